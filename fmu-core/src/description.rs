@@ -1,0 +1,249 @@
+//! The neutral description: what a binary tells of its model, from which XML, documentation and tools are made.
+
+use crate::model::{Block, Experiment, Model};
+use crate::probe;
+use crate::unit::{Exponents, Quantity};
+use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Slot, Variability};
+use crate::Fault;
+use serde::{Deserialize, Serialize};
+
+/// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
+pub const TIME: u32 = 0;
+
+/// All that an importer can know of a model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Description {
+    /// Name and model identifier.
+    pub name: String,
+    /// One sentence.
+    pub description: String,
+    /// Version of the model.
+    pub version: String,
+    /// Who wrote it.
+    pub author: String,
+    /// Licence, an SPDX expression.
+    pub license: String,
+    /// Copyright line.
+    pub copyright: String,
+    /// Instantiation token (GUID in FMI 2.0).
+    pub token: String,
+    /// Recommended experiment.
+    pub experiment: Experiment,
+    /// Body of the documentation page, an HTML fragment.
+    pub documentation: String,
+    /// The variables in the order of their value references, without `time`.
+    pub variables: Vec<Variable>,
+}
+
+/// A variable of the description.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Variable {
+    /// Full name.
+    pub name: String,
+    /// One sentence.
+    pub description: String,
+    /// Value reference; an array also owns the references of its further elements.
+    pub value_reference: u32,
+    /// Who sets it.
+    pub causality: Causality,
+    /// When it changes.
+    pub variability: Variability,
+    /// Base type, with the type definition that belongs to it.
+    pub kind: VariableKind,
+    /// Lower bound.
+    pub min: Option<f64>,
+    /// Upper bound.
+    pub max: Option<f64>,
+    /// What is allowed, in words, where there is a bound.
+    pub allowed: Option<String>,
+    /// Typical magnitude.
+    pub nominal: Option<f64>,
+    /// Number of elements, `None` for a scalar.
+    pub dimension: Option<usize>,
+    /// Start values (one, or one per element) of what the importer may set; `None` for what is calculated.
+    pub start: Option<Vec<Value>>,
+    /// Value references of all that the initial value depends on; `None` for what the importer sets.
+    pub initial_dependencies: Option<Vec<u32>>,
+}
+
+/// A base type with its type definition.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum VariableKind {
+    /// A real number.
+    Real {
+        /// Name of the type definition.
+        quantity: String,
+        /// Unit name, empty for a number without a unit.
+        unit: String,
+        /// SI base exponents of the unit.
+        exponents: Exponents,
+        /// Factor of the unit to SI.
+        factor: f64,
+        /// Display unit: name, factor and offset.
+        display: Option<(String, f64, f64)>,
+    },
+    /// A 32-bit integer.
+    Integer,
+    /// A truth value.
+    Boolean,
+    /// A named value.
+    Enumeration {
+        /// Name of the type definition.
+        name: String,
+        /// Description of the type.
+        description: String,
+        /// Value, name and description of each item.
+        items: Vec<(i32, String, String)>,
+    },
+}
+
+/// A start value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum Value {
+    /// Of a real variable.
+    Real(f64),
+    /// Of an integer or an enumeration.
+    Integer(i32),
+    /// Of a Boolean.
+    Boolean(bool),
+}
+
+impl Description {
+    /// Describes model `M`; start values come from its `Default`, dependencies from probing it.
+    ///
+    /// # Errors
+    /// Names what no compile-time check can see: a name that two parts share, a start value outside its range, a type
+    /// definition named like a variable.
+    pub fn of<M: Model>() -> Result<Self, Fault> {
+        let mut block = Block::<M>::default();
+        block.initialise();
+        let dependencies = probe::initial_dependencies::<M>();
+        let table = M::TABLE;
+        let mut variables: Vec<Variable> = Vec::new();
+        for index in 0..table.len() {
+            let Some((name, meta, element)) = table.locate(index) else { continue };
+            let Some((_, slot)) = table.entry(&mut block, index) else { continue };
+            let start = settable(meta.causality).then(|| value(&slot));
+            if let (Some(start), true) = (start, settable(meta.causality)) {
+                check_start(&name, meta, start)?;
+            }
+            if element > 0 {
+                if let (Some(Variable { start: Some(all), .. }), Some(start)) = (variables.last_mut(), start) {
+                    all.push(start);
+                }
+                continue;
+            }
+            if variables.iter().any(|other| other.name == name) {
+                return Err(Fault::new(format!("two variables of {} have the name {name}", M::INFO.name)));
+            }
+            let initial_dependencies = dependencies[index].as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
+            variables.push(variable(name, meta, reference(index), start, initial_dependencies));
+        }
+        check_types(&variables)?;
+        let info = M::INFO;
+        Ok(Self {
+            name: info.name.into(),
+            description: info.description.into(),
+            version: info.version.into(),
+            author: info.author.into(),
+            license: info.license.into(),
+            copyright: info.copyright.into(),
+            token: M::TOKEN.as_str().into(),
+            experiment: info.experiment,
+            documentation: info.documentation.into(),
+            variables,
+        })
+    }
+
+    /// The variable of this name.
+    pub fn variable(&self, name: &str) -> Option<&Variable> {
+        self.variables.iter().find(|v| v.name == name)
+    }
+}
+
+fn variable(
+    name: String,
+    meta: &Meta,
+    value_reference: u32,
+    start: Option<Value>,
+    initial_dependencies: Option<Vec<u32>>,
+) -> Variable {
+    let bounded = meta.range.min.is_finite() || meta.range.max.is_finite();
+    Variable {
+        name,
+        description: meta.description.into(),
+        value_reference,
+        causality: meta.causality,
+        variability: meta.variability,
+        kind: kind(&meta.kind),
+        min: meta.range.min.is_finite().then_some(meta.range.min),
+        max: meta.range.max.is_finite().then_some(meta.range.max),
+        allowed: bounded.then(|| meta.range.to_string()),
+        nominal: meta.nominal,
+        dimension: meta.dimension,
+        start: start.map(|x| vec![x]),
+        initial_dependencies,
+    }
+}
+
+/// Value reference of the table's variable `index`.
+fn reference(index: usize) -> u32 {
+    u32::try_from(index + 1).unwrap_or(u32::MAX)
+}
+
+/// Whether the importer sets variables of this causality.
+pub fn settable(causality: Causality) -> bool {
+    matches!(causality, Causality::Input | Causality::Parameter)
+}
+
+fn value(slot: &Slot<'_>) -> Value {
+    match slot {
+        Slot::Real(x) => Value::Real(**x),
+        Slot::Integer(x) => Value::Integer(**x),
+        Slot::Boolean(x) => Value::Boolean(**x),
+    }
+}
+
+fn kind(kind: &Kind) -> VariableKind {
+    match kind {
+        Kind::Real(Quantity { name, unit, display }) => VariableKind::Real {
+            quantity: (*name).into(),
+            unit: unit.name.into(),
+            exponents: unit.exponents,
+            factor: unit.factor,
+            display: display.map(|d| (d.name.into(), d.factor, d.offset)),
+        },
+        Kind::Integer => VariableKind::Integer,
+        Kind::Boolean => VariableKind::Boolean,
+        Kind::Enumeration(Enumeration { name, description, items }) => VariableKind::Enumeration {
+            name: (*name).into(),
+            description: (*description).into(),
+            items: items.iter().map(|i| (i.value, i.name.into(), i.description.into())).collect(),
+        },
+    }
+}
+
+/// The same judgement that a set gets.
+fn check_start(name: &str, meta: &Meta, start: Value) -> Result<(), Fault> {
+    let allowed = match (start, &meta.kind) {
+        (Value::Real(x), _) => meta.range.contains(x),
+        (Value::Integer(x), Kind::Enumeration(enumeration)) => enumeration.items.iter().any(|item| item.value == x),
+        (Value::Integer(x), _) => meta.range.contains(f64::from(x)),
+        (Value::Boolean(_), _) => true,
+    };
+    if allowed { Ok(()) } else { Err(Fault::value(name, format!("{start:?} at the start"), Range::to_string(&meta.range))) }
+}
+
+fn check_types(variables: &[Variable]) -> Result<(), Fault> {
+    for of in variables {
+        let (VariableKind::Real { quantity: name, .. } | VariableKind::Enumeration { name, .. }) = &of.kind else {
+            continue;
+        };
+        if variables.iter().any(|v| v.name == *name) {
+            return Err(Fault::new(format!("the type definition {name} has the name of a variable")));
+        }
+    }
+    Ok(())
+}

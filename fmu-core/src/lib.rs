@@ -1,0 +1,24 @@
+//! What a model is, for an exporter and for an author: the trait [`Model`], its variable [`Table`], quantities and units,
+//! time on an integer grid, and the neutral [`Description`].
+//!
+//! Layers, from below: [`unit`], [`variable`], [`table`], [`model`], [`description`]. No motor, no XML, no C, no `unsafe`.
+
+#![forbid(unsafe_code)]
+
+pub mod description;
+pub mod fault;
+pub mod model;
+mod probe;
+pub mod table;
+pub mod time;
+pub mod token;
+pub mod unit;
+pub mod variable;
+
+pub use description::Description;
+pub use fault::Fault;
+pub use model::{Block, Experiment, Info, Model};
+pub use table::{Part, Table};
+pub use time::{Elapsed, SampleGrid, Step};
+pub use token::{Hash, Token};
+pub use variable::{Causality, Enumeration, Item, Kind, Meta, Range, Row, Slot, Variability};

@@ -1,0 +1,120 @@
+//! The trait a model implements, and its life as an importer lives it.
+
+use crate::{Elapsed, Fault, Hash, Step, Table, Token};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+/// What a model tells of itself besides its variables.
+#[derive(Clone, Copy, Debug)]
+pub struct Info {
+    /// Name and model identifier: a C identifier.
+    pub name: &'static str,
+    /// One sentence.
+    pub description: &'static str,
+    /// Version of the model; a change of behaviour or of a start value changes it.
+    pub version: &'static str,
+    /// Who wrote it.
+    pub author: &'static str,
+    /// Licence, an SPDX expression.
+    pub license: &'static str,
+    /// Copyright line.
+    pub copyright: &'static str,
+    /// Recommended experiment.
+    pub experiment: Experiment,
+    /// Body of the documentation page: an HTML fragment (equations, how to connect); the variables are added to it.
+    pub documentation: &'static str,
+}
+
+/// The default experiment: times in s.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Experiment {
+    /// Start time.
+    pub start: f64,
+    /// Stop time.
+    pub stop: f64,
+    /// Recommended communication step size.
+    pub step: f64,
+}
+
+/// A model of one block in a block diagram, sampled or continuous.
+///
+/// The life of an instance:
+/// 1. `Default` makes it: inputs and parameters at their start values.
+/// 2. The importer sets parameters and inputs; each set is checked against its range in the table.
+/// 3. [`derive`](Model::derive), [`initialise`](Model::initialise) and [`output`](Model::output) run whenever the importer
+///    asks for a value after it has set one, so that initialisation can be iterated.
+/// 4. [`validate`](Model::validate) judges the parameters together; then the simulation starts.
+/// 5. [`advance`](Model::advance) and [`output`](Model::output) run in turn. An `advance` does not allocate, lock, read a
+///    clock or print, and never writes a parameter.
+/// 6. Saving is a clone, storing is serde; both at any time between calls.
+pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static {
+    /// The outputs, a plain struct of their own.
+    type Outputs: Default + Clone + Serialize + DeserializeOwned + Send + 'static;
+
+    /// What the model tells of itself.
+    const INFO: Info;
+
+    /// The variables: the one place where a name, a unit or a range is written.
+    const TABLE: &'static Table<Block<Self>>;
+
+    /// Layout of the serialised state; a change of a field changes it.
+    const STATE_VERSION: u16 = 1;
+
+    /// The instantiation token: a hash of name, version and table.
+    const TOKEN: Token = Self::HASH.guid();
+
+    /// What the token writes down.
+    const HASH: Hash = Hash::START.text(Self::INFO.name).text(Self::INFO.version).join(&Self::TABLE.hash());
+
+    /// Calculated parameters from the parameters; runs again when a tunable parameter was set.
+    fn derive(&mut self) {}
+
+    /// Rules across parameters, checked on leaving initialisation.
+    ///
+    /// # Errors
+    /// Says which parameters do not fit together, their values and why.
+    fn validate(&self) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    /// The state at the start time, from parameters and inputs.
+    fn initialise(&mut self);
+
+    /// Computes the outputs from parameters and state at time `now`, and changes nothing else.
+    fn output(&self, now: Elapsed, outputs: &mut Self::Outputs);
+
+    /// Advances the state by one step with the inputs held.
+    ///
+    /// # Errors
+    /// Says what made the step impossible, for example a state that left the finite numbers.
+    fn advance(&mut self, step: &Step) -> Result<(), Fault>;
+}
+
+/// A model and its outputs side by side: what the rows of its table see.
+#[derive(Clone, Default, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Block<M: Model> {
+    /// Inputs, parameters and state.
+    pub model: M,
+    /// Outputs at the last communication point.
+    pub out: M::Outputs,
+}
+
+impl<M: Model> Block<M> {
+    /// Calculated parameters, state and outputs at the start, from what is set so far.
+    pub fn initialise(&mut self) {
+        self.model.derive();
+        self.model.initialise();
+        self.model.output(Elapsed::ZERO, &mut self.out);
+    }
+
+    /// One step and the outputs at its end.
+    ///
+    /// # Errors
+    /// As [`Model::advance`].
+    #[inline]
+    pub fn step(&mut self, step: &Step) -> Result<(), Fault> {
+        self.model.advance(step)?;
+        self.model.output(step.end(), &mut self.out);
+        Ok(())
+    }
+}

@@ -1,0 +1,167 @@
+//! The variable table of a type, composed of variables and of other types' tables.
+//!
+//! A variable's index is its running offset: a scalar takes one, an array one per element, a part as many as its table.
+//! Everything that does not need a value is checked while compiling: names, ranges, the number of variables.
+
+use crate::token::Hash;
+use crate::variable::{Access, Meta, Row, Slot};
+
+/// Most variables a table can hold, its parts' included.
+pub const CAPACITY: usize = 512;
+
+/// The table of `P` seen through `W`, of which `P` is a part.
+pub struct Part<W: 'static, P: 'static> {
+    /// Table of the part.
+    pub table: &'static Table<P>,
+    /// Where the part is.
+    pub lens: fn(&mut W) -> &mut P,
+}
+
+/// What a table asks of a part without knowing its type.
+pub(crate) trait Node<W>: Sync {
+    fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
+    fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
+}
+
+impl<W, P> Node<W> for Part<W, P> {
+    fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)> {
+        self.table.entry((self.lens)(whole), index)
+    }
+
+    fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {
+        self.table.locate_into(index, name)
+    }
+}
+
+/// Where an index leads: a row, and the index inside it.
+#[derive(Clone, Copy)]
+struct Place {
+    row: u16,
+    inner: u16,
+}
+
+/// All variables of `W`.
+pub struct Table<W: 'static> {
+    rows: &'static [Row<W>],
+    places: [Place; CAPACITY],
+    len: usize,
+    hash: Hash,
+}
+
+impl<W: 'static> Table<W> {
+    /// Builds the table; a duplicate name or an empty range does not compile.
+    #[expect(clippy::cast_possible_truncation, reason = "CAPACITY fits in 16 bits, asserted below")]
+    pub const fn new(rows: &'static [Row<W>]) -> Self {
+        assert!(CAPACITY <= u16::MAX as usize);
+        let mut places = [Place { row: 0, inner: 0 }; CAPACITY];
+        let (mut len, mut row, mut hash) = (0, 0, Hash::START);
+        while row < rows.len() {
+            let meta = &rows[row].meta;
+            let count = match (&rows[row].access, meta.dimension) {
+                (Access::Part { len, hash: of_part, .. }, _) => {
+                    hash = hash.text(meta.name).join(of_part);
+                    *len
+                }
+                (_, dimension) => {
+                    check(meta);
+                    hash = hash.meta(meta);
+                    if let Some(n) = dimension { n } else { 1 }
+                }
+            };
+            let mut inner = 0;
+            while inner < count {
+                assert!(len < CAPACITY, "the table holds more variables than CAPACITY");
+                places[len] = Place { row: row as u16, inner: inner as u16 };
+                len += 1;
+                inner += 1;
+            }
+            check_unique(rows, row);
+            row += 1;
+        }
+        Self { rows, places, len, hash }
+    }
+
+    /// Number of indices: variables, array elements counted singly.
+    pub const fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no variable at all.
+    pub const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Hash of all that the rows say.
+    pub const fn hash(&self) -> Hash {
+        self.hash
+    }
+
+    /// What variable `index` is, and its value in `whole`; `None` past the end.
+    #[inline]
+    pub fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)> {
+        if index >= self.len {
+            return None;
+        }
+        let place = self.places[index];
+        let row = &self.rows[usize::from(place.row)];
+        let slot = match &row.access {
+            Access::Real(get) => Slot::Real(get(whole)),
+            Access::Reals(get) => Slot::Real(get(whole).get_mut(usize::from(place.inner))?),
+            Access::Integer(get) => Slot::Integer(get(whole)),
+            Access::Boolean(get) => Slot::Boolean(get(whole)),
+            Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
+        };
+        Some((&row.meta, slot))
+    }
+
+    /// Full name and description of variable `index`, and which element of an array it is (0 for a scalar).
+    pub fn locate(&self, index: usize) -> Option<(String, &'static Meta, usize)> {
+        let mut name = String::new();
+        let (meta, element) = self.locate_into(index, &mut name)?;
+        Some((name, meta, element))
+    }
+
+    fn locate_into(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {
+        if index >= self.len {
+            return None;
+        }
+        let place = self.places[index];
+        let row = &self.rows[usize::from(place.row)];
+        name.push_str(row.meta.name);
+        match &row.access {
+            Access::Part { node, .. } => node.locate(usize::from(place.inner), name),
+            _ => Some((&row.meta, usize::from(place.inner))),
+        }
+    }
+}
+
+const fn check(meta: &Meta) {
+    assert!(!meta.name.is_empty(), "a variable needs a name");
+    assert!(meta.range.min <= meta.range.max, "min is greater than max");
+}
+
+/// The name of row `last` differs from all before it.
+const fn check_unique<W>(rows: &[Row<W>], last: usize) {
+    let mut row = 0;
+    while row < last {
+        // A part without a prefix has no name of its own; its variables are checked by the description.
+        let same = !rows[row].meta.name.is_empty() && same_text(rows[row].meta.name, rows[last].meta.name);
+        assert!(!same, "two rows of a table have the same name");
+        row += 1;
+    }
+}
+
+const fn same_text(a: &str, b: &str) -> bool {
+    let (a, b) = (a.as_bytes(), b.as_bytes());
+    if a.len() != b.len() {
+        return false;
+    }
+    let mut i = 0;
+    while i < a.len() {
+        if a[i] != b[i] {
+            return false;
+        }
+        i += 1;
+    }
+    true
+}

@@ -1,0 +1,120 @@
+//! Time since the start: a sum of steps without rounding drift, and a sample grid counted in integers.
+//!
+//! An importer's communication points are rounded, often accumulated, and after 1e7 steps off by more than any sensible
+//! tolerance. The instance therefore adds up the step sizes itself, in two doubles (Knuth's two-sum, exact to about
+//! 1e-32 relative), and a sampled model compares that sum with `k T_s`, k an integer.
+
+use serde::{Deserialize, Serialize};
+
+/// Instants closer than this fraction of the sample period are the same instant.
+pub const SAME_INSTANT: f64 = 1e-6;
+
+/// Time since the start of the simulation in s, as an unevaluated sum of two doubles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Elapsed {
+    high: f64,
+    low: f64,
+}
+
+impl Elapsed {
+    /// The start.
+    pub const ZERO: Self = Self { high: 0.0, low: 0.0 };
+
+    /// This instant and `h` seconds.
+    pub fn plus(self, h: f64) -> Self {
+        let (high, error) = two_sum(self.high, h);
+        let (high, low) = two_sum(high, self.low + error);
+        Self { high, low }
+    }
+
+    /// Seconds since the start, rounded to one double.
+    pub fn seconds(self) -> f64 {
+        self.high + self.low
+    }
+
+    /// This instant minus `k` periods in s, rounded once.
+    pub fn minus_periods(self, k: u64, period: f64) -> f64 {
+        let k = count(k);
+        let product = k * period;
+        // |k * period - product| is recovered exactly by a fused multiply-add.
+        let error = f64::mul_add(k, period, -product);
+        (self.high - product) + (self.low - error)
+    }
+}
+
+/// `a + b` and its rounding error.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let b_in = sum - a;
+    let a_in = sum - b_in;
+    (sum, (a - a_in) + (b - b_in))
+}
+
+/// An integer count as a double, exact below 2^53 (2.8 million years at 100 Hz, 285 000 years at 1 kHz).
+#[expect(clippy::cast_precision_loss, reason = "a count of samples stays below 2^53")]
+fn count(k: u64) -> f64 {
+    k as f64
+}
+
+/// The interval of one communication step: its start and its length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Time since the start of the simulation at the beginning of the step.
+    pub start: Elapsed,
+    /// Step size in s, finite and positive.
+    pub h: f64,
+}
+
+impl Step {
+    /// Time since the start of the simulation at the end of the step.
+    pub fn end(&self) -> Elapsed {
+        self.start.plus(self.h)
+    }
+}
+
+/// The instants `k T_s` since the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleGrid {
+    /// Sample period in s, positive.
+    pub period: f64,
+}
+
+impl SampleGrid {
+    /// Whether instant `k` is at `now` or before it; instants closer than [`SAME_INSTANT`] periods are the same.
+    pub fn reached(&self, k: u64, now: Elapsed) -> bool {
+        now.minus_periods(k, self.period) >= -SAME_INSTANT * self.period
+    }
+
+    /// Whether instant `k` is before `now` and not the same instant.
+    pub fn passed(&self, k: u64, now: Elapsed) -> bool {
+        now.minus_periods(k, self.period) > SAME_INSTANT * self.period
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ten_million_steps_do_not_drift() {
+        let h = 1e-4 / 3.0;
+        let mut now = Elapsed::ZERO;
+        for _ in 0..10_000_000 {
+            now = now.plus(h);
+        }
+        // 1e7 steps of the double h, exactly: the product rounded once.
+        assert!((now.seconds() - 1e7 * h).abs() < 1e-13, "{}", now.seconds());
+        assert!(SampleGrid { period: 3.0 * h }.reached(3_333_333, now));
+        assert!(!SampleGrid { period: 3.0 * h }.reached(3_333_334, now));
+    }
+
+    #[test]
+    fn naive_sum_would_lose_the_grid() {
+        let mut t = 0.0;
+        for _ in 0..10_000_000 {
+            t += 1e-4;
+        }
+        let drift = t - 1000.0_f64;
+        assert!(drift.abs() > SAME_INSTANT * 1e-4, "the test shows why the sum is kept in two doubles: {drift}");
+    }
+}

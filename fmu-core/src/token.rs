@@ -1,0 +1,135 @@
+//! The instantiation token: a hash of the interface, computed while compiling.
+//!
+//! Binaries of one model built apart, for several platforms, have the same token; a changed name, unit, range or
+//! version changes it. 128 bits of FNV-1a, written as a GUID.
+
+use crate::unit::Quantity;
+use crate::variable::{Kind, Meta};
+
+/// A running FNV-1a hash of 128 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hash(u128);
+
+impl Hash {
+    /// The empty hash (FNV-1a offset basis).
+    pub const START: Self = Self(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
+    const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
+
+    /// Hash of this and `bytes`.
+    pub const fn bytes(self, bytes: &[u8]) -> Self {
+        let (mut hash, mut i) = (self.0, 0);
+        while i < bytes.len() {
+            hash = (hash ^ bytes[i] as u128).wrapping_mul(Self::PRIME);
+            i += 1;
+        }
+        Self(hash)
+    }
+
+    /// Hash of this and a text with its length.
+    pub const fn text(self, text: &str) -> Self {
+        self.bytes(text.as_bytes()).bytes(&text.len().to_le_bytes())
+    }
+
+    /// Hash of this and another hash.
+    pub const fn join(self, other: &Self) -> Self {
+        self.bytes(&other.0.to_le_bytes())
+    }
+
+    /// Hash of this and all that a table row says.
+    pub(crate) const fn meta(self, meta: &Meta) -> Self {
+        let range = &meta.range;
+        let dimension = match meta.dimension {
+            Some(n) => n,
+            None => 0,
+        };
+        let nominal = match meta.nominal {
+            Some(x) => x,
+            None => 0.0,
+        };
+        let hash = self
+            .text(meta.name)
+            .bytes(&[meta.causality as u8, meta.variability as u8, range.above as u8, range.below as u8])
+            .number(range.min)
+            .number(range.max)
+            .number(nominal)
+            .bytes(&dimension.to_le_bytes());
+        match meta.kind {
+            Kind::Real(quantity) => hash.quantity(quantity),
+            Kind::Integer => hash.text("integer"),
+            Kind::Boolean => hash.text("boolean"),
+            Kind::Enumeration(enumeration) => {
+                let (mut hash, mut i) = (hash.text(enumeration.name), 0);
+                while i < enumeration.items.len() {
+                    hash = hash.text(enumeration.items[i].name).bytes(&enumeration.items[i].value.to_le_bytes());
+                    i += 1;
+                }
+                hash
+            }
+        }
+    }
+
+    const fn quantity(self, quantity: &Quantity) -> Self {
+        let hash = self.text(quantity.name).text(quantity.unit.name);
+        match quantity.display {
+            Some(display) => hash.text(display.name),
+            None => hash,
+        }
+    }
+
+    const fn number(self, x: f64) -> Self {
+        self.bytes(&x.to_bits().to_le_bytes())
+    }
+
+    /// The hash as a GUID in braces, `{8-4-4-4-12}` hexadecimal digits.
+    pub const fn guid(self) -> Token {
+        const DIGITS: &[u8; 16] = b"0123456789abcdef";
+        let bytes = self.0.to_be_bytes();
+        let mut text = [b'-'; 38];
+        text[0] = b'{';
+        text[37] = b'}';
+        let (mut i, mut at) = (0, 1);
+        while i < 16 {
+            if i == 4 || i == 6 || i == 8 || i == 10 {
+                at += 1;
+            }
+            text[at] = DIGITS[(bytes[i] >> 4) as usize];
+            text[at + 1] = DIGITS[(bytes[i] & 15) as usize];
+            at += 2;
+            i += 1;
+        }
+        Token(text)
+    }
+
+    /// The 16 bytes of the hash.
+    pub const fn to_bytes(self) -> [u8; 16] {
+        self.0.to_be_bytes()
+    }
+}
+
+/// An instantiation token in ASCII.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Token([u8; 38]);
+
+impl Token {
+    /// The token as text.
+    pub fn as_str(&self) -> &str {
+        std::str::from_utf8(&self.0).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_fnv_vectors() {
+        assert_eq!(Hash::START.bytes(b"").0, Hash::START.0);
+        // FNV-1a 128 of "foobar", draft-eastlake-fnv.
+        assert_eq!(Hash::START.bytes(b"foobar").0, 0x343e_1662_793c_64bf_6f0d_3597_ba44_6f18);
+    }
+
+    #[test]
+    fn guid_has_its_form() {
+        assert_eq!(Hash(0x0123_4567_89ab_cdef_0123_4567_89ab_cdef).guid().as_str(), "{01234567-89ab-cdef-0123-456789abcdef}");
+    }
+}

@@ -1,0 +1,137 @@
+//! Quantities, units and display units: the constants that every variable table names.
+//!
+//! A [`Quantity`] is what a variable measures: it has a name (the type definition in the XML), a [`Unit`] with its SI
+//! base exponents, and at most one display unit that importers show by default. Each exists once, here or, for an
+//! author's own quantity, beside the author's model.
+
+use serde::{Deserialize, Serialize};
+
+/// Exponents of the SI base units (FMI 3.0.2, 2.4.3 `BaseUnit`); the radian counts as one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Exponents {
+    /// Kilogram.
+    pub kg: i8,
+    /// Metre.
+    pub m: i8,
+    /// Second.
+    pub s: i8,
+    /// Ampere.
+    #[serde(rename = "A")]
+    pub ampere: i8,
+    /// Kelvin.
+    #[serde(rename = "K")]
+    pub kelvin: i8,
+    /// Mole.
+    pub mol: i8,
+    /// Candela.
+    pub cd: i8,
+    /// Radian.
+    pub rad: i8,
+}
+
+impl Exponents {
+    /// Dimensionless.
+    pub const NONE: Self = Self { kg: 0, m: 0, s: 0, ampere: 0, kelvin: 0, mol: 0, cd: 0, rad: 0 };
+
+    /// Exponents of kilogram, metre, second and ampere.
+    pub const fn mechanical(kg: i8, m: i8, s: i8, ampere: i8) -> Self {
+        Self { kg, m, s, ampere, ..Self::NONE }
+    }
+
+    /// The same with an exponent of the radian.
+    pub const fn with_rad(self, rad: i8) -> Self {
+        Self { rad, ..self }
+    }
+}
+
+/// A unit an importer shows instead: `shown = factor * value + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DisplayUnit {
+    /// Name, for example `rpm`.
+    pub name: &'static str,
+    /// Factor from the unit to the display unit.
+    pub factor: f64,
+    /// Offset in the display unit.
+    pub offset: f64,
+}
+
+/// A unit: `base value = factor * value` in the SI base units of `exponents`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    /// Name, for example `N.m`; empty for a number without a unit.
+    pub name: &'static str,
+    /// SI base exponents.
+    pub exponents: Exponents,
+    /// Factor to the coherent SI unit (1 for every SI unit).
+    pub factor: f64,
+}
+
+impl Unit {
+    /// A coherent SI unit.
+    pub const fn si(name: &'static str, exponents: Exponents) -> Self {
+        Self { name, exponents, factor: 1.0 }
+    }
+}
+
+/// What a variable measures: the type definition that it refers to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quantity {
+    /// Name of the type definition, for example `Voltage`; no variable may bear it.
+    pub name: &'static str,
+    /// Unit of the value.
+    pub unit: Unit,
+    /// Unit an importer shows by default, where that is another one.
+    pub display: Option<DisplayUnit>,
+}
+
+impl Quantity {
+    /// A quantity shown in its own unit.
+    pub const fn new(name: &'static str, unit: Unit) -> Self {
+        Self { name, unit, display: None }
+    }
+
+    /// The same, shown in another unit.
+    pub const fn shown_in(self, display: DisplayUnit) -> Self {
+        Self { display: Some(display), ..self }
+    }
+}
+
+const RAD_PER_S_UNIT: Unit = Unit::si("rad/s", Exponents::mechanical(0, 0, -1, 0).with_rad(1));
+
+/// Degrees.
+pub const DEGREE: DisplayUnit = DisplayUnit { name: "deg", factor: 180.0 / std::f64::consts::PI, offset: 0.0 };
+/// Revolutions per minute.
+pub const RPM: DisplayUnit = DisplayUnit { name: "rpm", factor: 30.0 / std::f64::consts::PI, offset: 0.0 };
+
+/// A number without a unit.
+pub const ONE: Quantity = Quantity::new("Number", Unit::si("", Exponents::NONE));
+/// Voltage in V.
+pub const VOLT: Quantity = Quantity::new("Voltage", Unit::si("V", Exponents::mechanical(1, 2, -3, -1)));
+/// Current in A.
+pub const AMPERE: Quantity = Quantity::new("Current", Unit::si("A", Exponents::mechanical(0, 0, 0, 1)));
+/// Resistance in Ohm.
+pub const OHM: Quantity = Quantity::new("Resistance", Unit::si("Ohm", Exponents::mechanical(1, 2, -3, -2)));
+/// Inductance in H.
+pub const HENRY: Quantity = Quantity::new("Inductance", Unit::si("H", Exponents::mechanical(1, 2, -2, -2)));
+/// Flux linkage in Wb.
+pub const WEBER: Quantity = Quantity::new("FluxLinkage", Unit::si("Wb", Exponents::mechanical(1, 2, -2, -1)));
+/// Torque in N.m.
+pub const NEWTON_METRE: Quantity = Quantity::new("Torque", Unit::si("N.m", Exponents::mechanical(1, 2, -2, 0)));
+/// Power in W.
+pub const WATT: Quantity = Quantity::new("Power", Unit::si("W", Exponents::mechanical(1, 2, -3, 0)));
+/// Moment of inertia in kg.m2.
+pub const KG_M2: Quantity = Quantity::new("Inertia", Unit::si("kg.m2", Exponents::mechanical(1, 2, 0, 0)));
+/// Viscous friction in N.m.s/rad.
+pub const NM_S_PER_RAD: Quantity =
+    Quantity::new("ViscousFriction", Unit::si("N.m.s/rad", Exponents::mechanical(1, 2, -1, 0).with_rad(-1)));
+/// Angle in rad, shown in degrees.
+pub const RADIAN: Quantity =
+    Quantity::new("Angle", Unit::si("rad", Exponents::NONE.with_rad(1))).shown_in(DEGREE);
+/// Speed of rotation in rad/s, shown in rpm.
+pub const SPEED: Quantity = Quantity::new("Speed", RAD_PER_S_UNIT).shown_in(RPM);
+/// Angular frequency in rad/s: bandwidths and poles, shown as they are.
+pub const RAD_PER_S: Quantity = Quantity::new("AngularFrequency", RAD_PER_S_UNIT);
+/// Rate in 1/s.
+pub const PER_SECOND: Quantity = Quantity::new("Rate", Unit::si("1/s", Exponents::mechanical(0, 0, -1, 0)));
+/// Time in s.
+pub const SECOND: Quantity = Quantity::new("Time", Unit::si("s", Exponents::mechanical(0, 0, 1, 0)));

@@ -1,0 +1,111 @@
+//! A small model with every kind of variable, a part and an array: what a table makes of it.
+#![allow(missing_docs, clippy::float_cmp)]
+
+use fmu_core::unit::{AMPERE, OHM, SPEED, VOLT};
+use fmu_core::variable::Enumeration;
+use fmu_core::*;
+use serde::{Deserialize, Serialize};
+
+#[derive(Clone, Serialize, Deserialize)]
+struct Load {
+    r: f64,
+    map: [f64; 3],
+    mode: i32,
+}
+
+static MODE: Enumeration = Enumeration {
+    name: "Mode",
+    description: "How the load behaves",
+    items: &[Item { value: 1, name: "Plain", description: "" }, Item { value: 3, name: "Odd", description: "" }],
+};
+
+type P = Row<Load>;
+const LOAD: &Table<Load> = &Table::new(const { &[
+    P::parameter("R", &OHM, "Resistance", |m| &mut m.r).above(0.0),
+    P::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.map),
+    P::enumeration_parameter("mode", &MODE, "Mode", |m| &mut m.mode),
+] });
+
+#[derive(Clone, Serialize, Deserialize)]
+struct Small {
+    u: f64,
+    load: Load,
+    on: bool,
+    n: i32,
+    gain: f64,
+    i: f64,
+}
+
+impl Default for Small {
+    fn default() -> Self {
+        Self { u: 2.0, load: Load { r: 4.0, map: [0.0, 1.0, 2.0], mode: 1 }, on: true, n: 1, gain: 0.0, i: 0.0 }
+    }
+}
+
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct SmallOutputs {
+    i: f64,
+}
+
+type V = Row<Block<Small>>;
+
+impl Model for Small {
+    type Outputs = SmallOutputs;
+    const INFO: Info = Info {
+        name: "Small",
+        description: "A test",
+        version: "1",
+        author: "",
+        license: "MIT",
+        copyright: "",
+        experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
+        documentation: "",
+    };
+    const TABLE: &'static Table<Block<Self>> = &Table::new(const { &[
+        V::input("u", &VOLT, "Voltage", |m| &mut m.model.u),
+        V::output("i", &AMPERE, "Current", |m| &mut m.out.i),
+        V::part("load.", &Part { table: LOAD, lens: |m| &mut m.model.load }),
+        V::boolean_parameter("on", "On", |m| &mut m.model.on),
+        V::integer_parameter("n", "Count", |m| &mut m.model.n).at_least(1.0),
+        V::calculated("gain", &OHM, "Gain", |m| &mut m.model.gain),
+    ] });
+    fn derive(&mut self) {
+        self.gain = 2.0 * self.load.r;
+    }
+    fn initialise(&mut self) {
+        self.i = if self.on { self.u / self.load.r * f64::from(self.n) } else { 0.0 };
+    }
+    fn output(&self, _: Elapsed, out: &mut SmallOutputs) {
+        out.i = self.i + self.load.map[1];
+    }
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        self.i += step.h;
+        Ok(())
+    }
+}
+
+#[test]
+fn indices_are_offsets_and_parts_are_seen_through() {
+    let mut block = Block::<Small>::default();
+    assert_eq!(Small::TABLE.len(), 10);
+    let (name, meta, element) = Small::TABLE.locate(4).unwrap();
+    assert_eq!((name.as_str(), meta.dimension, element), ("load.map", Some(3), 1));
+    let Some((_, Slot::Real(x))) = Small::TABLE.entry(&mut block, 5) else { panic!("an element") };
+    *x = 7.0;
+    assert_eq!(block.model.load.map, [0.0, 1.0, 7.0]);
+    assert!(Small::TABLE.entry(&mut block, 10).is_none() && Small::TABLE.locate(10).is_none());
+}
+
+#[test]
+fn description_says_what_depends_on_what() {
+    let d = Description::of::<Small>().unwrap();
+    let names: Vec<_> = d.variables.iter().map(|v| (v.name.as_str(), v.value_reference)).collect();
+    let expected = [("u", 1), ("i", 2), ("load.R", 3), ("load.map", 4), ("load.mode", 7), ("on", 8), ("n", 9), ("gain", 10)];
+    assert_eq!(names, expected);
+    // i depends on u, R, the middle of the map, on and n; the gain on R alone.
+    assert_eq!(d.variable("i").unwrap().initial_dependencies, Some(vec![1, 3, 5, 8, 9]));
+    assert_eq!(d.variable("gain").unwrap().initial_dependencies, Some(vec![3]));
+    assert_eq!(d.variable("load.map").unwrap().start.as_ref().unwrap().len(), 3);
+    assert_eq!(d.variable("i").unwrap().start, None);
+    assert_eq!(d.token, Small::TOKEN.as_str());
+}

@@ -1,0 +1,1 @@
+//! modelDescription.xml, written and read.

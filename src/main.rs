@@ -1,0 +1,2 @@
+//! The command `fmu`.
+fn main() {}
