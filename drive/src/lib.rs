@@ -1,1 +1,27 @@
-//! Drives.
+//! Permanent-magnet synchronous machine drives: the plant, its control, its estimators, and the models made of them.
+//!
+//! Conventions, everywhere: SI units; motor sign (currents flow into the machine, torque positive with positive speed);
+//! space vectors are peak-valued (amplitude-invariant Clarke transform), so torque and power carry a factor 3/2; angles
+//! are electrical unless the name says mechanical; the d axis is the magnet's axis; `theta_tilde = theta_hat - theta`.
+//! A value with `_hat` belongs to an estimator; the controller never sees the plant's parameters.
+//!
+//! Papers: Rasmussen, *Sensorless speed control including zero speed of non salient PM synchronous drives*, Bull. Polish
+//! Acad. Sci. Tech. Sci. 54 (3), 2006, quoted as "Rasmussen (n)"; Kim & Sul, *Sensorless control of AC motor - where are
+//! we now?*, ICEMS 2011, quoted as "Kim & Sul (n)".
+
+#![forbid(unsafe_code)]
+// The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
+#![allow(non_snake_case)]
+
+pub mod control;
+pub mod estimator;
+pub mod frame;
+pub mod integrate;
+pub mod math;
+pub mod motor;
+pub mod pair;
+pub mod plant;
+
+pub use control::model::SensorlessController;
+pub use pair::Pair;
+pub use plant::model::PmsmPlant;

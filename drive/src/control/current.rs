@@ -1,0 +1,144 @@
+//! The current loop: PI in the estimated rotor frame, decoupled, limited to the hexagon, with back-calculation.
+//!
+//! u_d = K_p e_d + I_d - w^ L_q i_q, u_q = K_p e_q + I_q + w^ (L_d i_d + psi_M), one PI per axis with K_p = w_c L and
+//! K_i = w_c R^; or, with active resistance, K_i = w_c^2 L and -(w_c L - R^) i besides. What the hexagon cuts off drives
+//! the integrators back: I += T_s K_i (e + (u_limited - u) / K_p).
+
+use crate::frame::DqHat;
+use crate::motor::Motor;
+use fmu_core::unit::RAD_PER_S;
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the current loop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CurrentLoop {
+    /// Bandwidth w_c in rad/s, > 0.
+    pub bandwidth: f64,
+    /// Integral gain w_c^2 L and active resistance w_c L - R instead of K_i = w_c R.
+    pub active_resistance: bool,
+}
+
+impl Default for CurrentLoop {
+    fn default() -> Self {
+        Self { bandwidth: 2.0 * std::f64::consts::PI * 250.0, active_resistance: false }
+    }
+}
+
+/// Gains of one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct AxisGains {
+    k_p: f64,
+    k_i: f64,
+    active_resistance: f64,
+}
+
+impl AxisGains {
+    fn new(par: &CurrentLoop, L: f64, R: f64) -> Self {
+        let w_c = par.bandwidth;
+        if par.active_resistance {
+            Self { k_p: w_c * L, k_i: w_c * w_c * L, active_resistance: w_c * L - R }
+        } else {
+            Self { k_p: w_c * L, k_i: w_c * R, active_resistance: 0.0 }
+        }
+    }
+}
+
+/// Gains of both axes, from bandwidth and machine estimates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CurrentGains {
+    d: AxisGains,
+    q: AxisGains,
+}
+
+impl CurrentGains {
+    /// Gains for the machine estimates `motor`.
+    pub fn new(par: &CurrentLoop, motor: &Motor) -> Self {
+        Self { d: AxisGains::new(par, motor.L_d, motor.R_s), q: AxisGains::new(par, motor.L_q, motor.R_s) }
+    }
+}
+
+/// State: the integral part in V.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CurrentController {
+    integral: DqHat,
+}
+
+impl CurrentController {
+    /// Voltage command (V) for the current error at the electrical speed `w` (rad/s), before the limit.
+    #[inline]
+    pub fn command(&self, gains: &CurrentGains, motor: &Motor, i_ref: DqHat, i: DqHat, w: f64) -> DqHat {
+        let error = i_ref - i;
+        DqHat::new(
+            gains.d.k_p * error.d() + self.integral.d() - gains.d.active_resistance * i.d() - w * motor.L_q * i.q(),
+            gains.q.k_p * error.q() + self.integral.q() - gains.q.active_resistance * i.q()
+                + w * (motor.L_d * i.d() + motor.psi_M),
+        )
+    }
+
+    /// Integrates one sample of `T_s` (s); `cut` (V) is the limited command minus the wanted one.
+    #[inline]
+    pub fn integrate(&mut self, gains: &CurrentGains, error: DqHat, cut: DqHat, T_s: f64) {
+        let CurrentGains { d, q } = gains;
+        self.integral +=
+            DqHat::new(T_s * d.k_i * (error.d() + cut.d() / d.k_p), T_s * q.k_i * (error.q() + cut.q() / q.k_p));
+    }
+}
+
+type P = Row<CurrentLoop>;
+
+/// The current loop's variables; their owner gives the prefix `current.`.
+pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
+    const {
+        &[
+            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the current loop", |p| &mut p.bandwidth).above(0.0),
+            P::boolean_parameter(
+                "active_resistance",
+                "false: Kp = wc L, Ki = wc R; true: Ki = wc^2 L with active resistance wc L - R",
+                |p| &mut p.active_resistance,
+            ),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Time constant of the closed loop on an R-L circuit, sampled fast so that the delay does not count.
+    fn time_constant(active_resistance: bool) -> f64 {
+        let motor = Motor::default();
+        let gains = CurrentGains::new(&CurrentLoop { active_resistance, ..CurrentLoop::default() }, &motor);
+        let (mut controller, mut i, h) = (CurrentController::default(), 0.0, 1e-7);
+        for k in 0..100_000_u32 {
+            let (i_ref, measured) = (DqHat::new(0.0, 1.0), DqHat::new(0.0, i));
+            let u = controller.command(&gains, &motor, i_ref, measured, 0.0).q();
+            controller.integrate(&gains, i_ref - measured, DqHat::ZERO, h);
+            i += h * (u - motor.R_s * i) / motor.L_q;
+            if i > 1.0 - (-1.0_f64).exp() {
+                return f64::from(k) * h;
+            }
+        }
+        f64::NAN
+    }
+
+    #[test]
+    fn the_closed_loop_is_first_order_with_the_bandwidth() {
+        let expected = 1.0 / CurrentLoop::default().bandwidth;
+        assert!((time_constant(false) / expected - 1.0).abs() < 1e-3);
+        assert!((time_constant(true) / expected - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn back_calculation_settles_where_the_command_is_the_limit() {
+        let (motor, mut c) = (Motor::default(), CurrentController::default());
+        let gains = CurrentGains::new(&CurrentLoop::default(), &motor);
+        let (i_ref, i, limit) = (DqHat::new(0.0, 5.0), DqHat::ZERO, 20.0);
+        for _ in 0..100_000 {
+            let wanted = c.command(&gains, &motor, i_ref, i, 0.0).q();
+            c.integrate(&gains, i_ref - i, DqHat::new(0.0, limit - wanted), 1e-4);
+        }
+        // cut = -K_p e: the integral part stays bounded at the limit instead of growing with K_i e t.
+        assert!((c.integral.q() - limit).abs() < 1e-6, "{:?}", c.integral);
+    }
+}

@@ -1,0 +1,7 @@
+//! The control: current and speed loops, the low-speed law, and the model `SensorlessController` made of them.
+
+pub mod current;
+pub mod model;
+pub mod speed;
+pub mod tables;
+pub mod zero_speed;

@@ -1,0 +1,262 @@
+//! The model `SensorlessController`: one digital controller on its own sample grid.
+
+use crate::control::current::{CurrentController, CurrentGains};
+use crate::control::speed::{SpeedController, SpeedGains};
+use crate::control::tables::{ControllerParameters, PARAMETERS};
+use crate::estimator::rasmussen::Rasmussen;
+use crate::estimator::{Estimate, Sample};
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
+use crate::math::wrap;
+use crate::plant::inverter::limit_to_hexagon;
+use fmu_core::unit::{AMPERE, RADIAN, SPEED, VOLT};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table};
+use serde::{Deserialize, Serialize};
+
+/// Inputs, read at the sample instants.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ControllerInputs {
+    /// Measured stator currents in A.
+    pub i: Phases,
+    /// Measured DC-link voltage in V, >= 0.
+    pub u_dc: f64,
+    /// Mechanical speed reference in rad/s.
+    pub speed_ref: f64,
+    /// Electrical angle of a sensor in rad.
+    pub theta_meas: f64,
+    /// Mechanical speed of a sensor in rad/s.
+    pub speed_meas: f64,
+}
+
+impl Default for ControllerInputs {
+    fn default() -> Self {
+        Self { i: Phases::default(), u_dc: 325.0, speed_ref: 0.0, theta_meas: 0.0, speed_meas: 0.0 }
+    }
+}
+
+/// Outputs: what sample k computed, shown from t_k + T_s on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ControllerOutputs {
+    /// Stator voltage references in V, inside the hexagon of u_dc.
+    pub u: Phases,
+    /// Estimated mechanical speed in rad/s.
+    pub speed_est: f64,
+    /// Estimated electrical angle in rad, in (-pi, pi], for the instant t_k + T_s.
+    pub theta_est: f64,
+    /// Stator current in the estimated rotor frame in A.
+    pub i: DqParts,
+    /// Its reference in A.
+    pub i_ref: DqParts,
+}
+
+/// The two components of a vector, as variables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DqParts {
+    /// Along the estimated magnet axis.
+    pub d: f64,
+    /// Across it.
+    pub q: f64,
+}
+
+impl From<DqHat> for DqParts {
+    fn from(v: DqHat) -> Self {
+        Self { d: v.d(), q: v.q() }
+    }
+}
+
+/// Gains computed from the parameters.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Gains {
+    current: CurrentGains,
+    speed: SpeedGains,
+}
+
+/// What a sample hands on to the next.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct State {
+    /// Number of samples taken: the next one is at `samples` T_s.
+    #[serde(with = "postcard_fixed")]
+    samples: u64,
+    estimator: Rasmussen,
+    speed: SpeedController,
+    current: CurrentController,
+    /// Commands of the last sample and of the one before it, in V.
+    commands: [AlphaBeta; 2],
+    /// Outputs of the last sample, not shown before the next instant.
+    computed: ControllerOutputs,
+    /// Outputs shown now.
+    shown: ControllerOutputs,
+}
+
+/// A count in eight bytes whatever its value, so that every stored state has the same size.
+mod postcard_fixed {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(count: &u64, to: S) -> Result<S::Ok, S::Error> {
+        count.to_le_bytes().serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
+        <[u8; 8]>::deserialize(from).map(u64::from_le_bytes)
+    }
+}
+
+/// Sensorless speed control of a permanent-magnet synchronous machine (Rasmussen, Fig. 2).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SensorlessController {
+    /// Inputs.
+    pub inputs: ControllerInputs,
+    /// Parameters.
+    pub parameters: ControllerParameters,
+    gains: Gains,
+    state: State,
+}
+
+impl SensorlessController {
+    /// One sample of the controller: currents in, voltage references out.
+    fn sample(&mut self) -> ControllerOutputs {
+        let Self { inputs, parameters: par, gains, state } = self;
+        let (motor, T_s) = (&par.motor, par.T_s);
+        let i = inputs.i.to_stator();
+        // The command that acted since the last sample: with a delay of one it is not the newest.
+        let u = state.commands[usize::from(par.delay != 0)];
+        let Estimate { theta, w } = if state.samples == 0 {
+            state.estimator = Rasmussen::start(motor, par.theta_est, i);
+            state.estimator.estimate()
+        } else {
+            state.estimator.update(&par.observer, motor, &Sample { i, u }, T_s)
+        };
+        let speed = w / f64::from(motor.n_p);
+
+        let i_hat = Axis::<Estimated>::at(theta).from_stator(i);
+        let i_d_ref = par.zero_speed.i_d_ref(speed);
+        let limit = par.limit.i_q_beside(i_d_ref);
+        let i_q_ref = state.speed.update(&gains.speed, inputs.speed_ref, speed, limit, T_s);
+        let i_ref = DqHat::new(i_d_ref, i_q_ref);
+
+        let wanted = state.current.command(&gains.current, motor, i_ref, i_hat, w);
+        // The command acts from `delay` to `delay + 1` samples from now: turned to the middle of that interval.
+        let acting = Axis::<Estimated>::at(theta + (f64::from(par.delay) + 0.5) * T_s * w);
+        let command = limit_to_hexagon(Phases::from_stator(acting.to_stator(wanted)), inputs.u_dc);
+        state.current.integrate(&gains.current, i_ref - i_hat, acting.from_stator(command) - wanted, T_s);
+        state.commands = [command, state.commands[0]];
+
+        ControllerOutputs {
+            u: Phases::from_stator(command),
+            speed_est: speed,
+            theta_est: wrap(theta + T_s * w),
+            i: i_hat.into(),
+            i_ref: i_ref.into(),
+        }
+    }
+}
+
+impl Model for SensorlessController {
+    type Outputs = ControllerOutputs;
+
+    const INFO: Info = Info {
+        name: "SensorlessController",
+        description: "Sensorless speed control of a permanent-magnet synchronous machine, zero speed included",
+        version: env!("CARGO_PKG_VERSION"),
+        author: "The sensorless-drive developers",
+        license: "MIT OR Apache-2.0",
+        copyright: "Copyright (c) 2026 The sensorless-drive developers",
+        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+        documentation: include_str!("../../docs/sensorless_controller.html"),
+    };
+
+    const TABLE: &'static Table<Block<Self>> = TABLE;
+
+    fn derive(&mut self) {
+        let ControllerParameters { current, speed_loop, motor, J, .. } = &self.parameters;
+        self.gains = Gains {
+            current: CurrentGains::new(current, motor),
+            speed: SpeedGains::new(speed_loop, *J, motor.torque_constant()),
+        };
+    }
+
+    fn validate(&self) -> Result<(), Fault> {
+        let ControllerParameters { limit, zero_speed, .. } = &self.parameters;
+        if zero_speed.i_0 > limit.i {
+            let allowed = format!("at most limit.i = {} A", limit.i);
+            return Err(Fault::value("zero_speed.i_0", format!("{} A", zero_speed.i_0), allowed));
+        }
+        Ok(())
+    }
+
+    fn initialise(&mut self) {
+        let shown = ControllerOutputs { theta_est: wrap(self.parameters.theta_est), ..ControllerOutputs::default() };
+        self.state = State { computed: shown.clone(), shown, ..State::default() };
+    }
+
+    fn output(&self, _now: Elapsed, out: &mut ControllerOutputs) {
+        out.clone_from(&self.state.shown);
+    }
+
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        let grid = SampleGrid { period: self.parameters.T_s };
+        let end = step.end();
+        while grid.passed(self.state.samples, end) {
+            self.state.shown = self.state.computed.clone();
+            self.state.computed = self.sample();
+            self.state.samples += 1;
+        }
+        if grid.reached(self.state.samples, end) {
+            self.state.shown = self.state.computed.clone();
+        }
+        let ControllerOutputs { u, speed_est, .. } = &self.state.computed;
+        if speed_est.is_finite() && (u.a + u.b + u.c).is_finite() {
+            Ok(())
+        } else {
+            let sample = self.state.samples - 1;
+            Err(Fault::new(format!("the controller's state left the finite numbers at sample {sample}")))
+        }
+    }
+}
+
+type V = Row<Block<SensorlessController>>;
+
+const TABLE: &Table<Block<SensorlessController>> = &Table::new(
+    const {
+        &[
+            V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
+            V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
+            V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
+            V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+            V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
+            V::input(
+                "theta_meas",
+                &RADIAN,
+                "Electrical rotor angle of a sensor, read by the sensored estimator",
+                |m| &mut m.model.inputs.theta_meas,
+            ),
+            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor, read by the sensored estimator", |m| {
+                &mut m.model.inputs.speed_meas
+            }),
+            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+        ]
+    },
+);
+
+type O = Row<ControllerOutputs>;
+
+/// The controller's outputs.
+pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
+    const {
+        &[
+            O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| {
+                &mut o.u.a
+            }),
+            O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
+            O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
+            O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
+            O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
+                &mut o.theta_est
+            }),
+            O::discrete_output("i_d", &AMPERE, "Stator current along the estimated magnet axis", |o| &mut o.i.d),
+            O::discrete_output("i_q", &AMPERE, "Stator current across the estimated magnet axis", |o| &mut o.i.q),
+            O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d", |o| &mut o.i_ref.d),
+            O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q", |o| &mut o.i_ref.q),
+        ]
+    },
+);

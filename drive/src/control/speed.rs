@@ -1,0 +1,100 @@
+//! The speed loop: PI with set-point weight, limited, its integrator held while the limit is hit.
+//!
+//! i_q,ref = K_p (b w_ref - w) + I, K_p = J w_s / K, dI/dt = (K_p w_s / t_is)(w_ref - w), with K = 1.5 n_p psi_M and all
+//! speeds mechanical. The integrator holds while i_q is at its limit and the error drives it further in.
+
+use fmu_core::unit::{ONE, RAD_PER_S};
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the speed loop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SpeedLoop {
+    /// Bandwidth w_s in rad/s, > 0.
+    pub bandwidth: f64,
+    /// Integral time in units of 1/w_s, > 0.
+    pub t_is: f64,
+    /// Weight of the set point on the proportional part, 0..1.
+    pub b: f64,
+}
+
+impl Default for SpeedLoop {
+    fn default() -> Self {
+        Self { bandwidth: 80.0, t_is: 4.0, b: 0.5 }
+    }
+}
+
+/// Gains, from bandwidth, inertia and torque constant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SpeedGains {
+    k_p: f64,
+    k_i: f64,
+    b: f64,
+}
+
+impl SpeedGains {
+    /// Gains for inertia `J` (kg.m2) and torque constant `k` (N.m/A); K_p in A.s/rad.
+    pub fn new(par: &SpeedLoop, J: f64, k: f64) -> Self {
+        let k_p = J * par.bandwidth / k;
+        Self { k_p, k_i: k_p * par.bandwidth / par.t_is, b: par.b }
+    }
+}
+
+/// State: the integral part in A.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SpeedController {
+    integral: f64,
+}
+
+impl SpeedController {
+    /// Reference of i_q in A at the speed reference `w_ref` and the speed `w` (rad/s), within +-`limit` (A); one sample
+    /// of `T_s` (s).
+    #[inline]
+    pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limit: f64, T_s: f64) -> f64 {
+        let error = w_ref - w;
+        let wanted = gains.k_p * (gains.b * w_ref - w) + self.integral;
+        let i_q_ref = wanted.clamp(-limit, limit);
+        let further_in = (wanted > limit && error > 0.0) || (wanted < -limit && error < 0.0);
+        if !further_in {
+            self.integral += T_s * gains.k_i * error;
+        }
+        i_q_ref
+    }
+}
+
+type P = Row<SpeedLoop>;
+
+/// The speed loop's variables; their owner gives the prefix `speed_loop.`.
+pub const SPEED_LOOP: &Table<SpeedLoop> = &Table::new(
+    const {
+        &[
+            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the speed loop", |p| &mut p.bandwidth).above(0.0),
+            P::parameter("t_is", &ONE, "Integral time in units of 1/bandwidth", |p| &mut p.t_is).above(0.0),
+            P::parameter("b", &ONE, "Weight of the set point on the proportional part", |p| &mut p.b)
+                .at_least(0.0)
+                .at_most(1.0),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gains_follow_the_bandwidth() {
+        let gains = SpeedGains::new(&SpeedLoop::default(), 1.5e-3, 0.675);
+        assert!((gains.k_p - 1.5e-3 * 80.0 / 0.675).abs() < 1e-15);
+        assert!((gains.k_i - gains.k_p * 20.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_integrator_holds_at_the_limit_only_when_driven_in() {
+        let gains = SpeedGains::new(&SpeedLoop::default(), 1.5e-3, 0.675);
+        let mut held = SpeedController { integral: 7.0 };
+        assert!((held.update(&gains, 10.0, 0.0, 6.0, 1e-4) - 6.0).abs() < 1e-15);
+        assert!((held.integral - 7.0).abs() < 1e-15, "the error drives it in: held");
+        held.update(&gains, -1.0, 0.0, 6.0, 1e-4);
+        assert!(held.integral < 7.0, "the error drives it out: it moves");
+    }
+}

@@ -1,0 +1,113 @@
+//! The controller's parameters and their table.
+
+use crate::control::current::{CURRENT_LOOP, CurrentLoop};
+use crate::control::speed::{SPEED_LOOP, SpeedLoop};
+use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
+use crate::estimator::ESTIMATORS;
+use crate::estimator::rasmussen::{OBSERVER, RasmussenParameters};
+use crate::motor::{MOTOR, Motor};
+use fmu_core::unit::{AMPERE, KG_M2, RADIAN, SECOND};
+use fmu_core::{Part, Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Limits of the current references.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Limits {
+    /// Greatest |i_q| in A, > 0.
+    pub i_q: f64,
+    /// Greatest magnitude of the current in A, > 0.
+    pub i: f64,
+}
+
+impl Limits {
+    /// Greatest |i_q| in A beside `i_d` (A), which has priority.
+    #[inline]
+    pub fn i_q_beside(&self, i_d: f64) -> f64 {
+        self.i_q.min((self.i * self.i - i_d * i_d).max(0.0).sqrt())
+    }
+}
+
+/// Everything a commissioning engineer sets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ControllerParameters {
+    /// Sample period in s, > 0.
+    pub T_s: f64,
+    /// Samples from taking the currents to the voltage acting: 1 (Jacobi exchange) or 0.
+    pub delay: i32,
+    /// Value of the estimator in [`ESTIMATORS`].
+    pub estimator: i32,
+    /// Estimates of the machine.
+    pub motor: Motor,
+    /// The Rasmussen observer.
+    pub observer: RasmussenParameters,
+    /// The current loop.
+    pub current: CurrentLoop,
+    /// The speed loop.
+    pub speed_loop: SpeedLoop,
+    /// Inertia in kg.m2 that tunes the speed loop, > 0.
+    pub J: f64,
+    /// Limits of the references.
+    pub limit: Limits,
+    /// The low-speed law.
+    pub zero_speed: ZeroSpeed,
+    /// First estimate of the electrical angle in rad.
+    pub theta_est: f64,
+}
+
+impl Default for ControllerParameters {
+    /// Tuned for the reference motor, with R^ = 0.9 R on purpose: the safe side at standstill.
+    fn default() -> Self {
+        let motor = Motor::default();
+        Self {
+            T_s: 1e-4,
+            delay: 1,
+            estimator: 1,
+            motor: Motor { R_s: 0.9 * motor.R_s, ..motor },
+            observer: RasmussenParameters::default(),
+            current: CurrentLoop::default(),
+            speed_loop: SpeedLoop::default(),
+            J: 1.5e-3,
+            limit: Limits { i_q: 6.0, i: 7.5 },
+            zero_speed: ZeroSpeed::default(),
+            theta_est: 0.0,
+        }
+    }
+}
+
+type P = Row<ControllerParameters>;
+
+/// The controller's parameters.
+pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
+    const {
+        &[
+            P::parameter("T_s", &SECOND, "Sample period, independent of the communication step", |p| &mut p.T_s)
+                .above(0.0),
+            P::integer_parameter(
+                "timing.delay",
+                "Samples from taking the currents to the voltage acting, as the importer exchanges values: 1 (all \
+                 outputs read, then all inputs set) or 0 (the plant gets this step's command in this step)",
+                |p| &mut p.delay,
+            )
+            .at_least(0.0)
+            .at_most(1.0),
+            P::enumeration_parameter("estimator", &ESTIMATORS, "Estimator of rotor angle and speed", |p| {
+                &mut p.estimator
+            }),
+            P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
+            P::part("observer.", &Part { table: OBSERVER, lens: |p| &mut p.observer }),
+            P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
+            P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
+            P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
+                .above(0.0),
+            P::parameter("limit.i_q", &AMPERE, "Greatest magnitude of i_q", |p| &mut p.limit.i_q).above(0.0),
+            P::parameter("limit.i", &AMPERE, "Greatest magnitude of the current; i_d has priority over i_q", |p| {
+                &mut p.limit.i
+            })
+            .above(0.0),
+            P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
+            P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
+                &mut p.theta_est
+            }),
+        ]
+    },
+);

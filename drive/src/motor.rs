@@ -1,0 +1,49 @@
+//! Electrical parameters of the machine: the plant's true ones, or the controller's estimates of them.
+
+use fmu_core::unit::{HENRY, OHM, WEBER};
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// A permanent-magnet synchronous machine, salient in general.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Motor {
+    /// Number of pole pairs (Z_p in Rasmussen).
+    pub n_p: i32,
+    /// Stator resistance in Ohm, > 0.
+    pub R_s: f64,
+    /// Inductance along the magnet in H, > 0.
+    pub L_d: f64,
+    /// Inductance across the magnet in H, > 0.
+    pub L_q: f64,
+    /// Flux linkage of the magnet in Wb, peak-valued, > 0.
+    pub psi_M: f64,
+}
+
+impl Default for Motor {
+    /// The reference motor: 800 W, assumed, since the paper's table is missing.
+    fn default() -> Self {
+        Self { n_p: 3, R_s: 2.0, L_d: 6e-3, L_q: 6e-3, psi_M: 0.15 }
+    }
+}
+
+impl Motor {
+    /// Torque per ampere of i_q in N.m/A: K = 1.5 n_p psi_M.
+    pub fn torque_constant(&self) -> f64 {
+        1.5 * f64::from(self.n_p) * self.psi_M
+    }
+}
+
+type P = Row<Motor>;
+
+/// The machine's variables; their owner gives the prefix `motor.`.
+pub const MOTOR: &Table<Motor> = &Table::new(
+    const {
+        &[
+            P::integer_parameter("n_p", "Number of pole pairs", |m| &mut m.n_p).at_least(1.0).at_most(1000.0),
+            P::parameter("R_s", &OHM, "Stator resistance", |m| &mut m.R_s).above(0.0),
+            P::parameter("L_d", &HENRY, "Inductance along the magnet axis", |m| &mut m.L_d).above(0.0),
+            P::parameter("L_q", &HENRY, "Inductance across the magnet axis", |m| &mut m.L_q).above(0.0),
+            P::parameter("psi_M", &WEBER, "Peak flux linkage of the magnet", |m| &mut m.psi_M).above(0.0),
+        ]
+    },
+);

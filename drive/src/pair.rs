@@ -1,0 +1,45 @@
+//! Plant and controller side by side, exchanging values as an importer does: all outputs read, all inputs set, both
+//! stepped (Jacobi). The native reference that the packed FMUs must equal bit for bit.
+
+use crate::{PmsmPlant, SensorlessController};
+use fmu_core::{Block, Elapsed, Fault, Model, Step};
+
+/// The closed loop of plant and controller.
+#[derive(Clone, Default)]
+pub struct Pair {
+    /// Inverter, machine and mechanics.
+    pub plant: Block<PmsmPlant>,
+    /// The digital controller.
+    pub controller: Block<SensorlessController>,
+    /// Time since the start.
+    pub now: Elapsed,
+}
+
+impl Pair {
+    /// Parameters are set: both start.
+    ///
+    /// # Errors
+    /// As [`Model::validate`] of either.
+    pub fn start(&mut self) -> Result<(), Fault> {
+        self.now = Elapsed::ZERO;
+        self.plant.initialise();
+        self.controller.initialise();
+        self.plant.model.validate()?;
+        self.controller.model.validate()
+    }
+
+    /// One communication step of `h` (s): exchange, then both advance.
+    ///
+    /// # Errors
+    /// As [`Model::advance`] of either.
+    #[inline]
+    pub fn step(&mut self, h: f64) -> Result<(), Fault> {
+        self.plant.model.inputs.u = self.controller.out.u;
+        self.controller.model.inputs.i = self.plant.out.i;
+        let step = Step { start: self.now, h };
+        self.plant.step(&step)?;
+        self.controller.step(&step)?;
+        self.now = step.end();
+        Ok(())
+    }
+}

@@ -1,0 +1,69 @@
+//! The rotor and what is coupled to it: one inertia with viscous and Coulomb friction.
+//!
+//! J d speed/dt = tau_e - tau_load - B speed - tau_coulomb tanh(speed / w_coulomb).
+
+use crate::math::tanh;
+use fmu_core::unit::{KG_M2, NEWTON_METRE, NM_S_PER_RAD, SPEED};
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Inertia and friction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Mechanics {
+    /// Moment of inertia in kg.m2, > 0.
+    pub J: f64,
+    /// Viscous friction in N.m.s/rad, >= 0.
+    pub B: f64,
+    /// Coulomb friction torque in N.m, >= 0.
+    pub tau_coulomb: f64,
+    /// Speed in rad/s over which the Coulomb torque changes sign, > 0.
+    pub w_coulomb: f64,
+}
+
+impl Default for Mechanics {
+    fn default() -> Self {
+        Self { J: 1.5e-3, B: 2e-4, tau_coulomb: 0.03, w_coulomb: 0.3 }
+    }
+}
+
+impl Mechanics {
+    /// Friction torque in N.m at `speed` in rad/s, positive against positive speed.
+    #[inline]
+    pub fn friction(&self, speed: f64) -> f64 {
+        self.B * speed + self.tau_coulomb * tanh(speed / self.w_coulomb)
+    }
+
+    /// Angular acceleration in rad/s2.
+    #[inline]
+    pub fn acceleration(&self, tau_e: f64, tau_load: f64, speed: f64) -> f64 {
+        (tau_e - tau_load - self.friction(speed)) / self.J
+    }
+}
+
+type P = Row<Mechanics>;
+
+/// The mechanical variables; their owner gives the prefix `mechanics.`.
+pub const MECHANICS: &Table<Mechanics> = &Table::new(
+    const {
+        &[
+            P::parameter("J", &KG_M2, "Moment of inertia of rotor and load", |m| &mut m.J).above(0.0),
+            P::parameter("B", &NM_S_PER_RAD, "Viscous friction", |m| &mut m.B).at_least(0.0),
+            P::parameter("tau_coulomb", &NEWTON_METRE, "Coulomb friction torque", |m| &mut m.tau_coulomb).at_least(0.0),
+            P::parameter("w_coulomb", &SPEED, "Speed over which the Coulomb torque changes sign", |m| &mut m.w_coulomb)
+                .above(0.0),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn friction_is_odd_and_saturates() {
+        let m = Mechanics::default();
+        assert!((m.friction(10.0) - (2e-3 + 0.03)).abs() < 1e-9);
+        assert_eq!(m.friction(-0.2).to_bits(), (-m.friction(0.2)).to_bits());
+        assert!((m.acceleration(1.0, 0.4, 0.0) - 400.0).abs() < 1e-9);
+    }
+}

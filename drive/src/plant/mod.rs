@@ -1,0 +1,6 @@
+//! The plant: machine, mechanics and inverter, and the model `PmsmPlant` made of them.
+
+pub mod inverter;
+pub mod machine;
+pub mod mechanics;
+pub mod model;

@@ -1,0 +1,254 @@
+//! The model `PmsmPlant`: inverter, machine and mechanics, integrated with held inputs.
+
+use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
+use crate::integrate::rk4;
+use crate::math::wrap;
+use crate::motor::{MOTOR, Motor};
+use crate::plant::inverter::limit_to_hexagon;
+use crate::plant::machine;
+use crate::plant::mechanics::{MECHANICS, Mechanics};
+use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, Table};
+use nalgebra::Vector4;
+use serde::{Deserialize, Serialize};
+
+/// Longest step of the integration in s. At 4500 rpm of the reference motor the error of a current stays below 1e-6 A.
+const LONGEST_SUBSTEP: f64 = 50e-6;
+
+/// Most substeps of one communication step: 500 s of simulated time.
+const MOST_SUBSTEPS: f64 = 1e7;
+
+/// Inputs, held over a communication step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlantInputs {
+    /// Stator voltage references in V, averages over a PWM period.
+    pub u: Phases,
+    /// DC-link voltage in V, >= 0.
+    pub u_dc: f64,
+    /// Load torque in N.m, positive against positive speed.
+    pub tau_load: f64,
+}
+
+impl Default for PlantInputs {
+    fn default() -> Self {
+        Self { u: Phases::default(), u_dc: 325.0, tau_load: 0.0 }
+    }
+}
+
+/// Parameters.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlantParameters {
+    /// The machine.
+    pub motor: Motor,
+    /// Inertia and friction.
+    pub mechanics: Mechanics,
+    /// State at the start.
+    pub initial: Initial,
+}
+
+/// Where the rotor is and how fast it turns at the start.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Initial {
+    /// Electrical rotor angle in rad.
+    pub theta_e: f64,
+    /// Mechanical speed in rad/s.
+    pub speed: f64,
+}
+
+/// What the integration advances.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct State {
+    /// Stator flux linkage in Wb.
+    psi: Dq,
+    /// Mechanical speed in rad/s.
+    speed: f64,
+    /// Mechanical angle in rad, not wrapped.
+    angle: f64,
+}
+
+impl State {
+    fn to_vector(self) -> Vector4<f64> {
+        Vector4::new(self.psi.d(), self.psi.q(), self.speed, self.angle)
+    }
+
+    fn from_vector(x: &Vector4<f64>) -> Self {
+        Self { psi: Dq::new(x[0], x[1]), speed: x[2], angle: x[3] }
+    }
+
+    fn is_finite(self) -> bool {
+        self.psi.is_finite() && self.speed.is_finite() && self.angle.is_finite()
+    }
+}
+
+/// Outputs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlantOutputs {
+    /// Stator currents in A, positive into the machine.
+    pub i: Phases,
+    /// Mechanical speed in rad/s.
+    pub speed: f64,
+    /// Mechanical angle in rad, not wrapped.
+    pub angle: f64,
+    /// Electrical angle in rad, in (-pi, pi].
+    pub theta_e: f64,
+    /// Electromagnetic torque in N.m.
+    pub tau_e: f64,
+    /// Current along the magnet in A.
+    pub i_d: f64,
+    /// Current across the magnet in A.
+    pub i_q: f64,
+}
+
+/// Permanent-magnet synchronous machine with an average inverter and one inertia.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PmsmPlant {
+    /// Inputs.
+    pub inputs: PlantInputs,
+    /// Parameters.
+    pub parameters: PlantParameters,
+    state: State,
+}
+
+impl PmsmPlant {
+    /// Derivative of the state with the stator voltage `u` held.
+    #[inline]
+    fn derivative(&self, x: &Vector4<f64>, u: AlphaBeta) -> Vector4<f64> {
+        let PlantParameters { motor, mechanics, .. } = &self.parameters;
+        let State { psi, speed, angle } = State::from_vector(x);
+        let n_p = f64::from(motor.n_p);
+        let i = machine::current(motor, psi);
+        let u = Axis::<Rotor>::at(n_p * angle).from_stator(u);
+        let d_psi = machine::flux_derivative(motor, psi, u, i, n_p * speed);
+        let acceleration = mechanics.acceleration(machine::torque(motor, psi, i), self.inputs.tau_load, speed);
+        Vector4::new(d_psi.d(), d_psi.q(), acceleration, speed)
+    }
+}
+
+impl Model for PmsmPlant {
+    type Outputs = PlantOutputs;
+
+    const INFO: Info = Info {
+        name: "PmsmPlant",
+        description: "Permanent-magnet synchronous machine with average inverter and mechanics",
+        version: env!("CARGO_PKG_VERSION"),
+        author: "The sensorless-drive developers",
+        license: "MIT OR Apache-2.0",
+        copyright: "Copyright (c) 2026 The sensorless-drive developers",
+        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+        documentation: include_str!("../../docs/pmsm_plant.html"),
+    };
+
+    const TABLE: &'static Table<Block<Self>> = TABLE;
+
+    fn initialise(&mut self) {
+        let PlantParameters { motor, initial, .. } = &self.parameters;
+        self.state = State {
+            psi: machine::flux(motor, Dq::ZERO),
+            speed: initial.speed,
+            angle: initial.theta_e / f64::from(motor.n_p),
+        };
+    }
+
+    fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
+        let motor = &self.parameters.motor;
+        let State { psi, speed, angle } = self.state;
+        let i = machine::current(motor, psi);
+        let theta_e = f64::from(motor.n_p) * angle;
+        *out = PlantOutputs {
+            i: Phases::from_stator(Axis::<Rotor>::at(theta_e).to_stator(i)),
+            speed,
+            angle,
+            theta_e: wrap(theta_e),
+            tau_e: machine::torque(motor, psi, i),
+            i_d: i.d(),
+            i_q: i.q(),
+        };
+    }
+
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
+        let count = (step.h / LONGEST_SUBSTEP - 1e-9).ceil().max(1.0);
+        if count > MOST_SUBSTEPS {
+            let longest = MOST_SUBSTEPS * LONGEST_SUBSTEP;
+            return Err(Fault::value("the step size", format!("{} s", step.h), format!("at most {longest} s")));
+        }
+        let h = step.h / count;
+        let mut x = self.state.to_vector();
+        let mut left = count;
+        while left > 0.0 {
+            x = rk4(x, h, |x| self.derivative(x, u));
+            left -= 1.0;
+        }
+        let state = State::from_vector(&x);
+        if !state.is_finite() {
+            return Err(Fault::new(format!(
+                "the machine's state left the finite numbers within a step of {} s; the step before it ended with \
+                 psi_d = {} Wb, psi_q = {} Wb, speed = {} rad/s",
+                step.h,
+                self.state.psi.d(),
+                self.state.psi.q(),
+                self.state.speed
+            )));
+        }
+        self.state = state;
+        Ok(())
+    }
+}
+
+type V = Row<Block<PmsmPlant>>;
+
+const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
+    const {
+        &[
+            V::discrete_input("u_a", &VOLT, "Voltage reference of phase a, average over a PWM period", |m| {
+                &mut m.model.inputs.u.a
+            }),
+            V::discrete_input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
+            V::discrete_input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
+            V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+            V::input("tau_load", &NEWTON_METRE, "Load torque at the shaft, positive against positive speed", |m| {
+                &mut m.model.inputs.tau_load
+            }),
+            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+        ]
+    },
+);
+
+type O = Row<PlantOutputs>;
+
+/// The plant's outputs.
+pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
+    const {
+        &[
+            O::output("i_a", &AMPERE, "Stator current of phase a, positive into the machine", |o| &mut o.i.a),
+            O::output("i_b", &AMPERE, "Stator current of phase b", |o| &mut o.i.b),
+            O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
+            O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed),
+            O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle),
+            O::output(
+                "theta_e",
+                &RADIAN,
+                "Electrical rotor angle from phase a to the magnet axis, in (-pi, pi]",
+                |o| &mut o.theta_e,
+            ),
+            O::output("tau_e", &NEWTON_METRE, "Electromagnetic torque", |o| &mut o.tau_e),
+            O::output("i_d", &AMPERE, "Stator current along the true magnet axis", |o| &mut o.i_d),
+            O::output("i_q", &AMPERE, "Stator current across the true magnet axis", |o| &mut o.i_q),
+        ]
+    },
+);
+
+type P = Row<PlantParameters>;
+
+/// The plant's parameters.
+pub const PARAMETERS: &Table<PlantParameters> = &Table::new(
+    const {
+        &[
+            P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
+            P::part("mechanics.", &Part { table: MECHANICS, lens: |p| &mut p.mechanics }),
+            P::parameter("initial.theta_e", &RADIAN, "Electrical rotor angle at the start", |p| &mut p.initial.theta_e),
+            P::parameter("initial.speed", &SPEED, "Mechanical rotor speed at the start", |p| &mut p.initial.speed),
+        ]
+    },
+);
