@@ -7,6 +7,7 @@
 
 pub mod description;
 pub mod fault;
+pub mod log;
 pub mod model;
 mod probe;
 pub mod table;

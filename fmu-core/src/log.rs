@@ -1,0 +1,21 @@
+//! The log categories, by the standards' own names (FMI 2.0.5, 2.2.4; FMI 3.0.2, 2.4.5).
+
+/// What happened, as a step or a set succeeded.
+pub const EVENTS: &str = "logEvents";
+/// A status Warning.
+pub const WARNING: &str = "logStatusWarning";
+/// A status Discard.
+pub const DISCARD: &str = "logStatusDiscard";
+/// A status Error.
+pub const ERROR: &str = "logStatusError";
+/// A status Fatal.
+pub const FATAL: &str = "logStatusFatal";
+
+/// Every category that a message can have: its name and its description. No message has another one.
+pub const CATEGORIES: &[(&str, &str)] = &[
+    (EVENTS, "What happens when all is well"),
+    (WARNING, "Messages that come with the status Warning"),
+    (DISCARD, "Messages that come with the status Discard"),
+    (ERROR, "Messages that come with the status Error"),
+    (FATAL, "Messages that come with the status Fatal"),
+];
