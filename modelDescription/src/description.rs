@@ -1,0 +1,174 @@
+//! All that a modelDescription.xml tells an importer of co-simulation FMUs.
+
+use crate::units::{TypeDefinition, Unit};
+use crate::variable::ModelVariable;
+use crate::version::FmiVersion;
+
+/// A modelDescription.xml.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelDescription {
+    /// The standard.
+    pub version: FmiVersion,
+    /// `fmiVersion` as the file has it.
+    pub fmi_version: String,
+    /// Name of the model.
+    pub model_name: String,
+    /// Instantiation token (GUID in FMI 2.0).
+    pub token: String,
+    /// One sentence.
+    pub description: Option<String>,
+    /// Who wrote it.
+    pub author: Option<String>,
+    /// Version of the model.
+    pub model_version: Option<String>,
+    /// Copyright line.
+    pub copyright: Option<String>,
+    /// Licence.
+    pub license: Option<String>,
+    /// The tool that wrote the file.
+    pub generation_tool: Option<String>,
+    /// When it was written, as the file says it.
+    pub generation_date_and_time: Option<String>,
+    /// Names are structured (`part.name[1]`), not flat.
+    pub structured_names: bool,
+    /// What the FMU tells of its co-simulation interface, where it has one.
+    pub co_simulation: Option<CoSimulation>,
+    /// The model exchange interface's model identifier, where there is one.
+    pub model_exchange: Option<String>,
+    /// The scheduled execution interface's model identifier, where there is one (FMI 3.0 only).
+    pub scheduled_execution: Option<String>,
+    /// Default experiment.
+    pub default_experiment: Experiment,
+    /// Units.
+    pub units: Vec<Unit>,
+    /// Type definitions.
+    pub types: Vec<TypeDefinition>,
+    /// Log categories.
+    pub log_categories: Vec<LogCategory>,
+    /// Variables, in the order of the file.
+    pub variables: Vec<ModelVariable>,
+    /// Outputs of the model structure.
+    pub outputs: Vec<Unknown>,
+    /// Continuous state derivatives of the model structure.
+    pub derivatives: Vec<Unknown>,
+    /// Initial unknowns of the model structure.
+    pub initial_unknowns: Vec<Unknown>,
+}
+
+impl ModelDescription {
+    /// The variable of this name, or of this alias.
+    pub fn variable(&self, name: &str) -> Option<&ModelVariable> {
+        let named = self.variables.iter().find(|v| v.name == name);
+        named.or_else(|| self.variables.iter().find(|v| v.aliases.iter().any(|a| a.name == name)))
+    }
+
+    /// The variable that the model structure means by a number: the place in the list, from 1, in FMI 2.0 (2.2.8), the
+    /// value reference in FMI 3.0 (2.4.8).
+    pub fn referenced(&self, reference: u32) -> Option<&ModelVariable> {
+        match self.version {
+            FmiVersion::V2 => self.variables.get(usize::try_from(reference).ok()?.checked_sub(1)?),
+            FmiVersion::V3 => self.variables.iter().find(|v| v.value_reference == reference),
+        }
+    }
+
+    /// The unit of this name.
+    pub fn unit(&self, name: &str) -> Option<&Unit> {
+        self.units.iter().find(|u| u.name == name)
+    }
+
+    /// The type definition of this name.
+    pub fn type_definition(&self, name: &str) -> Option<&TypeDefinition> {
+        self.types.iter().find(|t| t.name == name)
+    }
+}
+
+/// The co-simulation interface: its model identifier and everything it claims to be able to do.
+///
+/// Capabilities are kept as written, for a checker wants to see a misspelt one; [`flag`](Self::flag) reads them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CoSimulation {
+    /// Base name of the binaries.
+    pub model_identifier: String,
+    /// Every attribute but the model identifier, as written.
+    pub attributes: Vec<(String, String)>,
+    /// Line of the element.
+    pub line: usize,
+}
+
+impl CoSimulation {
+    /// The value of an attribute.
+    pub fn attribute(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
+    }
+
+    /// Whether a capability is claimed; what is not mentioned is `false` in both standards.
+    pub fn flag(&self, name: &str) -> bool {
+        self.attribute(name).is_some_and(|value| matches!(value.trim(), "true" | "1"))
+    }
+
+    /// The state can be got and set.
+    pub fn can_get_and_set_state(&self) -> bool {
+        // The two standards spell it apart: FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2.
+        self.flag("canGetAndSetFMUstate") || self.flag("canGetAndSetFMUState")
+    }
+
+    /// The state can be serialised.
+    pub fn can_serialize_state(&self) -> bool {
+        self.flag("canSerializeFMUstate") || self.flag("canSerializeFMUState")
+    }
+
+    /// The communication step may change.
+    pub fn can_handle_variable_step(&self) -> bool {
+        self.flag("canHandleVariableCommunicationStepSize")
+    }
+
+    /// Another program must be installed.
+    pub fn needs_execution_tool(&self) -> bool {
+        self.flag("needsExecutionTool")
+    }
+
+    /// One instance per process only.
+    pub fn only_one_instance(&self) -> bool {
+        self.flag("canBeInstantiatedOnlyOncePerProcess")
+    }
+
+    /// There is an event mode (FMI 3.0 only).
+    pub fn has_event_mode(&self) -> bool {
+        self.flag("hasEventMode")
+    }
+}
+
+/// The default experiment, as far as the file tells it: times in the unit of the independent variable, mostly s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Experiment {
+    /// Start time.
+    pub start: Option<f64>,
+    /// Stop time.
+    pub stop: Option<f64>,
+    /// Recommended communication step size.
+    pub step: Option<f64>,
+    /// Relative tolerance.
+    pub tolerance: Option<f64>,
+}
+
+/// A log category.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogCategory {
+    /// Name.
+    pub name: String,
+    /// Description.
+    pub description: Option<String>,
+}
+
+/// An entry of the model structure. Its numbers are as written; [`ModelDescription::referenced`] finds the variables.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unknown {
+    /// The variable.
+    pub reference: u32,
+    /// What it depends on: `None` when the file does not say (then on everything), empty for on nothing.
+    pub dependencies: Option<Vec<u32>>,
+    /// How, one word for each dependency.
+    pub kinds: Option<Vec<String>>,
+    /// Line of the element.
+    pub line: usize,
+}

@@ -1,0 +1,97 @@
+//! The neutral description as modelDescription.xml of either standard.
+
+mod structure;
+mod types;
+mod variables;
+
+use crate::number;
+use crate::version::FmiVersion;
+use crate::xml::{Element, print};
+use fmu_core::Description;
+
+/// Who writes the file, and when: the only two things in it that do not follow from the description.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Generation {
+    /// Name and version of the tool.
+    pub tool: String,
+    /// `YYYY-MM-DDThh:mm:ssZ`, see [`date_from_epoch`](crate::date_from_epoch).
+    pub date_and_time: String,
+}
+
+/// modelDescription.xml of a co-simulation FMU; the same arguments give the same text.
+pub fn write(description: &Description, version: FmiVersion, generation: &Generation) -> String {
+    let units = types::units(description);
+    let definitions = types::definitions(description, version);
+    let root = header(description, version, generation).children(
+        // The order of the schemas.
+        [
+            Some(co_simulation(description, version)),
+            Some(units),
+            definitions,
+            Some(log_categories(version)),
+            Some(experiment(description)),
+            Some(variables::variables(description, version)),
+            Some(structure::structure(description, version)),
+        ]
+        .into_iter()
+        .flatten(),
+    );
+    print(&root)
+}
+
+/// FMI 2.0.5, 2.2.1; FMI 3.0.2, 2.4.1.
+fn header(description: &Description, version: FmiVersion, generation: &Generation) -> Element {
+    let token = match version {
+        FmiVersion::V2 => "guid",
+        FmiVersion::V3 => "instantiationToken",
+    };
+    Element::new("fmiModelDescription")
+        .with("fmiVersion", version.to_string())
+        .with("modelName", &*description.name)
+        .with(token, &*description.token)
+        .with_text("description", &description.description)
+        .with_text("author", &description.author)
+        .with_text("version", &description.version)
+        .with_text("copyright", &description.copyright)
+        .with_text("license", &description.license)
+        .with_text("generationTool", &generation.tool)
+        .with_text("generationDateAndTime", &generation.date_and_time)
+        .with("variableNamingConvention", "structured")
+}
+
+/// FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2 and 4.4. What is not written is `false` in both.
+fn co_simulation(description: &Description, version: FmiVersion) -> Element {
+    let element = Element::new("CoSimulation")
+        .with("modelIdentifier", &*description.name)
+        .with("needsExecutionTool", "false")
+        .with("canHandleVariableCommunicationStepSize", "true")
+        .with("canBeInstantiatedOnlyOncePerProcess", "false");
+    match version {
+        FmiVersion::V2 => element
+            .with("canInterpolateInputs", "false")
+            // A Rust library has an allocator of its own; using it without this flag is a violation.
+            .with("canNotUseMemoryManagementFunctions", "true")
+            .with("canGetAndSetFMUstate", "true")
+            .with("canSerializeFMUstate", "true"),
+        FmiVersion::V3 => element.with("canGetAndSetFMUState", "true").with("canSerializeFMUState", "true"),
+    }
+}
+
+/// FMI 2.0.5, 2.2.4; FMI 3.0.2, 2.4.5.
+fn log_categories(version: FmiVersion) -> Element {
+    let category = |&(name, description): &(&str, &str)| {
+        Element::new("Category").with("name", name).with_text("description", description)
+    };
+    // FMI 3.0 dropped the category; an empty list of categories means all of them in both standards.
+    let all = (version == FmiVersion::V2).then_some(("logAll", "All messages"));
+    Element::new("LogCategories").children(fmu_core::log::CATEGORIES.iter().chain(&all).map(category))
+}
+
+/// FMI 2.0.5, 2.2.5; FMI 3.0.2, 2.4.6.
+fn experiment(description: &Description) -> Element {
+    let experiment = &description.experiment;
+    Element::new("DefaultExperiment")
+        .with("startTime", number::format(experiment.start))
+        .with("stopTime", number::format(experiment.stop))
+        .with("stepSize", number::format(experiment.step))
+}

@@ -1,0 +1,134 @@
+//! `ModelVariables`: time, then the variables in the order of their value references.
+//!
+//! FMI 2.0.5, 2.2.7; FMI 3.0.2, 2.4.7. Unit and display unit stand on the variable as well as in its type definition:
+//! both standards allow it, and importers that do not look type definitions up find them there.
+
+use crate::number;
+use crate::version::FmiVersion;
+use crate::xml::Element;
+use fmu_core::Description;
+use fmu_core::description::{TIME, Value, Variable, VariableKind};
+use fmu_core::unit::SECOND;
+use fmu_core::{Causality, Variability};
+
+/// All variables.
+pub(super) fn variables(description: &Description, version: FmiVersion) -> Element {
+    let variables = description.variables.iter().flat_map(|v| match version {
+        FmiVersion::V2 => scalars(v),
+        FmiVersion::V3 => vec![variable(v)],
+    });
+    Element::new("ModelVariables").children([time(version)]).children(variables)
+}
+
+/// The independent variable: no start value, no `initial`.
+fn time(version: FmiVersion) -> Element {
+    let named = |element: &str| {
+        Element::new(element)
+            .with("name", "time")
+            .with("valueReference", TIME.to_string())
+            .with("description", "Simulation time")
+            .with("causality", "independent")
+            .with("variability", "continuous")
+    };
+    match version {
+        FmiVersion::V2 => named("ScalarVariable").children([Element::new("Real").with("unit", SECOND.unit.name)]),
+        FmiVersion::V3 => named("Float64").with("unit", SECOND.unit.name),
+    }
+}
+
+/// FMI 2.0 has no arrays: one scalar per element, `name[1]` the first (2.2.9).
+fn scalars(v: &Variable) -> Vec<Element> {
+    let element = |name: &str, offset: u32, start: Option<&Value>| {
+        let mut typed = Element::new(match v.kind {
+            VariableKind::Real { .. } => "Real",
+            VariableKind::Integer => "Integer",
+            VariableKind::Boolean => "Boolean",
+            VariableKind::Enumeration { .. } => "Enumeration",
+        });
+        typed.attributes = type_attributes(v);
+        typed = typed.with_some("start", start.map(text));
+        identity("ScalarVariable", v, name, v.value_reference.saturating_add(offset)).children([typed])
+    };
+    let start = |i: usize| v.start.as_ref().and_then(|all| all.get(i));
+    match v.dimension {
+        None => vec![element(&v.name, 0, start(0))],
+        Some(n) => (0..n).zip(0..).map(|(i, k)| element(&format!("{}[{}]", v.name, i + 1), k, start(i))).collect(),
+    }
+}
+
+/// One variable of FMI 3.0, scalar or array.
+fn variable(v: &Variable) -> Element {
+    let base = match v.kind {
+        VariableKind::Real { .. } => "Float64",
+        VariableKind::Integer => "Int32",
+        VariableKind::Boolean => "Boolean",
+        VariableKind::Enumeration { .. } => "Enumeration",
+    };
+    let mut element = identity(base, v, &v.name, v.value_reference);
+    element.attributes.extend(type_attributes(v));
+    let start = v.start.as_ref().map(|all| all.iter().map(text).collect::<Vec<_>>().join(" "));
+    let dimension = v.dimension.map(|n| Element::new("Dimension").with("start", n.to_string()));
+    element.with_some("start", start).children(dimension)
+}
+
+/// Who the variable is: all that does not depend on its base type.
+fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> Element {
+    let (causality, initial) = match v.causality {
+        Causality::Parameter => ("parameter", Some("exact")),
+        Causality::CalculatedParameter => ("calculatedParameter", Some("calculated")),
+        // FMI 2.0 forbids `initial` on an input, FMI 3.0 allows only the value it has without.
+        Causality::Input => ("input", None),
+        Causality::Output => ("output", Some("calculated")),
+        Causality::Local => ("local", Some("calculated")),
+    };
+    let variability = match v.variability {
+        Variability::Fixed => "fixed",
+        Variability::Tunable => "tunable",
+        Variability::Discrete => "discrete",
+        Variability::Continuous => "continuous",
+    };
+    Element::new(element)
+        .with("name", name)
+        .with("valueReference", value_reference.to_string())
+        .with_text("description", &v.description)
+        .with("causality", causality)
+        .with("variability", variability)
+        .with_some("initial", initial)
+}
+
+/// Type definition, unit and bounds. A strict bound is written like any other: the XML has no word for it, the FMU refuses
+/// the bound itself and says why.
+fn type_attributes(v: &Variable) -> Vec<(String, String)> {
+    let element = Element::default();
+    let element = match &v.kind {
+        VariableKind::Real { quantity, unit, display, .. } => {
+            let display = display.as_ref().map(|(name, ..)| name.as_str()).filter(|_| !unit.is_empty());
+            element
+                .with_text("declaredType", quantity)
+                .with_text("unit", unit)
+                .with_some("displayUnit", display)
+                .with_some("min", v.min.map(number::format))
+                .with_some("max", v.max.map(number::format))
+                // A magnitude, greater than 0 in both standards.
+                .with_some("nominal", v.nominal.map(|x| number::format(x.abs())))
+        }
+        VariableKind::Integer => {
+            // xs:int: rounded inwards, and left out where every integer is inside.
+            let representable = |x: &f64| x.abs() <= f64::from(i32::MAX);
+            element
+                .with_some("min", v.min.map(f64::ceil).filter(representable).map(number::format))
+                .with_some("max", v.max.map(f64::floor).filter(representable).map(number::format))
+        }
+        VariableKind::Boolean => element,
+        VariableKind::Enumeration { name, .. } => element.with("declaredType", name),
+    };
+    element.attributes
+}
+
+fn text(value: &Value) -> String {
+    match value {
+        Value::Real(x) => number::format(*x),
+        Value::Integer(x) => x.to_string(),
+        Value::Boolean(x) => x.to_string(),
+    }
+}

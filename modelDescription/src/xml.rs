@@ -1,0 +1,89 @@
+//! A small element tree: names, attributes, children. Neither standard keeps anything in text content, so there is none.
+
+mod parse;
+mod print;
+
+pub(crate) use parse::parse;
+pub(crate) use print::print;
+
+/// An element.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Element {
+    /// Name, with its namespace prefix where it has one.
+    pub(crate) name: String,
+    /// Attributes in the order of the file, values unescaped.
+    pub(crate) attributes: Vec<(String, String)>,
+    /// Child elements in the order of the file.
+    pub(crate) children: Vec<Element>,
+    /// Line of the start tag, from 1; 0 for one that was not read.
+    pub(crate) line: usize,
+}
+
+impl Element {
+    /// An element with nothing in it.
+    pub(crate) fn new(name: &str) -> Self {
+        Self { name: name.into(), ..Self::default() }
+    }
+
+    /// The same with one more attribute.
+    pub(crate) fn with(mut self, name: &str, value: impl Into<String>) -> Self {
+        self.attributes.push((name.into(), value.into()));
+        self
+    }
+
+    /// The same with one more attribute, unless there is no value for it.
+    pub(crate) fn with_some(self, name: &str, value: Option<impl Into<String>>) -> Self {
+        match value {
+            Some(value) => self.with(name, value),
+            None => self,
+        }
+    }
+
+    /// The same with one more attribute, unless the text is empty.
+    pub(crate) fn with_text(self, name: &str, value: &str) -> Self {
+        self.with_some(name, Some(value).filter(|text| !text.is_empty()))
+    }
+
+    /// The same with more children.
+    pub(crate) fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
+        self.children.extend(children);
+        self
+    }
+
+    /// The value of an attribute.
+    pub(crate) fn get(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
+    }
+
+    /// The first child of this name.
+    pub(crate) fn child(&self, name: &str) -> Option<&Element> {
+        self.children.iter().find(|c| c.name == name)
+    }
+
+    /// All children of this name.
+    pub(crate) fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Element> {
+        self.children.iter().filter(move |c| c.name == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_printed_reads_back() {
+        let text = "a < b & \"c\" 'd' >\n\tnext\r\u{e9}\u{1f50b} ]]> &amp;";
+        let tree = Element::new("root")
+            .with("text", text)
+            .children([Element::new("leaf").with("x", ""), Element::new("branch").children([Element::new("leaf")])]);
+        let printed = print(&tree);
+        let mut back = parse(&printed).unwrap();
+        forget_lines(&mut back);
+        assert_eq!(back, tree);
+    }
+
+    fn forget_lines(element: &mut Element) {
+        element.line = 0;
+        element.children.iter_mut().for_each(forget_lines);
+    }
+}

@@ -1,0 +1,139 @@
+//! Reads an element tree. Any bytes are answered by a tree or an error: no panic, no unbounded recursion, no entity
+//! expansion, no external file.
+
+use super::Element;
+use crate::error::Error;
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Reader, XmlVersion};
+
+/// Deeper trees are refused; both standards need 5 levels, annotations of tools a few more. Trees are dropped recursively.
+const DEEPEST: usize = 200;
+
+/// The root element of an XML document.
+pub(crate) fn parse(text: &str) -> Result<Element, Error> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut reader = Reader::from_str(text);
+    let mut lines = Lines { text, offset: 0, line: 1 };
+    let mut open: Vec<Element> = Vec::new();
+    let mut root = None;
+    loop {
+        let event = reader.read_event();
+        let line = lines.at(match &event {
+            Ok(_) => reader.buffer_position(),
+            Err(_) => reader.error_position(),
+        });
+        let wrong = |reason: &dyn std::fmt::Display| Error::NotXml { line, reason: reason.to_string() };
+        let (tag, empty) = match event.map_err(|e| wrong(&e))? {
+            Event::Start(tag) => (tag, false),
+            Event::Empty(tag) => (tag, true),
+            Event::End(_) => {
+                // The reader has checked that the end tag matches.
+                if let Some(element) = open.pop() {
+                    place(element, &mut open, &mut root);
+                }
+                continue;
+            }
+            Event::Text(content) if open.is_empty() && !content.xml10_content().trim().is_empty() => {
+                return Err(wrong(&"text outside the root element"));
+            }
+            Event::CData(_) | Event::GeneralRef(_) if open.is_empty() => {
+                return Err(wrong(&"text outside the root element"));
+            }
+            Event::Eof => break,
+            _ => continue,
+        };
+        if root.is_some() {
+            return Err(wrong(&"a second root element"));
+        }
+        if open.len() >= DEEPEST {
+            return Err(wrong(&format!("more than {DEEPEST} levels of elements")));
+        }
+        let mut element = start(&tag).map_err(|e| wrong(&e))?;
+        // The position is behind the tag, which may have line breaks between its attributes.
+        element.line = line - tag.matches('\n').count();
+        if empty {
+            place(element, &mut open, &mut root);
+        } else {
+            open.push(element);
+        }
+    }
+    let line = lines.line;
+    match (open.pop(), root) {
+        (Some(element), _) => Err(Error::NotXml { line, reason: format!("<{}> is not closed", element.name) }),
+        (None, None) => Err(Error::NotXml { line, reason: "no root element".into() }),
+        (None, Some(root)) => Ok(root),
+    }
+}
+
+fn place(element: Element, open: &mut [Element], root: &mut Option<Element>) {
+    match open.last_mut() {
+        Some(parent) => parent.children.push(element),
+        None => *root = Some(element),
+    }
+}
+
+fn start(tag: &BytesStart<'_>) -> Result<Element, quick_xml::Error> {
+    let mut element = Element::new(tag.name().as_ref());
+    for attribute in tag.attributes() {
+        let attribute = attribute?;
+        let value = attribute.normalized_value(XmlVersion::Implicit1_0)?;
+        element.attributes.push((attribute.key.as_ref().into(), value.into_owned()));
+    }
+    Ok(element)
+}
+
+/// Counts lines while positions grow, so that all of them together cost one pass.
+struct Lines<'a> {
+    text: &'a str,
+    offset: usize,
+    line: usize,
+}
+
+impl Lines<'_> {
+    fn at(&mut self, position: u64) -> usize {
+        let position = usize::try_from(position).unwrap_or(usize::MAX).clamp(self.offset, self.text.len());
+        let passed = &self.text.as_bytes()[self.offset..position];
+        self.line += passed.iter().map(|&b| usize::from(b == b'\n')).sum::<usize>();
+        self.offset = position;
+        self.line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_and_references() {
+        let tree =
+            parse("\u{feff}<?xml version='1.0'?>\n<!-- -->\n<a\n  x='&#x41;&lt;'>\n <b/> text <![CDATA[<]]>\n</a>\n")
+                .unwrap();
+        assert_eq!((tree.line, tree.get("x"), tree.children[0].line), (3, Some("A<"), 5));
+    }
+
+    #[test]
+    fn broken_documents_name_their_line() {
+        for (text, line) in [
+            ("", 1),
+            ("plain", 1),
+            ("<a>\n<b>\n</a>", 3),
+            ("<a/>\n<b/>", 2),
+            ("<a x='1' x='2'/>", 1),
+            ("<a>\n<b x=1/></a>", 2),
+            ("<a x='&unknown;'/>", 1),
+            ("<a/>\n&amp;", 2),
+            ("<a>\n\n", 3),
+        ] {
+            match parse(text) {
+                Err(Error::NotXml { line: at, .. }) => assert_eq!(at, line, "{text}"),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn depth_is_bounded() {
+        let deep = "<a>".repeat(1_000_000);
+        assert!(matches!(parse(&deep), Err(Error::NotXml { .. })));
+    }
+}

@@ -1,0 +1,55 @@
+//! Prints an element tree: declaration, one element per line, two blanks per level.
+
+use super::Element;
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
+
+/// The XML document of a tree, in UTF-8, with a newline at its end.
+pub(crate) fn print(root: &Element) -> String {
+    let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
+    let mut events = vec![Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None))];
+    collect(root, &mut events);
+    for event in events {
+        // A Vec takes all that is written to it, and the writer has no other reason to fail.
+        let _ = writer.write_event(event);
+    }
+    let mut bytes = writer.into_inner();
+    bytes.push(b'\n');
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn collect<'a>(element: &'a Element, events: &mut Vec<Event<'a>>) {
+    let mut start = BytesStart::new(element.name.as_str());
+    for (name, value) in &element.attributes {
+        let value: String = value.chars().map(legal).collect();
+        start.push_attribute((name.as_str(), value.as_str()));
+    }
+    if element.children.is_empty() {
+        events.push(Event::Empty(start));
+        return;
+    }
+    events.push(Event::Start(start));
+    element.children.iter().for_each(|child| collect(child, events));
+    events.push(Event::End(BytesEnd::new(element.name.as_str())));
+}
+
+/// A character that XML 1.0 has no way to write, not even as a reference, becomes the replacement character.
+fn legal(c: char) -> char {
+    match c {
+        '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..='\u{10ffff}' => c,
+        _ => '\u{fffd}',
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn form() {
+        let tree = Element::new("a").children([Element::new("b").with("x", "1 < 2\n\"\u{1}\"")]);
+        let expected =
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<a>\n  <b x=\"1 &lt; 2&#10;&quot;\u{fffd}&quot;\"/>\n</a>\n";
+        assert_eq!(print(&tree), expected);
+    }
+}
