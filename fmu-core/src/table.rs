@@ -21,6 +21,7 @@ pub struct Part<W: 'static, P: 'static> {
 pub(crate) trait Node<W>: Sync {
     fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
+    fn element(&self, index: usize) -> Option<usize>;
 }
 
 impl<W, P> Node<W> for Part<W, P> {
@@ -30,6 +31,10 @@ impl<W, P> Node<W> for Part<W, P> {
 
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {
         self.table.locate_into(index, name)
+    }
+
+    fn element(&self, index: usize) -> Option<usize> {
+        self.table.element(index)
     }
 }
 
@@ -112,6 +117,15 @@ impl<W: 'static> Table<W> {
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
         };
         Some((&row.meta, slot))
+    }
+
+    /// Which element of an array variable `index` is, 0 for a scalar; `None` past the end. Does not allocate.
+    pub fn element(&self, index: usize) -> Option<usize> {
+        let place = self.places[..self.len].get(index)?;
+        match &self.rows[usize::from(place.row)].access {
+            Access::Part { node, .. } => node.element(usize::from(place.inner)),
+            _ => Some(usize::from(place.inner)),
+        }
     }
 
     /// Full name and description of variable `index`, and which element of an array it is (0 for a scalar).

@@ -90,6 +90,9 @@ fn indices_are_offsets_and_parts_are_seen_through() {
     assert_eq!(Small::TABLE.len(), 10);
     let (name, meta, element) = Small::TABLE.locate(4).unwrap();
     assert_eq!((name.as_str(), meta.dimension, element), ("load.map", Some(3), 1));
+    let elements: Vec<_> = (0..11).map(|i| Small::TABLE.element(i)).collect();
+    assert_eq!(elements[2..7], [Some(0), Some(0), Some(1), Some(2), Some(0)]);
+    assert_eq!(elements[10], None);
     let Some((_, Slot::Real(x))) = Small::TABLE.entry(&mut block, 5) else { panic!("an element") };
     *x = 7.0;
     assert_eq!(block.model.load.map, [0.0, 1.0, 7.0]);
