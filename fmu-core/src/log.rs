@@ -1,13 +1,24 @@
-//! The log categories of every FMU: what the binary logs under and the XML lists (FMI 2.0.5, 2.2.4; FMI 3.0.2, 2.4.5).
+//! The log categories, by the standards' own names (FMI 2.0.5, 2.2.4; FMI 3.0.2, 2.4.5).
 
-/// Name and description of each category; the names are the standards' own.
+/// What happened, as a step or a set succeeded.
+pub const EVENTS: &str = "logEvents";
+/// A status Warning.
+pub const WARNING: &str = "logStatusWarning";
+/// A status Discard.
+pub const DISCARD: &str = "logStatusDiscard";
+/// A status Error.
+pub const ERROR: &str = "logStatusError";
+/// A status Fatal.
+pub const FATAL: &str = "logStatusFatal";
+
+/// Every category that a message can have: its name and its description. No message has another one.
 pub const CATEGORIES: &[(&str, &str)] = &[
-    ("logEvents", "Instantiated, initialised, terminated, reset"),
-    ("logStatusWarning", "Calls that returned Warning"),
-    ("logStatusDiscard", "Calls that returned Discard"),
-    ("logStatusError", "Calls that returned Error: what was called, with what, and what was allowed"),
-    ("logStatusFatal", "Calls that returned Fatal"),
+    (EVENTS, "What happens when all is well"),
+    (WARNING, "Messages that come with the status Warning"),
+    (DISCARD, "Messages that come with the status Discard"),
+    (ERROR, "Messages that come with the status Error"),
+    (FATAL, "Messages that come with the status Fatal"),
 ];
 
-/// A category of FMI 2.0 only: all of [`CATEGORIES`] at once.
-pub const FMI2_ALL: (&str, &str) = ("logAll", "All categories");
+/// In FMI 2.0 only: all categories at once.
+pub const ALL: &str = "logAll";
