@@ -1,10 +1,10 @@
 //! The neutral description: what a binary tells of its model, from which XML, documentation and tools are made.
 
+use crate::Fault;
 use crate::model::{Block, Experiment, Model};
 use crate::probe;
 use crate::unit::{Exponents, Quantity};
 use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Slot, Variability};
-use crate::Fault;
 use serde::{Deserialize, Serialize};
 
 /// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
@@ -122,7 +122,7 @@ impl Description {
         let dependencies = probe::initial_dependencies::<M>();
         let table = M::TABLE;
         let mut variables: Vec<Variable> = Vec::new();
-        for index in 0..table.len() {
+        for (index, dependencies) in dependencies.iter().enumerate() {
             let Some((name, meta, element)) = table.locate(index) else { continue };
             let Some((_, slot)) = table.entry(&mut block, index) else { continue };
             let start = settable(meta.causality).then(|| value(&slot));
@@ -138,7 +138,7 @@ impl Description {
             if variables.iter().any(|other| other.name == name) {
                 return Err(Fault::new(format!("two variables of {} have the name {name}", M::INFO.name)));
             }
-            let initial_dependencies = dependencies[index].as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
+            let initial_dependencies = dependencies.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
             variables.push(variable(name, meta, reference(index), start, initial_dependencies));
         }
         check_types(&variables)?;
@@ -233,7 +233,11 @@ fn check_start(name: &str, meta: &Meta, start: Value) -> Result<(), Fault> {
         (Value::Integer(x), _) => meta.range.contains(f64::from(x)),
         (Value::Boolean(_), _) => true,
     };
-    if allowed { Ok(()) } else { Err(Fault::value(name, format!("{start:?} at the start"), Range::to_string(&meta.range))) }
+    if allowed {
+        Ok(())
+    } else {
+        Err(Fault::value(name, format!("{start:?} at the start"), Range::to_string(&meta.range)))
+    }
 }
 
 fn check_types(variables: &[Variable]) -> Result<(), Fault> {

@@ -59,7 +59,8 @@ fn change<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
         Slot::Real(x) => {
             let scale = if *x == 0.0 { meta.nominal.unwrap_or(1.0) } else { *x };
             for _ in 0..20 {
-                let candidate = if *x == 0.0 { scale * draw.between(-1.0, 1.0) } else { scale * draw.between(0.5, 1.5) };
+                let candidate =
+                    if *x == 0.0 { scale * draw.between(-1.0, 1.0) } else { scale * draw.between(0.5, 1.5) };
                 if meta.range.contains(candidate) && candidate.to_bits() != x.to_bits() {
                     *x = candidate;
                     return;

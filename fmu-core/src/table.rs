@@ -54,7 +54,10 @@ pub struct Table<W: 'static> {
 }
 
 impl<W: 'static> Table<W> {
-    /// Builds the table; a duplicate name or an empty range does not compile.
+    /// Builds the table.
+    ///
+    /// # Panics
+    /// While compiling, on a duplicate name, an empty range or more than [`CAPACITY`] variables.
     #[expect(clippy::cast_possible_truncation, reason = "CAPACITY fits in 16 bits, asserted below")]
     pub const fn new(rows: &'static [Row<W>]) -> Self {
         assert!(CAPACITY <= u16::MAX as usize);

@@ -130,6 +130,9 @@ mod tests {
 
     #[test]
     fn guid_has_its_form() {
-        assert_eq!(Hash(0x0123_4567_89ab_cdef_0123_4567_89ab_cdef).guid().as_str(), "{01234567-89ab-cdef-0123-456789abcdef}");
+        assert_eq!(
+            Hash(0x0123_4567_89ab_cdef_0123_4567_89ab_cdef).guid().as_str(),
+            "{01234567-89ab-cdef-0123-456789abcdef}"
+        );
     }
 }

@@ -125,8 +125,7 @@ pub const KG_M2: Quantity = Quantity::new("Inertia", Unit::si("kg.m2", Exponents
 pub const NM_S_PER_RAD: Quantity =
     Quantity::new("ViscousFriction", Unit::si("N.m.s/rad", Exponents::mechanical(1, 2, -1, 0).with_rad(-1)));
 /// Angle in rad, shown in degrees.
-pub const RADIAN: Quantity =
-    Quantity::new("Angle", Unit::si("rad", Exponents::NONE.with_rad(1))).shown_in(DEGREE);
+pub const RADIAN: Quantity = Quantity::new("Angle", Unit::si("rad", Exponents::NONE.with_rad(1))).shown_in(DEGREE);
 /// Speed of rotation in rad/s, shown in rpm.
 pub const SPEED: Quantity = Quantity::new("Speed", RAD_PER_S_UNIT).shown_in(RPM);
 /// Angular frequency in rad/s: bandwidths and poles, shown as they are.

@@ -167,16 +167,8 @@ impl<W: 'static> Row<W> {
         kind: Kind,
         access: Access<W>,
     ) -> Self {
-        let meta = Meta {
-            name,
-            description,
-            causality,
-            variability,
-            kind,
-            range: Range::ALL,
-            nominal: None,
-            dimension: None,
-        };
+        let meta =
+            Meta { name, description, causality, variability, kind, range: Range::ALL, nominal: None, dimension: None };
         Self { meta, access }
     }
 
@@ -217,11 +209,7 @@ impl<W: 'static> Row<W> {
     }
 
     /// A Boolean input.
-    pub const fn boolean_input(
-        name: &'static str,
-        description: &'static str,
-        get: fn(&mut W) -> &mut bool,
-    ) -> Self {
+    pub const fn boolean_input(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut bool) -> Self {
         let access = Access::Boolean(get);
         Self::new(name, description, Causality::Input, Variability::Discrete, Kind::Boolean, access)
     }
@@ -247,21 +235,13 @@ impl<W: 'static> Row<W> {
     }
 
     /// An integer output.
-    pub const fn integer_output(
-        name: &'static str,
-        description: &'static str,
-        get: fn(&mut W) -> &mut i32,
-    ) -> Self {
+    pub const fn integer_output(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut i32) -> Self {
         let access = Access::Integer(get);
         Self::new(name, description, Causality::Output, Variability::Discrete, Kind::Integer, access)
     }
 
     /// A Boolean output.
-    pub const fn boolean_output(
-        name: &'static str,
-        description: &'static str,
-        get: fn(&mut W) -> &mut bool,
-    ) -> Self {
+    pub const fn boolean_output(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut bool) -> Self {
         let access = Access::Boolean(get);
         Self::new(name, description, Causality::Output, Variability::Discrete, Kind::Boolean, access)
     }
@@ -285,18 +265,13 @@ impl<W: 'static> Row<W> {
         get: fn(&mut W) -> &mut [f64],
     ) -> Self {
         let kind = Kind::Real(quantity);
-        let mut it =
-            Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Reals(get));
+        let mut it = Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Reals(get));
         it.meta.dimension = Some(dimension);
         it
     }
 
     /// An integer parameter.
-    pub const fn integer_parameter(
-        name: &'static str,
-        description: &'static str,
-        get: fn(&mut W) -> &mut i32,
-    ) -> Self {
+    pub const fn integer_parameter(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut i32) -> Self {
         let access = Access::Integer(get);
         Self::new(name, description, Causality::Parameter, Variability::Fixed, Kind::Integer, access)
     }
@@ -333,6 +308,9 @@ impl<W: 'static> Row<W> {
     }
 
     /// A parameter becomes tunable: it may change at communication points.
+    ///
+    /// # Panics
+    /// While compiling, on anything but a parameter.
     pub const fn tunable(mut self) -> Self {
         assert!(matches!(self.meta.causality, Causality::Parameter), "only a parameter can be tunable");
         self.meta.variability = Variability::Tunable;
@@ -366,6 +344,9 @@ impl<W: 'static> Row<W> {
     }
 
     /// Typical magnitude, for solvers' scaling; not 0.
+    ///
+    /// # Panics
+    /// While compiling, on 0.
     pub const fn nominal(mut self, magnitude: f64) -> Self {
         assert!(magnitude != 0.0, "a nominal value must not be 0");
         self.meta.nominal = Some(magnitude);

@@ -20,11 +20,15 @@ static MODE: Enumeration = Enumeration {
 };
 
 type P = Row<Load>;
-const LOAD: &Table<Load> = &Table::new(const { &[
-    P::parameter("R", &OHM, "Resistance", |m| &mut m.r).above(0.0),
-    P::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.map),
-    P::enumeration_parameter("mode", &MODE, "Mode", |m| &mut m.mode),
-] });
+const LOAD: &Table<Load> = &Table::new(
+    const {
+        &[
+            P::parameter("R", &OHM, "Resistance", |m| &mut m.r).above(0.0),
+            P::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.map),
+            P::enumeration_parameter("mode", &MODE, "Mode", |m| &mut m.mode),
+        ]
+    },
+);
 
 #[derive(Clone, Serialize, Deserialize)]
 struct Small {
@@ -61,14 +65,18 @@ impl Model for Small {
         experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
         documentation: "",
     };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(const { &[
-        V::input("u", &VOLT, "Voltage", |m| &mut m.model.u),
-        V::output("i", &AMPERE, "Current", |m| &mut m.out.i),
-        V::part("load.", &Part { table: LOAD, lens: |m| &mut m.model.load }),
-        V::boolean_parameter("on", "On", |m| &mut m.model.on),
-        V::integer_parameter("n", "Count", |m| &mut m.model.n).at_least(1.0),
-        V::calculated("gain", &OHM, "Gain", |m| &mut m.model.gain),
-    ] });
+    const TABLE: &'static Table<Block<Self>> = &Table::new(
+        const {
+            &[
+                V::input("u", &VOLT, "Voltage", |m| &mut m.model.u),
+                V::output("i", &AMPERE, "Current", |m| &mut m.out.i),
+                V::part("load.", &Part { table: LOAD, lens: |m| &mut m.model.load }),
+                V::boolean_parameter("on", "On", |m| &mut m.model.on),
+                V::integer_parameter("n", "Count", |m| &mut m.model.n).at_least(1.0),
+                V::calculated("gain", &OHM, "Gain", |m| &mut m.model.gain),
+            ]
+        },
+    );
     fn derive(&mut self) {
         self.gain = 2.0 * self.load.r;
     }
@@ -103,7 +111,8 @@ fn indices_are_offsets_and_parts_are_seen_through() {
 fn description_says_what_depends_on_what() {
     let d = Description::of::<Small>().unwrap();
     let names: Vec<_> = d.variables.iter().map(|v| (v.name.as_str(), v.value_reference)).collect();
-    let expected = [("u", 1), ("i", 2), ("load.R", 3), ("load.map", 4), ("load.mode", 7), ("on", 8), ("n", 9), ("gain", 10)];
+    let expected =
+        [("u", 1), ("i", 2), ("load.R", 3), ("load.map", 4), ("load.mode", 7), ("on", 8), ("n", 9), ("gain", 10)];
     assert_eq!(names, expected);
     // i depends on u, R, the middle of the map, on and n; the gain on R alone.
     assert_eq!(d.variable("i").unwrap().initial_dependencies, Some(vec![1, 3, 5, 8, 9]));

@@ -74,7 +74,7 @@ struct Gains {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct State {
     /// Number of samples taken: the next one is at `samples` T_s.
-    #[serde(with = "postcard_fixed")]
+    #[serde(with = "fixed_size")]
     samples: u64,
     estimator: Rasmussen,
     speed: SpeedController,
@@ -88,9 +88,10 @@ struct State {
 }
 
 /// A count in eight bytes whatever its value, so that every stored state has the same size.
-mod postcard_fixed {
+mod fixed_size {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
     pub(super) fn serialize<S: Serializer>(count: &u64, to: S) -> Result<S::Ok, S::Error> {
         count.to_le_bytes().serialize(to)
     }

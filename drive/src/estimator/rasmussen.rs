@@ -110,3 +110,110 @@ pub const OBSERVER: &Table<RasmussenParameters> = &Table::new(
         ]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Rotor;
+    use crate::math::wrap;
+
+    const T_S: f64 = 1e-4;
+
+    /// Number of samples in a time (s).
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few seconds")]
+    fn samples(seconds: f64) -> usize {
+        (seconds / T_S).round() as usize
+    }
+
+    /// The observer beside a machine that turns at `w` (rad/s, electrical) with the current `i` in its rotor frame:
+    /// angle errors in rad at each sample, from `theta_tilde` on. The voltage is the exact mean of each interval, plus
+    /// `du` (V) in the rotor frame, which the machine does not see.
+    fn beside(par: &RasmussenParameters, hat: &Motor, w: f64, i: DqHat, theta_tilde: f64, seconds: f64) -> Vec<f64> {
+        let motor = Motor::default();
+        let rotor = |theta: f64| Axis::<Estimated>::at(theta);
+        let current = |theta: f64| rotor(theta).to_stator(i);
+        let flux = |theta: f64| rotor(theta).to_stator(DqHat::new(motor.psi_M, 0.0) + inductive(&motor, i));
+        let mut observer = Rasmussen { w, w_i: w, ..Rasmussen::start(hat, theta_tilde, current(0.0)) };
+        let (mut theta, mut errors) = (0.0, vec![theta_tilde]);
+        for _ in 0..samples(seconds) {
+            let next = theta + w * T_S;
+            // The trapezoid of R i on both sides: what the observer assumes of the current between samples.
+            let resistive = (current(theta) + current(next)) * (0.5 * motor.R_s);
+            let u = (flux(next) - flux(theta)) * (1.0 / T_S) + resistive;
+            theta = next;
+            let estimate = observer.update(par, hat, &Sample { i: current(theta), u }, T_S);
+            errors.push(wrap(estimate.theta - theta));
+        }
+        errors
+    }
+
+    /// Decay rate in 1/s between two stretches, from the largest error of each.
+    fn decay(errors: &[f64], from: f64, to: f64, stretch: f64) -> f64 {
+        let peak = |t: f64| errors[samples(t)..samples(t + stretch)].iter().fold(0.0_f64, |m, e| m.max(e.abs()));
+        (peak(from) / peak(to)).ln() / (to - from)
+    }
+
+    fn rpm(n: f64) -> f64 {
+        n * std::f64::consts::PI / 10.0 // 3 pole pairs
+    }
+
+    /// Reference figure 10: poles at -c_1/2 above |w| = c_1/2, a slow one at -w^2/c_1 below.
+    #[test]
+    fn an_initial_error_decays_as_the_linearisation_says() {
+        let (par, motor, start) = (RasmussenParameters::default(), Motor::default(), 20.0_f64.to_radians());
+        for n in [300.0, 500.0, 1000.0, 1500.0] {
+            let errors = beside(&par, &motor, rpm(n), DqHat::ZERO, start, 0.4);
+            let period = std::f64::consts::TAU / rpm(n);
+            let rate = decay(&errors, 0.05, 0.25, period);
+            assert!((rate - 25.0).abs() < 2.5, "{n} rpm: {rate} 1/s");
+        }
+        let errors = beside(&par, &motor, rpm(20.0), DqHat::ZERO, start, 6.0);
+        let (rate, expected) = (decay(&errors, 2.0, 5.0, 2.0 * T_S), rpm(20.0) * rpm(20.0) / 50.0);
+        assert!((rate / expected - 1.0).abs() < 0.15, "20 rpm: {rate} 1/s, not {expected}");
+    }
+
+    /// At standstill the error does not move: nothing of it is in the voltage.
+    #[test]
+    fn standstill_is_unobservable() {
+        let errors = beside(&RasmussenParameters::default(), &Motor::default(), 0.0, DqHat::ZERO, 0.3, 1.0);
+        // What moves is the fast transient of the adaptation; after it the error stays where it is.
+        let (early, late) = (errors[2000], errors[10_000]);
+        assert!((early - late).abs() < 1e-6 && late.abs() > 0.05, "{early} {late}");
+    }
+
+    /// The steady state that corrects Rasmussen (24): with du = (R - R^) i, exactly
+    /// w (psi_rd^ - psi_M cos theta~) = du_q and -w psi_M sin theta~ = du_d - c_1 (psi_rd^ - psi_M), in the estimated
+    /// frame. To first order sin theta~ = (-du_d + c_1 du_q / w) / (w psi_M): the opposite sign of the print.
+    #[test]
+    fn resistance_error_turns_the_estimate_as_corrected_24_says() {
+        let (par, motor) = (RasmussenParameters::default(), Motor::default());
+        let hat = Motor { R_s: 0.8 * motor.R_s, ..motor.clone() };
+        for (w, i) in [
+            (rpm(500.0), DqHat::new(5.0, 0.0)),
+            (rpm(500.0), DqHat::new(0.0, 3.0)),
+            (rpm(-800.0), DqHat::new(2.0, 3.0)),
+        ] {
+            let theta_tilde = *beside(&par, &hat, w, i, 0.0, 1.5).last().unwrap();
+            // Current in the estimated frame: the rotor frame's turned back by theta~.
+            let seen = Axis::<Rotor>::at(theta_tilde).from_stator(AlphaBeta::new(i.d(), i.q()));
+            let (du_d, du_q) = (0.4 * seen.d(), 0.4 * seen.q());
+            let psi_rd = du_q / w + motor.psi_M * theta_tilde.cos();
+            let residual = -w * motor.psi_M * theta_tilde.sin() - (du_d - par.c_1 * (psi_rd - motor.psi_M));
+            assert!(residual.abs() < 2e-3 * (du_d.abs() + du_q.abs()), "residual {residual} V at w = {w}");
+            let first_order = (-du_d + par.c_1 * du_q / w) / (w * motor.psi_M);
+            assert!((theta_tilde - first_order).abs() < 0.05 * first_order.abs(), "{theta_tilde} {first_order}");
+        }
+    }
+
+    /// At the start psi_r^ is the magnet's flux whatever the current, so nothing moves.
+    #[test]
+    fn start_is_an_equilibrium() {
+        let motor = Motor::default();
+        for i in [AlphaBeta::ZERO, AlphaBeta::new(3.0, -2.0)] {
+            let mut observer = Rasmussen::start(&motor, 0.7, i);
+            let u = i * motor.R_s;
+            let estimate = observer.update(&RasmussenParameters::default(), &motor, &Sample { i, u }, T_S);
+            assert!((estimate.theta - 0.7).abs() < 1e-15 && estimate.w.abs() < 1e-9, "{estimate:?}");
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The closed loop run natively: the reference for every figure and for the packed FMUs.
+#![allow(dead_code, missing_docs, clippy::missing_panics_doc)]
+
+use drive::Pair;
+use fmu::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
+use fmu_core::{Block, Model, Slot};
+
+/// Sets the variable `name` of a block; integers and Booleans from their number.
+pub fn set<M: Model>(block: &mut Block<M>, name: &str, value: f64) {
+    let index = (0..M::TABLE.len())
+        .find(|&i| M::TABLE.locate(i).is_some_and(|(n, ..)| n == name))
+        .unwrap_or_else(|| panic!("{} has no variable {name}", M::INFO.name));
+    match M::TABLE.entry(block, index) {
+        Some((_, Slot::Real(x))) => *x = value,
+        #[expect(clippy::cast_possible_truncation, reason = "small integers in tests")]
+        Some((_, Slot::Integer(x))) => *x = value as i32,
+        Some((_, Slot::Boolean(x))) => *x = value != 0.0,
+        None => unreachable!(),
+    }
+}
+
+/// Angle error theta^ - theta in deg, wrapped.
+pub fn error(pair: &Pair) -> f64 {
+    drive::math::wrap(pair.controller.out.theta_est - pair.plant.out.theta_e).to_degrees()
+}
+
+/// Runs a pair for `duration` (s) in steps of `h` (s); `each` sees it before every step with the time, and at the end.
+pub fn run(pair: &mut Pair, h: f64, duration: f64, mut each: impl FnMut(f64, &mut Pair)) {
+    pair.start().expect("parameters that fit together");
+    let mut k = 0_u32;
+    while f64::from(k) * h < duration - 0.5 * h {
+        each(f64::from(k) * h, pair);
+        pair.step(h).expect("a step");
+        k += 1;
+    }
+    each(f64::from(k) * h, pair);
+}
+
+/// A pair with parameters set on both sides.
+pub fn pair(plant: &[(&str, f64)], controller: &[(&str, f64)]) -> Pair {
+    let mut pair = Pair::default();
+    for (name, value) in plant {
+        set(&mut pair.plant, name, *value);
+    }
+    for (name, value) in controller {
+        set(&mut pair.controller, name, *value);
+    }
+    pair
+}
+
+/// The native closed loop.
+pub struct Native;
+
+impl ClosedLoop for Native {
+    fn run(&self, scenario: &Scenario, h: f64) -> anyhow::Result<Trace> {
+        let mut trace = Trace::default();
+        let (mut k, every) = (0, samples_apart(h));
+        run(&mut pair(scenario.plant, scenario.controller), h, scenario.duration, |t, p| {
+            p.controller.model.inputs.speed_ref = at(scenario.speed_ref, t) * RPM;
+            p.plant.model.inputs.tau_load = at(scenario.load, t);
+            k += 1;
+            if (k - 1) % every != 0 {
+                return;
+            }
+            let (plant, controller) = (&p.plant.out, &p.controller.out);
+            let point = Point {
+                speed: plant.speed,
+                theta_e: plant.theta_e,
+                speed_est: controller.speed_est,
+                theta_est: controller.theta_est,
+                i_d: controller.i.d,
+                i_q: controller.i.q,
+            };
+            trace.push(scenario, t, &point);
+        });
+        Ok(trace)
+    }
+}
