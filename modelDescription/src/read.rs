@@ -1,11 +1,117 @@
-//! reader (next)
-use crate::description::ModelDescription;
-use crate::error::Error;
+//! modelDescription.xml of any FMU of either standard.
+//!
+//! The reader wants what an importer cannot do without: well-formed XML, a version it knows, required attributes, values of
+//! the right form. It does not judge: two variables of one name or an undefined unit are read as they are, for a checker to
+//! find. Elements and attributes that it does not know are passed over.
 
-/// Reads.
+mod attributes;
+mod structure;
+mod types;
+mod variables;
+
+use crate::description::{CoSimulation, Experiment, LogCategory, ModelDescription};
+use crate::error::Error;
+use crate::version::FmiVersion;
+use crate::xml::{Element, parse};
+use attributes::{boolean, number, owned, required};
+
+/// Reads modelDescription.xml; the bytes must be UTF-8, as both standards require.
 ///
 /// # Errors
-/// Not XML.
-pub fn read(_xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
-    Err(Error::NotXml { line: 1, reason: String::new() })
+/// Names the line, what is there and what was expected.
+pub fn read(xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
+    let bytes = xml.as_ref();
+    let text = std::str::from_utf8(bytes).map_err(|e| {
+        let line = bytes[..e.valid_up_to()].split(|&b| b == b'\n').count();
+        Error::NotXml { line, reason: "not UTF-8".into() }
+    })?;
+    let root = parse(text)?;
+    if root.name != "fmiModelDescription" {
+        return Err(Error::OtherRoot { line: root.line, found: root.name });
+    }
+    let version = version(&root)?;
+    let token = match version {
+        FmiVersion::V2 => "guid",
+        FmiVersion::V3 => "instantiationToken",
+    };
+    let types = types::definitions(&root, version)?;
+    let structure = element(&root, "ModelStructure")?;
+    Ok(ModelDescription {
+        version,
+        fmi_version: required(&root, "fmiVersion")?.into(),
+        model_name: required(&root, "modelName")?.into(),
+        token: required(&root, token)?.into(),
+        description: owned(&root, "description"),
+        author: owned(&root, "author"),
+        model_version: owned(&root, "version"),
+        copyright: owned(&root, "copyright"),
+        license: owned(&root, "license"),
+        generation_tool: owned(&root, "generationTool"),
+        generation_date_and_time: owned(&root, "generationDateAndTime"),
+        structured_names: root.get("variableNamingConvention") == Some("structured"),
+        co_simulation: root.child("CoSimulation").map(co_simulation).transpose()?,
+        model_exchange: model_identifier(&root, "ModelExchange")?,
+        scheduled_execution: model_identifier(&root, "ScheduledExecution")?,
+        default_experiment: root.child("DefaultExperiment").map_or(Ok(Experiment::default()), experiment)?,
+        units: types::units(&root)?,
+        variables: variables::variables(element(&root, "ModelVariables")?, version, &types)?,
+        types,
+        log_categories: log_categories(&root)?,
+        outputs: structure::unknowns(structure, version, "Outputs", "Output")?,
+        derivatives: structure::unknowns(structure, version, "Derivatives", "ContinuousStateDerivative")?,
+        initial_unknowns: structure::unknowns(structure, version, "InitialUnknowns", "InitialUnknown")?,
+    })
+}
+
+/// The version, before anything else: FMI 1.0 has the same root element and other attributes.
+fn version(root: &Element) -> Result<FmiVersion, Error> {
+    let found = required(root, "fmiVersion")?;
+    // FMI 3.0.2, 2.4.1 allows patch numbers and suffixes, 3.0.1 or 3.0-rc.2.
+    let patch = found.strip_prefix("3.0").is_some_and(|rest| rest.starts_with(['.', '-']));
+    match found {
+        "2.0" => Ok(FmiVersion::V2),
+        _ if found == "3.0" || patch => Ok(FmiVersion::V3),
+        _ => Err(Error::UnsupportedVersion { line: root.line, found: found.into() }),
+    }
+}
+
+/// A required child.
+fn element<'a>(parent: &'a Element, name: &str) -> Result<&'a Element, Error> {
+    let missing = || Error::MissingElement { line: parent.line, parent: parent.name.clone(), element: name.into() };
+    parent.child(name).ok_or_else(missing)
+}
+
+fn model_identifier(root: &Element, interface: &str) -> Result<Option<String>, Error> {
+    root.child(interface).map(|e| required(e, "modelIdentifier").map(str::to_owned)).transpose()
+}
+
+fn co_simulation(element: &Element) -> Result<CoSimulation, Error> {
+    const IDENTIFIER: &str = "modelIdentifier";
+    for (name, _) in &element.attributes {
+        // Every capability that begins like this is an xs:boolean, in both standards.
+        if ["can", "has", "might", "needs", "provides"].iter().any(|verb| name.starts_with(verb)) {
+            boolean(element, name)?;
+        }
+    }
+    Ok(CoSimulation {
+        model_identifier: required(element, IDENTIFIER)?.into(),
+        attributes: element.attributes.iter().filter(|(name, _)| name != IDENTIFIER).cloned().collect(),
+        line: element.line,
+    })
+}
+
+fn experiment(element: &Element) -> Result<Experiment, Error> {
+    Ok(Experiment {
+        start: number(element, "startTime")?,
+        stop: number(element, "stopTime")?,
+        step: number(element, "stepSize")?,
+        tolerance: number(element, "tolerance")?,
+    })
+}
+
+fn log_categories(root: &Element) -> Result<Vec<LogCategory>, Error> {
+    let categories = root.child("LogCategories").into_iter().flat_map(|list| list.all("Category"));
+    categories
+        .map(|e| Ok(LogCategory { name: required(e, "name")?.into(), description: owned(e, "description") }))
+        .collect()
 }

@@ -83,7 +83,7 @@ fn log_categories(version: FmiVersion) -> Element {
         Element::new("Category").with("name", name).with_text("description", description)
     };
     // FMI 3.0 dropped the category; an empty list of categories means all of them in both standards.
-    let all = (version == FmiVersion::V2).then_some(("logAll", "All messages"));
+    let all = (version == FmiVersion::V2).then_some((fmu_core::log::ALL, "All messages"));
     Element::new("LogCategories").children(fmu_core::log::CATEGORIES.iter().chain(&all).map(category))
 }
 

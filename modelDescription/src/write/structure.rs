@@ -8,53 +8,54 @@ use fmu_core::description::{TIME, Variable, settable};
 use fmu_core::{Causality, Description};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// An entry: the number of the variable and those of what it depends on, `None` where that is not known.
+type Unknown = (u32, Option<Vec<u32>>);
+
 /// The model structure of a model whose outputs change through steps only.
 pub(super) fn structure(description: &Description, version: FmiVersion) -> Element {
     let numbering = Numbering::of(description, version);
-    let outputs = || numbering.variables.iter().filter(|(v, _)| v.causality == Causality::Output);
-    // All our outputs are initial="calculated", so the initial unknowns are all of them and the calculated parameters
-    // (2.2.8; 2.4.8), in the order of the variables.
-    let initial = || {
-        numbering
-            .variables
-            .iter()
-            .filter(|(v, _)| matches!(v.causality, Causality::Output | Causality::CalculatedParameter))
-    };
-    // At a communication point no set changes an output, only fmi2DoStep or fmi3DoStep does: dependencies="".
-    let outputs: Vec<_> = outputs().flat_map(|(_, numbers)| numbers).map(|&number| (number, Some(vec![]))).collect();
-    let initial: Vec<_> =
-        initial().flat_map(|(v, numbers)| numbers.iter().map(|&number| (number, numbering.known(v)))).collect();
+    let (mut outputs, mut initial) = (Vec::new(), Vec::new());
+    for (v, numbers) in &numbering.variables {
+        let output = v.causality == Causality::Output;
+        if output {
+            // At a communication point no set changes an output, only fmi2DoStep and fmi3DoStep do: no dependencies.
+            outputs.extend(numbers.iter().map(|&number| (number, Some(Vec::new()))));
+        }
+        // Every output is initial="calculated", hence an initial unknown, and so is a calculated parameter. FMI 2.0 wants
+        // them in the order of the variables.
+        if output || v.causality == Causality::CalculatedParameter {
+            initial.extend(numbers.iter().map(|&number| (number, numbering.known(v))));
+        }
+    }
     let root = Element::new("ModelStructure");
     match version {
         FmiVersion::V2 => {
-            let list = |name: &str, unknowns: Vec<_>| {
-                let unknowns = unknowns.into_iter().map(|u| unknown("Unknown", "index", u));
-                Element::new(name).children(unknowns)
+            let list = |name: &str, unknowns: Vec<Unknown>| {
+                Element::new(name).children(unknowns.iter().map(|u| unknown("Unknown", "index", u)))
             };
             // A list that is there must not be empty.
             let lists = [list("Outputs", outputs), list("InitialUnknowns", initial)];
             root.children(lists.into_iter().filter(|list| !list.children.is_empty()))
         }
-        FmiVersion::V3 => {
-            let unknown = |name, u| unknown(name, "valueReference", u);
-            root.children(outputs.into_iter().map(|u| unknown("Output", u)))
-                .children(initial.into_iter().map(|u| unknown("InitialUnknown", u)))
-        }
+        FmiVersion::V3 => root
+            .children(outputs.iter().map(|u| unknown("Output", "valueReference", u)))
+            .children(initial.iter().map(|u| unknown("InitialUnknown", "valueReference", u))),
     }
 }
 
-fn unknown(element: &str, attribute: &str, (number, dependencies): (u32, Option<Vec<u32>>)) -> Element {
-    let join = |words: Vec<String>| words.join(" ");
-    let kinds = dependencies.as_ref().filter(|d| !d.is_empty()).map(|d| vec!["dependent".to_owned(); d.len()]);
+fn unknown(element: &str, attribute: &str, (number, dependencies): &Unknown) -> Element {
+    let list = |d: &Vec<u32>| d.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
+    // The only kind that is right for every function of a parameter in the initialisation mode.
+    let kinds = |d: &Vec<u32>| vec!["dependent"; d.len()].join(" ");
     Element::new(element)
         .with(attribute, number.to_string())
-        .with_some("dependencies", dependencies.map(|d| join(d.iter().map(u32::to_string).collect())))
-        .with_some("dependenciesKind", kinds.map(join))
+        .with_some("dependencies", dependencies.as_ref().map(list))
+        .with_some("dependenciesKind", dependencies.as_ref().filter(|d| !d.is_empty()).map(kinds))
 }
 
 /// How the model structure numbers the variables.
 struct Numbering<'a> {
-    /// Every variable with the numbers of the variables that it is in the XML: one per element in FMI 2.0.
+    /// Every variable with its numbers: one, or one per element of an array in FMI 2.0.
     variables: Vec<(&'a Variable, Vec<u32>)>,
     /// From the value reference of what an unknown may depend on (inputs, parameters, time), array elements too.
     known: BTreeMap<u32, u32>,
@@ -75,9 +76,7 @@ impl<'a> Numbering<'a> {
                     known.insert(reference, number);
                 }
             }
-            if version == FmiVersion::V3 {
-                numbers.truncate(1);
-            }
+            numbers.dedup(); // FMI 3.0 has one variable, whatever its size
             variables.push((v, numbers));
         }
         Self { variables, known }

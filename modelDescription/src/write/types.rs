@@ -12,14 +12,14 @@ use fmu_core::unit::{Exponents, SECOND};
 
 /// `UnitDefinitions`: the unit of time, and those of the variables.
 pub(super) fn units(description: &Description) -> Element {
-    let mut units = vec![unit(SECOND.unit.name, &SECOND.unit.exponents, SECOND.unit.factor)];
+    let mut units = vec![unit(SECOND.unit.name, SECOND.unit.exponents, SECOND.unit.factor)];
     for variable in &description.variables {
         let VariableKind::Real { unit: name, exponents, factor, display, .. } = &variable.kind else { continue };
         if name.is_empty() {
             continue;
         }
         let at = units.iter().position(|u| u.get("name") == Some(name)).unwrap_or_else(|| {
-            units.push(unit(name, exponents, *factor));
+            units.push(unit(name, *exponents, *factor));
             units.len() - 1
         });
         let Some((display, factor, offset)) = display else { continue };
@@ -32,8 +32,8 @@ pub(super) fn units(description: &Description) -> Element {
 }
 
 /// `base value = factor * value`; what is not written is 0, or 1 for the factor.
-fn unit(name: &str, exponents: &Exponents, factor: f64) -> Element {
-    let Exponents { kg, m, s, ampere, kelvin, mol, cd, rad } = *exponents;
+fn unit(name: &str, exponents: Exponents, factor: f64) -> Element {
+    let Exponents { kg, m, s, ampere, kelvin, mol, cd, rad } = exponents;
     let mut base = Element::new("BaseUnit");
     for (name, exponent) in BaseUnit::NAMES.into_iter().zip([kg, m, s, ampere, kelvin, mol, cd, rad]) {
         base = base.with_some(name, (exponent != 0).then(|| exponent.to_string()));

@@ -1,0 +1,128 @@
+//! A description with every kind of variable, made by hand: no model stands behind it.
+
+#![allow(dead_code)] // each test file uses its own part
+
+use fmu_core::description::{Value, Variable, VariableKind};
+use fmu_core::unit::{ONE, Quantity, RAD_PER_S, SPEED, VOLT};
+use fmu_core::{Causality, Description, Experiment, Variability};
+use model_description::{FmiVersion, Generation, write};
+
+/// Both standards.
+pub(crate) const VERSIONS: [FmiVersion; 2] = [FmiVersion::V2, FmiVersion::V3];
+
+/// Everything that XML gives a meaning, and what a careless writer loses.
+pub(crate) const AWKWARD: &str = "a < b & c > d, \"quoted\" 'and' \u{3c8}_M\u{b2} \u{1f50b}\n\tsecond line";
+
+pub(crate) fn generation() -> Generation {
+    Generation { tool: "sample 1.0".into(), date_and_time: "2026-01-02T03:04:05Z".into() }
+}
+
+pub(crate) fn xml(version: FmiVersion) -> String {
+    write(&sample(), version, &generation())
+}
+
+pub(crate) fn real(quantity: &Quantity) -> VariableKind {
+    VariableKind::Real {
+        quantity: quantity.name.into(),
+        unit: quantity.unit.name.into(),
+        exponents: quantity.unit.exponents,
+        factor: quantity.unit.factor,
+        display: quantity.display.map(|d| (d.name.into(), d.factor, d.offset)),
+    }
+}
+
+pub(crate) fn variable(
+    name: &str,
+    value_reference: u32,
+    pair: (Causality, Variability),
+    kind: VariableKind,
+) -> Variable {
+    Variable {
+        name: name.into(),
+        description: format!("The variable {name}"),
+        value_reference,
+        causality: pair.0,
+        variability: pair.1,
+        kind,
+        min: None,
+        max: None,
+        allowed: None,
+        nominal: None,
+        dimension: None,
+        start: None,
+        initial_dependencies: None,
+    }
+}
+
+/// Every kind of variable; the array owns the value references 4, 5 and 6.
+pub(crate) fn sample() -> Description {
+    let parameter = (Causality::Parameter, Variability::Fixed);
+    let output = (Causality::Output, Variability::Discrete);
+    let observer = VariableKind::Enumeration {
+        name: "Observer".into(),
+        description: "What estimates the <speed>".into(),
+        items: vec![(1, "Simple".into(), "The simple one".into()), (3, "Good".into(), "5 % better & slower".into())],
+    };
+    let percent = VariableKind::Real {
+        quantity: "Share".into(),
+        unit: "%".into(),
+        exponents: ONE.unit.exponents,
+        factor: 0.01,
+        display: Some(("ppm".into(), 1e4, 0.5)),
+    };
+    let variables = vec![
+        Variable {
+            start: Some(vec![Value::Real(325.1)]),
+            min: Some(0.0),
+            max: Some(1e21),
+            nominal: Some(300.0),
+            description: AWKWARD.into(),
+            ..variable("u_dc", 1, (Causality::Input, Variability::Continuous), real(&VOLT))
+        },
+        Variable {
+            start: Some(vec![Value::Boolean(true)]),
+            ..variable("enable", 2, (Causality::Input, Variability::Discrete), VariableKind::Boolean)
+        },
+        Variable {
+            start: Some(vec![Value::Integer(3)]),
+            min: Some(1.0),
+            max: Some(3e9),
+            ..variable("motor.n_p", 3, parameter, VariableKind::Integer)
+        },
+        Variable {
+            start: Some(vec![Value::Real(0.1), Value::Real(-1e-7), Value::Real(1.0 / 3.0)]),
+            dimension: Some(3),
+            ..variable("filter.b", 4, parameter, real(&ONE))
+        },
+        Variable { start: Some(vec![Value::Integer(3)]), ..variable("observer", 7, parameter, observer) },
+        Variable {
+            start: Some(vec![Value::Real(5e-324)]),
+            min: Some(f64::MIN),
+            ..variable("bandwidth", 8, (Causality::Parameter, Variability::Tunable), real(&RAD_PER_S))
+        },
+        Variable { start: Some(vec![Value::Real(50.0)]), ..variable("share", 9, parameter, percent) },
+        Variable {
+            initial_dependencies: Some(vec![6, 3, 4]),
+            ..variable("gain", 10, (Causality::CalculatedParameter, Variability::Fixed), real(&ONE))
+        },
+        Variable {
+            initial_dependencies: Some(vec![]),
+            ..variable("speed", 11, (Causality::Output, Variability::Continuous), real(&SPEED))
+        },
+        Variable { initial_dependencies: Some(vec![0, 8]), ..variable("sector", 12, output, VariableKind::Integer) },
+        Variable { initial_dependencies: Some(vec![2]), ..variable("ready", 13, output, VariableKind::Boolean) },
+        variable("inner", 14, (Causality::Local, Variability::Continuous), real(&SPEED)),
+    ];
+    Description {
+        name: "Sample".into(),
+        description: AWKWARD.into(),
+        version: "1.2.3".into(),
+        author: "A & B".into(),
+        license: "MIT OR Apache-2.0".into(),
+        copyright: "\u{a9} 2026".into(),
+        token: "{01234567-89ab-cdef-0123-456789abcdef}".into(),
+        experiment: Experiment { start: 0.0, stop: 2.0, step: 1e-4 },
+        documentation: String::new(),
+        variables,
+    }
+}

@@ -1,0 +1,211 @@
+//! What the writer says, read back and held against the description and the rules of the standards.
+
+mod common;
+
+use common::{AWKWARD, VERSIONS, generation, sample, xml};
+use fmu_core::Description;
+use model_description::{
+    BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, Unknown, Variability, read, write,
+};
+
+fn sample_read(version: FmiVersion) -> ModelDescription {
+    read(xml(version)).unwrap()
+}
+
+/// The whole text, so that a change of it is seen. `UPDATE_GOLDEN=1 cargo test -p model-description` accepts a change.
+#[test]
+fn golden_files() {
+    for version in VERSIONS {
+        let path = format!("{}/tests/golden/sample-{version}.xml", env!("CARGO_MANIFEST_DIR"));
+        let written = xml(version);
+        if std::env::var_os("UPDATE_GOLDEN").is_some() {
+            std::fs::write(&path, &written).unwrap();
+        }
+        let golden = std::fs::read_to_string(&path).unwrap();
+        assert!(written == golden, "{path} differs from what is written now:\n{written}");
+        assert_eq!(written, xml(version), "not deterministic");
+    }
+}
+
+#[test]
+fn header() {
+    for version in VERSIONS {
+        let text = xml(version);
+        assert!(text.starts_with("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"), "X01");
+        let (md, sample) = (sample_read(version), sample());
+        assert_eq!((md.version, md.fmi_version.as_str()), (version, version.to_string().as_str()), "X02");
+        assert_eq!((md.model_name, md.token), (sample.name, sample.token), "X04");
+        assert_eq!(md.generation_date_and_time.as_deref(), Some("2026-01-02T03:04:05Z"), "X05");
+        assert_eq!(md.generation_tool, Some(generation().tool), "X06");
+        assert_eq!(md.author.as_deref(), Some("A & B"), "X06");
+        assert_eq!(md.model_version, Some(sample.version), "X06");
+        assert_eq!(md.copyright, Some(sample.copyright), "X06");
+        assert_eq!(md.license, Some(sample.license), "X06");
+        assert_eq!(md.description.as_deref(), Some(AWKWARD), "X13");
+        assert!(md.structured_names, "V01");
+        let experiment = md.default_experiment;
+        assert_eq!((experiment.start, experiment.stop, experiment.step), (Some(0.0), Some(2.0), Some(1e-4)), "X10");
+        assert!(md.model_exchange.is_none() && md.scheduled_execution.is_none());
+    }
+}
+
+#[test]
+fn capabilities() {
+    for (version, state) in VERSIONS.into_iter().zip(["FMUstate", "FMUState"]) {
+        let cs = sample_read(version).co_simulation.unwrap();
+        assert_eq!(cs.model_identifier, "Sample", "X03");
+        for name in [format!("canGetAndSet{state}"), format!("canSerialize{state}")] {
+            assert_eq!(cs.attribute(&name), Some("true"), "X07: {name}");
+        }
+        assert!(cs.can_get_and_set_state() && cs.can_serialize_state() && cs.can_handle_variable_step(), "X08");
+        assert!(!cs.needs_execution_tool() && !cs.only_one_instance() && !cs.has_event_mode(), "X08");
+        assert_eq!(cs.flag("canNotUseMemoryManagementFunctions"), version == FmiVersion::V2, "X08");
+        assert_eq!(cs.attribute("canInterpolateInputs"), (version == FmiVersion::V2).then_some("false"));
+    }
+}
+
+#[test]
+fn log_categories() {
+    for version in VERSIONS {
+        let names: Vec<_> = sample_read(version).log_categories.into_iter().map(|c| c.name).collect();
+        let expected = fmu_core::log::CATEGORIES.iter().map(|(name, _)| (*name).to_owned());
+        let all = (version == FmiVersion::V2).then(|| "logAll".to_owned());
+        assert_eq!(names, expected.chain(all).collect::<Vec<_>>(), "G-L1");
+    }
+}
+
+type Expected = (&'static str, BaseType, Causality, Variability, Option<Initial>, &'static str);
+
+/// Name, base type, causality, variability, initial and the first start value of every variable of the sample.
+const EXPECTED: [Expected; 12] = [
+    ("u_dc", BaseType::Float64, Causality::Input, Variability::Continuous, None, "325.1"),
+    ("enable", BaseType::Boolean, Causality::Input, Variability::Discrete, None, "true"),
+    ("motor.n_p", BaseType::Int32, Causality::Parameter, Variability::Fixed, Some(Initial::Exact), "3"),
+    ("filter.b", BaseType::Float64, Causality::Parameter, Variability::Fixed, Some(Initial::Exact), "0.1"),
+    ("observer", BaseType::Enumeration, Causality::Parameter, Variability::Fixed, Some(Initial::Exact), "3"),
+    ("bandwidth", BaseType::Float64, Causality::Parameter, Variability::Tunable, Some(Initial::Exact), "5e-324"),
+    ("share", BaseType::Float64, Causality::Parameter, Variability::Fixed, Some(Initial::Exact), "50"),
+    ("gain", BaseType::Float64, Causality::CalculatedParameter, Variability::Fixed, Some(Initial::Calculated), ""),
+    ("speed", BaseType::Float64, Causality::Output, Variability::Continuous, Some(Initial::Calculated), ""),
+    ("sector", BaseType::Int32, Causality::Output, Variability::Discrete, Some(Initial::Calculated), ""),
+    ("ready", BaseType::Boolean, Causality::Output, Variability::Discrete, Some(Initial::Calculated), ""),
+    ("inner", BaseType::Float64, Causality::Local, Variability::Continuous, Some(Initial::Calculated), ""),
+];
+
+#[test]
+fn variables_come_back() {
+    for version in VERSIONS {
+        let (md, sample) = (sample_read(version), sample());
+        let time = &md.variables[0];
+        assert_eq!((time.name.as_str(), time.value_reference, time.unit.as_deref()), ("time", 0, Some("s")), "V03");
+        assert_eq!((time.causality, time.variability), (Causality::Independent, Variability::Continuous), "V03");
+        assert_eq!((&time.start, time.initial), (&None, None), "V03");
+        for (name, base, causality, variability, initial, start) in EXPECTED {
+            let array = name == "filter.b" && version == FmiVersion::V2;
+            let v = md.variable(if array { "filter.b[1]" } else { name }).unwrap();
+            let of = sample.variable(name).unwrap();
+            assert_eq!((v.base, v.causality, v.variability, v.initial), (base, causality, variability, initial), "V04");
+            let first = v.start.as_ref().and_then(|text| text.split(' ').next());
+            assert_eq!(first.unwrap_or_default(), start, "V04, V07: {name}");
+            assert_eq!(v.value_reference, of.value_reference, "V02");
+            assert_eq!(v.description.as_ref(), Some(&of.description), "X13");
+        }
+        let u_dc = md.variable("u_dc").unwrap();
+        assert_eq!((u_dc.min, u_dc.max, u_dc.nominal), (Some(0.0), Some(1e21), Some(300.0)));
+        // An integer's bound that xs:int cannot say is no bound.
+        let n_p = md.variable("motor.n_p").unwrap();
+        assert_eq!((n_p.min, n_p.max), (Some(1.0), None));
+        let mut names: Vec<_> = md.variables.iter().map(|v| &v.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), md.variables.len(), "V01");
+    }
+}
+
+#[test]
+fn arrays() {
+    let three = sample_read(FmiVersion::V3);
+    let b = three.variable("filter.b").unwrap();
+    assert_eq!((&b.dimensions[..], b.is_array()), (&[Dimension::Fixed(3)][..], true), "C01");
+    let start: Vec<f64> = b.start.as_ref().unwrap().split(' ').map(|x| x.parse().unwrap()).collect();
+    assert_eq!(start, [0.1, -1e-7, 1.0 / 3.0]);
+    let two = sample_read(FmiVersion::V2);
+    for (i, start) in start.into_iter().enumerate() {
+        let at = two.variables.iter().position(|v| v.name == format!("filter.b[{}]", i + 1)).unwrap();
+        assert_eq!(at, 4 + i, "V01: elements are contiguous");
+        assert_eq!(usize::try_from(two.variables[at].value_reference), Ok(4 + i));
+        assert_eq!(two.variables[at].start.as_ref().unwrap().parse(), Ok(start));
+    }
+}
+
+#[test]
+fn units_and_types() {
+    for version in VERSIONS {
+        let md = sample_read(version);
+        let names: Vec<_> = md.units.iter().map(|u| u.name.as_str()).collect();
+        assert_eq!(names, ["s", "V", "rad/s", "%"], "V09: used ones only, each once");
+        let base = |name: &str| md.unit(name).unwrap().base.unwrap();
+        assert_eq!(
+            (base("V").exponents, base("V").factor.to_bits()),
+            ([1, 2, -3, -1, 0, 0, 0, 0], 1f64.to_bits()),
+            "V09"
+        );
+        assert_eq!(base("rad/s").exponents, [0, 0, -1, 0, 0, 0, 0, 1], "V09");
+        assert_eq!((base("%").exponents, base("%").factor.to_bits()), ([0; 8], 0.01f64.to_bits()), "V09");
+        let speed = md.variable("speed").unwrap();
+        assert_eq!((speed.unit.as_deref(), speed.display_unit.as_deref()), (Some("rad/s"), Some("rpm")), "V09");
+        let rpm = md.unit("rad/s").unwrap().display_unit("rpm").unwrap();
+        assert!((rpm.show(std::f64::consts::TAU) - 60.0).abs() < 1e-12, "V09: display = factor * unit");
+        assert_eq!(md.variable("bandwidth").unwrap().display_unit, None);
+        assert_eq!(md.variable("filter.b").or(md.variable("filter.b[1]")).unwrap().unit, None);
+        for v in &md.variables {
+            let Some(name) = &v.declared_type else { continue };
+            let declared = md.type_definition(name).unwrap();
+            assert_eq!(declared.base, v.base, "V08");
+            assert_eq!((&declared.unit, &declared.display_unit), (&v.unit, &v.display_unit));
+            assert!(md.variable(name).is_none(), "V08: a type named like a variable");
+        }
+        let observer = md.type_definition("Observer").unwrap();
+        assert_eq!(observer.description.as_deref(), Some("What estimates the <speed>"));
+        let items: Vec<_> = observer.items.iter().map(|i| (i.value, i.name.as_str())).collect();
+        assert_eq!(items, [(1, "Simple"), (3, "Good")], "V08");
+    }
+}
+
+#[test]
+fn structure() {
+    for version in VERSIONS {
+        let md = sample_read(version);
+        let name = |&reference: &u32| md.referenced(reference).unwrap().name.as_str();
+        let names = |unknowns: &[Unknown]| unknowns.iter().map(|u| name(&u.reference).to_owned()).collect::<Vec<_>>();
+        assert_eq!(names(&md.outputs), ["speed", "sector", "ready"], "S01");
+        assert!(md.outputs.iter().all(|u| u.dependencies == Some(vec![]) && u.kinds.is_none()), "S04");
+        assert_eq!(names(&md.initial_unknowns), ["gain", "speed", "sector", "ready"], "S02");
+        assert!(md.initial_unknowns.is_sorted_by_key(|u| u.reference), "S02");
+        let dependencies: Vec<Vec<_>> = md
+            .initial_unknowns
+            .iter()
+            .map(|u| {
+                let of = u.dependencies.as_ref().unwrap();
+                assert!(of.is_sorted_by(|a, b| a < b), "S03");
+                assert_eq!(u.kinds.clone().unwrap_or_default(), vec!["dependent"; of.len()], "S03");
+                of.iter().map(name).collect()
+            })
+            .collect();
+        let gain = match version {
+            FmiVersion::V2 => vec!["motor.n_p", "filter.b[1]", "filter.b[3]"],
+            FmiVersion::V3 => vec!["motor.n_p", "filter.b"],
+        };
+        assert_eq!(dependencies, [gain, vec![], vec!["time", "bandwidth"], vec!["enable"]], "S03");
+    }
+}
+
+#[test]
+fn a_model_without_outputs_has_no_empty_list() {
+    let bare = Description { variables: Vec::new(), ..sample() };
+    for version in VERSIONS {
+        let text = write(&bare, version, &generation());
+        assert!(text.contains("<ModelStructure/>") && !text.contains("TypeDefinitions"), "X01: {text}");
+        assert_eq!(read(&text).unwrap().variables.len(), 1);
+    }
+}
