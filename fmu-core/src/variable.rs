@@ -363,7 +363,7 @@ mod tests {
         let positive = Range { min: 0.0, above: true, ..Range::ALL };
         assert!(positive.contains(1e-300) && !positive.contains(0.0) && !positive.contains(-1.0));
         let closed = Range { min: -1.0, max: 1.0, ..Range::ALL };
-        assert!(closed.contains(-1.0) && closed.contains(1.0) && !closed.contains(1.0000001));
+        assert!(closed.contains(-1.0) && closed.contains(1.0) && !closed.contains(1.000_000_1));
         assert!(!Range::ALL.contains(f64::NAN) && !Range::ALL.contains(f64::INFINITY));
     }
 

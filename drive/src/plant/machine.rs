@@ -48,7 +48,7 @@ mod tests {
         // Kim & Sul (1) with constant currents: u_d = R i_d - w L_q i_q, u_q = R i_q + w (L_d i_d + psi_M).
         let motor = Motor { L_q: 9e-3, ..Motor::default() };
         let (i, w) = (Dq::new(-1.0, 3.0), 200.0);
-        let u = Dq::new(2.0 * -1.0 - w * 9e-3 * 3.0, 2.0 * 3.0 + w * (6e-3 * -1.0 + 0.15));
+        let u = Dq::new(-2.0 - w * 9e-3 * 3.0, 2.0 * 3.0 + w * (-6e-3 + 0.15));
         let rest = flux_derivative(&motor, flux(&motor, i), u, i, w);
         assert!(rest.magnitude() < 1e-13, "{rest:?}");
     }
