@@ -1,0 +1,164 @@
+//! Opens the archive of an FMU: reads its description and extracts what is needed to run it.
+
+use super::Error;
+use crate::platform::Platform;
+use model_description::{FmiVersion, ModelDescription};
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use zip::ZipArchive;
+
+/// Most bytes that are unpacked; an archive that claims less and yields more is stopped there.
+const LIMIT: u64 = 4 << 30;
+/// Most entries.
+const ENTRIES: usize = 100_000;
+
+/// An FMU's archive, checked, with its description read.
+pub(super) struct Archive {
+    path: PathBuf,
+    zip: ZipArchive<File>,
+    names: Vec<String>,
+    /// Its modelDescription.xml.
+    pub(super) description: ModelDescription,
+}
+
+impl Archive {
+    pub(super) fn open(path: &Path) -> Result<Self, Error> {
+        let wrong = |cause: &dyn std::fmt::Display| Error::file(path, cause);
+        if path.is_dir() {
+            return Err(wrong(&"is a directory, expected an .fmu file"));
+        }
+        let file = File::open(path).map_err(|e| wrong(&e))?;
+        let mut zip = ZipArchive::new(file).map_err(|e| wrong(&format!("not a ZIP archive, or cut short: {e}")))?;
+        let names = check_entries(&mut zip).map_err(|cause| wrong(&cause))?;
+        let mut xml = Vec::new();
+        match zip.by_name("modelDescription.xml") {
+            Ok(entry) => {
+                entry.take(LIMIT).read_to_end(&mut xml).map_err(|e| wrong(&format!("modelDescription.xml: {e}")))?
+            }
+            Err(zip::result::ZipError::FileNotFound) => return Err(wrong(&"has no modelDescription.xml")),
+            Err(e) => return Err(wrong(&format!("modelDescription.xml: {e}"))),
+        };
+        let xml = String::from_utf8(xml).map_err(|_| wrong(&"modelDescription.xml is not UTF-8"))?;
+        let description = model_description::read(&xml).map_err(|e| wrong(&format!("modelDescription.xml: {e}")))?;
+        Ok(Self { path: path.into(), zip, names, description })
+    }
+
+    /// Extracts the binaries for this machine and the resources; returns the folder and the binary in it.
+    pub(super) fn extract(&mut self) -> Result<(TempDir, PathBuf), Error> {
+        let wrong = |path: &Path, cause: &dyn std::fmt::Display| Error::file(path, cause);
+        let Some(interface) = &self.description.co_simulation else {
+            return Err(wrong(&self.path, &"has no co-simulation interface"));
+        };
+        let host = Platform::host();
+        let folders = host.folders(self.description.version);
+        let name = format!("{}.{}", interface.model_identifier, host.extension());
+        let has = |folder: &&&str| self.names.iter().any(|n| *n == format!("binaries/{folder}/{name}"));
+        let Some(&folder) = folders.iter().find(has) else {
+            return Err(wrong(&self.path, &self.missing_binary(folders[0], &name)));
+        };
+        let dir = tempfile::Builder::new().prefix("fmu-").tempdir().map_err(|e| wrong(&self.path, &e))?;
+        // The resources folder is named to the FMU, so it exists even when the archive has none.
+        fs::create_dir(dir.path().join("resources")).map_err(|e| wrong(&self.path, &e))?;
+        let binaries = format!("binaries/{folder}/");
+        self.extract_into(dir.path(), &[&binaries, "resources/"]).map_err(|e| wrong(&self.path, &e))?;
+        let binary = dir.path().join(&binaries).join(name);
+        Ok((dir, binary))
+    }
+
+    fn extract_into(&mut self, dir: &Path, prefixes: &[&str]) -> io::Result<()> {
+        let mut left = LIMIT;
+        for (index, name) in self.names.iter().enumerate() {
+            if !prefixes.iter().any(|p| name.starts_with(p)) {
+                continue;
+            }
+            let mut entry = self.zip.by_index(index)?;
+            let target = dir.join(name);
+            if entry.is_dir() {
+                fs::create_dir_all(&target)?;
+                continue;
+            }
+            if let Some(parent) = target.parent() {
+                fs::create_dir_all(parent)?;
+            }
+            let mut out = io::BufWriter::new(File::create(&target)?);
+            // A size that lies ends here, not with a full disk.
+            let copied = io::copy(&mut (&mut entry).take(left + 1), &mut out)
+                .map_err(|e| io::Error::other(format!("{name}: {e}")))?;
+            let too_much = || io::Error::other(format!("{name}: unpacks to more than {LIMIT} bytes"));
+            left = left.checked_sub(copied).ok_or_else(too_much)?;
+            out.flush()?;
+        }
+        Ok(())
+    }
+
+    fn missing_binary<'a>(&'a self, folder: &str, name: &str) -> String {
+        let folder_of = |name: &'a String| Some(name.strip_prefix("binaries/")?.split_once('/')?.0);
+        let mut there: Vec<&str> = self.names.iter().filter_map(folder_of).collect();
+        there.sort_unstable();
+        there.dedup();
+        let there =
+            if there.is_empty() { "no binaries at all".into() } else { format!("binaries for {}", there.join(", ")) };
+        let standard = if self.description.version == FmiVersion::V2 { "FMI 2.0" } else { "FMI 3.0" };
+        format!("has no binaries/{folder}/{name} for this platform ({standard}); it has {there}")
+    }
+}
+
+/// The names of the entries; refuses names that lead outside, links, and sizes that no FMU has.
+fn check_entries(zip: &mut ZipArchive<File>) -> Result<Vec<String>, String> {
+    if zip.len() > ENTRIES {
+        return Err(format!("has {} entries, more than {ENTRIES}", zip.len()));
+    }
+    let (mut names, mut size) = (Vec::new(), 0_u64);
+    for index in 0..zip.len() {
+        let entry = zip.by_index_raw(index).map_err(|e| format!("entry {index}: {e}"))?;
+        let name = entry.name().map_err(|e| format!("entry {index}: {e}"))?.into_owned();
+        if entry.enclosed_name().is_none() || !inside(&name) {
+            return Err(format!("entry {name:?} leads outside of the archive"));
+        }
+        if entry.is_symlink() {
+            return Err(format!("entry {name:?} is a link"));
+        }
+        size = size.saturating_add(entry.size());
+        names.push(name);
+    }
+    if size > LIMIT { Err(format!("unpacks to {size} bytes, more than {LIMIT}")) } else { Ok(names) }
+}
+
+/// Whether a name stays below the folder it is joined to, on every system.
+fn inside(name: &str) -> bool {
+    !name.contains(['\\', ':', '\0']) && !name.starts_with('/') && name.split('/').all(|part| part != "..")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use zip::write::SimpleFileOptions;
+
+    fn refused(names: &[&str]) -> String {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("x.fmu");
+        let mut zip = zip::ZipWriter::new(File::create(&path).unwrap());
+        for name in names {
+            zip.start_file(*name, SimpleFileOptions::default()).unwrap();
+            zip.write_all(b"x").unwrap();
+        }
+        zip.finish().unwrap();
+        Archive::open(&path).err().unwrap().to_string()
+    }
+
+    #[test]
+    fn nothing_is_unpacked_outside() {
+        for name in ["../evil", "/etc/evil", "resources/../../evil", "..\\evil", "C:/evil"] {
+            let error = refused(&["modelDescription.xml", name]);
+            assert!(error.contains("leads outside"), "{name}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_file_without_a_description_is_no_fmu() {
+        assert!(refused(&["readme.txt"]).ends_with("has no modelDescription.xml"));
+        assert!(refused(&["modelDescription.xml"]).contains("modelDescription.xml: line 1"));
+    }
+}

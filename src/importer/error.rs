@@ -1,0 +1,77 @@
+//! What goes wrong with an FMU: its file, its use, or a call into it.
+
+use std::path::{Path, PathBuf};
+
+/// One line that names the file or the instance, and the cause.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// The file is not an FMU that can be run here.
+    #[error("{}: {cause}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// A name, a type or a value that the FMU does not have or does not take.
+    #[error("{instance}: {cause}")]
+    Usage {
+        /// Name of the instance.
+        instance: String,
+        /// What is wrong.
+        cause: String,
+    },
+    /// The FMU refused a call.
+    #[error("{instance}: {function} returned {status}{}", said(message.as_deref()))]
+    Call {
+        /// Name of the instance.
+        instance: String,
+        /// The C function.
+        function: &'static str,
+        /// Its status, in words.
+        status: String,
+        /// The last message that the FMU logged during the call.
+        message: Option<String>,
+    },
+}
+
+impl Error {
+    pub(crate) fn file(path: &Path, cause: impl std::fmt::Display) -> Self {
+        Self::File { path: path.into(), cause: one_line(&cause.to_string()) }
+    }
+
+    pub(crate) fn usage(instance: &str, cause: impl std::fmt::Display) -> Self {
+        Self::Usage { instance: instance.into(), cause: one_line(&cause.to_string()) }
+    }
+
+    /// Whether the FMU itself refused, rather than its file or the user's wishes being wrong.
+    pub fn is_of_the_run(&self) -> bool {
+        matches!(self, Self::Call { .. })
+    }
+}
+
+fn said(message: Option<&str>) -> String {
+    message.map(|m| format!(": {}", one_line(m))).unwrap_or_default()
+}
+
+/// Messages of others may have several lines; an error has one.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_one_line() {
+        let error = Error::Call {
+            instance: "plant".into(),
+            function: "fmi2DoStep",
+            status: "Error".into(),
+            message: Some("the step\n  is negative\n".into()),
+        };
+        assert_eq!(error.to_string(), "plant: fmi2DoStep returned Error: the step is negative");
+        assert_eq!(Error::file(Path::new("a.fmu"), "no\nthing").to_string(), "a.fmu: no thing");
+    }
+}

@@ -1,0 +1,264 @@
+//! One instance of an FMU, the same for both standards.
+
+use super::log::{Log, Message, Status};
+use super::standard::{Experiment, Outcome, Refusal, Standard};
+use super::{Error, Values, explain};
+use model_description::{BaseType, Dimension, ModelDescription, ModelVariable};
+use std::ffi::c_void;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// A saved state of an instance, as a number that only this instance understands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct State(usize);
+
+/// An instance of an FMU. Dropping it frees it.
+pub struct Instance {
+    name: String,
+    description: Arc<ModelDescription>,
+    standard: Box<dyn Standard>,
+    states: Vec<Option<*mut c_void>>,
+    dead: bool,
+    // After the instance, which may log while it is freed.
+    log: Arc<Log>,
+}
+
+impl Instance {
+    pub(super) fn new(
+        name: &str,
+        description: Arc<ModelDescription>,
+        standard: Box<dyn Standard>,
+        log: Arc<Log>,
+    ) -> Self {
+        Self { name: name.into(), description, standard, states: Vec::new(), dead: false, log }
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What the FMU's modelDescription.xml says.
+    pub fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    /// The messages since the last time.
+    pub fn take_messages(&self) -> Vec<Message> {
+        self.log.take()
+    }
+
+    /// A variable by its name.
+    ///
+    /// # Errors
+    /// There is none of this name.
+    pub fn variable(&self, name: &str) -> Result<&ModelVariable, Error> {
+        let none = || Error::usage(&self.name, format!("{} has no variable {name}", self.description.model_name));
+        self.description.variable(name).ok_or_else(none)
+    }
+
+    /// Reads a variable.
+    ///
+    /// # Errors
+    /// There is none of this name, or the FMU refuses.
+    pub fn get(&mut self, name: &str) -> Result<Values, Error> {
+        let (base, reference, count) = self.place(name)?;
+        self.call(|s| s.get(base, reference, count))
+    }
+
+    /// Writes a variable.
+    ///
+    /// # Errors
+    /// There is none of this name, the values do not fit, or the FMU refuses.
+    pub fn set(&mut self, name: &str, values: &Values) -> Result<(), Error> {
+        let (base, reference, count) = self.place(name)?;
+        if values.len() != count {
+            return Err(Error::usage(&self.name, format!("{name} has {count} elements, not {}", values.len())));
+        }
+        self.call(|s| s.set(base, reference, values))
+    }
+
+    /// Writes a variable as a user writes it: `3.3`, `true`, `Rasmussen`, or elements with commas between them.
+    ///
+    /// # Errors
+    /// As [`set`](Self::set), or the text is no value of the variable's type.
+    pub fn set_text(&mut self, name: &str, text: &str) -> Result<(), Error> {
+        let variable = self.variable(name)?;
+        let definition = variable.declared_type.as_ref().and_then(|t| self.description.type_definition(t));
+        let items: Vec<_> =
+            definition.map(|d| d.items.iter().map(|i| (i.name.clone(), i.value)).collect()).unwrap_or_default();
+        let values = Values::parse(text, variable, &items).map_err(|cause| Error::usage(&self.name, cause))?;
+        self.set(name, &values)
+    }
+
+    /// Reads real scalars by value reference: the fast way.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    #[inline]
+    pub fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Error> {
+        self.call(|s| s.get_reals(references, values))
+    }
+
+    /// Writes real scalars by value reference: the fast way.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    #[inline]
+    pub fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Result<(), Error> {
+        self.call(|s| s.set_reals(references, values))
+    }
+
+    /// Switches remarks on or off; errors are always told.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn set_debug_logging(&mut self, on: bool) -> Result<(), Error> {
+        self.call(|s| s.set_debug_logging(on))
+    }
+
+    /// Says when the simulation starts and, if that is known, ends.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn setup(&mut self, start: f64, stop: Option<f64>) -> Result<(), Error> {
+        self.call(|s| s.setup(Experiment { start, stop, tolerance: None }))
+    }
+
+    /// Initialisation begins: parameters and inputs are set, outputs may be read.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn enter_initialization(&mut self) -> Result<(), Error> {
+        self.call(|s| s.enter_initialization())
+    }
+
+    /// Initialisation ends.
+    ///
+    /// # Errors
+    /// The FMU refuses, for example parameters that do not fit together.
+    pub fn exit_initialization(&mut self) -> Result<(), Error> {
+        self.call(|s| s.exit_initialization())
+    }
+
+    /// Steps from `t` to `t + h`; breaks when the FMU asks to end the simulation.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    #[inline]
+    pub fn do_step(&mut self, t: f64, h: f64) -> Result<ControlFlow<()>, Error> {
+        self.call(|s| s.do_step(t, h))
+    }
+
+    /// Ends the simulation; variables can still be read.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn terminate(&mut self) -> Result<(), Error> {
+        self.call(|s| s.terminate())
+    }
+
+    /// Back to what it was when it was made.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn reset(&mut self) -> Result<(), Error> {
+        self.call(|s| s.reset())
+    }
+
+    /// Saves the state.
+    ///
+    /// # Errors
+    /// The FMU refuses, or cannot.
+    pub fn get_state(&mut self) -> Result<State, Error> {
+        let state = self.call(|s| s.get_state())?;
+        self.states.push(Some(state));
+        Ok(State(self.states.len() - 1))
+    }
+
+    /// Goes back to a saved state.
+    ///
+    /// # Errors
+    /// The FMU refuses, or the state was freed.
+    pub fn set_state(&mut self, state: State) -> Result<(), Error> {
+        let state = self.state(state)?;
+        self.call(|s| s.set_state(state))
+    }
+
+    /// Frees a saved state. Those that remain are freed with the instance.
+    ///
+    /// # Errors
+    /// The FMU refuses, or the state was freed before.
+    pub fn free_state(&mut self, state: State) -> Result<(), Error> {
+        let raw = self.state(state)?;
+        self.states[state.0] = None;
+        self.call(|s| s.free_state(raw))
+    }
+
+    /// A saved state as bytes.
+    ///
+    /// # Errors
+    /// The FMU refuses, or cannot, or the state was freed.
+    pub fn serialize_state(&mut self, state: State) -> Result<Vec<u8>, Error> {
+        let state = self.state(state)?;
+        self.call(|s| s.serialize(state))
+    }
+
+    /// A saved state from bytes; it is not yet set.
+    ///
+    /// # Errors
+    /// The FMU refuses, or cannot.
+    pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<State, Error> {
+        let state = self.call(|s| s.deserialize(bytes))?;
+        self.states.push(Some(state));
+        Ok(State(self.states.len() - 1))
+    }
+
+    fn state(&self, state: State) -> Result<*mut c_void, Error> {
+        let alive = self.states.get(state.0).copied().flatten();
+        alive.ok_or_else(|| Error::usage(&self.name, "the state was freed, or is of another instance"))
+    }
+
+    /// Base type, value reference and number of elements.
+    fn place(&self, name: &str) -> Result<(BaseType, u32, usize), Error> {
+        let variable = self.variable(name)?;
+        Ok((variable.base, variable.value_reference, self.elements(variable)?))
+    }
+
+    /// The extents of an array as the file has them: sizes that structural parameters give are their start values.
+    fn elements(&self, variable: &ModelVariable) -> Result<usize, Error> {
+        let extent = |dimension: &Dimension| match dimension {
+            Dimension::Fixed(n) => usize::try_from(*n).ok(),
+            Dimension::Variable(reference) => {
+                let size = self.description.variables.iter().find(|v| v.value_reference == *reference)?;
+                size.start.as_ref()?.trim().parse().ok()
+            }
+        };
+        let count = variable.dimensions.iter().map(extent).try_fold(1, |n: usize, d| n.checked_mul(d?));
+        count.ok_or_else(|| Error::usage(&self.name, format!("the size of {} is not known", variable.name)))
+    }
+
+    /// The one way to the FMU.
+    #[inline]
+    fn call<T>(&mut self, call: impl FnOnce(&mut dyn Standard) -> Outcome<T>) -> Result<T, Error> {
+        if self.dead {
+            return Err(Error::usage(&self.name, "had a fatal error before, and takes no more calls"));
+        }
+        call(&mut *self.standard).map_err(|refusal| {
+            if matches!(refusal, Refusal::Status(_, Status::FATAL)) {
+                self.standard.abandon();
+                self.dead = true;
+            }
+            explain(&self.name, refusal, self.log.reason())
+        })
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        for state in std::mem::take(&mut self.states).into_iter().flatten() {
+            // Nobody is left to hear of a refusal.
+            let _ = self.call(|s| s.free_state(state));
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! What an FMU says through its log callback.
+
+use std::collections::VecDeque;
+use std::ffi::{CStr, c_char, c_void};
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Messages kept; an FMU that talks all the time does not fill the memory.
+const KEPT: usize = 10_000;
+
+/// One message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// Status that it was logged with.
+    pub status: Status,
+    /// Log category.
+    pub category: String,
+    /// The text; in FMI 2.0 it is the format string as it came, see `fmi2`.
+    pub text: String,
+}
+
+/// A status of either standard; the two agree up to `Fatal`.
+#[derive(Clone, Copy, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct Status(pub std::ffi::c_int);
+
+impl Status {
+    /// The call succeeded.
+    pub const OK: Self = Self(0);
+    /// It succeeded, and something is strange.
+    pub const WARNING: Self = Self(1);
+    /// Nothing was done; the instance lives on.
+    pub const DISCARD: Self = Self(2);
+    /// It failed; this instance is done for.
+    pub const ERROR: Self = Self(3);
+    /// Every instance of this FMU is done for.
+    pub const FATAL: Self = Self(4);
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            0 => f.pad("OK"),
+            1 => f.pad("Warning"),
+            2 => f.pad("Discard"),
+            3 => f.pad("Error"),
+            4 => f.pad("Fatal"),
+            5 => f.pad("Pending"),
+            other => write!(f, "the unknown status {other}"),
+        }
+    }
+}
+
+impl fmt::Debug for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// The messages of one instance. Its address is the instance environment of the callbacks, so it is shared.
+#[derive(Debug, Default)]
+pub(super) struct Log(Mutex<Messages>);
+
+#[derive(Debug, Default)]
+struct Messages {
+    all: VecDeque<Message>,
+    /// How many of the last ones no error has told yet.
+    fresh: usize,
+}
+
+impl Log {
+    /// What the callbacks get back as their first argument.
+    pub(super) fn environment(self: &Arc<Self>) -> *mut c_void {
+        Arc::as_ptr(self).cast_mut().cast()
+    }
+
+    /// Takes all messages.
+    pub(super) fn take(&self) -> Vec<Message> {
+        self.messages().all.drain(..).collect()
+    }
+
+    /// What an error tells: the last message since the last error that is not a mere remark, else the last of all since.
+    pub(super) fn reason(&self) -> Option<String> {
+        let mut messages = self.messages();
+        let fresh = std::mem::take(&mut messages.fresh);
+        let mut fresh = messages.all.iter().rev().take(fresh).peekable();
+        let last = fresh.peek().copied();
+        let serious = fresh.find(|m| !matches!(m.status, Status::OK | Status::WARNING));
+        serious.or(last).map(|m| m.text.clone())
+    }
+
+    fn messages(&self) -> std::sync::MutexGuard<'_, Messages> {
+        // A callback never panics while it holds the lock; if it did, the messages would still be whole.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Receives a message from C.
+    ///
+    /// # Safety
+    /// `environment` is null or came from [`Log::environment`] of a log that is alive; the texts are null or end with a
+    /// null byte.
+    pub(super) unsafe fn receive(
+        environment: *mut c_void,
+        status: Status,
+        category: *const c_char,
+        text: *const c_char,
+    ) {
+        // SAFETY: the caller promises that the pointer is null or a living log; a log is only used by shared reference.
+        let Some(log) = (unsafe { environment.cast::<Self>().as_ref() }) else { return };
+        // SAFETY: promised by the caller.
+        let (category, text) = unsafe { (copy_text(category), copy_text(text)) };
+        let mut messages = log.messages();
+        if messages.all.len() == KEPT {
+            messages.all.pop_front();
+        }
+        messages.fresh += 1;
+        messages.all.push_back(Message { status, category, text });
+    }
+}
+
+/// Copies a C string; null is the empty string, and what is not UTF-8 is replaced.
+///
+/// # Safety
+/// `text` is null or ends with a null byte.
+pub(super) unsafe fn copy_text(text: *const c_char) -> String {
+    if text.is_null() {
+        return String::new();
+    }
+    // SAFETY: not null, and the caller promises the null byte.
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_serious_message_counts() {
+        let log = Arc::<Log>::default();
+        for (status, text) in [(Status::OK, c"hello"), (Status::ERROR, c"h is negative"), (Status::OK, c"bye")] {
+            // SAFETY: the log is alive, the texts are C strings.
+            unsafe { Log::receive(log.environment(), status, std::ptr::null(), text.as_ptr()) };
+        }
+        assert_eq!(log.reason().as_deref(), Some("h is negative"));
+        assert_eq!(log.reason(), None, "told once");
+        assert_eq!(log.take().len(), 3);
+    }
+
+    #[test]
+    fn an_fmu_that_forgets_its_environment_does_no_harm() {
+        // SAFETY: null is allowed everywhere.
+        unsafe { Log::receive(std::ptr::null_mut(), Status::OK, std::ptr::null(), std::ptr::null()) };
+    }
+}

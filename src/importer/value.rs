@@ -1,0 +1,120 @@
+//! Values that cross the interface, whatever the standard calls their type.
+
+use model_description::{BaseType, ModelVariable};
+use std::fmt;
+
+/// The elements of a variable: one of a scalar, all in row-major order of an array.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// Of `Real`, `Float32`, `Float64`.
+    Reals(Vec<f64>),
+    /// Of every integer type and of enumerations; wide enough for each of them.
+    Integers(Vec<i128>),
+    /// Of `Boolean` and `Clock`.
+    Booleans(Vec<bool>),
+    /// Of `String`.
+    Strings(Vec<String>),
+    /// Of `Binary`.
+    Binaries(Vec<Vec<u8>>),
+}
+
+impl Values {
+    /// Reads what a user writes: numbers, `true` or `false`, names of an enumeration; commas between elements.
+    ///
+    /// # Errors
+    /// Says what was expected.
+    pub fn parse(text: &str, variable: &ModelVariable, items: &[(String, i64)]) -> Result<Self, String> {
+        let elements = || text.split(',').map(str::trim);
+        let wrong = |element: &str, expected: &str| format!("{} = {element} is not {expected}", variable.name);
+        match variable.base {
+            BaseType::Float32 | BaseType::Float64 => elements()
+                .map(|e| e.parse::<f64>().map_err(|_| wrong(e, "a number")))
+                .collect::<Result<_, _>>()
+                .map(Self::Reals),
+            BaseType::Boolean | BaseType::Clock => elements()
+                .map(|e| match e {
+                    "true" | "1" => Ok(true),
+                    "false" | "0" => Ok(false),
+                    _ => Err(wrong(e, "true or false")),
+                })
+                .collect::<Result<_, _>>()
+                .map(Self::Booleans),
+            BaseType::String => Ok(Self::Strings(vec![text.into()])),
+            BaseType::Binary => Err(wrong(text, "a value that can be written as text")),
+            BaseType::Enumeration => elements()
+                .map(|e| {
+                    let named = items.iter().find(|(name, _)| name == e).map(|(_, value)| i128::from(*value));
+                    named.or_else(|| e.parse().ok()).ok_or_else(|| {
+                        let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
+                        wrong(e, &format!("one of {}", names.join(", ")))
+                    })
+                })
+                .collect::<Result<_, _>>()
+                .map(Self::Integers),
+            _ => elements()
+                .map(|e| e.parse().map_err(|_| wrong(e, "an integer")))
+                .collect::<Result<_, _>>()
+                .map(Self::Integers),
+        }
+    }
+
+    /// A number as a value of this base type: rounded for an integer, not 0 for true.
+    ///
+    /// # Errors
+    /// A text is no number.
+    pub fn from_number(x: f64, base: BaseType) -> Result<Self, String> {
+        match base {
+            BaseType::Float32 | BaseType::Float64 => Ok(Self::Reals(vec![x])),
+            BaseType::Boolean | BaseType::Clock => Ok(Self::Booleans(vec![x != 0.0])),
+            BaseType::String | BaseType::Binary => Err(format!("a {base} takes no number")),
+            _ => {
+                // Beyond the range of the variable's type the setter refuses; a NaN becomes 0.
+                #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+                let rounded = x.round() as i128;
+                Ok(Self::Integers(vec![rounded]))
+            }
+        }
+    }
+
+    /// The first element as a number, for columns and plots; `None` for a text.
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Reals(x) => x.first().copied(),
+            #[expect(clippy::cast_precision_loss, reason = "columns are of doubles; exact below 2^53")]
+            Self::Integers(x) => x.first().map(|&i| i as f64),
+            Self::Booleans(x) => x.first().map(|&b| f64::from(u8::from(b))),
+            Self::Strings(_) | Self::Binaries(_) => None,
+        }
+    }
+
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Reals(x) => x.len(),
+            Self::Integers(x) => x.len(),
+            Self::Booleans(x) => x.len(),
+            Self::Strings(x) => x.len(),
+            Self::Binaries(x) => x.len(),
+        }
+    }
+
+    /// Whether there is no element.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl fmt::Display for Values {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fn list<T: ToString>(x: &[T]) -> String {
+            x.iter().map(T::to_string).collect::<Vec<_>>().join(", ")
+        }
+        f.write_str(&match self {
+            Self::Reals(x) => list(x),
+            Self::Integers(x) => list(x),
+            Self::Booleans(x) => list(x),
+            Self::Strings(x) => list(x),
+            Self::Binaries(x) => list(&x.iter().map(|b| format!("{} bytes", b.len())).collect::<Vec<_>>()),
+        })
+    }
+}

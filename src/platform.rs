@@ -1,0 +1,109 @@
+//! Platforms and what the two standards call them.
+
+use model_description::FmiVersion;
+use std::env::consts;
+use std::fmt;
+use std::str::FromStr;
+
+/// An operating system and a processor that FMUs have binaries for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Platform {
+    /// Linux on x86_64.
+    X64Linux,
+    /// Linux on 64-bit ARM.
+    ArmLinux,
+    /// Windows on x86_64.
+    X64Windows,
+    /// Windows on 64-bit ARM.
+    ArmWindows,
+    /// macOS on x86_64.
+    X64Darwin,
+    /// macOS on 64-bit ARM.
+    ArmDarwin,
+}
+
+impl Platform {
+    /// All that are known.
+    pub const ALL: [Self; 6] =
+        [Self::X64Linux, Self::ArmLinux, Self::X64Windows, Self::ArmWindows, Self::X64Darwin, Self::ArmDarwin];
+
+    /// The platform that this program runs on; another Unix passes for Linux.
+    pub fn host() -> Self {
+        match (consts::OS, consts::ARCH) {
+            ("windows", "aarch64") => Self::ArmWindows,
+            ("windows", _) => Self::X64Windows,
+            ("macos", "aarch64") => Self::ArmDarwin,
+            ("macos", _) => Self::X64Darwin,
+            (_, "aarch64") => Self::ArmLinux,
+            _ => Self::X64Linux,
+        }
+    }
+
+    /// The platform tuple of FMI 3.0 (FMI 3.0.2, 2.5.1.4.1).
+    pub const fn tuple(self) -> &'static str {
+        match self {
+            Self::X64Linux => "x86_64-linux",
+            Self::ArmLinux => "aarch64-linux",
+            Self::X64Windows => "x86_64-windows",
+            Self::ArmWindows => "aarch64-windows",
+            Self::X64Darwin => "x86_64-darwin",
+            Self::ArmDarwin => "aarch64-darwin",
+        }
+    }
+
+    /// The folders under `binaries/` to look in, the one to write to first. FMI 2.0.5 (2.3) names three of 64 bits and
+    /// lets others take the tuples of FMI 3.0.
+    pub fn folders(self, version: FmiVersion) -> Vec<&'static str> {
+        match (version, self) {
+            (FmiVersion::V2, Self::X64Linux) => vec!["linux64", self.tuple()],
+            (FmiVersion::V2, Self::X64Windows) => vec!["win64", self.tuple()],
+            (FmiVersion::V2, Self::X64Darwin) => vec!["darwin64", self.tuple()],
+            // Universal binaries live in darwin64.
+            (FmiVersion::V2, Self::ArmDarwin) => vec![self.tuple(), "darwin64"],
+            _ => vec![self.tuple()],
+        }
+    }
+
+    /// Extension of a shared library.
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::X64Linux | Self::ArmLinux => "so",
+            Self::X64Windows | Self::ArmWindows => "dll",
+            Self::X64Darwin | Self::ArmDarwin => "dylib",
+        }
+    }
+}
+
+impl fmt::Display for Platform {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.tuple())
+    }
+}
+
+impl FromStr for Platform {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = || Self::ALL.map(Self::tuple).join(", ");
+        Self::ALL
+            .into_iter()
+            .find(|p| p.tuple() == text)
+            .ok_or_else(|| format!("{text} is not a platform: {}", known()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_the_standards() {
+        assert_eq!(Platform::X64Linux.folders(FmiVersion::V2)[0], "linux64");
+        assert_eq!(Platform::ArmDarwin.folders(FmiVersion::V2)[0], "aarch64-darwin");
+        for platform in Platform::ALL {
+            assert_eq!(platform.folders(FmiVersion::V3), [platform.tuple()]);
+            assert_eq!(platform.tuple().parse(), Ok(platform));
+        }
+        assert!("x86_64-plan9".parse::<Platform>().is_err());
+    }
+}
