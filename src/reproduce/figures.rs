@@ -151,8 +151,18 @@ pub fn start(trace: &Trace) -> Vec<Figure> {
     figures.extend(list(
         "4b",
         vec![
-            ("first start: angle error below 5° after", "s", Expected::Near(0.14, 0.03), first.settled(|t| &t.error, 0.0, 5.0)),
-            ("first start: angle error below 1° after", "s", Expected::AtMost(0.30), first.settled(|t| &t.error, 0.0, 1.0)),
+            (
+                "first start: angle error below 5° after",
+                "s",
+                Expected::Near(0.14, 0.03),
+                first.settled(|t| &t.error, 0.0, 5.0),
+            ),
+            (
+                "first start: angle error below 1° after",
+                "s",
+                Expected::AtMost(0.30),
+                first.settled(|t| &t.error, 0.0, 1.0),
+            ),
             ("first start: final angle error", "deg", Expected::AtMost(0.05), first.steady(|t| &t.error).abs()),
         ],
     ));
@@ -186,7 +196,12 @@ pub fn step(figure: &'static str, trace: &Trace, speed: f64, rise: f64, peak: f6
     list(
         figure,
         vec![
-            ("10-90 % rise time", "s", Expected::Near(rise, 0.1 * rise), w.rise(|t| &t.speed, 0.1 * speed, 0.9 * speed)),
+            (
+                "10-90 % rise time",
+                "s",
+                Expected::Near(rise, 0.1 * rise),
+                w.rise(|t| &t.speed, 0.1 * speed, 0.9 * speed),
+            ),
             ("overshoot", "%", Expected::AtMost(1.0), overshoot),
             ("peak angle error", "deg", Expected::Near(peak, 1.0), w.peak(|t| &t.error)),
             ("final angle error", "deg", Expected::AtMost(0.02), w.steady(|t| &t.error).abs()),
@@ -223,13 +238,19 @@ pub fn load_1000(trace: &Trace) -> Vec<Figure> {
         "5b",
         vec![
             ("2 N.m at 1000 rpm: dip", "rpm", Expected::Near(118.0, 6.0), 1000.0 - w.min(|t| &t.speed)),
-            ("2 N.m at 1000 rpm: within 2 % after", "s", Expected::Near(0.105, 0.0105), w.settled(|t| &t.speed, 1000.0, 20.0)),
+            (
+                "2 N.m at 1000 rpm: within 2 % after",
+                "s",
+                Expected::Near(0.105, 0.0105),
+                w.settled(|t| &t.speed, 1000.0, 20.0),
+            ),
         ],
     );
     let i_d = w.steady(|t| &t.i_d).abs();
     figures.extend(list("5d", vec![("2 N.m at 1000 rpm: steady |i_sd|", "A", Expected::AtMost(0.01), i_d)]));
     let error = w.steady(|t| &t.error);
-    figures.extend(list("5f", vec![("2 N.m at 1000 rpm: steady angle error", "deg", Expected::Near(0.12, 0.03), error)]));
+    figures
+        .extend(list("5f", vec![("2 N.m at 1000 rpm: steady angle error", "deg", Expected::Near(0.12, 0.03), error)]));
     figures
 }
 

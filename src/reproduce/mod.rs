@@ -1,4 +1,68 @@
-//! The paper's start-up, speed steps and load steps, run and measured.
+//! The paper's start-up, speed steps and load steps: run through the packed FMUs, measured, judged, drawn.
 
 pub mod figures;
+pub mod packed;
+mod plots;
+mod report;
 pub mod scenario;
+
+use anyhow::{Context, Result};
+use packed::Packed;
+use report::Table;
+use scenario::{ALL, ClosedLoop, Trace};
+use std::path::Path;
+
+/// Communication step of the experiments in s: the controller's sample period.
+const STEP: f64 = 1e-4;
+
+/// Runs every experiment with the archives of `folder/fmi2` and `folder/fmi3`, writes everything to `out` and returns the
+/// table as text with the verdict.
+///
+/// # Errors
+/// An archive cannot run, a step is refused, or a file cannot be written. A figure that is off is a verdict, no error.
+pub fn run(folder: &Path, out: &Path, progress: &(dyn Fn(&str) + Sync)) -> Result<(String, bool)> {
+    let all = |standard: &str| -> Result<Vec<Trace>> {
+        let pair = Packed::open(&folder.join(standard))?;
+        let run = |s: &scenario::Scenario| {
+            progress(s.title);
+            pair.run(s, STEP).with_context(|| format!("{standard}, {}", s.title))
+        };
+        ALL.iter().map(run).collect()
+    };
+    // One thread a standard: the two runs do not know of each other.
+    let (fmi2, fmi3) = std::thread::scope(|scope| {
+        let other = scope.spawn(|| all("fmi2"));
+        let fmi3 = all("fmi3");
+        (other.join().expect("a thread that returns its errors"), fmi3)
+    });
+    let (fmi2, fmi3) = (fmi2?, fmi3?);
+
+    let measure = |traces: &[Trace]| ALL.iter().zip(traces).flat_map(|(s, trace)| figures::of(s.id, trace)).collect();
+    let table = Table { fmi2: measure(&fmi2), fmi3: measure(&fmi3) };
+    let identical = fmi2 == fmi3;
+
+    std::fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
+    let write = |name: &str, text: &str| {
+        std::fs::write(out.join(name), text).with_context(|| format!("writing {}", out.join(name).display()))
+    };
+    for (scenario, trace) in ALL.iter().zip(&fmi3) {
+        write(&format!("{}.csv", scenario.id), &report::csv(trace))?;
+    }
+    let [start, step_20, step_500, step_1000, step_1500, load_0, load_1000] = &fmi3[..] else {
+        unreachable!("as many traces as experiments")
+    };
+    let figure_4 = plots::figure_4(start, [step_20, step_500, step_1000, step_1500])?;
+    let second = plots::second_start(start)?;
+    let figure_5 = plots::figure_5(load_0, load_1000)?;
+    write("figure-4.svg", &figure_4)?;
+    write("second-start.svg", &second)?;
+    write("figure-5.svg", &figure_5)?;
+    let plots = [
+        ("Fig. 4: start-up and speed steps", figure_4.as_str()),
+        ("Section 3.2: the second start", second.as_str()),
+        ("Fig. 5: load steps", figure_5.as_str()),
+    ];
+    write("report.html", &report::html(&table, identical, &plots, &ALL))?;
+    write("table.md", &table.text())?;
+    Ok((table.text(), table.holds() && identical))
+}

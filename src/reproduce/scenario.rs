@@ -30,16 +30,8 @@ pub struct Scenario {
 }
 
 /// An experiment in which nothing is set and nothing happens.
-pub const REST: Scenario = Scenario {
-    id: "",
-    figure: "",
-    title: "",
-    plant: &[],
-    controller: &[],
-    speed_ref: &[],
-    load: &[],
-    duration: 1.0,
-};
+pub const REST: Scenario =
+    Scenario { id: "", figure: "", title: "", plant: &[], controller: &[], speed_ref: &[], load: &[], duration: 1.0 };
 
 /// Start from the worst angle, then a stop and a second start.
 pub const START: Scenario = Scenario {
@@ -212,7 +204,9 @@ mod tests {
     #[test]
     fn a_schedule_holds_its_values() {
         let s: Schedule = &[(0.2, 500.0), (1.2, 0.0)];
-        assert!([(0.0, 0.0), (0.2, 500.0), (1.199, 500.0), (1.2, 0.0)].iter().all(|&(t, v)| (at(s, t) - v).abs() < 1e-12));
+        assert!(
+            [(0.0, 0.0), (0.2, 500.0), (1.199, 500.0), (1.2, 0.0)].iter().all(|&(t, v)| (at(s, t) - v).abs() < 1e-12)
+        );
     }
 
     #[test]

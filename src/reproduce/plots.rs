@@ -1,0 +1,167 @@
+//! The paper's Fig. 4 and Fig. 5, drawn in its own layout as SVG.
+
+use super::scenario::Trace;
+use anyhow::{Result, anyhow};
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+/// One curve of a panel.
+struct Curve<'a> {
+    name: &'static str,
+    color: RGBColor,
+    values: &'a [f64],
+}
+
+/// One panel of a figure.
+struct Panel<'a> {
+    title: &'static str,
+    unit: &'static str,
+    trace: &'a Trace,
+    /// Time window in s.
+    window: (f64, f64),
+    curves: Vec<Curve<'a>>,
+}
+
+const BLUE_INK: RGBColor = RGBColor(0, 84, 166);
+const RED_INK: RGBColor = RGBColor(200, 60, 40);
+const GREY: RGBColor = RGBColor(150, 150, 150);
+
+/// Most points of a curve; the eye sees no more at the size of a panel.
+const POINTS: usize = 1200;
+
+impl Panel<'_> {
+    fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<()> {
+        let t = &self.trace.t;
+        let from = t.partition_point(|x| *x < self.window.0);
+        let to = t.partition_point(|x| *x <= self.window.1);
+        let inside = |c: &Curve<'_>| c.values[from..to].to_vec();
+        let all: Vec<f64> = self.curves.iter().flat_map(inside).collect();
+        let low = all.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let margin = (0.08 * (high - low)).max(1e-3);
+        let mut chart = ChartBuilder::on(area)
+            .caption(self.title, ("sans-serif", 15))
+            .margin(8)
+            .x_label_area_size(34)
+            .y_label_area_size(58)
+            .build_cartesian_2d(self.window.0..self.window.1, low - margin..high + margin)
+            .map_err(drawing)?;
+        chart
+            .configure_mesh()
+            .x_desc("t [s]")
+            .y_desc(self.unit)
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(RGBColor(225, 225, 225))
+            .label_style(("sans-serif", 12))
+            .draw()
+            .map_err(drawing)?;
+        let stride = (to - from).div_ceil(POINTS).max(1);
+        for Curve { name, color, values } in &self.curves {
+            let style = color.stroke_width(if *color == GREY { 1 } else { 2 });
+            let points = (from..to).step_by(stride).map(|k| (t[k], values[k]));
+            let series = chart.draw_series(LineSeries::new(points, style)).map_err(drawing)?;
+            series.label(*name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+        }
+        if self.curves.len() > 1 {
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperRight)
+                .background_style(WHITE.mix(0.8))
+                .border_style(GREY)
+                .label_font(("sans-serif", 12))
+                .draw()
+                .map_err(drawing)?;
+        }
+        Ok(())
+    }
+}
+
+fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> anyhow::Error {
+    anyhow!("drawing a plot: {error}")
+}
+
+/// Panels in rows of two.
+fn page(panels: &[Panel<'_>]) -> Result<String> {
+    let mut svg = String::new();
+    {
+        let rows = panels.len().div_ceil(2);
+        let height = u32::try_from(rows * 260)?;
+        let root = SVGBackend::with_string(&mut svg, (1000, height)).into_drawing_area();
+        root.fill(&WHITE).map_err(drawing)?;
+        for (panel, area) in panels.iter().zip(root.split_evenly((rows, 2))) {
+            panel.draw(&area)?;
+        }
+        root.present().map_err(drawing)?;
+    }
+    Ok(svg)
+}
+
+fn speed<'a>(title: &'static str, trace: &'a Trace, window: (f64, f64)) -> Panel<'a> {
+    let curves = vec![
+        Curve { name: "reference", color: GREY, values: &trace.speed_ref },
+        Curve { name: "true", color: RED_INK, values: &trace.speed },
+        Curve { name: "estimated", color: BLUE_INK, values: &trace.speed_est },
+    ];
+    Panel { title, unit: "rpm", trace, window, curves }
+}
+
+fn currents<'a>(title: &'static str, trace: &'a Trace, window: (f64, f64)) -> Panel<'a> {
+    let curves = vec![
+        Curve { name: "i_sd", color: BLUE_INK, values: &trace.i_d },
+        Curve { name: "i_sq", color: RED_INK, values: &trace.i_q },
+    ];
+    Panel { title, unit: "A", trace, window, curves }
+}
+
+fn error<'a>(title: &'static str, trace: &'a Trace, window: (f64, f64)) -> Panel<'a> {
+    let curves = vec![Curve { name: "error", color: BLUE_INK, values: &trace.error }];
+    Panel { title, unit: "deg", trace, window, curves }
+}
+
+/// Fig. 4: start from 180 deg (speed, angle) and the four speed steps.
+///
+/// # Errors
+/// When drawing fails.
+pub(super) fn figure_4(start: &Trace, steps: [&Trace; 4]) -> Result<String> {
+    let angles = vec![
+        Curve { name: "true", color: RED_INK, values: &start.theta_e },
+        Curve { name: "estimated", color: BLUE_INK, values: &start.theta_est },
+    ];
+    let (window, title) = ((0.15, 0.5), "(b) start from 180°: electrical rotor angle");
+    let angle = Panel { title, unit: "deg", trace: start, window, curves: angles };
+    page(&[
+        speed("(a) start from 180°: speed", start, (0.1, 1.0)),
+        angle,
+        speed("(c) 0 - 20 rpm", steps[0], (0.0, 1.0)),
+        speed("(d) 0 - 500 rpm", steps[1], (0.0, 0.6)),
+        speed("(e) 0 - 1000 rpm", steps[2], (0.0, 0.6)),
+        speed("(f) 0 - 1500 rpm", steps[3], (0.0, 0.6)),
+    ])
+}
+
+/// Section 3.2: the second start after a return to zero speed.
+///
+/// # Errors
+/// When drawing fails.
+pub(super) fn second_start(start: &Trace) -> Result<String> {
+    page(&[
+        speed("first start, stop, second start: speed", start, (0.0, 3.2)),
+        error("first start, stop, second start: angle error", start, (0.0, 3.2)),
+    ])
+}
+
+/// Fig. 5: load steps at 0 rpm (left) and 1000 rpm (right).
+///
+/// # Errors
+/// When drawing fails.
+pub(super) fn figure_5(at_0: &Trace, at_1000: &Trace) -> Result<String> {
+    let (left, right) = ((0.3, 2.5), (0.8, 2.0));
+    page(&[
+        speed("(a) 2 N.m at 0 rpm: speed", at_0, left),
+        speed("(b) 2 N.m at 1000 rpm: speed", at_1000, right),
+        currents("(c) currents", at_0, left),
+        currents("(d) currents", at_1000, right),
+        error("(e) angle error", at_0, left),
+        error("(f) angle error", at_1000, right),
+    ])
+}
