@@ -162,7 +162,9 @@ fn f12_reversals() {
 /// End of a start from an initial angle: speed in rpm and angle error in deg, 0.6 s after the step at 0.1 s.
 fn start(theta: f64, reference: f64, r_hat: f64) -> (f64, f64) {
     let mut p = pair(&[("initial.theta_e", theta.to_radians())], &[("motor.R_s", r_hat)]);
-    run(&mut p, T_S, 0.7, |t, p| p.controller.model.inputs.speed_ref = if t >= 0.1 - 1e-9 { reference * RPM } else { 0.0 });
+    run(&mut p, T_S, 0.7, |t, p| {
+        p.controller.model.inputs.speed_ref = if t >= 0.1 - 1e-9 { reference * RPM } else { 0.0 }
+    });
     (p.plant.out.speed / RPM, error(&p))
 }
 

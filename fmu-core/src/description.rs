@@ -58,6 +58,8 @@ pub struct Variable {
     pub allowed: Option<String>,
     /// Typical magnitude.
     pub nominal: Option<f64>,
+    /// Grows without bound.
+    pub unbounded: bool,
     /// Number of elements, `None` for a scalar.
     pub dimension: Option<usize>,
     /// Start values (one, or one per element) of what the importer may set; `None` for what is calculated.
@@ -182,6 +184,7 @@ fn variable(
         max: meta.range.max.is_finite().then_some(meta.range.max),
         allowed: bounded.then(|| meta.range.to_string()),
         nominal: meta.nominal,
+        unbounded: meta.unbounded,
         dimension: meta.dimension,
         start: start.map(|x| vec![x]),
         initial_dependencies,

@@ -48,7 +48,13 @@ impl Hash {
         };
         let hash = self
             .text(meta.name)
-            .bytes(&[meta.causality as u8, meta.variability as u8, range.above as u8, range.below as u8])
+            .bytes(&[
+                meta.causality as u8,
+                meta.variability as u8,
+                range.above as u8,
+                range.below as u8,
+                meta.unbounded as u8,
+            ])
             .number(range.min)
             .number(range.max)
             .number(nominal)

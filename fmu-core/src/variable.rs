@@ -128,6 +128,8 @@ pub struct Meta {
     pub range: Range,
     /// Typical magnitude, for solvers' scaling.
     pub nominal: Option<f64>,
+    /// Grows without bound, like an angle that is not wrapped.
+    pub unbounded: bool,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,
 }
@@ -167,8 +169,17 @@ impl<W: 'static> Row<W> {
         kind: Kind,
         access: Access<W>,
     ) -> Self {
-        let meta =
-            Meta { name, description, causality, variability, kind, range: Range::ALL, nominal: None, dimension: None };
+        let meta = Meta {
+            name,
+            description,
+            causality,
+            variability,
+            kind,
+            range: Range::ALL,
+            nominal: None,
+            unbounded: false,
+            dimension: None,
+        };
         Self { meta, access }
     }
 
@@ -340,6 +351,12 @@ impl<W: 'static> Row<W> {
     /// Values of at most `bound`.
     pub const fn at_most(mut self, bound: f64) -> Self {
         self.meta.range.max = bound;
+        self
+    }
+
+    /// The variable grows without bound, like an angle that is not wrapped (FMI 3.0.2, 2.4.7.5 `unbounded`).
+    pub const fn unbounded(mut self) -> Self {
+        self.meta.unbounded = true;
         self
     }
 

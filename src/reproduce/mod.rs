@@ -33,7 +33,7 @@ pub fn run(folder: &Path, out: &Path, progress: &(dyn Fn(&str) + Sync)) -> Resul
     let (fmi2, fmi3) = std::thread::scope(|scope| {
         let other = scope.spawn(|| all("fmi2"));
         let fmi3 = all("fmi3");
-        (other.join().expect("a thread that returns its errors"), fmi3)
+        (other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), fmi3)
     });
     let (fmi2, fmi3) = (fmi2?, fmi3?);
 

@@ -213,7 +213,7 @@ mod tests {
     fn errors_wrap_to_half_open_turn() {
         let mut trace = Trace::default();
         for (theta_est, theta_e) in [(PI, -PI / 2.0), (0.0, PI), (0.1, -0.1)] {
-            trace.push(&REST, 0.0, &Point { theta_est, theta_e, ..Point::default() });
+            trace.push(&REST, 0.0, &Point { theta_e, theta_est, ..Point::default() });
         }
         for (error, expected) in trace.error.iter().zip([-90.0, 180.0, 0.2_f64.to_degrees()]) {
             assert!((error - expected).abs() < 1e-9, "{error} {expected}");

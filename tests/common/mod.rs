@@ -1,5 +1,5 @@
 //! The closed loop run natively: the reference for every figure and for the packed FMUs.
-#![allow(dead_code, missing_docs, clippy::missing_panics_doc)]
+#![allow(dead_code, missing_docs, unreachable_pub, clippy::missing_panics_doc)]
 
 use drive::Pair;
 use fmu::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};

@@ -225,7 +225,7 @@ pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
             O::output("i_b", &AMPERE, "Stator current of phase b", |o| &mut o.i.b),
             O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
             O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed),
-            O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle),
+            O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle).unbounded(),
             O::output(
                 "theta_e",
                 &RADIAN,

@@ -111,6 +111,7 @@ fn type_attributes(v: &Variable) -> Vec<(String, String)> {
                 .with_some("max", v.max.map(number::format))
                 // A magnitude, greater than 0 in both standards.
                 .with_some("nominal", v.nominal.map(|x| number::format(x.abs())))
+                .with_some("unbounded", v.unbounded.then(|| "true".to_owned()))
         }
         VariableKind::Integer => {
             // xs:int: rounded inwards, and left out where every integer is inside.

@@ -48,6 +48,7 @@ pub(crate) fn variable(
         max: None,
         allowed: None,
         nominal: None,
+        unbounded: false,
         dimension: None,
         start: None,
         initial_dependencies: None,
