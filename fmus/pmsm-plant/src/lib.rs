@@ -1,1 +1,3 @@
 //! The FMU PmsmPlant.
+
+fmu_export::export!(drive::PmsmPlant);

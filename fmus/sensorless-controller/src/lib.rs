@@ -1,1 +1,3 @@
 //! The FMU SensorlessController.
+
+fmu_export::export!(drive::SensorlessController);

@@ -1,0 +1,204 @@
+//! The calls that both standards have: from pointers to the instance's functions.
+
+use super::Abi;
+use super::gate::{Entry, enter};
+use super::pointer::{array, place, room, text};
+use super::types::{FmuState, Instance, References};
+use crate::value::Value;
+use crate::{blob, registry};
+use fmu_core::{Fault, Model};
+use std::ffi::{c_char, c_int};
+
+/// # Safety
+/// Of every function here: what the standard demands of the importer. The instance is NULL, or one that this binary
+/// made and has not freed, used by one thread at a time; a pointer to an array is NULL or leads to as many elements as
+/// the call says.
+#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the safety is above for all")]
+impl<M: Model> Abi<M> {
+    pub unsafe fn get<T: Value>(
+        entry: Entry,
+        instance: Instance,
+        references: References,
+        n: usize,
+        values: *mut T,
+        room_for: usize,
+    ) -> c_int {
+        // SAFETY: the importer's arrays, of these lengths.
+        unsafe {
+            enter::<M>(entry, instance, |it| {
+                let out = room(values, room_for, "values")?;
+                Ok(it.get(array(references, n, "value references")?, out)?)
+            })
+        }
+    }
+
+    pub unsafe fn set<T: Value>(
+        entry: Entry,
+        instance: Instance,
+        references: References,
+        n: usize,
+        values: *const T,
+        n_values: usize,
+    ) -> c_int {
+        // SAFETY: the importer's arrays, of these lengths.
+        unsafe {
+            enter::<M>(entry, instance, |it| {
+                let values = array(values, n_values, "values")?;
+                Ok(it.set(array(references, n, "value references")?, values)?)
+            })
+        }
+    }
+
+    /// A getter or setter of a type that no variable has: fine for no variable.
+    pub unsafe fn none(
+        entry: Entry,
+        instance: Instance,
+        references: References,
+        n: usize,
+        n_values: usize,
+        carries: &str,
+    ) -> c_int {
+        // SAFETY: the importer's array, of this length.
+        unsafe {
+            enter::<M>(entry, instance, |it| {
+                it.refuse(array(references, n, "value references")?, carries)?;
+                if n_values == 0 { Ok(()) } else { Err(Fault::value("nValues", n_values, "0 for no reference").into()) }
+            })
+        }
+    }
+
+    pub unsafe fn set_debug_logging(
+        entry: Entry,
+        instance: Instance,
+        on: bool,
+        n: usize,
+        categories: *const *const c_char,
+    ) -> c_int {
+        // SAFETY: the importer's array of C strings.
+        unsafe {
+            enter::<M>(entry, instance, |it| {
+                let mut names = Vec::new();
+                for &category in array(categories, n, "categories")? {
+                    let category = text(category).ok_or_else(|| Fault::new("a log category is NULL"))?;
+                    names.push(category.to_str().map_err(|_| Fault::new("a log category is not UTF-8"))?);
+                }
+                Ok(it.log.switch(entry.standard, on, &names)?)
+            })
+        }
+    }
+
+    pub unsafe fn exit_initialisation(entry: Entry, instance: Instance) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe { enter::<M>(entry, instance, |it| Ok(it.exit_initialisation()?)) }
+    }
+
+    pub unsafe fn terminate(entry: Entry, instance: Instance) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe {
+            enter::<M>(entry, instance, |it| {
+                it.terminate();
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn reset(entry: Entry, instance: Instance) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe {
+            enter::<M>(entry, instance, |it| {
+                it.reset();
+                Ok(())
+            })
+        }
+    }
+
+    /// `state` leads to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.6.4).
+    pub unsafe fn save_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
+        // SAFETY: the importer's variable, which it has initialised as the standard says.
+        unsafe {
+            enter::<M>(entry, instance, |it| {
+                let state = place(state, "FMUState")?.assume_init_mut();
+                *state = handle(it.save(state.addr())?);
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn restore_state(entry: Entry, instance: Instance, state: FmuState) -> c_int {
+        // SAFETY: the importer's instance; the state is a number to us.
+        unsafe { enter::<M>(entry, instance, |it| Ok(it.restore(state.addr())?)) }
+    }
+
+    /// NULL, and a variable that holds NULL, are fine.
+    pub unsafe fn free_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
+        // SAFETY: the importer's variable, which it has initialised as the standard says.
+        unsafe {
+            enter::<M>(entry, instance, |_| {
+                if state.is_null() {
+                    return Ok(());
+                }
+                let state = place(state, "FMUState")?.assume_init_mut();
+                registry::free::<M>(state.addr())?;
+                *state = handle(0);
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn serialised_size(entry: Entry, instance: Instance, state: FmuState, size: *mut usize) -> c_int {
+        // SAFETY: the importer's variable; the state is a number to us.
+        unsafe {
+            enter::<M>(entry, instance, |_| {
+                let size = place(size, "size")?;
+                size.write(registry::with::<M, _>(state.addr(), |state| blob::size(state))?);
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn serialise(entry: Entry, instance: Instance, state: FmuState, bytes: *mut u8, size: usize) -> c_int {
+        // SAFETY: the importer's array of this size; the state is a number to us.
+        unsafe {
+            enter::<M>(entry, instance, |_| {
+                let out = room(bytes, size, "serializedState")?;
+                let bytes = registry::with::<M, _>(state.addr(), |state| blob::write(state))?;
+                if bytes.len() != size {
+                    return Err(Fault::value("size", size, format_args!("{} for this state", bytes.len())).into());
+                }
+                for (place, byte) in out.iter_mut().zip(bytes) {
+                    place.write(byte);
+                }
+                Ok(())
+            })
+        }
+    }
+
+    /// Always makes a new state: what the variable held before is not looked at.
+    pub unsafe fn deserialise(
+        entry: Entry,
+        instance: Instance,
+        bytes: *const u8,
+        size: usize,
+        state: *mut FmuState,
+    ) -> c_int {
+        // SAFETY: the importer's array of this size, and its variable.
+        unsafe {
+            enter::<M>(entry, instance, |it| {
+                let state = place(state, "FMUState")?;
+                state.write(handle(it.deserialise(array(bytes, size, "serializedState")?)?));
+                Ok(())
+            })
+        }
+    }
+
+    /// What this FMU does not offer.
+    pub unsafe fn unsupported(entry: Entry, instance: Instance, why: &str) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe { enter::<M>(entry, instance, |_| Err(Fault::new(format!("not supported: {why}")).into())) }
+    }
+}
+
+/// A handle as C carries it: a number in a pointer's place.
+fn handle(number: usize) -> FmuState {
+    std::ptr::without_provenance_mut(number)
+}

@@ -1,0 +1,206 @@
+//! FMI 2.0.5: what it has of its own, and the table of its functions.
+
+use super::gate::{Entry, Refusal, enter, open};
+use super::logger::Fmi2Sink;
+use super::pointer::{place, text};
+use super::types::{Fmi2Boolean, Fmi2Callbacks, Instance, Text};
+use super::{Abi, credentials};
+use crate::log::Log;
+use fmu_core::{Fault, Model};
+use std::ffi::c_int;
+
+/// `fmi2CoSimulation` of `fmi2Type`.
+const CO_SIMULATION: c_int = 1;
+/// `fmi2LastSuccessfulTime` of `fmi2StatusKind`.
+const LAST_SUCCESSFUL_TIME: c_int = 2;
+/// `fmi2Terminated` of `fmi2StatusKind`.
+const TERMINATED: c_int = 3;
+
+/// # Safety
+/// As in `calls.rs`.
+#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the safety is above for all")]
+impl<M: Model> Abi<M> {
+    /// FMI 2.0.5, 2.1.5. The callbacks' struct is copied: its pointer is valid only now.
+    pub unsafe fn fmi2_instantiate(
+        entry: Entry,
+        name: Text,
+        fmu_type: c_int,
+        token: Text,
+        callbacks: *const Fmi2Callbacks,
+        logging_on: bool,
+    ) -> Instance {
+        // SAFETY: the importer's texts and struct, valid during this call.
+        let (name, token, callbacks) = unsafe { (text(name), text(token), callbacks.as_ref()) };
+        let sink = Fmi2Sink {
+            logger: callbacks.and_then(|c| c.logger),
+            environment: callbacks.map_or(std::ptr::null_mut(), |c| c.environment),
+            instance: name.unwrap_or_default().to_owned(),
+        };
+        let judged = credentials::<M>(name, token).and_then(|name| {
+            let fits = fmu_type == CO_SIMULATION;
+            if fits { Ok(name) } else { Err(Fault::value("fmuType", fmu_type, "fmi2CoSimulation (1)")) }
+        });
+        open::<M>(entry, Log::new(Box::new(sink), logging_on), judged)
+    }
+
+    pub unsafe fn fmi2_setup_experiment(
+        entry: Entry,
+        instance: Instance,
+        start: f64,
+        stop_defined: Fmi2Boolean,
+        stop: f64,
+    ) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe { enter::<M>(entry, instance, |it| Ok(it.set_up(start, (stop_defined.0 != 0).then_some(stop))?)) }
+    }
+
+    pub unsafe fn fmi2_enter_initialisation(entry: Entry, instance: Instance) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe { enter::<M>(entry, instance, |it| Ok(it.enter_initialisation()?)) }
+    }
+
+    pub unsafe fn fmi2_do_step(entry: Entry, instance: Instance, t: f64, h: f64) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe { enter::<M>(entry, instance, |it| Ok(it.do_step(t, h)?)) }
+    }
+
+    /// `fmi2LastSuccessfulTime`; the rest is of asynchronous steps (FMI 2.0.5, 4.2.3).
+    pub unsafe fn fmi2_real_status(entry: Entry, instance: Instance, kind: c_int, value: *mut f64) -> c_int {
+        // SAFETY: the importer's variable.
+        unsafe {
+            enter::<M>(entry, instance, |it| {
+                let value = place(value, "value")?;
+                if kind != LAST_SUCCESSFUL_TIME {
+                    return no_status(kind);
+                }
+                value.write(it.now.end);
+                Ok(())
+            })
+        }
+    }
+
+    /// `fmi2Terminated`: this FMU never asks to end the simulation.
+    pub unsafe fn fmi2_boolean_status(entry: Entry, instance: Instance, kind: c_int, value: *mut Fmi2Boolean) -> c_int {
+        // SAFETY: the importer's variable.
+        unsafe {
+            enter::<M>(entry, instance, |_| {
+                let value = place(value, "value")?;
+                if kind != TERMINATED {
+                    return no_status(kind);
+                }
+                value.write(Fmi2Boolean(0));
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn fmi2_no_status(entry: Entry, instance: Instance, kind: c_int) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe { enter::<M>(entry, instance, |_| no_status(kind)) }
+    }
+}
+
+/// FMI 2.0.5, 4.2.3: Discard if the status is not available.
+fn no_status(kind: c_int) -> Result<(), Refusal> {
+    let kind = ["fmi2DoStepStatus", "fmi2PendingStatus", "fmi2LastSuccessfulTime", "fmi2Terminated"]
+        .get(usize::try_from(kind).unwrap_or(usize::MAX))
+        .map_or_else(|| kind.to_string(), ToString::to_string);
+    Err(Refusal::Discard(Fault::new(format!("{kind} is not available: every step ends before fmi2DoStep returns"))))
+}
+
+/// The functions of `fmi2Functions.h`: name, arguments, row of the lifecycle table, what does it with which arguments.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! export_fmi2 {
+    ($model:ty) => {
+        #[unsafe(no_mangle)]
+        pub(crate) extern "C" fn fmi2GetTypesPlatform() -> Text {
+            c"default".as_ptr()
+        }
+
+        #[unsafe(no_mangle)]
+        pub(crate) extern "C" fn fmi2GetVersion() -> Text {
+            c"2.0".as_ptr()
+        }
+
+        #[unsafe(no_mangle)]
+        pub(crate) unsafe extern "C" fn fmi2Instantiate(
+            name: Text,
+            fmu_type: c_int,
+            guid: Text,
+            _resources: Text,
+            callbacks: *const Fmi2Callbacks,
+            _visible: Fmi2Boolean,
+            logging_on: Fmi2Boolean,
+        ) -> Instance {
+            $crate::abi::quiet();
+            let entry = Entry { standard: Standard::Fmi2, call: Call::Reset, name: "fmi2Instantiate" };
+            // SAFETY: what the standard demands of the importer.
+            unsafe {
+                $crate::abi::Abi::<$model>::fmi2_instantiate(entry, name, fmu_type, guid, callbacks, logging_on.0 != 0)
+            }
+        }
+
+        #[unsafe(no_mangle)]
+        pub(crate) unsafe extern "C" fn fmi2FreeInstance(instance: Instance) {
+            // SAFETY: what the standard demands of the importer.
+            unsafe { $crate::abi::Abi::<$model>::free_instance(instance) }
+        }
+
+        $crate::functions! { Fmi2 $model;
+            fmi2SetDebugLogging(on: Fmi2Boolean, n: usize, categories: *const Text)
+                => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
+            fmi2SetupExperiment(_tolerance_defined: Fmi2Boolean, _tolerance: f64, start: f64, stop_defined: Fmi2Boolean, stop: f64)
+                => SetupExperiment: fmi2_setup_experiment(start, stop_defined, stop);
+            fmi2EnterInitializationMode() => EnterInitialization: fmi2_enter_initialisation();
+            fmi2ExitInitializationMode() => ExitInitialization: exit_initialisation();
+            fmi2Terminate() => Terminate: terminate();
+            fmi2Reset() => Reset: reset();
+
+            fmi2GetReal(vr: References, n: usize, values: *mut f64) => Get: get(vr, n, values, n);
+            fmi2GetInteger(vr: References, n: usize, values: *mut Fmi2Integer) => Get: get(vr, n, values, n);
+            fmi2GetBoolean(vr: References, n: usize, values: *mut Fmi2Boolean) => Get: get(vr, n, values, n);
+            fmi2GetString(vr: References, n: usize, _values: *mut Text) => Get: none(vr, n, 0, "a text");
+            fmi2SetReal(vr: References, n: usize, values: *const f64) => Set: set(vr, n, values, n);
+            fmi2SetInteger(vr: References, n: usize, values: *const Fmi2Integer) => Set: set(vr, n, values, n);
+            fmi2SetBoolean(vr: References, n: usize, values: *const Fmi2Boolean) => Set: set(vr, n, values, n);
+            fmi2SetString(vr: References, n: usize, _values: *const Text) => Set: none(vr, n, 0, "a text");
+
+            fmi2GetFMUstate(state: *mut FmuState) => SaveState: save_state(state);
+            fmi2SetFMUstate(state: FmuState) => RestoreState: restore_state(state);
+            fmi2FreeFMUstate(state: *mut FmuState) => UseState: free_state(state);
+            fmi2SerializedFMUstateSize(state: FmuState, size: *mut usize) => UseState: serialised_size(state, size);
+            fmi2SerializeFMUstate(state: FmuState, bytes: *mut u8, size: usize) => UseState: serialise(state, bytes, size);
+            fmi2DeSerializeFMUstate(bytes: *const u8, size: usize, state: *mut FmuState)
+                => UseState: deserialise(bytes, size, state);
+
+            fmi2DoStep(t: f64, h: f64, _no_set_state_prior: Fmi2Boolean) => DoStep: fmi2_do_step(t, h);
+            fmi2CancelStep() => Unsupported: unsupported("no step is ever in progress");
+            fmi2GetStatus(kind: c_int, _value: *mut c_int) => Status: fmi2_no_status(kind);
+            fmi2GetRealStatus(kind: c_int, value: *mut f64) => Status: fmi2_real_status(kind, value);
+            fmi2GetIntegerStatus(kind: c_int, _value: *mut Fmi2Integer) => Status: fmi2_no_status(kind);
+            fmi2GetBooleanStatus(kind: c_int, value: *mut Fmi2Boolean) => Status: fmi2_boolean_status(kind, value);
+            fmi2GetStringStatus(kind: c_int, _value: *mut Text) => Status: fmi2_no_status(kind);
+            fmi2SetRealInputDerivatives(_vr: References, _n: usize, _order: *const c_int, _values: *const f64)
+                => Unsupported: unsupported("canInterpolateInputs = false");
+            fmi2GetRealOutputDerivatives(_vr: References, _n: usize, _order: *const c_int, _values: *mut f64)
+                => Unsupported: unsupported("maxOutputDerivativeOrder = 0");
+            fmi2GetDirectionalDerivative(
+                _unknowns: References, _n_unknowns: usize, _knowns: References, _n_knowns: usize,
+                _seed: *const f64, _sensitivity: *mut f64
+            ) => Unsupported: unsupported("providesDirectionalDerivative = false");
+
+            fmi2EnterEventMode() => Unsupported: unsupported("Model Exchange");
+            fmi2NewDiscreteStates(_info: *mut c_void) => Unsupported: unsupported("Model Exchange");
+            fmi2EnterContinuousTimeMode() => Unsupported: unsupported("Model Exchange");
+            fmi2CompletedIntegratorStep(_no_set_state_prior: Fmi2Boolean, _event: *mut Fmi2Boolean, _end: *mut Fmi2Boolean)
+                => Unsupported: unsupported("Model Exchange");
+            fmi2SetTime(_time: f64) => Unsupported: unsupported("Model Exchange");
+            fmi2SetContinuousStates(_x: *const f64, _n: usize) => Unsupported: unsupported("Model Exchange");
+            fmi2GetDerivatives(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
+            fmi2GetEventIndicators(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
+            fmi2GetContinuousStates(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
+            fmi2GetNominalsOfContinuousStates(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
+        }
+    };
+}

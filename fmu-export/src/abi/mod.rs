@@ -1,0 +1,117 @@
+//! The C interface: the only place with `unsafe`. Pointers become Rust values here, and nothing is decided here.
+//!
+//! [`gate`] is what every call passes, [`calls`](Abi) what both standards share, [`fmi2`] and [`fmi3`] the tables of
+//! their functions, which [`export!`](crate::export) makes C functions of.
+
+mod calls;
+pub mod fmi2;
+pub mod fmi3;
+mod gate;
+mod logger;
+mod pointer;
+pub mod types;
+
+use fmu_core::{Description, Fault, Model};
+use std::ffi::{CStr, c_int, c_void};
+use std::marker::PhantomData;
+use std::panic::{catch_unwind, set_hook};
+use std::sync::Once;
+use types::Instance;
+
+/// The functions for one model.
+pub struct Abi<M>(PhantomData<M>);
+
+impl<M: Model> Abi<M> {
+    /// # Safety
+    /// The instance is NULL, or one that this binary made and has not freed; nobody uses it now or later.
+    pub unsafe fn free_instance(instance: Instance) {
+        // SAFETY: the caller's promise.
+        unsafe { gate::close::<M>(instance) }
+    }
+
+    /// Passes the model's description to `sink` as JSON and returns 0, or a message and 1.
+    pub fn describe(
+        sink: extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize),
+        context: *mut c_void,
+    ) -> c_int {
+        let json = catch_unwind(|| {
+            let description = Description::of::<M>()?;
+            serde_json::to_string(&description).map_err(|e| Fault::new(e.to_string()))
+        });
+        let json = json.unwrap_or_else(|_| Err(Fault::new("a fault in the model's code (panic)")));
+        let (text, status) = match json {
+            Ok(text) => (text, 0),
+            Err(fault) => (fault.to_string(), 1),
+        };
+        sink(context, text.as_ptr(), text.len());
+        status
+    }
+}
+
+/// A panic becomes a log message, so the hook that would print it is silenced. The hook is the binary's own: a cdylib
+/// has its own standard library.
+pub fn quiet() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| set_hook(Box::new(|_| {})));
+}
+
+/// The instance's name, if name and token are right.
+fn credentials<M: Model>(name: Option<&CStr>, token: Option<&CStr>) -> Result<String, Fault> {
+    let name = name.map(CStr::to_string_lossy).filter(|name| !name.trim().is_empty());
+    let Some(name) = name else { return Err(Fault::new("the instance name is missing: NULL, empty or blank")) };
+    let expected = M::TOKEN;
+    match token.map(CStr::to_string_lossy) {
+        Some(token) if token == expected.as_str() => Ok(name.into_owned()),
+        token => Err(Fault::new(format!(
+            "the instantiation token (GUID) is {}, and {} is expected: description and binary are of different builds",
+            token.as_deref().unwrap_or("NULL"),
+            expected.as_str()
+        ))),
+    }
+}
+
+/// C functions from a table of them. One line of the table reads: name in C, arguments after the instance, row of the
+/// lifecycle table, function of [`Abi`] with the arguments it gets.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! functions {
+    ($standard:ident $model:ty; $(
+        $name:ident($($argument:ident: $type:ty),*) => $call:ident: $function:ident($($passed:expr),*);
+    )*) => { $(
+        #[unsafe(no_mangle)]
+        pub(crate) unsafe extern "C" fn $name(instance: Instance $(, $argument: $type)*) -> c_int {
+            let entry = Entry { standard: Standard::$standard, call: Call::$call, name: stringify!($name) };
+            // SAFETY: what the standard demands of the importer.
+            unsafe { $crate::abi::Abi::<$model>::$function(entry, instance $(, $passed)*) }
+        }
+    )* };
+}
+
+/// Makes the crate the binary of an FMU: all C functions of FMI 2.0 and FMI 3.0 for one model, and one more,
+/// `fmu_description`, that hands out its description.
+///
+/// ```ignore
+/// fmu_export::export!(drive::PmsmPlant);
+/// ```
+#[macro_export]
+macro_rules! export {
+    ($model:ty) => {
+        #[allow(non_snake_case, unused_imports, clippy::wildcard_imports, clippy::too_many_arguments)]
+        mod fmi {
+            use super::*;
+            use $crate::abi::types::*;
+
+            $crate::export_fmi2!($model);
+            $crate::export_fmi3!($model);
+
+            #[unsafe(no_mangle)]
+            pub(crate) extern "C" fn fmu_description(
+                sink: extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize),
+                context: *mut c_void,
+            ) -> c_int {
+                $crate::abi::quiet();
+                $crate::abi::Abi::<$model>::describe(sink, context)
+            }
+        }
+    };
+}

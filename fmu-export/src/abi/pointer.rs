@@ -1,0 +1,71 @@
+//! From C pointers to slices, texts and places; every check that is possible is made.
+
+use fmu_core::Fault;
+use std::ffi::{CStr, c_char};
+use std::mem::MaybeUninit;
+use std::slice;
+
+/// An array of `n` elements. NULL is an array of none.
+///
+/// # Safety
+/// A non-NULL aligned `pointer` is readable for `n` elements, and nobody writes there during `'a`.
+#[inline]
+pub(crate) unsafe fn array<'a, T>(pointer: *const T, n: usize, name: &str) -> Result<&'a [T], Fault> {
+    if n == 0 {
+        return Ok(&[]);
+    }
+    if !fits(pointer, n) {
+        return Err(refuse(pointer.is_null(), n, name));
+    }
+    // SAFETY: not NULL, aligned, no larger than an allocation can be; readable by the caller's promise.
+    Ok(unsafe { slice::from_raw_parts(pointer, n) })
+}
+
+/// Room for `n` elements that the importer need not have initialised. NULL is room for none.
+///
+/// # Safety
+/// A non-NULL aligned `pointer` is writable for `n` elements, and nobody else uses it during `'a`.
+#[inline]
+pub(crate) unsafe fn room<'a, T>(pointer: *mut T, n: usize, name: &str) -> Result<&'a mut [MaybeUninit<T>], Fault> {
+    if n == 0 {
+        return Ok(&mut []);
+    }
+    if !fits(pointer, n) {
+        return Err(refuse(pointer.is_null(), n, name));
+    }
+    // SAFETY: not NULL, aligned, no larger than an allocation can be; ours by the caller's promise; uninitialised is fine.
+    Ok(unsafe { slice::from_raw_parts_mut(pointer.cast(), n) })
+}
+
+/// A place for one value of the importer.
+///
+/// # Safety
+/// As [`room`] of one element.
+#[inline]
+pub(crate) unsafe fn place<'a, T>(pointer: *mut T, name: &str) -> Result<&'a mut MaybeUninit<T>, Fault> {
+    if !fits(pointer, 1) {
+        return Err(refuse(pointer.is_null(), 1, name));
+    }
+    // SAFETY: not NULL, aligned; ours by the caller's promise; uninitialised is fine.
+    Ok(unsafe { &mut *pointer.cast() })
+}
+
+/// A C string, `None` for NULL.
+///
+/// # Safety
+/// A non-NULL `pointer` leads to bytes that end with a zero and stay as they are during `'a`.
+pub(crate) unsafe fn text<'a>(pointer: *const c_char) -> Option<&'a CStr> {
+    // SAFETY: not NULL; terminated by the caller's promise.
+    (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) })
+}
+
+#[inline]
+fn fits<T>(pointer: *const T, n: usize) -> bool {
+    !pointer.is_null() && pointer.is_aligned() && n <= isize::MAX.unsigned_abs() / size_of::<T>()
+}
+
+#[cold]
+fn refuse(null: bool, n: usize, name: &str) -> Fault {
+    let why = if null { "NULL" } else { "not aligned for its type, or too long" };
+    Fault::new(format!("{name} is {why}; an array of {n} is expected"))
+}

@@ -1,0 +1,33 @@
+//! The C types of both standards, as far as the signatures need them.
+
+pub use super::gate::Entry;
+pub use super::logger::{Fmi2Logger, Fmi3Logger};
+pub use crate::lifecycle::{Call, Standard};
+pub use crate::value::{Fmi2Boolean, Fmi2Integer, Fmi3Boolean};
+pub use std::ffi::{c_char, c_int, c_void};
+
+/// `fmi2Component`, `fmi3Instance`.
+pub type Instance = *mut c_void;
+/// `fmi2FMUstate`, `fmi3FMUState`.
+pub type FmuState = *mut c_void;
+/// `const fmi2ValueReference[]`, `const fmi3ValueReference[]`.
+pub type References = *const u32;
+/// `fmi2String`, `fmi3String`.
+pub type Text = *const c_char;
+
+/// `fmi2CallbackFunctions`. The memory functions are not used: the model description says so
+/// (`canNotUseMemoryManagementFunctions`).
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct Fmi2Callbacks {
+    /// The logger, may be NULL.
+    pub logger: Option<Fmi2Logger>,
+    /// Not used.
+    pub allocate_memory: *const c_void,
+    /// Not used.
+    pub free_memory: *const c_void,
+    /// Not used: a step is never asynchronous.
+    pub step_finished: *const c_void,
+    /// Passed back to the logger.
+    pub environment: *mut c_void,
+}

@@ -1,0 +1,126 @@
+//! A saved state as bytes: header, payload, checksum. No pointer, no address, no host order: the same on every platform.
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 8 | magic |
+//! | 2 | [`FORMAT`] |
+//! | 2 | `Model::STATE_VERSION` |
+//! | 16 | `Model::HASH`, the model and its interface |
+//! | 4 | length of the payload |
+//! | n | payload in postcard's encoding, padded with zeros to a multiple of [`unit`] |
+//! | 4 | CRC-32 of all before |
+
+use crate::lifecycle::State;
+use crate::saved::Saved;
+use fmu_core::{Fault, Model};
+
+const MAGIC: &[u8; 8] = b"FMUstate";
+/// Version of this layout.
+const FORMAT: u16 = 1;
+const HEADER: usize = 8 + 2 + 2 + 16 + 4;
+const CHECKSUM: usize = 4;
+
+/// Number of bytes of a state. Integers have a variable length in the payload, but the padding makes the size the same
+/// for every state of a model, unless it holds lists that grow.
+///
+/// # Errors
+/// The model cannot be serialised.
+pub fn size<M: Model>(state: &Saved<M>) -> Result<usize, Fault> {
+    padded::<M>(payload_size(state)?)
+}
+
+/// A state as bytes, [`size`] of them.
+///
+/// # Errors
+/// The model cannot be serialised.
+pub fn write<M: Model>(state: &Saved<M>) -> Result<Vec<u8>, Fault> {
+    let payload = payload_size(state)?;
+    let length = u32::try_from(payload).map_err(|_| Fault::new("the state is larger than 4 GB"))?;
+    let mut bytes = vec![0; padded::<M>(payload)?];
+    let body = bytes.len() - CHECKSUM;
+    bytes[..HEADER].copy_from_slice(&header::<M>(length));
+    postcard::to_slice(state, &mut bytes[HEADER..body]).map_err(|e| unable(&e))?;
+    let checksum = crc32(&bytes[..body]);
+    bytes[body..].copy_from_slice(&checksum.to_le_bytes());
+    Ok(bytes)
+}
+
+/// Reads a state, trusting nothing.
+///
+/// # Errors
+/// Says what is wrong with the bytes: length, kind, version, checksum, content.
+pub fn read<M: Model>(bytes: &[u8]) -> Result<Saved<M>, Fault> {
+    let refuse = |why: String| Fault::new(format!("these {} bytes are no state of this FMU: {why}", bytes.len()));
+    let Some((body, checksum)) = bytes.split_last_chunk::<CHECKSUM>() else { return Err(refuse("too short".into())) };
+    let Some((header, room)) = body.split_first_chunk::<HEADER>() else { return Err(refuse("too short".into())) };
+    let (fixed, length) = header.split_at(HEADER - 4);
+    let expected = self::header::<M>(0);
+    if header[..8] != MAGIC[..] {
+        return Err(refuse("they do not begin like one".into()));
+    }
+    if header[12..28] != expected[12..28] {
+        return Err(refuse(format!("another model, or another version than {} {}", M::INFO.name, M::INFO.version)));
+    }
+    if *fixed != expected[..HEADER - 4] {
+        return Err(refuse("written by another version of this FMU".into()));
+    }
+    let length = length.iter().rev().fold(0_usize, |n, &byte| (n << 8) | usize::from(byte));
+    if length > room.len() || padded::<M>(length)? != bytes.len() {
+        return Err(refuse(format!("{length} bytes of content do not fit this size")));
+    }
+    if crc32(body).to_le_bytes() != *checksum {
+        return Err(refuse("the checksum differs".into()));
+    }
+    let (mut state, rest): (Saved<M>, &[u8]) =
+        postcard::take_from_bytes(&room[..length]).map_err(|e| refuse(format!("content: {e}")))?;
+    if !rest.is_empty() || state.life.state() == State::Error {
+        return Err(refuse("content".into()));
+    }
+    state.check().and_then(|()| state.check_time()).map_err(|fault| refuse(fault.to_string()))?;
+    if matches!(state.life.state(), State::Step | State::Terminated) {
+        state.block.model.validate().map_err(|fault| refuse(fault.to_string()))?;
+    }
+    Ok(state)
+}
+
+fn header<M: Model>(length: u32) -> [u8; HEADER] {
+    let mut header = [0; HEADER];
+    header[..8].copy_from_slice(MAGIC);
+    header[8..10].copy_from_slice(&FORMAT.to_le_bytes());
+    header[10..12].copy_from_slice(&M::STATE_VERSION.to_le_bytes());
+    header[12..28].copy_from_slice(&M::HASH.to_bytes());
+    header[28..].copy_from_slice(&length.to_le_bytes());
+    header
+}
+
+fn payload_size<M: Model>(state: &Saved<M>) -> Result<usize, Fault> {
+    postcard::experimental::serialized_size(state).map_err(|e| unable(&e))
+}
+
+fn unable(error: &postcard::Error) -> Fault {
+    Fault::new(format!("the state cannot be serialised: {error}"))
+}
+
+/// Room for a payload: twice what a fresh model needs, and some; more than an hour of counters adds to it.
+fn unit<M: Model>() -> Result<usize, Fault> {
+    Ok((2 * payload_size(&Saved::<M>::default())?).next_multiple_of(64) + 64)
+}
+
+fn padded<M: Model>(payload: usize) -> Result<usize, Fault> {
+    Ok(HEADER + payload.next_multiple_of(unit::<M>()?) + CHECKSUM)
+}
+
+/// CRC-32 of ISO 3309, as in PNG and ZIP.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn checksum_of_the_catalogue() {
+        assert_eq!(super::crc32(b"123456789"), 0xcbf4_3926);
+    }
+}

@@ -1,0 +1,100 @@
+//! What an instance says, and to whom. Errors are always said; the rest only when the importer asked for its category.
+
+use crate::lifecycle::Standard;
+use fmu_core::Fault;
+use fmu_core::log::{ALL, CATEGORIES, DISCARD, ERROR, EVENTS};
+
+/// A status as both standards number it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(i32)]
+pub enum Status {
+    /// All well.
+    Ok = 0,
+    /// Not used by this library.
+    Warning = 1,
+    /// The call could not be fulfilled; nothing changed and nothing is wrong.
+    Discard = 2,
+    /// The call failed; see [`State::Error`](crate::lifecycle::State::Error).
+    Error = 3,
+}
+
+/// The importer's logger.
+pub trait Sink {
+    /// Passes one message on.
+    fn write(&self, status: Status, category: &str, message: &str);
+}
+
+/// The logger and what it is to be told.
+pub struct Log {
+    sink: Box<dyn Sink>,
+    /// One flag per category of [`CATEGORIES`].
+    enabled: [bool; CATEGORIES.len()],
+}
+
+impl Log {
+    /// A log with all categories on or off.
+    pub fn new(sink: Box<dyn Sink>, on: bool) -> Self {
+        Self { sink, enabled: [on; CATEGORIES.len()] }
+    }
+
+    /// Says why a call failed; heard even with logging off, since the status alone helps nobody.
+    #[cold]
+    pub fn error(&self, message: &str) {
+        self.sink.write(Status::Error, ERROR, message);
+    }
+
+    /// Says why a call was discarded.
+    #[cold]
+    pub fn discard(&self, message: &str) {
+        if self.is_on(DISCARD) {
+            self.sink.write(Status::Discard, DISCARD, message);
+        }
+    }
+
+    /// Says what happened; the message is only made when somebody listens.
+    pub fn event(&self, message: impl FnOnce() -> String) {
+        if self.is_on(EVENTS) {
+            self.sink.write(Status::Ok, EVENTS, &message());
+        }
+    }
+
+    fn is_on(&self, category: &str) -> bool {
+        position(category).is_some_and(|i| self.enabled[i])
+    }
+
+    /// `SetDebugLogging`. No category means all. In FMI 2.0 the listed categories become the only ones (2.0.5, 2.1.5),
+    /// in FMI 3.0 they are switched and the others stay (3.0.2, 2.3.1).
+    ///
+    /// # Errors
+    /// Names a category that does not exist; then nothing changes.
+    pub fn switch(&mut self, standard: Standard, on: bool, categories: &[&str]) -> Result<(), Fault> {
+        let mut listed = [categories.is_empty(); CATEGORIES.len()];
+        for &category in categories {
+            match position(category) {
+                Some(i) => listed[i] = true,
+                None if category == ALL && standard == Standard::Fmi2 => listed = [true; CATEGORIES.len()],
+                None => return Err(unknown(category, standard)),
+            }
+        }
+        for (enabled, listed) in self.enabled.iter_mut().zip(listed) {
+            match (listed, standard) {
+                (true, _) => *enabled = on,
+                (false, Standard::Fmi2) => *enabled = *enabled && !on,
+                (false, Standard::Fmi3) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+fn position(category: &str) -> Option<usize> {
+    CATEGORIES.iter().position(|(name, _)| *name == category)
+}
+
+fn unknown(category: &str, standard: Standard) -> Fault {
+    let mut names: Vec<&str> = CATEGORIES.iter().map(|(name, _)| *name).collect();
+    if standard == Standard::Fmi2 {
+        names.push(ALL);
+    }
+    Fault::new(format!("log category {category:?} does not exist; these do: {}", names.join(", ")))
+}

@@ -1,0 +1,117 @@
+//! All that changes in an instance, as one plain value: what an FMU state saves.
+
+use crate::lifecycle::Life;
+use crate::message;
+use crate::value::Value;
+use fmu_core::{Block, Causality, Elapsed, Fault, Kind, Model, Slot};
+use serde::{Deserialize, Serialize};
+
+/// Start and stop time of the importer's experiment in s.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Experiment {
+    /// Start time.
+    pub start: f64,
+    /// Stop time, if the importer fixed one.
+    pub stop: Option<f64>,
+}
+
+impl Experiment {
+    /// Judges the times.
+    ///
+    /// # Errors
+    /// Says which time is not finite, or that the stop is not after the start.
+    pub fn new(start: f64, stop: Option<f64>) -> Result<Self, Fault> {
+        if !start.is_finite() {
+            return Err(Fault::value("startTime", start, "any finite number"));
+        }
+        match stop {
+            Some(stop) if !(stop.is_finite() && stop > start) => {
+                Err(Fault::value("stopTime", stop, format_args!("finite and greater than startTime = {start}")))
+            }
+            _ => Ok(Self { start, stop }),
+        }
+    }
+}
+
+/// Model, outputs, time and state of the lifecycle.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Saved<M: Model> {
+    /// State of the lifecycle.
+    pub life: Life,
+    /// Set by `SetupExperiment` or `EnterInitializationMode`.
+    pub experiment: Option<Experiment>,
+    /// Time since the start, summed here.
+    pub elapsed: Elapsed,
+    /// End of the last step as the importer computes it, `t + h`; before the first step the start time.
+    pub end: f64,
+    /// Something was set that the model has not seen yet: before the start everything, afterwards tunable parameters.
+    pub dirty: bool,
+    /// The model and its outputs.
+    pub block: Block<M>,
+}
+
+impl<M: Model> Default for Saved<M> {
+    fn default() -> Self {
+        Self {
+            life: Life::default(),
+            experiment: None,
+            elapsed: Elapsed::ZERO,
+            end: M::INFO.experiment.start,
+            dirty: true,
+            block: Block::default(),
+        }
+    }
+}
+
+impl<M: Model> Clone for Saved<M> {
+    fn clone(&self) -> Self {
+        Self { block: self.block.clone(), ..*self }
+    }
+
+    /// Reuses what `self` holds: for a plain model, and one with a `clone_from` of its own, nothing is allocated.
+    fn clone_from(&mut self, source: &Self) {
+        let Self { life, experiment, elapsed, end, dirty, block } = source;
+        (self.life, self.experiment, self.elapsed) = (*life, *experiment, *elapsed);
+        (self.end, self.dirty) = (*end, *dirty);
+        self.block.model.clone_from(&block.model);
+        self.block.out.clone_from(&block.out);
+    }
+}
+
+impl<M: Model> Saved<M> {
+    /// Every value that the importer sets is one that it could have set, and no other is NaN.
+    ///
+    /// # Errors
+    /// Names the first variable that is not, its value and what is allowed.
+    pub fn check(&mut self) -> Result<(), Fault> {
+        for index in 0..M::TABLE.len() {
+            let Some((meta, slot)) = M::TABLE.entry(&mut self.block, index) else { continue };
+            let set = matches!(meta.causality, Causality::Input | Causality::Parameter);
+            let refused = match (&slot, meta.kind) {
+                (Slot::Real(x), _) if set => (**x).judge(meta) != Some(true),
+                (Slot::Integer(x), Kind::Enumeration(_)) if set => i64::from(**x).judge(meta) != Some(true),
+                (Slot::Integer(x), _) if set => (**x).judge(meta) != Some(true),
+                (Slot::Real(x), _) => x.is_nan(),
+                _ => false,
+            };
+            if refused {
+                let allowed = if set { message::allowed(meta) } else { "a number".into() };
+                return Err(Fault::value(&message::name::<M>(index), message::value(&slot), allowed));
+            }
+        }
+        Ok(())
+    }
+
+    /// Time is what a simulation can have reached.
+    ///
+    /// # Errors
+    /// Says what does not fit.
+    pub fn check_time(&self) -> Result<(), Fault> {
+        let fits = self.end.is_finite() && self.elapsed.seconds() >= 0.0 && self.elapsed.seconds().is_finite();
+        if !fits {
+            return Err(Fault::new(format!("time {} after {} s of simulation", self.end, self.elapsed.seconds())));
+        }
+        self.experiment.map_or(Ok(()), |e| Experiment::new(e.start, e.stop).map(|_| ()))
+    }
+}

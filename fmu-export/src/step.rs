@@ -1,0 +1,55 @@
+//! Whether a communication step continues the simulation (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1.1).
+
+use crate::saved::Saved;
+use fmu_core::{Elapsed, Fault, Model};
+
+impl<M: Model> Saved<M> {
+    /// Judges a step from `t` by `h`, which reaches `next` after the start.
+    ///
+    /// # Errors
+    /// Says which of the two is wrong, and what was expected.
+    #[inline]
+    pub(crate) fn check_step(&self, t: f64, h: f64, next: Elapsed) -> Result<(), Fault> {
+        // NaN is not contained; a subnormal h is below the resolution of any time but 0.
+        if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&h) {
+            return Err(size(h));
+        }
+        let end = t + h;
+        if !(t.is_finite() && (t - self.end).abs() <= h / 100.0 + rounding(t) && end > t && end < f64::INFINITY) {
+            return Err(point(t, h, self.end));
+        }
+        match self.experiment {
+            Some(experiment) => {
+                let Some(stop) = experiment.stop else { return Ok(()) };
+                // Our own sum does not drift; the importer's may, and it may cut its last step to meet the stop time.
+                let reached = (experiment.start + next.seconds()).min(end);
+                if reached > stop + 1e-9 * h + rounding(stop) { Err(beyond(t, h, stop)) } else { Ok(()) }
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// What two additions may lose at this magnitude.
+fn rounding(t: f64) -> f64 {
+    2.0 * f64::EPSILON * t.abs()
+}
+
+#[cold]
+fn size(h: f64) -> Fault {
+    Fault::value("communicationStepSize", h, "finite and greater than 0")
+}
+
+#[cold]
+fn point(t: f64, h: f64, end: f64) -> Fault {
+    let allowed = format!("the last step ended at {end}, and a step of {h} may begin at most {} away", h / 100.0);
+    if (t - end).abs() <= h / 100.0 {
+        return Fault::new(format!("a step of {h} does not advance the time {t}"));
+    }
+    Fault::value("currentCommunicationPoint", t, allowed)
+}
+
+#[cold]
+fn beyond(t: f64, h: f64, stop: f64) -> Fault {
+    Fault::new(format!("a step of {h} from {t} goes beyond the stop time {stop}"))
+}

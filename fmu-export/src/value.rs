@@ -1,0 +1,172 @@
+//! Values as they cross the C interface: which base type of the table each C type carries.
+
+use fmu_core::{Kind, Meta, Slot};
+use std::ffi::c_int;
+use std::fmt::{self, Display};
+
+/// A C type of one of the standards, in the layout of C.
+pub trait Value: Copy + Display {
+    /// What it carries, in words.
+    const CARRIES: &'static str;
+
+    /// The value in `slot`, `None` if the variable has another base type.
+    fn read(meta: &Meta, slot: &Slot<'_>) -> Option<Self>;
+
+    /// Writes a value that was [judged](Value::judge) before.
+    fn write(self, slot: Slot<'_>);
+
+    /// Whether the variable may take this value, `None` if it has another base type.
+    fn judge(self, meta: &Meta) -> Option<bool>;
+
+    /// The independent variable as a value, for the one type that can carry it.
+    fn time(_seconds: f64) -> Option<Self> {
+        None
+    }
+}
+
+/// `fmi2Integer`: carries enumerations too (FMI 2.0.5, 2.1.7).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct Fmi2Integer(pub c_int);
+
+/// `fmi2Boolean`: everything but 0 is true.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct Fmi2Boolean(pub c_int);
+
+/// `fmi3Boolean`, a C `bool`: received as a byte, since an importer may pass any.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct Fmi3Boolean(pub u8);
+
+impl Display for Fmi2Integer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl Display for Fmi2Boolean {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (self.0 != 0).fmt(f)
+    }
+}
+
+impl Display for Fmi3Boolean {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (self.0 != 0).fmt(f)
+    }
+}
+
+impl Value for f64 {
+    const CARRIES: &'static str = "a real number";
+
+    #[inline]
+    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
+        if let Slot::Real(x) = slot { Some(**x) } else { None }
+    }
+
+    #[inline]
+    fn write(self, slot: Slot<'_>) {
+        if let Slot::Real(x) = slot {
+            *x = self;
+        }
+    }
+
+    #[inline]
+    fn judge(self, meta: &Meta) -> Option<bool> {
+        matches!(meta.kind, Kind::Real(_)).then(|| meta.range.contains(self))
+    }
+
+    fn time(seconds: f64) -> Option<Self> {
+        Some(seconds)
+    }
+}
+
+/// `fmi3Int32`.
+impl Value for i32 {
+    const CARRIES: &'static str = "a 32-bit integer";
+
+    fn read(meta: &Meta, slot: &Slot<'_>) -> Option<Self> {
+        if let (Slot::Integer(x), Kind::Integer) = (slot, meta.kind) { Some(**x) } else { None }
+    }
+
+    fn write(self, slot: Slot<'_>) {
+        if let Slot::Integer(x) = slot {
+            *x = self;
+        }
+    }
+
+    fn judge(self, meta: &Meta) -> Option<bool> {
+        matches!(meta.kind, Kind::Integer).then(|| meta.range.contains(f64::from(self)))
+    }
+}
+
+/// `fmi3Int64`, the type of an enumeration (FMI 3.0.2, 2.4.7.8).
+impl Value for i64 {
+    const CARRIES: &'static str = "an enumeration";
+
+    fn read(meta: &Meta, slot: &Slot<'_>) -> Option<Self> {
+        if let (Slot::Integer(x), Kind::Enumeration(_)) = (slot, meta.kind) { Some(Self::from(**x)) } else { None }
+    }
+
+    fn write(self, slot: Slot<'_>) {
+        if let (Slot::Integer(x), Ok(value)) = (slot, i32::try_from(self)) {
+            *x = value;
+        }
+    }
+
+    fn judge(self, meta: &Meta) -> Option<bool> {
+        let Kind::Enumeration(enumeration) = meta.kind else { return None };
+        Some(enumeration.items.iter().any(|item| Self::from(item.value) == self))
+    }
+}
+
+impl Value for Fmi2Integer {
+    const CARRIES: &'static str = "an integer or an enumeration";
+
+    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
+        if let Slot::Integer(x) = slot { Some(Self(**x)) } else { None }
+    }
+
+    fn write(self, slot: Slot<'_>) {
+        self.0.write(slot);
+    }
+
+    fn judge(self, meta: &Meta) -> Option<bool> {
+        self.0.judge(meta).or_else(|| i64::from(self.0).judge(meta))
+    }
+}
+
+impl Value for Fmi2Boolean {
+    const CARRIES: &'static str = "a truth value";
+
+    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
+        if let Slot::Boolean(x) = slot { Some(Self(c_int::from(**x))) } else { None }
+    }
+
+    fn write(self, slot: Slot<'_>) {
+        if let Slot::Boolean(x) = slot {
+            *x = self.0 != 0;
+        }
+    }
+
+    fn judge(self, meta: &Meta) -> Option<bool> {
+        matches!(meta.kind, Kind::Boolean).then_some(true)
+    }
+}
+
+impl Value for Fmi3Boolean {
+    const CARRIES: &'static str = Fmi2Boolean::CARRIES;
+
+    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
+        if let Slot::Boolean(x) = slot { Some(Self(u8::from(**x))) } else { None }
+    }
+
+    fn write(self, slot: Slot<'_>) {
+        Fmi2Boolean(c_int::from(self.0)).write(slot);
+    }
+
+    fn judge(self, meta: &Meta) -> Option<bool> {
+        matches!(meta.kind, Kind::Boolean).then_some(true)
+    }
+}
