@@ -32,6 +32,11 @@ impl Elapsed {
         self.high + self.low
     }
 
+    /// Seconds from `earlier` to this instant.
+    pub fn since(self, earlier: Self) -> f64 {
+        (self.high - earlier.high) + (self.low - earlier.low)
+    }
+
     /// This instant minus `k` periods in s, rounded once.
     pub fn minus_periods(self, k: u64, period: f64) -> f64 {
         let k = count(k);
@@ -80,14 +85,33 @@ pub struct SampleGrid {
 }
 
 impl SampleGrid {
-    /// Whether instant `k` is at `now` or before it; instants closer than [`SAME_INSTANT`] periods are the same.
+    /// Instants closer than this many seconds are the same.
+    pub fn width(&self) -> f64 {
+        SAME_INSTANT * self.period
+    }
+
+    /// Whether instant `k` is at `now` or before it.
     pub fn reached(&self, k: u64, now: Elapsed) -> bool {
-        now.minus_periods(k, self.period) >= -SAME_INSTANT * self.period
+        now.minus_periods(k, self.period) >= -self.width()
     }
 
     /// Whether instant `k` is before `now` and not the same instant.
     pub fn passed(&self, k: u64, now: Elapsed) -> bool {
-        now.minus_periods(k, self.period) > SAME_INSTANT * self.period
+        now.minus_periods(k, self.period) > self.width()
+    }
+
+    /// The first instant after `now` that is not the same instant; `now` is not before the start.
+    pub fn first_after(&self, now: Elapsed) -> u64 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates; a time is not negative"
+        )]
+        let mut k = (now.seconds() / self.period) as u64;
+        while self.reached(k, now) {
+            k += 1;
+        }
+        k
     }
 }
 
@@ -106,6 +130,16 @@ mod tests {
         assert!((now.seconds() - 1e7 * h).abs() < 1e-13, "{}", now.seconds());
         assert!(SampleGrid { period: 3.0 * h }.reached(3_333_333, now));
         assert!(!SampleGrid { period: 3.0 * h }.reached(3_333_334, now));
+    }
+
+    #[test]
+    fn the_next_instant_is_found_from_anywhere() {
+        let grid = SampleGrid { period: 1e-4 };
+        for (t, k) in [(0.0, 1), (1e-4, 2), (1e-4 - 5e-11, 2), (1e-4 - 5e-10, 1), (2.5e-4, 3), (0.9999, 10_000)] {
+            assert_eq!(grid.first_after(Elapsed::ZERO.plus(t)), k, "after {t} s");
+        }
+        let (early, late) = (Elapsed::ZERO.plus(1e6), Elapsed::ZERO.plus(1e6).plus(1e-9));
+        assert!((late.since(early) - 1e-9).abs() < 1e-24, "a nanosecond after 1e6 s");
     }
 
     #[test]
