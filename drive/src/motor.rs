@@ -31,6 +31,12 @@ impl Motor {
     pub fn torque_constant(&self) -> f64 {
         1.5 * f64::from(self.n_p) * self.psi_M
     }
+
+    /// Torque in N.m of the currents `i_d` and `i_q` (A): 1.5 n_p (psi_M + (L_d - L_q) i_d) i_q.
+    #[inline]
+    pub fn torque(&self, i_d: f64, i_q: f64) -> f64 {
+        1.5 * f64::from(self.n_p) * (self.psi_M + (self.L_d - self.L_q) * i_d) * i_q
+    }
 }
 
 type P = Row<Motor>;

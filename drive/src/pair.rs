@@ -1,6 +1,7 @@
 //! Plant and controller side by side, exchanging values as an importer does: all outputs read, all inputs set, both
 //! stepped (Jacobi). The native reference that the packed FMUs must equal bit for bit.
 
+use crate::control::model::ControllerInputs;
 use crate::{PmsmPlant, SensorlessController};
 use fmu_core::{Block, Elapsed, Fault, Model, Step};
 
@@ -35,7 +36,10 @@ impl Pair {
     #[inline]
     pub fn step(&mut self, h: f64) -> Result<(), Fault> {
         self.plant.model.inputs.u = self.controller.out.u;
-        self.controller.model.inputs.i = self.plant.out.i;
+        let ControllerInputs { i, theta_meas, speed_meas, .. } = &mut self.controller.model.inputs;
+        *i = self.plant.out.i;
+        *theta_meas = self.plant.out.theta_e;
+        *speed_meas = self.plant.out.speed;
         let step = Step { start: self.now, h };
         self.plant.step(&step)?;
         self.controller.step(&step)?;

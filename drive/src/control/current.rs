@@ -76,6 +76,12 @@ impl CurrentController {
         )
     }
 
+    /// What the PI gives for `error` (A), without decoupling and active resistance, in V.
+    #[inline]
+    pub fn output(&self, gains: &CurrentGains, error: DqHat) -> DqHat {
+        self.integral + DqHat::new(gains.d.k_p * error.d(), gains.q.k_p * error.q())
+    }
+
     /// Integrates one sample of `T_s` (s); `cut` (V) is the limited command minus the wanted one.
     #[inline]
     pub fn integrate(&mut self, gains: &CurrentGains, error: DqHat, cut: DqHat, T_s: f64) {

@@ -3,8 +3,7 @@
 use crate::control::current::{CurrentController, CurrentGains};
 use crate::control::speed::{SpeedController, SpeedGains};
 use crate::control::tables::{ControllerParameters, PARAMETERS};
-use crate::estimator::rasmussen::Rasmussen;
-use crate::estimator::{Estimate, Sample};
+use crate::estimator::{Context, Estimate, Estimator, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
 use crate::math::wrap;
 use crate::plant::inverter::limit_to_hexagon;
@@ -76,15 +75,32 @@ struct State {
     /// Number of samples taken: the next one is at `samples` T_s.
     #[serde(with = "fixed_size")]
     samples: u64,
-    estimator: Rasmussen,
+    estimator: Estimator,
     speed: SpeedController,
     current: CurrentController,
-    /// Commands of the last sample and of the one before it, in V.
-    commands: [AlphaBeta; 2],
+    /// Commands of the last sample and of the one before it.
+    commands: [Command; 2],
+    /// Current of the last sample in A.
+    i_last: AlphaBeta,
+    /// References of the last sample in A.
+    i_ref: DqHat,
+    /// Torque reference of the last sample in N.m.
+    tau_ref: f64,
+    /// Output of the current PI at the last sample in V.
+    u_pi: DqHat,
     /// Outputs of the last sample, not shown before the next instant.
     computed: ControllerOutputs,
     /// Outputs shown now.
     shown: ControllerOutputs,
+}
+
+/// A voltage command in stator axes, limited.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Command {
+    /// All of it, in V.
+    u: AlphaBeta,
+    /// The injected part, in V.
+    injected: AlphaBeta,
 }
 
 /// A count in eight bytes whatever its value, so that every stored state has the same size.
@@ -113,23 +129,49 @@ pub struct SensorlessController {
 }
 
 impl SensorlessController {
+    /// What the estimator may know of the parameters.
+    fn context(par: &ControllerParameters) -> Context<'_> {
+        let ControllerParameters { estimators, motor, J, T_s, delay, .. } = par;
+        Context { par: estimators, motor, J: *J, T_s: *T_s, delay: f64::from(*delay) }
+    }
+
     /// One sample of the controller: currents in, voltage references out.
     fn sample(&mut self) -> ControllerOutputs {
         let Self { inputs, parameters: par, gains, state } = self;
         let (motor, T_s) = (&par.motor, par.T_s);
+        let n_p = f64::from(motor.n_p);
         let i = inputs.i.to_stator();
+        let first = state.samples == 0;
         // The command that acted since the last sample: with a delay of one it is not the newest.
-        let u = state.commands[usize::from(par.delay != 0)];
-        let Estimate { theta, w } = if state.samples == 0 {
-            state.estimator = Rasmussen::start(motor, par.theta_est, i);
-            state.estimator.estimate()
-        } else {
-            state.estimator.update(&par.observer, motor, &Sample { i, u }, T_s)
+        let acted = state.commands[usize::from(par.delay != 0)];
+        let sample = Sample {
+            k: state.samples,
+            i,
+            i_last: if first { i } else { state.i_last },
+            u: acted.u,
+            u_injected: acted.injected,
+            u_pi: state.u_pi,
+            i_ref: state.i_ref,
+            tau_ref: state.tau_ref,
+            theta_meas: inputs.theta_meas,
+            w_meas: n_p * inputs.speed_meas,
+            u_dc: inputs.u_dc,
         };
-        let speed = w / f64::from(motor.n_p);
+        let context = Self::context(par);
+        let kind = Kind::of(par.estimator).unwrap_or(Kind::Rasmussen);
+        let estimate = if first {
+            let (estimator, estimate) = Estimator::start(kind, &context, &sample, par.theta_est, n_p * par.speed_est);
+            state.estimator = estimator;
+            estimate
+        } else {
+            state.estimator.update(&context, &sample)
+        };
+        let Estimate { theta, w, i: controlled, injection } = estimate;
+        let speed = w / n_p;
 
-        let i_hat = Axis::<Estimated>::at(theta).from_stator(i);
-        let i_d_ref = par.zero_speed.i_d_ref(speed);
+        let i_hat = Axis::<Estimated>::at(theta).from_stator(controlled);
+        // The low-speed law is Rasmussen's; it would only be a loss where the angle is known.
+        let i_d_ref = if kind == Kind::Rasmussen { par.zero_speed.i_d_ref(speed) } else { 0.0 };
         let limit = par.limit.i_q_beside(i_d_ref);
         let i_q_ref = state.speed.update(&gains.speed, inputs.speed_ref, speed, limit, T_s);
         let i_ref = DqHat::new(i_d_ref, i_q_ref);
@@ -137,9 +179,21 @@ impl SensorlessController {
         let wanted = state.current.command(&gains.current, motor, i_ref, i_hat, w);
         // The command acts from `delay` to `delay + 1` samples from now: turned to the middle of that interval.
         let acting = Axis::<Estimated>::at(theta + (f64::from(par.delay) + 0.5) * T_s * w);
-        let command = limit_to_hexagon(Phases::from_stator(acting.to_stator(wanted)), inputs.u_dc);
-        state.current.integrate(&gains.current, i_ref - i_hat, acting.from_stator(command) - wanted, T_s);
-        state.commands = [command, state.commands[0]];
+        let injected = match injection {
+            Injection::None => AlphaBeta::ZERO,
+            Injection::Stator(u) => u,
+            Injection::Estimated(u) => acting.to_stator(u),
+        };
+        let whole = acting.to_stator(wanted) + injected;
+        let command = limit_to_hexagon(Phases::from_stator(whole), inputs.u_dc);
+        let cut = acting.from_stator(command - injected) - wanted;
+        state.current.integrate(&gains.current, i_ref - i_hat, cut, T_s);
+        let share = if whole.magnitude() > 0.0 { command.magnitude() / whole.magnitude() } else { 1.0 };
+        state.commands = [Command { u: command, injected: injected * share }, state.commands[0]];
+        state.i_last = i;
+        state.i_ref = i_ref;
+        state.tau_ref = motor.torque(i_ref.d(), i_ref.q());
+        state.u_pi = state.current.output(&gains.current, i_ref - i_hat);
 
         ControllerOutputs {
             u: Phases::from_stator(command),
@@ -167,6 +221,8 @@ impl Model for SensorlessController {
 
     const TABLE: &'static Table<Block<Self>> = TABLE;
 
+    const STATE_VERSION: u16 = 2;
+
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, .. } = &self.parameters;
         self.gains = Gains {
@@ -176,7 +232,11 @@ impl Model for SensorlessController {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        let ControllerParameters { limit, zero_speed, .. } = &self.parameters;
+        let ControllerParameters { limit, zero_speed, estimator, .. } = &self.parameters;
+        let Some(kind) = Kind::of(*estimator) else {
+            return Err(Fault::value("estimator", estimator, "one of the enumeration's values"));
+        };
+        kind.validate(&Self::context(&self.parameters))?;
         if zero_speed.i_0 > limit.i {
             let allowed = format!("at most limit.i = {} A", limit.i);
             return Err(Fault::value("zero_speed.i_0", format!("{} A", zero_speed.i_0), allowed));

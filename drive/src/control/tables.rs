@@ -4,9 +4,9 @@ use crate::control::current::{CURRENT_LOOP, CurrentLoop};
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::ESTIMATORS;
-use crate::estimator::rasmussen::{OBSERVER, RasmussenParameters};
+use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
 use crate::motor::{MOTOR, Motor};
-use fmu_core::unit::{AMPERE, KG_M2, RADIAN, SECOND};
+use fmu_core::unit::{AMPERE, KG_M2, RADIAN, SECOND, SPEED};
 use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -38,8 +38,8 @@ pub struct ControllerParameters {
     pub estimator: i32,
     /// Estimates of the machine.
     pub motor: Motor,
-    /// The Rasmussen observer.
-    pub observer: RasmussenParameters,
+    /// Parameters of the estimators.
+    pub estimators: EstimatorParameters,
     /// The current loop.
     pub current: CurrentLoop,
     /// The speed loop.
@@ -52,6 +52,8 @@ pub struct ControllerParameters {
     pub zero_speed: ZeroSpeed,
     /// First estimate of the electrical angle in rad.
     pub theta_est: f64,
+    /// First estimate of the mechanical speed in rad/s.
+    pub speed_est: f64,
 }
 
 impl Default for ControllerParameters {
@@ -63,13 +65,14 @@ impl Default for ControllerParameters {
             delay: 1,
             estimator: 1,
             motor: Motor { R_s: 0.9 * motor.R_s, ..motor },
-            observer: RasmussenParameters::default(),
+            estimators: EstimatorParameters::default(),
             current: CurrentLoop::default(),
             speed_loop: SpeedLoop::default(),
             J: 1.5e-3,
             limit: Limits { i_q: 6.0, i: 7.5 },
             zero_speed: ZeroSpeed::default(),
             theta_est: 0.0,
+            speed_est: 0.0,
         }
     }
 }
@@ -94,7 +97,7 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
                 &mut p.estimator
             }),
             P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
-            P::part("observer.", &Part { table: OBSERVER, lens: |p| &mut p.observer }),
+            P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
             P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
             P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
             P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
@@ -108,6 +111,7 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
                 &mut p.theta_est
             }),
+            P::parameter("initial.speed_est", &SPEED, "First estimate of the mechanical speed", |p| &mut p.speed_est),
         ]
     },
 );

@@ -1,35 +1,216 @@
 //! Estimators of rotor angle and speed: one file each, one row in the list here.
+//!
+//! At sample k an estimator gets a [`Sample`], the currents of that instant and the voltage that acted since the last
+//! one, and gives an [`Estimate`]: angle and speed at that instant, the current to control, and, if it injects a
+//! carrier, the voltage to add to this sample's command. What it needs of other parts (machine estimates, inertia, its
+//! parameters) comes in a [`Context`].
+//!
+//! A new estimator implements [`Estimating`], has a row in the list at the end of this file and, for parameters of its
+//! own, a row in [`tables`]. It then appears in the enumeration, the FMUs and their documentation.
 
+pub mod interval;
 pub mod rasmussen;
+pub mod sensored;
+pub mod tables;
+pub mod tracker;
 
-use crate::frame::AlphaBeta;
-use fmu_core::{Enumeration, Item};
-
-/// The estimators, in the order of the interface: the value never changes, new ones are appended.
-pub static ESTIMATORS: Enumeration = Enumeration {
-    name: "Estimator",
-    description: "Estimator of rotor angle and speed",
-    items: &[Item {
-        value: 1,
-        name: "Rasmussen",
-        description: "Full-order flux observer with PI speed adaptation, Rasmussen 2006, eq (16) and (21)",
-    }],
-};
+use crate::frame::{AlphaBeta, DqHat};
+use crate::motor::Motor;
+use fmu_core::{Enumeration, Fault, Item};
+use serde::{Deserialize, Serialize};
+pub use tables::EstimatorParameters;
 
 /// What a controller knows at sample k.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// Stator current measured at the sample, in A.
+    /// Number of the sample, 0 at the start.
+    pub k: u64,
+    /// Stator current measured at sample k, in A.
     pub i: AlphaBeta,
-    /// Stator voltage command that acted since the last sample, in V: limited, without dead-time compensation.
+    /// Stator current measured at sample k - 1, in A; at the first sample that of sample 0.
+    pub i_last: AlphaBeta,
+    /// Stator voltage command that acted in [k - 1, k), in V: limited, injection included, without dead-time
+    /// compensation. Held in stator axes.
     pub u: AlphaBeta,
+    /// The injected part of `u`, in V, reduced as `u` was where the limit cut it.
+    pub u_injected: AlphaBeta,
+    /// Output of the current PI at sample k - 1, without feed-forward and injection, in V.
+    pub u_pi: DqHat,
+    /// Current references of sample k - 1, in A.
+    pub i_ref: DqHat,
+    /// Torque reference of sample k - 1, limited, in N.m.
+    pub tau_ref: f64,
+    /// Electrical angle of a sensor in rad.
+    pub theta_meas: f64,
+    /// Electrical speed of a sensor in rad/s.
+    pub w_meas: f64,
+    /// DC-link voltage in V.
+    pub u_dc: f64,
 }
 
-/// What an estimator knows at sample k.
+/// What an estimator may know besides the sample: parameters and the controller's estimates.
+#[derive(Clone, Copy, Debug)]
+pub struct Context<'a> {
+    /// The estimators' parameters.
+    pub par: &'a EstimatorParameters,
+    /// Estimates of the machine.
+    pub motor: &'a Motor,
+    /// Estimate of the inertia in kg.m2.
+    pub J: f64,
+    /// Sample period in s.
+    pub T_s: f64,
+    /// Samples from taking the currents to the voltage acting: the command of sample k acts in
+    /// [k + delay, k + delay + 1).
+    pub delay: f64,
+}
+
+/// A voltage to be added to the command of this sample, in V.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Injection {
+    /// None.
+    #[default]
+    None,
+    /// In stator axes.
+    Stator(AlphaBeta),
+    /// In the estimated rotor frame, turned as the command is: to the middle of the interval in which it acts.
+    Estimated(DqHat),
+}
+
+/// What an estimator knows at sample k, and what it asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
     /// Electrical rotor angle in rad, not wrapped.
     pub theta: f64,
     /// Electrical speed in rad/s.
     pub w: f64,
+    /// Stator current to control in A: the measured one without the carrier.
+    pub i: AlphaBeta,
+    /// Voltage to add.
+    pub injection: Injection,
+}
+
+impl Estimate {
+    /// Angle (rad) and speed (rad/s) without injection: the measured current is controlled.
+    #[inline]
+    pub fn new(theta: f64, w: f64, sample: &Sample) -> Self {
+        Self { theta, w, i: sample.i, injection: Injection::None }
+    }
+}
+
+/// The life of an estimator: started at the first sample, updated at each later one. A step does not allocate.
+pub trait Estimating: Sized {
+    /// The estimator at the first sample, at the electrical angle `theta` (rad) and speed `w` (rad/s).
+    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate);
+
+    /// One sample.
+    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate;
+
+    /// Puts the estimate at sample k to another electrical angle (rad) and speed (rad/s), known from elsewhere: while an
+    /// I-f start leads the rotor, and by half a turn when a magnet turns out to point the other way.
+    fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
+        *self = Self::start(context, sample, theta, w).0;
+    }
+
+    /// Whether the parameters suit this estimator.
+    ///
+    /// # Errors
+    /// Says which parameters do not, and why.
+    fn validate(context: &Context) -> Result<(), Fault> {
+        let _ = context;
+        Ok(())
+    }
+}
+
+/// The list: value, name, state and description make the enumeration and the one place of dispatch.
+macro_rules! estimators {
+    ($($value:literal $name:ident($state:ty) $description:literal;)*) => {
+        /// The estimators, in the order of the interface: a value never changes, new ones are appended.
+        pub static ESTIMATORS: Enumeration = Enumeration {
+            name: "Estimator",
+            description: "Estimator of rotor angle and speed",
+            items: &[$(Item { value: $value, name: stringify!($name), description: $description }),*],
+        };
+
+        /// An estimator by its name.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Kind {
+            $(#[doc = $description] $name = $value,)*
+        }
+
+        impl Kind {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$name),*];
+
+            /// The one with this value in [`ESTIMATORS`].
+            pub fn of(value: i32) -> Option<Self> {
+                match value {
+                    $($value => Some(Self::$name),)*
+                    _ => None,
+                }
+            }
+
+            /// Its name in [`ESTIMATORS`].
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => stringify!($name),)*
+                }
+            }
+
+            /// Whether the parameters suit this estimator.
+            ///
+            /// # Errors
+            /// As [`Estimating::validate`].
+            pub fn validate(self, context: &Context) -> Result<(), Fault> {
+                match self {
+                    $(Self::$name => <$state>::validate(context),)*
+                }
+            }
+        }
+
+        /// The state of the estimator that is at work.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        pub enum Estimator {
+            $(#[doc = $description] $name($state),)*
+        }
+
+        impl Estimator {
+            /// As [`Estimating::start`].
+            pub fn start(kind: Kind, context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+                match kind {
+                    $(Kind::$name => {
+                        let (state, estimate) = <$state>::start(context, sample, theta, w);
+                        (Self::$name(state), estimate)
+                    })*
+                }
+            }
+
+            /// As [`Estimating::update`].
+            #[inline]
+            pub fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+                match self {
+                    $(Self::$name(state) => state.update(context, sample),)*
+                }
+            }
+
+            /// As [`Estimating::place`].
+            pub fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
+                match self {
+                    $(Self::$name(state) => state.place(context, sample, theta, w),)*
+                }
+            }
+        }
+    };
+}
+
+estimators! {
+    1 Rasmussen(rasmussen::Rasmussen)
+        "Full-order flux observer with PI speed adaptation, Rasmussen 2006, eq (16) and (21)";
+    13 Sensored(sensored::Sensored)
+        "Angle and speed of a sensor, theta_meas and speed_meas, Kim & Sul 2011, Fig. 1a";
+}
+
+impl Default for Estimator {
+    fn default() -> Self {
+        Self::Rasmussen(rasmussen::Rasmussen::default())
+    }
 }

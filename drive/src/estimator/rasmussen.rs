@@ -14,7 +14,7 @@
 //! Limits: at w = 0 the angle is not observable (the slow pole is -w^2/c_1 below |w| = c_1/2); a resistance estimate
 //! above the true one runs away at standstill, one below it is the safe side.
 
-use crate::estimator::{Estimate, Sample};
+use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use crate::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND, RAD_PER_S};
@@ -57,22 +57,18 @@ pub struct Rasmussen {
     w: f64,
 }
 
-impl Rasmussen {
-    /// The observer at its first sample: the magnet's flux on the estimated d axis, standing still at `theta` (rad).
-    pub fn start(motor: &Motor, theta: f64, i: AlphaBeta) -> Self {
+impl Estimating for Rasmussen {
+    /// The magnet's flux is on the estimated d axis.
+    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        let (motor, i) = (context.motor, sample.i);
         let axis = Axis::<Estimated>::at(theta);
         let psi_s = axis.to_stator(DqHat::new(motor.psi_M, 0.0) + inductive(motor, axis.from_stator(i)));
-        Self { psi_s, i, theta, ..Self::default() }
+        (Self { psi_s, i, theta, w, w_i: w, ..Self::default() }, Estimate::new(theta, w, sample))
     }
 
-    /// The estimate at the last sample.
-    pub fn estimate(&self) -> Estimate {
-        Estimate { theta: self.theta, w: self.w }
-    }
-
-    /// One sample of `T_s` (s).
     #[inline]
-    pub fn update(&mut self, par: &RasmussenParameters, motor: &Motor, sample: &Sample, T_s: f64) -> Estimate {
+    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+        let Context { motor, T_s, par: EstimatorParameters { observer: par, .. }, .. } = *context;
         let half_way = Axis::<Estimated>::at(self.theta + 0.5 * T_s * self.w);
         let resistive = (self.i + sample.i) * (0.5 * motor.R_s);
         self.psi_s += (sample.u - resistive + half_way.to_stator(self.v)) * T_s;
@@ -86,7 +82,7 @@ impl Rasmussen {
         self.w_i += T_s * g_2 * psi_r.q();
         self.w = g_1 * psi_r.q() + self.w_i;
         self.v = DqHat::new(-par.c_1 * (psi_r.d() - motor.psi_M), -par.c_2 * psi_r.q());
-        self.estimate()
+        Estimate::new(self.theta, self.w, sample)
     }
 }
 
@@ -125,6 +121,10 @@ mod tests {
         (seconds / T_S).round() as usize
     }
 
+    fn context<'a>(par: &'a EstimatorParameters, motor: &'a Motor) -> Context<'a> {
+        Context { par, motor, J: 1.5e-3, T_s: T_S, delay: 1.0 }
+    }
+
     /// The observer beside a machine that turns at `w` (rad/s, electrical) with the current `i` in its rotor frame:
     /// angle errors in rad at each sample, from `theta_tilde` on. The voltage is the exact mean of each interval, plus
     /// `du` (V) in the rotor frame, which the machine does not see.
@@ -133,7 +133,10 @@ mod tests {
         let rotor = |theta: f64| Axis::<Estimated>::at(theta);
         let current = |theta: f64| rotor(theta).to_stator(i);
         let flux = |theta: f64| rotor(theta).to_stator(DqHat::new(motor.psi_M, 0.0) + inductive(&motor, i));
-        let mut observer = Rasmussen { w, w_i: w, ..Rasmussen::start(hat, theta_tilde, current(0.0)) };
+        let par = EstimatorParameters { observer: par.clone(), ..EstimatorParameters::default() };
+        let context = context(&par, hat);
+        let first = Sample { i: current(0.0), ..Sample::default() };
+        let (mut observer, _) = Rasmussen::start(&context, &first, theta_tilde, w);
         let (mut theta, mut errors) = (0.0, vec![theta_tilde]);
         for _ in 0..samples(seconds) {
             let next = theta + w * T_S;
@@ -141,7 +144,7 @@ mod tests {
             let resistive = (current(theta) + current(next)) * (0.5 * motor.R_s);
             let u = (flux(next) - flux(theta)) * (1.0 / T_S) + resistive;
             theta = next;
-            let estimate = observer.update(par, hat, &Sample { i: current(theta), u }, T_S);
+            let estimate = observer.update(&context, &Sample { i: current(theta), u, ..Sample::default() });
             errors.push(wrap(estimate.theta - theta));
         }
         errors
@@ -210,9 +213,10 @@ mod tests {
     fn start_is_an_equilibrium() {
         let motor = Motor::default();
         for i in [AlphaBeta::ZERO, AlphaBeta::new(3.0, -2.0)] {
-            let mut observer = Rasmussen::start(&motor, 0.7, i);
-            let u = i * motor.R_s;
-            let estimate = observer.update(&RasmussenParameters::default(), &motor, &Sample { i, u }, T_S);
+            let par = EstimatorParameters::default();
+            let sample = Sample { i, u: i * motor.R_s, ..Sample::default() };
+            let (mut observer, _) = Rasmussen::start(&context(&par, &motor), &sample, 0.7, 0.0);
+            let estimate = observer.update(&context(&par, &motor), &sample);
             assert!((estimate.theta - 0.7).abs() < 1e-15 && estimate.w.abs() < 1e-9, "{estimate:?}");
         }
     }

@@ -1,0 +1,29 @@
+//! The measured angle and speed (Kim & Sul, Fig. 1a): the yardstick of all estimators.
+//!
+//! Limits: none of its own; the sensor is ideal unless the importer makes it otherwise.
+
+use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::math::wrap;
+use serde::{Deserialize, Serialize};
+
+/// State: the angle of the last sample, so that the estimate is not wrapped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sensored {
+    /// Electrical angle in rad, not wrapped.
+    theta: f64,
+}
+
+impl Estimating for Sensored {
+    fn start(_: &Context, sample: &Sample, _: f64, _: f64) -> (Self, Estimate) {
+        (Self { theta: sample.theta_meas }, Estimate::new(sample.theta_meas, sample.w_meas, sample))
+    }
+
+    #[inline]
+    fn update(&mut self, _: &Context, sample: &Sample) -> Estimate {
+        self.theta += wrap(sample.theta_meas - self.theta);
+        Estimate::new(self.theta, sample.w_meas, sample)
+    }
+
+    /// A sensor is not told where the rotor is.
+    fn place(&mut self, _: &Context, _: &Sample, _: f64, _: f64) {}
+}

@@ -1,0 +1,141 @@
+//! Trackers: from an angle error e = theta - theta^ (Kim & Sul's sign) to angle and speed.
+//!
+//! - PLL, poles (s + rho)^2: theta^ += T_s (w^ + 2 rho e), w^ += T_s rho^2 e.
+//! - Mechanical observer, poles (s + rho)^3, with the torque reference tau* as feed-forward:
+//!   theta^ += T_s (w^ + 3 rho e), w^ += T_s (n_p / J (tau* - tau_L) + 3 rho^2 e), tau_L -= T_s J / n_p rho^3 e.
+//!
+//! The PLL follows a constant speed without an error; the mechanical observer a constant load and, as far as J is right,
+//! each torque of its own, so its speed has no lag.
+//! Limits: behind a filter or observer of bandwidth w_o, rho <= w_o / 3; below 2 pi 15 rad/s a 50 % load step loses it.
+
+use crate::estimator::Context;
+use fmu_core::unit::RAD_PER_S;
+use fmu_core::{Enumeration, Item, Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// The trackers; a value never changes.
+pub static TRACKERS: Enumeration = Enumeration {
+    name: "Tracker",
+    description: "Tracker of angle and speed from an angle error",
+    items: &[
+        Item { value: 1, name: "Pll", description: "Phase-locked loop of second order" },
+        Item { value: 2, name: "MechanicalObserver", description: "Observer of speed and load torque, of third order" },
+    ],
+};
+
+/// Value of the mechanical observer in [`TRACKERS`].
+pub const MECHANICAL_OBSERVER: i32 = 2;
+
+/// Parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrackerParameters {
+    /// Value in [`TRACKERS`].
+    pub kind: i32,
+    /// Pole rho in rad/s, > 0, of multiplicity two or three.
+    pub bandwidth: f64,
+}
+
+impl Default for TrackerParameters {
+    fn default() -> Self {
+        Self { kind: 1, bandwidth: 2.0 * std::f64::consts::PI * 20.0 }
+    }
+}
+
+/// State at a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tracker {
+    /// Electrical angle at this sample in rad, not wrapped.
+    pub theta: f64,
+    /// Electrical angle at the last sample in rad.
+    pub theta_last: f64,
+    /// Electrical speed in rad/s.
+    pub w: f64,
+    /// Speed of the frame from this sample to the next in rad/s: w and the correction of the angle.
+    pub w_frame: f64,
+    /// Load torque in N.m (mechanical observer).
+    pub tau_load: f64,
+}
+
+impl Tracker {
+    /// At the electrical angle `theta` (rad), turning at `w` (rad/s).
+    pub fn at(theta: f64, w: f64, T_s: f64) -> Self {
+        Self { theta, theta_last: theta - w * T_s, w, w_frame: w, tau_load: 0.0 }
+    }
+
+    /// To the next sample, `T_s` (s) later: first thing in an update.
+    #[inline]
+    pub fn advance(&mut self, T_s: f64) {
+        self.theta_last = self.theta;
+        self.theta += T_s * self.w_frame;
+    }
+
+    /// Corrects by the angle error `e` (rad) with the bandwidth `rho` (rad/s): the angle from the next sample on, the
+    /// speed at once. `tau_ref` (N.m) is the torque reference.
+    #[inline]
+    pub fn correct(&mut self, context: &Context, rho: f64, e: f64, tau_ref: f64) {
+        let T_s = context.T_s;
+        if context.par.tracker.kind == MECHANICAL_OBSERVER {
+            let inertia = context.J / f64::from(context.motor.n_p);
+            self.w_frame = self.w + 3.0 * rho * e;
+            self.w += T_s * ((tau_ref - self.tau_load) / inertia + 3.0 * rho * rho * e);
+            self.tau_load -= T_s * inertia * rho * rho * rho * e;
+        } else {
+            self.w_frame = self.w + 2.0 * rho * e;
+            self.w += T_s * rho * rho * e;
+        }
+    }
+}
+
+type P = Row<TrackerParameters>;
+
+/// The tracker's variables; their owner gives the prefix `tracker.`.
+pub const TRACKER: &Table<TrackerParameters> = &Table::new(
+    const {
+        &[
+            P::enumeration_parameter("kind", &TRACKERS, "Tracker of angle and speed from the angle error", |p| {
+                &mut p.kind
+            }),
+            P::parameter("bandwidth", &RAD_PER_S, "Pole of the tracker, of multiplicity two or three", |p| {
+                &mut p.bandwidth
+            })
+            .above(0.0),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use crate::motor::Motor;
+
+    /// Angle and speed error after `n` samples behind a rotor with a constant acceleration (rad/s2).
+    fn behind(kind: i32, acceleration: f64, tau_ref: f64, n: u32) -> (f64, f64) {
+        let par = EstimatorParameters {
+            tracker: TrackerParameters { kind, ..TrackerParameters::default() },
+            ..EstimatorParameters::default()
+        };
+        let motor = Motor::default();
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4, delay: 1.0 };
+        let mut tracker = Tracker::at(0.3, 0.0, context.T_s);
+        let (mut theta, mut w) = (0.0, 50.0);
+        for _ in 0..n {
+            tracker.advance(context.T_s);
+            theta += context.T_s * w + 0.5 * context.T_s * context.T_s * acceleration;
+            w += context.T_s * acceleration;
+            tracker.correct(&context, par.tracker.bandwidth, theta - tracker.theta, tau_ref);
+        }
+        (theta - tracker.theta, w - tracker.w)
+    }
+
+    #[test]
+    fn steady_errors_are_those_of_the_loop_type() {
+        let rho = TrackerParameters::default().bandwidth;
+        let (angle, speed) = behind(1, 0.0, 0.0, 5000);
+        assert!(angle.abs() < 1e-10 && speed.abs() < 1e-9, "PLL at constant speed: {angle} rad, {speed} rad/s");
+        let (angle, _) = behind(1, 1000.0, 0.0, 5000);
+        assert!((angle - 1000.0 / (rho * rho)).abs() < 1e-4, "PLL at constant acceleration: {angle} rad");
+        let (angle, speed) = behind(2, 1000.0, 0.0, 10_000);
+        assert!(angle.abs() < 1e-9 && speed.abs() < 0.2, "the unknown load becomes tau_load: {angle}, {speed}");
+    }
+}

@@ -1,0 +1,166 @@
+//! The model `PmsmDrive`: plant and controller closed inside one block, for drive-train models that step at 1 ms or more.
+//!
+//! It is the pair of [`PmsmPlant`] and [`SensorlessController`], exchanging values at every sample instant, and for a
+//! communication step that is a multiple of T_s it gives the pair's results bit for bit. At any other communication step
+//! plant and controller also stop at the sample instants between, which an importer's exchange cannot do.
+
+use crate::control::model::ControllerOutputs;
+use crate::control::tables;
+use crate::pair::Pair;
+use crate::plant::model as plant;
+use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table};
+use serde::{Deserialize, Serialize};
+
+#[cfg(doc)]
+use crate::{PmsmPlant, SensorlessController};
+
+/// Inputs, held over a communication step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DriveInputs {
+    /// Mechanical speed reference in rad/s.
+    pub speed_ref: f64,
+    /// Load torque in N.m, positive against positive speed.
+    pub tau_load: f64,
+    /// DC-link voltage in V, >= 0, of the inverter and as the controller measures it.
+    pub u_dc: f64,
+}
+
+impl Default for DriveInputs {
+    fn default() -> Self {
+        Self { speed_ref: 0.0, tau_load: 0.0, u_dc: 325.0 }
+    }
+}
+
+/// Outputs of both parts.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DriveOutputs {
+    /// The plant's.
+    pub plant: plant::PlantOutputs,
+    /// The controller's.
+    pub controller: ControllerOutputs,
+}
+
+/// A whole sensorless drive.
+#[derive(Clone, Default, Serialize, Deserialize)]
+pub struct PmsmDrive {
+    /// Inputs.
+    pub inputs: DriveInputs,
+    /// Plant and controller with their parameters.
+    pub pair: Pair,
+}
+
+impl PmsmDrive {
+    /// Time in s from `now` to the first sample instant after it.
+    fn to_next_sample(grid: &SampleGrid, now: Elapsed) -> f64 {
+        let k = grid.first_after(now);
+        // Exactly one period where the instant before is `now`: the pair at T_s takes steps of T_s and no other.
+        if k > 0 && grid.reached(k - 1, now) && !grid.passed(k - 1, now) {
+            return grid.period;
+        }
+        -now.minus_periods(k, grid.period)
+    }
+}
+
+impl Model for PmsmDrive {
+    type Outputs = DriveOutputs;
+
+    const INFO: Info = Info {
+        name: "PmsmDrive",
+        description: "Sensorless drive: permanent-magnet synchronous machine, inverter and controller in one",
+        version: env!("CARGO_PKG_VERSION"),
+        author: "The sensorless-drive developers",
+        license: "MIT OR Apache-2.0",
+        copyright: "Copyright (c) 2026 The sensorless-drive developers",
+        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-3 },
+        documentation: include_str!("../docs/pmsm_drive.html"),
+    };
+
+    const TABLE: &'static Table<Block<Self>> = TABLE;
+
+    fn derive(&mut self) {
+        self.pair.plant.model.derive();
+        self.pair.controller.model.derive();
+    }
+
+    fn validate(&self) -> Result<(), Fault> {
+        let in_part = |part: &str, fault: Fault| Fault::new(format!("{part}.{fault}"));
+        self.pair.plant.model.validate().map_err(|fault| in_part("plant", fault))?;
+        self.pair.controller.model.validate().map_err(|fault| in_part("controller", fault))
+    }
+
+    fn initialise(&mut self) {
+        let Self { inputs, pair } = self;
+        pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
+        pair.initialise();
+    }
+
+    fn output(&self, _now: Elapsed, out: &mut DriveOutputs) {
+        out.plant.clone_from(&self.pair.plant.out);
+        out.controller.clone_from(&self.pair.controller.out);
+    }
+
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        let Self { inputs, pair } = self;
+        pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
+        let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
+        let (mut now, end) = (step.start, step.end());
+        loop {
+            let left = end.since(now);
+            let h = Self::to_next_sample(&grid, now);
+            // The last piece ends where the step ends; a rest below the width of an instant is no piece of its own.
+            if h >= left - grid.width() {
+                let whole = (h - left).abs() <= grid.width();
+                return pair.step(if whole { h } else { left });
+            }
+            pair.step(h)?;
+            now = now.plus(h);
+        }
+    }
+}
+
+type V = Row<Block<PmsmDrive>>;
+
+const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
+    const {
+        &[
+            V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
+            V::input("tau_load", &NEWTON_METRE, "Load torque at the shaft, positive against positive speed", |m| {
+                &mut m.model.inputs.tau_load
+            }),
+            V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)
+                .at_least(0.0),
+            V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),
+            V::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |m| &mut m.out.controller }),
+            V::part(
+                "plant.",
+                &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters },
+            ),
+            V::part(
+                "controller.",
+                &Part { table: tables::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
+            ),
+        ]
+    },
+);
+
+type O = Row<ControllerOutputs>;
+
+/// The controller's outputs under names that leave `i_d` and `i_q` to the plant.
+const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
+    const {
+        &[
+            O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
+            O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
+                &mut o.theta_est
+            }),
+            O::discrete_output("i_d_est", &AMPERE, "Stator current along the estimated magnet axis", |o| &mut o.i.d),
+            O::discrete_output("i_q_est", &AMPERE, "Stator current across the estimated magnet axis", |o| &mut o.i.q),
+            O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
+            O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
+            O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| &mut o.u.a),
+            O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
+            O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
+        ]
+    },
+);
