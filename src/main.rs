@@ -1,2 +1,39 @@
 //! The command `fmu`.
-fn main() {}
+
+use clap::{Parser, Subcommand};
+use fmu::commands::{build, reproduce, simulate};
+use std::process::ExitCode;
+
+/// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.
+///
+/// Exit status: 0 when all is well, 1 when a simulation, a compiler or a check failed, 2 for bad usage or a bad file.
+#[derive(Debug, Parser)]
+#[command(name = "fmu", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Build(build::Build),
+    Simulate(simulate::Simulate),
+    Reproduce(reproduce::Reproduce),
+}
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Build(args) => build::run(&args).map(|files| {
+            for file in files {
+                println!("{}", file.display());
+            }
+            ExitCode::SUCCESS
+        }),
+        Command::Simulate(args) => simulate::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
+    };
+    outcome.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::from(fmu::exit_status(&error))
+    })
+}

@@ -1,0 +1,153 @@
+//! `fmu build`: compiles models and packs them.
+
+use crate::importer::describe;
+use crate::licences::Licences;
+use crate::pack::{self, Moment};
+use crate::platform::Platform;
+use crate::workspace::{Package, Selection, Workspace};
+use anyhow::{Context, Result, anyhow, bail};
+use clap::Args;
+use fmu_core::Description;
+use model_description::FmiVersion;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Compiles FMUs and packs them for both standards.
+///
+/// Without names, every FMU of the workspace: the packages in its folder fmus/. A name is that of the package
+/// (pmsm-plant) or of the FMU (PmsmPlant).
+///
+/// An FMU of your own is any cdylib with one line `fmu_export::export!(MyModel);`:
+///   an example of a package        fmu build --example own_fmu
+///   a package anywhere             fmu build --package my-fmu
+///   a library that is already built, or several of one model for several platforms
+///                                  fmu build --library target/release/libmy_fmu.so
+///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
+///
+/// With SOURCE_DATE_EPOCH set, the same sources give the same bytes.
+#[derive(Debug, Default, Args)]
+#[command(verbatim_doc_comment)]
+pub struct Build {
+    /// FMUs to build, by package or FMU name
+    #[arg(value_name = "FMU", conflicts_with_all = ["package", "example", "library"])]
+    pub fmus: Vec<String>,
+    /// The standard: 2 or 3; both without this option
+    #[arg(long, value_name = "VERSION", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
+    pub fmi: Option<String>,
+    /// Where fmi2/NAME.fmu and fmi3/NAME.fmu go [default: fmu in Cargo's target folder]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// A package with a cdylib, of this workspace
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["example", "library"])]
+    pub package: Option<String>,
+    /// An example whose crate-type is cdylib, of this workspace
+    #[arg(long, value_name = "NAME", conflicts_with = "library")]
+    pub example: Option<String>,
+    /// A library that is already built; PLATFORM= if it is not for this machine
+    #[arg(long, value_name = "[PLATFORM=]FILE")]
+    pub library: Vec<String>,
+}
+
+/// A compiled model, ready to be packed.
+struct Model {
+    description: Description,
+    binaries: Vec<(Platform, Vec<u8>)>,
+    licences: Licences,
+}
+
+/// Runs the command; returns the files that were written.
+///
+/// # Errors
+/// A name that is no FMU, a compiler that fails, a library that is none of ours, a folder that cannot be written.
+pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
+    let moment = Moment::of_environment()?;
+    let versions = match args.fmi.as_deref() {
+        None => vec![FmiVersion::V2, FmiVersion::V3],
+        Some(version) => vec![version.parse()?],
+    };
+    let (models, out) = if args.library.is_empty() {
+        let workspace = Workspace::find()?;
+        let out = args.out.clone().unwrap_or_else(|| workspace.target.join("fmu"));
+        (compile(&workspace, args)?, out)
+    } else {
+        let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("fmu")), Ok);
+        (vec![given(&args.library)?], out.context("--out says where to write to when there is no workspace")?)
+    };
+    let mut written = Vec::new();
+    for model in &models {
+        for &version in &versions {
+            let folder = if version == FmiVersion::V2 { "fmi2" } else { "fmi3" };
+            let path = out.join(folder).join(format!("{}.fmu", model.description.name));
+            let files = pack::contents(&model.description, &model.binaries, &model.licences, version, moment);
+            pack::write(&path, &pack::archive(&files, moment)?)?;
+            written.push(path);
+        }
+    }
+    Ok(written)
+}
+
+fn compile(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
+    let built = if let Some(example) = &args.example {
+        workspace.compile(&Selection::Example(example))?
+    } else {
+        let packages = match &args.package {
+            Some(name) => vec![workspace.package(name).ok_or_else(|| anyhow!("the workspace has no package {name}"))?],
+            None => choose(&workspace.fmus(), &args.fmus)?,
+        };
+        let names: Vec<String> = packages.iter().map(|p| p.name.clone()).collect();
+        workspace.compile(&Selection::Packages(&names))?
+    };
+    if built.is_empty() {
+        bail!("nothing that was compiled is a cdylib: set crate-type = [\"cdylib\"]");
+    }
+    let model = |(package, library): &(String, PathBuf)| {
+        let licences = match args.example {
+            // Cargo does not tell which dependencies of its package an example uses; the exporter it uses for certain.
+            Some(_) => Licences::of_package(workspace, "fmu-export"),
+            None => Licences::of_package(workspace, package),
+        };
+        load(&[(Platform::host(), library.clone())], licences)
+    };
+    built.iter().map(model).collect()
+}
+
+/// The packages that are meant: by their names, or by those of their FMUs, which only differ in how words are joined.
+fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>> {
+    let letters = |name: &str| name.to_lowercase().replace(['-', '_'], "");
+    if all.is_empty() {
+        bail!("the workspace has no folder fmus/ with packages");
+    }
+    if names.is_empty() {
+        return Ok(all.to_vec());
+    }
+    let one = |name: &String| {
+        let known = || all.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
+        let found = all.iter().copied().find(|p| letters(&p.name) == letters(name));
+        found.ok_or_else(|| anyhow!("there is no FMU {name}; there are {}", known()))
+    };
+    names.iter().map(one).collect()
+}
+
+/// Libraries of one model, built before.
+fn given(libraries: &[String]) -> Result<Model> {
+    let parse = |text: &String| match text.split_once('=') {
+        Some((platform, file)) => Ok((platform.parse().map_err(|e: String| anyhow!(e))?, PathBuf::from(file))),
+        None => Ok((Platform::host(), PathBuf::from(text))),
+    };
+    let libraries = libraries.iter().map(parse).collect::<Result<Vec<_>>>()?;
+    load(&libraries, Licences::default())
+}
+
+fn load(libraries: &[(Platform, PathBuf)], licences: Licences) -> Result<Model> {
+    let own = libraries.iter().find(|(platform, _)| *platform == Platform::host());
+    let (_, own) = own.ok_or_else(|| {
+        anyhow!("one library must be for this machine ({}): it describes the model", Platform::host())
+    })?;
+    let description = describe(own)?;
+    let read = |(platform, path): &(Platform, PathBuf)| Ok((*platform, read(path)?));
+    Ok(Model { description, binaries: libraries.iter().map(read).collect::<Result<_>>()?, licences })
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).with_context(|| path.display().to_string())
+}

@@ -1,0 +1,5 @@
+//! The commands of the command line.
+
+pub mod build;
+pub mod reproduce;
+pub mod simulate;

@@ -1,0 +1,32 @@
+//! `fmu reproduce`: the paper's experiments through the packed FMUs.
+
+use super::build::{self, Build};
+use crate::workspace::Workspace;
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Builds the FMUs, runs the paper's experiments through them in both standards and compares the figures.
+///
+/// Writes CSV, plots and report.html to `reproduce` in Cargo's target folder. Exit status 1 when a figure is off.
+#[derive(Debug, Args)]
+pub struct Reproduce {
+    /// Where the results go [default: reproduce in Cargo's target folder]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Runs the command; returns whether every figure is as expected.
+///
+/// # Errors
+/// The FMUs cannot be built or run, or a file cannot be written.
+pub fn run(args: &Reproduce) -> Result<bool> {
+    let target = Workspace::find()?.target;
+    let fmus = target.join("fmu");
+    build::run(&Build { out: Some(fmus.clone()), ..Build::default() })?;
+    let out = args.out.clone().unwrap_or_else(|| target.join("reproduce"));
+    let (table, holds) = crate::reproduce::run(&fmus, &out, &|title| eprintln!("{title}"))?;
+    println!("{table}");
+    println!("{}", out.join("report.html").display());
+    Ok(holds)
+}

@@ -1,0 +1,271 @@
+//! `fmu simulate`: co-simulates FMUs.
+
+use crate::Failed;
+use crate::cosimulation::{Point, Recording, Schedule, Settings, System};
+use crate::importer::{Fmu, Message};
+use crate::{pack, plot};
+use anyhow::{Context, Result, anyhow, bail};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use model_description::Experiment;
+use std::io::{self, BufWriter, IsTerminal};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Co-simulates FMUs of FMI 2.0 and FMI 3.0, of this project or of any other.
+///
+/// An instance has the name of its file; NAME=FILE gives another. Variables are written INSTANCE.VARIABLE.
+///
+/// At every communication point all outputs are read and all inputs set, then all FMUs step: what one FMU sends reaches
+/// the other one step later. With --sequential the FMUs step in the order given, each with what those before it have just
+/// computed.
+///
+/// Start the motor and turn it at 1000 rpm (104.7 rad/s):
+///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
+///     --input SensorlessController.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
+/// The same, connected by hand, with another resistance, some variables only, as CSV:
+///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --connect c.u_a=p.u_a --connect c.u_b=p.u_b \
+///     --connect c.u_c=p.u_c --connect p.i_a=c.i_a --connect p.i_b=c.i_b --connect p.i_c=c.i_c \
+///     --set p.motor.R_s=3.3 --input c.speed_ref=0:0,0.1:104.7 --stop 1 --record p.speed,c.speed_est --csv -
+#[derive(Debug, Default, Args)]
+#[command(verbatim_doc_comment)]
+pub struct Simulate {
+    /// FMUs, each with a name of your choice or that of the file
+    #[arg(value_name = "[NAME=]FILE", required = true)]
+    pub fmus: Vec<String>,
+    /// Connect an output to an input (repeatable)
+    #[arg(long, value_name = "OUTPUT=INPUT")]
+    pub connect: Vec<String>,
+    /// Connect every input that nothing feeds to the output of the same name of another FMU
+    #[arg(long)]
+    pub auto_connect: bool,
+    /// Set a parameter, or an input that nothing feeds (repeatable)
+    #[arg(long, value_name = "VARIABLE=VALUE")]
+    pub set: Vec<String>,
+    /// Feed an input over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE for straight lines, or
+    /// a CSV file with time in the first column and INSTANCE.VARIABLE above the others
+    #[arg(long, value_name = "VARIABLE=POINTS|FILE.csv")]
+    pub input: Vec<String>,
+    /// Start time in s [default: that of the FMUs, or 0]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    pub start: Option<f64>,
+    /// Stop time in s [default: the latest of the FMUs, or 1]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    pub stop: Option<f64>,
+    /// Communication step in s [default: the shortest of the FMUs, or a thousandth of the time]
+    #[arg(long, value_name = "H")]
+    pub step: Option<f64>,
+    /// Variables to record [default: all outputs]
+    #[arg(long, value_name = "VARIABLE,...", value_delimiter = ',')]
+    pub record: Vec<String>,
+    /// Write what was recorded as CSV; - for standard output
+    #[arg(long, value_name = "FILE|-")]
+    pub csv: Option<PathBuf>,
+    /// Plot what was recorded
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
+    /// Step the FMUs one after the other, each with what those before it have just computed
+    #[arg(long)]
+    pub sequential: bool,
+    /// Show all that the FMUs log
+    #[arg(long)]
+    pub logging: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A file is no FMU that runs here, a name is wrong, or an FMU fails.
+pub fn run(args: &Simulate) -> Result<()> {
+    let mut system = System::default();
+    let settings = prepare(&mut system, args)?;
+    let mut progress = Progress::new(settings);
+    let mut hook = |point: &mut Point<'_>| {
+        if args.logging {
+            show(&point.take_messages());
+        }
+        progress.at(point.time);
+        Ok(ControlFlow::Continue(()))
+    };
+    let outcome = system.run(&settings, &mut hook);
+    progress.end();
+    if args.logging {
+        show(&system.take_messages());
+    }
+    write(&outcome?, args)
+}
+
+/// Everything before the run.
+fn prepare(system: &mut System, args: &Simulate) -> Result<Settings> {
+    let mut experiments = Vec::new();
+    for text in &args.fmus {
+        let (name, path) = name_and_path(text)?;
+        let fmu = Fmu::open(path)?;
+        experiments.push(fmu.description().default_experiment);
+        system.add(&name, &fmu, args.logging)?;
+    }
+    for text in &args.connect {
+        let (from, to) = halves(text, "--connect OUTPUT=INPUT")?;
+        system.connect(from, to)?;
+    }
+    for text in &args.input {
+        match text.split_once('=') {
+            Some((port, points)) => {
+                let schedule = Schedule::parse(points).map_err(|cause| anyhow!("--input {text}: {cause}"))?;
+                system.input(port, schedule)?;
+            }
+            None => {
+                for (port, schedule) in
+                    Schedule::read_csv(Path::new(text)).map_err(|cause| anyhow!("--input {cause}"))?
+                {
+                    system.input(&port, schedule)?;
+                }
+            }
+        }
+    }
+    if args.auto_connect {
+        for (from, to) in system.connect_by_name()? {
+            eprintln!("connected {from} -> {to}");
+        }
+    }
+    for text in &args.set {
+        let (port, value) = halves(text, "--set VARIABLE=VALUE")?;
+        system.set(port, value)?;
+    }
+    if args.record.is_empty() {
+        system.record_outputs()?;
+    }
+    args.record.iter().try_for_each(|port| system.record(port))?;
+    Ok(settings(args, &experiments))
+}
+
+/// What is not said is taken from the FMUs.
+fn settings(args: &Simulate, experiments: &[Experiment]) -> Settings {
+    let start = args.start.or_else(|| experiments.iter().find_map(|x| x.start)).unwrap_or(0.0);
+    let latest = experiments.iter().filter_map(|x| x.stop).reduce(f64::max);
+    let stop = args.stop.or(latest).unwrap_or(start + 1.0);
+    let shortest = experiments.iter().filter_map(|x| x.step).reduce(f64::min);
+    let step = args.step.or(shortest).unwrap_or((stop - start) / 1000.0);
+    Settings { start, stop, step, sequential: args.sequential }
+}
+
+fn write(recording: &Recording, args: &Simulate) -> Result<()> {
+    let mut to_stdout = false;
+    match args.csv.as_deref() {
+        Some(path) if path == Path::new("-") => {
+            to_stdout = true;
+            match recording.write_csv(&mut BufWriter::new(io::stdout().lock())) {
+                // A reader like `head` has seen enough.
+                Err(e) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
+                other => other.context("standard output")?,
+            }
+        }
+        Some(path) => {
+            let mut bytes = Vec::new();
+            recording.write_csv(&mut bytes)?;
+            pack::write(path, &bytes)?;
+        }
+        None => {}
+    }
+    if let Some(path) = &args.plot {
+        pack::write(path, plot::svg(recording)?.as_bytes())?;
+    }
+    let mut table = recording.last_values();
+    if let Some(name) = &recording.ended_by {
+        table = format!("{table}\n{name} asked to end the simulation");
+    }
+    if to_stdout {
+        eprintln!("{table}");
+    } else {
+        println!("{table}");
+    }
+    let bad = recording.columns.iter().find(|c| c.values.last().is_some_and(|x| !x.is_finite()));
+    match bad {
+        Some(column) => Err(Failed(format!("{} is not finite at the end", column.name)).into()),
+        None => Ok(()),
+    }
+}
+
+/// `plant=a/b.fmu`, or `a/b.fmu` with the name `b`.
+fn name_and_path(text: &str) -> Result<(String, &Path)> {
+    // A path may have an equals sign; a name has no separator.
+    if let Some((name, path)) = text.split_once('=').filter(|(name, _)| !name.contains(['/', '\\'])) {
+        if name.is_empty() {
+            bail!("{text}: the name before = is empty");
+        }
+        return Ok((name.into(), Path::new(path)));
+    }
+    let path = Path::new(text);
+    let stem = path.file_stem().ok_or_else(|| anyhow!("{text}: is no file"))?;
+    Ok((stem.to_string_lossy().into_owned(), path))
+}
+
+fn halves<'a>(text: &'a str, form: &str) -> Result<(&'a str, &'a str)> {
+    text.split_once('=').ok_or_else(|| anyhow!("{text}: is not {form}"))
+}
+
+fn show(messages: &[(String, Message)]) {
+    for (instance, Message { status, category, text }) in messages {
+        eprintln!("{instance}: {status} [{category}] {text}");
+    }
+}
+
+/// A bar on a terminal, once the run takes longer than a second.
+struct Progress {
+    settings: Settings,
+    begun: Instant,
+    next: Duration,
+    bar: Option<ProgressBar>,
+}
+
+impl Progress {
+    fn new(settings: Settings) -> Self {
+        let next = if io::stderr().is_terminal() { Duration::from_secs(1) } else { Duration::MAX };
+        Self { settings, begun: Instant::now(), next, bar: None }
+    }
+
+    fn at(&mut self, time: f64) {
+        if self.begun.elapsed() < self.next {
+            return;
+        }
+        self.next = self.begun.elapsed() + Duration::from_millis(100);
+        let bar = self.bar.get_or_insert_with(|| {
+            let style = ProgressStyle::with_template("{wide_bar} {percent} %  {eta} left");
+            ProgressBar::new(1000).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        });
+        let done = (time - self.settings.start) / (self.settings.stop - self.settings.start);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 1000")]
+        bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
+    }
+
+    fn end(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_instances() {
+        let name = |text| name_and_path(text).map(|(name, path)| (name, path.to_owned())).unwrap();
+        assert_eq!(name("a/PmsmPlant.fmu"), ("PmsmPlant".into(), "a/PmsmPlant.fmu".into()));
+        assert_eq!(name("p=a/x=y.fmu"), ("p".into(), "a/x=y.fmu".into()));
+        assert_eq!(name("a=b/c.fmu"), ("a".into(), "b/c.fmu".into()));
+        assert_eq!(name("./a=b/c.fmu"), ("c".into(), "./a=b/c.fmu".into()));
+        assert!(name_and_path("=x.fmu").is_err());
+    }
+
+    #[test]
+    fn what_is_not_said_comes_from_the_fmus() {
+        let experiment = |stop, step| Experiment { start: None, stop, step, tolerance: None };
+        let s = settings(&Simulate::default(), &[experiment(Some(2.0), Some(1e-4)), experiment(Some(3.0), Some(2e-4))]);
+        assert_eq!((s.start, s.stop, s.step), (0.0, 3.0, 1e-4));
+        let s = settings(&Simulate { stop: Some(4.0), ..Simulate::default() }, &[experiment(None, None)]);
+        assert_eq!((s.stop, s.step), (4.0, 0.004));
+    }
+}

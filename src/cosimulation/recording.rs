@@ -1,0 +1,106 @@
+//! What was recorded.
+
+use model_description::DisplayUnit;
+use std::io::{self, Write};
+
+/// A recorded variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// `instance.variable`.
+    pub name: String,
+    /// Unit, empty for none.
+    pub unit: String,
+    /// Display unit.
+    pub display: Option<DisplayUnit>,
+    /// One value for each communication point.
+    pub values: Vec<f64>,
+}
+
+/// Columns over time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recording {
+    /// The communication points in s.
+    pub time: Vec<f64>,
+    /// The recorded variables, in the order they were asked for.
+    pub columns: Vec<Column>,
+    /// The instance that asked to end the simulation, if one did.
+    pub ended_by: Option<String>,
+}
+
+impl Recording {
+    pub(super) fn new(columns: impl Iterator<Item = Column>) -> Self {
+        Self { columns: columns.collect(), ..Self::default() }
+    }
+
+    pub(super) fn push(&mut self, time: f64, row: &[f64]) {
+        self.time.push(time);
+        self.columns.iter_mut().zip(row).for_each(|(column, x)| column.values.push(*x));
+    }
+
+    /// The column of this name.
+    pub fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|c| c.name == name)
+    }
+
+    /// Comma-separated, one header line; every number reads back to the same double.
+    ///
+    /// # Errors
+    /// As the writer's.
+    pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
+        let names: Vec<_> = std::iter::once("time").chain(self.columns.iter().map(|c| c.name.as_str())).collect();
+        writeln!(out, "{}", names.join(","))?;
+        for (k, t) in self.time.iter().enumerate() {
+            write!(out, "{t}")?;
+            self.columns.iter().try_for_each(|c| write!(out, ",{}", c.values[k]))?;
+            writeln!(out)?;
+        }
+        out.flush()
+    }
+
+    /// The last values as a table, with the display unit where there is one.
+    pub fn last_values(&self) -> String {
+        let width = self.columns.iter().map(|c| c.name.len()).max().unwrap_or(0);
+        let row = |c: &Column| {
+            let x = c.values.last().copied().unwrap_or(f64::NAN);
+            let shown = c.display.as_ref().map(|d| format!("  = {} {}", six(d.show(x)), d.name));
+            format!("{:width$}  {:>12} {}{}", c.name, six(x), c.unit, shown.unwrap_or_default()).trim_end().to_owned()
+        };
+        let rows: Vec<String> = self.columns.iter().map(row).collect();
+        let time = self.time.last().copied().unwrap_or(f64::NAN);
+        format!("{:width$}  {:>12} s\n{}", "time", six(time), rows.join("\n"))
+    }
+}
+
+/// A number with six digits.
+fn six(x: f64) -> String {
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    let plain = rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) || !x.is_finite();
+    if plain { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recording() -> Recording {
+        let display =
+            Some(DisplayUnit { name: "rpm".into(), factor: 30.0 / std::f64::consts::PI, offset: 0.0, inverse: false });
+        let speed = Column { name: "p.speed".into(), unit: "rad/s".into(), display, values: Vec::new() };
+        let mut recording = Recording::new([speed].into_iter());
+        recording.push(0.0, &[0.1 + 0.2]);
+        recording.push(1e-4, &[104.719_755_119_659_77]);
+        recording
+    }
+
+    #[test]
+    fn csv_keeps_every_bit() {
+        let mut text = Vec::new();
+        recording().write_csv(&mut text).unwrap();
+        assert_eq!(text, b"time,p.speed\n0,0.30000000000000004\n0.0001,104.71975511965977\n");
+    }
+
+    #[test]
+    fn last_values_are_for_people() {
+        assert_eq!(recording().last_values(), "time           0.0001 s\np.speed        104.72 rad/s  = 1000 rpm");
+    }
+}

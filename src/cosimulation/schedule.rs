@@ -1,0 +1,157 @@
+//! Inputs over time.
+
+use std::fmt;
+use std::path::Path;
+
+/// Values of one input over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule {
+    points: Vec<(f64, f64)>,
+    linear: bool,
+}
+
+/// Instants closer than this (s) are the same: communication points are `start + k h`, rounded.
+const SAME: f64 = 1e-9;
+
+impl Schedule {
+    /// Steps: each value holds from its time (s) on; before the first, the first value holds.
+    ///
+    /// # Errors
+    /// There is no point, a number is not finite, or times do not rise.
+    pub fn steps(points: Vec<(f64, f64)>) -> Result<Self, String> {
+        Self::new(points, false)
+    }
+
+    /// Straight lines between the points; before the first and after the last, their values hold.
+    ///
+    /// # Errors
+    /// As [`steps`](Self::steps).
+    pub fn lines(points: Vec<(f64, f64)>) -> Result<Self, String> {
+        Self::new(points, true)
+    }
+
+    fn new(points: Vec<(f64, f64)>, linear: bool) -> Result<Self, String> {
+        if points.is_empty() {
+            return Err("has no point".into());
+        }
+        if let Some((t, x)) = points.iter().find(|(t, x)| !t.is_finite() || !x.is_finite()) {
+            return Err(format!("{t}:{x} is not finite"));
+        }
+        if let Some(pair) = points.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
+            return Err(format!("the time {} does not follow {}", pair[1].0, pair[0].0));
+        }
+        Ok(Self { points, linear })
+    }
+
+    /// `0:0,0.1:52.36` for steps, `0:0~0.1:52.36` for straight lines; a single number is a constant.
+    ///
+    /// # Errors
+    /// Says which point is none, or as [`steps`](Self::steps).
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let linear = text.contains('~');
+        if linear && text.contains(',') {
+            return Err("has both , for steps and ~ for lines".into());
+        }
+        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("{:?} is not a number", text.trim()));
+        let point = |text: &str| match text.split_once(':') {
+            Some((t, x)) => Ok((number(t)?, number(x)?)),
+            None if !text.contains(':') && !linear => Ok((0.0, number(text)?)),
+            None => Err(format!("{text:?} is not TIME:VALUE")),
+        };
+        let parts: Vec<&str> = text.split([',', '~']).collect();
+        if parts.len() > 1 && parts.iter().any(|p| !p.contains(':')) {
+            return Err("needs TIME:VALUE for every point".into());
+        }
+        Self::new(parts.into_iter().map(point).collect::<Result<_, _>>()?, linear)
+    }
+
+    /// The columns of a CSV file: the first is time (s), the header of each other names its input. Lines connect the
+    /// points.
+    ///
+    /// # Errors
+    /// The file cannot be read, has no header, or a row has another number of numbers than the header.
+    pub fn read_csv(path: &Path) -> Result<Vec<(String, Self)>, String> {
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Self::parse_csv(&text).map_err(|cause| format!("{}: {cause}", path.display()))
+    }
+
+    fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
+        let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+        let cells = |line: &str| line.split(',').map(|c| c.trim().trim_matches('"').to_owned()).collect::<Vec<_>>();
+        let (_, header) = lines.next().ok_or("is empty")?;
+        let names: Vec<String> = cells(header).into_iter().skip(1).collect();
+        if names.is_empty() {
+            return Err("has no column besides time".into());
+        }
+        let mut columns: Vec<Vec<(f64, f64)>> = vec![Vec::new(); names.len()];
+        for (index, line) in lines {
+            let row: Result<Vec<f64>, _> = cells(line).iter().map(|c| c.parse::<f64>()).collect();
+            match row.as_deref() {
+                Ok([t, values @ ..]) if values.len() == names.len() => {
+                    columns.iter_mut().zip(values).for_each(|(column, x)| column.push((*t, *x)));
+                }
+                Ok(_) => return Err(format!("line {}: expected {} numbers", index + 1, names.len() + 1)),
+                Err(_) => return Err(format!("line {}: a cell is not a number", index + 1)),
+            }
+        }
+        names.into_iter().zip(columns).map(|(name, points)| Ok((name, Self::lines(points)?))).collect()
+    }
+
+    /// Value at time `t` (s).
+    pub fn at(&self, t: f64) -> f64 {
+        let after = self.points.partition_point(|(time, _)| *time <= t + SAME);
+        let (Some(&(t0, x0)), next) = (self.points.get(after.saturating_sub(1)), self.points.get(after)) else {
+            return 0.0;
+        };
+        match next {
+            Some(&(t1, x1)) if self.linear && after > 0 => x0 + (x1 - x0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0),
+            _ => x0,
+        }
+    }
+}
+
+impl fmt::Display for Schedule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let points: Vec<_> = self.points.iter().map(|(t, x)| format!("{t}:{x}")).collect();
+        f.write_str(&points.join(if self.linear { "~" } else { "," }))
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact where nothing is rounded")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_hold_and_lines_connect() {
+        let steps = Schedule::parse("0:0, 0.1:52.36").unwrap();
+        let values = [-1.0, 0.0, 0.099, 0.1, 0.1 - 1e-12, 9.0].map(|t| steps.at(t));
+        assert_eq!(values, [0.0, 0.0, 0.0, 52.36, 52.36, 52.36]);
+        let lines = Schedule::parse("1:0~2:10~3:10").unwrap();
+        assert_eq!([0.0, 1.0, 1.5, 2.0, 2.5, 4.0].map(|t| lines.at(t)), [0.0, 0.0, 5.0, 10.0, 10.0, 10.0]);
+        assert_eq!(Schedule::parse("325").unwrap().at(-7.0), 325.0);
+    }
+
+    #[test]
+    fn what_is_no_schedule_is_told() {
+        for (text, cause) in [
+            ("", "\"\" is not a number"),
+            ("a:1", "\"a\" is not a number"),
+            ("0:1,0:2", "the time 0 does not follow 0"),
+            ("0:1,2", "needs TIME:VALUE for every point"),
+            ("0:1~1:2,3:4", "has both , for steps and ~ for lines"),
+            ("0:NaN", "0:NaN is not finite"),
+        ] {
+            assert_eq!(Schedule::parse(text).unwrap_err(), cause, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_table_has_a_column_for_each_input() {
+        let columns = Schedule::parse_csv("\"time\",\"c.speed_ref\",p.tau_load\n0,0,0\n1,10,2\n").unwrap();
+        assert_eq!(columns[0].0, "c.speed_ref");
+        assert_eq!((columns[0].1.at(0.5), columns[1].1.at(0.5)), (5.0, 1.0));
+        assert_eq!(Schedule::parse_csv("time,a\n0\n").unwrap_err(), "line 2: expected 2 numbers");
+        assert_eq!(Schedule::parse_csv("time,a\n0,x\n").unwrap_err(), "line 2: a cell is not a number");
+    }
+}

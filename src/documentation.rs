@@ -1,0 +1,231 @@
+//! `documentation/index.html`: a page that needs no network, made from the description.
+
+use fmu_core::description::{Description, Value, Variable, VariableKind};
+use fmu_core::variable::{Causality, Variability};
+use model_description::FmiVersion;
+use std::fmt::Write;
+
+/// Appends formatted text; writing to a `String` does not fail.
+macro_rules! put {
+    ($out:ident, $($arguments:tt)*) => { let _ = write!($out, $($arguments)*); };
+}
+
+const STYLE: &str = include_str!("documentation.css");
+
+/// The whole page.
+pub fn page(d: &Description, version: FmiVersion) -> String {
+    let name = escape(&d.name);
+    let mut out = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
+         <header>\n<h1>{name}</h1>\n<p class=\"summary\">{}</p>\n<p>Version {} · FMI {version} for co-simulation · {}</p>\n\
+         </header>\n<main>\n",
+        escape(&d.description),
+        escape(&d.version),
+        escape(&d.author),
+    );
+    if !d.documentation.is_empty() {
+        put!(out, "<section>\n{}\n</section>\n", d.documentation.trim());
+    }
+    out += &timing(d);
+    for (title, causality) in
+        [("Inputs", Causality::Input), ("Outputs", Causality::Output), ("Local variables", Causality::Local)]
+    {
+        let variables: Vec<_> = d.variables.iter().filter(|v| v.causality == causality).collect();
+        out += &section(title, &variables);
+    }
+    out += &parameters(d);
+    out += &enumerations(d);
+    put!(
+        out,
+        "<h2>Licence</h2>\n<p>{} <br>{}. The full texts, and those of the libraries in the binary, are in \
+         <a href=\"licenses/license.txt\">licenses/license.txt</a>.</p>\n</main>\n</body>\n</html>\n",
+        escape(&d.copyright),
+        escape(&d.license),
+    );
+    out
+}
+
+/// The recommended experiment, and what happens at other steps.
+fn timing(d: &Description) -> String {
+    let x = d.experiment;
+    let discrete =
+        d.variables.iter().any(|v| v.causality == Causality::Output && v.variability == Variability::Discrete);
+    let outputs = if discrete {
+        "Outputs marked “sampled” change at the model's own sample instants, whatever the communication step is."
+    } else {
+        "Outputs are those of the end of the step."
+    };
+    format!(
+        "<h2>Recommended experiment and timing</h2>\n<table>\n\
+         <tr><th>Start</th><td class=\"number\">{} s</td></tr>\n<tr><th>Stop</th><td class=\"number\">{} s</td></tr>\n\
+         <tr><th>Communication step</th><td class=\"number\">{} s</td></tr>\n</table>\n\
+         <p>Inputs are held over a communication step. {outputs}</p>\n",
+        number(x.start),
+        number(x.stop),
+        number(x.step),
+    )
+}
+
+/// Parameters under a heading for each prefix, those without one first.
+fn parameters(d: &Description) -> String {
+    let of = |c: Causality| matches!(c, Causality::Parameter | Causality::CalculatedParameter);
+    let all: Vec<_> = d.variables.iter().filter(|v| of(v.causality)).collect();
+    let mut prefixes: Vec<&str> = Vec::new();
+    for variable in &all {
+        if !prefixes.contains(&prefix(&variable.name)) {
+            prefixes.push(prefix(&variable.name));
+        }
+    }
+    prefixes.sort_by_key(|p| !p.is_empty());
+    let mut out = String::new();
+    for p in prefixes {
+        let variables: Vec<_> = all.iter().copied().filter(|v| prefix(&v.name) == p).collect();
+        let title = if p.is_empty() { "Parameters".into() } else { format!("Parameters: {p}") };
+        out += &section(&title, &variables);
+    }
+    out
+}
+
+/// Everything before the last dot.
+fn prefix(name: &str) -> &str {
+    name.rsplit_once('.').map_or("", |(prefix, _)| prefix)
+}
+
+fn section(title: &str, variables: &[&Variable]) -> String {
+    if variables.is_empty() {
+        return String::new();
+    }
+    let mut out = format!(
+        "<h2>{}</h2>\n<div class=\"scroll\">\n<table class=\"variables\">\n<tr><th>Name</th><th class=\"wide\">Description</th>\
+         <th>Unit</th><th class=\"number\">Start</th><th>Allowed</th></tr>\n",
+        escape(title)
+    );
+    for v in variables {
+        let kind = match (v.causality, v.variability) {
+            (_, Variability::Tunable) => " <small>tunable</small>",
+            (Causality::Output | Causality::Input | Causality::Local, Variability::Discrete) => {
+                " <small>sampled</small>"
+            }
+            (Causality::CalculatedParameter, _) => " <small>calculated</small>",
+            _ => "",
+        };
+        let size = v.dimension.map(|n| format!("[{n}]")).unwrap_or_default();
+        put!(
+            out,
+            "<tr><td class=\"name\">{}{size}</td><td>{}{kind}</td><td class=\"unit\">{}</td><td class=\"number\">{}</td>\
+             <td>{}</td></tr>\n",
+            escape(&v.name),
+            escape(&v.description),
+            unit(v),
+            start(v),
+            escape(v.allowed.as_deref().unwrap_or_default()),
+        );
+    }
+    out + "</table>\n</div>\n"
+}
+
+fn unit(v: &Variable) -> String {
+    match &v.kind {
+        VariableKind::Real { unit, display, .. } => {
+            let shown = display.as_ref().map(|(name, ..)| format!(" <small>shown in {}</small>", escape(name)));
+            escape(unit) + &shown.unwrap_or_default()
+        }
+        VariableKind::Integer => "<small>integer</small>".into(),
+        VariableKind::Boolean => "<small>true or false</small>".into(),
+        VariableKind::Enumeration { name, .. } => format!("<a href=\"#{0}\">{0}</a>", escape(name)),
+    }
+}
+
+fn start(v: &Variable) -> String {
+    let item = |x: i32| match &v.kind {
+        VariableKind::Enumeration { items, .. } => {
+            items.iter().find(|(value, ..)| *value == x).map(|(_, name, _)| escape(name))
+        }
+        _ => None,
+    };
+    let one = |x: &Value| match x {
+        Value::Real(x) => number(*x),
+        Value::Integer(x) => item(*x).unwrap_or_else(|| x.to_string()),
+        Value::Boolean(x) => x.to_string(),
+    };
+    let all: Vec<String> = v.start.iter().flatten().map(one).collect();
+    match all.as_slice() {
+        [first, .., last] if all.len() > 4 => format!("{first} … {last}"),
+        _ => all.join(", "),
+    }
+}
+
+fn enumerations(d: &Description) -> String {
+    let mut out = String::new();
+    let mut seen: Vec<&str> = Vec::new();
+    for v in &d.variables {
+        let VariableKind::Enumeration { name, description, items } = &v.kind else { continue };
+        if seen.contains(&name.as_str()) {
+            continue;
+        }
+        seen.push(name);
+        let title = escape(name);
+        put!(
+            out,
+            "<h2 id=\"{title}\">{title}</h2>\n<p>{}</p>\n<table>\n<tr><th class=\"number\">Value</th><th>Name</th>\
+             <th>Description</th></tr>\n",
+            escape(description)
+        );
+        for (value, item, text) in items {
+            let (item, text) = (escape(item), escape(text));
+            put!(out, "<tr><td class=\"number\">{value}</td><td class=\"name\">{item}</td><td>{text}</td></tr>\n");
+        }
+        out += "</table>\n";
+    }
+    out
+}
+
+/// A number as a person writes it: six digits tell an engineer enough, the XML has them all.
+fn number(x: f64) -> String {
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    let plain = rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs());
+    if plain { format!("{rounded}") } else { format!("{rounded:e}") }.replace('-', "\u{2212}")
+}
+
+/// Text for HTML.
+fn escape(text: &str) -> String {
+    let entity = |c: char| match c {
+        '&' => "&amp;".into(),
+        '<' => "&lt;".into(),
+        '>' => "&gt;".into(),
+        '"' => "&quot;".into(),
+        c => c.to_string(),
+    };
+    text.chars().map(entity).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        let cases = [
+            (0.0, "0"),
+            (325.0, "325"),
+            (1e-4, "0.0001"),
+            (3.2e-5, "3.2e−5"),
+            (1_570.796_326_8, "1570.8"),
+            (-2.5, "−2.5"),
+        ];
+        for (x, text) in cases {
+            assert_eq!(number(x), text);
+        }
+    }
+
+    #[test]
+    fn markup_in_a_description_stays_text() {
+        assert_eq!(escape("a < b & \"c\""), "a &lt; b &amp; &quot;c&quot;");
+    }
+
+    #[test]
+    fn prefixes() {
+        assert_eq!((prefix("T_s"), prefix("motor.R_s"), prefix("plant.motor.R_s")), ("", "motor", "plant.motor"));
+    }
+}

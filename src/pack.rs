@@ -1,0 +1,202 @@
+//! The archive of an FMU: what is in it, and writing it so that the same contents give the same bytes.
+
+use crate::documentation;
+use crate::licences::Licences;
+use crate::platform::Platform;
+use anyhow::{Context, Result};
+use fmu_core::Description;
+use model_description::{FmiVersion, Generation, date_from_epoch};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{Cursor, Write};
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+/// The tool, as `generationTool` names it.
+pub const TOOL: &str = concat!("fmu ", env!("CARGO_PKG_VERSION"));
+
+/// A file of an archive.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Its contents.
+    pub bytes: Vec<u8>,
+    /// Whether it gets the permission to be executed.
+    pub executable: bool,
+}
+
+impl Entry {
+    fn text(text: String) -> Self {
+        Self { bytes: text.into_bytes(), executable: false }
+    }
+}
+
+/// When the FMU is made: `SOURCE_DATE_EPOCH`, or now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Moment {
+    seconds: i64,
+    fixed: bool,
+}
+
+impl Moment {
+    /// What the environment says, or the clock.
+    ///
+    /// # Errors
+    /// `SOURCE_DATE_EPOCH` is no number of seconds.
+    pub fn of_environment() -> Result<Self> {
+        if let Ok(text) = std::env::var("SOURCE_DATE_EPOCH") {
+            let seconds =
+                text.trim().parse().with_context(|| format!("SOURCE_DATE_EPOCH={text} is no number of seconds"))?;
+            return Ok(Self::fixed(seconds));
+        }
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Ok(Self { seconds: i64::try_from(since.as_secs()).unwrap_or(i64::MAX), fixed: false })
+    }
+
+    /// This many seconds after 1970-01-01T00:00:00Z.
+    pub const fn fixed(seconds: i64) -> Self {
+        Self { seconds, fixed: true }
+    }
+
+    /// As `generationDateAndTime` has it.
+    pub fn date_and_time(self) -> String {
+        date_from_epoch(self.seconds)
+    }
+
+    /// The time of every file: 1980-01-01 unless it is fixed, for an archive need not tell when it was made twice.
+    fn of_files(self) -> DateTime {
+        let text = date_from_epoch(self.seconds);
+        let field = |range: std::ops::Range<usize>| text[range].parse::<u16>().unwrap_or(0);
+        let small = |range| u8::try_from(field(range)).unwrap_or(0);
+        let time = DateTime::from_date_and_time(
+            field(0..4),
+            small(5..7),
+            small(8..10),
+            small(11..13),
+            small(14..16),
+            small(17..19),
+        );
+        // ZIP counts from 1980; an earlier moment becomes that.
+        if self.fixed { time.unwrap_or_default() } else { DateTime::default() }
+    }
+}
+
+/// All files of an FMU.
+pub fn contents(
+    description: &Description,
+    binaries: &[(Platform, Vec<u8>)],
+    licences: &Licences,
+    version: FmiVersion,
+    moment: Moment,
+) -> BTreeMap<String, Entry> {
+    let generation = Generation { tool: TOOL.into(), date_and_time: moment.date_and_time() };
+    let mut files = BTreeMap::from([
+        ("modelDescription.xml".into(), Entry::text(model_description::write(description, version, &generation))),
+        ("documentation/index.html".into(), Entry::text(documentation::page(description, version))),
+        ("documentation/licenses/license.txt".into(), Entry::text(licences.text(description))),
+    ]);
+    if version == FmiVersion::V3 {
+        let spdx = licences.spdx(description, &generation.date_and_time);
+        files.insert("documentation/licenses/license.spdx".into(), Entry::text(spdx));
+    }
+    for (platform, bytes) in binaries {
+        let (folder, name) = (platform.folders(version)[0], &description.name);
+        let path = format!("binaries/{folder}/{name}.{}", platform.extension());
+        files.insert(path, Entry { bytes: bytes.clone(), executable: true });
+    }
+    files
+}
+
+/// The bytes of a ZIP archive as FMI wants it (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5): deflate, `/` in names, files only, no
+/// ZIP64, no data descriptors; and the same for the same files: sorted, one time, one compressor.
+///
+/// # Errors
+/// A file is larger than 4 GiB.
+pub fn archive(files: &BTreeMap<String, Entry>, moment: Moment) -> Result<Vec<u8>> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, Entry { bytes, executable }) in files {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .compression_level(Some(9))
+            .last_modified_time(moment.of_files())
+            .unix_permissions(if *executable { 0o755 } else { 0o644 });
+        zip.start_file(name.as_str(), options).with_context(|| name.clone())?;
+        zip.write_all(bytes).with_context(|| name.clone())?;
+    }
+    Ok(zip.finish()?.into_inner())
+}
+
+/// Writes a file at once: nobody ever sees half of it.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let of = || path.display().to_string();
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).with_context(of)?;
+    let mut file = tempfile::Builder::new().prefix(".fmu-").tempfile_in(folder).with_context(of)?;
+    file.write_all(bytes).with_context(of)?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // A temporary file is private; an FMU is for everybody.
+        file.as_file().set_permissions(fs::Permissions::from_mode(0o644)).with_context(of)?;
+    }
+    file.persist(path).map_err(|e| e.error).with_context(of)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> BTreeMap<String, Entry> {
+        let file = |bytes: &[u8], executable| Entry { bytes: bytes.into(), executable };
+        BTreeMap::from([
+            ("modelDescription.xml".into(), file(b"<x/>", false)),
+            ("binaries/linux64/X.so".into(), file(&[7; 5000], true)),
+        ])
+    }
+
+    #[test]
+    fn the_same_files_give_the_same_bytes() {
+        let make = |seconds| archive(&sample(), Moment::fixed(seconds)).unwrap();
+        assert_eq!(make(1_700_000_000), make(1_700_000_000));
+        assert_ne!(make(1_700_000_000), make(1_800_000_000));
+        assert_eq!(make(0), make(5), "before 1980");
+    }
+
+    /// Reads the raw headers: `zip`'s own reader is too kind.
+    #[test]
+    fn headers_are_plain() {
+        let bytes = archive(&sample(), Moment::fixed(1_700_000_000)).unwrap();
+        let u16_at = |i: usize| u16::from_le_bytes([bytes[i], bytes[i + 1]]);
+        let starts = |magic: &[u8]| {
+            bytes.windows(4).enumerate().filter(|(_, w)| *w == magic).map(|(i, _)| i).collect::<Vec<_>>()
+        };
+        let local = starts(b"PK\x03\x04");
+        assert_eq!(local.len(), 2);
+        for i in local {
+            assert!(u16_at(i + 4) <= 20, "version needed {}", u16_at(i + 4));
+            assert_eq!(u16_at(i + 6), 0, "flags: no data descriptor, no UTF-8");
+            assert_eq!(u16_at(i + 8), 8, "deflate");
+            assert_eq!(u16_at(i + 28), 0, "no extra field");
+        }
+        let central = starts(b"PK\x01\x02");
+        let modes: Vec<u16> = central.iter().map(|i| u16_at(i + 40)).collect();
+        assert_eq!(modes, [0o100_755, 0o100_644]);
+        assert!(central.iter().all(|i| u16_at(i + 6) <= 20 && u16_at(i + 30) == 0));
+        assert!(starts(b"PK\x06\x06").is_empty(), "no ZIP64");
+    }
+
+    #[test]
+    fn a_file_is_written_whole() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("fmi2/X.fmu");
+        write(&path, b"one").unwrap();
+        write(&path, b"two").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"two");
+        assert_eq!(fs::read_dir(dir.path().join("fmi2")).unwrap().count(), 1);
+    }
+}
