@@ -1,0 +1,344 @@
+//! An importer for tests: the C functions of both standards behind one set of names.
+#![allow(dead_code, unreachable_pub, reason = "a module of every test crate, each of which uses a part")]
+
+pub mod model;
+
+pub(crate) use fmi::*;
+use fmu_core::Model;
+use fmu_export::abi::types::*;
+use model::Probe;
+use std::cell::RefCell;
+use std::ffi::{CStr, CString};
+use std::ptr::{null, null_mut};
+use std::sync::Once;
+
+fmu_export::export!(Probe);
+
+pub const OK: c_int = 0;
+pub const DISCARD: c_int = 2;
+pub const ERROR: c_int = 3;
+
+/// One message of the logger.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Message {
+    pub instance: Option<String>,
+    pub status: c_int,
+    pub category: String,
+    pub text: String,
+}
+
+/// What the logger was told; its address is the environment pointer.
+#[derive(Default)]
+pub struct Journal(pub RefCell<Vec<Message>>);
+
+fn string(text: Text) -> String {
+    unsafe { CStr::from_ptr(text) }.to_str().unwrap().into()
+}
+
+pub extern "C" fn log2(environment: *mut c_void, name: Text, status: c_int, category: Text, text: Text) {
+    let journal = unsafe { &*environment.cast::<Journal>() };
+    let (instance, category, text) = (Some(string(name)), string(category), string(text));
+    journal.0.borrow_mut().push(Message { instance, status, category, text });
+}
+
+pub extern "C" fn log3(environment: *mut c_void, status: c_int, category: Text, text: Text) {
+    let journal = unsafe { &*environment.cast::<Journal>() };
+    let (category, text) = (string(category), string(text));
+    journal.0.borrow_mut().push(Message { instance: None, status, category, text });
+}
+
+/// A function with fixed arguments as the variadic logger: the first five go the same way on our platforms.
+pub fn variadic(f: extern "C" fn(*mut c_void, Text, c_int, Text, Text)) -> Fmi2Logger {
+    unsafe { std::mem::transmute(f) }
+}
+
+pub fn token() -> CString {
+    CString::new(Probe::TOKEN.as_str()).unwrap()
+}
+
+/// The library silences panics; a test wants to see its own.
+pub fn loud() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        fmu_export::abi::quiet();
+        drop(std::panic::take_hook());
+    });
+}
+
+/// An instance of one of the standards.
+pub struct Fmu {
+    pub version: u8,
+    pub it: Instance,
+    pub journal: Box<Journal>,
+}
+
+impl Fmu {
+    pub fn new(version: u8) -> Self {
+        let journal = Box::<Journal>::default();
+        let it = Self::open(version, c"probe", &token(), &*journal, true, false);
+        assert!(!it.is_null());
+        Self { version, it, journal }
+    }
+
+    pub fn open(
+        version: u8,
+        name: &CStr,
+        token: &CStr,
+        journal: *const Journal,
+        logger: bool,
+        logging_on: bool,
+    ) -> Instance {
+        loud();
+        let environment = journal.cast_mut().cast();
+        let (name, token, on) = (name.as_ptr(), token.as_ptr(), u8::from(logging_on));
+        if version == 2 {
+            let mut callbacks = Fmi2Callbacks {
+                logger: logger.then(|| variadic(log2)),
+                allocate_memory: null(),
+                free_memory: null(),
+                step_finished: null(),
+                environment,
+            };
+            let it =
+                unsafe { fmi2Instantiate(name, 1, token, null(), &callbacks, Fmi2Boolean(0), Fmi2Boolean(on.into())) };
+            // The importer may do with its struct what it likes afterwards (FMI 2.0.5, 2.1.5).
+            unsafe { std::ptr::write_bytes(&mut callbacks, 0xdd, 1) };
+            return it;
+        }
+        let (no, logger) = (Fmi3Boolean(0), logger.then_some(log3 as Fmi3Logger));
+        unsafe {
+            fmi3InstantiateCoSimulation(
+                name,
+                token,
+                null(),
+                no,
+                Fmi3Boolean(on),
+                no,
+                no,
+                null(),
+                0,
+                environment,
+                logger,
+                null(),
+            )
+        }
+    }
+
+    /// In Initialization Mode, from 0 s without a stop time.
+    pub fn entered(version: u8) -> Self {
+        let fmu = Self::new(version);
+        assert_eq!(fmu.enter(0.0, None), OK);
+        fmu
+    }
+
+    /// In Step Mode at 0 s.
+    pub fn started(version: u8) -> Self {
+        let fmu = Self::entered(version);
+        assert_eq!(fmu.exit(), OK);
+        fmu
+    }
+
+    /// In one of the five states, by its letter.
+    pub fn in_state(version: u8, state: char) -> Self {
+        match state {
+            'i' => Self::new(version),
+            'n' => Self::entered(version),
+            's' => Self::started(version),
+            't' => {
+                let fmu = Self::started(version);
+                assert_eq!(fmu.terminate(), OK);
+                fmu
+            }
+            'e' => {
+                let fmu = Self::started(version);
+                assert_eq!(fmu.step(0.0, -1.0), ERROR);
+                fmu.journal.0.borrow_mut().clear();
+                fmu
+            }
+            _ => unreachable!(),
+        }
+    }
+
+    pub fn enter(&self, start: f64, stop: Option<f64>) -> c_int {
+        let (defined, stop) = (stop.is_some(), stop.unwrap_or_default());
+        unsafe {
+            if self.version == 3 {
+                let defined = Fmi3Boolean(defined.into());
+                return fmi3EnterInitializationMode(self.it, Fmi3Boolean(0), 0.0, start, defined, stop);
+            }
+            match fmi2SetupExperiment(self.it, Fmi2Boolean(0), 0.0, start, Fmi2Boolean(defined.into()), stop) {
+                OK => fmi2EnterInitializationMode(self.it),
+                status => status,
+            }
+        }
+    }
+
+    pub fn exit(&self) -> c_int {
+        unsafe {
+            if self.version == 2 { fmi2ExitInitializationMode(self.it) } else { fmi3ExitInitializationMode(self.it) }
+        }
+    }
+
+    pub fn terminate(&self) -> c_int {
+        unsafe { if self.version == 2 { fmi2Terminate(self.it) } else { fmi3Terminate(self.it) } }
+    }
+
+    pub fn reset(&self) -> c_int {
+        unsafe { if self.version == 2 { fmi2Reset(self.it) } else { fmi3Reset(self.it) } }
+    }
+
+    pub fn step(&self, t: f64, h: f64) -> c_int {
+        if self.version == 2 {
+            return unsafe { fmi2DoStep(self.it, t, h, Fmi2Boolean(1)) };
+        }
+        let (mut event, mut end, mut early, mut last) = (Fmi3Boolean(9), Fmi3Boolean(9), Fmi3Boolean(9), f64::NAN);
+        let status = unsafe { fmi3DoStep(self.it, t, h, Fmi3Boolean(1), &mut event, &mut end, &mut early, &mut last) };
+        if status == OK {
+            assert_eq!((event.0, end.0, early.0, last.to_bits()), (0, 0, 0, (t + h).to_bits()));
+        }
+        status
+    }
+
+    pub fn set(&self, vr: &[u32], values: &[f64]) -> c_int {
+        let (it, n) = (self.it, vr.len());
+        unsafe {
+            if self.version == 2 {
+                assert_eq!(n, values.len());
+                fmi2SetReal(it, vr.as_ptr(), n, values.as_ptr())
+            } else {
+                fmi3SetFloat64(it, vr.as_ptr(), n, values.as_ptr(), values.len())
+            }
+        }
+    }
+
+    /// Sets an integer (or, in FMI 2, an enumeration).
+    pub fn set_integer(&self, vr: u32, value: i32) -> c_int {
+        unsafe {
+            if self.version == 2 {
+                fmi2SetInteger(self.it, &vr, 1, &Fmi2Integer(value))
+            } else {
+                fmi3SetInt32(self.it, &vr, 1, &value, 1)
+            }
+        }
+    }
+
+    /// Sets an enumeration.
+    pub fn set_mode(&self, value: i32) -> c_int {
+        if self.version == 2 {
+            return self.set_integer(model::MODE, value);
+        }
+        let value = i64::from(value);
+        unsafe { fmi3SetInt64(self.it, &model::MODE, 1, &value, 1) }
+    }
+
+    pub fn try_get(&self, vr: &[u32], values: &mut [f64]) -> c_int {
+        let (it, n, m) = (self.it, vr.len(), values.len());
+        unsafe {
+            if self.version == 2 {
+                assert_eq!(n, m);
+                fmi2GetReal(it, vr.as_ptr(), n, values.as_mut_ptr())
+            } else {
+                fmi3GetFloat64(it, vr.as_ptr(), n, values.as_mut_ptr(), m)
+            }
+        }
+    }
+
+    pub fn get(&self, vr: u32) -> f64 {
+        let mut value = f64::NAN;
+        assert_eq!(self.try_get(&[vr], std::slice::from_mut(&mut value)), OK);
+        value
+    }
+
+    pub fn save(&self, state: &mut FmuState) -> c_int {
+        unsafe { if self.version == 2 { fmi2GetFMUstate(self.it, state) } else { fmi3GetFMUState(self.it, state) } }
+    }
+
+    pub fn restore(&self, state: FmuState) -> c_int {
+        unsafe { if self.version == 2 { fmi2SetFMUstate(self.it, state) } else { fmi3SetFMUState(self.it, state) } }
+    }
+
+    pub fn free_state(&self, state: &mut FmuState) -> c_int {
+        unsafe { if self.version == 2 { fmi2FreeFMUstate(self.it, state) } else { fmi3FreeFMUState(self.it, state) } }
+    }
+
+    pub fn size(&self, state: FmuState) -> usize {
+        let mut size = 0;
+        let status = unsafe {
+            if self.version == 2 {
+                fmi2SerializedFMUstateSize(self.it, state, &mut size)
+            } else {
+                fmi3SerializedFMUStateSize(self.it, state, &mut size)
+            }
+        };
+        assert_eq!(status, OK);
+        size
+    }
+
+    pub fn serialise(&self, state: FmuState, bytes: &mut [u8]) -> c_int {
+        let (p, n) = (bytes.as_mut_ptr(), bytes.len());
+        unsafe {
+            if self.version == 2 {
+                fmi2SerializeFMUstate(self.it, state, p, n)
+            } else {
+                fmi3SerializeFMUState(self.it, state, p, n)
+            }
+        }
+    }
+
+    pub fn deserialise(&self, bytes: &[u8], state: &mut FmuState) -> c_int {
+        let (p, n) = (bytes.as_ptr(), bytes.len());
+        unsafe {
+            if self.version == 2 {
+                fmi2DeSerializeFMUstate(self.it, p, n, state)
+            } else {
+                fmi3DeserializeFMUState(self.it, p, n, state)
+            }
+        }
+    }
+
+    /// The state as bytes.
+    pub fn bytes(&self) -> Vec<u8> {
+        let mut state = null_mut();
+        assert_eq!(self.save(&mut state), OK);
+        let mut bytes = vec![0xaa; self.size(state)];
+        assert_eq!(self.serialise(state, &mut bytes), OK);
+        assert_eq!(self.free_state(&mut state), OK);
+        bytes
+    }
+
+    /// The only message since the last look, which must be an error.
+    pub fn error(&self) -> String {
+        let messages: Vec<Message> = self.journal.0.borrow_mut().drain(..).collect();
+        assert_eq!(messages.len(), 1, "{messages:?}");
+        assert_eq!((messages[0].status, messages[0].category.as_str()), (ERROR, "logStatusError"));
+        messages[0].text.clone()
+    }
+
+    /// In which state the instance is, found out by what it allows, through the C interface alone.
+    pub fn state(&self) -> char {
+        let mut here = null_mut();
+        if self.save(&mut here) == ERROR {
+            return 'e';
+        }
+        let mut end = 0.0;
+        // Not allowed in every state; then the state is restored.
+        self.try_get(&[model::TIME], std::slice::from_mut(&mut end));
+        assert_eq!(self.restore(here), OK);
+        let attempts: [(char, &dyn Fn() -> c_int); 3] =
+            [('s', &|| self.step(end, 1e-3)), ('n', &|| self.exit()), ('i', &|| self.enter(0.0, None))];
+        let found = attempts.iter().find(|(_, attempt)| {
+            let done = attempt();
+            assert_eq!(self.restore(here), OK);
+            done == OK
+        });
+        assert_eq!(self.free_state(&mut here), OK);
+        self.journal.0.borrow_mut().clear();
+        found.map_or('t', |(state, _)| *state)
+    }
+}
+
+impl Drop for Fmu {
+    fn drop(&mut self) {
+        unsafe { if self.version == 2 { fmi2FreeInstance(self.it) } else { fmi3FreeInstance(self.it) } }
+    }
+}
