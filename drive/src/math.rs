@@ -18,6 +18,12 @@ pub fn exp(x: f64) -> f64 {
     libm::exp(x)
 }
 
+/// Natural logarithm of `x`.
+#[inline]
+pub fn ln(x: f64) -> f64 {
+    libm::log(x)
+}
+
 /// Hyperbolic tangent of `x`.
 #[inline]
 pub fn tanh(x: f64) -> f64 {

@@ -6,7 +6,7 @@
 
 use crate::frame::DqHat;
 use crate::motor::Motor;
-use fmu_core::unit::RAD_PER_S;
+use fmu_core::unit::{ONE, RAD_PER_S};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -17,11 +17,23 @@ pub struct CurrentLoop {
     pub bandwidth: f64,
     /// Integral gain w_c^2 L and active resistance w_c L - R instead of K_i = w_c R.
     pub active_resistance: bool,
+    /// Integral gain in units of w_c^2 L, >= 0; 0: as `active_resistance` says.
+    pub integral: f64,
+    /// Decoupling from the references, with R, instead of from the measured currents.
+    pub reference_feed_forward: bool,
+    /// Maximum torque per ampere instead of i_d = 0, where the low-speed law does not rule.
+    pub mtpa: bool,
 }
 
 impl Default for CurrentLoop {
     fn default() -> Self {
-        Self { bandwidth: 2.0 * std::f64::consts::PI * 250.0, active_resistance: false }
+        Self {
+            bandwidth: 2.0 * std::f64::consts::PI * 250.0,
+            active_resistance: false,
+            integral: 0.0,
+            reference_feed_forward: false,
+            mtpa: false,
+        }
     }
 }
 
@@ -36,11 +48,10 @@ struct AxisGains {
 impl AxisGains {
     fn new(par: &CurrentLoop, L: f64, R: f64) -> Self {
         let w_c = par.bandwidth;
-        if par.active_resistance {
-            Self { k_p: w_c * L, k_i: w_c * w_c * L, active_resistance: w_c * L - R }
-        } else {
-            Self { k_p: w_c * L, k_i: w_c * R, active_resistance: 0.0 }
-        }
+        let (k_i, active_resistance) =
+            if par.active_resistance { (w_c * w_c * L, w_c * L - R) } else { (w_c * R, 0.0) };
+        let k_i = if par.integral > 0.0 { par.integral * w_c * w_c * L } else { k_i };
+        Self { k_p: w_c * L, k_i, active_resistance }
     }
 }
 
@@ -49,12 +60,17 @@ impl AxisGains {
 pub struct CurrentGains {
     d: AxisGains,
     q: AxisGains,
+    reference_feed_forward: bool,
 }
 
 impl CurrentGains {
     /// Gains for the machine estimates `motor`.
     pub fn new(par: &CurrentLoop, motor: &Motor) -> Self {
-        Self { d: AxisGains::new(par, motor.L_d, motor.R_s), q: AxisGains::new(par, motor.L_q, motor.R_s) }
+        Self {
+            d: AxisGains::new(par, motor.L_d, motor.R_s),
+            q: AxisGains::new(par, motor.L_q, motor.R_s),
+            reference_feed_forward: par.reference_feed_forward,
+        }
     }
 }
 
@@ -69,10 +85,16 @@ impl CurrentController {
     #[inline]
     pub fn command(&self, gains: &CurrentGains, motor: &Motor, i_ref: DqHat, i: DqHat, w: f64) -> DqHat {
         let error = i_ref - i;
+        let forward = if gains.reference_feed_forward { i_ref } else { i };
+        let resistive = if gains.reference_feed_forward { i_ref * motor.R_s } else { DqHat::ZERO };
         DqHat::new(
-            gains.d.k_p * error.d() + self.integral.d() - gains.d.active_resistance * i.d() - w * motor.L_q * i.q(),
+            gains.d.k_p * error.d() + self.integral.d()
+                - gains.d.active_resistance * i.d()
+                - w * motor.L_q * forward.q()
+                + resistive.d(),
             gains.q.k_p * error.q() + self.integral.q() - gains.q.active_resistance * i.q()
-                + w * (motor.L_d * i.d() + motor.psi_M),
+                + w * (motor.L_d * forward.d() + motor.psi_M)
+                + resistive.q(),
         )
     }
 
@@ -85,7 +107,7 @@ impl CurrentController {
     /// Integrates one sample of `T_s` (s); `cut` (V) is the limited command minus the wanted one.
     #[inline]
     pub fn integrate(&mut self, gains: &CurrentGains, error: DqHat, cut: DqHat, T_s: f64) {
-        let CurrentGains { d, q } = gains;
+        let CurrentGains { d, q, .. } = gains;
         self.integral +=
             DqHat::new(T_s * d.k_i * (error.d() + cut.d() / d.k_p), T_s * q.k_i * (error.q() + cut.q() / q.k_p));
     }
@@ -102,6 +124,20 @@ pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
                 "active_resistance",
                 "false: Kp = wc L, Ki = wc R; true: Ki = wc^2 L with active resistance wc L - R",
                 |p| &mut p.active_resistance,
+            ),
+            P::parameter("integral", &ONE, "Integral gain Ki in units of wc^2 L; 0: as active_resistance says", |p| {
+                &mut p.integral
+            })
+            .at_least(0.0),
+            P::boolean_parameter(
+                "reference_feed_forward",
+                "Decoupling from the current references, with R, as in Kim & Sul (31); false: from the measured currents",
+                |p| &mut p.reference_feed_forward,
+            ),
+            P::boolean_parameter(
+                "mtpa",
+                "Maximum torque per ampere; false: i_d = 0. The estimator Rasmussen has its own law for i_d",
+                |p| &mut p.mtpa,
             ),
         ]
     },

@@ -2,6 +2,8 @@
 
 pub mod current;
 pub mod model;
+pub mod reference;
+pub mod sensor;
 pub mod speed;
 pub mod tables;
 pub mod zero_speed;

@@ -1,12 +1,13 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid.
 
 use crate::control::current::{CurrentController, CurrentGains};
+use crate::control::reference::{greatest_torque, max_torque_per_ampere};
 use crate::control::speed::{SpeedController, SpeedGains};
 use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::{Context, Estimate, Estimator, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
 use crate::math::wrap;
-use crate::plant::inverter::limit_to_hexagon;
+use crate::plant::inverter::{dead_time_loss, limit_to_hexagon};
 use fmu_core::unit::{AMPERE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table};
 use serde::{Deserialize, Serialize};
@@ -67,6 +68,10 @@ impl From<DqHat> for DqParts {
 struct Gains {
     current: CurrentGains,
     speed: SpeedGains,
+    /// Torque constant in N.m/A.
+    k: f64,
+    /// Greatest torque in N.m over the torque constant: the limit of the speed loop in A.
+    i_tau: f64,
 }
 
 /// What a sample hands on to the next.
@@ -140,7 +145,7 @@ impl SensorlessController {
         let Self { inputs, parameters: par, gains, state } = self;
         let (motor, T_s) = (&par.motor, par.T_s);
         let n_p = f64::from(motor.n_p);
-        let i = inputs.i.to_stator();
+        let i = par.sensor.measure(inputs.i, state.samples).to_stator();
         let first = state.samples == 0;
         // The command that acted since the last sample: with a delay of one it is not the newest.
         let acted = state.commands[usize::from(par.delay != 0)];
@@ -171,10 +176,14 @@ impl SensorlessController {
 
         let i_hat = Axis::<Estimated>::at(theta).from_stator(controlled);
         // The low-speed law is Rasmussen's; it would only be a loss where the angle is known.
-        let i_d_ref = if kind == Kind::Rasmussen { par.zero_speed.i_d_ref(speed) } else { 0.0 };
-        let limit = par.limit.i_q_beside(i_d_ref);
-        let i_q_ref = state.speed.update(&gains.speed, inputs.speed_ref, speed, limit, T_s);
-        let i_ref = DqHat::new(i_d_ref, i_q_ref);
+        let i_ref = if kind == Kind::Rasmussen {
+            let i_d_ref = par.zero_speed.i_d_ref(speed);
+            let limit = par.limit.i_q_beside(i_d_ref).min(gains.i_tau);
+            DqHat::new(i_d_ref, state.speed.update(&gains.speed, inputs.speed_ref, speed, limit, T_s))
+        } else {
+            let i_q_ref = state.speed.update(&gains.speed, inputs.speed_ref, speed, gains.i_tau, T_s);
+            if par.current.mtpa { max_torque_per_ampere(motor, gains.k * i_q_ref) } else { DqHat::new(0.0, i_q_ref) }
+        };
 
         let wanted = state.current.command(&gains.current, motor, i_ref, i_hat, w);
         // The command acts from `delay` to `delay + 1` samples from now: turned to the middle of that interval.
@@ -190,13 +199,20 @@ impl SensorlessController {
         state.current.integrate(&gains.current, i_ref - i_hat, cut, T_s);
         let share = if whole.magnitude() > 0.0 { command.magnitude() / whole.magnitude() } else { 1.0 };
         state.commands = [Command { u: command, injected: injected * share }, state.commands[0]];
+        let compensated = if par.compensation.u_dead > 0.0 {
+            let legs = Phases::from_stator(acting.to_stator(i_ref));
+            let loss = dead_time_loss(par.compensation.u_dead, par.compensation.i_zero, legs);
+            limit_to_hexagon(Phases::from_stator(command + loss), inputs.u_dc)
+        } else {
+            command
+        };
         state.i_last = i;
         state.i_ref = i_ref;
         state.tau_ref = motor.torque(i_ref.d(), i_ref.q());
         state.u_pi = state.current.output(&gains.current, i_ref - i_hat);
 
         ControllerOutputs {
-            u: Phases::from_stator(command),
+            u: Phases::from_stator(compensated),
             speed_est: speed,
             theta_est: wrap(theta + T_s * w),
             i: i_hat.into(),
@@ -224,11 +240,15 @@ impl Model for SensorlessController {
     const STATE_VERSION: u16 = 2;
 
     fn derive(&mut self) {
-        let ControllerParameters { current, speed_loop, motor, J, .. } = &self.parameters;
-        self.gains = Gains {
-            current: CurrentGains::new(current, motor),
-            speed: SpeedGains::new(speed_loop, *J, motor.torque_constant()),
+        let ControllerParameters { current, speed_loop, motor, J, limit, estimator, .. } = &self.parameters;
+        let k = motor.torque_constant();
+        let tau = if Kind::of(*estimator) == Some(Kind::Rasmussen) {
+            limit.tau
+        } else {
+            greatest_torque(motor, limit, current.mtpa)
         };
+        let speed = SpeedGains::new(speed_loop, *J, k);
+        self.gains = Gains { current: CurrentGains::new(current, motor), speed, k, i_tau: tau / k };
     }
 
     fn validate(&self) -> Result<(), Fault> {

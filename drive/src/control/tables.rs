@@ -1,12 +1,13 @@
 //! The controller's parameters and their table.
 
 use crate::control::current::{CURRENT_LOOP, CurrentLoop};
+use crate::control::sensor::{SENSOR, Sensor};
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::ESTIMATORS;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
 use crate::motor::{MOTOR, Motor};
-use fmu_core::unit::{AMPERE, KG_M2, RADIAN, SECOND, SPEED};
+use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METRE, RADIAN, SECOND, SPEED, VOLT};
 use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +18,8 @@ pub struct Limits {
     pub i_q: f64,
     /// Greatest magnitude of the current in A, > 0.
     pub i: f64,
+    /// Greatest magnitude of the torque reference in N.m, > 0.
+    pub tau: f64,
 }
 
 impl Limits {
@@ -26,6 +29,40 @@ impl Limits {
         self.i_q.min((self.i * self.i - i_d * i_d).max(0.0).sqrt())
     }
 }
+
+/// What is added to the command for the inverter's dead time; the estimators get the command without it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Compensation {
+    /// Voltage that a leg loses in V, >= 0; 0: none.
+    pub u_dead: f64,
+    /// Current in A below which less is added, > 0.
+    pub i_zero: f64,
+}
+
+impl Default for Compensation {
+    fn default() -> Self {
+        Self { u_dead: 0.0, i_zero: 0.1 }
+    }
+}
+
+type C = Row<Compensation>;
+
+/// The compensation's variables; their owner gives the prefix `compensation.`.
+const COMPENSATION: &Table<Compensation> = &Table::new(
+    const {
+        &[
+            C::parameter(
+                "u_dead",
+                &VOLT,
+                "Voltage that a leg loses to dead time, added to the command; 0: none",
+                |p| &mut p.u_dead,
+            )
+            .at_least(0.0),
+            C::parameter("i_zero", &AMPERE, "Current below which proportionally less is added", |p| &mut p.i_zero)
+                .above(0.0),
+        ]
+    },
+);
 
 /// Everything a commissioning engineer sets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,6 +77,10 @@ pub struct ControllerParameters {
     pub motor: Motor,
     /// Parameters of the estimators.
     pub estimators: EstimatorParameters,
+    /// Current sensors.
+    pub sensor: Sensor,
+    /// Dead-time compensation.
+    pub compensation: Compensation,
     /// The current loop.
     pub current: CurrentLoop,
     /// The speed loop.
@@ -66,10 +107,12 @@ impl Default for ControllerParameters {
             estimator: 1,
             motor: Motor { R_s: 0.9 * motor.R_s, ..motor },
             estimators: EstimatorParameters::default(),
+            sensor: Sensor::default(),
+            compensation: Compensation::default(),
             current: CurrentLoop::default(),
             speed_loop: SpeedLoop::default(),
             J: 1.5e-3,
-            limit: Limits { i_q: 6.0, i: 7.5 },
+            limit: Limits { i_q: 6.0, i: 7.5, tau: 1000.0 },
             zero_speed: ZeroSpeed::default(),
             theta_est: 0.0,
             speed_est: 0.0,
@@ -98,6 +141,8 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             }),
             P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
             P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
+            P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
+            P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
             P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
             P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
             P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
@@ -105,6 +150,10 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::parameter("limit.i_q", &AMPERE, "Greatest magnitude of i_q", |p| &mut p.limit.i_q).above(0.0),
             P::parameter("limit.i", &AMPERE, "Greatest magnitude of the current; i_d has priority over i_q", |p| {
                 &mut p.limit.i
+            })
+            .above(0.0),
+            P::parameter("limit.tau", &NEWTON_METRE, "Greatest magnitude of the torque reference", |p| {
+                &mut p.limit.tau
             })
             .above(0.0),
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),

@@ -1,6 +1,65 @@
-//! The average inverter: three phase voltages over a PWM period, limited to the hexagon of the DC link.
+//! The average inverter: three phase voltages over a PWM period, limited to the hexagon of the DC link, and the error of
+//! the dead time between the two switches of a leg.
+//!
+//! While both switches are off the current chooses the diode: over a PWM period the leg's voltage is off by
+//! -u_dead sign(i) with u_dead = dead_time u_dc / T_pwm. Below i_zero the current crosses zero within the dead time (the
+//! ripple, the capacitances of the switches) and the error falls linearly: -u_dead i / i_zero.
 
 use crate::frame::{AlphaBeta, Phases};
+use fmu_core::unit::{AMPERE, SECOND};
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Parameters; no dead time is the ideal average inverter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Inverter {
+    /// Dead time in s, >= 0.
+    pub dead_time: f64,
+    /// PWM period in s, > 0.
+    pub T_pwm: f64,
+    /// Current in A below which the error falls linearly, > 0.
+    pub i_zero: f64,
+}
+
+impl Default for Inverter {
+    fn default() -> Self {
+        Self { dead_time: 0.0, T_pwm: 1e-4, i_zero: 0.1 }
+    }
+}
+
+impl Inverter {
+    /// Voltage lost per leg in V at the DC-link voltage `u_dc` (V).
+    #[inline]
+    pub fn u_dead(&self, u_dc: f64) -> f64 {
+        self.dead_time / self.T_pwm * u_dc
+    }
+}
+
+/// The voltage (V) that legs lose which lose up to `u_dead` (V) with the currents `i` (A).
+#[inline]
+pub fn dead_time_loss(u_dead: f64, i_zero: f64, i: Phases) -> AlphaBeta {
+    let leg = |i: f64| u_dead * (i / i_zero).clamp(-1.0, 1.0);
+    Phases { a: leg(i.a), b: leg(i.b), c: leg(i.c) }.to_stator()
+}
+
+type P = Row<Inverter>;
+
+/// The inverter's variables; their owner gives the prefix `inverter.`.
+pub const INVERTER: &Table<Inverter> = &Table::new(
+    const {
+        &[
+            P::parameter("dead_time", &SECOND, "Dead time between the switches of a leg; 0: ideal", |p| {
+                &mut p.dead_time
+            })
+            .at_least(0.0),
+            P::parameter("T_pwm", &SECOND, "PWM period", |p| &mut p.T_pwm).above(0.0),
+            P::parameter("i_zero", &AMPERE, "Current below which the error of the dead time falls linearly", |p| {
+                &mut p.i_zero
+            })
+            .above(0.0),
+        ]
+    },
+);
 
 /// The stator voltage (V) that an inverter on `u_dc` (V, >= 0) applies for the references `u` (V).
 ///
@@ -29,6 +88,18 @@ mod tests {
             assert!((got.magnitude() - edge).abs() < 1e-9, "{i} deg: {} V, not {edge} V", got.magnitude());
             assert!(got.cross(wanted).abs() < 1e-6, "the direction stays");
         }
+    }
+
+    #[test]
+    fn a_leg_loses_the_dead_time() {
+        let inverter = Inverter { dead_time: 2e-6, ..Inverter::default() };
+        let u_dead = inverter.u_dead(540.0);
+        assert!((u_dead - 10.8).abs() < 1e-12);
+        // Currents (+, -, -): legs lose (u, -u, -u), a vector of 4/3 u along phase a.
+        let loss = dead_time_loss(u_dead, 0.1, Phases { a: 2.0, b: -1.0, c: -1.0 });
+        assert!((loss.alpha() - 4.0 / 3.0 * u_dead).abs() < 1e-12 && loss.beta().abs() < 1e-12);
+        let loss = dead_time_loss(u_dead, 0.1, Phases { a: 0.02, b: -0.01, c: -0.01 });
+        assert!((loss.alpha() - 0.2 * u_dead).abs() < 1e-12, "inside the zone it is a resistance");
     }
 
     #[test]

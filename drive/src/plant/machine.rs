@@ -1,12 +1,13 @@
 //! The salient permanent-magnet machine in its rotor frame (Rasmussen (2) for L_d = L_q, Kim & Sul (1) in general).
 //!
 //! d psi_d/dt = u_d - R_s i_d + w psi_q, d psi_q/dt = u_q - R_s i_q - w psi_d, psi_d = L_d i_d + psi_M, psi_q = L_q i_q,
-//! tau_e = 1.5 n_p (psi_d i_q - psi_q i_d). Flux linkages are the state: they stay right when inductances saturate.
+//! tau_e = 1.5 n_p (psi_d i_q - psi_q i_d), and what [`saturation`](crate::plant::saturation) adds to the current. Flux linkages are the state: they stay right when inductances saturate.
 
 use crate::frame::Dq;
 use crate::motor::Motor;
+use crate::plant::saturation::Saturation;
 
-/// Flux linkage (Wb) that goes with the current `i` (A).
+/// Flux linkage (Wb) that goes with the current `i` (A) where nothing saturates.
 #[inline]
 pub fn flux(motor: &Motor, i: Dq) -> Dq {
     Dq::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q())
@@ -14,8 +15,8 @@ pub fn flux(motor: &Motor, i: Dq) -> Dq {
 
 /// Current (A) that goes with the flux linkage `psi` (Wb).
 #[inline]
-pub fn current(motor: &Motor, psi: Dq) -> Dq {
-    Dq::new((psi.d() - motor.psi_M) / motor.L_d, psi.q() / motor.L_q)
+pub fn current(motor: &Motor, saturation: &Saturation, psi: Dq) -> Dq {
+    Dq::new((psi.d() - motor.psi_M) / motor.L_d, psi.q() / motor.L_q) + saturation.current(motor, psi)
 }
 
 /// Derivative of the flux linkage (V) at the voltage `u` (V), the current `i` (A) and the electrical speed `w` (rad/s).
@@ -40,7 +41,7 @@ mod tests {
         let i = Dq::new(-2.0, 4.0);
         let expected = 1.5 * 3.0 * (0.15 * 4.0 + (6e-3 - 9e-3) * -2.0 * 4.0);
         assert!((torque(&motor, flux(&motor, i), i) - expected).abs() < 1e-14);
-        assert_eq!(current(&motor, flux(&motor, i)).q().to_bits(), 4.0_f64.to_bits());
+        assert_eq!(current(&motor, &Saturation::default(), flux(&motor, i)).q().to_bits(), 4.0_f64.to_bits());
     }
 
     #[test]

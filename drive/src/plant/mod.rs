@@ -4,3 +4,4 @@ pub mod inverter;
 pub mod machine;
 pub mod mechanics;
 pub mod model;
+pub mod saturation;

@@ -4,9 +4,10 @@ use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
 use crate::integrate::rk4;
 use crate::math::wrap;
 use crate::motor::{MOTOR, Motor};
-use crate::plant::inverter::limit_to_hexagon;
+use crate::plant::inverter::{INVERTER, Inverter, dead_time_loss, limit_to_hexagon};
 use crate::plant::machine;
 use crate::plant::mechanics::{MECHANICS, Mechanics};
+use crate::plant::saturation::{SATURATION, Saturation};
 use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, Table};
 use nalgebra::Vector4;
@@ -40,6 +41,10 @@ impl Default for PlantInputs {
 pub struct PlantParameters {
     /// The machine.
     pub motor: Motor,
+    /// Its saturation.
+    pub saturation: Saturation,
+    /// The inverter.
+    pub inverter: Inverter,
     /// Inertia and friction.
     pub mechanics: Mechanics,
     /// State at the start.
@@ -113,11 +118,18 @@ impl PmsmPlant {
     /// Derivative of the state with the stator voltage `u` held.
     #[inline]
     fn derivative(&self, x: &Vector4<f64>, u: AlphaBeta) -> Vector4<f64> {
-        let PlantParameters { motor, mechanics, .. } = &self.parameters;
+        let PlantParameters { motor, saturation, inverter, mechanics, .. } = &self.parameters;
         let State { psi, speed, angle } = State::from_vector(x);
         let n_p = f64::from(motor.n_p);
-        let i = machine::current(motor, psi);
-        let u = Axis::<Rotor>::at(n_p * angle).from_stator(u);
+        let i = machine::current(motor, saturation, psi);
+        let axis = Axis::<Rotor>::at(n_p * angle);
+        let u = if inverter.dead_time > 0.0 {
+            let legs = Phases::from_stator(axis.to_stator(i));
+            u - dead_time_loss(inverter.u_dead(self.inputs.u_dc), inverter.i_zero, legs)
+        } else {
+            u
+        };
+        let u = axis.from_stator(u);
         let d_psi = machine::flux_derivative(motor, psi, u, i, n_p * speed);
         let acceleration = mechanics.acceleration(machine::torque(motor, psi, i), self.inputs.tau_load, speed);
         Vector4::new(d_psi.d(), d_psi.q(), acceleration, speed)
@@ -140,6 +152,8 @@ impl Model for PmsmPlant {
 
     const TABLE: &'static Table<Block<Self>> = TABLE;
 
+    const STATE_VERSION: u16 = 2;
+
     fn initialise(&mut self) {
         let PlantParameters { motor, initial, .. } = &self.parameters;
         self.state = State {
@@ -150,9 +164,9 @@ impl Model for PmsmPlant {
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
-        let motor = &self.parameters.motor;
+        let PlantParameters { motor, saturation, .. } = &self.parameters;
         let State { psi, speed, angle } = self.state;
-        let i = machine::current(motor, psi);
+        let i = machine::current(motor, saturation, psi);
         let theta_e = f64::from(motor.n_p) * angle;
         *out = PlantOutputs {
             i: Phases::from_stator(Axis::<Rotor>::at(theta_e).to_stator(i)),
@@ -246,6 +260,8 @@ pub const PARAMETERS: &Table<PlantParameters> = &Table::new(
     const {
         &[
             P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
+            P::part("saturation.", &Part { table: SATURATION, lens: |p| &mut p.saturation }),
+            P::part("inverter.", &Part { table: INVERTER, lens: |p| &mut p.inverter }),
             P::part("mechanics.", &Part { table: MECHANICS, lens: |p| &mut p.mechanics }),
             P::parameter("initial.theta_e", &RADIAN, "Electrical rotor angle at the start", |p| &mut p.initial.theta_e),
             P::parameter("initial.speed", &SPEED, "Mechanical rotor speed at the start", |p| &mut p.initial.speed),

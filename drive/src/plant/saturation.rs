@@ -1,0 +1,73 @@
+//! Magnetic saturation and cross-saturation: the current as a polynomial of the flux linkage.
+//!
+//! With x = psi_d - psi_M: i_d = x / L_d + c_2 x^2 + c_3 x^3 + c_x psi_q^2 / 2, i_q = psi_q / L_q + c_x x psi_q.
+//! Both are derivatives of one energy, so no cycle yields energy: d i_d / d psi_q = d i_q / d psi_d = c_x psi_q.
+//!
+//! c_2 > 0 tells the two ends of the magnet apart: current along it (x > 0) meets a smaller inductance than against it.
+//! Limits: a polynomial, good to about the flux at which d i_d / d psi_d = 1 / L_d + 2 c_2 x + 3 c_3 x^2 stays positive.
+
+use crate::frame::Dq;
+use crate::motor::Motor;
+use fmu_core::unit::{Exponents, Quantity, Unit};
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Second-order coefficient in A/Wb2.
+const A_PER_WB2: Quantity = Quantity::new("SaturationOfSecondOrder", Unit::si("A/Wb2", per_weber(2)));
+/// Third-order coefficient in A/Wb3.
+const A_PER_WB3: Quantity = Quantity::new("SaturationOfThirdOrder", Unit::si("A/Wb3", per_weber(3)));
+
+/// Exponents of an ampere per weber to the power of `n`: 1 Wb = 1 kg.m2.s-2.A-1.
+const fn per_weber(n: i8) -> Exponents {
+    Exponents::mechanical(-n, -2 * n, 2 * n, 1 + n)
+}
+
+/// Parameters; all zero is the linear machine.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Saturation {
+    /// Of second order along the magnet in A/Wb2.
+    pub c_2: f64,
+    /// Of third order along the magnet in A/Wb3.
+    pub c_3: f64,
+    /// Between the axes in A/Wb2.
+    pub c_x: f64,
+}
+
+impl Saturation {
+    /// The current (A) beyond the linear machine's at the flux linkage `psi` (Wb).
+    #[inline]
+    pub fn current(&self, motor: &Motor, psi: Dq) -> Dq {
+        let (x, q) = (psi.d() - motor.psi_M, psi.q());
+        Dq::new((self.c_2 + self.c_3 * x) * x * x + 0.5 * self.c_x * q * q, self.c_x * x * q)
+    }
+}
+
+type P = Row<Saturation>;
+
+/// The saturation's variables; their owner gives the prefix `saturation.`.
+pub const SATURATION: &Table<Saturation> = &Table::new(
+    const {
+        &[
+            P::parameter("c_2", &A_PER_WB2, "Saturation of second order along the magnet; 0: none", |p| &mut p.c_2),
+            P::parameter("c_3", &A_PER_WB3, "Saturation of third order along the magnet; 0: none", |p| &mut p.c_3)
+                .at_least(0.0),
+            P::parameter("c_x", &A_PER_WB2, "Cross-saturation between the axes; 0: none", |p| &mut p.c_x),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn is_reciprocal_and_tells_north_from_south() {
+        let (motor, s) = (Motor::default(), Saturation { c_2: 40.0, c_3: 40.0, c_x: 7.0 });
+        let (psi, h) = (Dq::new(0.21, -0.08), 1e-6);
+        let by = |v: Dq| (s.current(&motor, psi + v) - s.current(&motor, psi - v)) * (0.5 / h);
+        let (by_d, by_q) = (by(Dq::new(h, 0.0)), by(Dq::new(0.0, h)));
+        assert!((by_d.q() - by_q.d()).abs() < 1e-9, "{by_d:?} {by_q:?}");
+        let along = |x: f64| s.current(&motor, Dq::new(motor.psi_M + x, 0.0)).d();
+        assert!(along(0.1) > 0.0 && along(0.1) > -along(-0.1));
+    }
+}
