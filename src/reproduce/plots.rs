@@ -20,6 +20,8 @@ struct Panel<'a> {
     /// Time window in s.
     window: (f64, f64),
     curves: Vec<Curve<'a>>,
+    /// Where the legend hides nothing.
+    legend: SeriesLabelPosition,
 }
 
 const BLUE_INK: RGBColor = RGBColor(0, 84, 166);
@@ -27,7 +29,7 @@ const RED_INK: RGBColor = RGBColor(200, 60, 40);
 const GREY: RGBColor = RGBColor(150, 150, 150);
 
 /// Most points of a curve; the eye sees no more at the size of a panel.
-const POINTS: usize = 1200;
+const POINTS: usize = 600;
 
 impl Panel<'_> {
     fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<()> {
@@ -50,6 +52,8 @@ impl Panel<'_> {
             .configure_mesh()
             .x_desc("t [s]")
             .y_desc(self.unit)
+            .x_label_formatter(&tick)
+            .y_label_formatter(&tick)
             .light_line_style(TRANSPARENT)
             .bold_line_style(RGBColor(225, 225, 225))
             .label_style(("sans-serif", 12))
@@ -65,7 +69,7 @@ impl Panel<'_> {
         if self.curves.len() > 1 {
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
+                .position(self.legend.clone())
                 .background_style(WHITE.mix(0.8))
                 .border_style(GREY)
                 .label_font(("sans-serif", 12))
@@ -79,6 +83,11 @@ impl Panel<'_> {
 #[expect(clippy::needless_pass_by_value, reason = "the signature that map_err wants")]
 fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> anyhow::Error {
     anyhow!("drawing a plot: {error}")
+}
+
+/// A tick's number in its shortest form.
+fn tick(x: &f64) -> String {
+    ((x * 1e6).round() / 1e6).to_string()
 }
 
 /// Panels in rows of two.
@@ -103,7 +112,7 @@ fn speed<'a>(title: &'static str, trace: &'a Trace, window: (f64, f64)) -> Panel
         Curve { name: "true", color: RED_INK, values: &trace.speed },
         Curve { name: "estimated", color: BLUE_INK, values: &trace.speed_est },
     ];
-    Panel { title, unit: "rpm", trace, window, curves }
+    Panel { title, unit: "rpm", trace, window, curves, legend: SeriesLabelPosition::LowerRight }
 }
 
 fn currents<'a>(title: &'static str, trace: &'a Trace, window: (f64, f64)) -> Panel<'a> {
@@ -111,12 +120,12 @@ fn currents<'a>(title: &'static str, trace: &'a Trace, window: (f64, f64)) -> Pa
         Curve { name: "i_sd", color: BLUE_INK, values: &trace.i_d },
         Curve { name: "i_sq", color: RED_INK, values: &trace.i_q },
     ];
-    Panel { title, unit: "A", trace, window, curves }
+    Panel { title, unit: "A", trace, window, curves, legend: SeriesLabelPosition::MiddleRight }
 }
 
 fn error<'a>(title: &'static str, trace: &'a Trace, window: (f64, f64)) -> Panel<'a> {
     let curves = vec![Curve { name: "error", color: BLUE_INK, values: &trace.error }];
-    Panel { title, unit: "deg", trace, window, curves }
+    Panel { title, unit: "deg", trace, window, curves, legend: SeriesLabelPosition::UpperRight }
 }
 
 /// Fig. 4: start from 180 deg (speed, angle) and the four speed steps.
@@ -129,7 +138,8 @@ pub(super) fn figure_4(start: &Trace, steps: [&Trace; 4]) -> Result<String> {
         Curve { name: "estimated", color: BLUE_INK, values: &start.theta_est },
     ];
     let (window, title) = ((0.15, 0.5), "(b) start from 180°: electrical rotor angle");
-    let angle = Panel { title, unit: "deg", trace: start, window, curves: angles };
+    let legend = SeriesLabelPosition::LowerLeft;
+    let angle = Panel { title, unit: "deg", trace: start, window, curves: angles, legend };
     page(&[
         speed("(a) start from 180°: speed", start, (0.1, 1.0)),
         angle,

@@ -76,3 +76,12 @@ impl ClosedLoop for Native {
         Ok(trace)
     }
 }
+
+/// Folder with the packed FMUs of both standards, `fmi2/` and `fmi3/`, built once a test program.
+pub fn archives() -> &'static std::path::Path {
+    static FOLDER: std::sync::OnceLock<std::path::PathBuf> = std::sync::OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let files = fmu::commands::build::run(&fmu::commands::build::Build::default()).expect("FMUs that build");
+        files[0].parent().and_then(std::path::Path::parent).expect("DIR/fmi2/NAME.fmu").to_owned()
+    })
+}
