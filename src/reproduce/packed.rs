@@ -45,8 +45,10 @@ fn references<const N: usize>(instance: &Instance, names: [&str; N]) -> Result<[
 
 impl ClosedLoop for Packed {
     fn run(&self, scenario: &Scenario, h: f64) -> Result<Trace> {
-        let mut plant = start(&self.plant, "plant", scenario.plant, scenario.duration)?;
-        let mut controller = start(&self.controller, "controller", scenario.controller, scenario.duration)?;
+        // The last step may end up to half a step away from the duration.
+        let stop = scenario.duration + h;
+        let mut plant = start(&self.plant, "plant", scenario.plant, stop)?;
+        let mut controller = start(&self.controller, "controller", scenario.controller, stop)?;
         let plant_out = references(&plant, ["i_a", "i_b", "i_c", "speed", "theta_e"])?;
         let plant_in = references(&plant, ["u_a", "u_b", "u_c", "tau_load"])?;
         let controller_out = references(&controller, ["u_a", "u_b", "u_c", "speed_est", "theta_est", "i_d", "i_q"])?;
