@@ -4,8 +4,9 @@
 mod common;
 
 use common::Native;
+use fmu::importer::{Fmu, Values};
 use fmu::reproduce::packed::Packed;
-use fmu::reproduce::scenario::{ALL, ClosedLoop, Scenario};
+use fmu::reproduce::scenario::{ALL, ClosedLoop, RPM, Scenario, at};
 
 fn compare(scenario: &Scenario, h: f64) {
     let native = Native.run(scenario, h).unwrap();
@@ -31,5 +32,29 @@ fn every_experiment_at_the_sample_period() {
 fn other_communication_steps() {
     for h in [0.5e-4, 1e-4 / 3.0, 0.7e-4, 3e-4] {
         compare(&Scenario { duration: 0.3, ..ALL[0] }, h);
+    }
+}
+
+/// PmsmDrive at 1 ms is the pair of packed FMUs at T_s.
+#[test]
+fn the_whole_drive_in_one_fmu() {
+    let scenario = Scenario { duration: 0.6, ..ALL[0] };
+    let pair = Packed::open(&common::archives().join("fmi3")).unwrap().run(&scenario, 1e-4).unwrap();
+    for standard in ["fmi2", "fmi3"] {
+        let fmu = Fmu::open(common::archives().join(standard).join("PmsmDrive.fmu")).unwrap();
+        let mut drive = fmu.instantiate("drive", false).unwrap();
+        drive.set_text("plant.initial.theta_e", &std::f64::consts::PI.to_string()).unwrap();
+        drive.setup(0.0, Some(1.0)).unwrap();
+        drive.enter_initialization().unwrap();
+        drive.exit_initialization().unwrap();
+        for k in 0..600_u32 {
+            let t = f64::from(k) * 1e-3;
+            drive.set("speed_ref", &Values::Reals(vec![at(scenario.speed_ref, t) * RPM])).unwrap();
+            let _ = drive.do_step(t, 1e-3).unwrap();
+        }
+        for (name, expected) in [("speed", &pair.speed), ("speed_est", &pair.speed_est)] {
+            let got = drive.get(name).unwrap().number().unwrap() / RPM;
+            assert_eq!(got.to_bits(), expected.last().unwrap().to_bits(), "{standard}, {name}");
+        }
     }
 }

@@ -13,6 +13,7 @@
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
 #![allow(non_snake_case)]
 
+pub mod bench;
 pub mod control;
 pub mod estimator;
 pub mod frame;
@@ -21,7 +22,9 @@ pub mod math;
 pub mod motor;
 pub mod pair;
 pub mod plant;
+pub mod pmsm_drive;
 
 pub use control::model::SensorlessController;
 pub use pair::Pair;
 pub use plant::model::PmsmPlant;
+pub use pmsm_drive::PmsmDrive;

@@ -4,9 +4,10 @@
 use crate::control::model::ControllerInputs;
 use crate::{PmsmPlant, SensorlessController};
 use fmu_core::{Block, Elapsed, Fault, Model, Step};
+use serde::{Deserialize, Serialize};
 
 /// The closed loop of plant and controller.
-#[derive(Clone, Default)]
+#[derive(Clone, Default, Serialize, Deserialize)]
 pub struct Pair {
     /// Inverter, machine and mechanics.
     pub plant: Block<PmsmPlant>,
@@ -22,11 +23,24 @@ impl Pair {
     /// # Errors
     /// As [`Model::validate`] of either.
     pub fn start(&mut self) -> Result<(), Fault> {
+        self.initialise();
+        self.plant.model.validate()?;
+        self.controller.model.validate()
+    }
+
+    /// State and outputs of both at the start.
+    pub fn initialise(&mut self) {
         self.now = Elapsed::ZERO;
         self.plant.initialise();
         self.controller.initialise();
-        self.plant.model.validate()?;
-        self.controller.model.validate()
+    }
+
+    /// Inputs from outside: speed reference (rad/s), load torque (N.m), DC-link voltage of both (V).
+    pub fn set_inputs(&mut self, speed_ref: f64, tau_load: f64, u_dc: f64) {
+        self.controller.model.inputs.speed_ref = speed_ref;
+        self.controller.model.inputs.u_dc = u_dc;
+        self.plant.model.inputs.tau_load = tau_load;
+        self.plant.model.inputs.u_dc = u_dc;
     }
 
     /// One communication step of `h` (s): exchange, then both advance.

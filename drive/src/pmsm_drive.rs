@@ -15,6 +15,9 @@ use serde::{Deserialize, Serialize};
 #[cfg(doc)]
 use crate::{PmsmPlant, SensorlessController};
 
+/// Most samples within one communication step.
+const MOST_SAMPLES: f64 = 1e6;
+
 /// Inputs, held over a communication step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveInputs {
@@ -48,18 +51,6 @@ pub struct PmsmDrive {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,
-}
-
-impl PmsmDrive {
-    /// Time in s from `now` to the first sample instant after it.
-    fn to_next_sample(grid: &SampleGrid, now: Elapsed) -> f64 {
-        let k = grid.first_after(now);
-        // Exactly one period where the instant before is `now`: the pair at T_s takes steps of T_s and no other.
-        if k > 0 && grid.reached(k - 1, now) && !grid.passed(k - 1, now) {
-            return grid.period;
-        }
-        -now.minus_periods(k, grid.period)
-    }
 }
 
 impl Model for PmsmDrive {
@@ -104,19 +95,25 @@ impl Model for PmsmDrive {
         let Self { inputs, pair } = self;
         pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
         let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
-        let (mut now, end) = (step.start, step.end());
-        loop {
-            let left = end.since(now);
-            let h = Self::to_next_sample(&grid, now);
-            // The last piece ends where the step ends; a rest below the width of an instant is no piece of its own.
-            if h >= left - grid.width() {
-                let whole = (h - left).abs() <= grid.width();
-                return pair.step(if whole { h } else { left });
-            }
-            pair.step(h)?;
-            now = now.plus(h);
+        let end = step.end();
+        if step.h > MOST_SAMPLES * grid.period {
+            let longest = format!("at most {} s at this T_s", MOST_SAMPLES * grid.period);
+            return Err(Fault::value("the step size", format!("{} s", step.h), longest));
         }
+        pair.now = step.start;
+        while end.since(pair.now) > grid.width() {
+            let (left, next) = (end.since(pair.now), to_next_sample(grid, pair.now));
+            pair.step(if next <= left + grid.width() { next } else { left })?;
+        }
+        Ok(())
     }
+}
+
+/// Time in s from `now` to the first sample instant after it: exactly one period where `now` is an instant itself, since
+/// the pair at T_s takes steps of T_s and no other.
+fn to_next_sample(grid: SampleGrid, now: Elapsed) -> f64 {
+    let k = grid.first_after(now);
+    if k > 0 && !grid.passed(k - 1, now) { grid.period } else { -now.minus_periods(k, grid.period) }
 }
 
 type V = Row<Block<PmsmDrive>>;
@@ -132,10 +129,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 .at_least(0.0),
             V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),
             V::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |m| &mut m.out.controller }),
-            V::part(
-                "plant.",
-                &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters },
-            ),
+            V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
             V::part(
                 "controller.",
                 &Part { table: tables::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
@@ -158,9 +152,71 @@ const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("i_q_est", &AMPERE, "Stator current across the estimated magnet axis", |o| &mut o.i.q),
             O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
             O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
-            O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| &mut o.u.a),
+            O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| {
+                &mut o.u.a
+            }),
             O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
             O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
         ]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RPM: f64 = std::f64::consts::PI / 30.0;
+
+    /// Times in s of a speed step and a load step, on the grid of every step that is compared.
+    type Events = (f64, f64);
+
+    /// Speed reference and load at `t` (s).
+    fn inputs(t: f64, events: Events) -> (f64, f64) {
+        let t = t + 1e-9;
+        (if t < events.0 { 0.0 } else { 500.0 * RPM }, if t < events.1 { 0.0 } else { 1.5 })
+    }
+
+    fn drive(h: f64, steps: u32, events: Events) -> Block<PmsmDrive> {
+        let mut block = Block::<PmsmDrive>::default();
+        block.model.pair.plant.model.parameters.initial.theta_e = std::f64::consts::PI;
+        block.initialise();
+        block.model.validate().unwrap();
+        let mut now = Elapsed::ZERO;
+        for k in 0..steps {
+            (block.model.inputs.speed_ref, block.model.inputs.tau_load) = inputs(f64::from(k) * h, events);
+            let step = Step { start: now, h };
+            block.step(&step).unwrap();
+            now = step.end();
+        }
+        block
+    }
+
+    #[test]
+    fn steps_of_many_samples_are_the_pair_bit_for_bit() {
+        let (mut pair, events) = (Pair::default(), (0.05, 0.4));
+        pair.plant.model.parameters.initial.theta_e = std::f64::consts::PI;
+        pair.start().unwrap();
+        for k in 0..6000_u32 {
+            let (speed_ref, tau_load) = inputs(f64::from(k) * 1e-4, events);
+            pair.set_inputs(speed_ref, tau_load, 325.0);
+            pair.step(1e-4).unwrap();
+        }
+        for (h, steps) in [(1e-4, 6000), (1e-3, 600), (1e-2, 60)] {
+            let out = drive(h, steps, events).out;
+            assert_eq!((&out.plant, &out.controller), (&pair.plant.out, &pair.controller.out), "h = {h}");
+        }
+        assert!((pair.plant.out.speed - 500.0 * RPM).abs() < 15.0 * RPM, "{}", pair.plant.out.speed / RPM);
+    }
+
+    #[test]
+    fn other_steps_also_stop_at_the_samples() {
+        // 0.7 and 3.3 samples: the pair would lose angle or the drive; here only the rounding of the pieces differs.
+        let events = (0.0504, 0.399);
+        let reference = drive(1e-4, 4200, events).out.plant;
+        for (h, steps) in [(0.7e-4, 6000), (3.5e-4, 1200), (1.4e-3, 300)] {
+            let out = drive(h, steps, events).out.plant;
+            assert!((out.speed - reference.speed).abs() < 1e-4, "h = {h}: {} {}", out.speed, reference.speed);
+            assert!((out.i_q - reference.i_q).abs() < 1e-4, "h = {h}: {} {}", out.i_q, reference.i_q);
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! The FMU PmsmDrive.
+
+fmu_export::export!(drive::PmsmDrive);
