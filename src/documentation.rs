@@ -78,11 +78,13 @@ fn parameters(d: &Description) -> String {
         }
     }
     prefixes.sort_by_key(|p| !p.is_empty());
-    let mut out = String::new();
+    let mut out = String::from(if all.is_empty() { "" } else { "<h2>Parameters</h2>\n" });
     for p in prefixes {
         let variables: Vec<_> = all.iter().copied().filter(|v| prefix(&v.name) == p).collect();
-        let title = if p.is_empty() { "Parameters".into() } else { format!("Parameters: {p}") };
-        out += &section(&title, &variables);
+        if !p.is_empty() {
+            put!(out, "<h3>{}</h3>\n", escape(p));
+        }
+        out += &table(&variables);
     }
     out
 }
@@ -93,13 +95,16 @@ fn prefix(name: &str) -> &str {
 }
 
 fn section(title: &str, variables: &[&Variable]) -> String {
-    if variables.is_empty() {
-        return String::new();
-    }
+    if variables.is_empty() { String::new() } else { format!("<h2>{title}</h2>\n{}", table(variables)) }
+}
+
+fn table(variables: &[&Variable]) -> String {
+    // What is calculated has no start value and no bounds: then no empty columns.
+    let settable = variables.iter().any(|v| v.start.is_some());
+    let columns = if settable { "<th class=\"number\">Start</th><th>Allowed</th>" } else { "" };
     let mut out = format!(
-        "<h2>{}</h2>\n<div class=\"scroll\">\n<table class=\"variables\">\n<tr><th>Name</th><th class=\"wide\">Description</th>\
-         <th>Unit</th><th class=\"number\">Start</th><th>Allowed</th></tr>\n",
-        escape(title)
+        "<div class=\"scroll\">\n<table class=\"variables\">\n<tr><th>Name</th><th class=\"wide\">Description</th>\
+         <th>Unit</th>{columns}</tr>\n"
     );
     for v in variables {
         let kind = match (v.causality, v.variability) {
@@ -111,16 +116,13 @@ fn section(title: &str, variables: &[&Variable]) -> String {
             _ => "",
         };
         let size = v.dimension.map(|n| format!("[{n}]")).unwrap_or_default();
-        put!(
-            out,
-            "<tr><td class=\"name\">{}{size}</td><td>{}{kind}</td><td class=\"unit\">{}</td><td class=\"number\">{}</td>\
-             <td>{}</td></tr>\n",
-            escape(&v.name),
-            escape(&v.description),
-            unit(v),
-            start(v),
-            escape(v.allowed.as_deref().unwrap_or_default()),
-        );
+        let (name, text, unit) = (escape(&v.name), escape(&v.description), unit(v));
+        put!(out, "<tr><td class=\"name\">{name}{size}</td><td>{text}{kind}</td><td class=\"unit\">{unit}</td>");
+        if settable {
+            let allowed = escape(v.allowed.as_deref().unwrap_or_default());
+            put!(out, "<td class=\"number\">{}</td><td>{allowed}</td>", start(v));
+        }
+        out += "</tr>\n";
     }
     out + "</table>\n</div>\n"
 }

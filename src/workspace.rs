@@ -39,6 +39,7 @@ pub struct Package {
 #[derive(Clone, Debug, Deserialize)]
 struct Target {
     kind: Vec<String>,
+    crate_types: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -93,6 +94,13 @@ impl Package {
         self.manifest_path.parent().unwrap_or(Path::new("."))
     }
 
+    /// Whether it has a library that C can load.
+    pub fn has_cdylib(&self) -> bool {
+        self.targets
+            .iter()
+            .any(|t| t.kind.iter().all(|k| k != "example") && t.crate_types.iter().any(|c| c == "cdylib"))
+    }
+
     /// A procedural macro runs in the compiler; nothing of it is in the binary.
     fn is_linked(&self) -> bool {
         !self.targets.iter().any(|t| t.kind.iter().any(|k| k == "proc-macro"))
@@ -118,7 +126,8 @@ impl Workspace {
         let output = metadata.stdin(Stdio::null()).output().context("cargo cannot be run")?;
         if !output.status.success() {
             let message = String::from_utf8_lossy(&output.stderr);
-            bail!("no Cargo workspace here: {}", message.split_whitespace().collect::<Vec<_>>().join(" "));
+            let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
+            bail!("no Cargo workspace here: {}", message.trim_start_matches("error: "));
         }
         let metadata: Metadata = serde_json::from_slice(&output.stdout).context("cargo metadata")?;
         let normal = |d: Dependency| d.dep_kinds.iter().any(|k| k.kind.is_none()).then_some(d.pkg);

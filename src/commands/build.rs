@@ -91,7 +91,10 @@ fn compile(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
         workspace.compile(&Selection::Example(example))?
     } else {
         let packages = match &args.package {
-            Some(name) => vec![workspace.package(name).ok_or_else(|| anyhow!("the workspace has no package {name}"))?],
+            Some(name) => {
+                let package = workspace.package(name).filter(|p| p.has_cdylib());
+                vec![package.ok_or_else(|| anyhow!("{name} is no package with crate-type = [\"cdylib\"] here"))?]
+            }
             None => choose(&workspace.fmus(), &args.fmus)?,
         };
         let names: Vec<String> = packages.iter().map(|p| p.name.clone()).collect();

@@ -54,7 +54,7 @@ pub struct Simulate {
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub stop: Option<f64>,
     /// Communication step in s [default: the shortest of the FMUs, or a thousandth of the time]
-    #[arg(long, value_name = "H")]
+    #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
     /// Variables to record [default: all outputs]
     #[arg(long, value_name = "VARIABLE,...", value_delimiter = ',')]

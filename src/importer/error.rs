@@ -44,6 +44,14 @@ impl Error {
         Self::Usage { instance: instance.into(), cause: one_line(&cause.to_string()) }
     }
 
+    /// The cause, without what it happened to.
+    pub(crate) fn cause(&self) -> String {
+        match self {
+            Self::File { cause, .. } | Self::Usage { cause, .. } => cause.clone(),
+            Self::Call { .. } => self.to_string(),
+        }
+    }
+
     /// Whether the FMU itself refused, rather than its file or the user's wishes being wrong.
     pub fn is_of_the_run(&self) -> bool {
         matches!(self, Self::Call { .. })

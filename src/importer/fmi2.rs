@@ -57,7 +57,7 @@ const TERMINATED: c_int = 3;
 /// `fmi2CallbackFunctions`.
 #[repr(C)]
 pub(super) struct Callbacks {
-    logger: unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char),
+    logger: unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, *const c_char),
     allocate: unsafe extern "C" fn(usize, usize) -> *mut c_void,
     free: unsafe extern "C" fn(*mut c_void),
     step_finished: Option<unsafe extern "C" fn(*mut c_void, Status)>,
@@ -69,19 +69,26 @@ unsafe extern "C" {
     fn free(memory: *mut c_void);
 }
 
-/// The logger. In C it is variadic, which a Rust function cannot be; on x86_64 and 64-bit ARM, Linux and Windows, the fixed
-/// arguments of a variadic call are passed like those of any call and the caller cleans up, so the five can be received
-/// and the rest is never looked at. (So it is on Apple's ARM: only the variadic part goes elsewhere.) The message is
-/// therefore shown unformatted; `%%` is the one thing that is resolved.
+/// The logger. In C it is variadic, which a Rust function cannot be. On x86_64 and 64-bit ARM, Linux and Windows, a variadic
+/// call passes its arguments where any call passes them and the caller cleans up, so the first six can be received as fixed
+/// ones; what is beyond is never looked at. (Apple's ARM passes the variadic ones elsewhere: there only five are.)
+///
+/// The message is shown unformatted, but for the two forms that need no formatter: `%%`, and `%s` alone with its text.
 unsafe extern "C" fn logger(
     environment: *mut c_void,
     _instance: *const c_char,
     status: Status,
     category: *const c_char,
-    message: *const c_char,
+    format: *const c_char,
+    first: *const c_char,
 ) {
-    // SAFETY: the FMU passes the environment that it got in the callbacks, and C strings.
-    unsafe { Log::receive(environment, status, category, message) };
+    let with_text = cfg!(not(target_vendor = "apple"));
+    // SAFETY: the FMU passes the environment that it got in the callbacks, and C strings; a format "%s" comes with a text.
+    unsafe {
+        let format = copy_text(format);
+        let message = if with_text && format == "%s" { copy_text(first) } else { format.replace("%%", "%") };
+        Log::receive(environment, status, copy_text(category), message);
+    };
 }
 
 /// An instance. Owns what the FMU may keep pointers to.

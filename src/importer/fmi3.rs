@@ -73,7 +73,7 @@ unsafe extern "C" fn log_message(
     message: *const c_char,
 ) {
     // SAFETY: the FMU passes the environment that it was instantiated with, and C strings.
-    unsafe { Log::receive(environment, status, category, message) };
+    unsafe { Log::receive(environment, status, copy_text(category), copy_text(message)) };
 }
 
 /// An instance.

@@ -41,7 +41,12 @@ pub(super) use symbols;
 pub(super) fn load(path: &Path) -> Result<Library, Error> {
     // SAFETY: loading runs the library's initialisers. That is what running an FMU means: its code has every right of
     // this process, and the user named the file.
-    unsafe { Library::new(path) }.map_err(|e| Error::file(path, e))
+    unsafe { Library::new(path) }.map_err(|e| Error::file(path, reason(&e)))
+}
+
+/// The system's words; libloading keeps them one level down.
+fn reason(error: &libloading::Error) -> String {
+    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }
 
 type Sink = extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize);

@@ -15,7 +15,7 @@ pub struct Message {
     pub status: Status,
     /// Log category.
     pub category: String,
-    /// The text; in FMI 2.0 it is the format string as it came, see `fmi2`.
+    /// The text; in FMI 2.0 it is not formatted, see `fmi2`.
     pub text: String,
 }
 
@@ -94,21 +94,13 @@ impl Log {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Receives a message from C.
+    /// Receives a message from an FMU.
     ///
     /// # Safety
-    /// `environment` is null or came from [`Log::environment`] of a log that is alive; the texts are null or end with a
-    /// null byte.
-    pub(super) unsafe fn receive(
-        environment: *mut c_void,
-        status: Status,
-        category: *const c_char,
-        text: *const c_char,
-    ) {
+    /// `environment` is null or came from [`Log::environment`] of a log that is alive.
+    pub(super) unsafe fn receive(environment: *mut c_void, status: Status, category: String, text: String) {
         // SAFETY: the caller promises that the pointer is null or a living log; a log is only used by shared reference.
         let Some(log) = (unsafe { environment.cast::<Self>().as_ref() }) else { return };
-        // SAFETY: promised by the caller.
-        let (category, text) = unsafe { (copy_text(category), copy_text(text)) };
         let mut messages = log.messages();
         if messages.all.len() == KEPT {
             messages.all.pop_front();
@@ -137,9 +129,9 @@ mod tests {
     #[test]
     fn the_last_serious_message_counts() {
         let log = Arc::<Log>::default();
-        for (status, text) in [(Status::OK, c"hello"), (Status::ERROR, c"h is negative"), (Status::OK, c"bye")] {
-            // SAFETY: the log is alive, the texts are C strings.
-            unsafe { Log::receive(log.environment(), status, std::ptr::null(), text.as_ptr()) };
+        for (status, text) in [(Status::OK, "hello"), (Status::ERROR, "h is negative"), (Status::OK, "bye")] {
+            // SAFETY: the log is alive.
+            unsafe { Log::receive(log.environment(), status, String::new(), text.into()) };
         }
         assert_eq!(log.reason().as_deref(), Some("h is negative"));
         assert_eq!(log.reason(), None, "told once");
@@ -148,7 +140,7 @@ mod tests {
 
     #[test]
     fn an_fmu_that_forgets_its_environment_does_no_harm() {
-        // SAFETY: null is allowed everywhere.
-        unsafe { Log::receive(std::ptr::null_mut(), Status::OK, std::ptr::null(), std::ptr::null()) };
+        // SAFETY: null is allowed.
+        unsafe { Log::receive(std::ptr::null_mut(), Status::OK, String::new(), String::new()) };
     }
 }

@@ -72,7 +72,7 @@ impl Fmu {
         let mut archive = Archive::open(path)?;
         let (dir, binary) = archive.extract()?;
         let (description, dir) = (archive.description, Arc::new(dir));
-        let library = library::load(&binary).map_err(|e| Error::file(path, format!("does not load: {e}")))?;
+        let library = library::load(&binary).map_err(|e| Error::file(path, e.cause()))?;
         let functions = match description.version {
             FmiVersion::V2 => {
                 // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that
