@@ -1,0 +1,196 @@
+//! The command line: what it prints, what it writes, how it ends.
+#![allow(missing_docs)]
+
+mod common;
+
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn fmu(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// The arguments fail with this status and one line that contains all of these.
+fn fails(arguments: &[&str], status: i32, parts: &[&str]) {
+    let output = fmu(arguments);
+    let error = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(status), "{arguments:?}: {error}");
+    assert_eq!(error.lines().count(), 1, "{error}");
+    for part in std::iter::once(&"error: ").chain(parts) {
+        assert!(error.contains(part), "{arguments:?}: {part:?} is not in {error}");
+    }
+}
+
+fn zip(path: &Path, entries: &[(&str, &[u8])]) {
+    let mut zip = zip::ZipWriter::new(File::create(path).unwrap());
+    for (name, bytes) in entries {
+        zip.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    zip.finish().unwrap();
+}
+
+fn archive(standard: &str, name: &str) -> PathBuf {
+    common::archives().join(standard).join(name).with_extension("fmu")
+}
+
+const DESCRIPTION: &[u8] = br#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="X" instantiationToken="x">
+<CoSimulation modelIdentifier="X"/><ModelVariables><Float64 name="time" valueReference="0" causality="independent"/>
+</ModelVariables><ModelStructure/></fmiModelDescription>"#;
+
+#[test]
+fn a_bad_file_gives_one_line_and_status_2() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let refused = |name: &str, cause: &str| {
+        let path = path(name);
+        let path = path.to_str().unwrap();
+        fails(&["simulate", path], 2, &[path, cause]);
+    };
+    refused("missing.fmu", "No such file");
+    std::fs::write(path("text.fmu"), "hello").unwrap();
+    refused("text.fmu", "not a ZIP archive");
+    zip(&path("empty.fmu"), &[]);
+    refused("empty.fmu", "has no modelDescription.xml");
+    zip(&path("slip.fmu"), &[("modelDescription.xml", DESCRIPTION), ("../evil", b"x")]);
+    refused("slip.fmu", "leads outside");
+    zip(&path("xml.fmu"), &[("modelDescription.xml", b"<a")]);
+    refused("xml.fmu", "modelDescription.xml: line 1");
+    zip(&path("fmi1.fmu"), &[("modelDescription.xml", br#"<fmiModelDescription fmiVersion="1.0"/>"#)]);
+    refused("fmi1.fmu", "fmiVersion=\"1.0\" is not supported");
+    zip(&path("source.fmu"), &[("modelDescription.xml", DESCRIPTION), ("binaries/sparc-solaris/X.so", b"x")]);
+    refused("source.fmu", "for this platform (FMI 3.0); it has binaries for sparc-solaris");
+    let me = text(DESCRIPTION).replace("CoSimulation", "ModelExchange");
+    zip(&path("me.fmu"), &[("modelDescription.xml", me.as_bytes())]);
+    refused("me.fmu", "has no co-simulation interface");
+    let bytes = std::fs::read(path("slip.fmu")).unwrap();
+    std::fs::write(path("cut.fmu"), &bytes[..bytes.len() / 2]).unwrap();
+    refused("cut.fmu", "cut short");
+}
+
+#[test]
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn a_bad_binary_gives_one_line_and_status_2() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    let with = |binary: &[u8]| {
+        zip(&path, &[("modelDescription.xml", DESCRIPTION), ("binaries/x86_64-linux/X.so", binary)]);
+    };
+    with(b"not a library");
+    fails(&["simulate", path.to_str().unwrap()], 2, &["x.fmu: "]);
+    // A library of the system that is no FMU.
+    let system = ["/lib/x86_64-linux-gnu/libm.so.6", "/lib64/libm.so.6", "/usr/lib/libm.so.6"];
+    if let Some(library) = system.iter().find_map(|path| std::fs::read(path).ok()) {
+        with(&library);
+        fails(
+            &["simulate", path.to_str().unwrap()],
+            2,
+            &["x.fmu: the function fmi3InstantiateCoSimulation is missing"],
+        );
+    }
+}
+
+#[test]
+fn bad_usage_names_what_is_wrong() {
+    let plant = archive("fmi3", "PmsmPlant");
+    let controller = archive("fmi2", "SensorlessController");
+    let (p, c) = (format!("p={}", plant.display()), format!("c={}", controller.display()));
+    for (arguments, part) in [
+        (["--set", "p.motor.R=3"], "p: PmsmPlant has no variable motor.R"),
+        (["--set", "q.motor.R_s=3"], "q.motor.R_s: is not INSTANCE.VARIABLE; the instances are p, c"),
+        (["--set", "p.motor.n_p=2.5"], "motor.n_p = 2.5 is not an integer"),
+        (["--set", "c.estimator=Magic"], "estimator = Magic is not one of Rasmussen, "),
+        (["--connect", "c.u_a=p.speed"], "p.speed: is no input"),
+        (["--connect", "c.T_s=p.u_a"], "c.T_s: is no output"),
+        (["--input", "p.u_a=0:0,0:1"], "--input p.u_a=0:0,0:1: the time 0 does not follow 0"),
+        (["--input", "nothing.csv"], "--input nothing.csv: "),
+        (["--record", "p.nothing"], "p: PmsmPlant has no variable nothing"),
+        (["--step", "-1"], "step -1 be positive"),
+    ] {
+        fails(&[&["simulate", p.as_str(), c.as_str()][..], &arguments[..]].concat(), 2, &[part]);
+    }
+    fails(&["simulate", p.as_str(), p.as_str()], 2, &["p: two instances have this name"]);
+    fails(&["build", "Magic"], 2, &["there is no FMU Magic; there are "]);
+    fails(&["build", "--library", "Cargo.toml"], 2, &["Cargo.toml: "]);
+}
+
+#[test]
+fn a_refusal_of_an_fmu_is_told_in_its_own_words() {
+    for standard in ["fmi2", "fmi3"] {
+        let plant = format!("p={}", archive(standard, "PmsmPlant").display());
+        fails(&["simulate", &plant, "--set", "p.motor.R_s=-1"], 1, &["p: fmi", "motor.R_s = -1 is not allowed"]);
+    }
+}
+
+/// Plant and controller, connected by name, at 1000 rpm after 1 s.
+#[test]
+fn the_pair_runs_alike_in_both_standards() {
+    let run = |standard: &str, more: &[&str]| {
+        let [p, c] = [("p", "PmsmPlant"), ("c", "SensorlessController")]
+            .map(|(name, file)| format!("{name}={}", archive(standard, file).display()));
+        let arguments = ["simulate", &p, &c, "--auto-connect", "--input", "c.speed_ref=0:0,0.1:104.72", "--stop", "1"];
+        let record = ["--record", "p.speed,c.speed_est,c.speed_ref", "--csv", "-"];
+        let output = fmu(&[&arguments[..], &record[..], more].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("connected c.u_a -> p.u_a"));
+        text(&output.stdout)
+    };
+    let [two, three] = ["fmi2", "fmi3"].map(|standard| run(standard, &[]));
+    assert_eq!(two, three);
+    assert_eq!(two.lines().count(), 10_002);
+    assert_eq!(two.lines().next(), Some("time,p.speed,c.speed_est,c.speed_ref"));
+    let last: Vec<f64> = two.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    assert!((last[1] - 104.72).abs() < 0.5 && (last[2] - last[1]).abs() < 0.5, "{last:?}");
+    assert_ne!(run("fmi3", &["--sequential"]), three, "one step less on the way from plant to controller");
+}
+
+#[test]
+fn results_are_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (csv, svg, table) = (file("sub/out.csv"), file("out.svg"), file("in.csv"));
+    std::fs::write(&table, "time,PmsmPlant.tau_load\n0,0\n0.01,-1\n").unwrap();
+    let plant = archive("fmi3", "PmsmPlant");
+    let arguments = ["simulate", plant.to_str().unwrap(), "--input", &table, "--csv", &csv, "--plot", &svg];
+    let output = fmu(&[&arguments[..], &["--stop", "0.02", "--record", "PmsmPlant.speed,PmsmPlant.tau_load"]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("rpm"), "the final values have display units");
+    let csv = std::fs::read_to_string(csv).unwrap();
+    assert!(csv.lines().nth(51).unwrap().ends_with(",-0.5"), "{csv}");
+    assert!(std::fs::read_to_string(svg).unwrap().starts_with("<svg"));
+}
+
+/// Two builds agree byte for byte, and nothing in them tells where they were made.
+#[test]
+fn builds_are_reproducible() {
+    let dir = tempfile::tempdir().unwrap();
+    let build = |name: &str| {
+        let out = dir.path().join(name);
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fmu"));
+        command.args(["build", "PmsmPlant", "--out"]).arg(&out).env("SOURCE_DATE_EPOCH", "1700000000");
+        assert!(command.output().unwrap().status.success());
+        ["fmi2", "fmi3"].map(|standard| std::fs::read(out.join(standard).join("PmsmPlant.fmu")).unwrap())
+    };
+    assert!(build("a") == build("b"), "two builds differ");
+    let root = env!("CARGO_MANIFEST_DIR").as_bytes();
+    let mut zip = zip::ZipArchive::new(File::open(dir.path().join("a/fmi3/PmsmPlant.fmu")).unwrap()).unwrap();
+    for index in 0..zip.len() {
+        let mut bytes = Vec::new();
+        std::io::copy(&mut zip.by_index(index).unwrap(), &mut bytes).unwrap();
+        assert!(!bytes.windows(root.len()).any(|w| w == root), "entry {index} names {}", env!("CARGO_MANIFEST_DIR"));
+    }
+}
+
+#[test]
+fn help_has_an_example_for_the_pair() {
+    let help = text(&fmu(&["simulate", "--help"]).stdout);
+    assert!(help.contains("PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect"), "{help}");
+    assert!(text(&fmu(&["build", "--help"]).stdout).contains("fmu build --example own_fmu"));
+}

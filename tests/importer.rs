@@ -1,0 +1,119 @@
+//! The importer on our own FMUs: state, reset, values of every type, several instances.
+#![allow(missing_docs)]
+
+mod common;
+
+use fmu::importer::{Error, Fmu, Instance, Values};
+
+fn open(standard: &str, name: &str) -> Fmu {
+    Fmu::open(common::archives().join(standard).join(name).with_extension("fmu")).unwrap()
+}
+
+/// Runs `f` with each standard.
+fn in_both(name: &str, f: impl Fn(&Fmu)) {
+    for standard in ["fmi2", "fmi3"] {
+        f(&open(standard, name));
+    }
+}
+
+fn started(fmu: &Fmu) -> Result<Instance, Error> {
+    let mut plant = fmu.instantiate("plant", false)?;
+    plant.setup(0.0, None)?;
+    plant.enter_initialization()?;
+    plant.exit_initialization()?;
+    Ok(plant)
+}
+
+/// Steps with a torque on the shaft; returns speed and angle.
+fn steps(plant: &mut Instance, from: u32, to: u32) -> Result<[f64; 2], Error> {
+    plant.set("tau_load", &Values::Reals(vec![-1.0]))?;
+    for k in from..to {
+        assert!(plant.do_step(f64::from(k) * 1e-4, 1e-4)?.is_continue());
+    }
+    let references = [plant.variable("speed")?.value_reference, plant.variable("angle")?.value_reference];
+    let mut values = [0.0; 2];
+    plant.get_reals(&references, &mut values)?;
+    Ok(values)
+}
+
+#[test]
+fn a_saved_state_comes_back_in_the_same_and_in_another_instance() {
+    in_both("PmsmPlant", |fmu| {
+        let mut plant = started(fmu).unwrap();
+        let _ = steps(&mut plant, 0, 50).unwrap();
+        let state = plant.get_state().unwrap();
+        let bytes = plant.serialize_state(state).unwrap();
+        let there = steps(&mut plant, 50, 100).unwrap();
+        plant.set_state(state).unwrap();
+        assert_eq!(steps(&mut plant, 50, 100).unwrap(), there);
+        plant.free_state(state).unwrap();
+        assert!(plant.set_state(state).unwrap_err().to_string().contains("the state was freed"));
+
+        let mut other = started(fmu).unwrap();
+        let state = other.deserialize_state(&bytes).unwrap();
+        other.set_state(state).unwrap();
+        assert_eq!(steps(&mut other, 50, 100).unwrap(), there);
+    });
+}
+
+#[test]
+fn a_reset_instance_is_a_new_one() {
+    in_both("PmsmPlant", |fmu| {
+        let mut plant = started(fmu).unwrap();
+        let first = steps(&mut plant, 0, 100).unwrap();
+        plant.terminate().unwrap();
+        plant.reset().unwrap();
+        plant.setup(0.0, None).unwrap();
+        plant.enter_initialization().unwrap();
+        plant.exit_initialization().unwrap();
+        assert_eq!(steps(&mut plant, 0, 100).unwrap(), first);
+    });
+}
+
+#[test]
+fn values_of_every_type() {
+    in_both("SensorlessController", |fmu| {
+        let mut controller = fmu.instantiate("controller", false).unwrap();
+        for (name, text) in
+            [("T_s", "0.0002"), ("motor.n_p", "4"), ("current.active_resistance", "true"), ("estimator", "Sensored")]
+        {
+            controller.set_text(name, text).unwrap();
+        }
+        controller.setup(0.0, None).unwrap();
+        controller.enter_initialization().unwrap();
+        assert_eq!(controller.get("T_s").unwrap(), Values::Reals(vec![2e-4]));
+        assert_eq!(controller.get("motor.n_p").unwrap(), Values::Integers(vec![4]));
+        assert_eq!(controller.get("current.active_resistance").unwrap(), Values::Booleans(vec![true]));
+        assert_eq!(controller.get("estimator").unwrap(), Values::Integers(vec![13]));
+        let wrong = controller.set("T_s", &Values::Booleans(vec![true])).unwrap_err();
+        assert_eq!(wrong.to_string(), "controller: true is not a value of the type Float64");
+    });
+}
+
+#[test]
+fn a_refused_call_tells_function_status_and_reason() {
+    in_both("PmsmPlant", |fmu| {
+        let mut plant = started(fmu).unwrap();
+        let Error::Call { instance, function, status, message } = plant.do_step(0.5, 1e-4).unwrap_err() else {
+            panic!("another error");
+        };
+        assert!(function.ends_with("DoStep") && instance == "plant" && status == "Error", "{function} {status}");
+        assert!(message.is_some_and(|m| !m.is_empty()));
+        assert!(!plant.take_messages().is_empty());
+    });
+}
+
+#[test]
+fn instances_and_standards_do_not_disturb_each_other() {
+    let (two, three) = (open("fmi2", "PmsmPlant"), open("fmi3", "PmsmPlant"));
+    let alone = steps(&mut started(&two).unwrap(), 0, 100).unwrap();
+    let mut all: Vec<Instance> = [&two, &three, &two].iter().map(|fmu| started(fmu).unwrap()).collect();
+    for part in 0..10 {
+        for plant in &mut all {
+            let _ = steps(plant, 10 * part, 10 * (part + 1)).unwrap();
+        }
+    }
+    // Instances keep the binary: the FMUs may go first.
+    drop((two, three));
+    assert!(all.iter_mut().all(|plant| steps(plant, 100, 100).unwrap() == alone));
+}
