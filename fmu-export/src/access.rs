@@ -5,8 +5,11 @@ use crate::lifecycle::State;
 use crate::message;
 use crate::value::Value;
 use fmu_core::description::TIME;
-use fmu_core::{Causality, Fault, Meta, Model, Variability};
+use fmu_core::{Causality, Fault, Meta, Model, Slot, Variability};
 use std::mem::MaybeUninit;
+
+/// Values that a set remembers to take them back.
+const SHORT: usize = 8;
 
 /// The table's index of a value reference; [`TIME`] becomes an index past every table.
 #[inline]
@@ -16,12 +19,22 @@ const fn index(reference: u32) -> usize {
 
 /// Whether a variable may be set in this state (FMI 2.0.5, 2.2.7 and 4.2.4; FMI 3.0.2, 2.4.7.4).
 #[inline]
-fn settable(meta: &Meta, state: State) -> bool {
+fn open(meta: &Meta, state: State) -> bool {
     match meta.causality {
         Causality::Input => true,
         Causality::Parameter => state != State::Step || meta.variability == Variability::Tunable,
         _ => false,
     }
+}
+
+/// The variable that was found, if it can be set, now, to this value.
+#[inline]
+fn settable<'a, T: Value>(
+    found: Option<(&'static Meta, Slot<'a>)>,
+    state: State,
+    value: T,
+) -> Option<(&'static Meta, Slot<'a>)> {
+    found.filter(|(meta, _)| open(meta, state) && value.judge(meta) == Some(true))
 }
 
 impl<M: Model> Instance<M> {
@@ -34,14 +47,37 @@ impl<M: Model> Instance<M> {
     pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Fault> {
         self.check_count(references, out.len())?;
         self.refresh();
+        if self.arrays { self.get_each::<T, true>(references, out) } else { self.get_each::<T, false>(references, out) }
+    }
+
+    fn get_each<T: Value, const ARRAYS: bool>(
+        &mut self,
+        references: &[u32],
+        out: &mut [MaybeUninit<T>],
+    ) -> Result<(), Fault> {
         let mut places = out.iter_mut();
         for &reference in references {
-            let count = self.count(reference)?;
+            let first = index(reference);
+            let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, place) in (0..count).zip(&mut places) {
-                place.write(self.read(reference, index(reference).wrapping_add(offset))?);
+                let index = first.wrapping_add(offset);
+                match M::TABLE.entry(&mut self.now.block, index).and_then(|(meta, slot)| T::read(meta, &slot)) {
+                    Some(value) => place.write(value),
+                    None => place.write(self.read_other(reference, index)?),
+                };
             }
         }
         Ok(())
+    }
+
+    /// What no variable of this type is: time, or a mistake.
+    #[cold]
+    fn read_other<T: Value>(&mut self, reference: u32, index: usize) -> Result<T, Fault> {
+        match M::TABLE.entry(&mut self.now.block, index) {
+            Some((meta, _)) => Err(message::type_of::<M>(index, meta, T::CARRIES)),
+            None if reference == TIME => T::time(self.now.end).ok_or_else(|| message::time(T::CARRIES)),
+            None => Err(message::unknown::<M>(reference)),
+        }
     }
 
     /// Sets variables: all of them or, on an error, none.
@@ -51,48 +87,86 @@ impl<M: Model> Instance<M> {
     #[inline]
     pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Fault> {
         self.check_count(references, values.len())?;
+        let Some(&any) = values.first() else { return Ok(()) };
+        if self.arrays {
+            self.set_each::<T, true>(references, values, any)
+        } else {
+            self.set_each::<T, false>(references, values, any)
+        }
+    }
+
+    /// A short vector is written at once and taken back on an error; a long one is judged before.
+    fn set_each<T: Value, const ARRAYS: bool>(
+        &mut self,
+        references: &[u32],
+        values: &[T],
+        any: T,
+    ) -> Result<(), Fault> {
+        if values.len() > SHORT {
+            self.judge_each::<T, ARRAYS>(references, values)?;
+        }
+        let state = self.now.life.state();
+        let (mut done, mut old, mut dirty) = (0, [(0, any); SHORT], false);
+        let mut next = values.iter();
+        for &reference in references {
+            let first = index(reference);
+            let count = if ARRAYS { self.elements(reference)? } else { 1 };
+            for (offset, &value) in (0..count).zip(&mut next) {
+                let index = first.wrapping_add(offset);
+                let Some((meta, slot)) = settable(M::TABLE.entry(&mut self.now.block, index), state, value) else {
+                    self.take_back(&old[..done]);
+                    return Err(self.refusal(reference, index, value));
+                };
+                if let (Some(old), Some(before)) = (old.get_mut(done), T::read(meta, &slot)) {
+                    *old = (index, before);
+                    done += 1;
+                }
+                value.write(slot);
+                // The model sees an input by itself; the rest waits for `initialise` or `derive`.
+                dirty |= meta.causality == Causality::Parameter;
+            }
+        }
+        self.now.dirty |= dirty || state != State::Step;
+        Ok(())
+    }
+
+    fn judge_each<T: Value, const ARRAYS: bool>(&mut self, references: &[u32], values: &[T]) -> Result<(), Fault> {
         let state = self.now.life.state();
         let mut next = values.iter();
         for &reference in references {
-            let count = self.count(reference)?;
+            let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, &value) in (0..count).zip(&mut next) {
-                self.judge(reference, index(reference).wrapping_add(offset), value, state)?;
-            }
-        }
-        let mut next = values.iter();
-        for &reference in references {
-            let count = self.count(reference)?;
-            for (offset, value) in (0..count).zip(&mut next) {
-                let Some((meta, slot)) = M::TABLE.entry(&mut self.now.block, index(reference) + offset) else {
-                    continue;
-                };
-                value.write(slot);
-                // The model sees an input by itself; the rest waits for `initialise` or `derive`.
-                self.now.dirty |= state != State::Step || meta.causality == Causality::Parameter;
+                let index = index(reference).wrapping_add(offset);
+                if settable(M::TABLE.entry(&mut self.now.block, index), state, value).is_none() {
+                    return Err(self.refusal(reference, index, value));
+                }
             }
         }
         Ok(())
     }
 
-    #[inline]
-    fn read<T: Value>(&mut self, reference: u32, index: usize) -> Result<T, Fault> {
-        match M::TABLE.entry(&mut self.now.block, index) {
-            Some((meta, slot)) => T::read(meta, &slot).ok_or_else(|| message::type_of::<M>(index, meta, T::CARRIES)),
-            None if reference == TIME => T::time(self.now.end).ok_or_else(|| message::time(T::CARRIES)),
-            None => Err(message::unknown::<M>(reference)),
+    #[cold]
+    fn take_back<T: Value>(&mut self, old: &[(usize, T)]) {
+        for &(index, before) in old.iter().rev() {
+            if let Some((_, slot)) = M::TABLE.entry(&mut self.now.block, index) {
+                before.write(slot);
+            }
         }
     }
 
-    #[inline]
-    fn judge<T: Value>(&mut self, reference: u32, index: usize, value: T, state: State) -> Result<(), Fault> {
-        let Some((meta, _)) = M::TABLE.entry(&mut self.now.block, index) else {
-            return Err(if reference == TIME { message::time(T::CARRIES) } else { message::unknown::<M>(reference) });
-        };
-        match value.judge(meta) {
-            None => Err(message::type_of::<M>(index, meta, T::CARRIES)),
-            Some(_) if !settable(meta, state) => Err(message::fixed::<M>(index, meta, state)),
-            Some(false) => Err(message::range::<M>(index, meta, value)),
-            Some(true) => Ok(()),
+    /// Why a value cannot be set.
+    #[cold]
+    fn refusal<T: Value>(&mut self, reference: u32, index: usize, value: T) -> Fault {
+        match M::TABLE.entry(&mut self.now.block, index) {
+            Some((meta, _)) => match value.judge(meta) {
+                None => message::type_of::<M>(index, meta, T::CARRIES),
+                Some(_) if !open(meta, self.now.life.state()) => {
+                    message::fixed::<M>(index, meta, self.now.life.state())
+                }
+                Some(_) => message::range::<M>(index, meta, value),
+            },
+            None if reference == TIME => message::time(T::CARRIES),
+            None => message::unknown::<M>(reference),
         }
     }
 
@@ -116,18 +190,13 @@ impl<M: Model> Instance<M> {
         if self.arrays {
             needed = 0;
             for &reference in references {
-                needed += self.count(reference)?;
+                needed += self.elements(reference)?;
             }
         }
         if given == needed { Ok(()) } else { Err(message::count(given, needed)) }
     }
 
-    /// How many values a reference stands for: one, or all elements of an array of FMI 3.0.
-    #[inline]
-    fn count(&mut self, reference: u32) -> Result<usize, Fault> {
-        if self.arrays { self.elements(reference) } else { Ok(1) }
-    }
-
+    /// How many values a reference of FMI 3.0 stands for: one, or all elements of an array.
     fn elements(&mut self, reference: u32) -> Result<usize, Fault> {
         let index = index(reference);
         match M::TABLE.element(index) {

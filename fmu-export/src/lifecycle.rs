@@ -85,6 +85,8 @@ impl fmt::Display for States {
 /// A call of the importer, by what it does; several functions of the standards share one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Call {
+    /// `Instantiate`: there is no instance yet, so no state.
+    Instantiate,
     /// `SetDebugLogging`.
     SetDebugLogging,
     /// `fmi2SetupExperiment`; FMI 3.0 has it in `EnterInitializationMode`.
@@ -136,6 +138,7 @@ impl Call {
         use State::{Error, Initialization, Instantiated, Step, Terminated};
         match self {
             Self::SetDebugLogging | Self::RestoreState | Self::UseState | Self::Unsupported => both(&State::ALL, None),
+            Self::Instantiate => both(&[], None),
             Self::SetupExperiment => each(&[Instantiated], &[]),
             Self::EnterInitialization => both(&[Instantiated], Some(Initialization)),
             Self::ExitInitialization => both(&[Initialization], Some(Step)),
@@ -150,6 +153,11 @@ impl Call {
             Self::SaveState => both(&[Instantiated, Initialization, Step, Terminated], None),
             Self::Status => each(&[Step, Terminated], &[]),
         }
+    }
+
+    /// The state that it leads to, `None` if it stays.
+    pub const fn next(self) -> Option<State> {
+        self.row().next
     }
 
     /// The states that allow this call.
@@ -171,18 +179,12 @@ impl Life {
         self.0
     }
 
-    /// Whether `call` is allowed now.
+    /// Takes note that a call succeeded, with the [next](Call::next) state, or failed.
     #[inline]
-    pub const fn admits(self, call: Call, standard: Standard) -> bool {
-        call.states(standard).contains(self.0)
-    }
-
-    /// Takes note that `call` succeeded or failed.
-    #[inline]
-    pub const fn after(&mut self, call: Call, succeeded: bool) {
+    pub const fn after(&mut self, succeeded: bool, next: Option<State>) {
         if !succeeded {
             self.0 = State::Error;
-        } else if let Some(next) = call.row().next {
+        } else if let Some(next) = next {
             self.0 = next;
         }
     }

@@ -3,6 +3,11 @@
 //! States: i instantiated, n initialization, s step, t terminated, e error. After a success the state is the one named
 //! (`.`: as before), after a failure it is e, and there is one message that names the function.
 #![allow(missing_docs)]
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    clippy::borrow_as_ptr,
+    reason = "an importer calls C functions, rightly or not"
+)]
 
 mod common;
 

@@ -1,5 +1,10 @@
 //! Which steps continue a simulation.
 #![allow(missing_docs, clippy::float_cmp)]
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    clippy::borrow_as_ptr,
+    reason = "an importer calls C functions, rightly or not"
+)]
 
 mod common;
 

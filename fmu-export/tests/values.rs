@@ -1,5 +1,10 @@
 //! Getting and setting: what may be set when, ranges, types, arrays, atomicity, and the words of the errors.
 #![allow(missing_docs, clippy::float_cmp)]
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    clippy::borrow_as_ptr,
+    reason = "an importer calls C functions, rightly or not"
+)]
 
 mod common;
 
@@ -122,6 +127,26 @@ fn a_vector_is_set_whole_or_not_at_all() {
                 assert_eq!(fmu.set(&[U, K, GAIN, bad.0], &[4.0, 4.0, 4.0, bad.1]), ERROR);
                 assert_eq!([fmu.get(U), fmu.get(K), fmu.get(GAIN)], [1.0, 0.0, 1.0], "{version} {state} {bad:?}");
             }
+        }
+    }
+}
+
+#[test]
+fn a_long_vector_is_set_whole_or_not_at_all() {
+    for version in [2, 3] {
+        for length in 1..20_u32 {
+            let vr: Vec<u32> = (0..length).map(|i| if i % 2 == 0 { U } else { K }).collect();
+            let good: Vec<f64> = (0..length).map(|i| 2.0 - 0.1 * f64::from(i)).collect();
+            for bad in (0..length as usize).filter(|i| i % 2 == 1) {
+                let mut values = good.clone();
+                values[bad] = 6.0;
+                let fmu = Fmu::started(version);
+                assert_eq!(fmu.set(&vr, &values), ERROR);
+                assert_eq!((fmu.get(U), fmu.get(K)), (1.0, 0.0), "{length} {bad}");
+                assert!(fmu.error().contains("k = 6 is not allowed"));
+            }
+            let fmu = Fmu::started(version);
+            assert_eq!((fmu.set(&vr, &good), fmu.get(vr[vr.len() - 1])), (OK, good[good.len() - 1]));
         }
     }
 }

@@ -134,10 +134,10 @@ macro_rules! export_fmi2 {
             logging_on: Fmi2Boolean,
         ) -> Instance {
             $crate::abi::quiet();
-            let entry = Entry { standard: Standard::Fmi2, call: Call::Reset, name: "fmi2Instantiate" };
+            const ENTRY: Entry = Entry::new(Standard::Fmi2, Call::Instantiate, "fmi2Instantiate");
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$model>::fmi2_instantiate(entry, name, fmu_type, guid, callbacks, logging_on.0 != 0)
+                $crate::abi::Abi::<$model>::fmi2_instantiate(ENTRY, name, fmu_type, guid, callbacks, logging_on.0 != 0)
             }
         }
 

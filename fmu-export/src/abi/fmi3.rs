@@ -95,7 +95,7 @@ macro_rules! export_fmi3 {
             _intermediate_update: *const c_void,
         ) -> Instance {
             $crate::abi::quiet();
-            let entry = Entry { standard: Standard::Fmi3, call: Call::Reset, name: "fmi3InstantiateCoSimulation" };
+            const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateCoSimulation");
             let refused = match (event_mode_used.0 != 0, n_intermediate) {
                 (true, _) => Some("eventModeUsed = true is not allowed: hasEventMode = false"),
                 (_, 1..) => Some("nRequiredIntermediateVariables must be 0: providesIntermediateUpdate = false"),
@@ -104,7 +104,7 @@ macro_rules! export_fmi3 {
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$model>::fmi3_instantiate(
-                    entry, name, token, logging_on, environment, logger, refused,
+                    ENTRY, name, token, logging_on, environment, logger, refused,
                 )
             }
         }
@@ -120,12 +120,12 @@ macro_rules! export_fmi3 {
             logger: Option<Fmi3Logger>,
         ) -> Instance {
             $crate::abi::quiet();
-            let entry = Entry { standard: Standard::Fmi3, call: Call::Unsupported, name: "fmi3InstantiateModelExchange" };
+            const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateModelExchange");
             let refused = Some("not supported: Model Exchange; this FMU is for Co-Simulation");
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$model>::fmi3_instantiate(
-                    entry, name, token, logging_on, environment, logger, refused,
+                    ENTRY, name, token, logging_on, environment, logger, refused,
                 )
             }
         }
@@ -144,13 +144,12 @@ macro_rules! export_fmi3 {
             _unlock_preemption: *const c_void,
         ) -> Instance {
             $crate::abi::quiet();
-            let entry =
-                Entry { standard: Standard::Fmi3, call: Call::Unsupported, name: "fmi3InstantiateScheduledExecution" };
+            const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateScheduledExecution");
             let refused = Some("not supported: Scheduled Execution; this FMU is for Co-Simulation");
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$model>::fmi3_instantiate(
-                    entry, name, token, logging_on, environment, logger, refused,
+                    ENTRY, name, token, logging_on, environment, logger, refused,
                 )
             }
         }

@@ -2,7 +2,7 @@
 //! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
 
 use crate::instance::Instance;
-use crate::lifecycle::{Call, Standard};
+use crate::lifecycle::{Call, Standard, State, States};
 use crate::log::{Log, Status};
 use crate::saved::Saved;
 use fmu_core::{Fault, Model};
@@ -11,15 +11,20 @@ use std::cell::{Cell, UnsafeCell};
 use std::ffi::{c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Which function was called.
+/// Which function was called: its name in C and its row of the lifecycle table.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// Its standard.
-    pub standard: Standard,
-    /// Its row of the lifecycle table.
-    pub call: Call,
-    /// Its name in C.
-    pub name: &'static str,
+    name: &'static str,
+    pub(crate) standard: Standard,
+    states: States,
+    next: Option<State>,
+}
+
+impl Entry {
+    /// Looks the row up, while compiling.
+    pub const fn new(standard: Standard, call: Call, name: &'static str) -> Self {
+        Self { name, standard, states: call.states(standard), next: call.next() }
+    }
 }
 
 /// Why a call was not done.
@@ -73,13 +78,13 @@ fn pass<M: Model>(
     instance: &mut Instance<M>,
     body: impl FnOnce(&mut Instance<M>) -> Result<(), Refusal>,
 ) -> Status {
-    if instance.standard != entry.standard || !instance.now.life.admits(entry.call, entry.standard) {
+    if instance.standard != entry.standard || !entry.states.contains(instance.now.life.state()) {
         return fail(entry, instance, Refusal::Error(misplaced(entry, instance)));
     }
     // A panic can leave a half-done step; the instance then only leads to Reset, SetFMUState and Free.
     match catch_unwind(AssertUnwindSafe(|| body(instance))) {
         Ok(Ok(())) => {
-            instance.now.life.after(entry.call, true);
+            instance.now.life.after(true, entry.next);
             Status::Ok
         }
         Ok(Err(refusal)) => fail(entry, instance, refusal),
@@ -91,7 +96,7 @@ fn pass<M: Model>(
 fn fail<M: Model>(entry: Entry, instance: &mut Instance<M>, refusal: Refusal) -> Status {
     match refusal {
         Refusal::Error(fault) => {
-            instance.now.life.after(entry.call, false);
+            instance.now.life.after(false, None);
             instance.log.error(&format!("{}: {fault}", entry.name));
             Status::Error
         }
@@ -107,8 +112,8 @@ fn misplaced<M: Model>(entry: Entry, instance: &Instance<M>) -> Fault {
     if instance.standard != entry.standard {
         return Fault::new("the instance was made by the other standard's function");
     }
-    let (state, states) = (instance.now.life.state(), entry.call.states(entry.standard));
-    Fault::new(format!("not allowed in the state {state}; allowed in: {states}"))
+    let state = instance.now.life.state();
+    Fault::new(format!("not allowed in the state {state}; allowed in: {}", entry.states))
 }
 
 fn panicked(payload: &(dyn Any + Send)) -> Fault {

@@ -80,9 +80,9 @@ macro_rules! functions {
     )*) => { $(
         #[unsafe(no_mangle)]
         pub(crate) unsafe extern "C" fn $name(instance: Instance $(, $argument: $type)*) -> c_int {
-            let entry = Entry { standard: Standard::$standard, call: Call::$call, name: stringify!($name) };
+            const ENTRY: Entry = Entry::new(Standard::$standard, Call::$call, stringify!($name));
             // SAFETY: what the standard demands of the importer.
-            unsafe { $crate::abi::Abi::<$model>::$function(entry, instance $(, $passed)*) }
+            unsafe { $crate::abi::Abi::<$model>::$function(ENTRY, instance $(, $passed)*) }
         }
     )* };
 }

@@ -1,0 +1,104 @@
+//! What the interface costs: a set of six, a step and a get of six on a model that does nothing, through the C
+//! functions. `cargo bench -p fmu-export`; fails above 60 ns together.
+#![allow(missing_docs)]
+
+use fmu_core::unit::VOLT;
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table};
+use fmu_export::abi::types::*;
+use serde::{Deserialize, Serialize};
+use std::ffi::CString;
+use std::hint::black_box;
+use std::ptr::null;
+use std::time::Instant;
+
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Empty {
+    u: [f64; 6],
+}
+
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Outputs {
+    y: [f64; 6],
+}
+
+type V = Row<Block<Empty>>;
+
+impl Model for Empty {
+    type Outputs = Outputs;
+    const INFO: Info = Info {
+        name: "Empty",
+        description: "",
+        version: "1",
+        author: "",
+        license: "MIT",
+        copyright: "",
+        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+        documentation: "",
+    };
+    const TABLE: &'static Table<Block<Self>> = &Table::new(
+        const {
+            &[
+                V::input("u1", &VOLT, "", |m| &mut m.model.u[0]),
+                V::input("u2", &VOLT, "", |m| &mut m.model.u[1]),
+                V::input("u3", &VOLT, "", |m| &mut m.model.u[2]),
+                V::input("u4", &VOLT, "", |m| &mut m.model.u[3]),
+                V::input("u5", &VOLT, "", |m| &mut m.model.u[4]),
+                V::input("u6", &VOLT, "", |m| &mut m.model.u[5]),
+                V::output("y1", &VOLT, "", |m| &mut m.out.y[0]),
+                V::output("y2", &VOLT, "", |m| &mut m.out.y[1]),
+                V::output("y3", &VOLT, "", |m| &mut m.out.y[2]),
+                V::output("y4", &VOLT, "", |m| &mut m.out.y[3]),
+                V::output("y5", &VOLT, "", |m| &mut m.out.y[4]),
+                V::output("y6", &VOLT, "", |m| &mut m.out.y[5]),
+            ]
+        },
+    );
+    fn initialise(&mut self) {}
+    fn output(&self, _: Elapsed, _: &mut Outputs) {}
+    fn advance(&mut self, _: &Step) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+fmu_export::export!(Empty);
+
+/// Nanoseconds per call, the best of several rounds.
+fn time(mut call: impl FnMut() -> c_int) -> f64 {
+    const CALLS: u32 = 100_000;
+    let rounds = (0..200).map(|_| {
+        let start = Instant::now();
+        for _ in 0..CALLS {
+            assert_eq!(call(), 0);
+        }
+        start.elapsed().as_secs_f64() * 1e9 / f64::from(CALLS)
+    });
+    rounds.fold(f64::INFINITY, f64::min)
+}
+
+fn main() {
+    let no = Fmi2Boolean(0);
+    let token = CString::new(Empty::TOKEN.as_str()).unwrap_or_default();
+    // An importer calls through pointers that the compiler does not know.
+    let set: unsafe extern "C" fn(Instance, References, usize, *const f64) -> c_int = black_box(fmi::fmi2SetReal);
+    let step: unsafe extern "C" fn(Instance, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);
+    let get: unsafe extern "C" fn(Instance, References, usize, *mut f64) -> c_int = black_box(fmi::fmi2GetReal);
+    let (inputs, outputs, mut values) = ([1, 2, 3, 4, 5, 6], [7, 8, 9, 10, 11, 12], [1.0; 6]);
+    let (mut t, h) = (0.0, 1e-4);
+    // SAFETY: used as the standard demands: one thread, arrays of the lengths given, freed once.
+    unsafe {
+        let it = fmi::fmi2Instantiate(c"bench".as_ptr(), 1, token.as_ptr(), null(), null(), no, no);
+        assert_eq!(fmi::fmi2SetupExperiment(it, no, 0.0, 0.0, Fmi2Boolean(1), 1e9), 0);
+        assert_eq!((fmi::fmi2EnterInitializationMode(it), fmi::fmi2ExitInitializationMode(it)), (0, 0));
+        let set = time(|| set(it, inputs.as_ptr(), 6, black_box(values.as_ptr())));
+        let step = time(|| {
+            let status = step(it, t, h, no);
+            t += h;
+            status
+        });
+        let get = time(|| get(it, outputs.as_ptr(), 6, black_box(values.as_mut_ptr())));
+        fmi::fmi2FreeInstance(it);
+        let all = set + step + get;
+        println!("set of six {set:.1} ns, step {step:.1} ns, get of six {get:.1} ns, together {all:.1} ns");
+        assert!(all < 60.0, "the interface costs more than 60 ns");
+    }
+}
