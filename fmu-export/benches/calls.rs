@@ -4,7 +4,7 @@
 
 use fmu_core::unit::VOLT;
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table};
-use fmu_export::abi::types::*;
+use fmu_export::abi::types::{Fmi2Boolean, Instance, References, c_int};
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;
 use std::hint::black_box;

@@ -3,11 +3,11 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic |
-//! | 2 | [`FORMAT`] |
+//! | 2 | version of this layout |
 //! | 2 | `Model::STATE_VERSION` |
 //! | 16 | `Model::HASH`, the model and its interface |
 //! | 4 | length of the payload |
-//! | n | payload in postcard's encoding, padded with zeros to a multiple of [`unit`] |
+//! | n | payload in postcard's encoding, padded with zeros to a multiple of a fixed number |
 //! | 4 | CRC-32 of all before |
 
 use crate::lifecycle::State;
@@ -101,7 +101,7 @@ fn unable(error: &postcard::Error) -> Fault {
     Fault::new(format!("the state cannot be serialised: {error}"))
 }
 
-/// Room for a payload: twice what a fresh model needs, and some; more than an hour of counters adds to it.
+/// Room for a payload: twice what a fresh model needs, and some, for integers that grow from one byte to ten.
 fn unit<M: Model>() -> Result<usize, Fault> {
     Ok((2 * payload_size(&Saved::<M>::default())?).next_multiple_of(64) + 64)
 }

@@ -1,7 +1,7 @@
 //! The C interface: the only place with `unsafe`. Pointers become Rust values here, and nothing is decided here.
 //!
-//! [`gate`] is what every call passes, [`calls`](Abi) what both standards share, [`fmi2`] and [`fmi3`] the tables of
-//! their functions, which [`export!`](crate::export) makes C functions of.
+//! `gate.rs` is what every call passes, `calls.rs` what both standards share, [`fmi2`] and [`fmi3`] the tables of their
+//! functions, of which [`export!`](crate::export) makes C functions.
 
 mod calls;
 pub mod fmi2;
