@@ -12,6 +12,9 @@ use fmu_core::unit::{AMPERE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table};
 use serde::{Deserialize, Serialize};
 
+/// Most samples of one communication step: a step ends, whatever the importer and T_s make of it.
+const MOST_SAMPLES: f64 = 1e7;
+
 /// Inputs, read at the sample instants.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ControllerInputs {
@@ -136,8 +139,8 @@ pub struct SensorlessController {
 impl SensorlessController {
     /// What the estimator may know of the parameters.
     fn context(par: &ControllerParameters) -> Context<'_> {
-        let ControllerParameters { estimators, motor, J, T_s, delay, .. } = par;
-        Context { par: estimators, motor, J: *J, T_s: *T_s, delay: f64::from(*delay) }
+        let ControllerParameters { estimators, motor, current, J, T_s, delay, .. } = par;
+        Context { par: estimators, motor, current, J: *J, T_s: *T_s, delay: f64::from(*delay) }
     }
 
     /// One sample of the controller: currents in, voltage references out.
@@ -276,6 +279,10 @@ impl Model for SensorlessController {
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         let grid = SampleGrid { period: self.parameters.T_s };
         let end = step.end();
+        if end.minus_periods(self.state.samples, grid.period) > MOST_SAMPLES * grid.period {
+            let longest = format!("at most {MOST_SAMPLES} sample periods of {} s", grid.period);
+            return Err(Fault::value("the step size", format!("{} s", step.h), longest));
+        }
         while grid.passed(self.state.samples, end) {
             self.state.shown = self.state.computed.clone();
             self.state.computed = self.sample();
