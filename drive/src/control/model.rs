@@ -139,8 +139,8 @@ pub struct SensorlessController {
 impl SensorlessController {
     /// What the estimator may know of the parameters.
     fn context(par: &ControllerParameters) -> Context<'_> {
-        let ControllerParameters { estimators, motor, J, T_s, delay, .. } = par;
-        Context { par: estimators, motor, J: *J, T_s: *T_s, delay: f64::from(*delay) }
+        let ControllerParameters { estimators, motor, current, J, T_s, delay, .. } = par;
+        Context { par: estimators, motor, current, J: *J, T_s: *T_s, delay: f64::from(*delay) }
     }
 
     /// One sample of the controller: currents in, voltage references out.

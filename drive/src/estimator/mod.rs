@@ -8,12 +8,23 @@
 //! A new estimator implements [`Estimating`], has a row in the list at the end of this file and, for parameters of its
 //! own, a row in [`tables`]. It then appears in the enumeration, the FMUs and their documentation.
 
+pub mod current_model;
+pub mod direct_emf;
+pub mod emf;
+pub mod emf_observer;
+pub mod extended_emf;
+pub mod follower;
 pub mod interval;
 pub mod rasmussen;
 pub mod sensored;
 pub mod tables;
+#[cfg(test)]
+pub(crate) mod testing;
 pub mod tracker;
+pub mod voltage_feedback;
+pub mod voltage_model;
 
+use crate::control::current::CurrentLoop;
 use crate::frame::{AlphaBeta, DqHat};
 use crate::motor::Motor;
 use fmu_core::{Enumeration, Fault, Item};
@@ -55,6 +66,8 @@ pub struct Context<'a> {
     pub par: &'a EstimatorParameters,
     /// Estimates of the machine.
     pub motor: &'a Motor,
+    /// Parameters of the current loop.
+    pub current: &'a CurrentLoop,
     /// Estimate of the inertia in kg.m2.
     pub J: f64,
     /// Sample period in s.
@@ -205,6 +218,18 @@ macro_rules! estimators {
 estimators! {
     1 Rasmussen(rasmussen::Rasmussen)
         "Full-order flux observer with PI speed adaptation, Rasmussen 2006, eq (16) and (21)";
+    2 DirectEmf(direct_emf::DirectEmf)
+        "Back EMF calculated from the voltage equation, Kim & Sul 2011, eq (11) to (13)";
+    3 EmfObserver(emf_observer::EmfObserver)
+        "State observer of the back EMF, Kim & Sul 2011, eq (14) and (15)";
+    4 ExtendedEmf(extended_emf::ExtendedEmf)
+        "State observer of the extended EMF, Kim & Sul 2011, eq (16) to (23)";
+    5 VoltageModel(voltage_model::VoltageModel)
+        "Voltage model, Kim & Sul 2011, eq (24) to (27)";
+    6 CurrentModel(current_model::CurrentModel)
+        "Current model, Kim & Sul 2011, eq (28) to (30)";
+    7 VoltageFeedback(voltage_feedback::VoltageFeedback)
+        "Feedback of the current controller's voltage, Kim & Sul 2011, eq (31) and (32)";
     13 Sensored(sensored::Sensored)
         "Angle and speed of a sensor, theta_meas and speed_meas, Kim & Sul 2011, Fig. 1a";
 }

@@ -110,6 +110,7 @@ pub const OBSERVER: &Table<RasmussenParameters> = &Table::new(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::current::CurrentLoop;
     use crate::frame::Rotor;
     use crate::math::wrap;
 
@@ -122,7 +123,14 @@ mod tests {
     }
 
     fn context<'a>(par: &'a EstimatorParameters, motor: &'a Motor) -> Context<'a> {
-        Context { par, motor, J: 1.5e-3, T_s: T_S, delay: 1.0 }
+        const CURRENT: &CurrentLoop = &CurrentLoop {
+            bandwidth: 1571.0,
+            active_resistance: false,
+            integral: 0.0,
+            reference_feed_forward: false,
+            mtpa: false,
+        };
+        Context { par, motor, current: CURRENT, J: 1.5e-3, T_s: T_S, delay: 1.0 }
     }
 
     /// The observer beside a machine that turns at `w` (rad/s, electrical) with the current `i` in its rotor frame:

@@ -1,5 +1,7 @@
 //! The estimators' parameters: one part each, under its own prefix.
 
+use crate::estimator::emf::{EMF, EmfParameters};
+use crate::estimator::follower::{FOLLOWER, FollowerParameters};
 use crate::estimator::rasmussen::{OBSERVER, RasmussenParameters};
 use crate::estimator::tracker::{TRACKER, TrackerParameters};
 use fmu_core::{Part, Row, Table};
@@ -12,6 +14,10 @@ pub struct EstimatorParameters {
     pub observer: RasmussenParameters,
     /// The tracker of those that find an angle error.
     pub tracker: TrackerParameters,
+    /// Those on the EMF.
+    pub emf: EmfParameters,
+    /// Voltage model and current model.
+    pub model: FollowerParameters,
 }
 
 type P = Row<EstimatorParameters>;
@@ -22,6 +28,8 @@ pub const ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = &Table::new(
         &[
             P::part("observer.", &Part { table: OBSERVER, lens: |p| &mut p.observer }),
             P::part("tracker.", &Part { table: TRACKER, lens: |p| &mut p.tracker }),
+            P::part("emf.", &Part { table: EMF, lens: |p| &mut p.emf }),
+            P::part("model.", &Part { table: FOLLOWER, lens: |p| &mut p.model }),
         ]
     },
 );

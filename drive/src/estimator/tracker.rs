@@ -106,6 +106,7 @@ pub const TRACKER: &Table<TrackerParameters> = &Table::new(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::current::CurrentLoop;
     use crate::estimator::EstimatorParameters;
     use crate::motor::Motor;
 
@@ -116,7 +117,8 @@ mod tests {
             ..EstimatorParameters::default()
         };
         let motor = Motor::default();
-        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4, delay: 1.0 };
+        let current = CurrentLoop::default();
+        let context = Context { par: &par, motor: &motor, current: &current, J: 1.5e-3, T_s: 1e-4, delay: 1.0 };
         let mut tracker = Tracker::at(0.3, 0.0, context.T_s);
         let (mut theta, mut w) = (0.0, 50.0);
         for _ in 0..n {

@@ -1,0 +1,61 @@
+//! The current model (Kim & Sul (28)-(30), Fig. 5, after Matsui 1993): 5 of the review.
+//!
+//! One step from the measured current of the last sample, with the estimated speed in a right frame,
+//! i_dM = i_d + T_s / L_d (v_d - R i_d + w L_q i_q + (w_f - w) L_d i_q), i_qM = i_q + T_s / L_q (v_q - R i_q - w L_d i_d -
+//! (w_f - w) L_q i_d - w psi_M). What the machine does otherwise, di = i[k] - i_M, is the speed error on q and the angle
+//! error on d: di_d = psi_M T_s w sin theta~ / L_d, di_q = psi_M T_s (w - w_r cos theta~) / L_q. The speed is drawn through a
+//! low-pass, the angle as in the voltage model ([`follower`](crate::estimator::follower)).
+//! Corrected print: in (30) the q row is psi_M T_s (w^ - w_r cos theta~) / L_q, the speed error within the fraction.
+//!
+//! Limits: those of the voltage model: the two differ in form, not in content.
+
+use crate::estimator::emf::pole;
+use crate::estimator::follower::Follower;
+use crate::estimator::interval::Interval;
+use crate::estimator::{Context, Estimate, Estimating, Sample};
+use serde::{Deserialize, Serialize};
+
+/// State.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CurrentModel {
+    follower: Follower,
+}
+
+impl Estimating for CurrentModel {
+    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        (Self { follower: Follower::at(theta, w, context.T_s) }, Estimate::new(theta, w, sample))
+    }
+
+    #[inline]
+    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+        let Context { motor, par, T_s, .. } = *context;
+        let f = &mut self.follower;
+        f.advance(T_s);
+        let x = Interval::new(f.theta_last, f.theta, sample, T_s);
+        let (w, slip) = (f.w, par.emf.slip(&x, f.w));
+        let r_d = x.v.d() - motor.R_s * x.i.d() + (w * motor.L_q + slip * motor.L_d) * x.i.q();
+        let r_q = x.v.q() - motor.R_s * x.i.q() - (w * motor.L_d + slip * motor.L_q) * x.i.d() - w * motor.psi_M;
+        let di_d = x.i_now.d() - (x.i_last.d() + T_s / motor.L_d * r_d);
+        let di_q = x.i_now.q() - (x.i_last.q() + T_s / motor.L_q * r_q);
+        f.w -= (1.0 - pole(par.model.filter, T_s)) * di_q * motor.L_q / (T_s * motor.psi_M);
+        f.correct(context, -di_d * motor.L_d / T_s);
+        Estimate::new(f.theta, f.speed(), sample)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::testing::{comes_to_the_rotor, with_L_q};
+
+    #[test]
+    fn comes_to_the_rotor_without_bias() {
+        comes_to_the_rotor::<CurrentModel>(47.0);
+    }
+
+    #[test]
+    fn a_wrong_l_q_turns_it() {
+        let (more, less) = (with_L_q::<CurrentModel>(1.2), with_L_q::<CurrentModel>(0.8));
+        assert!((more - 5.5).abs() < 0.3 && (less + 5.9).abs() < 0.3, "{more} {less} deg");
+    }
+}

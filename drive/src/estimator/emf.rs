@@ -1,0 +1,168 @@
+//! What the estimators on the magnet's EMF share: parameters, the observer of one axis, the sign of the direction.
+//!
+//! In the estimated frame, which turns at w_f, every voltage equation of a row is v = R i + L p i + cross + e. The part
+//! that is known gives r = v - R i - cross, and what is left, e = r - L p i, holds the angle: (e_d, e_q) =
+//! E (-sin theta~, cos theta~) with theta~ = theta - theta^ and E of the sign of w.
+//!
+//! [`AxisObserver`] is Kim & Sul (14), (15) and (21) for one axis with the corrections of the print: the innovation is
+//! i - i^ with the MEASURED i, the gain on the EMF is negative (continuous: l_1 = 2 w_o - R/L, l_2 = -w_o^2 L), and R i
+//! and the cross terms take the measured current, so that no speed moves the poles. Sampled, with both poles at
+//! z = exp(-w_o T_s): i' = i^ + T_s / L (r - e^), i^ = i' + (1 - z^2)(i - i'), e^ = e^ - (1 - z)^2 L / T_s (i - i').
+//!
+//! The paper drops (w_f - w) L i in (18). With it dropped a zero in the right half plane at about E / (L_d i_q) appears
+//! when motoring, and rated load is lost below 0.21-0.25 of the rated speed: `frame_term` keeps it.
+
+use crate::estimator::Context;
+use crate::estimator::interval::Interval;
+use crate::math::exp;
+use fmu_core::unit::RAD_PER_S;
+use fmu_core::{Fault, Row, Table};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// Parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EmfParameters {
+    /// Bandwidth of the EMF in rad/s, > 0: both poles of the observers, the pole of the filter of the direct EMF.
+    pub bandwidth: f64,
+    /// Electrical speed in rad/s, > 0, that the estimate must reach on the other side to change the direction.
+    pub w_sign: f64,
+    /// Keep the term of the frame's speed.
+    pub frame_term: bool,
+}
+
+impl Default for EmfParameters {
+    fn default() -> Self {
+        Self { bandwidth: TAU * 150.0, w_sign: 5.0, frame_term: true }
+    }
+}
+
+impl EmfParameters {
+    /// Speed of the frame beyond the speed `w` (rad/s), or 0 where the term is dropped.
+    #[inline]
+    pub fn slip(&self, interval: &Interval, w: f64) -> f64 {
+        if self.frame_term { interval.w_frame - w } else { 0.0 }
+    }
+}
+
+/// Sign of the direction of rotation, with hysteresis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Direction(f64);
+
+impl Default for Direction {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
+
+impl Direction {
+    /// At the speed `w` (rad/s).
+    pub fn of(w: f64) -> Self {
+        Self(if w < 0.0 { -1.0 } else { 1.0 })
+    }
+
+    /// The sign once the speed is `w` (rad/s): it changes where `w` passes `w_sign` on the other side.
+    #[inline]
+    pub fn update(&mut self, w: f64, w_sign: f64) -> f64 {
+        if w * self.0 < -w_sign {
+            self.0 = -self.0;
+        }
+        self.0
+    }
+}
+
+/// Observer of current and EMF of one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AxisObserver {
+    i: f64,
+    e: f64,
+}
+
+impl AxisObserver {
+    /// At the measured current `i` (A) and the EMF `e` (V).
+    pub fn at(i: f64, e: f64) -> Self {
+        Self { i, e }
+    }
+
+    /// The EMF in V from `r` (V), the voltage without R i and cross terms, the current `i` (A) at the interval's end, and
+    /// the inductance `L` (H); pole `z` = exp(-w_o T_s).
+    #[inline]
+    pub fn update(&mut self, z: f64, L: f64, T_s: f64, r: f64, i: f64) -> f64 {
+        let predicted = self.i + T_s / L * (r - self.e);
+        let innovation = i - predicted;
+        self.i = predicted + (1.0 - z * z) * innovation;
+        self.e -= (1.0 - z) * (1.0 - z) * L / T_s * innovation;
+        self.e
+    }
+}
+
+/// A tracker needs a third of the bandwidth of the EMF behind which it works.
+///
+/// # Errors
+/// Says by how much it is too fast.
+pub fn validate(context: &Context) -> Result<(), Fault> {
+    let (rho, w_o) = (context.par.tracker.bandwidth, context.par.emf.bandwidth);
+    if rho > w_o / 3.0 * (1.0 + 1e-9) {
+        let allowed = format!("at most a third of emf.bandwidth = {w_o} rad/s, or the tracker rings on the EMF's lag");
+        return Err(Fault::value("tracker.bandwidth", format!("{rho} rad/s"), allowed));
+    }
+    Ok(())
+}
+
+/// Pole of a sampled first-order system of the bandwidth `w` (rad/s).
+#[inline]
+pub fn pole(w: f64, T_s: f64) -> f64 {
+    exp(-w * T_s)
+}
+
+type P = Row<EmfParameters>;
+
+/// The variables; their owner gives the prefix `emf.`.
+pub const EMF: &Table<EmfParameters> = &Table::new(
+    const {
+        &[
+            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the EMF: poles of its observer or filter", |p| {
+                &mut p.bandwidth
+            })
+            .above(0.0),
+            P::parameter(
+                "w_sign",
+                &RAD_PER_S,
+                "Electrical speed at which the estimate takes the other direction",
+                |p| &mut p.w_sign,
+            )
+            .above(0.0),
+            P::boolean_parameter(
+                "frame_term",
+                "Keep the speed of the estimated frame beside that of the rotor, which Kim & Sul drop in (18)",
+                |p| &mut p.frame_term,
+            ),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_poles_of_the_axis_observer_are_where_they_should_be() {
+        // Free response: i = 0, r = 0. Both poles at z: error(k) = (a + b k) z^k, so x(k+2) - 2 z x(k+1) + z^2 x(k) = 0.
+        let (z, L, T_s) = (pole(TAU * 150.0, 1e-4), 36e-3, 1e-4);
+        let mut o = AxisObserver::at(0.0, 10.0);
+        let mut e = [10.0, o.update(z, L, T_s, 0.0, 0.0), 0.0];
+        for _ in 0..100 {
+            e[2] = o.update(z, L, T_s, 0.0, 0.0);
+            assert!((e[2] - 2.0 * z * e[1] + z * z * e[0]).abs() < 1e-12, "{e:?}");
+            e = [e[1], e[2], 0.0];
+        }
+    }
+
+    #[test]
+    fn the_sign_has_hysteresis() {
+        let mut direction = Direction::of(20.0);
+        for (w, sign) in [(-4.0, 1.0), (-6.0, -1.0), (4.0, -1.0), (6.0, 1.0)] {
+            assert!((direction.update(w, 5.0) - sign).abs() < 1e-15);
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! An estimator beside a machine that turns steadily, for the estimators' unit tests: no control, no noise.
+
+use crate::control::current::CurrentLoop;
+use crate::estimator::{Context, Estimating, EstimatorParameters, Sample};
+use crate::frame::{AlphaBeta, Axis, Dq, Rotor};
+use crate::math::wrap;
+use crate::motor::Motor;
+use crate::plant::machine::flux;
+
+/// The machine of the tests, salient.
+pub(crate) fn salient() -> Motor {
+    Motor { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 }
+}
+
+/// Angle error theta - theta^ (rad) and speed error (rad/s) after `n` samples of 0.1 ms beside a machine with the
+/// current `i` (A, rotor frame), turning at `w` (rad/s, electrical). The estimate starts `theta_tilde` (rad) behind with
+/// the right speed; `hat` are its machine values. The voltage of each interval is the exact mean, the resistive part by
+/// the trapezoid that every estimator assumes between samples.
+pub(crate) fn beside<E: Estimating>(
+    par: &EstimatorParameters,
+    hat: &Motor,
+    (w, i): (f64, Dq),
+    theta_tilde: f64,
+    n: u32,
+) -> (f64, f64) {
+    let (motor, T_s) = (salient(), 1e-4);
+    let context = Context { par, motor: hat, current: &CurrentLoop::default(), J: 15e-3, T_s, delay: 1.0 };
+    let at = |theta: f64, v: Dq| -> AlphaBeta { Axis::<Rotor>::at(theta).to_stator(v) };
+    let tau_ref = motor.torque(i.d(), i.q());
+    let mut theta = 0.3;
+    let first = Sample { i: at(theta, i), i_last: at(theta - w * T_s, i), tau_ref, ..Sample::default() };
+    let (mut estimator, mut estimate) = E::start(&context, &first, theta - theta_tilde, w);
+    for k in 0..n {
+        let next = theta + w * T_s;
+        let resistive = (at(theta, i) + at(next, i)) * (0.5 * motor.R_s);
+        let u = (at(next, flux(&motor, i)) - at(theta, flux(&motor, i))) * (1.0 / T_s) + resistive;
+        let (i_last, i_now) = (at(theta, i), at(next, i));
+        theta = next;
+        let sample = Sample { k: u64::from(k) + 1, i: i_now, i_last, u, tau_ref, ..Sample::default() };
+        estimate = estimator.update(&context, &sample);
+    }
+    (wrap(theta - estimate.theta), w - estimate.w)
+}
+
+/// From 20 degrees on either side, in both directions, loaded: the estimate must come to the rotor; slowest at `slowest` (rad/s).
+pub(crate) fn comes_to_the_rotor<E: Estimating>(slowest: f64) {
+    let par = EstimatorParameters::default();
+    for w in [slowest, 235.0, 471.0, -235.0] {
+        for i_q in [-5.59, 5.59] {
+            for degrees in [-20.0_f64, 20.0] {
+                let point = (w, Dq::new(-0.84, i_q));
+                let (angle, speed) = beside::<E>(&par, &salient(), point, degrees.to_radians(), 10_000);
+                assert!(angle.abs().to_degrees() < 0.02, "{w} rad/s, {i_q} A: {} deg off", angle.to_degrees());
+                assert!(speed.abs() < 0.02, "{w} rad/s, {i_q} A: {speed} rad/s off");
+            }
+        }
+    }
+}
+
+/// Angle error in degrees at w = 235 rad/s and the rated point with L_q^ = `factor` L_q.
+pub(crate) fn with_L_q<E: Estimating>(factor: f64) -> f64 {
+    let hat = Motor { L_q: factor * salient().L_q, ..salient() };
+    let point = (235.0, Dq::new(-0.84, 5.59));
+    beside::<E>(&EstimatorParameters::default(), &hat, point, 0.0, 10_000).0.to_degrees()
+}

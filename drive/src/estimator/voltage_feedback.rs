@@ -1,0 +1,80 @@
+//! Fundamental voltage feedback (Kim & Sul (31), (32), after Bae et al. 2003): 6 of the review.
+//!
+//! The current controller's feed-forward (31) is all the voltage that a right frame needs, so what its PI adds on the
+//! d axis is the angle error: v_d,fb = -w psi_M sin theta~. e = -s v_d,fb / (psi_M |w|) to a tracker. With the frame's speed
+//! kept, e = -s (v_d,fb + (w_f - w) L_d i_q) / (psi_M |w|). Corrected print: (31) has R_s in both rows.
+//!
+//! It asks for a current loop of its own kind: feed-forward from the references and no active resistance, best with
+//! `current.integral` = 0.2.
+//! Limits: L p i is neglected; rated load is held from 0.02 of the rated speed with the frame term; as printed it fails at
+//! 0.1 with rho = 2 pi 15 rad/s. A reversal at light load is ambiguous by half a turn.
+
+use crate::estimator::emf::{self, Direction, pole};
+use crate::estimator::interval::Interval;
+use crate::estimator::tracker::Tracker;
+use crate::estimator::{Context, Estimate, Estimating, Sample};
+use fmu_core::Fault;
+use serde::{Deserialize, Serialize};
+
+/// Greatest angle error in rad that is passed on.
+const CLIP: f64 = 0.5;
+
+/// State.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct VoltageFeedback {
+    tracker: Tracker,
+    direction: Direction,
+    /// Smoothed voltage of the frame's speed in V.
+    frame: f64,
+}
+
+impl Estimating for VoltageFeedback {
+    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        let tracker = Tracker::at(theta, w, context.T_s);
+        (Self { tracker, direction: Direction::of(w), frame: 0.0 }, Estimate::new(theta, w, sample))
+    }
+
+    #[inline]
+    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+        let Context { motor, par, T_s, .. } = *context;
+        self.tracker.advance(T_s);
+        let x = Interval::new(self.tracker.theta_last, self.tracker.theta, sample, T_s);
+        let w = self.tracker.w;
+        let s = self.direction.update(w, par.emf.w_sign);
+        let smoothing = 1.0 - pole(par.emf.bandwidth, T_s);
+        self.frame += smoothing * (par.emf.slip(&x, w) * motor.L_d * x.i.q() - self.frame);
+        let v_dfb = sample.u_pi.d() + self.frame;
+        let e = (-s * v_dfb / (motor.psi_M * w.abs().max(par.emf.w_sign))).clamp(-CLIP, CLIP);
+        self.tracker.correct(context, par.tracker.bandwidth, e, sample.tau_ref);
+        Estimate::new(self.tracker.theta, self.tracker.w, sample)
+    }
+    fn validate(context: &Context) -> Result<(), Fault> {
+        let current = context.current;
+        if !current.reference_feed_forward || current.active_resistance {
+            return Err(Fault::new(
+                "estimator = VoltageFeedback reads the angle error from the voltage of the current controller's \
+                 integrators: it needs current.reference_feed_forward = true, which leaves them nothing else, and \
+                 current.active_resistance = false",
+            ));
+        }
+        emf::validate(context)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::bench;
+    use crate::estimator::Kind;
+
+    #[test]
+    fn asks_for_its_current_loop() {
+        let mut pair = bench::drive(Kind::VoltageFeedback);
+        pair.start().unwrap();
+        pair.controller.model.parameters.current.reference_feed_forward = false;
+        let fault = pair.start().unwrap_err();
+        assert!(fault.message().contains("current.reference_feed_forward"), "{fault}");
+        let mut pair = bench::drive(Kind::ExtendedEmf);
+        pair.controller.model.parameters.estimators.tracker.bandwidth = 400.0;
+        assert!(pair.start().unwrap_err().message().contains("tracker.bandwidth = 400 rad/s"));
+    }
+}
