@@ -1,0 +1,84 @@
+//! An FMU of your own in one file: a capacitor charged through a resistor.
+//!
+//! ```sh
+//! cargo run --release -- build --example own_fmu
+//! cargo run --release -- simulate target/fmu/fmi3/RcCircuit.fmu --set RcCircuit.R=2000 --input RcCircuit.u=0:0,0.5:5 \
+//!     --stop 5 --step 0.1 --csv -
+//! ```
+
+use fmu_core::unit::{AMPERE, Exponents, OHM, Quantity, Unit, VOLT};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table};
+use serde::{Deserialize, Serialize};
+
+/// A quantity of your own: a name, a unit, its SI base exponents (kg, m, s, A).
+const FARAD: Quantity = Quantity::new("Capacitance", Unit::si("F", Exponents::mechanical(-1, -2, 4, 2)));
+
+/// Inputs, parameters and state are plain data: this is all that a saved FMU state has to hold.
+#[derive(Clone, Serialize, Deserialize)]
+struct RcCircuit {
+    u: f64,
+    resistance: f64,
+    capacitance: f64,
+    u_start: f64,
+    u_c: f64,
+}
+
+/// Start values come from here and from nowhere else.
+impl Default for RcCircuit {
+    fn default() -> Self {
+        Self { u: 0.0, resistance: 1e3, capacitance: 1e-3, u_start: 0.0, u_c: 0.0 }
+    }
+}
+
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Outputs {
+    u_c: f64,
+    i: f64,
+}
+
+type V = Row<Block<RcCircuit>>;
+
+impl Model for RcCircuit {
+    type Outputs = Outputs;
+
+    const INFO: Info = Info {
+        name: "RcCircuit",
+        description: "A capacitor charged through a resistor",
+        version: "1.0.0",
+        author: "You",
+        license: "MIT",
+        copyright: "Copyright (c) 2026 You",
+        experiment: Experiment { start: 0.0, stop: 5.0, step: 0.1 },
+        documentation: "<p>R C du<sub>c</sub>/dt = u − u<sub>c</sub>, solved exactly for a held input.</p>",
+    };
+
+    // Name, unit, range and place of every variable; names must differ, or this does not compile.
+    const TABLE: &'static Table<Block<Self>> = &Table::new(
+        const {
+            &[
+                V::input("u", &VOLT, "Source voltage", |m| &mut m.model.u),
+                V::output("u_c", &VOLT, "Voltage of the capacitor", |m| &mut m.out.u_c),
+                V::output("i", &AMPERE, "Current into the capacitor", |m| &mut m.out.i),
+                V::parameter("R", &OHM, "Resistance", |m| &mut m.model.resistance).above(0.0),
+                V::parameter("C", &FARAD, "Capacitance", |m| &mut m.model.capacitance).above(0.0),
+                V::parameter("u_start", &VOLT, "Voltage of the capacitor at the start", |m| &mut m.model.u_start),
+            ]
+        },
+    );
+
+    fn initialise(&mut self) {
+        self.u_c = self.u_start;
+    }
+
+    fn output(&self, _now: Elapsed, out: &mut Outputs) {
+        *out = Outputs { u_c: self.u_c, i: (self.u - self.u_c) / self.resistance };
+    }
+
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        let decay = (-step.h / (self.resistance * self.capacitance)).exp();
+        self.u_c = self.u + (self.u_c - self.u) * decay;
+        Ok(())
+    }
+}
+
+fmu_export::export!(RcCircuit);
