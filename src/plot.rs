@@ -4,7 +4,9 @@ use crate::cosimulation::{Column, Recording};
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 
-const SIZE: (u32, u32) = (1000, 240);
+/// Width of the curves and height of a panel, in pixels; the names stand beside the curves, never on them.
+const SIZE: (u32, u32) = (820, 240);
+const NAMES: u32 = 240;
 /// Most points drawn of a curve: its highest and its lowest point in as many stretches as the picture can show.
 const STRETCHES: usize = 1000;
 /// Colours that people with any kind of colour vision tell apart (Okabe and Ito).
@@ -38,7 +40,7 @@ pub fn svg(recording: &Recording) -> Result<String> {
     let mut text = String::new();
     {
         let height = SIZE.1 * u32::try_from(units.len())?;
-        let root = SVGBackend::with_string(&mut text, (SIZE.0, height)).into_drawing_area();
+        let root = SVGBackend::with_string(&mut text, (SIZE.0 + NAMES, height)).into_drawing_area();
         root.fill(&WHITE).map_err(drawing)?;
         for (area, unit) in root.split_evenly((units.len(), 1)).iter().zip(&units) {
             let columns: Vec<&Column> = recording.columns.iter().filter(|c| c.unit == **unit).collect();
@@ -46,7 +48,8 @@ pub fn svg(recording: &Recording) -> Result<String> {
             let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
             let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
             let margin = (0.06 * (high - low)).max(1e-9 + 1e-3 * high.abs().max(low.abs()));
-            let mut chart = ChartBuilder::on(area)
+            let (curves, names) = area.split_horizontally(SIZE.0);
+            let mut chart = ChartBuilder::on(&curves)
                 .margin(10)
                 .x_label_area_size(30)
                 .y_label_area_size(70)
@@ -60,19 +63,16 @@ pub fn svg(recording: &Recording) -> Result<String> {
                 .y_desc(if unit.is_empty() { "1" } else { unit })
                 .draw()
                 .map_err(drawing)?;
-            for (column, colour) in columns.iter().zip(COLOURS.iter().cycle()) {
-                chart
-                    .draw_series(LineSeries::new(thin(&recording.time, &column.values), colour.stroke_width(1)))
-                    .map_err(drawing)?
-                    .label(column.name.as_str())
-                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour.stroke_width(2)));
+            for (place, column) in columns.iter().enumerate() {
+                // The colours come again, paler, when they are used up.
+                let colour = COLOURS[place % COLOURS.len()].mix(if place < COLOURS.len() { 1.0 } else { 0.45 });
+                let line = LineSeries::new(thin(&recording.time, &column.values), colour.stroke_width(1));
+                chart.draw_series(line).map_err(drawing)?;
+                let y = 20 + 17 * i32::try_from(place)?;
+                names.draw(&PathElement::new([(0, y), (18, y)], colour.stroke_width(3))).map_err(drawing)?;
+                let name = Text::new(column.name.as_str(), (24, y - 5), ("sans-serif", 12));
+                names.draw(&name).map_err(drawing)?;
             }
-            chart
-                .configure_series_labels()
-                .background_style(WHITE.mix(0.8))
-                .position(SeriesLabelPosition::UpperLeft)
-                .draw()
-                .map_err(drawing)?;
         }
         root.present().map_err(drawing)?;
     }

@@ -1,5 +1,5 @@
 //! The importer on our own FMUs: state, reset, values of every type, several instances.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::float_cmp)]
 
 mod common;
 

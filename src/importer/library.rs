@@ -10,7 +10,10 @@ use std::path::Path;
 macro_rules! symbols {
     ($(#[$doc:meta])* $name:ident { $($field:ident: $symbol:literal = $kind:ty,)* ; $($optional:ident: $other:literal = $other_kind:ty,)* }) => {
         $(#[$doc])*
-        pub(super) struct $name { $($field: $kind,)* $($optional: Option<$other_kind>,)* }
+        pub(in crate::importer) struct $name {
+            $(pub(in crate::importer) $field: $kind,)*
+            $(pub(in crate::importer) $optional: Option<$other_kind>,)*
+        }
 
         impl $name {
             /// Finds every function.
@@ -18,7 +21,7 @@ macro_rules! symbols {
             /// # Safety
             /// Where the library has these symbols, they are functions of the standard's types. The struct is not used
             /// after the library is closed.
-            pub(super) unsafe fn load(library: &libloading::Library) -> Result<Self, String> {
+            pub(in crate::importer) unsafe fn load(library: &libloading::Library) -> Result<Self, String> {
                 Ok(Self {
                     $(
                         // SAFETY: the caller promises the type.
