@@ -86,6 +86,7 @@ fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -
 }
 
 /// A tick's number in its shortest form.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "plotters hands out references")]
 fn tick(x: &f64) -> String {
     ((x * 1e6).round() / 1e6).to_string()
 }
