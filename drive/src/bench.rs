@@ -41,6 +41,7 @@ pub fn drive(kind: Kind) -> Pair {
     (par.speed_loop.bandwidth, par.speed_loop.t_is, par.speed_loop.b) = (TAU * 5.0, 4.0, 1.0);
     (par.limit.i_q, par.limit.i, par.limit.tau) = (15.0, 15.0, 1.6 * RATED_TORQUE);
     (par.sensor.noise, par.sensor.resolution) = (0.01, 40.0 / 4096.0);
+    (par.start.i, par.start.speed) = (8.0, 0.15 * RATED_SPEED);
     if kind == Kind::VoltageFeedback {
         par.current.active_resistance = false;
         par.current.reference_feed_forward = true;

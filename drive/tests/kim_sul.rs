@@ -3,6 +3,7 @@
 
 use drive::Pair;
 use drive::bench::{drive as preset, *};
+use drive::control::start::CURRENT_FREQUENCY;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 use std::f64::consts::TAU;
@@ -132,5 +133,29 @@ fn sensored_yardstick() {
     for speed in [0.0, 0.5, 1.0] {
         let steady = steady(preset(Kind::Sensored), speed, 1.0);
         assert!(steady.holds() && steady.error.peak < 1e-2, "{steady:?}");
+    }
+}
+
+/// I-f start from 24 angles to half the speed, both ways, light and loaded, the dead time compensated: no failure.
+#[test]
+fn i_f_start_from_every_angle() {
+    let emf = ON_THE_EMF.into_iter().chain(MODELS).chain([Kind::VoltageFeedback]);
+    let starts = emf.flat_map(|kind| (0..24).map(move |k| (kind, k)));
+    for (kind, k) in starts {
+        let load = if k % 2 == 0 { 0.0 } else { 0.3 };
+        let side = if k % 4 < 2 { 1.0 } else { -1.0 };
+        let mut pair = with_dead_time(with(kind, |p| p.start.mode = CURRENT_FREQUENCY), true);
+        pair.plant.model.parameters.initial.theta_e = (15.0 * f64::from(k)).to_radians();
+        let mut peak = 0.0_f64;
+        run(&mut pair, 2.0, |t, p| {
+            p.controller.model.inputs.speed_ref = if t > 0.6 { side * 0.5 * RATED_SPEED } else { 0.0 };
+            p.plant.model.inputs.tau_load = load * RATED_TORQUE * (p.plant.out.speed / 2.0).tanh();
+            if t > 1.3 {
+                peak = peak.max(angle_error(p).abs());
+            }
+        });
+        let speed = speed(&pair);
+        assert!((speed - side * 0.5).abs() < 0.01, "{} from {} deg: {speed} pu", kind.name(), 15 * k);
+        assert!(peak < 8.0, "{} from {} deg: {peak} deg off after the hand-over", kind.name(), 15 * k);
     }
 }

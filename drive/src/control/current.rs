@@ -4,7 +4,7 @@
 //! K_i = w_c R^; or, with active resistance, K_i = w_c^2 L and -(w_c L - R^) i besides. What the hexagon cuts off drives
 //! the integrators back: I += T_s K_i (e + (u_limited - u) / K_p).
 
-use crate::frame::DqHat;
+use crate::frame::{Axis, DqHat, Estimated};
 use crate::motor::Motor;
 use fmu_core::unit::{ONE, RAD_PER_S};
 use fmu_core::{Row, Table};
@@ -98,6 +98,13 @@ impl CurrentController {
         )
     }
 
+    /// The controller in a frame `angle` (rad) behind the one that it was in: the same voltage.
+    pub fn in_frame_behind(self, angle: f64) -> Self {
+        let by = Axis::<Estimated>::at(angle);
+        let turned = by.to_stator(self.integral);
+        Self { integral: DqHat::new(turned.alpha(), turned.beta()) }
+    }
+
     /// What the PI gives for `error` (A), without decoupling and active resistance, in V.
     #[inline]
     pub fn output(&self, gains: &CurrentGains, error: DqHat) -> DqHat {
@@ -169,6 +176,14 @@ mod tests {
         let expected = 1.0 / CurrentLoop::default().bandwidth;
         assert!((time_constant(false) / expected - 1.0).abs() < 1e-3);
         assert!((time_constant(true) / expected - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_voltage_stays_when_the_frame_changes() {
+        let c = CurrentController { integral: DqHat::new(3.0, 4.0) };
+        let stator = Axis::<Estimated>::at(1.2).to_stator(c.integral);
+        let turned = c.in_frame_behind(0.5);
+        assert!((Axis::<Estimated>::at(0.7).to_stator(turned.integral) - stator).magnitude() < 1e-14);
     }
 
     #[test]

@@ -5,5 +5,6 @@ pub mod model;
 pub mod reference;
 pub mod sensor;
 pub mod speed;
+pub mod start;
 pub mod tables;
 pub mod zero_speed;

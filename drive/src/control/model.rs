@@ -3,6 +3,7 @@
 use crate::control::current::{CurrentController, CurrentGains};
 use crate::control::reference::{greatest_torque, max_torque_per_ampere};
 use crate::control::speed::{SpeedController, SpeedGains};
+use crate::control::start::{CURRENT_FREQUENCY, Lead, Led};
 use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::{Context, Estimate, Estimator, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
@@ -84,6 +85,8 @@ struct State {
     #[serde(with = "fixed_size")]
     samples: u64,
     estimator: Estimator,
+    /// What leads the rotor before the estimator is at work.
+    lead: Option<Lead>,
     speed: SpeedController,
     current: CurrentController,
     /// Commands of the last sample and of the one before it.
@@ -100,6 +103,26 @@ struct State {
     computed: ControllerOutputs,
     /// Outputs shown now.
     shown: ControllerOutputs,
+}
+
+impl State {
+    /// From the frame of the lead at the angle `frame` (rad) to the estimated one at `theta` (rad), turning at `w`
+    /// (rad/s): the same voltage, the same torque.
+    fn take_over(
+        &mut self,
+        gains: &Gains,
+        par: &ControllerParameters,
+        speed_ref: f64,
+        sample: &Sample,
+        (theta, w, frame): (f64, f64, f64),
+    ) {
+        let motor = &par.motor;
+        let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
+        let i_q = motor.torque(i.d(), i.q()) / gains.k;
+        self.current = self.current.in_frame_behind(frame - theta);
+        self.speed = SpeedController::take_over(&gains.speed, speed_ref, w / f64::from(motor.n_p), i_q);
+        self.lead = None;
+    }
 }
 
 /// A voltage command in stator axes, limited.
@@ -167,19 +190,32 @@ impl SensorlessController {
         };
         let context = Self::context(par);
         let kind = Kind::of(par.estimator).unwrap_or(Kind::Rasmussen);
+        let led = state.lead.as_mut().map(|lead| lead.update(&par.start, &context, par.theta_est, inputs, &sample));
         let estimate = if first {
             let (estimator, estimate) = Estimator::start(kind, &context, &sample, par.theta_est, n_p * par.speed_est);
             state.estimator = estimator;
             estimate
+        } else if let Some(Led::HandOver(theta, w, frame)) = led {
+            state.estimator.place(&context, &sample, theta, w);
+            state.take_over(gains, par, inputs.speed_ref, &sample, (theta, w, frame));
+            Estimate::new(theta, w, &sample)
+        } else if led.is_some() {
+            Estimate::default()
         } else {
             state.estimator.update(&context, &sample)
+        };
+        let estimate = match led {
+            Some(Led::Frame(theta, w, _)) => Estimate::new(theta, w, &sample),
+            _ => estimate,
         };
         let Estimate { theta, w, i: controlled, injection } = estimate;
         let speed = w / n_p;
 
         let i_hat = Axis::<Estimated>::at(theta).from_stator(controlled);
         // The low-speed law is Rasmussen's; it would only be a loss where the angle is known.
-        let i_ref = if kind == Kind::Rasmussen {
+        let i_ref = if let Some(Led::Frame(.., i_ref)) = led {
+            i_ref
+        } else if kind == Kind::Rasmussen {
             let i_d_ref = par.zero_speed.i_d_ref(speed);
             let limit = par.limit.i_q_beside(i_d_ref).min(gains.i_tau);
             DqHat::new(i_d_ref, state.speed.update(&gains.speed, inputs.speed_ref, speed, limit, T_s))
@@ -255,10 +291,14 @@ impl Model for SensorlessController {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        let ControllerParameters { limit, zero_speed, estimator, .. } = &self.parameters;
+        let ControllerParameters { limit, zero_speed, estimator, start, .. } = &self.parameters;
         let Some(kind) = Kind::of(*estimator) else {
             return Err(Fault::value("estimator", estimator, "one of the enumeration's values"));
         };
+        if start.mode == CURRENT_FREQUENCY && start.i > limit.i {
+            let allowed = format!("at most limit.i = {} A", limit.i);
+            return Err(Fault::value("start.i", format!("{} A", start.i), allowed));
+        }
         kind.validate(&Self::context(&self.parameters))?;
         if zero_speed.i_0 > limit.i {
             let allowed = format!("at most limit.i = {} A", limit.i);
@@ -269,7 +309,8 @@ impl Model for SensorlessController {
 
     fn initialise(&mut self) {
         let shown = ControllerOutputs { theta_est: wrap(self.parameters.theta_est), ..ControllerOutputs::default() };
-        self.state = State { computed: shown.clone(), shown, ..State::default() };
+        let lead = (self.parameters.start.mode == CURRENT_FREQUENCY).then(Lead::default);
+        self.state = State { computed: shown.clone(), shown, lead, ..State::default() };
     }
 
     fn output(&self, _now: Elapsed, out: &mut ControllerOutputs) {

@@ -62,6 +62,13 @@ impl SpeedController {
     }
 }
 
+impl SpeedController {
+    /// Starts with the output `i_q` (A) at the speed reference `w_ref` and the speed `w` (rad/s).
+    pub fn take_over(gains: &SpeedGains, w_ref: f64, w: f64, i_q: f64) -> Self {
+        Self { integral: i_q - gains.k_p * (gains.b * w_ref - w) }
+    }
+}
+
 type P = Row<SpeedLoop>;
 
 /// The speed loop's variables; their owner gives the prefix `speed_loop.`.

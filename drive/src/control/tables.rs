@@ -3,6 +3,7 @@
 use crate::control::current::{CURRENT_LOOP, CurrentLoop};
 use crate::control::sensor::{SENSOR, Sensor};
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
+use crate::control::start::{START, StartParameters};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::ESTIMATORS;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
@@ -91,6 +92,8 @@ pub struct ControllerParameters {
     pub limit: Limits,
     /// The low-speed law.
     pub zero_speed: ZeroSpeed,
+    /// The start.
+    pub start: StartParameters,
     /// First estimate of the electrical angle in rad.
     pub theta_est: f64,
     /// First estimate of the mechanical speed in rad/s.
@@ -114,6 +117,7 @@ impl Default for ControllerParameters {
             J: 1.5e-3,
             limit: Limits { i_q: 6.0, i: 7.5, tau: 1000.0 },
             zero_speed: ZeroSpeed::default(),
+            start: StartParameters::default(),
             theta_est: 0.0,
             speed_est: 0.0,
         }
@@ -157,6 +161,7 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             })
             .above(0.0),
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
+            P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
             P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
                 &mut p.theta_est
             }),

@@ -1,0 +1,185 @@
+//! The I-f start: a current of fixed magnitude leads the rotor to a speed at which an EMF shows the angle.
+//!
+//! 1. Two alignments of `t_align`: the current on the axis 90 degrees behind `initial.theta_est`, then on it. One alone has
+//!    a dead point where the rotor is half a turn away.
+//! 2. Waits for a speed reference; then the frame speeds up by `acceleration` to `speed`, to the side of the reference.
+//! 3. Holds that speed for `settle`, then hands over: the angle is the frame's and that of the EMF in it,
+//!    theta = theta_f + atan2(-s e_d, s e_q), e = v - R i - j w_f (L_d i_d + j L_q i_q), low-passed. The integrators of the
+//!    current controller are turned into the new frame, that of the speed controller takes the torque over.
+//!
+//! Damping: a rotor on a current vector swings with w_0 = sqrt(n_p K I / J) and nothing damps it. e_q / psi_M is its speed,
+//! so i_q = -2 zeta w_0 J / (n_p K) (e_q / psi_M - w_f), at most I, is a damping torque, at standstill too.
+//!
+//! Limits: the load must stay below K I; at standstill the voltage errors of the inverter are in e_q.
+
+use crate::control::model::ControllerInputs;
+use crate::estimator::interval::Interval;
+use crate::estimator::{Context, Sample};
+use crate::frame::DqHat;
+use crate::math::{atan2, exp};
+use fmu_core::unit::{AMPERE, Exponents, Quantity, SECOND, SPEED, Unit};
+use fmu_core::{Enumeration, Item, Row, Table};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// Mechanical acceleration.
+const RAD_PER_S2: Quantity =
+    Quantity::new("AngularAcceleration", Unit::si("rad/s2", Exponents::mechanical(0, 0, -2, 0).with_rad(1)));
+
+/// Damping ratio of the rotor on the current vector.
+const ZETA: f64 = 0.5;
+/// Bandwidth of the EMF in rad/s.
+const FILTER: f64 = TAU * 60.0;
+
+/// The starts; a value never changes.
+pub static STARTS: Enumeration = Enumeration {
+    name: "Start",
+    description: "What happens before the estimator is at work",
+    items: &[
+        Item { value: 1, name: "Direct", description: "Nothing: the estimator starts at once" },
+        Item { value: 2, name: "CurrentFrequency", description: "I-f start: a current leads the rotor to start.speed" },
+    ],
+};
+
+/// Value of the I-f start in [`STARTS`].
+pub const CURRENT_FREQUENCY: i32 = 2;
+
+/// Parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StartParameters {
+    /// Value in [`STARTS`].
+    pub mode: i32,
+    /// Current I in A, > 0.
+    pub i: f64,
+    /// Duration of each of the two alignments in s, > 0.
+    pub t_align: f64,
+    /// Mechanical acceleration in rad/s2, > 0.
+    pub acceleration: f64,
+    /// Mechanical speed of the hand-over in rad/s, > 0: 0.15 of the rated speed is good.
+    pub speed: f64,
+    /// Time at that speed in s, >= 0.
+    pub settle: f64,
+}
+
+impl Default for StartParameters {
+    fn default() -> Self {
+        Self { mode: 1, i: 5.0, t_align: 0.25, acceleration: 100.0, speed: 24.0, settle: 0.2 }
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+enum Stage {
+    #[default]
+    Behind,
+    On,
+    Ramp,
+    Hold,
+}
+
+/// State: a frame that leads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Lead {
+    stage: Stage,
+    /// Samples in this stage.
+    n: f64,
+    /// Electrical angle of the frame in rad.
+    theta: f64,
+    /// Electrical speed of the frame in rad/s.
+    w: f64,
+    /// EMF in the frame in V, low-passed.
+    e: DqHat,
+}
+
+/// What the lead asks for at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Led {
+    /// Control this current (A) in the frame at the electrical angle (rad) that turns at the speed (rad/s).
+    Frame(f64, f64, DqHat),
+    /// The rotor is at this electrical angle (rad) and speed (rad/s): the estimator's turn. The frame was at the last
+    /// angle (rad).
+    HandOver(f64, f64, f64),
+}
+
+impl Lead {
+    /// One sample; `theta_est` (rad) is where the second alignment brings the rotor.
+    pub fn update(
+        &mut self,
+        par: &StartParameters,
+        context: &Context,
+        theta_est: f64,
+        inputs: &ControllerInputs,
+        sample: &Sample,
+    ) -> Led {
+        let Context { motor, T_s, J, .. } = *context;
+        let n_p = f64::from(motor.n_p);
+        let theta_last = self.theta;
+        let jumps = self.n == 0.0 && matches!(self.stage, Stage::Behind | Stage::On);
+        self.theta = match self.stage {
+            Stage::Behind => theta_est - FRAC_PI_2,
+            Stage::On => theta_est,
+            Stage::Ramp | Stage::Hold => self.theta + T_s * self.w,
+        };
+        if !jumps {
+            let x = Interval::new(theta_last, self.theta, sample, T_s);
+            let flux = DqHat::new(motor.L_d * x.i.d(), motor.L_q * x.i.q());
+            let e = x.v - x.i * motor.R_s - flux.turned() * self.w;
+            self.e += (e - self.e) * (1.0 - exp(-FILTER * T_s));
+        }
+
+        self.n += 1.0;
+        let t = self.n * T_s;
+        let (rated, side) = (n_p * par.speed, if inputs.speed_ref < 0.0 { -1.0 } else { 1.0 });
+        match self.stage {
+            Stage::Behind if t >= par.t_align => self.enter(Stage::On),
+            Stage::On if t >= par.t_align && inputs.speed_ref != 0.0 => self.enter(Stage::Ramp),
+            Stage::Ramp => {
+                // The side is chosen once: at the first sample of the ramp.
+                let side = if self.w == 0.0 { side } else { self.w.signum() };
+                self.w = side * (self.w.abs() + T_s * n_p * par.acceleration).min(rated);
+                if self.w.abs() >= rated {
+                    self.enter(Stage::Hold);
+                }
+            }
+            Stage::Hold if t >= par.settle => {
+                let s = self.w.signum();
+                let theta = self.theta + atan2(-s * self.e.d(), s * self.e.q());
+                return Led::HandOver(theta, self.w, self.theta);
+            }
+            _ => {}
+        }
+        let grown = if self.stage == Stage::Behind { (3.0 * t / par.t_align).min(1.0) } else { 1.0 };
+        let K = motor.torque_constant();
+        let w_0 = (n_p * K * par.i / J).sqrt();
+        let gain = 2.0 * ZETA * w_0 * J / (n_p * K);
+        let i_q = (-gain * (self.e.q() / motor.psi_M - self.w)).clamp(-par.i, par.i);
+        Led::Frame(self.theta, self.w, DqHat::new(par.i * grown, i_q * grown))
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        (self.stage, self.n) = (stage, 0.0);
+    }
+}
+
+type P = Row<StartParameters>;
+
+/// The start's variables; their owner gives the prefix `start.`.
+pub const START: &Table<StartParameters> = &Table::new(
+    const {
+        &[
+            P::enumeration_parameter("mode", &STARTS, "What happens before the estimator is at work", |p| &mut p.mode),
+            P::parameter("i", &AMPERE, "Current that leads the rotor, I-f start", |p| &mut p.i).above(0.0),
+            P::parameter("t_align", &SECOND, "Duration of each of the two alignments, I-f start", |p| &mut p.t_align)
+                .above(0.0),
+            P::parameter("acceleration", &RAD_PER_S2, "Mechanical acceleration of the current, I-f start", |p| {
+                &mut p.acceleration
+            })
+            .above(0.0),
+            P::parameter("speed", &SPEED, "Mechanical speed of the hand-over to the estimator, I-f start", |p| {
+                &mut p.speed
+            })
+            .above(0.0),
+            P::parameter("settle", &SECOND, "Time at that speed before the hand-over, I-f start", |p| &mut p.settle)
+                .at_least(0.0),
+        ]
+    },
+);
