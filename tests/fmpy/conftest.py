@@ -1,0 +1,46 @@
+"""The archives under test: `FMU_ARCHIVES` names the folder that holds fmi2/NAME.fmu and fmi3/NAME.fmu."""
+
+import os
+import zipfile
+from pathlib import Path
+
+import pytest
+
+FOLDER = os.environ.get("FMU_ARCHIVES")
+if FOLDER is None:
+    pytest.exit("set FMU_ARCHIVES to the folder that `cargo run --release -- build` wrote, target/fmu by default", 2)
+ARCHIVES = sorted(Path(FOLDER).absolute().glob("fmi[23]/*.fmu"))
+if not ARCHIVES:
+    pytest.exit(f"no archive fmi2/NAME.fmu or fmi3/NAME.fmu in FMU_ARCHIVES = {FOLDER}", 2)
+
+
+def name(archive):
+    return f"{archive.parent.name}-{archive.stem}"
+
+
+@pytest.fixture(scope="session")
+def archives():
+    """The folder of the archives."""
+    return Path(FOLDER).absolute()
+
+
+@pytest.fixture(scope="session", params=ARCHIVES, ids=name)
+def archive(request):
+    """Each archive."""
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def unpacked_folders(tmp_path_factory):
+    """All archives, unpacked side by side as STANDARD/NAME."""
+    root = tmp_path_factory.mktemp("unpacked")
+    for archive in ARCHIVES:
+        with zipfile.ZipFile(archive) as file:
+            file.extractall(root / archive.parent.name / archive.stem)
+    return root
+
+
+@pytest.fixture(scope="session", params=ARCHIVES, ids=name)
+def unpacked(request, unpacked_folders):
+    """The folder of each unpacked archive."""
+    return unpacked_folders / request.param.parent.name / request.param.stem

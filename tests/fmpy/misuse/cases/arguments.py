@@ -1,0 +1,195 @@
+"""Null pointers, wrong tokens, empty names: what can be wrong before an instance knows what is wanted."""
+
+import ctypes as c
+
+from ..abi import DISCARD, ENVIRONMENT, ERROR, OK, REAL, Instance
+from ..case import case
+from ..run import recovers, refused, run
+from ..signatures import ALL, FUNCTIONS, RETURNS
+
+
+def nothing(letters):
+    """Zeros and null pointers for a list of arguments."""
+    return [None if letter == "p" else 0 for letter in letters]
+
+
+@case
+def null_instance(fmu):
+    """Every function of both standards with nothing but zeros."""
+    for name, letters in ALL.items():
+        result = getattr(fmu.library, name)(*nothing(letters))
+        match RETURNS.get(name, "status"):
+            case "status":
+                assert result == ERROR, (name, result)
+            case "instance" | "nothing":
+                assert result is None, name
+
+
+@case
+def versions(fmu):
+    """Both standards answer from the same binary."""
+    assert fmu.library.fmi2GetVersion() == b"2.0"
+    assert fmu.library.fmi3GetVersion() == b"3.0"
+    assert fmu.library.fmi2GetTypesPlatform() == b"default"
+
+
+@case
+def null_arguments(fmu):
+    """A valid instance in Step Mode and null for every pointer, one for every count."""
+    trace = run(fmu.instance().begin(), 20)
+    for name, letters in FUNCTIONS[fmu.version].items():
+        pointers = letters.count("p") - letters.startswith("p")
+        if name in RETURNS or "Instantiate" in name or pointers == 0:
+            continue
+        it = fmu.instance().begin()
+        rest = [1 if letter == "n" else value for letter, value in zip(letters[1:], nothing(letters[1:]))]
+        status = getattr(fmu.library, name)(it.handle, *rest)
+        if "FreeFMU" in name:  # free of null is nothing, as in C
+            assert status == OK, name
+        elif name.endswith("Status"):
+            assert status in (DISCARD, ERROR), name
+        else:
+            refused(it, status)
+        recovers(it, trace)
+        it.free()
+
+
+@case
+def null_arrays_of_nothing(fmu):
+    """No value at all is asked for: fine, even without arrays."""
+    it = fmu.instance().begin()
+    size = (0,) if fmu.version == 3 else ()
+    for suffix in ("Real", "Integer", "Boolean", "String") if fmu.version == 2 else ("Float64", "Int32", "Boolean", "String"):
+        for way in ("Get", "Set"):
+            assert it.call(way + suffix, None, 0, None, *size) == OK, way + suffix
+    assert it.step() == OK
+
+
+@case
+def null_half(fmu):
+    """References without values, values without references."""
+    references, values = (c.c_uint32 * 1)(fmu.of("input")[0].reference), (c.c_double * 1)()
+    size = (1,) if fmu.version == 3 else ()
+    for way in ("Get", "Set"):
+        for arrays in ((references, 1, None), (None, 1, values)):
+            it = fmu.instance().begin()
+            refused(it, it.call(way + REAL[fmu.version], *arrays, *size))
+            it.free()
+
+
+@case
+def null_out_pointers_of_a_step(fmu):
+    """FMI 3.0: every one of the four results of a step is missing in turn."""
+    if fmu.version == 2:
+        return
+    for missing in range(4):
+        it = fmu.instance().begin()
+        flags, reached = (c.c_uint8 * 3)(), c.c_double()
+        out = [*(c.byref(flags, i) for i in range(3)), c.byref(reached)]
+        out[missing] = None
+        refused(it, it.call("DoStep", 0.0, 1e-4, 1, *out))
+
+
+@case
+def numbers_of_values(fmu):
+    """FMI 3.0: more or fewer values than references; nothing is written beyond or at all."""
+    if fmu.version == 2:
+        return
+    outputs = fmu.of("output")
+    references = (c.c_uint32 * len(outputs))(*(v.reference for v in outputs))
+    for count in (0, len(outputs) - 1, len(outputs) + 1, 2**62):
+        it = fmu.instance().begin()
+        values = (c.c_double * (len(outputs) + 2))(*([7.25] * (len(outputs) + 2)))
+        refused(it, it.call("GetFloat64", references, len(outputs), values, count))
+        assert list(values) == [7.25] * len(values), "a refused get wrote"
+        it.free()
+    inputs = fmu.of("input")
+    references = (c.c_uint32 * len(inputs))(*(v.reference for v in inputs))
+    for count in (0, len(inputs) - 1, len(inputs) + 1):
+        it = fmu.instance().begin()
+        before = it.reals("Get", inputs)
+        refused(it, it.call("SetFloat64", references, len(inputs), (c.c_double * 20)(*([3.0] * 20)), count))
+        assert it.reals("Get", inputs) == before, "a refused set wrote"
+        it.free()
+
+
+def refusal(fmu, *words, name=b"it", **arguments):
+    """An instantiation that must fail with one message that says why."""
+    it = Instance(fmu, name, **arguments)
+    assert it.handle is None, f"instantiated with {name!r}, {arguments}"
+    assert len(it.errors()) == 1, it.messages
+    for word in words:
+        assert word.lower() in it.errors()[0].lower(), (word, it.errors())
+
+
+@case
+def wrong_token(fmu):
+    """Another token, none, an empty one, one that is longer; the message shows both where there are two."""
+    word = "guid" if fmu.version == 2 else "token"
+    wrong = "{00000000-0000-0000-0000-000000000000}"
+    refusal(fmu, word, wrong, fmu.token, token=wrong.encode())
+    refusal(fmu, word, token=fmu.token.encode() + b" ")
+    refusal(fmu, word, token=fmu.token.encode()[:-1])
+    refusal(fmu, word, token=b"\xff\xfe")
+    refusal(fmu, word, token=c.create_string_buffer(b""))
+    refusal(fmu, word, token=b"")  # handed over as NULL
+
+
+@case
+def wrong_name(fmu):
+    """No name, an empty one, blanks."""
+    for name in (None, b"", b"  \t"):
+        refusal(fmu, "name", name=name)
+
+
+@case
+def wrong_kind(fmu):
+    """Model exchange, scheduled execution, event mode: not in this FMU."""
+    if fmu.version == 2:
+        refusal(fmu, "fmuType", "fmi2CoSimulation", type=0)
+        refusal(fmu, type=17)
+        return
+    refusal(fmu, "event", events=True)
+    for kind, more in (("ModelExchange", 0), ("ScheduledExecution", 3)):
+        it = fmu.instance()
+        callbacks = [c.cast(it.logger, c.c_void_p), *([None] * more)]
+        create = fmu.function(f"Instantiate{kind}")
+        assert create(b"it", fmu.token.encode(), None, 0, 1, ENVIRONMENT, *callbacks) is None
+        assert len(it.errors()) == 1, it.messages
+
+
+@case
+def refused_without_a_logger(fmu):
+    """What cannot be said is not said, and nothing crashes."""
+    assert Instance(fmu, b"it", token=b"wrong", logger=False).handle is None
+    assert Instance(fmu, None, logger=False).handle is None
+    it = fmu.instance(logger=False).begin()
+    run(it, 5)
+    assert it.step(-1.0) == ERROR
+    assert it.call("Reset") == OK
+    run(it.begin(), 5)
+    if fmu.version == 2:  # no callbacks at all: an instance or not, no crash
+        handle = fmu.function("Instantiate")(b"it", 1, fmu.token.encode(), None, None, 0, 1)
+        fmu.function("FreeInstance")(handle)
+
+
+@case
+def resource_locations(fmu):
+    """No resource is needed: whatever is given is tolerated."""
+    places = (None, b"", b"file:///tmp/x/resources", b"file:/tmp/x", b"file:///a%20b%zz", b"\xff\xff", b"C:\\x", b"x" * 100_000)
+    for place in places:
+        it = fmu.instance(resources=place).begin()
+        run(it, 2)
+        it.free()
+
+
+@case
+def long_names(fmu):
+    """A name of a megabyte, one with percent signs, one in UTF-8, one that is not UTF-8."""
+    for name in (b"n" * 1_000_000, b"%s%n%d%p", "Prüfstand №1".encode()):
+        it = fmu.instance(name).begin()
+        run(it, 2)
+        assert it.step(0.0) == ERROR
+        assert it.errors()
+        it.free()
+    Instance(fmu, b"\xff\xfe\x80", logger=False).free()  # refused or not, no crash
