@@ -59,6 +59,13 @@ pub fn with_dead_time(mut pair: Pair, compensated: bool) -> Pair {
     pair
 }
 
+/// The machine's saturation: it tells the magnet's poles apart.
+pub fn with_saturation(mut pair: Pair) -> Pair {
+    let saturation = &mut pair.plant.model.parameters.saturation;
+    (saturation.c_2, saturation.c_3) = (40.0, 40.0);
+    pair
+}
+
 /// The drive turning at `speed` (pu), its angle and speed known at the start.
 pub fn turning(mut pair: Pair, speed: f64) -> Pair {
     pair.plant.model.parameters.initial.speed = speed * RATED_SPEED;

@@ -6,7 +6,7 @@
 //! Corrected print: the q row of (24) is L_q p i_q + w L_d i_d; (25) is exact only with the frame term.
 //!
 //! Limits: rated load is held from 0.03 of the rated speed, 0.05 with a compensated inverter; L_q + 20 % turns by 5.5 deg.
-//! The derivative of the measured current makes the speed noisy: the low-pass decides.
+//! With L_q + 20 % rated load oscillates above 0.75 of the rated speed. The derivative of the current makes the speed noisy.
 
 use crate::estimator::emf::pole;
 use crate::estimator::follower::Follower;
