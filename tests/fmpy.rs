@@ -79,7 +79,10 @@ fn environment() -> Result<PathBuf, String> {
     }
     let partial = scratch().join(format!("venv-partial-{}", process::id()));
     let _ = fs::remove_dir_all(&partial);
-    run(Command::new(base).args(["-m", "venv"]).arg(&partial), "a virtual environment (on Debian: package python3-venv)")?;
+    run(
+        Command::new(base).args(["-m", "venv"]).arg(&partial),
+        "a virtual environment (on Debian: package python3-venv)",
+    )?;
     let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement"];
     run(
         Command::new(partial.join(inside)).args(install).arg(&requirements),
@@ -109,12 +112,16 @@ fn base_python() -> Result<(String, String), String> {
             return Ok((name.clone(), String::from_utf8_lossy(&stdout).into_owned()));
         }
     }
-    Err(format!("these tests need Python 3.10 or later with venv and pip; tried {} (PYTHON names another)", candidates.join(", ")))
+    Err(format!(
+        "these tests need Python 3.10 or later with venv and pip; tried {} (PYTHON names another)",
+        candidates.join(", ")
+    ))
 }
 
 /// Runs a command to its end; otherwise one line with what was to be had, and what the command said.
 fn run(command: &mut Command, what: &str) -> Result<(), String> {
-    let output = command.output().map_err(|e| format!("no {what}: {}: {e}", command.get_program().to_string_lossy()))?;
+    let output =
+        command.output().map_err(|e| format!("no {what}: {}: {e}", command.get_program().to_string_lossy()))?;
     if output.status.success() {
         return Ok(());
     }
