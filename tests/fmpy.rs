@@ -15,7 +15,7 @@ use std::{env, fs, io, process};
 
 #[test]
 fn fmpy_validates_and_cosimulates() {
-    pytest("fmpy", &["test_validate.py", "test_cosimulation.py", "test_simulate_fmu.py"]);
+    pytest("fmpy", &["test_validate.py", "test_controller.py", "test_cosimulation.py", "test_simulate_fmu.py"]);
 }
 
 #[test]

@@ -18,7 +18,7 @@ RECORDED = {"plant": ("speed", "theta_e"), "controller": ("speed_est", "theta_es
 class Unit:
     """One FMU: a thin layer over FMPy that makes FMI 2.0 and FMI 3.0 look the same."""
 
-    def __init__(self, archive, parameters=None):
+    def __init__(self, archive, parameters=None, integers=None):
         self.description = read_model_description(archive)
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
         self.fmi2 = self.description.fmiVersion == "2.0"
@@ -34,10 +34,20 @@ class Unit:
         self.slave.instantiate()
         for name, value in (parameters or {}).items():
             self.set_reals([self.references[name]], [value])
+        for name, value in (integers or {}).items():
+            self.set_integer(name, value)
         if self.fmi2:
             self.slave.setupExperiment(startTime=0.0)
         self.slave.enterInitializationMode()
         self.slave.exitInitializationMode()
+
+    def set_integer(self, name, value):
+        """Sets an integer or an enumeration; FMI 3.0 has a setter for each."""
+        kinds = {v.name: v.type for v in self.description.modelVariables}
+        setter = self.slave.setInteger if self.fmi2 else self.slave.setInt64
+        if kinds[name] == "Int32":
+            setter = self.slave.setInt32
+        setter([self.references[name]], [value])
 
     def of(self, *names):
         """Value references."""

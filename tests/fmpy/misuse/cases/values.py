@@ -79,6 +79,22 @@ def duplicate_references(fmu):
 
 
 @case
+def vectors_are_set_whole_or_not_at_all(fmu):
+    """One bad value at the end or in the middle of vectors of every length: nothing changes."""
+    variables = fmu.of("input", "parameter")
+    starts = [float(v.start) for v in variables]
+    it = fmu.instance()
+    for length in range(2, len(variables) + 1):
+        for bad in {length // 2, length - 1}:
+            values = [0.9 * start or 0.25 for start in starts[:length]]
+            values[bad] = math.nan
+            references = [v.reference for v in variables[:length]]
+            refused(it, it.access("Set", REAL[fmu.version], references, (c.c_double * length)(*values)), variables[bad].name)
+            assert it.get(*(v.name for v in variables)) == starts
+            assert it.call("Reset") == OK
+
+
+@case
 def not_a_number(fmu):
     """NaN and infinities into every real input and parameter: refused with name, value and range; nothing changed."""
     trace = alone(fmu, 10)
