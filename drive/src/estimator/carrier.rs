@@ -151,10 +151,8 @@ pub const CARRIER: &Table<CarrierParameters> = &Table::new(
     const {
         &[
             P::parameter("voltage", &VOLT, "Voltage of the sinusoidal carrier", |p| &mut p.voltage).above(0.0),
-            P::parameter("frequency", &RAD_PER_S, "Angular frequency of the sinusoidal carrier", |p| {
-                &mut p.frequency
-            })
-            .above(0.0),
+            P::parameter("frequency", &RAD_PER_S, "Angular frequency of the sinusoidal carrier", |p| &mut p.frequency)
+                .above(0.0),
             P::parameter("zeta", &ONE, "Damping of the band-pass around the carrier", |p| &mut p.zeta).above(0.0),
         ]
     },

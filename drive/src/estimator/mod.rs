@@ -24,11 +24,11 @@ pub mod saliency;
 pub mod sensored;
 pub mod square_wave;
 pub mod tables;
+#[cfg(test)]
+pub(crate) mod testing;
 pub mod tracker;
 pub mod voltage_feedback;
 pub mod voltage_model;
-#[cfg(test)]
-pub(crate) mod testing;
 
 use crate::control::current::CurrentLoop;
 use crate::frame::{AlphaBeta, DqHat};
@@ -179,8 +179,9 @@ macro_rules! estimators {
             /// Whether the parameters suit this estimator.
             ///
             /// # Errors
-            /// As [`Estimating::validate`].
+            /// As [`Estimating::validate`]; the tracker cannot work.
             pub fn validate(self, context: &Context) -> Result<(), Fault> {
+                tracker::validate(context)?;
                 match self {
                     $(Self::$name => <$state>::validate(context),)*
                 }

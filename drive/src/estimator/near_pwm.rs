@@ -5,7 +5,7 @@
 //! one period, the first term turns away: sum(delta i delta psi) = D e^{j 2 theta} sum |delta psi|^2. Seen from the
 //! estimated frame the argument of the sum is 2 theta~: the angle comes straight from voltage and current differences,
 //! whatever the amplitude and with no inductance but the sign of D, and has no dead point at 90 deg. The share of the
-//! current controller's voltage in delta i is known and taken off first ([`response`]): it does not turn away. The mean
+//! current controller's voltage in delta i is known and taken off first ([`response`]): it would not turn away. The mean
 //! of three currents is free of the carrier.
 //!
 //! Limits: above about 0.2 of the rated speed the voltage is missed elsewhere; one sample of delay in the current that is
@@ -113,3 +113,29 @@ pub const NEAR_PWM: &Table<NearPwmParameters> = &Table::new(
         .above(0.0)]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use crate::estimator::testing::{finds_the_rotor, injected, salient};
+
+    #[test]
+    fn finds_the_rotor_with_both_delays() {
+        finds_the_rotor::<NearPwmInjection>(&EstimatorParameters::default(), 0.05);
+    }
+
+    /// The argument of the sum is 2 theta~ for every angle and any inductances of the right order.
+    #[test]
+    fn the_angle_is_straight() {
+        let mut par = EstimatorParameters::default();
+        par.tracker.bandwidth = 1e-9;
+        for degrees in [-28.0_f64, -10.0, 5.0, 28.0] {
+            let mut tracker = Tracker::default();
+            let theta_tilde = degrees.to_radians();
+            injected::<NearPwmInjection>(&par, &salient(), 0.0, theta_tilde, 1.0, 10, |state| tracker = state.tracker);
+            let e = tracker.w_frame / (2.0 * par.tracker.bandwidth);
+            assert!((e - theta_tilde).to_degrees().abs() < 0.05, "{degrees} deg: {}", e.to_degrees());
+        }
+    }
+}

@@ -114,3 +114,19 @@ pub const PULSATING: &Table<PulsatingParameters> = &Table::new(
         )]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use crate::estimator::testing::finds_the_rotor;
+
+    #[test]
+    fn finds_the_rotor_with_both_demodulations_and_both_delays() {
+        let mut par = EstimatorParameters::default();
+        for demodulation in [1, MEASUREMENT_AXES] {
+            par.pulsating.demodulation = demodulation;
+            finds_the_rotor::<PulsatingInjection>(&par, 0.1);
+        }
+    }
+}

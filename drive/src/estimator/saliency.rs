@@ -5,7 +5,7 @@
 //! magnet apart; [`standstill`](crate::control::standstill) does. Limits, of all of them: saliency is needed, and
 //! cross-saturation turns the axis of the inductances itself, by -9 to -21 deg at rated load.
 
-use crate::estimator::{Context, Sample};
+use crate::estimator::Sample;
 use crate::frame::{Axis, DqHat, Estimated};
 use crate::motor::Motor;
 use fmu_core::Fault;
@@ -34,38 +34,17 @@ impl Admittance {
     }
 }
 
-/// What the last interval changed, seen from the estimated frame in its middle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Change {
-    /// Of the current, in A.
-    pub i: DqHat,
-    /// Of the flux linkage by the whole voltage, in Wb.
-    pub psi: DqHat,
-}
-
-/// Of the current in A what the injected voltage made of it, and R i and back EMF, which are slow: without the share of
-/// the current controller's voltage, which is known. Seen from the stator axes, and `middle`, the estimated frame in the
-/// middle of the interval. Without that share taken off, noise goes round through the current controller into the angle.
+/// Response to the injected voltage in [k - 1, k): the change of the current (A) without the shares of the current
+/// controller's voltage and of R i, which are known. The back EMF is left in it; it is slow. Without the first share taken
+/// off, noise goes round through the current controller into the angle; without the second, a carrier that turns by w_h
+/// in stator axes is behind and the angle off by R S / w_h. Seen from `middle`, the estimated frame in the middle of the
+/// interval.
 #[inline]
 pub fn response(motor: &Motor, middle: Axis<Estimated>, sample: &Sample, T_s: f64) -> DqHat {
     let i = middle.from_stator(sample.i - sample.i_last);
-    let psi = middle.from_stator((sample.u - sample.u_injected) * T_s);
+    let resistive = (sample.i + sample.i_last) * (0.5 * motor.R_s);
+    let psi = middle.from_stator((sample.u - sample.u_injected - resistive) * T_s);
     DqHat::new(i.d() - psi.d() / motor.L_d, i.q() - psi.q() / motor.L_q)
-}
-
-impl Change {
-    /// In [k - 1, k), while the frame turned from `theta_last` to `theta` (rad).
-    #[inline]
-    pub fn over(theta_last: f64, theta: f64, sample: &Sample, T_s: f64) -> Self {
-        let middle = Axis::<Estimated>::at(0.5 * (theta_last + theta));
-        Self { i: middle.from_stator(sample.i - sample.i_last), psi: middle.from_stator(sample.u * T_s) }
-    }
-
-    /// What changed more than in `earlier`: back EMF and R i are slow and drop out.
-    #[inline]
-    pub fn beyond(self, earlier: Self) -> Self {
-        Self { i: self.i - earlier.i, psi: self.psi - earlier.psi }
-    }
 }
 
 /// Whether the machine can be found by injection.

@@ -1,8 +1,8 @@
 //! The estimators' parameters: one part each, under its own prefix.
 
+use crate::estimator::carrier::{CARRIER, CarrierParameters};
 use crate::estimator::emf::{EMF, EmfParameters};
 use crate::estimator::follower::{FOLLOWER, FollowerParameters};
-use crate::estimator::carrier::{CARRIER, CarrierParameters};
 use crate::estimator::near_pwm::{NEAR_PWM, NearPwmParameters};
 use crate::estimator::pulsating::{PULSATING, PulsatingParameters};
 use crate::estimator::rasmussen::{OBSERVER, RasmussenParameters};
