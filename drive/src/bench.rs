@@ -4,9 +4,11 @@
 //! A run is the closed loop of plant and controller, stepped at the sample period as an importer steps it.
 
 use crate::estimator::Kind;
+use crate::estimator::tracker::MECHANICAL_OBSERVER;
 use crate::math::{sin_cos, wrap};
 use crate::motor::Motor;
 use crate::pair::Pair;
+use fmu_core::{Elapsed, Step};
 use std::f64::consts::TAU;
 
 /// Rated mechanical speed in rad/s: 1500 rpm.
@@ -49,6 +51,19 @@ pub fn drive(kind: Kind) -> Pair {
         par.estimators.tracker.bandwidth = TAU * 15.0;
         par.estimators.emf.bandwidth = TAU * 300.0;
     }
+    if matches!(kind, Kind::SquareWaveInjection | Kind::NearPwmInjection) {
+        par.estimators.tracker.bandwidth = TAU * 40.0;
+        par.speed_loop.bandwidth = TAU * 12.0;
+    }
+    pair
+}
+
+/// The mechanical observer as tracker, of the bandwidth of the injections' figures, and a speed loop of `bandwidth`
+/// (rad/s).
+pub fn with_mechanical_observer(mut pair: Pair, bandwidth: f64) -> Pair {
+    let par = &mut pair.controller.model.parameters;
+    (par.estimators.tracker.kind, par.estimators.tracker.bandwidth) = (MECHANICAL_OBSERVER, TAU * 25.0);
+    par.speed_loop.bandwidth = bandwidth;
     pair
 }
 
@@ -233,4 +248,31 @@ pub fn speed_bandwidth(pair: &Pair, speed: f64) -> f64 {
         (low, gain) = (high, next);
     }
     f64::INFINITY
+}
+
+/// Rms value in A of the current (as a vector) that an injection makes at standstill, between the samples too.
+///
+/// # Panics
+/// When a step fails.
+pub fn injected_current(mut pair: Pair) -> f64 {
+    const PARTS: u32 = 20;
+    (pair.controller.model.parameters.sensor.noise, pair.controller.model.parameters.sensor.resolution) = (0.0, 0.0);
+    let T_s = pair.controller.model.parameters.T_s;
+    let (mut d, mut q) = (Statistics::default(), Statistics::default());
+    run(&mut pair, 0.4, |t, p| {
+        if t < 0.3 {
+            return;
+        }
+        let mut plant = p.plant.clone();
+        plant.model.inputs.u = p.controller.out.u;
+        let mut now = Elapsed::ZERO;
+        for _ in 0..PARTS {
+            let step = Step { start: now, h: T_s / f64::from(PARTS) };
+            plant.step(&step).expect("a step");
+            now = step.end();
+            d.add(plant.out.i_d);
+            q.add(plant.out.i_q);
+        }
+    });
+    d.std().hypot(q.std())
 }

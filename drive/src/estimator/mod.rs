@@ -8,6 +8,7 @@
 //! A new estimator implements [`Estimating`], has a row in the list at the end of this file and, for parameters of its
 //! own, a row in [`tables`]. It then appears in the enumeration, the FMUs and their documentation.
 
+pub mod carrier;
 pub mod current_model;
 pub mod direct_emf;
 pub mod emf;
@@ -15,8 +16,13 @@ pub mod emf_observer;
 pub mod extended_emf;
 pub mod follower;
 pub mod interval;
+pub mod near_pwm;
+pub mod pulsating;
 pub mod rasmussen;
+pub mod rotating;
+pub mod saliency;
 pub mod sensored;
+pub mod square_wave;
 pub mod tables;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -173,8 +179,9 @@ macro_rules! estimators {
             /// Whether the parameters suit this estimator.
             ///
             /// # Errors
-            /// As [`Estimating::validate`].
+            /// As [`Estimating::validate`]; the tracker cannot work.
             pub fn validate(self, context: &Context) -> Result<(), Fault> {
+                tracker::validate(context)?;
                 match self {
                     $(Self::$name => <$state>::validate(context),)*
                 }
@@ -231,6 +238,14 @@ estimators! {
         "Current model, Kim & Sul 2011, eq (28) to (30)";
     7 VoltageFeedback(voltage_feedback::VoltageFeedback)
         "Feedback of the current controller's voltage, Kim & Sul 2011, eq (31) and (32)";
+    8 RotatingInjection(rotating::RotatingInjection)
+        "Rotating voltage in stator axes, heterodyne, Kim & Sul 2011, eq (38) to (40)";
+    9 PulsatingInjection(pulsating::PulsatingInjection)
+        "Pulsating voltage along the estimated magnet axis, Kim & Sul 2011, eq (42) to (45)";
+    10 SquareWaveInjection(square_wave::SquareWaveInjection)
+        "Square-wave voltage at half the PWM frequency, Kim & Sul 2011, section III";
+    11 NearPwmInjection(near_pwm::NearPwmInjection)
+        "Voltage with a period of three samples, Kim & Sul 2011, section III";
     13 Sensored(sensored::Sensored)
         "Angle and speed of a sensor, theta_meas and speed_meas, Kim & Sul 2011, Fig. 1a";
 }

@@ -1,8 +1,12 @@
 //! The estimators' parameters: one part each, under its own prefix.
 
+use crate::estimator::carrier::{CARRIER, CarrierParameters};
 use crate::estimator::emf::{EMF, EmfParameters};
 use crate::estimator::follower::{FOLLOWER, FollowerParameters};
+use crate::estimator::near_pwm::{NEAR_PWM, NearPwmParameters};
+use crate::estimator::pulsating::{PULSATING, PulsatingParameters};
 use crate::estimator::rasmussen::{OBSERVER, RasmussenParameters};
+use crate::estimator::square_wave::{SQUARE_WAVE, SquareWaveParameters};
 use crate::estimator::tracker::{TRACKER, TrackerParameters};
 use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};
@@ -18,6 +22,14 @@ pub struct EstimatorParameters {
     pub emf: EmfParameters,
     /// Voltage model and current model.
     pub model: FollowerParameters,
+    /// The sinusoidal carrier of rotating and pulsating injection.
+    pub carrier: CarrierParameters,
+    /// Pulsating injection.
+    pub pulsating: PulsatingParameters,
+    /// Square-wave injection.
+    pub square_wave: SquareWaveParameters,
+    /// Injection near the PWM frequency.
+    pub near_pwm: NearPwmParameters,
 }
 
 type P = Row<EstimatorParameters>;
@@ -30,6 +42,10 @@ pub const ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = &Table::new(
             P::part("tracker.", &Part { table: TRACKER, lens: |p| &mut p.tracker }),
             P::part("emf.", &Part { table: EMF, lens: |p| &mut p.emf }),
             P::part("model.", &Part { table: FOLLOWER, lens: |p| &mut p.model }),
+            P::part("carrier.", &Part { table: CARRIER, lens: |p| &mut p.carrier }),
+            P::part("pulsating.", &Part { table: PULSATING, lens: |p| &mut p.pulsating }),
+            P::part("square_wave.", &Part { table: SQUARE_WAVE, lens: |p| &mut p.square_wave }),
+            P::part("near_pwm.", &Part { table: NEAR_PWM, lens: |p| &mut p.near_pwm }),
         ]
     },
 );

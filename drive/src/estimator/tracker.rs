@@ -10,8 +10,9 @@
 
 use crate::estimator::Context;
 use fmu_core::unit::RAD_PER_S;
-use fmu_core::{Enumeration, Item, Row, Table};
+use fmu_core::{Enumeration, Fault, Item, Row, Table};
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 
 /// The trackers; a value never changes.
 pub static TRACKERS: Enumeration = Enumeration {
@@ -84,6 +85,21 @@ impl Tracker {
             self.w += T_s * rho * rho * e;
         }
     }
+}
+
+/// Whether the tracker can work.
+///
+/// # Errors
+/// The mechanical observer has no inertia.
+pub fn validate(context: &Context) -> Result<(), Fault> {
+    if context.par.tracker.kind == MECHANICAL_OBSERVER && context.J.partial_cmp(&0.0) != Some(Ordering::Greater) {
+        return Err(Fault::new(format!(
+            "mechanics.J = {} kg.m2 and tracker.kind = {MECHANICAL_OBSERVER} (MechanicalObserver): that observer divides \
+             torque by inertia, which must be above 0",
+            context.J
+        )));
+    }
+    Ok(())
 }
 
 type P = Row<TrackerParameters>;

@@ -1,0 +1,141 @@
+//! Injection near the PWM frequency, a period of three samples: 10 of the review (Kim & Sul 2011, III, [13]).
+//!
+//! A voltage V e^{j 2 pi k / 3} in stator axes. The changes of current and injected flux linkage from one interval to the
+//! next obey delta i = S delta psi + D e^{j 2 theta} conj(delta psi), as complex numbers. Times delta psi and summed over
+//! one period, the first term turns away: sum(delta i delta psi) = D e^{j 2 theta} sum |delta psi|^2. Seen from the
+//! estimated frame the argument of the sum is 2 theta~: the angle comes straight from voltage and current differences,
+//! whatever the amplitude and with no inductance but the sign of D, and has no dead point at 90 deg. The share of the
+//! current controller's voltage in delta i is known and taken off first ([`response`]): it would not turn away. The mean
+//! of three currents is free of the carrier.
+//!
+//! Limits: above about 0.2 of the rated speed the voltage is missed elsewhere; one sample of delay in the current that is
+//! controlled.
+
+use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
+use crate::estimator::tracker::Tracker;
+use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
+use crate::math::atan2;
+use fmu_core::unit::VOLT;
+use fmu_core::{Fault, Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NearPwmParameters {
+    /// Voltage V, > 0.
+    pub voltage: f64,
+}
+
+impl Default for NearPwmParameters {
+    fn default() -> Self {
+        Self { voltage: 150.0 }
+    }
+}
+
+/// State.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NearPwmInjection {
+    tracker: Tracker,
+    /// Response of the last interval in A.
+    response: DqHat,
+    /// Injected voltage of the last interval in V.
+    u: DqHat,
+    /// Products of the last two intervals in A.V, the newest first.
+    products: [DqHat; 2],
+    /// Currents of the last two samples in the estimated frame, in A, the newest first.
+    currents: [DqHat; 2],
+}
+
+/// Product of two vectors as complex numbers.
+#[inline]
+fn product(a: DqHat, b: DqHat) -> DqHat {
+    DqHat::new(a.d() * b.d() - a.q() * b.q(), a.d() * b.q() + a.q() * b.d())
+}
+
+impl NearPwmInjection {
+    fn estimate(&self, context: &Context, sample: &Sample, i: DqHat) -> Estimate {
+        const HALF_SQRT_3: f64 = 0.866_025_403_784_438_6;
+        let direction = match sample.k % 3 {
+            0 => AlphaBeta::new(1.0, 0.0),
+            1 => AlphaBeta::new(-0.5, HALF_SQRT_3),
+            _ => AlphaBeta::new(-0.5, -HALF_SQRT_3),
+        };
+        Estimate {
+            theta: self.tracker.theta,
+            w: self.tracker.w,
+            i: Axis::<Estimated>::at(self.tracker.theta).to_stator(i),
+            injection: Injection::Stator(direction * context.par.near_pwm.voltage),
+        }
+    }
+}
+
+impl Estimating for NearPwmInjection {
+    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
+        let this = Self { tracker: Tracker::at(theta, w, context.T_s), currents: [i; 2], ..Self::default() };
+        (this, this.estimate(context, sample, i))
+    }
+
+    #[inline]
+    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+        let Self { tracker, response: last, u: u_last, products, currents } = self;
+        tracker.advance(context.T_s);
+        let middle = Axis::<Estimated>::at(0.5 * (tracker.theta_last + tracker.theta));
+        let (x, u) = (response(context.motor, middle, sample, context.T_s), middle.from_stator(sample.u_injected));
+        let newest = product(x - *last, u - *u_last);
+        (*last, *u_last) = (x, u);
+        let sum = newest + products[0] + products[1];
+        *products = [newest, products[0]];
+        let sign = Admittance::of(context.motor).difference.signum();
+        let e = 0.5 * atan2(sign * sum.q(), sign * sum.d());
+        tracker.correct(context, context.par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample.tau_ref);
+
+        let i = Axis::<Estimated>::at(tracker.theta).from_stator(sample.i);
+        let free = (i + currents[0] + currents[1]) * (1.0 / 3.0);
+        *currents = [i, currents[0]];
+        self.estimate(context, sample, free)
+    }
+
+    fn validate(context: &Context) -> Result<(), Fault> {
+        validate_saliency(context.motor)
+    }
+}
+
+type P = Row<NearPwmParameters>;
+
+/// The variables; their owner gives the prefix `near_pwm.`.
+pub const NEAR_PWM: &Table<NearPwmParameters> = &Table::new(
+    const {
+        &[P::parameter("voltage", &VOLT, "Voltage of the vector that turns by 120 degrees each sample", |p| {
+            &mut p.voltage
+        })
+        .above(0.0)]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use crate::estimator::testing::{finds_the_rotor, injected, salient};
+
+    #[test]
+    fn finds_the_rotor_with_both_delays() {
+        finds_the_rotor::<NearPwmInjection>(&EstimatorParameters::default(), 0.05);
+    }
+
+    /// The argument of the sum is 2 theta~ for every angle and any inductances of the right order.
+    #[test]
+    fn the_angle_is_straight() {
+        let mut par = EstimatorParameters::default();
+        par.tracker.bandwidth = 1e-9;
+        for degrees in [-28.0_f64, -10.0, 5.0, 28.0] {
+            let mut tracker = Tracker::default();
+            let theta_tilde = degrees.to_radians();
+            injected::<NearPwmInjection>(&par, &salient(), 0.0, theta_tilde, 1.0, 10, |state| tracker = state.tracker);
+            let e = tracker.w_frame / (2.0 * par.tracker.bandwidth);
+            assert!((e - theta_tilde).to_degrees().abs() < 0.05, "{degrees} deg: {}", e.to_degrees());
+        }
+    }
+}

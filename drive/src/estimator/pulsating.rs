@@ -1,0 +1,132 @@
+//! Pulsating injection along the estimated d axis: 8 of the review (Kim & Sul (42)-(45)).
+//!
+//! A voltage u = V cos(phi k) along the estimated d axis changes the current in a sample, with theta~ = theta - theta^ and
+//! S, D of [`saliency`](crate::estimator::saliency), by x_d = T_s (S + D cos 2 theta~) u, x_q = T_s D sin(2 theta~) u.
+//! - Heterodyne: band-pass, times 2 u, low-pass ([`carrier`](crate::estimator::carrier)): eps = T_s D V^2 sin(2 theta~).
+//! - 45-degree measurement axes (Fig. 10): the magnitudes of (x_d + x_q) / sqrt 2 and (x_d - x_q) / sqrt 2 are equal where
+//!   theta~ = 0. Rectified, subtracted, low-pass: 2 sqrt 2 / pi T_s D V sin(2 theta~), whatever the phase of the carrier.
+//!
+//! e = eps / (2 T_s D V^2). Corrected print: (44) has cos^2 and sin^2 of theta~ and no 1/2, so (45) is a factor 2 low.
+//! Limits: the delay of the filters; e has zeros at 0, 90 and 180 deg, of which 90 deg is unstable.
+
+use crate::estimator::carrier::{self, BandPass, Carrier, PeriodMean};
+use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
+use crate::estimator::tracker::Tracker;
+use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
+use fmu_core::{Enumeration, Fault, Item, Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// The demodulations; a value never changes.
+pub static DEMODULATIONS: Enumeration = Enumeration {
+    name: "Demodulation",
+    description: "Demodulation of pulsating injection",
+    items: &[
+        Item { value: 1, name: "Heterodyne", description: "Product with the carrier, Kim & Sul 2011, Fig. 9" },
+        Item { value: 2, name: "MeasurementAxes", description: "Magnitudes in axes at 45 degrees, Fig. 10" },
+    ],
+};
+
+/// Value of the 45-degree measurement axes in [`DEMODULATIONS`].
+pub const MEASUREMENT_AXES: i32 = 2;
+
+/// Parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PulsatingParameters {
+    /// Value in [`DEMODULATIONS`].
+    pub demodulation: i32,
+}
+
+impl Default for PulsatingParameters {
+    fn default() -> Self {
+        Self { demodulation: 1 }
+    }
+}
+
+/// State.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PulsatingInjection {
+    tracker: Tracker,
+    /// Of the current.
+    notch: BandPass<Estimated>,
+    /// Of the response to the injected voltage.
+    band_pass: BandPass<Estimated>,
+    low_pass: PeriodMean,
+}
+
+impl PulsatingInjection {
+    fn estimate(&self, carrier: &Carrier, i: AlphaBeta) -> Estimate {
+        let injection = Injection::Estimated(DqHat::new(carrier.cos, 0.0));
+        Estimate { theta: self.tracker.theta, w: self.tracker.w, i, injection }
+    }
+}
+
+impl Estimating for PulsatingInjection {
+    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
+        let (tracker, notch) = (Tracker::at(theta, w, context.T_s), BandPass::start(i));
+        let this = Self { tracker, notch, ..Self::default() };
+        (this, this.estimate(&Carrier::at(context, sample.k), sample.i))
+    }
+
+    #[inline]
+    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+        use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
+        let Self { tracker, notch, band_pass, low_pass } = self;
+        let Context { motor, T_s, par, .. } = *context;
+        tracker.advance(T_s);
+        let carrier = Carrier::at(context, sample.k);
+        let middle = Axis::<Estimated>::at(0.5 * (tracker.theta_last + tracker.theta));
+        let x = band_pass.update(&carrier, response(motor, middle, sample, T_s));
+        let demodulated = if par.pulsating.demodulation == MEASUREMENT_AXES {
+            let magnitudes = ((x.d() + x.q()).abs() - (x.d() - x.q()).abs()) * FRAC_1_SQRT_2;
+            magnitudes * (0.5 * FRAC_PI_2 * SQRT_2) * par.carrier.voltage
+        } else {
+            2.0 * x.q() * middle.from_stator(sample.u_injected).d()
+        };
+        let epsilon = low_pass.update(&carrier, demodulated);
+        let V = par.carrier.voltage;
+        let e = epsilon / (2.0 * T_s * Admittance::of(motor).difference * V * V);
+        tracker.correct(context, par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample.tau_ref);
+
+        let axis = Axis::<Estimated>::at(tracker.theta);
+        let i = axis.from_stator(sample.i);
+        let free = axis.to_stator(i - notch.update(&carrier, i));
+        self.estimate(&carrier, free)
+    }
+
+    fn validate(context: &Context) -> Result<(), Fault> {
+        carrier::validate(context)?;
+        validate_saliency(context.motor)
+    }
+}
+
+type P = Row<PulsatingParameters>;
+
+/// The variables; their owner gives the prefix `pulsating.`.
+pub const PULSATING: &Table<PulsatingParameters> = &Table::new(
+    const {
+        &[P::enumeration_parameter(
+            "demodulation",
+            &DEMODULATIONS,
+            "How the angle error is found in the carrier's current",
+            |p| &mut p.demodulation,
+        )]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use crate::estimator::testing::finds_the_rotor;
+
+    #[test]
+    fn finds_the_rotor_with_both_demodulations_and_both_delays() {
+        let mut par = EstimatorParameters::default();
+        for demodulation in [1, MEASUREMENT_AXES] {
+            par.pulsating.demodulation = demodulation;
+            finds_the_rotor::<PulsatingInjection>(&par, 0.1);
+        }
+    }
+}
