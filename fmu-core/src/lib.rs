@@ -1,7 +1,7 @@
 //! What a model is, for an exporter and for an author: the trait [`Model`], its variable [`Table`], quantities and units,
 //! time on an integer grid, and the neutral [`Description`].
 //!
-//! Layers, from below: [`unit`], [`variable`], [`table`], [`model`], [`description`]. No motor, no XML, no C, no `unsafe`.
+//! Layers, from below: [`mod@unit`], [`variable`], [`table`], [`model`], [`description`]. No motor, no XML, no C, no `unsafe`.
 
 #![forbid(unsafe_code)]
 
