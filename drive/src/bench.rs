@@ -4,6 +4,7 @@
 //! A run is the closed loop of plant and controller, stepped at the sample period as an importer steps it.
 
 use crate::estimator::Kind;
+use crate::estimator::kalman::KalmanParameters;
 use crate::estimator::tracker::MECHANICAL_OBSERVER;
 use crate::math::{sin_cos, wrap};
 use crate::motor::Motor;
@@ -44,6 +45,8 @@ pub fn drive(kind: Kind) -> Pair {
     (par.limit.i_q, par.limit.i, par.limit.tau) = (15.0, 15.0, 1.6 * RATED_TORQUE);
     (par.sensor.noise, par.sensor.resolution) = (0.01, 40.0 / 4096.0);
     (par.start.i, par.start.speed) = (8.0, 0.15 * RATED_SPEED);
+    let w = 0.05 * 3.0 * RATED_SPEED;
+    par.estimators.kalman = KalmanParameters::new(machine().psi_M, TAU * 20.0, w, 0.01, par.T_s);
     if kind == Kind::VoltageFeedback {
         par.current.active_resistance = false;
         par.current.reference_feed_forward = true;

@@ -16,6 +16,7 @@ pub mod emf_observer;
 pub mod extended_emf;
 pub mod follower;
 pub mod interval;
+pub mod kalman;
 pub mod near_pwm;
 pub mod pulsating;
 pub mod rasmussen;
@@ -248,6 +249,8 @@ estimators! {
         "Voltage with a period of three samples, Kim & Sul 2011, section III";
     13 Sensored(sensored::Sensored)
         "Angle and speed of a sensor, theta_meas and speed_meas, Kim & Sul 2011, Fig. 1a";
+    14 KalmanFilter(kalman::Kalman)
+        "Extended Kalman filter on stator flux, speed and angle, Kim & Sul 2011, section II.A";
 }
 
 impl Default for Estimator {

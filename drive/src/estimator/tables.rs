@@ -3,6 +3,7 @@
 use crate::estimator::carrier::{CARRIER, CarrierParameters};
 use crate::estimator::emf::{EMF, EmfParameters};
 use crate::estimator::follower::{FOLLOWER, FollowerParameters};
+use crate::estimator::kalman::{KALMAN, KalmanParameters};
 use crate::estimator::near_pwm::{NEAR_PWM, NearPwmParameters};
 use crate::estimator::pulsating::{PULSATING, PulsatingParameters};
 use crate::estimator::rasmussen::{OBSERVER, RasmussenParameters};
@@ -30,6 +31,8 @@ pub struct EstimatorParameters {
     pub square_wave: SquareWaveParameters,
     /// Injection near the PWM frequency.
     pub near_pwm: NearPwmParameters,
+    /// The Kalman filter.
+    pub kalman: KalmanParameters,
 }
 
 type P = Row<EstimatorParameters>;
@@ -46,6 +49,7 @@ pub const ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = &Table::new(
             P::part("pulsating.", &Part { table: PULSATING, lens: |p| &mut p.pulsating }),
             P::part("square_wave.", &Part { table: SQUARE_WAVE, lens: |p| &mut p.square_wave }),
             P::part("near_pwm.", &Part { table: NEAR_PWM, lens: |p| &mut p.near_pwm }),
+            P::part("kalman.", &Part { table: KALMAN, lens: |p| &mut p.kalman }),
         ]
     },
 );
