@@ -3,9 +3,11 @@
 //! - [`commands`]: what the command line does, one module a command.
 //! - [`workspace`], [`pack`], [`documentation`], [`licences`]: from Rust sources to `.fmu` files.
 //! - [`importer`]: runs any co-simulation FMU; the only place with `unsafe` code.
+//! - [`check`]: whether an FMU keeps to its standard.
 //! - [`cosimulation`]: several FMUs connected; [`plot`]: what they did, as a picture.
 //! - [`reproduce`]: the paper's experiments.
 
+pub mod check;
 pub mod commands;
 pub mod cosimulation;
 pub mod documentation;

@@ -1,7 +1,8 @@
 //! The command `fmu`.
 
 use clap::{Parser, Subcommand};
-use fmu::commands::{build, reproduce, simulate};
+use fmu::check::probe;
+use fmu::commands::{build, check, reproduce, simulate};
 use std::process::ExitCode;
 
 /// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.
@@ -18,7 +19,10 @@ struct Cli {
 enum Command {
     Build(build::Build),
     Simulate(simulate::Simulate),
+    Check(check::Check),
     Reproduce(reproduce::Reproduce),
+    #[command(hide = true)]
+    Probe(probe::Probe),
 }
 
 fn main() -> ExitCode {
@@ -30,6 +34,8 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }),
         Command::Simulate(args) => simulate::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Check(args) => check::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
+        Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
     };
     outcome.unwrap_or_else(|error| {

@@ -21,7 +21,7 @@ pub fn format(x: f64) -> String {
 }
 
 /// A double in any of the forms that xs:double has.
-pub(crate) fn parse(text: &str) -> Option<f64> {
+pub fn parse(text: &str) -> Option<f64> {
     match text.trim() {
         "INF" | "+INF" => Some(f64::INFINITY),
         "-INF" => Some(f64::NEG_INFINITY),

@@ -6,17 +6,17 @@ mod print;
 pub(crate) use parse::parse;
 pub(crate) use print::print;
 
-/// An element.
+/// An element of an XML document, as the file has it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Element {
+pub struct Element {
     /// Name, with its namespace prefix where it has one.
-    pub(crate) name: String,
+    pub name: String,
     /// Attributes in the order of the file, values unescaped.
-    pub(crate) attributes: Vec<(String, String)>,
+    pub attributes: Vec<(String, String)>,
     /// Child elements in the order of the file.
-    pub(crate) children: Vec<Element>,
+    pub children: Vec<Element>,
     /// Line of the start tag, from 1; 0 for one that was not read.
-    pub(crate) line: usize,
+    pub line: usize,
 }
 
 impl Element {
@@ -50,18 +50,26 @@ impl Element {
         self
     }
 
+    /// The root element of an XML document.
+    ///
+    /// # Errors
+    /// It is not well-formed, or nested too deep.
+    pub fn parse(text: &str) -> Result<Self, crate::Error> {
+        parse(text)
+    }
+
     /// The value of an attribute.
-    pub(crate) fn get(&self, name: &str) -> Option<&str> {
+    pub fn get(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
     }
 
     /// The first child of this name.
-    pub(crate) fn child(&self, name: &str) -> Option<&Element> {
+    pub fn child(&self, name: &str) -> Option<&Element> {
         self.children.iter().find(|c| c.name == name)
     }
 
     /// All children of this name.
-    pub(crate) fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Element> {
+    pub fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Element> {
         self.children.iter().filter(move |c| c.name == name)
     }
 }

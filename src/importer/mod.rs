@@ -22,6 +22,7 @@ mod fmi3;
 mod instance;
 mod library;
 mod log;
+pub mod raw;
 mod standard;
 mod value;
 
@@ -142,7 +143,7 @@ fn explain(instance: &str, refusal: Refusal, message: Option<String>) -> Error {
 }
 
 /// `file:///` and the path, other characters than those of RFC 3986 percent-encoded.
-fn file_uri(path: &Path) -> String {
+pub(crate) fn file_uri(path: &Path) -> String {
     let path = path.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
     let root = if path.starts_with('/') { "file://" } else { "file:///" };
     let encode = |byte: u8| {

@@ -1,0 +1,339 @@
+//! The archive, by its raw headers (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
+
+use super::zip::inside;
+use super::{Check, Level, Levels, Run, Subject, Verdict};
+use model_description::{Element, FmiVersion};
+
+const ZIP: &str = "2.0.5, 2.3; 3.0.2, 2.5.1";
+const STRUCTURE: &str = "2.0.5, 2.3; 3.0.2, 2.5.1.4";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "Z01a", requirement: "The file's extension is .fmu.", clause: ZIP, levels: Levels::MUST, run: Run::File(extension) },
+    Check { id: "Z01b", requirement: "Entries have relative names with forward slashes that stay inside the archive.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1; APPNOTE 4.4.17", levels: Levels::MUST, run: Run::File(names) },
+    Check { id: "Z01c", requirement: "Names of entries are ASCII.", clause: ZIP, levels: Levels::SHOULD, run: Run::File(ascii) },
+    Check { id: "Z01d", requirement: "Entries are stored or deflated (method 0 or 8).", clause: ZIP, levels: Levels::MUST, run: Run::File(methods) },
+    Check { id: "Z01e", requirement: "A data descriptor (general purpose bit 3) only comes with deflate.", clause: ZIP, levels: Levels::MUST, run: Run::File(descriptors) },
+    Check { id: "Z01f", requirement: "Version needed to extract is at most 2.0, so there is no ZIP64.", clause: ZIP, levels: Levels::MUST, run: Run::File(needed) },
+    Check { id: "Z01g", requirement: "Nothing is encrypted.", clause: ZIP, levels: Levels::MUST, run: Run::File(encryption) },
+    Check { id: "Z01h", requirement: "The archive is neither split nor spanned.", clause: ZIP, levels: Levels::MUST, run: Run::File(split) },
+    Check { id: "Z01i", requirement: "There are no links.", clause: ZIP, levels: Levels::MUST, run: Run::File(links) },
+    Check { id: "Z01j", requirement: "Every entry unpacks to what its checksum says.", clause: "APPNOTE 4.4.7", levels: Levels::MUST, run: Run::File(contents) },
+    Check { id: "Z01k", requirement: "No name is there twice, and local and central headers agree.", clause: "APPNOTE 4.3", levels: Levels::HARD, run: Run::File(headers) },
+    Check { id: "Z02a", requirement: "There is at least one implementation: binaries or sources.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(implementation) },
+    Check { id: "Z02b", requirement: "The root has the standard's entries only.", clause: STRUCTURE, levels: Levels::SHOULD, run: Run::File(root) },
+    Check { id: "Z03", requirement: "Folders below binaries/ have the standard's names for platforms.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(platforms) },
+    Check { id: "X03", requirement: "In every platform's folder a library has the name of modelIdentifier.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(base_names) },
+    Check { id: "Z04a", requirement: "There is documentation/index.html.", clause: STRUCTURE, levels: Levels::SHOULD, run: Run::File(documentation) },
+    Check { id: "Z04b", requirement: "documentation/licenses has license.txt or license.html (in FMI 3.0 or license.spdx) as its entry.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(licences) },
+    Check { id: "Z04c", requirement: "An FMU that needs a tool tells so in documentation/externalDependencies.txt or .html.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(dependencies) },
+    Check { id: "Z05", requirement: "An icon or diagram as SVG comes with one as PNG.", clause: "3.0.2, 2.5.1", levels: Levels(None, Some(Level::Must)), run: Run::File(pictures) },
+    Check { id: "Z06", requirement: "Folders below extra/ have reverse domain names.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.6", levels: Levels::SHOULD, run: Run::File(extra) },
+    Check { id: "Z07", requirement: "Sources come with sources/buildDescription.xml and without the standard's headers.", clause: "3.0.2, 2.5.1.2", levels: Levels(Some(Level::Should), Some(Level::Should)), run: Run::File(sources) },
+    Check { id: "I01", requirement: "terminalsAndIcons.xml is well-formed and names variables that exist.", clause: "3.0.2, 2.4.9", levels: Levels::MUST, run: Run::File(terminals) },
+];
+
+/// A finding for each entry that the rule refuses.
+fn each(subject: &Subject, rule: impl Fn(&super::zip::Entry) -> Option<String>) -> Verdict {
+    let say = |entry| rule(entry).map(|why| format!("entry {:?}: {why}", entry.name()));
+    Verdict::of(subject.zip.entries.iter().filter_map(say).collect())
+}
+
+/// Both headers of an entry, with what they are called.
+fn both(entry: &super::zip::Entry) -> impl Iterator<Item = (&'static str, &super::zip::Header)> {
+    [("central", Some(&entry.central)), ("local", entry.local.as_ref())].into_iter().filter_map(|(n, h)| Some((n, h?)))
+}
+
+fn extension(subject: &Subject) -> Verdict {
+    let found = subject.path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    Verdict::of(if found == "fmu" { Vec::new() } else { vec![format!("the extension is {found:?}")] })
+}
+
+fn names(subject: &Subject) -> Verdict {
+    each(subject, |entry| {
+        let name = entry.name();
+        let bad = !inside(&name) || name.starts_with("./") || name.contains("/./") || name.is_empty();
+        bad.then(|| "is not a plain relative path with forward slashes".into())
+    })
+}
+
+fn ascii(subject: &Subject) -> Verdict {
+    each(subject, |entry| (!entry.central.name.is_ascii()).then(|| "is not ASCII".into()))
+}
+
+fn methods(subject: &Subject) -> Verdict {
+    each(subject, |entry| {
+        both(entry).find(|(_, h)| ![0, 8].contains(&h.method)).map(|(n, h)| format!("{n} header: method {}", h.method))
+    })
+}
+
+fn descriptors(subject: &Subject) -> Verdict {
+    each(subject, |entry| {
+        let bad = both(entry).find(|(_, h)| h.flags & 8 != 0 && h.method != 8);
+        bad.map(|(n, h)| format!("{n} header: bit 3 with method {}", h.method))
+    })
+}
+
+fn needed(subject: &Subject) -> Verdict {
+    let mut findings = Vec::new();
+    if subject.zip.zip64 {
+        findings.push("there is a ZIP64 end record".into());
+    }
+    for entry in &subject.zip.entries {
+        if let Some((n, h)) = both(entry).find(|(_, h)| h.needed & 0xff > 20) {
+            let (major, minor) = ((h.needed & 0xff) / 10, h.needed % 10);
+            findings.push(format!("entry {:?}: {n} header: version needed {major}.{minor}", entry.name()));
+        }
+    }
+    Verdict::of(findings)
+}
+
+fn encryption(subject: &Subject) -> Verdict {
+    each(subject, |entry| both(entry).find(|(_, h)| h.flags & 0x41 != 0).map(|(n, _)| format!("{n} header: encrypted")))
+}
+
+fn split(subject: &Subject) -> Verdict {
+    let other = |e: &super::zip::Entry| (e.disk != 0).then(|| format!("entry {:?}: on disk {}", e.name(), e.disk));
+    let mut findings: Vec<_> = subject.zip.entries.iter().filter_map(other).collect();
+    if subject.zip.split {
+        findings.push("the end record counts disks".into());
+    }
+    Verdict::of(findings)
+}
+
+fn links(subject: &Subject) -> Verdict {
+    each(subject, |entry| entry.is_link().then(|| "is a symbolic link".into()))
+}
+
+fn contents(subject: &Subject) -> Verdict {
+    Verdict::of(subject.broken.clone())
+}
+
+fn headers(subject: &Subject) -> Verdict {
+    let entries = &subject.zip.entries;
+    let mut names: Vec<_> = entries.iter().map(|e| e.central.name.to_ascii_lowercase()).collect();
+    names.sort();
+    let twice = names.windows(2).filter(|w| w[0] == w[1]);
+    let mut findings: Vec<_> = twice
+        .map(|w| format!("entry {:?}: is there twice (upper and lower case aside)", String::from_utf8_lossy(&w[0])))
+        .collect();
+    for entry in entries {
+        let c = &entry.central;
+        match &entry.local {
+            None => findings.push(format!("entry {:?}: has no local header", entry.name())),
+            Some(l) if l.name != c.name => findings.push(format!(
+                "entry {:?}: is {:?} in its local header",
+                entry.name(),
+                String::from_utf8_lossy(&l.name)
+            )),
+            // With a data descriptor the local header may be silent about sizes.
+            Some(l) => {
+                let sizes = l.flags & 8 != 0 || (l.crc, l.packed, l.size) == (c.crc, c.packed, c.size);
+                if !sizes || l.method != c.method || l.flags != c.flags {
+                    findings.push(format!("entry {:?}: local and central header differ", entry.name()));
+                }
+            }
+        }
+    }
+    Verdict::of(findings)
+}
+
+fn implementation(subject: &Subject) -> Verdict {
+    let sources = subject.zip.names().iter().any(|n| n.starts_with("sources/") && !n.ends_with('/'));
+    let statics = subject.zip.names().iter().any(|n| n.starts_with("binaries/") && !n.ends_with('/'));
+    let there = sources || statics;
+    Verdict::of(if there { Vec::new() } else { vec!["there are neither binaries/ nor sources/".into()] })
+}
+
+fn root(subject: &Subject) -> Verdict {
+    let folders = ["binaries", "documentation", "extra", "resources", "sources", "terminalsAndIcons"];
+    each(subject, |entry| {
+        let name = entry.name();
+        let known = match name.split_once('/') {
+            Some((folder, _)) => folders.contains(&folder),
+            None => name == "modelDescription.xml" || (subject.version == FmiVersion::V2 && name == "model.png"),
+        };
+        (!known).then(|| "is not of the standard's structure; extra/ is the place for it".into())
+    })
+}
+
+fn platforms(subject: &Subject) -> Verdict {
+    let old = ["win32", "win64", "linux32", "linux64", "darwin32", "darwin64"];
+    let tuple = |folder: &str| {
+        let parts: Vec<_> = folder.split('-').collect();
+        let arch = ["aarch32", "aarch64", "riscv32", "riscv64", "x86", "x86_64", "ppc32", "ppc64"];
+        let plain =
+            |p: &&str| !p.is_empty() && p.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_');
+        (2..=3).contains(&parts.len()) && (arch.contains(&parts[0]) || plain(&parts[0])) && parts[1..].iter().all(plain)
+    };
+    let mut folders: Vec<_> = subject
+        .zip
+        .names()
+        .iter()
+        .filter_map(|n| Some(n.strip_prefix("binaries/")?.split_once('/')?.0.to_owned()))
+        .collect();
+    folders.sort();
+    folders.dedup();
+    let known = |f: &&String| match subject.version {
+        FmiVersion::V2 => old.contains(&f.as_str()) || tuple(f),
+        FmiVersion::V3 => tuple(f),
+    };
+    Verdict::of(folders.iter().filter(|f| !known(f)).map(|f| format!("binaries/{f} is no platform tuple")).collect())
+}
+
+fn base_names(subject: &Subject) -> Verdict {
+    let description = match &subject.description {
+        Ok(description) => description,
+        Err(cause) => return Verdict::NotDetermined(cause.clone()),
+    };
+    let identifiers: Vec<&str> = [&description.model_exchange, &description.scheduled_execution]
+        .into_iter()
+        .filter_map(|i| i.as_deref())
+        .chain(description.co_simulation.as_ref().map(|c| c.model_identifier.as_str()))
+        .collect();
+    if subject.binaries.is_empty() {
+        return Verdict::NotApplicable("there are no shared libraries".into());
+    }
+    let mut findings = Vec::new();
+    for identifier in &identifiers {
+        let c_name = identifier.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+            && identifier.bytes().next().is_some_and(|b| !b.is_ascii_digit());
+        if !c_name {
+            findings.push(format!("modelIdentifier={identifier:?} is no C identifier"));
+        }
+    }
+    let mut folders: Vec<_> = subject.binaries.iter().map(|b| b.folder.as_str()).collect();
+    folders.sort_unstable();
+    folders.dedup();
+    for folder in folders {
+        let extension = if folder.contains("win") && !folder.contains("darwin") {
+            "dll"
+        } else if folder.contains("darwin") {
+            "dylib"
+        } else {
+            "so"
+        };
+        for identifier in &identifiers {
+            let name = format!("binaries/{folder}/{identifier}.{extension}");
+            if !subject.binaries.iter().any(|b| b.name == name) {
+                let there: Vec<_> =
+                    subject.binaries.iter().filter(|b| b.folder == folder).map(|b| b.name.as_str()).collect();
+                findings.push(format!("there is no {name}; there is {}", there.join(", ")));
+            }
+        }
+    }
+    Verdict::of(findings)
+}
+
+fn documentation(subject: &Subject) -> Verdict {
+    let there = subject.zip.find("documentation/index.html").is_some();
+    Verdict::of(if there { Vec::new() } else { vec!["there is no documentation/index.html".into()] })
+}
+
+fn licences(subject: &Subject) -> Verdict {
+    let names = subject.zip.names();
+    if !names.iter().any(|n| n.starts_with("documentation/licenses/")) {
+        return Verdict::NotApplicable("there is no documentation/licenses".into());
+    }
+    let entries = match subject.version {
+        FmiVersion::V2 => &["license.txt", "license.html"][..],
+        FmiVersion::V3 => &["license.txt", "license.html", "license.spdx"][..],
+    };
+    let there = entries.iter().any(|e| names.contains(&format!("documentation/licenses/{e}")));
+    Verdict::of(if there {
+        Vec::new()
+    } else {
+        vec![format!("documentation/licenses has none of {}", entries.join(", "))]
+    })
+}
+
+fn dependencies(subject: &Subject) -> Verdict {
+    match subject.interface() {
+        None => Verdict::NotDetermined("the description cannot be read".into()),
+        Some(i) if !i.needs_execution_tool() => Verdict::NotApplicable("needsExecutionTool is false".into()),
+        Some(i) => {
+            let there = ["txt", "html"]
+                .iter()
+                .any(|e| subject.zip.find(&format!("documentation/externalDependencies.{e}")).is_some());
+            let missing = format!(
+                "line {}: needsExecutionTool is true, and there is no documentation/externalDependencies",
+                i.line
+            );
+            Verdict::of(if there { Vec::new() } else { vec![missing] })
+        }
+    }
+}
+
+fn pictures(subject: &Subject) -> Verdict {
+    each(subject, |entry| {
+        let png = entry
+            .name()
+            .strip_suffix(".svg")
+            .filter(|n| !n.starts_with("extra/") && !n.starts_with("resources/"))
+            .map(|n| format!("{n}.png"))?;
+        let known = png.starts_with("terminalsAndIcons/") || png == "documentation/diagram.png";
+        (known && subject.zip.find(&png).is_none()).then(|| format!("there is no {png}"))
+    })
+}
+
+fn extra(subject: &Subject) -> Verdict {
+    if !subject.zip.names().iter().any(|n| n.starts_with("extra/") && n != "extra/") {
+        return Verdict::NotApplicable("there is no extra/".into());
+    }
+    each(subject, |entry| {
+        let name = entry.name();
+        let first = name.strip_prefix("extra/").filter(|r| !r.is_empty())?.split('/').next().unwrap_or_default();
+        (!first.contains('.')).then(|| "is not below a reverse domain name".into())
+    })
+}
+
+fn sources(subject: &Subject) -> Verdict {
+    let names = subject.zip.names();
+    if !names.iter().any(|n| n.starts_with("sources/") && !n.ends_with('/')) {
+        return Verdict::NotApplicable("there are no sources".into());
+    }
+    let mut findings = Vec::new();
+    if subject.version == FmiVersion::V3 && subject.zip.find("sources/buildDescription.xml").is_none() {
+        findings.push("there is no sources/buildDescription.xml".into());
+    }
+    let header = |n: &&String| {
+        let file = n.rsplit('/').next().unwrap_or_default();
+        ["Functions.h", "FunctionTypes.h", "TypesPlatform.h", "PlatformTypes.h"]
+            .iter()
+            .any(|h| file == format!("fmi2{h}") || file == format!("fmi3{h}"))
+    };
+    findings.extend(names.iter().filter(header).map(|n| format!("entry {n:?}: is a header of the standard")));
+    Verdict::of(findings)
+}
+
+fn terminals(subject: &Subject) -> Verdict {
+    let Some(entry) = subject.zip.find("terminalsAndIcons/terminalsAndIcons.xml") else {
+        return Verdict::NotApplicable("there is no terminalsAndIcons.xml".into());
+    };
+    let text = super::zip::contents(&subject.bytes, entry, 64 << 20);
+    let text = text.and_then(|t| String::from_utf8(t).map_err(|_| "is not UTF-8".to_owned()));
+    let tree = match text.and_then(|t| Element::parse(&t).map_err(|e| e.to_string())) {
+        Ok(tree) => tree,
+        Err(cause) => return Verdict::Violated(vec![format!("terminalsAndIcons.xml: {cause}")]),
+    };
+    let Ok(description) = &subject.description else {
+        return Verdict::NotDetermined("the description cannot be read".into());
+    };
+    let mut findings = Vec::new();
+    let mut open = vec![&tree];
+    while let Some(element) = open.pop() {
+        open.extend(&element.children);
+        for attribute in ["variableName", "inStreamVariableName", "outStreamVariableName"] {
+            if let Some(name) = element.get(attribute).filter(|name| description.variable(name).is_none()) {
+                findings.push(format!("terminalsAndIcons.xml: line {}: there is no variable {name:?}", element.line));
+            }
+        }
+        if let Some(base) = element.get("iconBaseName") {
+            let png = format!("terminalsAndIcons/{base}.png");
+            if subject.zip.find(&png).is_none() {
+                findings.push(format!("terminalsAndIcons.xml: line {}: there is no {png}", element.line));
+            }
+        }
+    }
+    Verdict::of(findings)
+}

@@ -1,0 +1,230 @@
+//! What `fmu check` tells: as text, JSON and HTML.
+
+use super::{Finding, GROUPS, Level, Subject, Verdict};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// All findings about one file.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The file.
+    pub file: String,
+    /// The standard: 2.0 or 3.0.
+    pub fmi_version: String,
+    /// Name of the model, where the description can be read.
+    pub model: Option<String>,
+    /// What wrote the file, as it says.
+    pub generation_tool: Option<String>,
+    /// One for each check.
+    pub findings: Vec<Finding>,
+}
+
+/// How many of which verdict.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Requirements that hold.
+    pub passed: usize,
+    /// Violated: must, should, hard.
+    pub violated: [usize; 3],
+    /// Not about this FMU.
+    pub not_applicable: usize,
+    /// Not found out.
+    pub not_determined: usize,
+}
+
+impl Report {
+    pub(super) fn new(subject: &Subject, findings: Vec<Finding>) -> Self {
+        let description = subject.description.as_ref().ok();
+        Self {
+            file: subject.path.display().to_string(),
+            fmi_version: subject.version.to_string(),
+            model: description.map(|d| d.model_name.clone()),
+            generation_tool: description.and_then(|d| d.generation_tool.clone()),
+            findings,
+        }
+    }
+
+    /// The finding of a check.
+    pub fn finding(&self, id: &str) -> Option<&Finding> {
+        self.findings.iter().find(|f| f.id == id)
+    }
+
+    /// The violated checks.
+    pub fn violated(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|f| matches!(f.verdict, Verdict::Violated(_)))
+    }
+
+    /// Whether no requirement of the standard is violated.
+    pub fn conforms(&self) -> bool {
+        self.violated().all(|f| f.level != Level::Must)
+    }
+
+    /// How many of which verdict.
+    pub fn counts(&self) -> Counts {
+        let mut counts = Counts::default();
+        for finding in &self.findings {
+            match &finding.verdict {
+                Verdict::Pass(_) => counts.passed += 1,
+                Verdict::Violated(_) => counts.violated[finding.level as usize] += 1,
+                Verdict::NotApplicable(_) => counts.not_applicable += 1,
+                Verdict::NotDetermined(_) => counts.not_determined += 1,
+            }
+        }
+        counts
+    }
+
+    fn summary(&self) -> String {
+        let c = self.counts();
+        let [must, should, hard] = c.violated;
+        format!(
+            "{} checks: {} passed; violated: {must} must, {should} should, {hard} hard; {} not applicable, {} not determined",
+            self.findings.len(),
+            c.passed,
+            c.not_applicable,
+            c.not_determined
+        )
+    }
+
+    fn heading(&self) -> String {
+        let model = self.model.as_deref().unwrap_or("?");
+        let tool = self.generation_tool.as_deref().unwrap_or("an unnamed tool");
+        format!("{}: {model}, FMI {}, made by {tool}", self.file, self.fmi_version)
+    }
+
+    fn groups(&self) -> impl Iterator<Item = (&'static str, Vec<&Finding>)> {
+        let of = |group: &str| self.findings.iter().filter(|f| f.group == group).collect::<Vec<_>>();
+        GROUPS.iter().map(move |g| (g.title, of(g.name))).filter(|(_, findings)| !findings.is_empty())
+    }
+
+    /// For a terminal: what is wrong and what was left out; with `verbose` also what is right.
+    pub fn text(&self, verbose: bool) -> String {
+        let mut out = format!("{}\n", self.heading());
+        for (title, findings) in self.groups() {
+            let passed = findings.iter().filter(|f| matches!(f.verdict, Verdict::Pass(_))).count();
+            let _ = writeln!(out, "\n{title} ({passed} of {} passed)", findings.len());
+            for f in findings {
+                if verbose || !matches!(f.verdict, Verdict::Pass(_) | Verdict::NotApplicable(_)) {
+                    line(&mut out, f);
+                }
+            }
+        }
+        let _ = writeln!(out, "\n{}", self.summary());
+        let end = match (self.conforms(), self.violated().count()) {
+            (true, 0) => "Nothing is violated.",
+            (true, _) => "No requirement of the standard (must) is violated.",
+            (false, _) => "Requirements of the standard (must) are violated.",
+        };
+        out + end + "\n"
+    }
+
+    /// As JSON.
+    ///
+    /// # Errors
+    /// Never, but for memory.
+    pub fn json(&self) -> serde_json::Result<String> {
+        serde_json::to_string_pretty(self)
+    }
+
+    /// One HTML page that needs nothing else.
+    pub fn html(&self) -> String {
+        let mut out = format!(
+            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title><style>\
+             body{{font:16px/1.4 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}}table{{border-collapse:collapse;width:100%}}\
+             td,th{{border-top:1px solid #ccc;padding:.3em .6em;text-align:left;vertical-align:top}}td:first-child{{white-space:nowrap}}\
+             .violated{{background:#fdd}}.violated.hard,.violated.should{{background:#fec}}.not{{color:#666}}small{{color:#555}}\
+             code{{overflow-wrap:anywhere}}</style></head><body>\n<h1>{0}</h1>\n<p>{1}</p>\n",
+            escape(&self.heading()),
+            escape(&self.summary())
+        );
+        for (title, findings) in self.groups() {
+            let _ = writeln!(out, "<h2>{}</h2>\n<table>", escape(title));
+            for f in findings {
+                let (word, evidence) = words(f);
+                let class = match &f.verdict {
+                    Verdict::Violated(_) => format!("violated {}", level(f.level)),
+                    Verdict::Pass(_) => "pass".into(),
+                    _ => "not".into(),
+                };
+                let evidence: Vec<_> = evidence.iter().map(|e| format!("<code>{}</code>", escape(e))).collect();
+                let _ = writeln!(
+                    out,
+                    "<tr class=\"{class}\" id=\"{0}\"><td>{0}</td><td>{1}</td><td>{2}</td><td>{3} <small>({4})</small><br>{5}</td></tr>",
+                    f.id,
+                    level(f.level),
+                    word,
+                    escape(f.requirement),
+                    escape(f.clause),
+                    evidence.join("<br>")
+                );
+            }
+            out.push_str("</table>\n");
+        }
+        out + "</body></html>\n"
+    }
+}
+
+/// The word for a level.
+pub(super) fn level(level: Level) -> &'static str {
+    match level {
+        Level::Must => "must",
+        Level::Should => "should",
+        Level::Hard => "hard",
+    }
+}
+
+/// The word for a verdict, and its evidence.
+fn words(finding: &Finding) -> (&'static str, Vec<&str>) {
+    match &finding.verdict {
+        Verdict::Pass(evidence) => ("pass", evidence.iter().map(String::as_str).collect()),
+        Verdict::Violated(evidence) => ("VIOLATED", evidence.iter().map(String::as_str).collect()),
+        Verdict::NotApplicable(reason) => ("not applicable", vec![reason]),
+        Verdict::NotDetermined(reason) => ("not determined", vec![reason]),
+    }
+}
+
+/// Pieces of evidence in the text.
+const SHOWN: usize = 8;
+
+fn line(out: &mut String, finding: &Finding) {
+    let (word, evidence) = words(finding);
+    let _ = writeln!(out, "  {:<6} {word} ({}): {}", finding.id, level(finding.level), finding.requirement);
+    if matches!(finding.verdict, Verdict::Violated(_)) {
+        let _ = writeln!(out, "         see FMI {}", finding.clause);
+    }
+    for text in evidence.iter().take(SHOWN) {
+        let _ = writeln!(out, "         - {}", text.lines().collect::<Vec<_>>().join(" "));
+    }
+    if evidence.len() > SHOWN {
+        let _ = writeln!(out, "         - and {} more; --format json has them", evidence.len() - SHOWN);
+    }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// The list of all checks, as a Markdown table a group.
+pub fn list() -> String {
+    let mut out = String::new();
+    for group in GROUPS {
+        let _ = writeln!(
+            out,
+            "### {} (`{}`)\n\n| id | 2.0 | 3.0 | requirement | clause |\n|---|---|---|---|---|",
+            group.title, group.name
+        );
+        for c in group.checks {
+            let word = |l: Option<Level>| l.map_or("-", level);
+            let _ = writeln!(
+                out,
+                "| {} | {} | {} | {} | {} |",
+                c.id,
+                word(c.levels.0),
+                word(c.levels.1),
+                c.requirement,
+                c.clause
+            );
+        }
+        out.push('\n');
+    }
+    out
+}

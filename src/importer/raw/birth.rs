@@ -1,0 +1,185 @@
+//! Instantiation, with every argument in the checker's hands.
+
+use super::super::log::Status;
+use super::callbacks::{Callbacks, allocate, logger2, logger3, release};
+use super::{Handle, Raw};
+use model_description::FmiVersion;
+use std::ffi::{CString, c_char, c_int, c_void};
+use std::ptr;
+
+/// What kind of FMU an instance is to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// Co-simulation.
+    CoSimulation,
+    /// Model exchange.
+    ModelExchange,
+    /// Scheduled execution (FMI 3.0 only).
+    ScheduledExecution,
+}
+
+/// The arguments of an instantiation.
+#[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "the arguments of the standards are")]
+pub struct Birth {
+    /// Instance name.
+    pub name: Option<CString>,
+    /// Token.
+    pub token: Option<CString>,
+    /// Path or URI of the resources.
+    pub resources: Option<CString>,
+    /// Kind of FMU.
+    pub interface: Interface,
+    /// Whether there is a log callback.
+    pub logger: bool,
+    /// Whether there is a struct of callbacks (FMI 2.0 only).
+    pub callbacks: bool,
+    /// Whether there are memory functions (FMI 2.0 only).
+    pub memory: bool,
+    /// Whether the struct of callbacks stays as it is after the call (FMI 2.0 only).
+    pub lasting: bool,
+    /// Logging on.
+    pub logging: bool,
+    /// Event mode used (FMI 3.0 only).
+    pub event_mode: bool,
+    /// The environment, which only comes back.
+    pub environment: usize,
+}
+
+impl Raw {
+    /// Makes an instance; `None` for NULL.
+    ///
+    /// # Errors
+    /// The function is missing.
+    pub fn instantiate(&self, birth: &Birth) -> Result<Option<Handle>, String> {
+        fn text(text: Option<&CString>) -> *const c_char {
+            text.map_or(ptr::null(), |t| t.as_ptr())
+        }
+        let (name, token) = (text(birth.name.as_ref()), text(birth.token.as_ref()));
+        let resources = text(birth.resources.as_ref());
+        let environment: *mut c_void = ptr::without_provenance_mut(birth.environment);
+        let pointer = match self.version {
+            FmiVersion::V2 => self.instantiate2(birth, [name, token, resources], environment),
+            FmiVersion::V3 => self.instantiate3(birth, [name, token, resources], environment),
+        };
+        let address = pointer?.expose_provenance();
+        Ok((address != 0).then_some(Handle(address)))
+    }
+
+    fn instantiate2(
+        &self,
+        b: &Birth,
+        texts: [*const c_char; 3],
+        environment: *mut c_void,
+    ) -> Result<*mut c_void, String> {
+        type Instantiate = unsafe extern "C" fn(
+            *const c_char,
+            c_int,
+            *const c_char,
+            *const c_char,
+            *const Callbacks,
+            c_int,
+            c_int,
+        ) -> *mut c_void;
+        let f: Instantiate = self.function("Instantiate").ok_or("the function fmi2Instantiate is missing")?;
+        // Kept for ever: an FMU made before FMI 2.0.5 may keep the pointer.
+        let callbacks = Box::leak(Box::new(Callbacks {
+            logger: b.logger.then_some(logger2::<false>),
+            allocate: b.memory.then_some(allocate),
+            free: b.memory.then_some(release),
+            step_finished: ptr::null(),
+            environment,
+        }));
+        let kind = c_int::from(b.interface == Interface::CoSimulation);
+        let given = if b.callbacks { ptr::from_mut(callbacks) } else { ptr::null_mut() };
+        // SAFETY: texts are NULL or C strings that outlive the call; the struct lives on.
+        let made = unsafe { f(texts[0], kind, texts[1], texts[2], given, 0, c_int::from(b.logging)) };
+        if !b.lasting {
+            // Still a struct of good functions: an FMU that looks again is found out and not crashed.
+            // SAFETY: ours, and nobody else's while no call is under way.
+            unsafe { (*ptr::from_mut(callbacks)).logger = Some(logger2::<true>) };
+        }
+        Ok(made)
+    }
+
+    fn instantiate3(
+        &self,
+        b: &Birth,
+        texts: [*const c_char; 3],
+        environment: *mut c_void,
+    ) -> Result<*mut c_void, String> {
+        type Logger = Option<unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char)>;
+        type Common = unsafe extern "C" fn(
+            *const c_char,
+            *const c_char,
+            *const c_char,
+            bool,
+            bool,
+            *mut c_void,
+            Logger,
+        ) -> *mut c_void;
+        type CoSimulation = unsafe extern "C" fn(
+            *const c_char,
+            *const c_char,
+            *const c_char,
+            bool,
+            bool,
+            bool,
+            bool,
+            *const u32,
+            usize,
+            *mut c_void,
+            Logger,
+            *const c_void,
+        ) -> *mut c_void;
+        type Scheduled = unsafe extern "C" fn(
+            *const c_char,
+            *const c_char,
+            *const c_char,
+            bool,
+            bool,
+            *mut c_void,
+            Logger,
+            *const c_void,
+            *const c_void,
+            *const c_void,
+        ) -> *mut c_void;
+        let logger: Logger = if b.logger { Some(logger3) } else { None };
+        let [name, token, resources] = texts;
+        let missing = |name: &str| format!("the function fmi3{name} is missing");
+        // SAFETY: of all three: the standard's types; texts are NULL or C strings that outlive the call.
+        unsafe {
+            match b.interface {
+                Interface::CoSimulation => {
+                    let name_of = "InstantiateCoSimulation";
+                    let f: CoSimulation = self.function(name_of).ok_or_else(|| missing(name_of))?;
+                    Ok(f(
+                        name,
+                        token,
+                        resources,
+                        false,
+                        b.logging,
+                        b.event_mode,
+                        false,
+                        ptr::null(),
+                        0,
+                        environment,
+                        logger,
+                        ptr::null(),
+                    ))
+                }
+                Interface::ModelExchange => {
+                    let name_of = "InstantiateModelExchange";
+                    let f: Common = self.function(name_of).ok_or_else(|| missing(name_of))?;
+                    Ok(f(name, token, resources, false, b.logging, environment, logger))
+                }
+                Interface::ScheduledExecution => {
+                    let name_of = "InstantiateScheduledExecution";
+                    let f: Scheduled = self.function(name_of).ok_or_else(|| missing(name_of))?;
+                    let none = ptr::null();
+                    Ok(f(name, token, resources, false, b.logging, environment, logger, none, none, none))
+                }
+            }
+        }
+    }
+}

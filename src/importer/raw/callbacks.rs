@@ -1,0 +1,112 @@
+//! The callbacks that the FMU gets, and what comes through them.
+
+use super::super::log::{Status, copy_text};
+use std::ffi::{CStr, c_char, c_int, c_void};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// What came through the log callback.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Event {
+    /// The first argument, a number that was given on instantiation.
+    pub environment: usize,
+    /// The instance's name (FMI 2.0 only).
+    pub instance: Option<String>,
+    /// The status.
+    pub status: c_int,
+    /// The category; `None` for NULL.
+    pub category: Option<String>,
+    /// The message; `None` for NULL, or what is not UTF-8.
+    pub text: Option<String>,
+    /// It came through a struct of callbacks that was no longer valid (FMI 2.0 only).
+    pub late: bool,
+}
+
+static EVENTS: Mutex<Vec<Event>> = Mutex::new(Vec::new());
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+/// Takes the messages so far.
+pub fn take_events() -> Vec<Event> {
+    std::mem::take(&mut *EVENTS.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// How often the FMU used the importer's memory functions.
+pub fn allocations() -> usize {
+    ALLOCATIONS.load(Ordering::Relaxed)
+}
+
+fn push(event: Event) {
+    let mut events = EVENTS.lock().unwrap_or_else(PoisonError::into_inner);
+    if events.len() < 100_000 {
+        events.push(event);
+    }
+}
+
+/// # Safety
+/// `text` is NULL or a C string.
+pub(super) unsafe fn optional(text: *const c_char) -> Option<String> {
+    if text.is_null() {
+        return None;
+    }
+    // SAFETY: the caller's promise.
+    unsafe { CStr::from_ptr(text) }.to_str().ok().map(str::to_owned)
+}
+
+/// See `fmi2::logger`: a variadic function, received as far as its arguments are in registers.
+pub(super) unsafe extern "C" fn logger2<const LATE: bool>(
+    environment: *mut c_void,
+    instance: *const c_char,
+    status: Status,
+    category: *const c_char,
+    format: *const c_char,
+    first: *const c_char,
+) {
+    // SAFETY: the FMU passes C strings; a format "%s" comes with a text.
+    let (instance, category, text) = unsafe {
+        let format = optional(format);
+        let plain = cfg!(target_vendor = "apple") || format.as_deref() != Some("%s");
+        (optional(instance), optional(category), if plain { format } else { Some(copy_text(first)) })
+    };
+    push(Event { environment: environment.addr(), instance, status: status.0, category, text, late: LATE });
+}
+
+pub(super) unsafe extern "C" fn logger3(
+    environment: *mut c_void,
+    status: Status,
+    category: *const c_char,
+    text: *const c_char,
+) {
+    // SAFETY: the FMU passes C strings.
+    let (category, text) = unsafe { (optional(category), optional(text)) };
+    push(Event { environment: environment.addr(), instance: None, status: status.0, category, text, late: false });
+}
+
+unsafe extern "C" {
+    fn calloc(count: usize, size: usize) -> *mut c_void;
+    fn free(memory: *mut c_void);
+}
+
+pub(super) unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
+    ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+    // SAFETY: the C library's.
+    unsafe { calloc(count, size) }
+}
+
+pub(super) unsafe extern "C" fn release(memory: *mut c_void) {
+    ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+    // SAFETY: the FMU passes what `allocate` gave, or NULL.
+    unsafe { free(memory) }
+}
+
+pub(super) type Logger2 =
+    unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, *const c_char);
+
+/// `fmi2CallbackFunctions`.
+#[repr(C)]
+pub(super) struct Callbacks {
+    pub(super) logger: Option<Logger2>,
+    pub(super) allocate: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
+    pub(super) free: Option<unsafe extern "C" fn(*mut c_void)>,
+    pub(super) step_finished: *const c_void,
+    pub(super) environment: *mut c_void,
+}

@@ -1,0 +1,93 @@
+//! Values as the bytes that cross the interface.
+
+use model_description::{BaseType, FmiVersion};
+
+/// The values of a call, as the bytes that cross the interface; a few more follow, to see whether they are touched.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cells {
+    pub(super) words: Vec<u64>,
+    width: usize,
+    count: usize,
+}
+
+/// What the bytes behind the values are filled with.
+pub(super) const CANARY: u64 = 0xc5c5_c5c5_c5c5_c5c5;
+const CANARIES: usize = 32;
+
+impl Cells {
+    /// Room for `count` values of a type, filled with a pattern.
+    pub fn room(base: BaseType, version: FmiVersion, count: usize) -> Self {
+        let width = width(base, version);
+        Self { words: vec![CANARY; (count * width).div_ceil(8) + CANARIES], width, count }
+    }
+
+    /// Values from their bits, the low ones of each.
+    pub fn of(base: BaseType, version: FmiVersion, bits: &[u64]) -> Self {
+        let mut cells = Self::room(base, version, bits.len());
+        for (i, value) in bits.iter().enumerate() {
+            let at = i * cells.width;
+            for (k, byte) in value.to_le_bytes()[..cells.width].iter().enumerate() {
+                let (word, shift) = ((at + k) / 8, 8 * ((at + k) % 8));
+                cells.words[word] = cells.words[word] & !(0xff << shift) | u64::from(*byte) << shift;
+            }
+        }
+        cells
+    }
+
+    /// The bits of the values.
+    pub fn bits(&self) -> Vec<u64> {
+        let byte = |at: usize| self.words[at / 8] >> (8 * (at % 8)) & 0xff;
+        (0..self.count).map(|i| (0..self.width).map(|k| byte(i * self.width + k) << (8 * k)).sum()).collect()
+    }
+
+    /// Whether nothing was written behind the values.
+    pub fn intact(&self) -> bool {
+        self.words[(self.count * self.width).div_ceil(8)..].iter().all(|w| *w == CANARY)
+    }
+
+    /// Number of values that there is room for, those behind included.
+    pub(super) fn capacity(&self) -> usize {
+        8 * self.words.len() / self.width
+    }
+}
+
+/// Bytes of a value of a type.
+pub fn width(base: BaseType, version: FmiVersion) -> usize {
+    match (version, base) {
+        (_, BaseType::Float64 | BaseType::String | BaseType::Binary) => 8,
+        (FmiVersion::V2, _) | (_, BaseType::Float32 | BaseType::Int32 | BaseType::UInt32) => 4,
+        (_, BaseType::Int8 | BaseType::UInt8 | BaseType::Boolean | BaseType::Clock) => 1,
+        (_, BaseType::Int16 | BaseType::UInt16) => 2,
+        _ => 8,
+    }
+}
+
+/// The C name of a type.
+pub fn type_name(base: BaseType, version: FmiVersion) -> &'static str {
+    match (version, base) {
+        (FmiVersion::V2, BaseType::Float32 | BaseType::Float64) => "Real",
+        (_, BaseType::Boolean) => "Boolean",
+        (_, BaseType::String) => "String",
+        (FmiVersion::V2, _) => "Integer",
+        (_, BaseType::Enumeration) => "Int64",
+        (_, other) => other.as_str(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_keep_their_bits() {
+        for (base, bits) in [
+            (BaseType::Float64, vec![1.5_f64.to_bits(), u64::MAX, 0]),
+            (BaseType::Int16, vec![1, 0xffff, 7]),
+            (BaseType::Boolean, vec![1, 0, 1, 1, 0, 0, 0, 0, 1]),
+        ] {
+            let cells = Cells::of(base, FmiVersion::V3, &bits);
+            assert_eq!(cells.bits(), bits);
+            assert!(cells.intact());
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! Raw calls of an FMU's binary, for the checker: every function of both standards, with arguments that a well-behaved
+//! importer would never pass.
+//!
+//! The functions here are safe to call as far as this side goes: arrays are as long as the count that goes with them, or
+//! NULL. What the FMU does with NULL or with a wrong state is what the checker wants to know; it calls from a process of
+//! its own. Instances and states are plain numbers here, so that freed and foreign ones can be passed on purpose.
+
+mod birth;
+mod callbacks;
+mod cells;
+mod others;
+mod states;
+
+pub use birth::{Birth, Interface};
+pub use callbacks::{Event, allocations, take_events};
+pub use cells::{Cells, type_name, width};
+
+use super::log::Status;
+use callbacks::optional;
+use cells::CANARY;
+use libloading::Library;
+use model_description::{BaseType, FmiVersion};
+use std::ffi::{CStr, c_char, c_int, c_void};
+use std::path::Path;
+use std::ptr;
+
+/// An instance, as the address that the FMU gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Handle(usize);
+
+impl Handle {
+    /// The instance that is none.
+    pub const NULL: Self = Self(0);
+
+    fn pointer(self) -> *mut c_void {
+        ptr::with_exposed_provenance_mut(self.0)
+    }
+}
+
+/// An FMU state, as the address that the FMU gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SavedState(pub usize);
+
+impl SavedState {
+    /// No state.
+    pub const NULL: Self = Self(0);
+
+    fn pointer(self) -> *mut c_void {
+        ptr::with_exposed_provenance_mut(self.0)
+    }
+}
+
+/// Which of the results of `fmi3DoStep` are to be told; the others get NULL.
+pub type Places = [bool; 4];
+
+/// What `fmi3DoStep` told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stepped {
+    /// `eventHandlingNeeded`, as a byte.
+    pub event: u8,
+    /// `terminateSimulation`, as a byte.
+    pub terminate: u8,
+    /// `earlyReturn`, as a byte.
+    pub early: u8,
+    /// `lastSuccessfulTime`.
+    pub last: f64,
+}
+
+/// A loaded binary.
+#[derive(Debug)]
+pub struct Raw {
+    library: Library,
+    version: FmiVersion,
+}
+
+type Simple = unsafe extern "C" fn(*mut c_void) -> Status;
+type Get2 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void) -> Status;
+type Get3 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void, usize) -> Status;
+
+impl Raw {
+    /// Loads a binary.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn open(path: &Path, version: FmiVersion) -> Result<Self, String> {
+        super::library::load(path).map(|library| Self { library, version }).map_err(|e| e.cause())
+    }
+
+    /// Loads a binary with its symbols visible to all that are loaded later, and resolved at once.
+    ///
+    /// # Errors
+    /// What the system says.
+    #[cfg(unix)]
+    pub fn open_global(path: &Path, version: FmiVersion) -> Result<Self, String> {
+        use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_NOW};
+        // SAFETY: as `library::load`: the code has every right of this process.
+        let library = unsafe { Library::open(Some(path), RTLD_NOW | RTLD_GLOBAL) };
+        library.map(|library| Self { library: library.into(), version }).map_err(|e| e.to_string())
+    }
+
+    /// Unloads it.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn close(self) -> Result<(), String> {
+        self.library.close().map_err(|e| e.to_string())
+    }
+
+    /// The standard.
+    pub fn version(&self) -> FmiVersion {
+        self.version
+    }
+
+    /// Name with the prefix of the standard: `fmi2` or `fmi3`.
+    pub fn name(&self, name: &str) -> String {
+        match self.version {
+            FmiVersion::V2 => format!("fmi2{name}"),
+            FmiVersion::V3 => format!("fmi3{name}"),
+        }
+    }
+
+    /// Whether there is a function of this name, without prefix.
+    pub fn has(&self, name: &str) -> bool {
+        self.function::<Simple>(name).is_some()
+    }
+
+    /// A function by its name without prefix. The type must be that of the standard, which every caller below sees to.
+    fn function<T: Copy>(&self, name: &str) -> Option<T> {
+        // SAFETY: only copied here; called below under the type that the standard gives this name.
+        unsafe { self.library.get::<T>(self.name(name)) }.ok().map(|f| *f)
+    }
+
+    /// `GetVersion` or `GetTypesPlatform`.
+    pub fn text(&self, name: &str) -> Option<String> {
+        let function: unsafe extern "C" fn() -> *const c_char = self.function(name)?;
+        // SAFETY: the standard's type; the text is a constant of the FMU.
+        unsafe { optional(function()) }
+    }
+
+    /// `FreeInstance`; `None` if it is missing.
+    pub fn free(&self, it: Handle) -> Option<()> {
+        let f: unsafe extern "C" fn(*mut c_void) = self.function("FreeInstance")?;
+        // SAFETY: an instance of this FMU, freed once, or NULL.
+        unsafe { f(it.pointer()) };
+        Some(())
+    }
+
+    /// A function with nothing but the instance.
+    pub fn simple(&self, name: &str, it: Handle) -> Option<Status> {
+        let f: Simple = self.function(name)?;
+        // SAFETY: the callers only name functions of this type.
+        Some(unsafe { f(it.pointer()) })
+    }
+
+    /// `fmi2SetupExperiment` or `fmi3EnterInitializationMode`.
+    pub fn experiment(&self, it: Handle, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Option<Status> {
+        let (has_tolerance, has_stop) = (tolerance.is_some(), stop.is_some());
+        let (tolerance, stop) = (tolerance.unwrap_or(0.0), stop.unwrap_or(0.0));
+        // SAFETY: the standards' types.
+        Some(unsafe {
+            match self.version {
+                FmiVersion::V2 => {
+                    type F = unsafe extern "C" fn(*mut c_void, c_int, f64, f64, c_int, f64) -> Status;
+                    let f: F = self.function("SetupExperiment")?;
+                    f(it.pointer(), c_int::from(has_tolerance), tolerance, start, c_int::from(has_stop), stop)
+                }
+                FmiVersion::V3 => {
+                    type F = unsafe extern "C" fn(*mut c_void, bool, f64, f64, bool, f64) -> Status;
+                    let f: F = self.function("EnterInitializationMode")?;
+                    f(it.pointer(), has_tolerance, tolerance, start, has_stop, stop)
+                }
+            }
+        })
+    }
+
+    /// A getter: `references` and `values` may be NULL, and `n` and `n_values` be other numbers than theirs, as long as
+    /// there is room. `n_values` is FMI 3.0's.
+    pub fn get(
+        &self,
+        it: Handle,
+        base: BaseType,
+        references: Option<&[u32]>,
+        n: usize,
+        values: Option<&mut Cells>,
+        n_values: usize,
+    ) -> Option<Status> {
+        let (references, values) = checked(references, n, values, n_values.max(n));
+        self.transfer(&format!("Get{}", type_name(base, self.version)), it, references, n, values, n_values)
+    }
+
+    /// A setter, as [`get`](Self::get).
+    pub fn set(
+        &self,
+        it: Handle,
+        base: BaseType,
+        references: Option<&[u32]>,
+        n: usize,
+        values: Option<&mut Cells>,
+        n_values: usize,
+    ) -> Option<Status> {
+        let (references, values) = checked(references, n, values, n_values.max(n));
+        self.transfer(&format!("Set{}", type_name(base, self.version)), it, references, n, values, n_values)
+    }
+
+    fn transfer(
+        &self,
+        name: &str,
+        it: Handle,
+        references: *const u32,
+        n: usize,
+        values: *mut c_void,
+        n_values: usize,
+    ) -> Option<Status> {
+        // SAFETY: the standards' types, whatever the values are: they only differ in what the pointer leads to.
+        Some(unsafe {
+            match self.version {
+                FmiVersion::V2 => self.function::<Get2>(name)?(it.pointer(), references, n, values),
+                FmiVersion::V3 => self.function::<Get3>(name)?(it.pointer(), references, n, values, n_values),
+            }
+        })
+    }
+
+    /// Texts; NULL pointers come back as `None`.
+    pub fn get_strings(&self, it: Handle, references: &[u32], count: usize) -> Option<(Status, Vec<Option<String>>)> {
+        let mut cells = Cells::room(BaseType::String, self.version, count);
+        for word in &mut cells.words[..count] {
+            *word = 0;
+        }
+        let status = self.get(it, BaseType::String, Some(references), references.len(), Some(&mut cells), count)?;
+        if !matches!(status, Status::OK | Status::WARNING) {
+            return Some((status, Vec::new()));
+        }
+        let pointer = |word: u64| ptr::with_exposed_provenance::<c_char>(usize::try_from(word).unwrap_or(0));
+        // SAFETY: C strings of the FMU, alive until its next call, or NULL.
+        Some((status, cells.bits().into_iter().map(|word| unsafe { optional(pointer(word)) }).collect()))
+    }
+
+    /// Sets texts; `None` for NULL. The buffer is overwritten afterwards.
+    pub fn set_strings(&self, it: Handle, references: &[u32], texts: &[Option<&CStr>]) -> Option<Status> {
+        let mut copies: Vec<Option<Vec<u8>>> =
+            texts.iter().map(|t| t.map(|t| t.to_bytes_with_nul().to_vec())).collect();
+        let address = |copy: &Option<Vec<u8>>| copy.as_ref().map_or(0, |c| c.as_ptr().expose_provenance() as u64);
+        let bits: Vec<u64> = copies.iter().map(address).collect();
+        let mut cells = Cells::of(BaseType::String, self.version, &bits);
+        let status = self.set(it, BaseType::String, Some(references), references.len(), Some(&mut cells), texts.len());
+        for copy in copies.iter_mut().flatten() {
+            let end = copy.len().saturating_sub(1);
+            copy[..end].fill(b'#');
+        }
+        status
+    }
+
+    /// `DoStep`; `places` are FMI 3.0's.
+    pub fn do_step(&self, it: Handle, t: f64, h: f64, no_prior: bool, places: Places) -> Option<(Status, Stepped)> {
+        let mut told = Stepped { event: 0xc5, terminate: 0xc5, early: 0xc5, last: f64::NAN };
+        // SAFETY: the standards' types; the places are ours or NULL.
+        let status = unsafe {
+            match self.version {
+                FmiVersion::V2 => {
+                    let f: unsafe extern "C" fn(*mut c_void, f64, f64, c_int) -> Status = self.function("DoStep")?;
+                    f(it.pointer(), t, h, c_int::from(no_prior))
+                }
+                FmiVersion::V3 => {
+                    type F = unsafe extern "C" fn(
+                        *mut c_void,
+                        f64,
+                        f64,
+                        bool,
+                        *mut u8,
+                        *mut u8,
+                        *mut u8,
+                        *mut f64,
+                    ) -> Status;
+                    let f: F = self.function("DoStep")?;
+                    let null = ptr::null_mut;
+                    f(
+                        it.pointer(),
+                        t,
+                        h,
+                        no_prior,
+                        if places[0] { &raw mut told.event } else { null() },
+                        if places[1] { &raw mut told.terminate } else { null() },
+                        if places[2] { &raw mut told.early } else { null() },
+                        if places[3] { &raw mut told.last } else { ptr::null_mut() },
+                    )
+                }
+            }
+        };
+        Some((status, told))
+    }
+
+    /// `SetDebugLogging`; `categories` may be NULL, and an element of it.
+    ///
+    /// # Panics
+    /// The categories are fewer than said.
+    pub fn debug_logging(
+        &self,
+        it: Handle,
+        on: bool,
+        categories: Option<&[Option<&CStr>]>,
+        n: usize,
+    ) -> Option<Status> {
+        let list: Vec<*const c_char> =
+            categories.unwrap_or_default().iter().map(|c| c.map_or(ptr::null(), CStr::as_ptr)).collect();
+        let pointer = if categories.is_some() { list.as_ptr() } else { ptr::null() };
+        assert!(categories.is_none() || n <= list.len(), "the array is shorter than said");
+        // SAFETY: the standards' types; as many strings as said, or NULL.
+        Some(unsafe {
+            match self.version {
+                FmiVersion::V2 => {
+                    type F = unsafe extern "C" fn(*mut c_void, c_int, usize, *const *const c_char) -> Status;
+                    self.function::<F>("SetDebugLogging")?(it.pointer(), c_int::from(on), n, pointer)
+                }
+                FmiVersion::V3 => {
+                    type F = unsafe extern "C" fn(*mut c_void, bool, usize, *const *const c_char) -> Status;
+                    self.function::<F>("SetDebugLogging")?(it.pointer(), on, n, pointer)
+                }
+            }
+        })
+    }
+
+    /// `fmi2Get...Status` with a place for any of its results; returns the first eight bytes of it.
+    pub fn step_status(&self, name: &str, it: Handle, kind: c_int) -> Option<(Status, u64)> {
+        let f: unsafe extern "C" fn(*mut c_void, c_int, *mut u64) -> Status = self.function(name)?;
+        let mut value = CANARY;
+        // SAFETY: FMI 2.0's type but for the place, which has room for each of its values.
+        Some((unsafe { f(it.pointer(), kind, &raw mut value) }, value))
+    }
+
+    /// `fmi3UpdateDiscreteStates`: whether another iteration is needed, and whether the simulation is to end.
+    pub fn update_discrete_states(&self, it: Handle) -> Option<(Status, bool, bool)> {
+        type F = unsafe extern "C" fn(*mut c_void, *mut u8, *mut u8, *mut u8, *mut u8, *mut u8, *mut f64) -> Status;
+        let (f, mut flags, mut next): (F, _, _) = (self.function("UpdateDiscreteStates")?, [0_u8; 5], 0.0);
+        let [a, b, c, d, e] = &mut flags;
+        // SAFETY: FMI 3.0's type; the places are ours.
+        let status = unsafe { f(it.pointer(), a, b, c, d, e, &raw mut next) };
+        Some((status, flags[0] != 0, flags[1] != 0))
+    }
+}
+
+/// Pointers to arrays that have room for what the counts say.
+fn checked(
+    references: Option<&[u32]>,
+    n: usize,
+    values: Option<&mut Cells>,
+    count: usize,
+) -> (*const u32, *mut c_void) {
+    assert!(references.is_none_or(|r| n <= r.len()), "the references are fewer than said");
+    let references = references.map_or(ptr::null(), <[u32]>::as_ptr);
+    let values = values.map_or(ptr::null_mut(), |cells| {
+        assert!(count <= cells.capacity(), "the values are fewer than said");
+        cells.words.as_mut_ptr().cast()
+    });
+    (references, values)
+}

@@ -1,0 +1,111 @@
+//! The functions that the checker only calls to see them refused.
+
+use super::super::log::Status;
+use super::{Get2, Handle, Raw};
+use model_description::FmiVersion;
+use std::ffi::{c_int, c_void};
+
+impl Raw {
+    /// Any other function of the standard, with arguments that are good as far as the instance allows: one variable,
+    /// numbers of 0, room for results.
+    pub fn other(&self, name: &str, it: Handle, reference: u32) -> Option<Status> {
+        type Ref = *const u32;
+        type Any = *mut c_void;
+        let (mut room, mut more, mut third) = ([0_u64; 64], [0_u64; 64], [0_u64; 64]);
+        let (a, b, c): (Any, Any, Any) =
+            (room.as_mut_ptr().cast(), more.as_mut_ptr().cast(), third.as_mut_ptr().cast());
+        let (vr, i) = (&raw const reference, it.pointer());
+        // SAFETY: every type is that of the standard, up to what a pointer to data leads to; each place has 512 bytes,
+        // more than one value or 64 states need.
+        Some(unsafe {
+            match name {
+                "GetBinary"
+                | "SetBinary"
+                | "GetClock"
+                | "SetClock"
+                | "GetShiftDecimal"
+                | "SetShiftDecimal"
+                | "SetIntervalDecimal"
+                | "GetIntervalDecimal"
+                | "GetShiftFraction"
+                | "SetShiftFraction"
+                | "SetIntervalFraction"
+                | "GetIntervalFraction" => match name {
+                    "GetBinary" | "SetBinary" => {
+                        self.function::<unsafe extern "C" fn(Any, Ref, usize, Any, Any, usize) -> Status>(name)?(
+                            i, vr, 1, a, b, 1,
+                        )
+                    }
+                    "GetIntervalFraction" => self
+                        .function::<unsafe extern "C" fn(Any, Ref, usize, Any, Any, Any) -> Status>(name)?(
+                        i, vr, 1, a, b, c,
+                    ),
+                    "GetIntervalDecimal" | "GetShiftFraction" | "SetShiftFraction" | "SetIntervalFraction" => {
+                        self.function::<unsafe extern "C" fn(Any, Ref, usize, Any, Any) -> Status>(name)?(
+                            i, vr, 1, a, b,
+                        )
+                    }
+                    _ => self.function::<Get2>(name)?(i, vr, 1, a),
+                },
+                "GetNumberOfVariableDependencies" => {
+                    self.function::<unsafe extern "C" fn(Any, u32, Any) -> Status>(name)?(i, reference, a)
+                }
+                "GetVariableDependencies" => {
+                    type F = unsafe extern "C" fn(Any, u32, Any, Any, Any, Any, usize) -> Status;
+                    let mut fourth = [0_u64; 64];
+                    self.function::<F>(name)?(i, reference, a, b, c, fourth.as_mut_ptr().cast(), 1)
+                }
+                "GetDirectionalDerivative" | "GetAdjointDerivative" => match self.version {
+                    FmiVersion::V2 => {
+                        type F = unsafe extern "C" fn(Any, Ref, usize, Ref, usize, Any, Any) -> Status;
+                        self.function::<F>(name)?(i, vr, 1, vr, 1, a, b)
+                    }
+                    FmiVersion::V3 => {
+                        type F = unsafe extern "C" fn(Any, Ref, usize, Ref, usize, Any, usize, Any, usize) -> Status;
+                        self.function::<F>(name)?(i, vr, 1, vr, 1, a, 1, b, 1)
+                    }
+                },
+                "GetOutputDerivatives" => {
+                    a.cast::<u64>().write(1);
+                    self.function::<unsafe extern "C" fn(Any, Ref, usize, Any, Any, usize) -> Status>(name)?(
+                        i, vr, 1, a, b, 1,
+                    )
+                }
+                "SetRealInputDerivatives" | "GetRealOutputDerivatives" => {
+                    a.cast::<u64>().write(1);
+                    self.function::<unsafe extern "C" fn(Any, Ref, usize, Any, Any) -> Status>(name)?(i, vr, 1, a, b)
+                }
+                "UpdateDiscreteStates" => {
+                    type F = unsafe extern "C" fn(Any, Any, Any, Any, Any, Any, Any) -> Status;
+                    let at = |n: usize| a.wrapping_byte_add(n);
+                    self.function::<F>(name)?(i, a, at(8), at(16), at(24), at(32), b)
+                }
+                "NewDiscreteStates" => self.function::<unsafe extern "C" fn(Any, Any) -> Status>(name)?(i, a),
+                "CompletedIntegratorStep" => match self.version {
+                    FmiVersion::V2 => {
+                        self.function::<unsafe extern "C" fn(Any, c_int, Any, Any) -> Status>(name)?(i, 1, a, b)
+                    }
+                    FmiVersion::V3 => {
+                        self.function::<unsafe extern "C" fn(Any, bool, Any, Any) -> Status>(name)?(i, true, a, b)
+                    }
+                },
+                "SetTime" => self.function::<unsafe extern "C" fn(Any, f64) -> Status>(name)?(i, 0.0),
+                "SetContinuousStates"
+                | "GetContinuousStateDerivatives"
+                | "GetDerivatives"
+                | "GetEventIndicators"
+                | "GetContinuousStates"
+                | "GetNominalsOfContinuousStates" => {
+                    self.function::<unsafe extern "C" fn(Any, Any, usize) -> Status>(name)?(i, a, 1)
+                }
+                "GetNumberOfEventIndicators" | "GetNumberOfContinuousStates" => {
+                    self.function::<unsafe extern "C" fn(Any, Any) -> Status>(name)?(i, a)
+                }
+                "ActivateModelPartition" => {
+                    self.function::<unsafe extern "C" fn(Any, u32, f64) -> Status>(name)?(i, reference, 0.0)
+                }
+                _ => self.simple(name, it)?,
+            }
+        })
+    }
+}

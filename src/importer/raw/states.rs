@@ -1,0 +1,86 @@
+//! Saved states, with every argument in the checker's hands.
+
+use super::super::log::Status;
+use super::{Handle, Raw, SavedState};
+use model_description::FmiVersion;
+use std::ffi::c_void;
+use std::ptr;
+
+impl Raw {
+    /// The names of the functions of FMU states, which the standards spell apart.
+    pub fn state_name(&self, name: &str) -> String {
+        match (self.version, name) {
+            (FmiVersion::V2, "Deserialize") => "DeSerializeFMUstate".into(),
+            (FmiVersion::V2, "Size") => "SerializedFMUstateSize".into(),
+            (FmiVersion::V3, "Size") => "SerializedFMUStateSize".into(),
+            (FmiVersion::V2, _) => format!("{name}FMUstate"),
+            (FmiVersion::V3, _) => format!("{name}FMUState"),
+        }
+    }
+
+    /// `GetFMUState`; `None` for the place passes NULL.
+    pub fn get_state(&self, it: Handle, place: Option<&mut SavedState>) -> Option<Status> {
+        self.with_place("Get", it, place)
+    }
+
+    /// `FreeFMUState`, as [`get_state`](Self::get_state).
+    pub fn free_state(&self, it: Handle, place: Option<&mut SavedState>) -> Option<Status> {
+        self.with_place("Free", it, place)
+    }
+
+    fn with_place(&self, name: &str, it: Handle, place: Option<&mut SavedState>) -> Option<Status> {
+        let f: unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> Status = self.function(&self.state_name(name))?;
+        match place {
+            // SAFETY: the standards' type; NULL is what the checker wants to pass.
+            None => Some(unsafe { f(it.pointer(), ptr::null_mut()) }),
+            Some(place) => {
+                let mut pointer = place.pointer();
+                // SAFETY: the standards' type; the place is ours.
+                let status = unsafe { f(it.pointer(), &raw mut pointer) };
+                *place = SavedState(pointer.expose_provenance());
+                Some(status)
+            }
+        }
+    }
+
+    /// `SetFMUState`.
+    pub fn set_state(&self, it: Handle, state: SavedState) -> Option<Status> {
+        let f: unsafe extern "C" fn(*mut c_void, *mut c_void) -> Status = self.function(&self.state_name("Set"))?;
+        // SAFETY: the standards' type; a foreign state is what the checker wants to pass.
+        Some(unsafe { f(it.pointer(), state.pointer()) })
+    }
+
+    /// `SerializedFMUStateSize`.
+    pub fn state_size(&self, it: Handle, state: SavedState) -> Option<(Status, usize)> {
+        type F = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut usize) -> Status;
+        let (f, mut size): (F, _) = (self.function(&self.state_name("Size"))?, 0);
+        // SAFETY: the standards' type; the place is ours.
+        Some((unsafe { f(it.pointer(), state.pointer(), &raw mut size) }, size))
+    }
+
+    /// `SerializeFMUState` into a buffer of this many bytes; the bytes behind it must stay as they are.
+    pub fn serialize(&self, it: Handle, state: SavedState, size: usize) -> Option<(Status, Vec<u8>, bool)> {
+        type F = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut u8, usize) -> Status;
+        let f: F = self.function(&self.state_name("Serialize"))?;
+        let mut bytes = vec![0xc5_u8; size + 256];
+        // SAFETY: the standards' type; the buffer is longer than said.
+        let status = unsafe { f(it.pointer(), state.pointer(), bytes.as_mut_ptr(), size) };
+        let intact = bytes[size..].iter().all(|b| *b == 0xc5);
+        bytes.truncate(size);
+        Some((status, bytes, intact))
+    }
+
+    /// `DeserializeFMUState`; `None` passes NULL with this size.
+    ///
+    /// # Panics
+    /// The bytes are fewer than said.
+    pub fn deserialize(&self, it: Handle, bytes: Option<&[u8]>, size: usize) -> Option<(Status, SavedState)> {
+        type F = unsafe extern "C" fn(*mut c_void, *const u8, usize, *mut *mut c_void) -> Status;
+        let (f, mut state): (F, *mut c_void) = (self.function(&self.state_name("Deserialize"))?, ptr::null_mut());
+        assert!(bytes.is_none_or(|b| size <= b.len()), "the bytes are fewer than said");
+        let pointer = bytes.map_or(ptr::null(), <[u8]>::as_ptr);
+        // SAFETY: the standards' type; as many bytes as said, or NULL.
+        let status = unsafe { f(it.pointer(), pointer, size, &raw mut state) };
+        Some((status, SavedState(state.expose_provenance())))
+    }
+}
