@@ -2,7 +2,7 @@
 //!
 //! One step from the measured current of the last sample, with the estimated speed in a right frame,
 //! i_dM = i_d + T_s / L_d (v_d - R i_d + w L_q i_q + (w_f - w) L_d i_q), i_qM = i_q + T_s / L_q (v_q - R i_q - w L_d i_d -
-//! (w_f - w) L_q i_d - w psi_M). What the machine does otherwise, di = i[k] - i_M, is the speed error on q and the angle
+//! (w_f - w) L_q i_d - w psi_M). What the machine does otherwise, `di = i[k] - i_M`, is the speed error on q and the angle
 //! error on d: di_d = psi_M T_s w sin theta~ / L_d, di_q = psi_M T_s (w - w_r cos theta~) / L_q. The speed is drawn through a
 //! low-pass, the angle as in the voltage model ([`follower`](crate::estimator::follower)).
 //! Corrected print: in (30) the q row is psi_M T_s (w^ - w_r cos theta~) / L_q, the speed error within the fraction.

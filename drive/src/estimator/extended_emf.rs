@@ -3,7 +3,7 @@
 //! All saliency is in the EMF: with L_d on both axes and w L_q in both cross terms,
 //! v_d = R i_d + L_d p i_d - w L_q i_q - (w_f - w) L_d i_q + e_d, v_q = R i_q + L_d p i_q + w L_q i_d + (w_f - w) L_d i_d + e_q,
 //! (e_d, e_q) = E_ex (-sin theta~, cos theta~), E_ex = w ((L_d - L_q) i_d + psi_M) - (L_d - L_q) p i_q, exactly.
-//! One observer per axis ([`emf`](crate::estimator::emf)), theta~ = atan2(-s e_d, s e_q) with s the sign of w, then a
+//! One observer per axis ([`emf`]), theta~ = atan2(-s e_d, s e_q) with s the sign of w, then a
 //! tracker. Corrected print: (19) and (21) have the measured current in the innovation; (20) is missing.
 //!
 //! Limits: no EMF, no angle: rated load is held from 0.03 of the rated speed with an ideal inverter, 0.05 with a
