@@ -25,10 +25,13 @@ fn misuse_of_the_c_interface() {
 
 /// Runs files of `tests/fmpy/` on freshly packed archives.
 fn pytest(name: &str, files: &[&str]) {
+    let python = python();
     let archives = common::archives();
-    let output = Command::new(python())
+    let temporary = scratch().join(format!("pytest-{name}-{}", process::id()));
+    let output = Command::new(python)
         .args(["-m", "pytest", "-q", "--tb=short", "--durations=3", "-p", "no:cacheprovider"])
-        .arg(format!("--basetemp={}", scratch().join(format!("pytest-{name}-{}", process::id())).display()))
+        .arg("--basetemp")
+        .arg(&temporary)
         .args(files)
         .current_dir(folder())
         .env("FMU_ARCHIVES", archives)
@@ -37,6 +40,7 @@ fn pytest(name: &str, files: &[&str]) {
         .env_remove("PYTEST_ADDOPTS")
         .output()
         .expect("the Python of the virtual environment");
+    let _ = fs::remove_dir_all(&temporary);
     show(&output);
     assert!(output.status.success(), "pytest {}: {}", files.join(" "), output.status);
     let said = String::from_utf8_lossy(&output.stdout);
