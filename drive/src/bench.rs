@@ -44,6 +44,8 @@ pub fn drive(kind: Kind) -> Pair {
     (par.speed_loop.bandwidth, par.speed_loop.t_is, par.speed_loop.b) = (TAU * 5.0, 4.0, 1.0);
     (par.limit.i_q, par.limit.i, par.limit.tau) = (15.0, 15.0, 1.6 * RATED_TORQUE);
     (par.sensor.noise, par.sensor.resolution) = (0.01, 40.0 / 4096.0);
+    // What an uncompensated dead time leaves is no sign of a lost rotor.
+    par.lock.u = 15.0;
     (par.start.i, par.start.speed) = (8.0, 0.15 * RATED_SPEED);
     let w = 0.05 * 3.0 * RATED_SPEED;
     par.estimators.kalman = KalmanParameters::new(machine().psi_M, TAU * 20.0, w, 0.01, par.T_s);

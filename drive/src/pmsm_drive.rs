@@ -4,11 +4,11 @@
 //! communication step that is a multiple of T_s it gives the pair's results bit for bit. At any other communication step
 //! plant and controller also stop at the sample instants between, which an importer's exchange cannot do.
 
-use crate::control::model::ControllerOutputs;
+use crate::control::model::{ControllerOutputs, LOCK_LOST};
 use crate::control::tables;
 use crate::pair::Pair;
 use crate::plant::model as plant;
-use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
+use fmu_core::unit::{AMPERE, NEWTON_METRE, ONE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table};
 use serde::{Deserialize, Serialize};
 
@@ -152,6 +152,7 @@ const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("i_q_est", &AMPERE, "Stator current across the estimated magnet axis", |o| &mut o.i.q),
             O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
             O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
+            O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
             O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| {
                 &mut o.u.a
             }),

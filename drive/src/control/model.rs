@@ -1,6 +1,7 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid.
 
 use crate::control::current::{CurrentController, CurrentGains};
+use crate::control::lock::{LOST, Lock, LockGains};
 use crate::control::reference::{greatest_torque, max_torque_per_ampere};
 use crate::control::speed::{SpeedController, SpeedGains};
 use crate::control::start::{CURRENT_FREQUENCY, Lead, Led};
@@ -9,9 +10,12 @@ use crate::estimator::{Context, Estimate, Estimator, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
 use crate::math::wrap;
 use crate::plant::inverter::{dead_time_loss, limit_to_hexagon};
-use fmu_core::unit::{AMPERE, RADIAN, SPEED, VOLT};
+use fmu_core::unit::{AMPERE, ONE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table};
 use serde::{Deserialize, Serialize};
+
+/// Greatest turn of the estimate in one sample in rad: beyond it nothing is estimated any more.
+const FASTEST: f64 = 20.0 * std::f64::consts::PI;
 
 /// Most samples of one communication step: a step ends, whatever the importer and T_s make of it.
 const MOST_SAMPLES: f64 = 1e7;
@@ -29,6 +33,13 @@ pub struct ControllerInputs {
     pub theta_meas: f64,
     /// Mechanical speed of a sensor in rad/s.
     pub speed_meas: f64,
+}
+
+impl ControllerInputs {
+    fn is_finite(&self) -> bool {
+        let Self { i, u_dc, speed_ref, theta_meas, speed_meas } = self;
+        [i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas].iter().all(|x| x.is_finite())
+    }
 }
 
 impl Default for ControllerInputs {
@@ -50,6 +61,16 @@ pub struct ControllerOutputs {
     pub i: DqParts,
     /// Its reference in A.
     pub i_ref: DqParts,
+    /// Whether the estimate is at the rotor: 0 yes, 1 and more no.
+    pub lock_lost: f64,
+}
+
+impl ControllerOutputs {
+    fn is_finite(&self) -> bool {
+        let Self { u, speed_est, theta_est, i, i_ref, lock_lost } = self;
+        let all = [u.a, u.b, u.c, *speed_est, *theta_est, i.d, i.q, i_ref.d, i_ref.q, *lock_lost];
+        all.iter().all(|x| x.is_finite())
+    }
 }
 
 /// The two components of a vector, as variables.
@@ -76,6 +97,7 @@ struct Gains {
     k: f64,
     /// Greatest torque in N.m over the torque constant: the limit of the speed loop in A.
     i_tau: f64,
+    lock: LockGains,
 }
 
 /// What a sample hands on to the next.
@@ -99,6 +121,7 @@ struct State {
     tau_ref: f64,
     /// Output of the current PI at the last sample in V.
     u_pi: DqHat,
+    lock: Lock,
     /// Outputs of the last sample, not shown before the next instant.
     computed: ControllerOutputs,
     /// Outputs shown now.
@@ -166,8 +189,34 @@ impl SensorlessController {
         Context { par: estimators, motor, current, J: *J, T_s: *T_s, delay: f64::from(*delay) }
     }
 
-    /// One sample of the controller: currents in, voltage references out.
+    /// One sample of the controller: currents in, voltage references out. What a lost estimator makes of its state may
+    /// leave the finite numbers; then the controller starts again from where it was last, at rest, and says so.
     fn sample(&mut self) -> ControllerOutputs {
+        let out = self.control();
+        let sane = (out.speed_est * f64::from(self.parameters.motor.n_p) * self.parameters.T_s).abs() < FASTEST;
+        if sane && out.is_finite() { out } else { self.start_again() }
+    }
+
+    /// At the angle of the last sample and at rest; no voltage.
+    #[cold]
+    fn start_again(&mut self) -> ControllerOutputs {
+        let Self { parameters: par, state, .. } = self;
+        let theta = state.computed.theta_est;
+        let kind = Kind::of(par.estimator).unwrap_or(Kind::Rasmussen);
+        let nothing = Sample { k: state.samples, ..Sample::default() };
+        let (estimator, _) = Estimator::start(kind, &Self::context(par), &nothing, theta, 0.0);
+        *state = State {
+            samples: state.samples,
+            estimator,
+            lock: Lock::lost(),
+            computed: state.computed.clone(),
+            shown: state.shown.clone(),
+            ..State::default()
+        };
+        ControllerOutputs { theta_est: theta, lock_lost: LOST, ..ControllerOutputs::default() }
+    }
+
+    fn control(&mut self) -> ControllerOutputs {
         let Self { inputs, parameters: par, gains, state } = self;
         let (motor, T_s) = (&par.motor, par.T_s);
         let n_p = f64::from(motor.n_p);
@@ -211,7 +260,8 @@ impl SensorlessController {
         let Estimate { theta, w, i: controlled, injection } = estimate;
         let speed = w / n_p;
 
-        let i_hat = Axis::<Estimated>::at(theta).from_stator(controlled);
+        let axis = Axis::<Estimated>::at(theta);
+        let i_hat = axis.from_stator(controlled);
         // The low-speed law is Rasmussen's; it would only be a loss where the angle is known.
         let i_ref = if let Some(Led::Frame(.., i_ref)) = led {
             i_ref
@@ -245,6 +295,13 @@ impl SensorlessController {
         } else {
             command
         };
+        // A current that leads is no estimate.
+        let lock_lost = if let Some(Led::Frame(..)) = led {
+            state.lock = Lock::default();
+            0.0
+        } else {
+            state.lock.update(&gains.lock, motor, &sample, axis, w)
+        };
         state.i_last = i;
         state.i_ref = i_ref;
         state.tau_ref = motor.torque(i_ref.d(), i_ref.q());
@@ -256,6 +313,7 @@ impl SensorlessController {
             theta_est: wrap(theta + T_s * w),
             i: i_hat.into(),
             i_ref: i_ref.into(),
+            lock_lost,
         }
     }
 }
@@ -276,10 +334,10 @@ impl Model for SensorlessController {
 
     const TABLE: &'static Table<Block<Self>> = TABLE;
 
-    const STATE_VERSION: u16 = 2;
+    const STATE_VERSION: u16 = 3;
 
     fn derive(&mut self) {
-        let ControllerParameters { current, speed_loop, motor, J, limit, estimator, .. } = &self.parameters;
+        let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
         let k = motor.torque_constant();
         let tau = if Kind::of(*estimator) == Some(Kind::Rasmussen) {
             limit.tau
@@ -287,7 +345,13 @@ impl Model for SensorlessController {
             greatest_torque(motor, limit, current.mtpa)
         };
         let speed = SpeedGains::new(speed_loop, *J, k);
-        self.gains = Gains { current: CurrentGains::new(current, motor), speed, k, i_tau: tau / k };
+        self.gains = Gains {
+            current: CurrentGains::new(current, motor),
+            speed,
+            k,
+            i_tau: tau / k,
+            lock: LockGains::new(lock, motor, *T_s),
+        };
     }
 
     fn validate(&self) -> Result<(), Fault> {
@@ -320,6 +384,9 @@ impl Model for SensorlessController {
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         let grid = SampleGrid { period: self.parameters.T_s };
         let end = step.end();
+        if !self.inputs.is_finite() {
+            return Err(Fault::new("an input of the controller is not a finite number"));
+        }
         if end.minus_periods(self.state.samples, grid.period) > MOST_SAMPLES * grid.period {
             let longest = format!("at most {MOST_SAMPLES} sample periods of {} s", grid.period);
             return Err(Fault::value("the step size", format!("{} s", step.h), longest));
@@ -332,13 +399,7 @@ impl Model for SensorlessController {
         if grid.reached(self.state.samples, end) {
             self.state.shown = self.state.computed.clone();
         }
-        let ControllerOutputs { u, speed_est, .. } = &self.state.computed;
-        if speed_est.is_finite() && (u.a + u.b + u.c).is_finite() {
-            Ok(())
-        } else {
-            let sample = self.state.samples - 1;
-            Err(Fault::new(format!("the controller's state left the finite numbers at sample {sample}")))
-        }
+        Ok(())
     }
 }
 
@@ -369,6 +430,10 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
 
 type O = Row<ControllerOutputs>;
 
+/// What the output says.
+pub const LOCK_LOST: &str =
+    "Whether the estimate fits the voltage: 0 it is at the rotor, 1 and more it is lost, 10 at most";
+
 /// The controller's outputs.
 pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
     const {
@@ -386,6 +451,7 @@ pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("i_q", &AMPERE, "Stator current across the estimated magnet axis", |o| &mut o.i.q),
             O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d", |o| &mut o.i_ref.d),
             O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q", |o| &mut o.i_ref.q),
+            O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
         ]
     },
 );

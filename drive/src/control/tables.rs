@@ -1,6 +1,7 @@
 //! The controller's parameters and their table.
 
 use crate::control::current::{CURRENT_LOOP, CurrentLoop};
+use crate::control::lock::{LOCK, LockParameters};
 use crate::control::sensor::{SENSOR, Sensor};
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
 use crate::control::start::{START, StartParameters};
@@ -92,6 +93,8 @@ pub struct ControllerParameters {
     pub limit: Limits,
     /// The low-speed law.
     pub zero_speed: ZeroSpeed,
+    /// What says that the rotor is lost.
+    pub lock: LockParameters,
     /// The start.
     pub start: StartParameters,
     /// First estimate of the electrical angle in rad.
@@ -117,6 +120,7 @@ impl Default for ControllerParameters {
             J: 1.5e-3,
             limit: Limits { i_q: 6.0, i: 7.5, tau: 1000.0 },
             zero_speed: ZeroSpeed::default(),
+            lock: LockParameters::default(),
             start: StartParameters::default(),
             theta_est: 0.0,
             speed_est: 0.0,
@@ -161,6 +165,7 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             })
             .above(0.0),
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
+            P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
             P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
             P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
                 &mut p.theta_est
