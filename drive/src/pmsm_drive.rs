@@ -103,7 +103,14 @@ impl Model for PmsmDrive {
         pair.now = step.start;
         while end.since(pair.now) > grid.width() {
             let (left, next) = (end.since(pair.now), to_next_sample(grid, pair.now));
+            let before = pair.now;
             pair.step(if next <= left + grid.width() { next } else { left })?;
+            if pair.now == before {
+                return Err(Fault::new(format!(
+                    "{} s after the start, T_s is below the resolution of time",
+                    before.seconds()
+                )));
+            }
         }
         Ok(())
     }
