@@ -15,7 +15,7 @@ const STATES: &str = "2.0.5, 4.2.4; 3.0.2, 2.3 and 4.2";
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "L00", requirement: "A plain life goes through: instantiation, initialisation, steps, termination.", clause: STATES, levels: Levels::MUST, run: Run::Probe(plain) },
-    Check { id: "X04", requirement: "A wrong instantiation token (GUID) gives NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(token) },
+    Check { id: "X04", requirement: "A wrong instantiation token (GUID) gives NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(token) },
     Check { id: "L01a", requirement: "An instance name that is NULL or empty, and a token that is NULL, give NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(names) },
     Check { id: "L01b", requirement: "An instance lives without a log callback.", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(mute) },
     Check { id: "L01c", requirement: "An FMU without resources needs no path to them.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(homeless) },

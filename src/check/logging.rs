@@ -17,7 +17,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "G-L3a", requirement: "An Error comes with a message of that status when logging is on.", clause: "3.0.2, 2.2.3", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(errors) },
     Check { id: "G-L3b", requirement: "Messages are UTF-8, not empty, and without a line break at the end.", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(texts) },
     Check { id: "G-L4", requirement: "Messages come with the environment, and in FMI 2.0 with the name, that the instance was made with.", clause: LOG, levels: Levels::MUST, run: Run::Probe(identity) },
-    Check { id: "G-L5", requirement: "With logging off there is no message but of errors.", clause: LOG, levels: Levels::MUST, run: Run::Probe(silence) },
+    Check { id: "G-L5", requirement: "With logging off there is no message but of errors.", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(silence) },
     Check { id: "M01", requirement: "With canNotUseMemoryManagementFunctions the importer's memory functions are not used, and may be NULL.", clause: "2.0.5, 2.1.5 and 4.3.1", levels: Levels(Some(Level::Must), None), run: Run::Probe(memory) },
 ];
 

@@ -15,9 +15,11 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Time that a probe may take.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(10);
 /// Checks for which it is a violation that the probe cannot even begin. All others then are not determined.
 const OUTRIGHT: [&str; 2] = ["B00", "L00"];
+/// Checks that say what is wrong when not even a plain life goes through.
+const FIRST: [&str; 3] = ["B00", "L00", "X02b"];
 /// Most restarts of a probe whose cases kill it.
 const RESTARTS: usize = 12;
 
@@ -40,7 +42,7 @@ pub struct Probe {
     #[arg(long, default_value_t = 0)]
     pub from: usize,
     /// Time that it may take, in seconds.
-    #[arg(long, default_value_t = 20.0)]
+    #[arg(long, default_value_t = 10.0)]
     pub seconds: f64,
 }
 
@@ -68,12 +70,20 @@ pub fn run(args: &Probe) -> anyhow::Result<()> {
             std::mem::forget(bench);
         }
         Err(Blocked(why)) => {
-            let line = if args.id == "B00" { Line::Violated(why) } else { Line::Blocked(why) };
+            let tool = needs_tool(&args.dir);
+            let line = if args.id == "B00" && !tool { Line::Violated(why) } else { Line::Blocked(why) };
             let text = [line, Line::Done].iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>()?;
             fs::write(&args.out, text.join("\n"))?;
         }
     }
     Ok(())
+}
+
+/// Whether the FMU needs a tool that may not be here.
+fn needs_tool(dir: &Path) -> bool {
+    let xml = fs::read(dir.join("modelDescription.xml")).unwrap_or_default();
+    let interface = model_description::read(&xml).ok().and_then(|d| d.co_simulation);
+    interface.is_some_and(|i| i.needs_execution_tool())
 }
 
 /// The verdicts of checks, in their order.
@@ -87,15 +97,17 @@ pub(super) fn run_all(subject: &Subject, checks: &[&Check], options: &Options) -
         }
     }
     let runner = Runner::new(subject, options);
+    let gate = if queue.is_empty() { None } else { gate(&runner) };
     let queue = Mutex::new(queue);
     let workers = std::thread::available_parallelism().map_or(2, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|| {
                 while let Some((check, verdict)) = take(&queue) {
-                    let found = match &runner {
-                        Ok(runner) => runner.run(check),
-                        Err(cause) => Verdict::NotDetermined(cause.clone()),
+                    let found = match (&runner, &gate) {
+                        (Err(cause), _) => Verdict::NotDetermined(cause.clone()),
+                        (Ok(_), Some(cause)) if !FIRST.contains(&check.id) => Verdict::NotDetermined(cause.clone()),
+                        (Ok(runner), _) => runner.run(check),
                     };
                     store(verdict, found);
                 }
@@ -104,6 +116,18 @@ pub(super) fn run_all(subject: &Subject, checks: &[&Check], options: &Options) -
     });
     let lost = || Verdict::NotDetermined("the probe was lost".into());
     verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect()
+}
+
+/// Why all other probes are in vain: not even a plain life goes through.
+fn gate(runner: &Result<Runner, String>) -> Option<String> {
+    let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == "L00")?;
+    match runner.as_ref().ok()?.run(check) {
+        Verdict::Violated(found) => {
+            Some(format!("a plain life does not go through (L00): {}", found.first().map_or("", String::as_str)))
+        }
+        Verdict::NotDetermined(why) => Some(why),
+        _ => None,
+    }
 }
 
 fn take<T>(queue: &Mutex<VecDeque<T>>) -> Option<T> {

@@ -102,9 +102,22 @@ impl Report {
         for (title, findings) in self.groups() {
             let passed = findings.iter().filter(|f| matches!(f.verdict, Verdict::Pass(_))).count();
             let _ = writeln!(out, "\n{title} ({passed} of {} passed)", findings.len());
-            for f in findings {
-                if verbose || !matches!(f.verdict, Verdict::Pass(_) | Verdict::NotApplicable(_)) {
-                    line(&mut out, f);
+            // What hinders a whole group is told once.
+            let mut told: Vec<&str> = Vec::new();
+            for f in &findings {
+                match &f.verdict {
+                    Verdict::Pass(_) | Verdict::NotApplicable(_) if !verbose => {}
+                    Verdict::NotDetermined(reason) if !verbose => {
+                        let same = |f: &&&Finding| f.verdict == Verdict::NotDetermined(reason.clone());
+                        let ids: Vec<_> = findings.iter().filter(same).map(|f| f.id).collect();
+                        if ids.len() == 1 {
+                            line(&mut out, f);
+                        } else if !told.contains(&reason.as_str()) {
+                            told.push(reason);
+                            let _ = writeln!(out, "  not determined: {}\n         - {reason}", ids.join(", "));
+                        }
+                    }
+                    _ => line(&mut out, f),
                 }
             }
         }
@@ -189,7 +202,9 @@ fn line(out: &mut String, finding: &Finding) {
     let (word, evidence) = words(finding);
     let _ = writeln!(out, "  {:<6} {word} ({}): {}", finding.id, level(finding.level), finding.requirement);
     if matches!(finding.verdict, Verdict::Violated(_)) {
-        let _ = writeln!(out, "         see FMI {}", finding.clause);
+        let clause = finding.clause;
+        let _ =
+            writeln!(out, "         see {}{clause}", if clause.starts_with(char::is_numeric) { "FMI " } else { "" });
     }
     for text in evidence.iter().take(SHOWN) {
         let _ = writeln!(out, "         - {}", text.lines().collect::<Vec<_>>().join(" "));

@@ -32,7 +32,7 @@ pub struct Check {
     /// Tell the checks that passed and those that do not apply, too
     #[arg(long, short)]
     pub verbose: bool,
-    /// Seconds that one probe of the binary may take [default: 20]
+    /// Seconds that one probe of the binary may take [default: 10]
     #[arg(long, value_name = "S")]
     pub patience: Option<f64>,
     /// List all checks and end

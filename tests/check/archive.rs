@@ -1,0 +1,62 @@
+//! Faults of the archive, by its raw headers.
+
+use crate::zip::{Entry, write};
+use crate::{check, told, violated};
+
+const XML: &str = include_str!("fmu.xml");
+
+fn good() -> Vec<Entry> {
+    let text = |name: &str| Entry::new(name, b"text");
+    vec![Entry::new("modelDescription.xml", XML.as_bytes()), text("documentation/index.html"), text("sources/fmu.c")]
+}
+
+#[test]
+fn each_fault_is_found_by_its_check() {
+    type Fault = (&'static str, &'static [&'static str], fn(&mut Vec<Entry>));
+    let faults: &[Fault] = &[
+        ("nothing", &[], |_| {}),
+        ("backslash", &["Z01b", "Z02b"], |e| e.push(Entry::new("a\\b", b""))),
+        ("absolute", &["Z01b", "Z02b"], |e| e.push(Entry::new("/etc/passwd", b""))),
+        ("outside", &["Z01b"], |e| e.push(Entry::new("resources/../../x", b""))),
+        ("dot", &["Z01b", "Z02b"], |e| e.push(Entry::new("./x", b""))),
+        ("umlaut", &["Z01c"], |e| e.push(Entry::new("resources/\u{e4}", b""))),
+        ("method 12", &["Z01d", "Z01j"], |e| e[2].method = 12),
+        ("descriptor without deflate", &["Z01e"], |e| e[2].flags = 8),
+        ("needs 4.5", &["Z01f"], |e| e[2].needed = 45),
+        ("encrypted", &["Z01g"], |e| e[2].flags = 1),
+        ("another disk", &["Z01h"], |e| e[2].disk = 1),
+        ("link", &["Z01i"], |e| e[2].mode = 0o120_777),
+        ("checksum", &["Z01j"], |e| e[2].crc = Some(7)),
+        ("twice", &["Z01k"], |e| e.push(e[2].clone())),
+        ("other name inside", &["Z01k"], |e| e[2].local_name = Some("sources/xyz.c".into())),
+        ("no implementation", &["Z02a"], |e| {
+            e.pop();
+        }),
+        ("foreign root", &["Z02b"], |e| e.push(Entry::new("readme.txt", b""))),
+        ("no documentation", &["Z04a"], |e| {
+            e.remove(1);
+        }),
+        ("licences without entry", &["Z04b"], |e| e.push(Entry::new("documentation/licenses/x", b""))),
+        ("odd platform", &["Z03"], |e| e.push(Entry::new("binaries/My Computer/x", b""))),
+        ("extra", &["Z06"], |e| e.push(Entry::new("extra/stuff/x", b""))),
+        ("header", &["Z07"], |e| e.push(Entry::new("sources/fmi2Functions.h", b""))),
+        ("terminal", &["I01"], |e| {
+            let xml = b"<fmiTerminalsAndIcons><Terminals><Terminal><TerminalMemberVariable variableName='zzz'/></Terminal></Terminals></fmiTerminalsAndIcons>";
+            e.push(Entry::new("terminalsAndIcons/terminalsAndIcons.xml", xml));
+        }),
+        ("other name of the binary", &["X03", "B10"], |e| e.push(Entry::new("binaries/linux64/Other.so", b"x"))),
+    ];
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    for (what, ids, fault) in faults {
+        let mut entries = good();
+        fault(&mut entries);
+        write(&path, &entries);
+        let report = check(&path, &["archive", "xml"]);
+        let expected: Vec<_> = ids.iter().filter(|id| **id != "B10").copied().collect();
+        assert_eq!(violated(&report), expected, "{what}: {}", told(&report));
+    }
+    let other = dir.path().join("x.zip");
+    write(&other, &good());
+    assert_eq!(violated(&check(&other, &["archive"])), ["Z01a"]);
+}

@@ -1,0 +1,147 @@
+//! Faults of the binary: a small C FMU that breaks no rule, compiled with one fault at a time.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+use crate::zip::{Entry, write};
+use crate::{check, told, violated};
+use fmu::check::Verdict;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Mutex;
+
+/// Fault, and the checks that must fail.
+const FAULTS: &[(&str, &[&str])] = &[
+    ("NONE", &[]),
+    ("B01", &["B01"]),
+    ("B02b", &["B02b"]),
+    ("B07a", &["B07a"]),
+    ("B08", &["B08"]),
+    ("X02b", &["X02b"]),
+    ("X04", &["X04"]),
+    ("L01a", &["L01a"]),
+    ("L01b", &["L01b"]),
+    ("L01c", &["L01c"]),
+    ("L02", &["L02"]),
+    ("L03", &["L03"]),
+    ("L05", &["L05"]),
+    ("L06", &["L06"]),
+    ("L07", &["L07"]),
+    ("L08", &["L08"]),
+    ("L08u", &["L08u"]),
+    ("L08n", &["L08n"]),
+    ("L09a", &["L09a"]),
+    ("L10", &["L10"]),
+    ("L12", &["L12"]),
+    ("V06b", &["V06b"]),
+    ("V07", &["V07"]),
+    ("V12", &["V12"]),
+    ("S04", &["S04"]),
+    ("G01a", &["G01a"]),
+    ("G01b", &["G01b"]),
+    ("G02", &["G02"]),
+    ("G03b", &["G03b"]),
+    ("G03c", &["G03c"]),
+    ("G04", &["G04"]),
+    ("G05", &["G05"]),
+    ("G07a", &["G07a"]),
+    ("G07b", &["G07b"]),
+    ("G08", &["G08"]),
+    ("T01a", &["T01a"]),
+    ("T01b", &["T01b"]),
+    ("T01c", &["T01c"]),
+    ("T02a", &["T02a"]),
+    ("T02b", &["T02b"]),
+    ("T03", &["T03"]),
+    ("T04", &["T04"]),
+    ("T06b", &["T06b"]),
+    ("T07", &["T07"]),
+    ("F01a", &["F01a"]),
+    ("F01b", &["F01b"]),
+    // A state that lacks a variable shows wherever one is restored.
+    ("F02", &["F01b", "F02a", "F02b", "F02c", "F03a", "F04a"]),
+    ("F03b", &["F03b"]),
+    ("F04a", &["F04a"]),
+    ("F04b", &["F04b"]),
+    ("F04c", &["F04c"]),
+    ("F04d", &["F04d"]),
+    ("G_L1b", &["G-L1b"]),
+    ("G_L2a", &["G-L2a"]),
+    ("G_L2b", &["G-L2b"]),
+    ("G_L3a", &["G-L3a"]),
+    ("G_L3b", &["G-L3b"]),
+    ("G_L4", &["G-L4"]),
+    ("G_L5", &["G-L5"]),
+    ("M01", &["M01"]),
+    ("CRASH", &["L00"]),
+    ("HANG", &["L00"]),
+];
+
+/// Compiles the small FMU; `None` without a compiler.
+fn compile(dir: &Path, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
+    let (source, out) =
+        (Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/check/fmu.c"), dir.join(format!("{fault}.so")));
+    let mut cc = Command::new("cc");
+    cc.args(["-shared", "-fPIC", "-O1", "-w", "-fvisibility=hidden", &format!("-DFAULT_{fault}")]).args(more);
+    let output = cc.arg(source).arg("-o").arg(&out).arg("-lm").output().ok()?;
+    assert!(output.status.success(), "{fault}: {}", String::from_utf8_lossy(&output.stderr));
+    std::fs::read(out).ok()
+}
+
+fn pack(dir: &Path, fault: &str, binary: &[u8]) -> std::path::PathBuf {
+    let path = dir.join(format!("{fault}.fmu"));
+    let entries = [
+        Entry::new("modelDescription.xml", include_bytes!("fmu.xml")),
+        Entry::new("binaries/linux64/Small.so", binary),
+        Entry::new("documentation/index.html", b"x"),
+    ];
+    write(&path, &entries);
+    path
+}
+
+#[test]
+fn each_fault_is_found_by_its_check() {
+    let dir = tempfile::tempdir().unwrap();
+    if compile(dir.path(), "NONE", &[]).is_none() {
+        eprintln!("there is no C compiler: not tested");
+        return;
+    }
+    let wrong = Mutex::new(Vec::new());
+    let next = Mutex::new(FAULTS.iter());
+    std::thread::scope(|scope| {
+        for _ in 0..3 {
+            scope.spawn(|| {
+                loop {
+                    let Some((fault, ids)) = next.lock().unwrap().next() else { return };
+                    let binary = compile(dir.path(), fault, &[]).unwrap();
+                    let report = check(&pack(dir.path(), fault, &binary), &[]);
+                    if violated(&report) != *ids {
+                        wrong.lock().unwrap().push(format!("{fault}: {}", told(&report)));
+                    }
+                }
+            });
+        }
+    });
+    let wrong = wrong.into_inner().unwrap();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn faults_of_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    if compile(dir.path(), "NONE", &[]).is_none() {
+        return;
+    }
+    for (more, ids) in [
+        (&["-Wl,-z,nodelete"][..], &["B02c", "B07b"][..]),
+        (&["-Wl,-rpath,/opt/lib"], &["B03r"]),
+        (&["-Wl,-z,execstack"], &["B05"]),
+        (&["-Wl,--no-as-needed", "-lgcc_s"], &["B03"]),
+    ] {
+        let binary = compile(dir.path(), "NONE", more).unwrap();
+        let report = check(&pack(dir.path(), "flags", &binary), &["binary", "instances"]);
+        assert_eq!(violated(&report), ids, "{more:?}: {}", told(&report));
+    }
+    let report = check(&pack(dir.path(), "text", b"no library"), &[]);
+    assert_eq!(violated(&report), ["B00", "B10"], "{}", told(&report));
+    let open = report.findings.iter().filter(|f| matches!(f.verdict, Verdict::NotDetermined(_))).count();
+    assert!(open > 40, "what cannot be looked at is not passed");
+}

@@ -1,0 +1,66 @@
+//! `fmu check` against faults: each makes exactly the right check fail.
+#![allow(missing_docs, unreachable_pub, clippy::missing_panics_doc)]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod archive;
+mod binary;
+mod description;
+mod foreign;
+mod survives;
+mod zip;
+
+use fmu::check::{Options, Verdict, report::Report};
+use std::path::Path;
+use std::time::Duration;
+
+/// All findings about a file.
+pub fn check(path: &Path, only: &[&str]) -> Report {
+    let options = Options {
+        only: only.iter().map(ToString::to_string).collect(),
+        patience: Some(Duration::from_secs(4)),
+        program: Some(env!("CARGO_BIN_EXE_fmu").into()),
+    };
+    fmu::check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The ids of the violated checks.
+pub fn violated(report: &Report) -> Vec<&'static str> {
+    report.violated().map(|f| f.id).collect()
+}
+
+/// What a check that should have failed said.
+pub fn told(report: &Report) -> String {
+    report.violated().map(|f| format!("{}: {:?}", f.id, f.verdict)).collect::<Vec<_>>().join("\n")
+}
+
+/// Our own archives pass whatever is not the packer's platform.
+#[test]
+fn our_own_archives_violate_nothing() {
+    for standard in ["fmi2", "fmi3"] {
+        for name in ["PmsmPlant", "SensorlessController", "PmsmDrive"] {
+            let report = check(&common::archives().join(standard).join(name).with_extension("fmu"), &[]);
+            // B03 and B04: a plain build of this machine needs its C library and libgcc_s.
+            let more: Vec<_> = violated(&report).into_iter().filter(|id| !["B03", "B04"].contains(id)).collect();
+            assert!(more.is_empty(), "{standard} {name}: {}", told(&report));
+            let open = report.findings.iter().find(|f| matches!(f.verdict, Verdict::NotDetermined(_)));
+            assert!(open.is_none(), "{standard} {name}: {open:?}");
+        }
+    }
+}
+
+/// The page has the list that the program has.
+#[test]
+fn the_page_has_the_list() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/check.md");
+    let page = std::fs::read_to_string(&path).unwrap();
+    let (before, after) = page.split_once("<!-- list -->\n").unwrap();
+    let (_, after) = after.split_once("<!-- end of list -->").unwrap();
+    let expected = format!("{before}<!-- list -->\n{}<!-- end of list -->{after}", fmu::check::report::list());
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(&path, expected).unwrap();
+    } else {
+        assert!(page == expected, "docs/check.md is old: UPDATE_GOLDEN=1 cargo test --test check writes it");
+    }
+}

@@ -1,0 +1,88 @@
+//! It survives whatever file it is given.
+
+use crate::common;
+use crate::zip::{Entry, write};
+use std::path::Path;
+use std::process::Command;
+
+fn status(path: &Path, more: &[&str]) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_fmu")).arg("check").arg(path).args(more).output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn what_is_no_fmu_is_status_2() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    let whole = std::fs::read(common::archives().join("fmi3/PmsmPlant.fmu")).unwrap();
+    let mut cases: Vec<(&str, Vec<u8>)> =
+        vec![("nothing", Vec::new()), ("text", b"hello".to_vec()), ("end only", b"PK\x05\x06".to_vec())];
+    cases.push(("cut", whole[..whole.len() / 2].to_vec()));
+    cases.push(("end record alone", whole[whole.len() - 22..].to_vec()));
+    for (what, bytes) in cases {
+        std::fs::write(&path, bytes).unwrap();
+        let (code, error) = status(&path, &[]);
+        assert_eq!(code, Some(2), "{what}: {error}");
+        assert!(error.starts_with("error: ") && error.lines().count() == 1, "{what}: {error}");
+    }
+    assert_eq!(status(dir.path(), &[]).0, Some(2));
+    assert_eq!(status(&dir.path().join("none.fmu"), &[]).0, Some(2));
+    write(&path, &[Entry::new("modelDescription.xml", br#"<fmiModelDescription fmiVersion="1.0"/>"#)]);
+    assert_eq!(status(&path, &[]).0, Some(2));
+}
+
+/// Any byte may be another: a verdict or a message, never a crash.
+#[test]
+fn changed_bytes_are_judged() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    write(&path, &[Entry::new("modelDescription.xml", include_bytes!("fmu.xml")), Entry::new("sources/x.c", b"x")]);
+    let good = std::fs::read(&path).unwrap();
+    let mut random = 1_u32;
+    for _ in 0..400 {
+        let mut bytes = good.clone();
+        for _ in 0..3 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let at = random as usize / 7 % bytes.len();
+            bytes[at] = u8::try_from(random >> 24).unwrap();
+        }
+        std::fs::write(&path, bytes).unwrap();
+        if let Ok(report) = fmu::check::run(&path, &fmu::check::Options::default()) {
+            assert!(!report.text(true).is_empty() && !report.html().is_empty() && report.json().is_ok());
+        }
+    }
+}
+
+/// Names outside, a bomb, an XML tree without end.
+#[test]
+fn bad_intent_is_harmless() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    let xml = Entry::new("modelDescription.xml", include_bytes!("fmu.xml"));
+    write(&path, &[xml.clone(), Entry::new("resources/../../../../tmp/evil-of-fmu-check", b"x")]);
+    assert_eq!(status(&path, &[]).0, Some(1));
+    assert!(!Path::new("/tmp/evil-of-fmu-check").exists());
+    let deep = format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?><a fmiVersion=\"2.0\">{}", "<a>".repeat(200_000));
+    write(&path, &[Entry::new("modelDescription.xml", deep.as_bytes())]);
+    assert_eq!(status(&path, &[]).0, Some(1));
+}
+
+#[test]
+fn the_command_line() {
+    let plant = common::archives().join("fmi3/PmsmPlant.fmu");
+    let run = |more: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_fmu")).arg("check").arg(&plant).args(more).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stdout).unwrap())
+    };
+    let (code, text) = run(&["--only", "Z01a,xml"]);
+    assert!(code == Some(0) && text.contains("9 checks: 9 passed"), "{text}");
+    let (code, json) = run(&["--only", "archive", "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert!(
+        code == Some(0) && json["findings"][0]["id"] == "Z01a" && json["findings"][0]["verdict"] == "pass",
+        "{json}"
+    );
+    let (_, html) = run(&["--only", "archive", "--format", "html"]);
+    assert!(html.starts_with("<!DOCTYPE html>") && html.contains("id=\"Z01a\""));
+    assert_eq!(run(&["--only", "nonsense"]).0, Some(2));
+}
