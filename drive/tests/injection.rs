@@ -3,6 +3,7 @@
 
 use drive::Pair;
 use drive::bench::{drive as preset, *};
+use drive::control::start::INJECTION;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 use drive::estimator::pulsating::MEASUREMENT_AXES;
@@ -234,6 +235,48 @@ fn cross_saturation_turns_all_alike() {
     }
 }
 
+/// A start by injection and voltage pulses from an angle (deg), then to `speed` (pu): angle error in deg after 1.5 s.
+fn start_from(method: &Method, degrees: f64, c_2: f64, speed: f64) -> f64 {
+    let mut pair = method.pair();
+    let par = &mut pair.controller.model.parameters;
+    (par.start.mode, par.c_2) = (INJECTION, 40.0);
+    let plant = &mut pair.plant.model.parameters;
+    (plant.saturation.c_2, plant.saturation.c_3) = (c_2, c_2);
+    plant.initial.theta_e = degrees.to_radians();
+    let mut turned = 0.0_f64;
+    run(&mut pair, 1.5, |t, p| {
+        p.controller.model.inputs.speed_ref = if t > 0.6 { speed * RATED_SPEED } else { 0.0 };
+        if t < 0.37 {
+            turned = turned.max(p.plant.out.speed.abs());
+        }
+    });
+    assert!(turned < 0.3, "{} from {degrees} deg: the rotor turned at {turned} rad/s", method.name);
+    angle_error(&pair)
+}
+
+#[test]
+fn start_at_standstill_from_every_angle() {
+    for method in &METHODS {
+        for k in 0..24 {
+            let degrees = 15.0 * f64::from(k);
+            let error = start_from(method, degrees, 40.0, if k % 2 == 0 { 0.05 } else { -0.05 });
+            assert!(error.abs() < 10.0, "{} from {degrees} deg: {error} deg", method.name);
+        }
+    }
+}
+
+/// Without saturation the noise decides: chance level. It proves that the pulses measure saturation and nothing else.
+#[test]
+fn without_saturation_the_pulses_decide_by_chance() {
+    let right = |method: &Method| {
+        let starts = (0..24).map(|k| start_from(method, 15.0 * f64::from(k), 0.0, 0.0));
+        starts.filter(|error| error.abs() < 90.0).count()
+    };
+    let all: usize = METHODS.iter().map(right).sum();
+    // 144 throws of a coin: 72 with a standard deviation of 6.
+    assert!((48..=96).contains(&all), "{all} of 144 right");
+}
+
 /// The message with which a combination is refused.
 fn refused(kind: Kind, set: impl Fn(&mut ControllerParameters)) -> String {
     let mut pair = preset(kind);
@@ -267,6 +310,16 @@ fn what_cannot_work_is_refused_with_names_and_reasons() {
     for part in ["mechanics.J = 0 kg.m2", "tracker.kind", "MechanicalObserver"] {
         assert!(message.contains(part), "{message}");
     }
+}
+
+#[test]
+fn a_start_that_cannot_work_is_refused() {
+    let message = refused(Kind::ExtendedEmf, |p| p.start.mode = INJECTION);
+    for part in ["start.mode = 3", "estimator = 4 (ExtendedEmf)"] {
+        assert!(message.contains(part), "{message}");
+    }
+    let message = refused(Kind::SquareWaveInjection, |p| p.start.mode = INJECTION);
+    assert!(message.contains("saturation.c_2 = 0 A/Wb2"), "{message}");
 }
 
 /// A rotor that is torn away, voltages that are not there: nothing but finite numbers.

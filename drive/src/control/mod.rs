@@ -2,6 +2,7 @@
 
 pub mod current;
 pub mod model;
+pub mod polarity;
 pub mod reference;
 pub mod sensor;
 pub mod speed;

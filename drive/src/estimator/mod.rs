@@ -253,6 +253,16 @@ estimators! {
         "Extended Kalman filter on stator flux, speed and angle, Kim & Sul 2011, section II.A";
 }
 
+impl Kind {
+    /// Whether it finds the magnet's axis at standstill, by injection.
+    pub fn injects(self) -> bool {
+        matches!(
+            self,
+            Self::RotatingInjection | Self::PulsatingInjection | Self::SquareWaveInjection | Self::NearPwmInjection
+        )
+    }
+}
+
 impl Default for Estimator {
     fn default() -> Self {
         Self::Rasmussen(rasmussen::Rasmussen::default())
