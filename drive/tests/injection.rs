@@ -236,8 +236,8 @@ fn cross_saturation_turns_all_alike() {
 }
 
 /// A start by injection and voltage pulses from an angle (deg), then to `speed` (pu): angle error in deg after 1.5 s.
-fn start_from(method: &Method, degrees: f64, c_2: f64, speed: f64) -> f64 {
-    let mut pair = method.pair();
+fn start_from(pair: &Pair, degrees: f64, c_2: f64, speed: f64) -> f64 {
+    let mut pair = pair.clone();
     let par = &mut pair.controller.model.parameters;
     (par.start.mode, par.c_2) = (INJECTION, 40.0);
     let plant = &mut pair.plant.model.parameters;
@@ -250,7 +250,7 @@ fn start_from(method: &Method, degrees: f64, c_2: f64, speed: f64) -> f64 {
             turned = turned.max(p.plant.out.speed.abs());
         }
     });
-    assert!(turned < 0.3, "{} from {degrees} deg: the rotor turned at {turned} rad/s", method.name);
+    assert!(turned < 0.3, "from {degrees} deg: the rotor turned at {turned} rad/s");
     angle_error(&pair)
 }
 
@@ -259,9 +259,14 @@ fn start_at_standstill_from_every_angle() {
     for method in &METHODS {
         for k in 0..24 {
             let degrees = 15.0 * f64::from(k);
-            let error = start_from(method, degrees, 40.0, if k % 2 == 0 { 0.05 } else { -0.05 });
+            let error = start_from(&method.pair(), degrees, 40.0, if k % 2 == 0 { 0.05 } else { -0.05 });
             assert!(error.abs() < 10.0, "{} from {degrees} deg: {error} deg", method.name);
         }
+    }
+    for k in 0..24 {
+        let degrees = 15.0 * f64::from(k);
+        let error = start_from(&preset(Kind::Hybrid), degrees, 40.0, if k % 2 == 0 { 0.5 } else { -0.5 });
+        assert!(error.abs() < 10.0, "hybrid from {degrees} deg: {error} deg");
     }
 }
 
@@ -269,12 +274,52 @@ fn start_at_standstill_from_every_angle() {
 #[test]
 fn without_saturation_the_pulses_decide_by_chance() {
     let right = |method: &Method| {
-        let starts = (0..24).map(|k| start_from(method, 15.0 * f64::from(k), 0.0, 0.0));
+        let starts = (0..24).map(|k| start_from(&method.pair(), 15.0 * f64::from(k), 0.0, 0.0));
         starts.filter(|error| error.abs() < 90.0).count()
     };
     let all: usize = METHODS.iter().map(right).sum();
     // 144 throws of a coin: 72 with a standard deviation of 6.
     assert!((48..=96).contains(&all), "{all} of 144 right");
+}
+
+/// Peak error in deg of the hybrid on its way 0 -> 0.95 -> -0.95 -> 0 pu under 0.8 of the rated torque, with ramps of
+/// `ramp` (s) from rest to speed, half a second between them.
+fn hybrid_both_ways(mut pair: Pair, ramp: f64, load: f64) -> f64 {
+    let (begin, stay) = (0.8, 0.5);
+    let legs = [begin, begin + ramp + stay, begin + 3.0 * ramp + 2.0 * stay];
+    let mut peak = 0.0_f64;
+    run(&mut pair, legs[2] + ramp + 0.5, |t, p| {
+        let up = |from: f64, by: f64| ((t - from) / ramp).clamp(0.0, by);
+        let speed = 0.95 * (up(legs[0], 1.0) - up(legs[1], 2.0) + up(legs[2], 1.0));
+        p.controller.model.inputs.speed_ref = speed * RATED_SPEED;
+        p.plant.model.inputs.tau_load = load * RATED_TORQUE * ((t - 0.1) / 0.3).clamp(0.0, 1.0);
+        peak = peak.max(angle_error(p).abs());
+    });
+    assert!(speed(&pair).abs() < 0.01, "it is back at rest: {}", speed(&pair));
+    peak
+}
+
+/// 7.6 deg ideal, below 13 deg with dead time. The list does not say how steep the ramps were; the peak grows with their
+/// square: ours are 1.9 pu/s, and half of that where nothing compensates the dead time.
+#[test]
+fn hybrid_from_standstill_to_speed_both_ways() {
+    for load in [0.8, -0.8] {
+        let hybrid = preset(Kind::Hybrid);
+        let peak = hybrid_both_ways(hybrid.clone(), 0.5, load);
+        assert!(peak < 7.6, "ideal: {peak} deg");
+        let peak = hybrid_both_ways(with_dead_time(hybrid.clone(), true), 0.5, load);
+        assert!(peak < 13.0, "compensated: {peak} deg");
+        let peak = hybrid_both_ways(with_dead_time(hybrid, false), 1.0, load);
+        assert!(peak < 13.0, "not compensated: {peak} deg");
+    }
+}
+
+#[test]
+fn hybrid_holds_rated_load_at_every_speed() {
+    for speed in [0.0, 0.02, -0.05, 0.1, 0.125, -0.15, 0.175, 0.2, 0.22, -0.5, 1.0] {
+        let steady = steady(preset(Kind::Hybrid), speed, 1.0);
+        assert!(steady.holds() && steady.error.mean().abs() < 0.3, "{speed} pu: {steady:?}");
+    }
 }
 
 /// The message with which a combination is refused.
@@ -301,6 +346,10 @@ fn what_cannot_work_is_refused_with_names_and_reasons() {
             }
         }
     }
+    let message = refused(Kind::Hybrid, |p| p.estimators.hybrid.w_high = p.estimators.hybrid.w_low);
+    assert!(message.contains("hybrid.w_high = ") && message.contains("above hybrid.w_low = "), "{message}");
+    let message = refused(Kind::Hybrid, |p| p.motor.L_q = p.motor.L_d);
+    assert!(message.contains("motor.L_d = 0.036 H"), "{message}");
     let message = refused(Kind::SquareWaveInjection, |p| p.estimators.square_wave.samples = 3);
     assert!(message.contains("square_wave.samples") && message.contains("2 or 4"), "{message}");
     let message = refused(Kind::SquareWaveInjection, |p| {
