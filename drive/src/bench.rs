@@ -56,6 +56,9 @@ pub fn drive(kind: Kind) -> Pair {
         par.estimators.tracker.bandwidth = TAU * 15.0;
         par.estimators.emf.bandwidth = TAU * 300.0;
     }
+    if kind == Kind::Hybrid {
+        par.estimators.tracker.bandwidth = TAU * 40.0;
+    }
     if matches!(kind, Kind::SquareWaveInjection | Kind::NearPwmInjection) {
         par.estimators.tracker.bandwidth = TAU * 40.0;
         par.speed_loop.bandwidth = TAU * 12.0;

@@ -3,6 +3,7 @@
 pub mod current;
 pub mod lock;
 pub mod model;
+pub mod polarity;
 pub mod reference;
 pub mod sensor;
 pub mod speed;

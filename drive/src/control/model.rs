@@ -2,9 +2,10 @@
 
 use crate::control::current::{CurrentController, CurrentGains};
 use crate::control::lock::{LOST, Lock, LockGains};
+use crate::control::polarity::{Search, Searching};
 use crate::control::reference::{greatest_torque, max_torque_per_ampere};
 use crate::control::speed::{SpeedController, SpeedGains};
-use crate::control::start::{CURRENT_FREQUENCY, Lead, Led};
+use crate::control::start::{CURRENT_FREQUENCY, INJECTION, Lead, Led};
 use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::{Context, Estimate, Estimator, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
@@ -109,6 +110,8 @@ struct State {
     estimator: Estimator,
     /// What leads the rotor before the estimator is at work.
     lead: Option<Lead>,
+    /// What finds the magnet at standstill before speed is controlled.
+    search: Option<Search>,
     speed: SpeedController,
     current: CurrentController,
     /// Commands of the last sample and of the one before it.
@@ -145,6 +148,11 @@ impl State {
         self.current = self.current.in_frame_behind(frame - theta);
         self.speed = SpeedController::take_over(&gains.speed, speed_ref, w / f64::from(motor.n_p), i_q);
         self.lead = None;
+    }
+
+    /// The magnet is found: the loops begin at rest.
+    fn found(&mut self) {
+        (self.current, self.speed, self.search) = (CurrentController::default(), SpeedController::default(), None);
     }
 }
 
@@ -240,6 +248,7 @@ impl SensorlessController {
         let context = Self::context(par);
         let kind = Kind::of(par.estimator).unwrap_or(Kind::Rasmussen);
         let led = state.lead.as_mut().map(|lead| lead.update(&par.start, &context, par.theta_est, inputs, &sample));
+        let searching = state.search.as_mut().map(|search| search.update(&par.polarity, &context, &sample));
         let estimate = if first {
             let (estimator, estimate) = Estimator::start(kind, &context, &sample, par.theta_est, n_p * par.speed_est);
             state.estimator = estimator;
@@ -250,6 +259,12 @@ impl SensorlessController {
             Estimate::new(theta, w, &sample)
         } else if led.is_some() {
             Estimate::default()
+        } else if let Some(Searching::Voltage(theta, _)) = searching {
+            Estimate::new(theta, 0.0, &sample)
+        } else if let Some(Searching::Found(theta)) = searching {
+            state.estimator.place(&context, &sample, theta, 0.0);
+            state.found();
+            Estimate::new(theta, 0.0, &sample)
         } else {
             state.estimator.update(&context, &sample)
         };
@@ -259,12 +274,17 @@ impl SensorlessController {
         };
         let Estimate { theta, w, i: controlled, injection } = estimate;
         let speed = w / n_p;
+        if let (Some(search), Some(Searching::Estimate)) = (&mut state.search, searching) {
+            search.sees(theta);
+        }
 
         let axis = Axis::<Estimated>::at(theta);
         let i_hat = axis.from_stator(controlled);
         // The low-speed law is Rasmussen's; it would only be a loss where the angle is known.
         let i_ref = if let Some(Led::Frame(.., i_ref)) = led {
             i_ref
+        } else if state.search.is_some() {
+            DqHat::ZERO
         } else if kind == Kind::Rasmussen {
             let i_d_ref = par.zero_speed.i_d_ref(speed);
             let limit = par.limit.i_q_beside(i_d_ref).min(gains.i_tau);
@@ -274,7 +294,11 @@ impl SensorlessController {
             if par.current.mtpa { max_torque_per_ampere(motor, gains.k * i_q_ref) } else { DqHat::new(0.0, i_q_ref) }
         };
 
-        let wanted = state.current.command(&gains.current, motor, i_ref, i_hat, w);
+        let wanted = if let Some(Searching::Voltage(_, u)) = searching {
+            u
+        } else {
+            state.current.command(&gains.current, motor, i_ref, i_hat, w)
+        };
         // The command acts from `delay` to `delay + 1` samples from now: turned to the middle of that interval.
         let acting = Axis::<Estimated>::at(theta + (f64::from(par.delay) + 0.5) * T_s * w);
         let injected = match injection {
@@ -355,13 +379,24 @@ impl Model for SensorlessController {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        let ControllerParameters { limit, zero_speed, estimator, start, .. } = &self.parameters;
+        let ControllerParameters { limit, zero_speed, estimator, start, polarity, motor, T_s, c_2, .. } =
+            &self.parameters;
         let Some(kind) = Kind::of(*estimator) else {
             return Err(Fault::value("estimator", estimator, "one of the enumeration's values"));
         };
         if start.mode == CURRENT_FREQUENCY && start.i > limit.i {
             let allowed = format!("at most limit.i = {} A", limit.i);
             return Err(Fault::value("start.i", format!("{} A", start.i), allowed));
+        }
+        if start.mode == INJECTION {
+            if !kind.injects() {
+                return Err(Fault::new(format!(
+                    "start.mode = {INJECTION} (Injection) and estimator = {estimator} ({}): the start by injection needs an \
+                     estimator that injects",
+                    kind.name()
+                )));
+            }
+            polarity.validate(motor, *T_s, *c_2, limit.i)?;
         }
         kind.validate(&Self::context(&self.parameters))?;
         if zero_speed.i_0 > limit.i {
@@ -374,7 +409,8 @@ impl Model for SensorlessController {
     fn initialise(&mut self) {
         let shown = ControllerOutputs { theta_est: wrap(self.parameters.theta_est), ..ControllerOutputs::default() };
         let lead = (self.parameters.start.mode == CURRENT_FREQUENCY).then(Lead::default);
-        self.state = State { computed: shown.clone(), shown, lead, ..State::default() };
+        let search = (self.parameters.start.mode == INJECTION).then(Search::default);
+        self.state = State { computed: shown.clone(), shown, lead, search, ..State::default() };
     }
 
     fn output(&self, _now: Elapsed, out: &mut ControllerOutputs) {

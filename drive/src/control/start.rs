@@ -38,11 +38,19 @@ pub static STARTS: Enumeration = Enumeration {
     items: &[
         Item { value: 1, name: "Direct", description: "Nothing: the estimator starts at once" },
         Item { value: 2, name: "CurrentFrequency", description: "I-f start: a current leads the rotor to start.speed" },
+        Item {
+            value: 3,
+            name: "Injection",
+            description: "Standstill: injection finds the magnet's axis, voltage pulses its north pole",
+        },
     ],
 };
 
 /// Value of the I-f start in [`STARTS`].
 pub const CURRENT_FREQUENCY: i32 = 2;
+
+/// Value of the start by injection in [`STARTS`].
+pub const INJECTION: i32 = 3;
 
 /// Parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -2,6 +2,7 @@
 
 use crate::control::current::{CURRENT_LOOP, CurrentLoop};
 use crate::control::lock::{LOCK, LockParameters};
+use crate::control::polarity::{POLARITY, PolarityParameters};
 use crate::control::sensor::{SENSOR, Sensor};
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
 use crate::control::start::{START, StartParameters};
@@ -9,6 +10,7 @@ use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::ESTIMATORS;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
 use crate::motor::{MOTOR, Motor};
+use crate::plant::saturation::A_PER_WB2;
 use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METRE, RADIAN, SECOND, SPEED, VOLT};
 use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};
@@ -97,6 +99,10 @@ pub struct ControllerParameters {
     pub lock: LockParameters,
     /// The start.
     pub start: StartParameters,
+    /// The start by injection.
+    pub polarity: PolarityParameters,
+    /// Estimate of the machine's saturation of second order in A/Wb2, >= 0; 0: not known.
+    pub c_2: f64,
     /// First estimate of the electrical angle in rad.
     pub theta_est: f64,
     /// First estimate of the mechanical speed in rad/s.
@@ -122,6 +128,8 @@ impl Default for ControllerParameters {
             zero_speed: ZeroSpeed::default(),
             lock: LockParameters::default(),
             start: StartParameters::default(),
+            polarity: PolarityParameters::default(),
+            c_2: 0.0,
             theta_est: 0.0,
             speed_est: 0.0,
         }
@@ -167,6 +175,14 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
             P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
             P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
+            P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
+            P::parameter(
+                "saturation.c_2",
+                &A_PER_WB2,
+                "Estimate of the saturation of second order along the magnet, start by injection; 0: not known",
+                |p| &mut p.c_2,
+            )
+            .at_least(0.0),
             P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
                 &mut p.theta_est
             }),

@@ -15,6 +15,7 @@ pub mod emf;
 pub mod emf_observer;
 pub mod extended_emf;
 pub mod follower;
+pub mod hybrid;
 pub mod interval;
 pub mod kalman;
 pub mod near_pwm;
@@ -247,10 +248,26 @@ estimators! {
         "Square-wave voltage at half the PWM frequency, Kim & Sul 2011, section III";
     11 NearPwmInjection(near_pwm::NearPwmInjection)
         "Voltage with a period of three samples, Kim & Sul 2011, section III";
+    12 Hybrid(hybrid::Hybrid)
+        "Square-wave injection at low speed, extended EMF above, Kim & Sul 2011, section IV";
     13 Sensored(sensored::Sensored)
         "Angle and speed of a sensor, theta_meas and speed_meas, Kim & Sul 2011, Fig. 1a";
     14 KalmanFilter(kalman::Kalman)
         "Extended Kalman filter on stator flux, speed and angle, Kim & Sul 2011, section II.A";
+}
+
+impl Kind {
+    /// Whether it finds the magnet's axis at standstill, by injection.
+    pub fn injects(self) -> bool {
+        matches!(
+            self,
+            Self::RotatingInjection
+                | Self::PulsatingInjection
+                | Self::SquareWaveInjection
+                | Self::NearPwmInjection
+                | Self::Hybrid
+        )
+    }
 }
 
 impl Default for Estimator {

@@ -1,4 +1,4 @@
-//! Injection near the PWM frequency, a period of three samples: 10 of the review (Kim & Sul 2011, III, [13]).
+//! Injection near the PWM frequency, a period of three samples: 10 of the review (Kim & Sul 2011, III, its reference 13).
 //!
 //! A voltage V e^{j 2 pi k / 3} in stator axes. The changes of current and injected flux linkage from one interval to the
 //! next obey delta i = S delta psi + D e^{j 2 theta} conj(delta psi), as complex numbers. Times delta psi and summed over

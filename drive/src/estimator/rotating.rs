@@ -2,7 +2,7 @@
 //!
 //! A voltage u = V e^{j phi k} in stator axes changes the current by T_s (S u + D e^{j 2 theta} conj(u)) in a sample
 //! ([`saliency`](crate::estimator::saliency)): one part turns with the carrier, the other against it. Band-pass,
-//! heterodyne with u e^{-j 2 theta^}, low-pass ([`carrier`](crate::estimator::carrier)): eps = T_s D V^2 sin(2 theta~), and
+//! heterodyne with u e^{-j 2 theta^}, low-pass ([`carrier`]): eps = T_s D V^2 sin(2 theta~), and
 //! e = eps / (2 T_s D V^2).
 //!
 //! The band-pass holds the part that turns against the carrier back by 2 w T_s / alpha; e is compensated by half of it,

@@ -2,7 +2,7 @@
 //!
 //! In stator axes, with u and i as complex numbers, di/dt = S u + D e^{j 2 theta} conj(u), where S = (1/L_d + 1/L_q) / 2
 //! and D = (1/L_d - 1/L_q) / 2: the angle is in D only, and as twice itself. So no injection tells the two ends of the
-//! magnet apart; [`standstill`](crate::control::standstill) does. Limits, of all of them: saliency is needed, and
+//! magnet apart; [`polarity`](crate::control::polarity) does. Limits, of all of them: saliency is needed, and
 //! cross-saturation turns the axis of the inductances itself, by -9 to -21 deg at rated load.
 
 use crate::estimator::Sample;

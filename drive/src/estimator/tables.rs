@@ -3,6 +3,7 @@
 use crate::estimator::carrier::{CARRIER, CarrierParameters};
 use crate::estimator::emf::{EMF, EmfParameters};
 use crate::estimator::follower::{FOLLOWER, FollowerParameters};
+use crate::estimator::hybrid::{HYBRID, HybridParameters};
 use crate::estimator::kalman::{KALMAN, KalmanParameters};
 use crate::estimator::near_pwm::{NEAR_PWM, NearPwmParameters};
 use crate::estimator::pulsating::{PULSATING, PulsatingParameters};
@@ -33,6 +34,8 @@ pub struct EstimatorParameters {
     pub near_pwm: NearPwmParameters,
     /// The Kalman filter.
     pub kalman: KalmanParameters,
+    /// The hybrid.
+    pub hybrid: HybridParameters,
 }
 
 type P = Row<EstimatorParameters>;
@@ -50,6 +53,7 @@ pub const ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = &Table::new(
             P::part("square_wave.", &Part { table: SQUARE_WAVE, lens: |p| &mut p.square_wave }),
             P::part("near_pwm.", &Part { table: NEAR_PWM, lens: |p| &mut p.near_pwm }),
             P::part("kalman.", &Part { table: KALMAN, lens: |p| &mut p.kalman }),
+            P::part("hybrid.", &Part { table: HYBRID, lens: |p| &mut p.hybrid }),
         ]
     },
 );

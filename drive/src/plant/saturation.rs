@@ -13,7 +13,7 @@ use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 
 /// Second-order coefficient in A/Wb2.
-const A_PER_WB2: Quantity = Quantity::new("SaturationOfSecondOrder", Unit::si("A/Wb2", per_weber(2)));
+pub(crate) const A_PER_WB2: Quantity = Quantity::new("SaturationOfSecondOrder", Unit::si("A/Wb2", per_weber(2)));
 /// Third-order coefficient in A/Wb3.
 const A_PER_WB3: Quantity = Quantity::new("SaturationOfThirdOrder", Unit::si("A/Wb3", per_weber(3)));
 
