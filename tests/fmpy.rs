@@ -23,6 +23,11 @@ fn misuse_of_the_c_interface() {
     pytest("misuse", &["test_misuse.py"]);
 }
 
+#[test]
+fn every_estimator_as_natively() {
+    pytest("estimators", &["test_estimators.py"]);
+}
+
 /// Runs files of `tests/fmpy/` on freshly packed archives.
 fn pytest(name: &str, files: &[&str]) {
     let python = python();
@@ -35,6 +40,7 @@ fn pytest(name: &str, files: &[&str]) {
         .args(files)
         .current_dir(folder())
         .env("FMU_ARCHIVES", archives)
+        .env("FMU_ESTIMATORS", estimators())
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .env_remove("PYTHONPATH")
         .env_remove("PYTEST_ADDOPTS")
@@ -51,6 +57,16 @@ fn pytest(name: &str, files: &[&str]) {
 fn show(output: &Output) {
     let mut out = io::stdout().lock();
     let _ = out.write_all(&output.stdout).and_then(|()| out.write_all(&output.stderr)).and_then(|()| out.flush());
+}
+
+/// The file with the estimators' experiments and what came out natively.
+fn estimators() -> &'static Path {
+    static FILE: OnceLock<PathBuf> = OnceLock::new();
+    FILE.get_or_init(|| {
+        let file = scratch().join(format!("estimators-{}.json", process::id()));
+        fs::write(&file, common::estimators::experiments().to_string()).expect("a file below the target folder");
+        file
+    })
 }
 
 fn folder() -> PathBuf {

@@ -1,6 +1,8 @@
 //! The closed loop run natively: the reference for every figure and for the packed FMUs.
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::missing_panics_doc)]
 
+pub mod estimators;
+
 use drive::Pair;
 use fmu::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
 use fmu_core::{Block, Model, Slot};

@@ -18,7 +18,7 @@ RECORDED = {"plant": ("speed", "theta_e"), "controller": ("speed_est", "theta_es
 class Unit:
     """One FMU: a thin layer over FMPy that makes FMI 2.0 and FMI 3.0 look the same."""
 
-    def __init__(self, archive, parameters=None, integers=None):
+    def __init__(self, archive, parameters=None, integers=None, booleans=None):
         self.description = read_model_description(archive)
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
         self.fmi2 = self.description.fmiVersion == "2.0"
@@ -36,6 +36,8 @@ class Unit:
             self.set_reals([self.references[name]], [value])
         for name, value in (integers or {}).items():
             self.set_integer(name, value)
+        for name, value in (booleans or {}).items():
+            self.slave.setBoolean([self.references[name]], [value])
         if self.fmi2:
             self.slave.setupExperiment(startTime=0.0)
         self.slave.enterInitializationMode()

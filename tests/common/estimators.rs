@@ -1,0 +1,118 @@
+//! A start and a load step for every estimator, run natively and told to fmpy: parameters, inputs and what must come out.
+
+use drive::bench::{self, RATED_SPEED, RATED_TORQUE};
+use drive::control::start::{CURRENT_FREQUENCY, INJECTION};
+use drive::estimator::Kind;
+use drive::{Pair, math};
+use fmu_core::{Block, Causality, Model, Slot};
+use serde_json::{Map, Value, json};
+
+const T_S: f64 = 1e-4;
+/// Samples from one recorded point to the next.
+const EVERY: u32 = 50;
+
+/// Values of an input over time: each holds from its time (s) on.
+type Schedule = Vec<(f64, f64)>;
+
+struct Experiment {
+    name: String,
+    pair: Pair,
+    speed_ref: Schedule,
+    load: Schedule,
+    duration: f64,
+}
+
+/// Every parameter that is not at its start value.
+fn parameters<M: Model>(block: &Block<M>) -> Map<String, Value> {
+    let (mut block, mut fresh) = (block.clone(), Block::<M>::default());
+    let mut map = Map::new();
+    for i in 0..M::TABLE.len() {
+        let Some((name, meta, _)) = M::TABLE.locate(i) else { continue };
+        if meta.causality != Causality::Parameter {
+            continue;
+        }
+        let value = |block: &mut Block<M>| match M::TABLE.entry(block, i) {
+            Some((_, Slot::Real(x))) => json!(*x),
+            Some((_, Slot::Integer(x))) => json!(*x),
+            Some((_, Slot::Boolean(x))) => json!(*x),
+            None => Value::Null,
+        };
+        let set = value(&mut block);
+        if set != value(&mut fresh) {
+            map.insert(name, set);
+        }
+    }
+    map
+}
+
+fn at(schedule: &Schedule, t: f64) -> f64 {
+    schedule.iter().rev().find(|(from, _)| t >= from - 1e-9).map_or(0.0, |(_, value)| *value)
+}
+
+fn load_step(kind: Kind) -> Experiment {
+    // Injections run out of voltage above 0.2 pu; the Rasmussen observer is for its own motor.
+    let speed = if (8..=11).contains(&(kind as i32)) { 0.1 } else { 0.5 };
+    let (pair, speed, load) = if kind == Kind::Rasmussen {
+        let mut pair = Pair::default();
+        pair.plant.model.parameters.initial.speed = 100.0;
+        pair.controller.model.parameters.speed_est = 100.0;
+        (pair, 100.0, 1.0)
+    } else {
+        (bench::turning(bench::drive(kind), speed), speed * RATED_SPEED, 0.3 * RATED_TORQUE)
+    };
+    let name = format!("{}: load step", kind.name());
+    Experiment { name, pair, speed_ref: vec![(0.0, speed)], load: vec![(0.2, load)], duration: 0.8 }
+}
+
+fn start(kind: Kind) -> Experiment {
+    let mut pair = if kind == Kind::Rasmussen { Pair::default() } else { bench::drive(kind) };
+    pair.plant.model.parameters.initial.theta_e = 2.0;
+    let (mode, speed) = match kind as i32 {
+        1 => (1, 50.0),
+        8..=11 => (INJECTION, 0.05 * RATED_SPEED),
+        12 => (INJECTION, 0.5 * RATED_SPEED),
+        13 => (1, 0.5 * RATED_SPEED),
+        _ => (CURRENT_FREQUENCY, 0.5 * RATED_SPEED),
+    };
+    pair.controller.model.parameters.start.mode = mode;
+    if mode == INJECTION {
+        pair = bench::with_saturation(pair);
+        pair.controller.model.parameters.c_2 = 40.0;
+    }
+    let name = format!("{}: start", kind.name());
+    Experiment { name, pair, speed_ref: vec![(0.6, speed)], load: vec![], duration: 1.6 }
+}
+
+impl Experiment {
+    /// Runs it natively: the experiment as JSON with speed and estimated angle of every recorded point.
+    fn run(mut self) -> Value {
+        let pair = &mut self.pair;
+        let u_dc = pair.plant.model.inputs.u_dc;
+        let (plant, controller) = (parameters(&pair.plant), parameters(&pair.controller));
+        let (mut speed, mut theta_est) = (Vec::new(), Vec::new());
+        super::run(pair, T_S, self.duration, |t, p| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of samples")]
+            let k = (t / T_S).round() as u32;
+            if k.is_multiple_of(EVERY) {
+                speed.push(p.plant.out.speed);
+                theta_est.push(p.controller.out.theta_est);
+            }
+            p.set_inputs(at(&self.speed_ref, t), at(&self.load, t), u_dc);
+        });
+        let reference = at(&self.speed_ref, self.duration);
+        let error = math::wrap(pair.controller.out.theta_est - pair.plant.out.theta_e).to_degrees();
+        assert!((pair.plant.out.speed - reference).abs() < 8.0, "{}: {} rad/s", self.name, pair.plant.out.speed);
+        assert!(error.abs() < 20.0, "{}: {error} deg off", self.name);
+        json!({
+            "name": self.name, "plant": plant, "controller": controller, "u_dc": u_dc, "speed_ref": self.speed_ref,
+            "load": self.load, "steps": (speed.len() - 1) * EVERY as usize, "every": EVERY, "speed": speed,
+            "theta_est": theta_est,
+        })
+    }
+}
+
+/// All experiments.
+pub fn experiments() -> Value {
+    let all = Kind::ALL.iter().flat_map(|&kind| [load_step(kind), start(kind)]);
+    Value::Array(all.map(Experiment::run).collect())
+}
