@@ -5,10 +5,11 @@
 //! - [`importer`]: runs any co-simulation FMU; the only place with `unsafe` code.
 //! - [`check`]: whether an FMU keeps to its standard.
 //! - [`cosimulation`]: several FMUs connected; [`plot`]: what they did, as a picture.
-//! - [`reproduce`]: the paper's experiments.
+//! - [`reproduce`]: the paper's experiments; [`compare`]: the estimators side by side, natively; [`tune`]: values for a machine.
 
 pub mod check;
 pub mod commands;
+pub mod compare;
 pub mod cosimulation;
 pub mod documentation;
 pub mod importer;
@@ -17,6 +18,7 @@ pub mod pack;
 pub mod platform;
 pub mod plot;
 pub mod reproduce;
+pub mod tune;
 pub mod workspace;
 
 /// The work itself failed, although the command and its files were good: exit status 1 instead of 2.

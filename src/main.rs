@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use fmu::check::probe;
-use fmu::commands::{build, check, reproduce, simulate};
+use fmu::commands::{build, check, compare, reproduce, simulate, tune};
 use std::process::ExitCode;
 
 /// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.
@@ -21,6 +21,8 @@ enum Command {
     Simulate(simulate::Simulate),
     Check(check::Check),
     Reproduce(reproduce::Reproduce),
+    Compare(compare::Compare),
+    Tune(tune::Tune),
     #[command(hide = true)]
     Probe(probe::Probe),
 }
@@ -37,6 +39,8 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
+        Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Compare(args) => compare::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
     };
     outcome.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");

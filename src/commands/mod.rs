@@ -2,5 +2,7 @@
 
 pub mod build;
 pub mod check;
+pub mod compare;
 pub mod reproduce;
 pub mod simulate;
+pub mod tune;

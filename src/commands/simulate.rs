@@ -3,6 +3,7 @@
 use crate::Failed;
 use crate::cosimulation::{Point, Recording, Schedule, Settings, System};
 use crate::importer::{Fmu, Message};
+use crate::tune::ssv;
 use crate::{pack, plot};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -40,6 +41,9 @@ pub struct Simulate {
     /// Connect every input that nothing feeds to the output of the same name of another FMU
     #[arg(long)]
     pub auto_connect: bool,
+    /// Set what a parameter file says, SSV of SSP 1.0, before --set (repeatable)
+    #[arg(long, value_name = "INSTANCE=FILE.ssv")]
+    pub parameters: Vec<String>,
     /// Set a parameter, or an input that nothing feeds (repeatable)
     #[arg(long, value_name = "VARIABLE=VALUE")]
     pub set: Vec<String>,
@@ -127,6 +131,14 @@ fn prepare(system: &mut System, args: &Simulate) -> Result<Settings> {
     if args.auto_connect {
         for (from, to) in system.connect_by_name()? {
             eprintln!("connected {from} -> {to}");
+        }
+    }
+    for text in &args.parameters {
+        let (instance, file) = halves(text, "--parameters INSTANCE=FILE.ssv")?;
+        let content = std::fs::read_to_string(file).with_context(|| format!("reading {file}"))?;
+        let values = ssv::read(&content).map_err(|cause| anyhow!("{file}: {cause}"))?;
+        for (name, value) in values {
+            system.set(&format!("{instance}.{name}"), &value).with_context(|| file.to_owned())?;
         }
     }
     for text in &args.set {

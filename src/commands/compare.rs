@@ -1,0 +1,83 @@
+//! `fmu compare`: every estimator through every scenario.
+
+use crate::compare::scenario::{self, Effort, SCENARIOS};
+use crate::compare::subject::Entry;
+use crate::compare::{self, Cell, Selection, table};
+use crate::workspace::Workspace;
+use anyhow::{Result, anyhow};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::{IsTerminal, stderr};
+use std::path::PathBuf;
+
+/// Runs every estimator through start-up, load steps, wrong parameters and more, and compares the figures.
+///
+/// Runs natively, on all cores. Writes compare.html, compare.md, compare.txt, compare.csv and plots to `compare` in Cargo's
+/// target folder. Exit status 1 when a number is outside the tolerance of the figure there is for it.
+#[derive(Debug, Default, Args)]
+pub struct Compare {
+    /// Some estimators only
+    #[arg(long, value_name = "ESTIMATOR,...", value_delimiter = ',')]
+    pub only: Vec<String>,
+    /// Some scenarios only
+    #[arg(long, value_name = "SCENARIO,...", value_delimiter = ',')]
+    pub scenario: Vec<String>,
+    /// List estimators and scenarios and end
+    #[arg(long)]
+    pub list: bool,
+    /// Where the results go [default: compare in Cargo's target folder]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Runs the command; returns whether every figure is as expected.
+///
+/// # Errors
+/// A name is unknown, or a file cannot be written.
+pub fn run(args: &Compare) -> Result<bool> {
+    if args.list {
+        println!("estimators: {}", names(Entry::all().iter().map(|e| e.name)));
+        for s in SCENARIOS {
+            println!("{:18}{}: {}", s.id, s.group, s.title);
+        }
+        return Ok(true);
+    }
+    let selection = selection(args)?;
+    let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("compare")), Ok)?;
+
+    let count = u64::try_from(selection.entries.len() * selection.scenarios.len())?;
+    let bar = if stderr().is_terminal() { ProgressBar::new(count) } else { ProgressBar::hidden() };
+    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} cells  {eta} left");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let cells = compare::run(&selection, || bar.inc(1));
+    bar.finish_and_clear();
+
+    compare::write(&cells, &out)?;
+    println!("{}", table::text(&cells));
+    println!("{}", out.join("compare.html").display());
+    Ok(cells.iter().all(Cell::holds))
+}
+
+fn names<'a>(all: impl Iterator<Item = &'a str>) -> String {
+    all.collect::<Vec<_>>().join(", ")
+}
+
+fn selection(args: &Compare) -> Result<Selection> {
+    let mut selection = Selection::all(Effort::Full);
+    let estimator = |name: &String| {
+        let found = Entry::all().into_iter().find(|e| e.name.eq_ignore_ascii_case(name));
+        let known = || names(Entry::all().iter().map(|e| e.name));
+        found.ok_or_else(|| anyhow!("--only {name}: is no estimator; there are {}", known()))
+    };
+    let scenario = |id: &String| {
+        let known = || names(SCENARIOS.iter().map(|s| s.id));
+        scenario::find(id).ok_or_else(|| anyhow!("--scenario {id}: is no scenario; there are {}", known()))
+    };
+    if !args.only.is_empty() {
+        selection.entries = args.only.iter().map(estimator).collect::<Result<_>>()?;
+    }
+    if !args.scenario.is_empty() {
+        selection.scenarios = args.scenario.iter().map(scenario).collect::<Result<_>>()?;
+    }
+    Ok(selection)
+}

@@ -1,0 +1,65 @@
+//! `fmu tune`: parameter values of the FMUs for a machine.
+
+use crate::tune::rules::{Setting, Value};
+use crate::tune::{self};
+use crate::workspace::Workspace;
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Turns a machine and bandwidths into parameter values of PmsmPlant and SensorlessController.
+///
+/// MOTOR.toml holds machine, mechanics, ratings, DC link and the bandwidths of current loop, speed loop and observer; the
+/// folder motors/ has examples. Writes NAME.PmsmPlant.ssv and NAME.SensorlessController.ssv (SSP 1.0), which importers
+/// read:
+///
+///   fmu tune motors/ipmsm-2.2kw.toml --out target/tune
+///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
+///     --parameters PmsmPlant=target/tune/ipmsm-2.2kw.PmsmPlant.ssv \
+///     --parameters SensorlessController=target/tune/ipmsm-2.2kw.SensorlessController.ssv \
+///     --input SensorlessController.speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub struct Tune {
+    /// File of the machine
+    #[arg(value_name = "MOTOR.toml")]
+    pub motor: PathBuf,
+    /// Where the files go [default: tune in Cargo's target folder]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The machine's file is wrong, or a file cannot be written.
+pub fn run(args: &Tune) -> Result<()> {
+    let tuned = tune::tune(&args.motor)?;
+    let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("tune")), Ok)?;
+    let files = tune::write(&tuned, &out)?;
+    println!("{}\n{}", tuned.name, tuned.source);
+    for (model, settings) in [("PmsmPlant", &tuned.plant), ("SensorlessController", &tuned.controller)] {
+        println!("\n{model}");
+        for Setting { name, value, rule, .. } in settings {
+            println!("  {name:26}{:>14}  {rule}", shown(value));
+        }
+    }
+    for note in &tuned.notes {
+        println!("\nnote: {note}");
+    }
+    println!();
+    for file in &files {
+        println!("{}", file.display());
+    }
+    Ok(())
+}
+
+fn shown(value: &Value) -> String {
+    match value {
+        // Six digits are enough to read; the file has them all.
+        Value::Real(x) => format!("{}", format!("{x:.5e}").parse::<f64>().unwrap_or(*x)),
+        Value::Integer(i) => i.to_string(),
+        Value::Boolean(b) => b.to_string(),
+        Value::Item(item) => item.clone(),
+    }
+}

@@ -1,0 +1,131 @@
+//! The grid: every estimator through every scenario, natively, on all cores; measured, judged, drawn.
+//!
+//! - [`subject`]: an estimator with the drive it is compared on; [`scenario`]: what it goes through;
+//! - [`measure`]: what is read off a run; [`expected`]: what the review's list of figures says about it;
+//! - [`queue`]: the runs on all cores; [`table`], [`html`], [`plots`]: what an engineer reads.
+
+pub mod expected;
+pub mod html;
+pub mod measure;
+mod parameters;
+pub mod plots;
+pub mod queue;
+mod running;
+pub mod scenario;
+mod signal;
+pub mod subject;
+pub mod table;
+
+use anyhow::{Context, Result};
+use measure::{Measure, Trace};
+use scenario::{Effort, SCENARIOS, Scenario};
+use std::path::Path;
+use subject::{Entry, Subject};
+
+/// What came of one estimator in one scenario.
+#[derive(Clone, Debug)]
+pub enum Outcome {
+    /// Numbers, and the run over time where it is worth a plot.
+    Measured(Vec<Measure>, Option<Trace>),
+    /// Why the scenario says nothing about this estimator.
+    NotApplicable(&'static str),
+    /// The drive could not even be started: the message of the parameters that do not fit together.
+    Refused(String),
+}
+
+/// One cell of the grid.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    /// The row.
+    pub entry: Entry,
+    /// The scenario.
+    pub scenario: &'static Scenario,
+    /// What came of it.
+    pub outcome: Outcome,
+}
+
+impl Cell {
+    /// The numbers; none where the scenario does not apply.
+    pub fn measures(&self) -> &[Measure] {
+        match &self.outcome {
+            Outcome::Measured(measures, _) => measures,
+            _ => &[],
+        }
+    }
+
+    /// The run over time.
+    pub fn trace(&self) -> Option<&Trace> {
+        match &self.outcome {
+            Outcome::Measured(_, trace) => trace.as_ref(),
+            _ => None,
+        }
+    }
+
+    /// The numbers that are not what is expected of them.
+    pub fn outside(&self) -> impl Iterator<Item = &Measure> {
+        self.measures().iter().filter(|m| m.expected.is_some_and(|e| !e.holds(m.value)))
+    }
+
+    /// Whether all that is expected of this cell is so.
+    pub fn holds(&self) -> bool {
+        !matches!(self.outcome, Outcome::Refused(_)) && self.outside().next().is_none()
+    }
+}
+
+/// Which cells, and how thoroughly.
+#[derive(Clone, Debug)]
+pub struct Selection {
+    /// The estimators, the rows.
+    pub entries: Vec<Entry>,
+    /// The scenarios, the columns.
+    pub scenarios: Vec<&'static Scenario>,
+    /// How thoroughly.
+    pub effort: Effort,
+}
+
+impl Selection {
+    /// All cells.
+    pub fn all(effort: Effort) -> Self {
+        Self { entries: Entry::all(), scenarios: SCENARIOS.iter().collect(), effort }
+    }
+}
+
+/// Runs the cells on all cores; `done` hears of each that is finished.
+pub fn run(selection: &Selection, done: impl Fn() + Sync) -> Vec<Cell> {
+    let Selection { entries, scenarios, effort } = selection;
+    let jobs: Vec<_> = entries.iter().flat_map(|&entry| scenarios.iter().map(move |&s| (entry, s))).collect();
+    queue::map(&jobs, |&(entry, scenario)| {
+        let subject = Subject::new(entry);
+        let mut outcome = match (scenario.run)(&subject, *effort) {
+            Ok(outcome) => outcome,
+            Err(fault) => Outcome::Refused(fault.message().into()),
+        };
+        if let Outcome::Measured(measures, _) = &mut outcome {
+            for m in measures {
+                m.expected = expected::of(entry.name, scenario.id, m.name);
+            }
+        }
+        done();
+        Cell { entry, scenario, outcome }
+    })
+}
+
+/// Writes table, CSV, plots and page to `out`.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write(cells: &[Cell], out: &Path) -> Result<()> {
+    let file = |name: &str, text: &str| {
+        let path = out.join(name);
+        std::fs::write(&path, text).with_context(|| format!("writing {}", path.display()))
+    };
+    std::fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
+    let plots = plots::all(cells)?;
+    for plot in &plots {
+        file(&format!("{}.svg", plot.name), &plot.svg)?;
+    }
+    file("compare.csv", &table::csv(cells))?;
+    file("compare.txt", &table::text(cells))?;
+    file("compare.md", &table::markdown(cells))?;
+    file("compare.html", &html::page(cells, &plots))
+}

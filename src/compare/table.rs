@@ -1,0 +1,259 @@
+//! The grid as text, Markdown and CSV. Estimators down, scenarios across, one table for each group of scenarios.
+
+use super::measure::Measure;
+use super::{Cell, Outcome};
+use crate::compare::subject::Class;
+use std::fmt::Write as _;
+
+/// A group of scenarios with its cells, as texts.
+#[derive(Debug)]
+pub struct Block {
+    /// What the scenarios have in common.
+    pub title: &'static str,
+    /// Heading of each column: name of the scenario, and what the numbers are.
+    pub headings: Vec<(String, String)>,
+    /// Estimator, its texts, and whether each holds.
+    pub rows: Vec<(&'static str, Vec<(String, bool)>)>,
+    /// Notes under the table.
+    pub notes: Vec<String>,
+}
+
+/// A number in the resolution that an engineer reads of its unit.
+pub fn number(m: &Measure) -> String {
+    if m.value.is_infinite() {
+        return if m.name == "settling time" { "never" } else { "lost" }.into();
+    }
+    let decimals = match m.unit {
+        "deg" | "pu" | "s" | "W" | "A" => 3 - usize::from(m.unit == "deg" || m.unit == "s"),
+        "Hz" => 1,
+        _ => 0,
+    };
+    // No -0.00.
+    let text = format!("{:.decimals$}", m.value);
+    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { text.replace('-', "") } else { text }
+}
+
+/// A cell: its numbers, each with a mark where something is expected of it.
+fn cell_text(cell: &Cell) -> String {
+    match &cell.outcome {
+        Outcome::NotApplicable(_) => "-".into(),
+        Outcome::Refused(_) => "REFUSED".into(),
+        Outcome::Measured(measures, _) if measures.iter().all(|m| m.value.is_infinite()) => {
+            format!("lost{}", mark(&measures[0], measures.iter().any(|m| m.expected.is_some())))
+        }
+        Outcome::Measured(measures, _) => {
+            let one = |m: &Measure| format!("{}{}", number(m), mark(m, m.expected.is_some()));
+            measures.iter().map(one).collect::<Vec<_>>().join("  ")
+        }
+    }
+}
+
+fn mark(m: &Measure, expected: bool) -> &'static str {
+    match (expected, m.expected.is_none_or(|e| e.holds(m.value)) && m.value.is_finite()) {
+        (false, _) => "",
+        (true, true) => "✓",
+        (true, false) => "✗",
+    }
+}
+
+/// The tables of the cells.
+pub fn blocks(cells: &[Cell]) -> Vec<Block> {
+    let mut groups: Vec<&'static str> = Vec::new();
+    for cell in cells {
+        if !groups.contains(&cell.scenario.group) {
+            groups.push(cell.scenario.group);
+        }
+    }
+    groups.into_iter().map(|group| block(group, cells)).collect()
+}
+
+fn block(group: &'static str, cells: &[Cell]) -> Block {
+    let inside: Vec<&Cell> = cells.iter().filter(|c| c.scenario.group == group).collect();
+    let (mut scenarios, mut estimators, mut notes) = (Vec::new(), Vec::new(), Vec::new());
+    for cell in &inside {
+        if !scenarios.contains(&cell.scenario.id) {
+            scenarios.push(cell.scenario.id);
+            notes.push(format!("{}: {}", cell.scenario.id, cell.scenario.title));
+        }
+        if !estimators.contains(&cell.entry.name) {
+            estimators.push(cell.entry.name);
+        }
+    }
+    let of = |id: &'static str| inside.iter().copied().filter(move |c| c.scenario.id == id);
+    let heading = |id: &'static str| {
+        let measured = of(id).map(Cell::measures).find(|m| !m.is_empty()).unwrap_or_default();
+        let names: Vec<_> = measured.iter().map(|m| format!("{} [{}]", m.name, m.unit)).collect();
+        (id.to_owned(), names.join(", "))
+    };
+    let row = |name: &&'static str| {
+        let text = |id: &&'static str| {
+            let cell = of(id).find(|c| c.entry.name == *name);
+            cell.map_or_else(|| (String::new(), true), |c| (cell_text(c), c.holds()))
+        };
+        (*name, scenarios.iter().map(text).collect())
+    };
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for cell in &inside {
+        let (Outcome::NotApplicable(why), who) = (&cell.outcome, cell.entry.name) else { continue };
+        match reasons.iter_mut().find(|(w, _)| w == why) {
+            Some((_, names)) if names.iter().any(|n| n == who) => {}
+            Some((_, names)) => names.push(who.into()),
+            None => reasons.push((why, vec![who.into()])),
+        }
+    }
+    notes.extend(reasons.into_iter().map(|(why, names)| format!("-: {why} ({})", names.join(", "))));
+    for cell in &inside {
+        if let Outcome::Refused(message) = &cell.outcome {
+            notes.push(format!("REFUSED: {}, {}: {message}", cell.entry.name, cell.scenario.id));
+        }
+    }
+    Block {
+        title: group,
+        headings: scenarios.iter().map(|id| heading(id)).collect(),
+        rows: estimators.iter().map(row).collect(),
+        notes,
+    }
+}
+
+/// Rows of texts under each other, columns aligned; `rule` draws the line under the first row.
+fn aligned(rows: &[Vec<String>], left: &str, between: &str, right: &str, rule: impl Fn(&[usize]) -> String) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|x| x.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for (k, row) in rows.iter().enumerate() {
+        let padded = |(x, w): (&String, &usize)| format!("{x}{}", " ".repeat(w - x.chars().count()));
+        let line: Vec<_> = row.iter().zip(&widths).map(padded).collect();
+        let _ = writeln!(text, "{}", format!("{left}{}{right}", line.join(between)).trim_end());
+        if k == 0 {
+            text.push_str(&rule(&widths));
+        }
+    }
+    text
+}
+
+/// The tables in plain text, with the list of what is outside.
+pub fn text(cells: &[Cell]) -> String {
+    let mut text = String::new();
+    for block in blocks(cells) {
+        let mut rows = vec![std::iter::once(String::new()).chain(block.headings.iter().map(|h| h.0.clone())).collect()];
+        rows.extend(block.rows.iter().map(|(name, cells)| {
+            std::iter::once((*name).to_owned()).chain(cells.iter().map(|c| c.0.clone())).collect::<Vec<_>>()
+        }));
+        let _ = writeln!(text, "{}", block.title);
+        text.push_str(&aligned(&rows, "  ", "   ", "", |_| String::new()));
+        for (id, names) in block.headings.iter().filter(|h| !h.1.is_empty()) {
+            let _ = writeln!(text, "  {id}: {names}");
+        }
+        text.push('\n');
+    }
+    let _ = write!(text, "{}", verdict(cells));
+    text
+}
+
+/// How many figures there are, and those that are not as expected.
+pub fn verdict(cells: &[Cell]) -> String {
+    let figures = cells.iter().flat_map(Cell::measures).filter(|m| m.expected.is_some()).count();
+    let outside: Vec<_> = cells.iter().flat_map(|c| c.outside().map(move |m| (c, m))).collect();
+    let mut text = format!("{} of {figures} figures are inside their tolerance.\n", figures - outside.len());
+    for (cell, m) in outside {
+        let expected = m.expected.map(|e| e.to_string()).unwrap_or_default();
+        let name = cell.entry.name;
+        let _ = writeln!(
+            text,
+            "OUTSIDE: {name}, {}, {}: {} {}, expected {expected}",
+            cell.scenario.id,
+            m.name,
+            number(m),
+            m.unit
+        );
+    }
+    for cell in cells {
+        if let Outcome::Refused(message) = &cell.outcome {
+            let _ = writeln!(text, "REFUSED: {}, {}: {message}", cell.entry.name, cell.scenario.id);
+        }
+    }
+    text
+}
+
+/// What each estimator runs on, in a sentence each.
+pub const MACHINES: &str = "All on the 2.2 kW machine with interior magnets (R 3.6 ohm, L_d 36 mH, L_q 51 mH, psi 0.545 Wb, \
+     1 pu = 1500 rpm and 14 N.m), 10 kHz, 10 mA of current noise, 12 bit; Rasmussen, which is for machines without saliency, \
+     on its own reference motor (assumed; 1 pu = 1500 rpm and 2 N.m) with R^ = 0.9 R and without noise. \
+     Angle errors are theta - theta^.";
+
+/// How the estimators of the cells start, in words.
+pub fn starts(cells: &[Cell]) -> String {
+    let mut ways: Vec<(&str, Vec<&str>)> = Vec::new();
+    for cell in cells {
+        let way = match Class::of(cell.entry.kind) {
+            Class::FluxObserver => "by itself, from any angle",
+            Class::BackEmf => "I-f start to 0.15 pu",
+            Class::Injection | Class::Hybrid => "initial position by injection, polarity by voltage pulses",
+            Class::Sensored => "by its sensor",
+        };
+        let name = cell.entry.name;
+        match ways.iter_mut().find(|(w, _)| *w == way) {
+            Some((_, names)) if names.contains(&name) => {}
+            Some((_, names)) => names.push(name),
+            None => ways.push((way, vec![name])),
+        }
+    }
+    let sentence = |(way, names): &(&str, Vec<&str>)| format!("{}: {way}", names.join(", "));
+    format!("How they start: {}.", ways.iter().map(sentence).collect::<Vec<_>>().join("; "))
+}
+
+/// The tables in Markdown.
+pub fn markdown(cells: &[Cell]) -> String {
+    let mut text = format!("# Estimators compared\n\n{MACHINES}\n\n{}\n\n", starts(cells));
+    text.push_str(
+        "✓ is inside, ✗ outside the tolerance of the figure there is for it; a number without a mark has none.\n\n",
+    );
+    for block in blocks(cells) {
+        let _ = writeln!(text, "## {}\n", block.title);
+        let heading =
+            |(id, names): &(String, String)| if names.is_empty() { id.clone() } else { format!("{id}: {names}") };
+        let mut rows =
+            vec![std::iter::once("estimator".to_owned()).chain(block.headings.iter().map(heading)).collect()];
+        rows.extend(block.rows.iter().map(|(name, cells)| {
+            std::iter::once((*name).to_owned()).chain(cells.iter().map(|c| c.0.clone())).collect::<Vec<_>>()
+        }));
+        let rule = |widths: &[usize]| {
+            let lines: Vec<_> = widths.iter().map(|w| "-".repeat(w + 2)).collect();
+            format!("|{}|\n", lines.join("|"))
+        };
+        text.push_str(&aligned(&rows, "| ", " | ", " |", rule));
+        text.push('\n');
+        block.notes.iter().for_each(|note| {
+            let _ = writeln!(text, "- {note}");
+        });
+        text.push('\n');
+    }
+    let _ = writeln!(text, "## Verdict\n\n{}", verdict(cells));
+    text
+}
+
+/// Every number with what is expected of it, one a line.
+pub fn csv(cells: &[Cell]) -> String {
+    let mut text = String::from("estimator,scenario,measure,unit,value,expected,verdict\n");
+    for cell in cells {
+        let (name, id) = (cell.entry.name, cell.scenario.id);
+        match &cell.outcome {
+            Outcome::NotApplicable(why) => {
+                let _ = writeln!(text, "{name},{id},,,,,\"not applicable: {why}\"");
+            }
+            Outcome::Refused(message) => {
+                let _ = writeln!(text, "{name},{id},,,,,\"refused: {}\"", message.replace('"', "'"));
+            }
+            Outcome::Measured(measures, _) => {
+                for m in measures {
+                    let expected = m.expected.map(|e| e.to_string()).unwrap_or_default();
+                    let verdict = m.expected.map_or("", |e| if e.holds(m.value) { "inside" } else { "outside" });
+                    let Measure { name: measure, unit, value, .. } = m;
+                    let _ = writeln!(text, "{name},{id},{measure},{unit},{value},{expected},{verdict}");
+                }
+            }
+        }
+    }
+    text
+}

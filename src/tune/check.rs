@@ -1,0 +1,57 @@
+//! Whether the models have the variables that the rules give values to, of that type and in that range.
+
+use super::motor::MotorFile;
+use super::rules::{Setting, Value};
+use anyhow::{Result, anyhow, bail};
+use drive::{PmsmPlant, SensorlessController};
+use fmu_core::Description;
+use fmu_core::description::{Variable, VariableKind};
+
+/// Checks both lists against the descriptions of the models.
+///
+/// # Errors
+/// Names the variable, and the place in the machine's file that its value comes from.
+pub fn check(plant_settings: &[Setting], controller_settings: &[Setting], motor: &MotorFile) -> Result<()> {
+    let plant = Description::of::<PmsmPlant>().map_err(|e| anyhow!("{e}"))?;
+    let controller = Description::of::<SensorlessController>().map_err(|e| anyhow!("{e}"))?;
+    for (description, settings) in [(&plant, plant_settings), (&controller, controller_settings)] {
+        for setting in settings {
+            one(description, setting).map_err(|what| match setting.origin {
+                Some(offset) => anyhow!("{}: {what}", motor.place_at(offset)),
+                None => anyhow!("{what} (by the rule: {})", setting.rule),
+            })?;
+        }
+    }
+    Ok(())
+}
+
+fn one(description: &Description, setting: &Setting) -> Result<()> {
+    let (model, name) = (&description.name, setting.name);
+    let Some(variable) = description.variable(name) else { bail!("{model} has no variable {name}") };
+    let number = match (&variable.kind, &setting.value) {
+        (VariableKind::Real { .. }, Value::Real(x)) => *x,
+        (VariableKind::Integer, Value::Integer(i)) => f64::from(*i),
+        (VariableKind::Boolean, Value::Boolean(_)) => return Ok(()),
+        (VariableKind::Enumeration { items, .. }, Value::Item(item)) => {
+            if items.iter().any(|(_, known, _)| known == item) {
+                return Ok(());
+            }
+            let known: Vec<_> = items.iter().map(|(_, known, _)| known.as_str()).collect();
+            bail!("{name} of {model} is one of {}, not {item}", known.join(", "));
+        }
+        _ => bail!("{name} of {model} has another type than {:?}", setting.value),
+    };
+    if !in_range(variable, number) {
+        let allowed = variable.allowed.as_deref().unwrap_or("a finite number");
+        bail!("{name} of {model} = {number} must be {allowed}: correct the value");
+    }
+    Ok(())
+}
+
+/// Whether a number is finite and within the bounds; `allowed` tells whether a bound itself is.
+fn in_range(variable: &Variable, x: f64) -> bool {
+    let allowed = variable.allowed.as_deref().unwrap_or_default();
+    let low = variable.min.is_none_or(|min| if allowed.contains("greater than") { x > min } else { x >= min });
+    let high = variable.max.is_none_or(|max| if allowed.contains("less than") { x < max } else { x <= max });
+    x.is_finite() && low && high
+}

@@ -1,0 +1,271 @@
+//! The rules by which parameter values follow from machine and bandwidths.
+//!
+//! For a machine without saliency (L_q within a tenth of L_d) Rasmussen's observer, which holds standstill; with saliency
+//! the extended EMF and an I-f start. Rules for Rasmussen's observer: w_n = observer, zeta = 1;
+//! c_1 = 4 |R - R^| i_0 / psi_M within 50..200 1/s, c_2 = c_1 / 50; K i_0 = 1.35 times the rated torque; w_0 = 30 rad/s
+//! electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest electrical
+//! acceleration alpha = n_p K i_q / J. R^ = 0.9 R: the safe side at standstill, where R^ > R runs away.
+
+use super::check::check;
+use super::motor::{Data, MotorFile, Number};
+use anyhow::{Result, bail};
+use std::f64::consts::TAU;
+
+/// A value for a variable.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Of a real variable.
+    Real(f64),
+    /// Of an integer.
+    Integer(i32),
+    /// Of a Boolean.
+    Boolean(bool),
+    /// Of an enumeration: the name of an item.
+    Item(String),
+}
+
+/// A variable with its value, and how it came about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Variable of the model.
+    pub name: &'static str,
+    /// Its value.
+    pub value: Value,
+    /// The rule.
+    pub rule: String,
+    /// Offset in the machine's file of the value that it comes from.
+    pub origin: Option<usize>,
+}
+
+/// Values of both FMUs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tuned {
+    /// Name of the machine.
+    pub name: String,
+    /// Where its data come from.
+    pub source: String,
+    /// Values of `PmsmPlant`.
+    pub plant: Vec<Setting>,
+    /// Values of `SensorlessController`.
+    pub controller: Vec<Setting>,
+    /// What is outside the ranges that the rules were tried in.
+    pub notes: Vec<String>,
+}
+
+fn given(name: &'static str, x: &Number) -> Setting {
+    Setting { name, value: Value::Real(*x.get_ref()), rule: "as given".into(), origin: Some(x.span().start) }
+}
+
+fn set(name: &'static str, value: Value, rule: &str) -> Setting {
+    Setting { name, value, rule: rule.into(), origin: None }
+}
+
+fn real(name: &'static str, x: f64, rule: &str) -> Setting {
+    set(name, Value::Real(x), rule)
+}
+
+/// Derives the values.
+///
+/// # Errors
+/// Values that do not fit together, with their place and what to do.
+pub fn tune(motor: &MotorFile) -> Result<Tuned> {
+    let data = &motor.data;
+    let plant = plant(data);
+    let estimator = estimator(motor)?;
+    let mut notes = Vec::new();
+    let mut controller = common(data, &estimator);
+    // What is given must be in range before anything is computed from it.
+    check(&plant, &controller, motor)?;
+    fits(motor, &mut notes)?;
+    if estimator == "Rasmussen" {
+        controller.extend(flux_observer(motor, &mut notes)?);
+    } else {
+        controller.extend(extended_emf(data, &mut notes));
+    }
+    check(&plant, &controller, motor)?;
+    Ok(Tuned { name: data.name.clone(), source: data.source.clone(), plant, controller, notes })
+}
+
+fn estimator(motor: &MotorFile) -> Result<String> {
+    let machine = &motor.data.machine;
+    let salient = (machine.L_q.get_ref() / machine.L_d.get_ref() - 1.0).abs() > 0.1;
+    match &motor.data.control.estimator {
+        None => Ok(if salient { "ExtendedEmf" } else { "Rasmussen" }.into()),
+        Some(name) if ["ExtendedEmf", "Rasmussen"].contains(&name.get_ref().as_str()) => Ok(name.get_ref().clone()),
+        Some(name) => {
+            let what = name.get_ref();
+            bail!(
+                "{}: there are no rules for {what}: choose Rasmussen or ExtendedEmf, or leave it out",
+                motor.place(name)
+            )
+        }
+    }
+}
+
+fn plant(data: &Data) -> Vec<Setting> {
+    let Data { machine, mechanics, saturation, .. } = data;
+    let n_p = &machine.n_p;
+    let mut all = vec![
+        Setting { origin: Some(n_p.span().start), ..set("motor.n_p", Value::Integer(*n_p.get_ref()), "as given") },
+        given("motor.R_s", &machine.R_s),
+        given("motor.L_d", &machine.L_d),
+        given("motor.L_q", &machine.L_q),
+        given("motor.psi_M", &machine.psi_M),
+        given("mechanics.J", &mechanics.J),
+    ];
+    let optional =
+        |name, x: &Option<Number>| x.as_ref().map_or_else(|| real(name, 0.0, "none given"), |x| given(name, x));
+    all.push(optional("mechanics.B", &mechanics.B));
+    all.push(optional("mechanics.tau_coulomb", &mechanics.tau_coulomb));
+    all.extend(mechanics.w_coulomb.as_ref().map(|x| given("mechanics.w_coulomb", x)));
+    if let Some(s) = saturation {
+        all.push(optional("saturation.c_2", &s.c_2));
+        all.push(optional("saturation.c_3", &s.c_3));
+        all.push(optional("saturation.c_x", &s.c_x));
+    }
+    all.push(given("u_dc", &data.dc_link.u_dc));
+    all
+}
+
+/// What every estimator needs.
+fn common(data: &Data, estimator: &str) -> Vec<Setting> {
+    let Data { machine, mechanics, bandwidth, control, .. } = data;
+    let mut all = vec![set("estimator", Value::Item(estimator.into()), "by the saliency, or as given")];
+    all.push(control.T_s.as_ref().map_or_else(|| real("T_s", 1e-4, "10 kHz"), |x| given("T_s", x)));
+    all.extend([
+        set("motor.n_p", Value::Integer(*machine.n_p.get_ref()), "as given"),
+        real("motor.R_s", 0.9 * machine.R_s.get_ref(), "0.9 R_s: the safe side at standstill"),
+        given("motor.L_d", &machine.L_d),
+        given("motor.L_q", &machine.L_q),
+        given("motor.psi_M", &machine.psi_M),
+        given("mechanics.J", &mechanics.J),
+        given("u_dc", &data.dc_link.u_dc),
+        given("current.bandwidth", &bandwidth.current),
+        given("speed_loop.bandwidth", &bandwidth.speed),
+        real("speed_loop.t_is", 4.0, "K_i = K_p w_s / 4"),
+        given("limit.i", &data.rating.current),
+    ]);
+    all
+}
+
+/// Torque constant in N.m/A.
+fn torque_constant(data: &Data) -> f64 {
+    1.5 * f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref()
+}
+
+/// What holds for every estimator.
+fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
+    let Data { machine, rating, dc_link, bandwidth, .. } = &motor.data;
+    for (name, x) in [("speed", &rating.speed), ("torque", &rating.torque), ("current", &rating.current)] {
+        if !(x.get_ref().is_finite() && *x.get_ref() > 0.0) {
+            bail!("{}: rating.{name} = {} must be greater than 0: correct the value", motor.place(x), x.get_ref());
+        }
+    }
+    let (w_s, w_o) = (*bandwidth.speed.get_ref(), *bandwidth.observer.get_ref());
+    if w_s > w_o / 3.0 * (1.0 + 1e-9) {
+        let place = motor.place(&bandwidth.speed);
+        bail!(
+            "{place}: bandwidth.speed = {w_s} rad/s is more than a third of bandwidth.observer = {w_o} rad/s: lower it, or raise that"
+        );
+    }
+    let emf = f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * machine.psi_M.get_ref();
+    let highest = dc_link.u_dc.get_ref() / 3.0_f64.sqrt();
+    if emf >= highest {
+        let place = motor.place(&rating.speed);
+        bail!(
+            "{place}: at rating.speed the magnet's EMF is {emf:.1} V, but dc_link.u_dc gives {highest:.1} V: lower the speed, or raise u_dc"
+        );
+    }
+    let hertz = bandwidth.current.get_ref() / TAU;
+    if !(60.0..=600.0).contains(&hertz) {
+        notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to 600 Hz were tried"));
+    }
+    Ok(())
+}
+
+fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setting>> {
+    let data = &motor.data;
+    let Data { machine, rating, bandwidth, mechanics, .. } = data;
+    let (k, n_p) = (torque_constant(data), f64::from(*machine.n_p.get_ref()));
+    let (limit, w_n) = (*rating.current.get_ref(), *bandwidth.observer.get_ref());
+    let i_0 = 1.35 * rating.torque.get_ref() / k;
+    if i_0 > limit {
+        let place = motor.place(&rating.current);
+        bail!(
+            "{place}: rating.current = {limit} A is less than the {i_0:.2} A that hold rating.torque at standstill (1.35 torque / K): raise it, or lower the torque"
+        );
+    }
+    let i_q = 0.8 * limit;
+    let least = (n_p * k * i_q / mechanics.J.get_ref() / 0.35).sqrt();
+    if w_n < least {
+        let place = motor.place(&bandwidth.observer);
+        bail!(
+            "{place}: bandwidth.observer = {w_n} rad/s cannot follow the greatest acceleration: at least {least:.0} rad/s, or a lower rating.current"
+        );
+    }
+    if !(150.0..=800.0).contains(&w_n) {
+        notes.push(format!("bandwidth.observer is {w_n} rad/s; 150 to 800 were tried"));
+    }
+    let w_s = *bandwidth.speed.get_ref();
+    if !(40.0..=120.0).contains(&w_s) {
+        notes.push(format!("bandwidth.speed is {w_s} rad/s; 40 to 120 were tried"));
+    }
+    let c_1 = (4.0 * 0.1 * machine.R_s.get_ref() * i_0 / machine.psi_M.get_ref()).max(50.0);
+    if c_1 > 200.0 {
+        notes.push(format!("c_1 psi_M >= 4 |R - R^| i_0 asks for c_1 = {c_1:.0} 1/s; up to 200 were tried"));
+    }
+    let c_1 = c_1.min(200.0);
+    Ok(vec![
+        real("speed_loop.b", 0.5, "set-point weight of Rasmussen's drive"),
+        real("limit.i_q", i_q, "0.8 of the greatest current"),
+        real("observer.w_n", w_n, "bandwidth.observer"),
+        real("observer.zeta", 1.0, "aperiodic"),
+        real("observer.c_1", c_1, "4 |R - R^| i_0 / psi_M, at least 50, at most 200"),
+        real("observer.c_2", c_1 / 50.0, "c_1 / 50"),
+        real("zero_speed.i_0", i_0, "1.35 times the rated torque / K"),
+        real("zero_speed.w_0", (30.0 / n_p).clamp(5.0, 40.0), "30 rad/s electrical, 5 to 40 mechanical"),
+    ])
+}
+
+fn extended_emf(data: &Data, notes: &mut Vec<String>) -> Vec<Setting> {
+    let Data { rating, bandwidth, mechanics, .. } = data;
+    let (limit, torque, rho) = (*rating.current.get_ref(), *rating.torque.get_ref(), *bandwidth.observer.get_ref());
+    if rho < TAU * 15.0 * (1.0 - 1e-9) {
+        notes.push(format!(
+            "bandwidth.observer is {rho} rad/s; below 94 rad/s a load step of half the torque loses the rotor"
+        ));
+    }
+    // A current along the magnet holds the rotor only while the magnet outweighs the reluctance: |L_q - L_d| i < psi_M.
+    let k = torque_constant(data);
+    let saliency = (data.machine.L_q.get_ref() - data.machine.L_d.get_ref()).abs();
+    let (wanted, stable) = ((1.4 * torque / k).min(limit), 0.5 * data.machine.psi_M.get_ref() / saliency);
+    let lead = wanted.min(stable);
+    if stable < wanted {
+        notes.push(format!(
+            "the saliency leaves {stable:.2} A for the I-f start: it carries up to {:.2} N.m",
+            k * stable
+        ));
+    }
+    vec![
+        set("current.active_resistance", Value::Boolean(true), "K_i = w_c^2 L"),
+        set("current.mtpa", Value::Boolean(true), "salient: least current for a torque"),
+        real("speed_loop.b", 1.0, "proportional part on the whole error"),
+        real("limit.i_q", limit, "the greatest current"),
+        real("limit.tau", 1.6 * torque, "1.6 times the rated torque"),
+        real("tracker.bandwidth", rho, "bandwidth.observer"),
+        real("emf.bandwidth", 7.5 * rho, "7.5 times the tracker's; 3 times is the least"),
+        real("zero_speed.i_0", 0.0, "not used"),
+        set("start.mode", Value::Item("CurrentFrequency".into()), "no EMF at standstill"),
+        real(
+            "start.i",
+            lead,
+            "1.4 times the rated torque / K, at most the greatest current and psi_M / (2 |L_q - L_d|)",
+        ),
+        real("start.speed", 0.15 * rating.speed.get_ref(), "0.15 of the rated speed"),
+        real(
+            "start.acceleration",
+            (0.3 * k * lead / mechanics.J.get_ref()).min(100.0),
+            "0.3 of the start's torque, at most 100 rad/s2",
+        ),
+    ]
+}

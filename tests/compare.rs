@@ -1,0 +1,118 @@
+//! The grid of estimators and scenarios: its reduced form against the golden copy, its figures, its command line.
+#![allow(missing_docs)]
+
+use fmu::compare::scenario::Effort;
+use fmu::compare::subject::Entry;
+use fmu::compare::{self, Cell, Selection, table};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// The reduced grid, run once a test program.
+fn grid() -> &'static [Cell] {
+    static GRID: OnceLock<Vec<Cell>> = OnceLock::new();
+    GRID.get_or_init(|| compare::run(&Selection::all(Effort::Reduced), || ()))
+}
+
+/// Value or reason of each estimator, scenario and measure of a CSV.
+fn values(csv: &str) -> BTreeMap<String, String> {
+    let line = |line: &str| {
+        let fields: Vec<&str> = line.splitn(7, ',').collect();
+        let value = if fields[2].is_empty() { fields[6] } else { fields[4] };
+        (fields[..3].join(", "), value.to_owned())
+    };
+    csv.lines().skip(1).map(line).collect()
+}
+
+/// Equal, or numbers that differ by less than an engineer would see.
+fn alike(a: &str, b: &str) -> bool {
+    let numbers = a.parse::<f64>().ok().zip(b.parse::<f64>().ok());
+    a == b || numbers.is_some_and(|(a, b)| (a - b).abs() <= 1e-3 * a.abs().max(b.abs()) + 1e-3)
+}
+
+#[test]
+fn the_grid_is_that_of_the_golden_copy() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/compare.csv");
+    let now = table::csv(grid());
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, &now).unwrap();
+        return;
+    }
+    let (golden, now) = (values(&std::fs::read_to_string(&path).unwrap()), values(&now));
+    let mut differences = Vec::new();
+    for (key, value) in &golden {
+        match now.get(key) {
+            None => differences.push(format!("{key}: gone, was {value}")),
+            Some(other) if !alike(value, other) => differences.push(format!("{key}: {other}, was {value}")),
+            Some(_) => {}
+        }
+    }
+    differences.extend(now.keys().filter(|key| !golden.contains_key(*key)).map(|key| format!("{key}: new")));
+    let list = differences.join("\n");
+    assert!(differences.is_empty(), "{list}\nUPDATE_GOLDEN=1 cargo test --test compare accepts the changes");
+}
+
+#[test]
+fn every_figure_is_inside_its_tolerance() {
+    let outside: Vec<_> = grid().iter().filter(|cell| !cell.holds()).collect();
+    assert!(outside.is_empty(), "{}", table::verdict(grid()));
+    assert!(grid().iter().flat_map(Cell::measures).filter(|m| m.expected.is_some()).count() > 100);
+}
+
+#[test]
+fn what_is_outside_is_marked() {
+    let mut cells: Vec<Cell> = grid().iter().filter(|c| c.entry.name == "DirectEmf").cloned().collect();
+    let cell = cells.iter_mut().find(|c| c.scenario.id == "load-0.5").unwrap();
+    let compare::Outcome::Measured(measures, _) = &mut cell.outcome else { panic!() };
+    measures.iter_mut().find(|m| m.name == "dip").unwrap().value = 0.2;
+    assert!(!cell.holds());
+    let text = table::text(&cells);
+    assert!(text.contains("0.200✗"), "{text}");
+    assert!(text.contains("OUTSIDE: DirectEmf, load-0.5, dip: 0.200 pu, expected 0.093"), "{text}");
+    assert!(table::markdown(&cells).contains("| DirectEmf"));
+}
+
+fn fmu(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).output().unwrap()
+}
+
+#[test]
+fn the_command_writes_table_plots_and_page() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("a/b");
+    let scenarios = "load-0.5,bandwidth,signal-trace";
+    let of = ["compare", "--only", "extendedemf,RotatingInjection", "--scenario", scenarios, "--out"];
+    let output = fmu(&[&of[..], &[out.to_str().unwrap()]].concat());
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(output.stderr.is_empty() && text.contains("figures are inside their tolerance"), "{text}");
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    for svg in ["load-0.5.svg", "signal-RotatingInjection-current.svg", "signal-RotatingInjection-angle.svg"] {
+        assert!(read(svg).contains("<svg"), "{svg}");
+    }
+    let html = read("compare.html");
+    assert!(html.contains("Fig. 8 of the review") && html.contains("<td>ExtendedEmf</td>"));
+    assert!(!html.contains("src=") && !html.contains("href="), "self-contained");
+    let csv = read("compare.csv");
+    assert!(
+        csv.contains("ExtendedEmf,load-0.5,dip,pu,0.09") && csv.contains("not applicable: injects nothing"),
+        "{csv}"
+    );
+    assert!(read("compare.md").contains("## Bandwidth of the speed loop"));
+}
+
+#[test]
+fn a_wrong_name_is_told_with_the_right_ones() {
+    for (arguments, known) in
+        [(["compare", "--only", "Luenberger"], "ExtendedEmf"), (["compare", "--scenario", "x"], "ramp")]
+    {
+        let output = fmu(&arguments);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(arguments[2]) && error.contains(known) && error.lines().count() == 1, "{error}");
+    }
+    let list = String::from_utf8(fmu(&["compare", "--list"]).stdout).unwrap();
+    assert!(Entry::all().iter().all(|e| list.contains(e.name)) && list.contains("wrong-l-q"), "{list}");
+}

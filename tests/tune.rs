@@ -1,0 +1,140 @@
+//! Machines as data: every file in motors/ gives parameter values with which the packed FMUs start and run.
+#![allow(missing_docs)]
+
+mod common;
+
+use fmu::tune::{self, motor::MotorFile, rules, ssv};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn motors() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("motors");
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    assert!(files.len() >= 4, "{files:?}");
+    files
+}
+
+fn fmu(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).output().unwrap()
+}
+
+#[test]
+fn every_machine_starts_and_reaches_its_speed() {
+    let dir = tempfile::tempdir().unwrap();
+    for (k, motor) in motors().iter().enumerate() {
+        // Both standards in turn.
+        let archives = common::archives().join(if k % 2 == 0 { "fmi2" } else { "fmi3" });
+        let tuned = fmu(&["tune", motor.to_str().unwrap(), "--out", dir.path().to_str().unwrap()]);
+        let table = String::from_utf8(tuned.stdout).unwrap();
+        assert!(tuned.status.success(), "{}", String::from_utf8_lossy(&tuned.stderr));
+        let files: Vec<&str> = table.lines().rev().take(2).collect();
+        let text = std::fs::read_to_string(motor).unwrap();
+        let data = MotorFile::parse(&text, motor).unwrap().data;
+        let speed = 0.5 * data.rating.speed.get_ref();
+        let load = 0.2 * data.rating.torque.get_ref();
+
+        let instance = |name: &str| format!("{name}={}", archives.join(name).with_extension("fmu").display());
+        let (plant, controller) = (instance("PmsmPlant"), instance("SensorlessController"));
+        let parameters = [format!("PmsmPlant={}", files[1]), format!("SensorlessController={}", files[0])];
+        let speed_ref = format!("SensorlessController.speed_ref=0:0,0.6:{speed}");
+        let load = format!("PmsmPlant.tau_load=0:0,3:{load}");
+        let output = fmu(&[
+            "simulate",
+            &plant,
+            &controller,
+            "--auto-connect",
+            "--parameters",
+            &parameters[0],
+            "--parameters",
+            &parameters[1],
+            "--set",
+            "PmsmPlant.initial.theta_e=2.5",
+            "--input",
+            &speed_ref,
+            "--input",
+            &load,
+            "--stop",
+            "4",
+            "--record",
+            "PmsmPlant.speed,SensorlessController.speed_est",
+            "--csv",
+            "-",
+        ]);
+        let csv = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success(), "{}: {}", motor.display(), String::from_utf8_lossy(&output.stderr));
+        let last: Vec<f64> = csv.lines().last().unwrap().split(',').map(|x| x.parse().unwrap()).collect();
+        assert!((last[1] / speed - 1.0).abs() < 0.02, "{}: {} rad/s, not {speed}", motor.display(), last[1]);
+        assert!((last[2] / last[1] - 1.0).abs() < 0.02, "{}: estimated {} rad/s", motor.display(), last[2]);
+    }
+}
+
+#[test]
+fn the_reference_motor_gives_the_start_values_of_the_controller() {
+    let path = motors().into_iter().find(|p| p.ends_with("reference.toml")).unwrap();
+    let tuned = tune::tune(&path).unwrap();
+    let description = fmu_core::Description::of::<drive::SensorlessController>().unwrap();
+    let mut compared = 0;
+    for setting in &tuned.controller {
+        let start = description.variable(setting.name).unwrap().start.as_ref().unwrap()[0];
+        if let (rules::Value::Real(x), fmu_core::description::Value::Real(start)) = (&setting.value, start) {
+            assert!((x - start).abs() <= 1e-6 * start.abs(), "{}: {x}, start value {start}", setting.name);
+            compared += 1;
+        }
+    }
+    assert!(compared > 15, "{compared} values");
+}
+
+#[test]
+fn values_are_those_of_the_rules() {
+    let path = motors().into_iter().find(|p| p.ends_with("ipmsm-2.2kw.toml")).unwrap();
+    let tuned = tune::tune(&path).unwrap();
+    let text = ssv::text("x", &tuned.controller);
+    for (name, value) in [
+        ("motor.R_s", "3.24"),
+        ("estimator", "ExtendedEmf"),
+        ("start.mode", "CurrentFrequency"),
+        ("current.mtpa", "true"),
+    ] {
+        let parameter = ssv::read(&text).unwrap().into_iter().find(|(n, _)| n == name).unwrap();
+        let same =
+            parameter.1 == value || (parameter.1.parse::<f64>().unwrap() - value.parse::<f64>().unwrap()).abs() < 1e-12;
+        assert!(same, "{parameter:?}");
+    }
+}
+
+/// The reference motor with one line of it changed.
+fn changed(from: &str, to: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("motors/reference.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    assert!(text.contains(from), "{from}");
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("m.toml");
+    std::fs::write(&file, text.replacen(from, to, 1)).unwrap();
+    format!("{:#}", tune::tune(&file).map(|_| ()).expect_err("must be refused"))
+}
+
+#[test]
+fn a_wrong_file_is_told_with_place_and_remedy() {
+    let refused = |from: &str, to: &str, parts: &[&str]| {
+        let error = changed(from, to);
+        for part in parts {
+            assert!(error.contains(part), "{part:?} is not in {error}");
+        }
+        assert_eq!(error.lines().count(), 1, "{error}");
+    };
+    refused("R_s = 2.0", "R = 2.0", &["m.toml:7:1", "unknown field `R`", "R_s"]);
+    refused("L_q = 6e-3     # H\n", "", &["m.toml:5:1", "missing field `L_q`", "reference.toml"]);
+    refused("L_q = 6e-3", "L_q = \"6 mH\"", &["m.toml:9:7", "invalid type", "f64"]);
+    refused("n_p = 3 ", "n_p = 2.5 ", &["m.toml:6:7", "invalid type", "i32"]);
+    refused("n_p = 3 ", "n_p = 0 ", &["m.toml:6:7", "motor.n_p", "at least 1"]);
+    refused("R_s = 2.0", "R_s = -2.0", &["m.toml:7:7", "motor.R_s of PmsmPlant = -2", "greater than 0"]);
+    refused("J = 1.5e-3", "J = nan", &["m.toml:13:5", "mechanics.J"]);
+    refused("torque = 2.5", "torque = -1", &["m.toml:20:10", "rating.torque", "greater than 0"]);
+    refused("speed = 80.0", "speed = 180.0", &["m.toml:28:", "a third of bandwidth.observer", "lower it"]);
+    refused("current = 7.5", "current = 4.0", &["rating.current", "raise it"]);
+    refused("observer = 300.0", "observer = 100.0", &["bandwidth"]);
+    refused("speed = 314.159265", "speed = 3141.59", &["rating.speed", "u_dc"]);
+    refused("[bandwidth]", "[control]\nestimator = \"Luenberger\"\n[bandwidth]", &["Luenberger", "choose Rasmussen"]);
+    refused("[bandwidth]", "[bandwidth", &["m.toml:26:"]);
+}
