@@ -150,6 +150,48 @@ impl State {
         self.lead = None;
     }
 
+    /// The estimate at a sample, whoever gives it: what leads, what searches, or the estimator.
+    fn estimate(
+        &mut self,
+        kind: Kind,
+        gains: &Gains,
+        par: &ControllerParameters,
+        inputs: &ControllerInputs,
+        sample: &Sample,
+    ) -> (Estimate, Option<Led>, Option<Searching>) {
+        let context = SensorlessController::context(par);
+        let led = self.lead.as_mut().map(|lead| lead.update(&par.start, &context, par.theta_est, inputs, sample));
+        let searching = self.search.as_mut().map(|search| search.update(&par.polarity, &context, sample));
+        let estimate = if sample.k == 0 {
+            let w = f64::from(par.motor.n_p) * par.speed_est;
+            let (estimator, estimate) = Estimator::start(kind, &context, sample, par.theta_est, w);
+            self.estimator = estimator;
+            estimate
+        } else if let Some(Led::HandOver(theta, w, frame)) = led {
+            self.estimator.place(&context, sample, theta, w);
+            self.take_over(gains, par, inputs.speed_ref, sample, (theta, w, frame));
+            Estimate::new(theta, w, sample)
+        } else if led.is_some() {
+            Estimate::default()
+        } else if let Some(Searching::Voltage(theta, _)) = searching {
+            Estimate::new(theta, 0.0, sample)
+        } else if let Some(Searching::Found(theta)) = searching {
+            self.estimator.place(&context, sample, theta, 0.0);
+            self.found();
+            Estimate::new(theta, 0.0, sample)
+        } else {
+            self.estimator.update(&context, sample)
+        };
+        if let (Some(search), Some(Searching::Estimate)) = (&mut self.search, searching) {
+            search.sees(estimate.theta);
+        }
+        let estimate = match led {
+            Some(Led::Frame(theta, w, _)) => Estimate::new(theta, w, sample),
+            _ => estimate,
+        };
+        (estimate, led, searching)
+    }
+
     /// The magnet is found: the loops begin at rest.
     fn found(&mut self) {
         (self.current, self.speed, self.search) = (CurrentController::default(), SpeedController::default(), None);
@@ -245,38 +287,10 @@ impl SensorlessController {
             w_meas: n_p * inputs.speed_meas,
             u_dc: inputs.u_dc,
         };
-        let context = Self::context(par);
         let kind = Kind::of(par.estimator).unwrap_or(Kind::Rasmussen);
-        let led = state.lead.as_mut().map(|lead| lead.update(&par.start, &context, par.theta_est, inputs, &sample));
-        let searching = state.search.as_mut().map(|search| search.update(&par.polarity, &context, &sample));
-        let estimate = if first {
-            let (estimator, estimate) = Estimator::start(kind, &context, &sample, par.theta_est, n_p * par.speed_est);
-            state.estimator = estimator;
-            estimate
-        } else if let Some(Led::HandOver(theta, w, frame)) = led {
-            state.estimator.place(&context, &sample, theta, w);
-            state.take_over(gains, par, inputs.speed_ref, &sample, (theta, w, frame));
-            Estimate::new(theta, w, &sample)
-        } else if led.is_some() {
-            Estimate::default()
-        } else if let Some(Searching::Voltage(theta, _)) = searching {
-            Estimate::new(theta, 0.0, &sample)
-        } else if let Some(Searching::Found(theta)) = searching {
-            state.estimator.place(&context, &sample, theta, 0.0);
-            state.found();
-            Estimate::new(theta, 0.0, &sample)
-        } else {
-            state.estimator.update(&context, &sample)
-        };
-        let estimate = match led {
-            Some(Led::Frame(theta, w, _)) => Estimate::new(theta, w, &sample),
-            _ => estimate,
-        };
+        let (estimate, led, searching) = state.estimate(kind, gains, par, inputs, &sample);
         let Estimate { theta, w, i: controlled, injection } = estimate;
         let speed = w / n_p;
-        if let (Some(search), Some(Searching::Estimate)) = (&mut state.search, searching) {
-            search.sees(theta);
-        }
 
         let axis = Axis::<Estimated>::at(theta);
         let i_hat = axis.from_stator(controlled);
@@ -319,8 +333,8 @@ impl SensorlessController {
         } else {
             command
         };
-        // A current that leads is no estimate.
-        let lock_lost = if let Some(Led::Frame(..)) = led {
+        // A current that leads is no estimate, and an axis that is still searched none either.
+        let lock_lost = if matches!(led, Some(Led::Frame(..))) || searching.is_some() {
             state.lock = Lock::default();
             0.0
         } else {
