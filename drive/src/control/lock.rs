@@ -1,7 +1,7 @@
 //! Whether the estimate still is at the rotor: the voltage that acted against the one that a machine there would need.
 //!
 //! psi^ = e^{j theta^} (L e^{-j theta^} i + psi_M) is the flux of a rotor at the estimated angle with the measured current;
-//! over the last interval epsilon = u - R (i[k-1] + i[k]) / 2 - (psi^[k] - psi^[k-1]) / T_s is zero where estimate and
+//! over the last interval `epsilon = u - R (i[k-1] + i[k]) / 2 - (psi^[k] - psi^[k-1]) / T_s` is zero where estimate and
 //! machine values are right, whatever is injected. A rotor elsewhere leaves j w psi_M (e^{j theta} - e^{j theta^}), of the
 //! magnitude 2 sin(theta~/2) |w| psi_M; a wrong speed the difference of the two EMFs. Seen from the estimated frame and
 //! smoothed at 50 Hz, epsilon is compared with

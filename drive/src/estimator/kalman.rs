@@ -2,8 +2,14 @@
 //!
 //! State x = (psi_d, psi_q, w, theta), the flux in the rotor frame. With the flux instead of the current nothing of the
 //! saliency is in the prediction, which is exact for a voltage held in stator axes:
-//! psi[k] = e^{-j theta[k]} (e^{j theta[k-1]} psi[k-1] + T_s (u - R (i[k-1] + i[k]) / 2)), w[k] = w[k-1],
-//! theta[k] = theta[k-1] + T_s w[k-1]. The measurement is the current, i = e^{j theta} L^-1 (psi - psi_M), L = diag(L_d, L_q);
+//!
+//! ```text
+//! psi[k]   = e^{-j theta[k]} (e^{j theta[k-1]} psi[k-1] + T_s (u - R (i[k-1] + i[k]) / 2))
+//! w[k]     = w[k-1]
+//! theta[k] = theta[k-1] + T_s w[k-1]
+//! ```
+//!
+//! The measurement is the current, i = e^{j theta} L^-1 (psi - psi_M), L = diag(L_d, L_q);
 //! the innovation is seen from the estimated frame, r = e^{-j theta^} i - L^-1 (psi^ - psi_M).
 //!
 //! The rotor frame matters: there flux and angle share the measurement by the constants 1/L and the current alone. With the
