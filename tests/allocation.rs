@@ -1,0 +1,45 @@
+//! A step of plant and controller does not allocate, whatever the estimator. A test program of its own: it counts for the
+//! whole process.
+#![allow(missing_docs)]
+#![allow(clippy::undocumented_unsafe_blocks, reason = "an allocator that counts and passes on")]
+
+use drive::bench::{self, RATED_SPEED};
+use drive::estimator::Kind;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+struct Counting;
+
+static CALLS: AtomicU64 = AtomicU64::new(0);
+
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        CALLS.fetch_add(1, Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        CALLS.fetch_add(1, Relaxed);
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_step_does_not_allocate() {
+    for &kind in Kind::ALL {
+        let mut pair = bench::turning(bench::drive(kind), 0.1);
+        pair.start().unwrap();
+        pair.set_inputs(0.1 * RATED_SPEED, 2.0, 540.0);
+        let before = CALLS.load(Relaxed);
+        for _ in 0..2000 {
+            pair.step(1e-4).unwrap();
+        }
+        assert_eq!(CALLS.load(Relaxed), before, "{}", kind.name());
+    }
+    let before = CALLS.load(Relaxed);
+    drop(Box::new(1));
+    assert!(CALLS.load(Relaxed) > before, "the counter counts");
+}
