@@ -28,3 +28,15 @@ pub use control::model::SensorlessController;
 pub use pair::Pair;
 pub use plant::model::PmsmPlant;
 pub use pmsm_drive::PmsmDrive;
+
+/// What all models of this crate tell of themselves alike; each adds its own name, description and documentation.
+const PROJECT: fmu_core::Info = fmu_core::Info {
+    name: "",
+    description: "",
+    version: env!("CARGO_PKG_VERSION"),
+    author: "The sensorless-drive developers",
+    license: "MIT OR Apache-2.0",
+    copyright: "Copyright (c) 2026 The sensorless-drive developers",
+    experiment: fmu_core::Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+    documentation: "",
+};

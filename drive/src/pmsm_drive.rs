@@ -59,12 +59,9 @@ impl Model for PmsmDrive {
     const INFO: Info = Info {
         name: "PmsmDrive",
         description: "Sensorless drive: permanent-magnet synchronous machine, inverter and controller in one",
-        version: env!("CARGO_PKG_VERSION"),
-        author: "The sensorless-drive developers",
-        license: "MIT OR Apache-2.0",
-        copyright: "Copyright (c) 2026 The sensorless-drive developers",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-3 },
         documentation: include_str!("../docs/pmsm_drive.html"),
+        ..crate::PROJECT
     };
 
     const TABLE: &'static Table<Block<Self>> = TABLE;

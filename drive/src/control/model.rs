@@ -362,12 +362,9 @@ impl Model for SensorlessController {
     const INFO: Info = Info {
         name: "SensorlessController",
         description: "Sensorless speed control of a permanent-magnet synchronous machine, zero speed included",
-        version: env!("CARGO_PKG_VERSION"),
-        author: "The sensorless-drive developers",
-        license: "MIT OR Apache-2.0",
-        copyright: "Copyright (c) 2026 The sensorless-drive developers",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
         documentation: include_str!("../../docs/sensorless_controller.html"),
+        ..crate::PROJECT
     };
 
     const TABLE: &'static Table<Block<Self>> = TABLE;

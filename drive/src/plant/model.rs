@@ -148,12 +148,9 @@ impl Model for PmsmPlant {
     const INFO: Info = Info {
         name: "PmsmPlant",
         description: "Permanent-magnet synchronous machine with average inverter and mechanics",
-        version: env!("CARGO_PKG_VERSION"),
-        author: "The sensorless-drive developers",
-        license: "MIT OR Apache-2.0",
-        copyright: "Copyright (c) 2026 The sensorless-drive developers",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
         documentation: include_str!("../../docs/pmsm_plant.html"),
+        ..crate::PROJECT
     };
 
     const TABLE: &'static Table<Block<Self>> = TABLE;
