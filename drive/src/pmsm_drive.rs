@@ -4,8 +4,8 @@
 //! communication step that is a multiple of T_s it gives the pair's results bit for bit. At any other communication step
 //! plant and controller also stop at the sample instants between, which an importer's exchange cannot do.
 
-use crate::control::model::{ControllerOutputs, LOCK_LOST};
-use crate::control::tables;
+use crate::control::model::ControllerOutputs;
+use crate::control::tables::{self, LOCK_LOST};
 use crate::pair::Pair;
 use crate::plant::model as plant;
 use fmu_core::unit::{AMPERE, NEWTON_METRE, ONE, RADIAN, SPEED, VOLT};

@@ -6,12 +6,12 @@ use crate::control::polarity::{Search, Searching};
 use crate::control::reference::{greatest_torque, max_torque_per_ampere};
 use crate::control::speed::{SpeedController, SpeedGains};
 use crate::control::start::{CURRENT_FREQUENCY, INJECTION, Lead, Led};
-use crate::control::tables::{ControllerParameters, PARAMETERS};
+use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::estimator::{Context, Estimate, Estimator, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
 use crate::math::wrap;
 use crate::plant::inverter::{dead_time_loss, limit_to_hexagon};
-use fmu_core::unit::{AMPERE, ONE, RADIAN, SPEED, VOLT};
+use fmu_core::unit::{AMPERE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table};
 use serde::{Deserialize, Serialize};
 
@@ -471,34 +471,6 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             }),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-        ]
-    },
-);
-
-type O = Row<ControllerOutputs>;
-
-/// What the output says.
-pub const LOCK_LOST: &str =
-    "Whether the estimate fits the voltage: 0 it is at the rotor, 1 and more it is lost, 10 at most";
-
-/// The controller's outputs.
-pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
-    const {
-        &[
-            O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| {
-                &mut o.u.a
-            }),
-            O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
-            O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
-            O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
-            O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
-                &mut o.theta_est
-            }),
-            O::discrete_output("i_d", &AMPERE, "Stator current along the estimated magnet axis", |o| &mut o.i.d),
-            O::discrete_output("i_q", &AMPERE, "Stator current across the estimated magnet axis", |o| &mut o.i.q),
-            O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d", |o| &mut o.i_ref.d),
-            O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q", |o| &mut o.i_ref.q),
-            O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
         ]
     },
 );

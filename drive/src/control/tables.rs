@@ -1,7 +1,8 @@
-//! The controller's parameters and their table.
+//! The controller's parameters, and the tables of its parameters and outputs.
 
 use crate::control::current::{CURRENT_LOOP, CurrentLoop};
 use crate::control::lock::{LOCK, LockParameters};
+use crate::control::model::ControllerOutputs;
 use crate::control::polarity::{POLARITY, PolarityParameters};
 use crate::control::sensor::{SENSOR, Sensor};
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
@@ -11,7 +12,7 @@ use crate::estimator::ESTIMATORS;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
 use crate::motor::{MOTOR, Motor};
 use crate::plant::saturation::A_PER_WB2;
-use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METRE, RADIAN, SECOND, SPEED, VOLT};
+use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METRE, ONE, RADIAN, SECOND, SPEED, VOLT};
 use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -187,6 +188,34 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
                 &mut p.theta_est
             }),
             P::parameter("initial.speed_est", &SPEED, "First estimate of the mechanical speed", |p| &mut p.speed_est),
+        ]
+    },
+);
+
+type O = Row<ControllerOutputs>;
+
+/// What the output says.
+pub const LOCK_LOST: &str =
+    "Whether the estimate fits the voltage: 0 it is at the rotor, 1 and more it is lost, 10 at most";
+
+/// The controller's outputs.
+pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
+    const {
+        &[
+            O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| {
+                &mut o.u.a
+            }),
+            O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
+            O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
+            O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
+            O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
+                &mut o.theta_est
+            }),
+            O::discrete_output("i_d", &AMPERE, "Stator current along the estimated magnet axis", |o| &mut o.i.d),
+            O::discrete_output("i_q", &AMPERE, "Stator current across the estimated magnet axis", |o| &mut o.i.q),
+            O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d", |o| &mut o.i_ref.d),
+            O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q", |o| &mut o.i_ref.q),
+            O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
         ]
     },
 );
