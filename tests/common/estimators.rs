@@ -12,7 +12,7 @@ const T_S: f64 = 1e-4;
 const EVERY: u32 = 50;
 
 /// Values of an input over time: each holds from its time (s) on.
-type Schedule = Vec<(f64, f64)>;
+pub type Schedule = Vec<(f64, f64)>;
 
 struct Experiment {
     name: String,
@@ -45,7 +45,7 @@ fn parameters<M: Model>(block: &Block<M>) -> Map<String, Value> {
     map
 }
 
-fn at(schedule: &Schedule, t: f64) -> f64 {
+pub fn at(schedule: &Schedule, t: f64) -> f64 {
     schedule.iter().rev().find(|(from, _)| t >= from - 1e-9).map_or(0.0, |(_, value)| *value)
 }
 

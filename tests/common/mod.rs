@@ -2,6 +2,8 @@
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::missing_panics_doc)]
 
 pub mod estimators;
+pub mod importers;
+pub mod python;
 
 use drive::Pair;
 use fmu::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
