@@ -4,14 +4,123 @@
 
 mod common;
 
-use common::importers;
-use common::python::{pytest, scratch};
-use std::{fs, process};
+use common::importers::{self, DRIVE_STEP, Experiment};
+use common::python::{environment, pytest, run, scratch};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::{env, fs, process};
+
+/// The file with the experiments and what came out natively.
+fn references() -> PathBuf {
+    let file = scratch().join(format!("importers-{}-{:?}.json", process::id(), std::thread::current().id()));
+    fs::write(&file, importers::references().to_string()).expect("a file below the target folder");
+    file
+}
 
 #[test]
 fn ecos_libcosim_and_fmucontainer() {
-    let file = scratch().join(format!("importers-{}.json", process::id()));
-    fs::write(&file, importers::references().to_string()).expect("a file below the target folder");
+    let file = references();
     let files = ["test_ecos.py", "test_libcosim.py", "test_fmucontainer.py"];
     pytest("importers", "importers", &files, &[("FMU_REFERENCE", &file)]);
+}
+
+/// A command of Cargo that builds bindings to C headers: libclang comes from PyPI, the headers of the compiler from gcc.
+fn cargo_with_libclang(arguments: &[&str]) -> Command {
+    let python = environment(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rust-fmi/requirements.txt"));
+    let find = "import clang, pathlib; print(pathlib.Path(clang.__file__).parent / 'native', end='')";
+    let libclang = Command::new(python).args(["-c", find]).output().expect("the Python of the virtual environment");
+    let gcc = Command::new("gcc").arg("-print-file-name=include").output().expect("gcc, for its headers");
+    let text = |output: process::Output| String::from_utf8_lossy(&output.stdout).trim().to_owned();
+    let mut command = Command::new(env!("CARGO"));
+    command
+        .args(arguments)
+        .env("LIBCLANG_PATH", text(libclang))
+        .env("BINDGEN_EXTRA_CLANG_ARGS", format!("-I{}", text(gcc)))
+        .env("CARGO_TARGET_DIR", scratch().join("rust-fmi"));
+    command
+}
+
+/// rust-fmi's crate `fmi` runs the pair of the FMI 2.0 archives. (Its reader of FMI 3.0 does not know units on variables.)
+#[test]
+#[ignore = "needs crates.io and PyPI, and builds 160 packages: some minutes"]
+fn rust_fmi() {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rust-fmi/Cargo.toml");
+    let mut command = cargo_with_libclang(&["run", "--locked", "--release", "--manifest-path"]);
+    let output =
+        command.arg(manifest).arg("--").arg(common::archives().join("fmi2")).arg(references()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
+    print!("{said}");
+    assert_eq!(said.matches("bit for bit").count(), importers::experiments().len());
+}
+
+/// fmi-sim runs the whole drive in steps of 1 ms from the archives of both standards.
+#[test]
+#[ignore = "needs crates.io and PyPI, and builds fmi-sim: ten minutes"]
+fn fmi_sim() {
+    let root = scratch().join("fmi-sim");
+    let program = root.join("bin").join(format!("fmi-sim{}", env::consts::EXE_SUFFIX));
+    if !program.exists() {
+        let mut install = cargo_with_libclang(&["install", "fmi-sim", "--version", "0.7.0", "--locked", "--root"]);
+        run(install.arg(&root), "fmi-sim 0.7.0").unwrap_or_else(|why| panic!("{why}"));
+    }
+    for standard in ["fmi2", "fmi3"] {
+        for experiment in importers::experiments() {
+            run_fmi_sim(&program, standard, &experiment);
+        }
+    }
+}
+
+fn run_fmi_sim(program: &Path, standard: &str, experiment: &Experiment) {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("in.csv"), folder.path().join("out.csv"));
+    fs::write(&input, steps_as_csv(experiment)).unwrap();
+    let status = Command::new(program)
+        .arg("--model")
+        .arg(common::archives().join(standard).join("PmsmDrive.fmu"))
+        .arg("--input-file")
+        .arg(&input)
+        .arg("--output-file")
+        .arg(&output)
+        .arg("co-simulation")
+        .args(["--output-interval", &DRIVE_STEP.to_string(), "-f", &experiment.duration.to_string()])
+        .args(["--init-values", &format!("plant.initial.theta_e={:?}", experiment.theta_e)])
+        .stdout(Stdio::null())
+        .output()
+        .unwrap();
+    assert!(status.status.success(), "{standard}: {}", String::from_utf8_lossy(&status.stderr));
+    // At the time of a jump fmi-sim applies the value before it in FMI 2.0, the one after it in FMI 3.0.
+    let late = if standard == "fmi2" { DRIVE_STEP } else { 0.0 };
+    let native = importers::drive_speed(experiment, late);
+    let speed = column(&fs::read_to_string(&output).unwrap(), "speed");
+    assert_eq!(speed.len(), native.len(), "{standard}, {}", experiment.name);
+    for (k, (value, expected)) in speed.iter().zip(&native).enumerate() {
+        assert_eq!(
+            value.to_bits(),
+            expected.to_bits(),
+            "{standard}, {}, {k} ms: {value}, native {expected}",
+            experiment.name
+        );
+    }
+    assert!(speed.iter().any(|n| n.abs() > 10.0), "the rotor moved");
+}
+
+/// The experiment's inputs as fmi-sim reads them: interpolated between rows, with two rows at the time of a jump.
+fn steps_as_csv(experiment: &Experiment) -> String {
+    let inputs = |t: f64| (importers::at(&experiment.speed_ref, t), importers::at(&experiment.load, t));
+    let jumps = experiment.speed_ref.iter().chain(&experiment.load).map(|(t, _)| *t);
+    let mut rows = vec![(0.0, inputs(0.0))];
+    for t in jumps {
+        rows.extend([(t, rows[rows.len() - 1].1), (t, inputs(t))]);
+    }
+    rows.push((experiment.duration, inputs(experiment.duration)));
+    let row = |(t, (speed_ref, load)): &(f64, (f64, f64))| format!("{t:?},{speed_ref:?},{load:?},325.0\n");
+    format!("time,speed_ref,tau_load,u_dc\n{}", rows.iter().map(row).collect::<String>())
+}
+
+/// A column of a CSV file by its title.
+fn column(csv: &str, title: &str) -> Vec<f64> {
+    let mut lines = csv.lines().map(|line| line.split(','));
+    let index = lines.next().unwrap().position(|name| name.trim_matches('"') == title).expect("the column");
+    lines.map(|mut fields| fields.nth(index).unwrap().parse().unwrap()).collect()
 }

@@ -1,7 +1,9 @@
 //! Start-up and load step of the pair in every exchange order that importers have, run natively: what the packed FMUs
 //! must give in each importer.
 
-use super::estimators::{Schedule, at};
+pub use super::estimators::at;
+
+use super::estimators::Schedule;
 use drive::Pair;
 use drive::pmsm_drive::PmsmDrive;
 use fmu::reproduce::scenario::RPM;
@@ -14,7 +16,7 @@ const T_S: f64 = 1e-4;
 /// Communication steps from one recorded point to the next.
 const EVERY: usize = 100;
 /// Communication step of the whole drive in s.
-const DRIVE_STEP: f64 = 1e-3;
+pub const DRIVE_STEP: f64 = 1e-3;
 
 /// An experiment: a start from the worst angle, or a load at standstill.
 pub struct Experiment {
@@ -99,15 +101,15 @@ pub fn times(h: f64, duration: f64) -> impl Iterator<Item = f64> {
     (0_u32..).map(move |k| f64::from(k) * h).take_while(move |t| *t < duration - 0.5 * h)
 }
 
-/// Speed in rad/s of the whole drive at each communication point of 1 ms, the end included.
-pub fn drive_speed(experiment: &Experiment) -> Vec<f64> {
+/// Speed in rad/s of the whole drive at each communication point of 1 ms, the end included; inputs come `late` (s).
+pub fn drive_speed(experiment: &Experiment, late: f64) -> Vec<f64> {
     let mut block = Block::<PmsmDrive>::default();
     block.model.pair.plant.model.parameters.initial.theta_e = experiment.theta_e;
     block.initialise();
     let (mut now, mut speed) = (Elapsed::ZERO, vec![block.out.plant.speed]);
     for t in times(DRIVE_STEP, experiment.duration) {
-        block.model.inputs.speed_ref = at(&experiment.speed_ref, t);
-        block.model.inputs.tau_load = at(&experiment.load, t);
+        block.model.inputs.speed_ref = at(&experiment.speed_ref, t - late);
+        block.model.inputs.tau_load = at(&experiment.load, t - late);
         let step = Step { start: now, h: DRIVE_STEP };
         block.step(&step).expect("a step");
         now = step.end();
