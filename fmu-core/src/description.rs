@@ -1,5 +1,9 @@
 //! The neutral description: what a binary tells of its model, from which XML, documentation and tools are made.
 
+mod terminals;
+
+pub use terminals::{Member, Terminal, TerminalPicture};
+
 use crate::Fault;
 use crate::model::{Block, Experiment, Model};
 use crate::probe;
@@ -33,6 +37,10 @@ pub struct Description {
     pub documentation: String,
     /// The variables in the order of their value references, without `time`.
     pub variables: Vec<Variable>,
+    /// Variables that are connected together.
+    pub terminals: Vec<Terminal>,
+    /// Icon: an SVG document.
+    pub icon: Option<String>,
 }
 
 /// A variable of the description.
@@ -117,7 +125,7 @@ impl Description {
     ///
     /// # Errors
     /// Names what no compile-time check can see: a name that two parts share, a start value outside its range, a type
-    /// definition named like a variable.
+    /// definition named like a variable, a terminal of variables that are not there.
     pub fn of<M: Model>() -> Result<Self, Fault> {
         let mut block = Block::<M>::default();
         block.initialise();
@@ -144,6 +152,7 @@ impl Description {
             variables.push(variable(name, meta, reference(index), start, initial_dependencies));
         }
         check_types(&variables)?;
+        let terminals = terminals::describe(M::TERMINALS, &variables)?;
         let info = M::INFO;
         Ok(Self {
             name: info.name.into(),
@@ -156,6 +165,8 @@ impl Description {
             experiment: info.experiment,
             documentation: info.documentation.into(),
             variables,
+            terminals,
+            icon: M::ICON.map(Into::into),
         })
     }
 

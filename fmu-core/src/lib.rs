@@ -1,7 +1,7 @@
 //! What a model is, for an exporter and for an author: the trait [`Model`], its variable [`Table`], quantities and units,
 //! time on an integer grid, and the neutral [`Description`].
 //!
-//! Layers, from below: [`mod@unit`], [`variable`], [`table`], [`model`], [`description`]. No motor, no XML, no C, no `unsafe`.
+//! Layers, from below: [`mod@unit`], [`variable`], [`table`], [`terminal`], [`model`], [`description`]. No motor, no XML, no C, no `unsafe`.
 
 #![forbid(unsafe_code)]
 
@@ -11,6 +11,7 @@ pub mod log;
 pub mod model;
 mod probe;
 pub mod table;
+pub mod terminal;
 pub mod time;
 pub mod token;
 pub mod unit;
@@ -20,6 +21,7 @@ pub use description::Description;
 pub use fault::Fault;
 pub use model::{Block, Experiment, Info, Model};
 pub use table::{Part, Table};
+pub use terminal::{Icon, Member, Terminal};
 pub use time::{Elapsed, SampleGrid, Step};
 pub use token::{Hash, Token};
 pub use variable::{Causality, Enumeration, Item, Kind, Meta, Range, Row, Slot, Variability};

@@ -1,6 +1,6 @@
 //! The trait a model implements, and its life as an importer lives it.
 
-use crate::{Elapsed, Fault, Hash, Step, Table, Token};
+use crate::{Elapsed, Fault, Hash, Step, Table, Terminal, Token};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// What a model tells of itself besides its variables.
@@ -55,6 +55,12 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
 
     /// The variables: the one place where a name, a unit or a range is written.
     const TABLE: &'static Table<Block<Self>>;
+
+    /// Variables that are connected together; no part of the token.
+    const TERMINALS: &'static [Terminal] = &[];
+
+    /// Icon: an SVG document without text (a renderer may have no fonts) for a square from -100 to 100 both ways.
+    const ICON: Option<&'static str> = None;
 
     /// Layout of the serialised state; a change of a field changes it.
     const STATE_VERSION: u16 = 1;

@@ -168,7 +168,7 @@ const fn check_unique<W>(rows: &[Row<W>], last: usize) {
     }
 }
 
-const fn same_text(a: &str, b: &str) -> bool {
+pub(crate) const fn same_text(a: &str, b: &str) -> bool {
     let (a, b) = (a.as_bytes(), b.as_bytes());
     if a.len() != b.len() {
         return false;

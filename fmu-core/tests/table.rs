@@ -121,3 +121,87 @@ fn description_says_what_depends_on_what() {
     assert_eq!(d.variable("i").unwrap().start, None);
     assert_eq!(d.token, Small::TOKEN.as_str());
 }
+
+/// A terminal's variables are looked up in the table; a wrong one is told when the model is described.
+mod terminals {
+    use super::*;
+    use fmu_core::terminal::MemberKind;
+
+    const DOT: Icon = Icon { name: "dot", svg: "<svg/>", color: [1, 2, 3] };
+    const OTHER_DOT: Icon = Icon { svg: "<svg >", ..DOT };
+    const ICON: Icon = Icon { name: "icon", ..DOT };
+
+    macro_rules! with_terminals {
+        ($name:ident, $terminals:expr) => {
+            #[derive(Clone, Default, Serialize, Deserialize)]
+            struct $name(Small);
+            impl Model for $name {
+                type Outputs = SmallOutputs;
+                const INFO: Info = Small::INFO;
+                const TABLE: &'static Table<Block<Self>> = &Table::new(
+                    const {
+                        &[
+                            Row::<Block<Self>>::input("u", &VOLT, "Voltage", |m| &mut m.model.0.u),
+                            Row::<Block<Self>>::output("i", &AMPERE, "Current", |m| &mut m.out.i),
+                            Row::<Block<Self>>::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.model.0.load.map),
+                        ]
+                    },
+                );
+                const TERMINALS: &'static [Terminal] = $terminals;
+                fn initialise(&mut self) {}
+                fn output(&self, _: Elapsed, _: &mut SmallOutputs) {}
+                fn advance(&mut self, _: &Step) -> Result<(), Fault> {
+                    Ok(())
+                }
+            }
+        };
+    }
+
+    with_terminals!(
+        Good,
+        &[const { Terminal::plug("port", "A port", const { &[Member::signal("u"), Member::outflow("q").of("i")] }) }
+            .drawn(&DOT, -100.0, 40.0)]
+    );
+    with_terminals!(Bare, &[]);
+    with_terminals!(NoVariable, &[Terminal::plug("port", "", const { &[Member::signal("v")] })]);
+    with_terminals!(Array, &[Terminal::bus("port", "", const { &[Member::signal("map")] })]);
+    with_terminals!(
+        Twice,
+        &[
+            Terminal::bus("port", "", const { &[Member::signal("u")] }),
+            Terminal::bus("port", "", const { &[Member::signal("i")] }),
+        ]
+    );
+    with_terminals!(BadIcon, &[Terminal::bus("port", "", const { &[Member::signal("u")] }).drawn(&ICON, 0.0, 0.0)]);
+    with_terminals!(
+        OtherIcon,
+        &[
+            Terminal::bus("port", "", const { &[Member::signal("u")] }).drawn(&DOT, 0.0, 0.0),
+            Terminal::bus("next", "", const { &[Member::signal("u")] }).drawn(&OTHER_DOT, 0.0, 0.0),
+        ]
+    );
+
+    #[test]
+    fn are_described_and_change_no_token() {
+        let d = Description::of::<Good>().unwrap();
+        let [port] = d.terminals.as_slice() else { panic!("one terminal") };
+        let members: Vec<_> = port.members.iter().map(|m| (m.name.as_str(), m.variable.as_str(), m.kind)).collect();
+        assert_eq!(members, [("u", "u", MemberKind::Signal), ("q", "i", MemberKind::Outflow)]);
+        let picture = port.picture.as_ref().unwrap();
+        assert_eq!((picture.area, picture.icon.as_str()), ([-110.0, 30.0, -90.0, 50.0], "dot"));
+        assert_eq!(d.token, Description::of::<Bare>().unwrap().token);
+        assert!(d.icon.is_none());
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        fn why<M: Model>() -> String {
+            Description::of::<M>().unwrap_err().to_string()
+        }
+        assert_eq!(why::<NoVariable>(), "the terminal port names a variable v that is not there");
+        assert!(why::<Array>().contains("has map: only a scalar"), "{}", why::<Array>());
+        assert!(why::<Twice>().contains("port is there twice"));
+        assert!(why::<BadIcon>().contains("icon \"icon\""));
+        assert!(why::<OtherIcon>().contains("has another icon dot"));
+    }
+}

@@ -13,12 +13,14 @@ pub enum Error {
         reason: String,
     },
     /// An XML document of another kind.
-    #[error("line {line}: the root element is <{found}>, expected <fmiModelDescription>")]
+    #[error("line {line}: the root element is <{found}>, expected <{expected}>")]
     OtherRoot {
         /// Line, from 1.
         line: usize,
         /// Name of the root element.
         found: String,
+        /// Name that it should have.
+        expected: &'static str,
     },
     /// FMI 1.0, or a version that does not exist.
     #[error("line {line}: fmiVersion=\"{found}\" is not supported, expected 2.0 or 3.0")]

@@ -1,7 +1,8 @@
-//! modelDescription.xml of FMI 2.0 and FMI 3.0, written and read.
+//! modelDescription.xml and terminalsAndIcons.xml of FMI 2.0 and FMI 3.0, written and read.
 //!
 //! [`write()`] turns the neutral description of a model (`fmu_core::Description`) into XML of either standard; [`read()`]
-//! opens the XML of any FMU of either standard. The two share the element tree of `xml` and nothing else, so that the
+//! opens the XML of any FMU of either standard; [`write_terminals()`] and [`read_terminals()`] do the same for its terminals and
+//! icons. Writer and reader share the element tree of `xml` and nothing else, so that the
 //! reader does not believe what the writer does. No pointers, and no FMU links this crate.
 //!
 //! Clauses are cited as FMI 2.0.5 and FMI 3.0.2.
@@ -13,6 +14,7 @@ mod description;
 mod error;
 mod number;
 mod read;
+mod terminals;
 mod units;
 mod variable;
 mod version;
@@ -23,9 +25,10 @@ pub use date::date_from_epoch;
 pub use description::{CoSimulation, Experiment, LogCategory, ModelDescription, Unknown};
 pub use error::Error;
 pub use number::{format as format_number, parse as parse_number};
-pub use read::read;
+pub use read::{read, read_terminals};
+pub use terminals::{Area, CoordinateSystem, Member, StreamMember, Terminal, TerminalPicture, TerminalsAndIcons};
 pub use units::{BaseUnit, DisplayUnit, Item, TypeDefinition, Unit};
 pub use variable::{Alias, BaseType, Causality, Dimension, Initial, ModelVariable, Variability};
 pub use version::{FmiVersion, UnknownVersion};
-pub use write::{Generation, write};
+pub use write::{Generation, write, write_terminals};
 pub use xml::Element;

@@ -6,6 +6,7 @@
 
 mod attributes;
 mod structure;
+mod terminals;
 mod types;
 mod variables;
 
@@ -13,6 +14,8 @@ use crate::description::{CoSimulation, Experiment, LogCategory, ModelDescription
 use crate::error::Error;
 use crate::version::FmiVersion;
 use crate::xml::{Element, parse};
+pub use terminals::read_terminals;
+
 use attributes::{boolean, number, owned, required};
 
 /// Reads modelDescription.xml; the bytes must be UTF-8, as both standards require.
@@ -20,15 +23,7 @@ use attributes::{boolean, number, owned, required};
 /// # Errors
 /// Names the line, what is there and what was expected.
 pub fn read(xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
-    let bytes = xml.as_ref();
-    let text = std::str::from_utf8(bytes).map_err(|e| {
-        let line = bytes[..e.valid_up_to()].split(|&b| b == b'\n').count();
-        Error::NotXml { line, reason: "not UTF-8".into() }
-    })?;
-    let root = parse(text)?;
-    if root.name != "fmiModelDescription" {
-        return Err(Error::OtherRoot { line: root.line, found: root.name });
-    }
+    let root = tree(xml.as_ref(), "fmiModelDescription")?;
     let version = version(&root)?;
     let token = match version {
         FmiVersion::V2 => "guid",
@@ -61,6 +56,16 @@ pub fn read(xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
         derivatives: structure::unknowns(structure, version, "Derivatives", "ContinuousStateDerivative")?,
         initial_unknowns: structure::unknowns(structure, version, "InitialUnknowns", "InitialUnknown")?,
     })
+}
+
+/// The elements of a document whose root has this name.
+fn tree(bytes: &[u8], expected: &'static str) -> Result<Element, Error> {
+    let text = std::str::from_utf8(bytes).map_err(|e| {
+        let line = bytes[..e.valid_up_to()].split(|&b| b == b'\n').count();
+        Error::NotXml { line, reason: "not UTF-8".into() }
+    })?;
+    let root = parse(text)?;
+    if root.name == expected { Ok(root) } else { Err(Error::OtherRoot { line: root.line, found: root.name, expected }) }
 }
 
 /// The version, before anything else: FMI 1.0 has the same root element and other attributes.

@@ -1,8 +1,11 @@
 //! The neutral description as modelDescription.xml of either standard.
 
 mod structure;
+mod terminals;
 mod types;
 mod variables;
+
+pub use terminals::write_terminals;
 
 use crate::number;
 use crate::version::FmiVersion;

@@ -2,7 +2,8 @@
 
 #![allow(dead_code)] // each test file uses its own part
 
-use fmu_core::description::{Value, Variable, VariableKind};
+use fmu_core::description::{Member, Terminal, TerminalPicture, Value, Variable, VariableKind};
+use fmu_core::terminal::{MatchingRule, MemberKind};
 use fmu_core::unit::{ONE, Quantity, RAD_PER_S, SPEED, VOLT};
 use fmu_core::{Causality, Description, Experiment, Variability};
 use model_description::{FmiVersion, Generation, write};
@@ -125,5 +126,33 @@ pub(crate) fn sample() -> Description {
         experiment: Experiment { start: 0.0, stop: 2.0, step: 1e-4 },
         documentation: String::new(),
         variables,
+        terminals: terminals(),
+        icon: Some(SVG.into()),
     }
+}
+
+/// A picture of nothing.
+pub(crate) const SVG: &str = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"8\" height=\"8\"/>";
+
+/// One drawn, one not; every kind of member.
+fn terminals() -> Vec<Terminal> {
+    let member = |name: &str, variable: &str, kind| Member { name: name.into(), variable: variable.into(), kind };
+    let picture =
+        TerminalPicture { area: [-110.0, 30.5, -90.0, 50.5], icon: "dc".into(), svg: SVG.into(), color: [255, 0, 7] };
+    vec![
+        Terminal {
+            name: "supply".into(),
+            description: AWKWARD.into(),
+            rule: MatchingRule::Plug,
+            members: vec![member("u", "u_dc", MemberKind::Inflow), member("ready", "ready", MemberKind::Outflow)],
+            picture: Some(picture),
+        },
+        Terminal {
+            name: "all".into(),
+            description: String::new(),
+            rule: MatchingRule::Bus,
+            members: vec![member("w", "speed", MemberKind::Signal)],
+            picture: None,
+        },
+    ]
 }

@@ -1,0 +1,148 @@
+//! Terminals: which variables belong together where models are connected, and pictures (FMI 3.0.2, 2.4.9).
+//!
+//! A terminal names variables of the table and adds nothing to them: an importer that knows no terminals loses nothing, and
+//! the instantiation token does not change.
+
+use crate::table::same_text;
+use serde::{Deserialize, Serialize};
+
+/// A group of variables that is connected as a whole.
+#[derive(Clone, Copy, Debug)]
+pub struct Terminal {
+    /// Name, unique within the model.
+    pub name: &'static str,
+    /// One sentence.
+    pub description: &'static str,
+    /// How the members of two connected terminals find each other.
+    pub rule: MatchingRule,
+    /// The variables.
+    pub members: &'static [Member],
+    /// Where it is drawn, and how; `None`: the importer chooses.
+    pub picture: Option<Picture>,
+}
+
+/// How the members of two connected terminals find each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum MatchingRule {
+    /// By name, all of them.
+    Plug,
+    /// By name, those that both have.
+    Bus,
+}
+
+/// A variable of a terminal.
+#[derive(Clone, Copy, Debug)]
+pub struct Member {
+    /// Name within the terminal, the same on both sides of a connection.
+    pub name: &'static str,
+    /// Name of the variable in the table.
+    pub variable: &'static str,
+    /// What a connection makes of it.
+    pub kind: MemberKind,
+}
+
+/// What a connection makes of a member.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum MemberKind {
+    /// Both sides have the same value.
+    Signal,
+    /// Flows into the model through the terminal; what all connected terminals take in sums up to zero.
+    Inflow,
+    /// Flows out of the model through the terminal.
+    Outflow,
+}
+
+/// Where a terminal is drawn: its centre, in a coordinate system from -100 to 100 with y upwards, and its icon.
+#[derive(Clone, Copy, Debug)]
+pub struct Picture {
+    /// What is drawn.
+    pub icon: &'static Icon,
+    /// Centre, to the right.
+    pub x: f64,
+    /// Centre, upwards.
+    pub y: f64,
+}
+
+/// The icon of terminals of one kind.
+#[derive(Clone, Copy, Debug)]
+pub struct Icon {
+    /// Base name of its files: letters, digits and `_`, not `icon`.
+    pub name: &'static str,
+    /// SVG document without text: a renderer may have no fonts.
+    pub svg: &'static str,
+    /// Colour of lines that connect such terminals: red, green, blue.
+    pub color: [u8; 3],
+}
+
+impl Picture {
+    /// Half of a terminal's width and height in the coordinate system.
+    pub const HALF: f64 = 10.0;
+}
+
+impl Terminal {
+    /// A terminal that is only connected as a whole.
+    ///
+    /// # Panics
+    /// While compiling, on two members of one name or none at all.
+    pub const fn plug(name: &'static str, description: &'static str, members: &'static [Member]) -> Self {
+        Self::new(name, description, MatchingRule::Plug, members)
+    }
+
+    /// A terminal that may be connected in part.
+    ///
+    /// # Panics
+    /// As [`plug`](Self::plug).
+    pub const fn bus(name: &'static str, description: &'static str, members: &'static [Member]) -> Self {
+        Self::new(name, description, MatchingRule::Bus, members)
+    }
+
+    const fn new(
+        name: &'static str,
+        description: &'static str,
+        rule: MatchingRule,
+        members: &'static [Member],
+    ) -> Self {
+        assert!(!members.is_empty(), "a terminal needs a member");
+        let mut last = 0;
+        while last < members.len() {
+            let mut before = 0;
+            while before < last {
+                assert!(!same_text(members[before].name, members[last].name), "two members have the same name");
+                before += 1;
+            }
+            last += 1;
+        }
+        Self { name, description, rule, members, picture: None }
+    }
+
+    /// The same, drawn with its centre at (x, y).
+    pub const fn drawn(mut self, icon: &'static Icon, x: f64, y: f64) -> Self {
+        self.picture = Some(Picture { icon, x, y });
+        self
+    }
+}
+
+impl Member {
+    /// A member whose value is the same on both sides, named like its variable.
+    pub const fn signal(name: &'static str) -> Self {
+        Self { name, variable: name, kind: MemberKind::Signal }
+    }
+
+    /// A member that flows into the model.
+    pub const fn inflow(name: &'static str) -> Self {
+        Self { name, variable: name, kind: MemberKind::Inflow }
+    }
+
+    /// A member that flows out of the model.
+    pub const fn outflow(name: &'static str) -> Self {
+        Self { name, variable: name, kind: MemberKind::Outflow }
+    }
+
+    /// The same for a variable of another name.
+    pub const fn of(mut self, variable: &'static str) -> Self {
+        self.variable = variable;
+        self
+    }
+}

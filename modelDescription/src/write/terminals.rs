@@ -1,0 +1,68 @@
+//! terminalsAndIcons.xml (FMI 3.0.2, 2.4.9).
+//!
+//! An FMU of FMI 2.0 carries the file of FMI 3.0 (FMI 2.0.5, 2.3), so both get the same text.
+
+use crate::number;
+use crate::terminals::CoordinateSystem;
+use crate::version::FmiVersion;
+use crate::xml::{Element, print};
+use fmu_core::Description;
+use fmu_core::description::{Member, Terminal};
+use fmu_core::terminal::{MatchingRule, MemberKind};
+
+/// terminalsAndIcons.xml, for an FMU of either standard; `None` for a model without terminals and icon.
+pub fn write_terminals(description: &Description) -> Option<String> {
+    let Description { terminals, icon, .. } = description;
+    if terminals.is_empty() && icon.is_none() {
+        return None;
+    }
+    let CoordinateSystem { area, to_mm } = CoordinateSystem::default();
+    let corners = [area.x1, area.y1, area.x2, area.y2];
+    let system = placed("CoordinateSystem", corners).with("suggestedScalingFactorTo_mm", number::format(to_mm));
+    let icon = icon.as_ref().map(|_| placed("Icon", corners));
+    let list = Element::new("Terminals").children(terminals.iter().map(terminal));
+    let root = Element::new("fmiTerminalsAndIcons")
+        .with("fmiVersion", FmiVersion::V3.to_string())
+        .children([Element::new("GraphicalRepresentation").children([system]).children(icon)])
+        .children((!terminals.is_empty()).then_some(list));
+    Some(print(&root))
+}
+
+fn terminal(t: &Terminal) -> Element {
+    let rule = match t.rule {
+        MatchingRule::Plug => "plug",
+        MatchingRule::Bus => "bus",
+    };
+    let picture = t.picture.as_ref().map(|p| {
+        let color: Vec<String> = p.color.iter().map(u8::to_string).collect();
+        let element = Element::new("TerminalGraphicalRepresentation").with("defaultConnectionColor", color.join(" "));
+        place(element, p.area).with("iconBaseName", &*p.icon)
+    });
+    Element::new("Terminal")
+        .with("name", &*t.name)
+        .with("matchingRule", rule)
+        .with_text("description", &t.description)
+        .children(t.members.iter().map(member))
+        .children(picture)
+}
+
+fn member(m: &Member) -> Element {
+    let kind = match m.kind {
+        MemberKind::Signal => "signal",
+        MemberKind::Inflow => "inflow",
+        MemberKind::Outflow => "outflow",
+    };
+    Element::new("TerminalMemberVariable")
+        .with("variableName", &*m.variable)
+        .with("memberName", &*m.name)
+        .with("variableKind", kind)
+}
+
+fn placed(name: &str, corners: [f64; 4]) -> Element {
+    place(Element::new(name), corners)
+}
+
+fn place(element: Element, corners: [f64; 4]) -> Element {
+    let names = ["x1", "y1", "x2", "y2"];
+    names.into_iter().zip(corners).fold(element, |e, (name, x)| e.with(name, number::format(x)))
+}
