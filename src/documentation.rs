@@ -1,6 +1,7 @@
 //! `documentation/index.html`: a page that needs no network, made from the description.
 
-use fmu_core::description::{Description, Value, Variable, VariableKind};
+use fmu_core::description::{Description, Member, Value, Variable, VariableKind};
+use fmu_core::terminal::MemberKind;
 use fmu_core::variable::{Causality, Variability};
 use model_description::FmiVersion;
 use std::fmt::Write;
@@ -34,6 +35,7 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
         let variables: Vec<_> = d.variables.iter().filter(|v| v.causality == causality).collect();
         out += &section(title, &variables);
     }
+    out += &terminals(d);
     out += &parameters(d);
     out += &enumerations(d);
     put!(
@@ -87,6 +89,33 @@ fn parameters(d: &Description) -> String {
         out += &table(&variables);
     }
     out
+}
+
+/// What is connected together.
+fn terminals(d: &Description) -> String {
+    if d.terminals.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from(
+        "<h2>Terminals</h2>\n<p>Variables that are connected together; those of one member name belong to each other.</p>\n\
+         <div class=\"scroll\">\n<table class=\"variables\">\n<tr><th>Terminal</th><th class=\"wide\">Description</th>\
+         <th>Members</th></tr>\n",
+    );
+    for t in &d.terminals {
+        let member = |m: &Member| {
+            let kind = match m.kind {
+                MemberKind::Signal => "",
+                MemberKind::Inflow => " <small>flows in</small>",
+                MemberKind::Outflow => " <small>flows out</small>",
+            };
+            let other = Some(&m.variable).filter(|v| **v != m.name).map(|v| format!(" = {}", escape(v)));
+            format!("{}{}{kind}", escape(&m.name), other.unwrap_or_default())
+        };
+        let members: Vec<String> = t.members.iter().map(member).collect();
+        let (name, text) = (escape(&t.name), escape(&t.description));
+        put!(out, "<tr><td class=\"name\">{name}</td><td>{text}</td><td>{}</td></tr>\n", members.join(", "));
+    }
+    out + "</table>\n</div>\n"
 }
 
 /// Everything before the last dot.

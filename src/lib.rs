@@ -1,7 +1,7 @@
 //! The command line tool `fmu`, as a library so that tests can use its parts.
 //!
 //! - [`commands`]: what the command line does, one module a command.
-//! - [`workspace`], [`pack`], [`documentation`], [`licences`]: from Rust sources to `.fmu` files.
+//! - [`workspace`], [`pack`], [`documentation`], [`icons`], [`licences`]: from Rust sources to `.fmu` files.
 //! - [`importer`]: runs any co-simulation FMU; the only place with `unsafe` code.
 //! - [`check`]: whether an FMU keeps to its standard.
 //! - [`cosimulation`]: several FMUs connected; [`plot`]: what they did, as a picture.
@@ -12,6 +12,7 @@ pub mod commands;
 pub mod compare;
 pub mod cosimulation;
 pub mod documentation;
+pub mod icons;
 pub mod importer;
 pub mod licences;
 pub mod pack;

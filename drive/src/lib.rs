@@ -23,6 +23,7 @@ pub mod motor;
 pub mod pair;
 pub mod plant;
 pub mod pmsm_drive;
+mod terminals;
 
 pub use control::model::SensorlessController;
 pub use pair::Pair;

@@ -9,7 +9,7 @@ use crate::control::tables::{self, LOCK_LOST};
 use crate::pair::Pair;
 use crate::plant::model as plant;
 use fmu_core::unit::{AMPERE, NEWTON_METRE, ONE, RADIAN, SPEED, VOLT};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
 
 #[cfg(doc)]
@@ -65,6 +65,10 @@ impl Model for PmsmDrive {
     };
 
     const TABLE: &'static Table<Block<Self>> = TABLE;
+
+    const TERMINALS: &'static [Terminal] = crate::terminals::DRIVE;
+
+    const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();

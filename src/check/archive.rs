@@ -2,7 +2,7 @@
 
 use super::zip::inside;
 use super::{Check, Level, Levels, Run, Subject, Verdict};
-use model_description::{Element, FmiVersion};
+use model_description::FmiVersion;
 
 const ZIP: &str = "2.0.5, 2.3; 3.0.2, 2.5.1";
 const STRUCTURE: &str = "2.0.5, 2.3; 3.0.2, 2.5.1.4";
@@ -30,7 +30,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "Z05", requirement: "An icon or diagram as SVG comes with one as PNG.", clause: "3.0.2, 2.5.1", levels: Levels(None, Some(Level::Must)), run: Run::File(pictures) },
     Check { id: "Z06", requirement: "Folders below extra/ have reverse domain names.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.6", levels: Levels::SHOULD, run: Run::File(extra) },
     Check { id: "Z07", requirement: "Sources come with sources/buildDescription.xml and without the standard's headers.", clause: "3.0.2, 2.5.1.2", levels: Levels(Some(Level::Should), Some(Level::Should)), run: Run::File(sources) },
-    Check { id: "I01", requirement: "terminalsAndIcons.xml is well-formed and names variables that exist.", clause: "3.0.2, 2.4.9", levels: Levels::MUST, run: Run::File(terminals) },
 ];
 
 /// A finding for each entry that the rule refuses.
@@ -303,37 +302,5 @@ fn sources(subject: &Subject) -> Verdict {
             .any(|h| file == format!("fmi2{h}") || file == format!("fmi3{h}"))
     };
     findings.extend(names.iter().filter(header).map(|n| format!("entry {n:?}: is a header of the standard")));
-    Verdict::of(findings)
-}
-
-fn terminals(subject: &Subject) -> Verdict {
-    let Some(entry) = subject.zip.find("terminalsAndIcons/terminalsAndIcons.xml") else {
-        return Verdict::NotApplicable("there is no terminalsAndIcons.xml".into());
-    };
-    let text = super::zip::contents(&subject.bytes, entry, 64 << 20);
-    let text = text.and_then(|t| String::from_utf8(t).map_err(|_| "is not UTF-8".to_owned()));
-    let tree = match text.and_then(|t| Element::parse(&t).map_err(|e| e.to_string())) {
-        Ok(tree) => tree,
-        Err(cause) => return Verdict::Violated(vec![format!("terminalsAndIcons.xml: {cause}")]),
-    };
-    let Ok(description) = &subject.description else {
-        return Verdict::NotDetermined("the description cannot be read".into());
-    };
-    let mut findings = Vec::new();
-    let mut open = vec![&tree];
-    while let Some(element) = open.pop() {
-        open.extend(&element.children);
-        for attribute in ["variableName", "inStreamVariableName", "outStreamVariableName"] {
-            if let Some(name) = element.get(attribute).filter(|name| description.variable(name).is_none()) {
-                findings.push(format!("terminalsAndIcons.xml: line {}: there is no variable {name:?}", element.line));
-            }
-        }
-        if let Some(base) = element.get("iconBaseName") {
-            let png = format!("terminalsAndIcons/{base}.png");
-            if subject.zip.find(&png).is_none() {
-                findings.push(format!("terminalsAndIcons.xml: line {}: there is no {png}", element.line));
-            }
-        }
-    }
     Verdict::of(findings)
 }

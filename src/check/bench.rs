@@ -45,7 +45,8 @@ pub(super) struct Bench {
     pub(super) md: ModelDescription,
     /// Path of the binary.
     pub(super) binary: PathBuf,
-    dir: PathBuf,
+    /// Folder that the FMU was unpacked to.
+    pub(super) dir: PathBuf,
     lines: RefCell<File>,
     journal: RefCell<File>,
     preparing: Cell<bool>,
@@ -98,12 +99,17 @@ impl Bench {
 
     /// The same FMU with another loaded binary; what it finds and calls goes to files that nobody reads.
     pub(super) fn twin_of(&self, raw: Raw, number: usize) -> Result<Self, Blocked> {
+        self.twin_at(&self.dir, raw, number)
+    }
+
+    /// The same, unpacked to another folder.
+    pub(super) fn twin_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, Blocked> {
         let scratch = || tempfile::tempfile().map_err(|e| Blocked(e.to_string()));
         Ok(Self {
             raw,
             md: self.md.clone(),
             binary: self.binary.clone(),
-            dir: self.dir.clone(),
+            dir: dir.into(),
             lines: RefCell::new(scratch()?),
             journal: RefCell::new(scratch()?),
             preparing: Cell::new(false),

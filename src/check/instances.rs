@@ -19,7 +19,7 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 /// Inputs that move, so that instances do something.
-fn life(it: &It<'_>, n: u32) -> Result<Vec<Vec<Vec<u64>>>, Blocked> {
+pub(super) fn life(it: &It<'_>, n: u32) -> Result<Vec<Vec<Vec<u64>>>, Blocked> {
     let watched = it.bench.watched();
     (0..n)
         .map(|k| {

@@ -22,6 +22,7 @@ mod state;
 mod structure;
 mod subject;
 mod table;
+mod terminals;
 mod time;
 mod units;
 mod variables;
@@ -109,6 +110,7 @@ pub const GROUPS: &[Group] = &[
     Group { name: "xml", title: "modelDescription.xml", checks: xml::CHECKS },
     Group { name: "variables", title: "Variables, types and units", checks: variables::CHECKS },
     Group { name: "structure", title: "Model structure", checks: structure::CHECKS },
+    Group { name: "terminals", title: "Terminals and icons", checks: terminals::CHECKS },
     Group { name: "binary", title: "The binary", checks: binary::CHECKS },
     Group { name: "lifecycle", title: "Life cycle", checks: lifecycle::CHECKS },
     Group { name: "access", title: "Getting and setting", checks: access::CHECKS },

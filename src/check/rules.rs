@@ -1,8 +1,8 @@
-//! What the standards allow in modelDescription.xml: elements, attributes, and the order of children.
+//! What the standards allow in modelDescription.xml and terminalsAndIcons.xml: elements, attributes, and the order of children.
 //!
 //! One line an element: its path from the root, its attributes with their forms (`!` required), its children in order.
 //! Forms: `s` text, `b` boolean, `i` integer, `u` unsigned integer, `d` number, `t` date and time, `l` list of unsigned
-//! integers, `w` words, `*` anything.
+//! integers, `w` words, `c` colour, `*` anything.
 //! `~` before the children: their order is free. Facts of FMI 2.0.5, 2.2 and FMI 3.0.2, 2.4 in our own words.
 
 /// An element of the standard.
@@ -107,6 +107,23 @@ pub(super) const V3: &[Rule] = &[
     rule("ClockedState", "valueReference:u! dependencies:l dependenciesKind:w", "Annotations?"),
     rule("InitialUnknown", "valueReference:u! dependencies:l dependenciesKind:w", "Annotations?"),
     rule("EventIndicator", "valueReference:u! dependencies:l dependenciesKind:w", "Annotations?"),
+];
+
+/// terminalsAndIcons.xml, FMI 3.0.2, 2.4.9.
+#[rustfmt::skip]
+pub(super) const TERMINALS: &[Rule] = &[
+    rule("fmiTerminalsAndIcons", "fmiVersion:s!", "GraphicalRepresentation? Terminals? Annotations?"),
+    rule("GraphicalRepresentation", "", "CoordinateSystem? Icon? Annotations?"),
+    rule("CoordinateSystem", "x1:d! y1:d! x2:d! y2:d! suggestedScalingFactorTo_mm:d!", ""),
+    rule("Icon", "x1:d! y1:d! x2:d! y2:d!", ""),
+    rule("Terminals", "", "Terminal!"),
+    rule("Terminal", "name:s! matchingRule:s! terminalKind:s description:s",
+        "TerminalMemberVariable TerminalStreamMemberVariable Terminal TerminalGraphicalRepresentation? Annotations?"),
+    rule("TerminalMemberVariable", "variableName:s! memberName:s variableKind:s!", "Annotations?"),
+    rule("TerminalStreamMemberVariable", "inStreamMemberName:s! outStreamMemberName:s! inStreamVariableName:s! outStreamVariableName:s!", "Annotations?"),
+    rule("TerminalGraphicalRepresentation", "defaultConnectionColor:c defaultConnectionStrokeSize:d x1:d! y1:d! x2:d! y2:d! iconBaseName:s!", "Annotations?"),
+    rule("Annotations", "", "Annotation!"),
+    rule("Annotation", "type:s!", "*"),
 ];
 
 /// What an `@` word stands for.

@@ -1,6 +1,6 @@
-//! Walks the elements of modelDescription.xml along the rules of the standard.
+//! Walks the elements of modelDescription.xml and terminalsAndIcons.xml along the rules of the standard.
 
-use super::rules::{Rule, V2, V3, expand};
+use super::rules::{Rule, TERMINALS, V2, V3, expand};
 use model_description::{Element, FmiVersion, parse_number};
 
 /// Every deviation, with its line.
@@ -9,8 +9,17 @@ pub(super) fn deviations(root: &Element, version: FmiVersion) -> Vec<String> {
         FmiVersion::V2 => V2,
         FmiVersion::V3 => V3,
     };
+    along(root, "fmiModelDescription", rules)
+}
+
+/// The same for terminalsAndIcons.xml, which both standards have alike.
+pub(super) fn deviations_of_terminals(root: &Element) -> Vec<String> {
+    along(root, "fmiTerminalsAndIcons", TERMINALS)
+}
+
+fn along(root: &Element, name: &str, rules: &'static [Rule]) -> Vec<String> {
     let mut findings = Vec::new();
-    if root.name != "fmiModelDescription" {
+    if root.name != name {
         return vec![format!("line {}: the root element is <{}>", root.line, root.name)];
     }
     walk(root, "", rules, &mut findings);
@@ -75,6 +84,10 @@ fn fits(value: &str, form: &str) -> bool {
         "u" => trimmed.parse::<u64>().is_ok(),
         "d" => parse_number(trimmed).is_some(),
         "l" => trimmed.split_whitespace().all(|w| w.parse::<u32>().is_ok()),
+        "c" => {
+            trimmed.split_whitespace().filter(|w| w.parse::<u8>().is_ok()).count() == 3
+                && trimmed.split_whitespace().count() == 3
+        }
         "w" => {
             trimmed.split_whitespace().all(|w| ["dependent", "constant", "fixed", "tunable", "discrete"].contains(&w))
         }
@@ -89,6 +102,7 @@ fn say(form: &str) -> &'static str {
         "u" => "an unsigned integer",
         "d" => "a number",
         "l" => "a list of unsigned integers",
+        "c" => "a colour, three numbers from 0 to 255",
         "w" => "a list of dependent, constant, fixed, tunable, discrete",
         _ => "of the right form",
     }

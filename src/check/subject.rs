@@ -87,7 +87,8 @@ impl Subject {
         Ok(subject)
     }
 
-    /// Where it was unpacked: `modelDescription.xml`, `binaries/` of every platform and `resources/`.
+    /// Where it was unpacked: `modelDescription.xml`, `binaries/` of every platform, `resources/`, and what probes take
+    /// away (I02).
     pub(super) fn dir(&self) -> &Path {
         self.dir.path()
     }
@@ -98,7 +99,8 @@ impl Subject {
         let mut left = LIMIT;
         for entry in &self.zip.entries {
             let name = entry.name();
-            let wanted = name.starts_with("binaries/") || name.starts_with("resources/");
+            let folder = name.split('/').next().unwrap_or_default();
+            let wanted = ["binaries", "resources", "terminalsAndIcons", "extra"].contains(&folder);
             if name.ends_with('/') || entry.is_link() || !inside(&name) || (name == "modelDescription.xml") {
                 continue;
             }

@@ -1,5 +1,6 @@
 //! `fmu build`: compiles models and packs them.
 
+use crate::icons;
 use crate::importer::describe;
 use crate::licences::Licences;
 use crate::pack::{self, Moment};
@@ -78,7 +79,8 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
         for &version in &versions {
             let folder = if version == FmiVersion::V2 { "fmi2" } else { "fmi3" };
             let path = out.join(folder).join(format!("{}.fmu", model.description.name));
-            let files = pack::contents(&model.description, &model.binaries, &model.licences, version, moment);
+            let mut files = pack::contents(&model.description, &model.binaries, &model.licences, version, moment);
+            files.extend(icons::files(&model.description, version)?);
             pack::write(&path, &pack::archive(&files, moment)?)?;
             written.push(path);
         }

@@ -25,6 +25,9 @@ use std::time::{Duration, Instant};
 /// Start the motor and turn it at 1000 rpm (104.7 rad/s):
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
 ///     --input SensorlessController.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
+/// The same, connected by terminals:
+///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --terminal p.phases=c.phases --terminal p.sensor=c.sensor \
+///     --input c.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
 /// The same, connected by hand, with another resistance, some variables only, as CSV:
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --connect c.u_a=p.u_a --connect c.u_b=p.u_b \
 ///     --connect c.u_c=p.u_c --connect p.i_a=c.i_a --connect p.i_b=c.i_b --connect p.i_c=c.i_c \
@@ -38,6 +41,9 @@ pub struct Simulate {
     /// Connect an output to an input (repeatable)
     #[arg(long, value_name = "OUTPUT=INPUT")]
     pub connect: Vec<String>,
+    /// Connect two terminals, each an instance's group of variables that belong together (repeatable)
+    #[arg(long, value_name = "TERMINAL=TERMINAL")]
+    pub terminal: Vec<String>,
     /// Connect every input that nothing feeds to the output of the same name of another FMU
     #[arg(long)]
     pub auto_connect: bool,
@@ -112,6 +118,12 @@ fn prepare(system: &mut System, args: &Simulate) -> Result<Settings> {
     for text in &args.connect {
         let (from, to) = halves(text, "--connect OUTPUT=INPUT")?;
         system.connect(from, to)?;
+    }
+    for text in &args.terminal {
+        let (one, other) = halves(text, "--terminal INSTANCE.TERMINAL=INSTANCE.TERMINAL")?;
+        for (from, to) in system.connect_terminals(one, other)? {
+            eprintln!("connected {from} -> {to}");
+        }
     }
     for text in &args.input {
         match text.split_once('=') {

@@ -26,6 +26,7 @@ mod grid;
 mod recording;
 mod run;
 mod schedule;
+mod terminals;
 
 pub use grid::Settings;
 pub use recording::{Column, Recording};
@@ -34,12 +35,14 @@ pub use schedule::Schedule;
 
 use crate::importer::{Error, Fmu, Instance, Message};
 use exchange::{Source, Wiring};
-use model_description::{BaseType, Causality, ModelVariable};
+use model_description::{BaseType, Causality, ModelVariable, TerminalsAndIcons};
 
 /// FMUs and how they belong together.
 #[derive(Default)]
 pub struct System {
     instances: Vec<Instance>,
+    /// Of each instance; what is wrong with them only matters to who asks for them.
+    terminals: Vec<Result<Option<TerminalsAndIcons>, Error>>,
     wiring: Wiring,
     records: Vec<Port>,
 }
@@ -63,6 +66,7 @@ impl System {
             return Err(Error::usage(name, "two instances have this name; NAME=FILE gives another"));
         }
         self.instances.push(fmu.instantiate(name, logging)?);
+        self.terminals.push(fmu.terminals().map(Option::<&_>::cloned));
         Ok(())
     }
 
@@ -183,21 +187,22 @@ impl System {
         variable.map_or(Causality::Local, |v| v.causality)
     }
 
-    /// `instance.variable`; an instance's name may itself have dots.
+    /// `instance.variable`.
     fn port(&self, text: &str) -> Result<Port, Error> {
+        let (instance, name) = self.instance_and_rest(text, "VARIABLE")?;
+        let variable = self.instances[instance].variable(name)?;
+        Ok(Port { instance, reference: variable.value_reference, base: variable.base, name: name.to_owned() })
+    }
+
+    /// The instance and what follows its name and a dot; an instance's name may itself have dots.
+    fn instance_and_rest<'a>(&self, text: &'a str, what: &str) -> Result<(usize, &'a str), Error> {
         let split = |(index, i): (usize, &Instance)| {
-            Some((index, i.name().len(), text.strip_prefix(i.name())?.strip_prefix('.')?.to_owned()))
+            Some((index, i.name().len(), text.strip_prefix(i.name())?.strip_prefix('.')?))
         };
         let best = self.instances.iter().enumerate().filter_map(split).max_by_key(|(_, length, _)| *length);
-        let Some((instance, _, name)) = best else {
-            let names: Vec<_> = self.instances.iter().map(Instance::name).collect();
-            return Err(Error::usage(
-                text,
-                format!("is not INSTANCE.VARIABLE; the instances are {}", names.join(", ")),
-            ));
-        };
-        let variable = self.instances[instance].variable(&name)?;
-        Ok(Port { instance, reference: variable.value_reference, base: variable.base, name })
+        let names = || self.instances.iter().map(Instance::name).collect::<Vec<_>>().join(", ");
+        let wrong = || Error::usage(text, format!("is not INSTANCE.{what}; the instances are {}", names()));
+        best.map(|(index, _, rest)| (index, rest)).ok_or_else(wrong)
     }
 
     /// A port that is one number.

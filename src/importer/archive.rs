@@ -2,7 +2,7 @@
 
 use super::Error;
 use crate::platform::Platform;
-use model_description::{FmiVersion, ModelDescription};
+use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -32,17 +32,20 @@ impl Archive {
         let file = File::open(path).map_err(|e| wrong(&e))?;
         let mut zip = ZipArchive::new(file).map_err(|e| wrong(&format!("not a ZIP archive, or cut short: {e}")))?;
         let names = check_entries(&mut zip).map_err(|cause| wrong(&cause))?;
-        let mut xml = Vec::new();
-        match zip.by_name("modelDescription.xml") {
-            Ok(entry) => {
-                entry.take(LIMIT).read_to_end(&mut xml).map_err(|e| wrong(&format!("modelDescription.xml: {e}")))?
-            }
-            Err(zip::result::ZipError::FileNotFound) => return Err(wrong(&"has no modelDescription.xml")),
-            Err(e) => return Err(wrong(&format!("modelDescription.xml: {e}"))),
-        };
+        let xml = contents(&mut zip, "modelDescription.xml").map_err(|cause| wrong(&cause))?;
+        let xml = xml.ok_or_else(|| wrong(&"has no modelDescription.xml"))?;
         let xml = String::from_utf8(xml).map_err(|_| wrong(&"modelDescription.xml is not UTF-8"))?;
         let description = model_description::read(&xml).map_err(|e| wrong(&format!("modelDescription.xml: {e}")))?;
         Ok(Self { path: path.into(), zip, names, description })
+    }
+
+    /// Its terminals and icons, where it has some.
+    pub(super) fn terminals(&mut self) -> Result<Option<TerminalsAndIcons>, Error> {
+        const NAME: &str = "terminalsAndIcons/terminalsAndIcons.xml";
+        let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, cause);
+        let xml = contents(&mut self.zip, NAME).map_err(|cause| wrong(&cause))?;
+        let read = |xml| model_description::read_terminals(xml).map_err(|e| wrong(&format!("{NAME}: {e}")));
+        xml.map(read).transpose()
     }
 
     /// Extracts the binaries for this machine and the resources; returns the folder and the binary in it.
@@ -103,6 +106,17 @@ impl Archive {
         let standard = if self.description.version == FmiVersion::V2 { "FMI 2.0" } else { "FMI 3.0" };
         format!("has no binaries/{folder}/{name} for this platform ({standard}); it has {there}")
     }
+}
+
+/// The contents of an entry; `None` where there is none of this name.
+fn contents(zip: &mut ZipArchive<File>, name: &str) -> Result<Option<Vec<u8>>, String> {
+    let mut bytes = Vec::new();
+    match zip.by_name(name) {
+        Ok(entry) => entry.take(LIMIT).read_to_end(&mut bytes).map_err(|e| format!("{name}: {e}"))?,
+        Err(zip::result::ZipError::FileNotFound) => return Ok(None),
+        Err(e) => return Err(format!("{name}: {e}")),
+    };
+    Ok(Some(bytes))
 }
 
 /// The names of the entries; refuses names that lead outside, links, and sizes that no FMU has.

@@ -34,7 +34,7 @@ pub use value::Values;
 
 use archive::Archive;
 use log::Log;
-use model_description::{FmiVersion, ModelDescription};
+use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
 use standard::{Outcome, Refusal, Standard};
 use std::ffi::CString;
 use std::path::{Path, PathBuf};
@@ -58,6 +58,7 @@ enum Functions {
 pub struct Fmu {
     path: PathBuf,
     description: Arc<ModelDescription>,
+    terminals: Result<Option<TerminalsAndIcons>, Error>,
     functions: Functions,
     dir: Arc<TempDir>,
 }
@@ -72,6 +73,7 @@ impl Fmu {
         let path = path.as_ref();
         let mut archive = Archive::open(path)?;
         let (dir, binary) = archive.extract()?;
+        let terminals = archive.terminals();
         let (description, dir) = (archive.description, Arc::new(dir));
         let library = library::load(&binary).map_err(|e| Error::file(path, e.cause()))?;
         let functions = match description.version {
@@ -88,12 +90,20 @@ impl Fmu {
             }
         };
         let functions = functions.map_err(|cause| Error::file(path, cause))?;
-        Ok(Self { path: path.into(), description: Arc::new(description), functions, dir })
+        Ok(Self { path: path.into(), description: Arc::new(description), terminals, functions, dir })
     }
 
     /// What its modelDescription.xml says.
     pub fn description(&self) -> &ModelDescription {
         &self.description
+    }
+
+    /// What its terminalsAndIcons.xml says, where it has one.
+    ///
+    /// # Errors
+    /// The file cannot be read; the FMU runs all the same.
+    pub fn terminals(&self) -> Result<Option<&TerminalsAndIcons>, Error> {
+        self.terminals.as_ref().map(Option::as_ref).map_err(Clone::clone)
     }
 
     /// The file.

@@ -40,10 +40,6 @@ fn each_fault_is_found_by_its_check() {
         ("odd platform", &["Z03"], |e| e.push(Entry::new("binaries/My Computer/x", b""))),
         ("extra", &["Z06"], |e| e.push(Entry::new("extra/stuff/x", b""))),
         ("header", &["Z07"], |e| e.push(Entry::new("sources/fmi2Functions.h", b""))),
-        ("terminal", &["I01"], |e| {
-            let xml = b"<fmiTerminalsAndIcons><Terminals><Terminal><TerminalMemberVariable variableName='zzz'/></Terminal></Terminals></fmiTerminalsAndIcons>";
-            e.push(Entry::new("terminalsAndIcons/terminalsAndIcons.xml", xml));
-        }),
         ("other name of the binary", &["X03", "B10"], |e| e.push(Entry::new("binaries/linux64/Other.so", b"x"))),
     ];
     let dir = tempfile::tempdir().unwrap();

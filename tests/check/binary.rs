@@ -71,6 +71,7 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("G_L4", &["G-L4"]),
     ("G_L5", &["G-L5"]),
     ("M01", &["M01"]),
+    ("I02", &["I02"]),
     ("CRASH", &["L00"]),
     ("HANG", &["L00"]),
 ];
@@ -92,6 +93,7 @@ fn pack(dir: &Path, fault: &str, binary: &[u8]) -> std::path::PathBuf {
         Entry::new("modelDescription.xml", include_bytes!("fmu.xml")),
         Entry::new("binaries/linux64/Small.so", binary),
         Entry::new("documentation/index.html", b"x"),
+        Entry::new("terminalsAndIcons/terminalsAndIcons.xml", b"<fmiTerminalsAndIcons fmiVersion=\"3.0\"/>"),
     ];
     write(&path, &entries);
     path

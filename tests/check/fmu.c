@@ -136,6 +136,13 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
     f->kept = callbacks;
     f->logging = logging;
     strncpy(f->name, name ? name : "", sizeof f->name - 1);
+#ifdef FAULT_I02
+    char path[2048];
+    snprintf(path, sizeof path, "%s/../terminalsAndIcons/terminalsAndIcons.xml", where ? where + strlen("file://") : "");
+    FILE *terminals = fopen(path, "r");
+    if (where && !terminals) f->data.gain += 1;
+    if (terminals) fclose(terminals);
+#endif
     say(f, OK, "made");
     return f;
 }

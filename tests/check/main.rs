@@ -9,6 +9,7 @@ mod binary;
 mod description;
 mod foreign;
 mod survives;
+mod terminals;
 mod zip;
 
 use fmu::check::{Options, Verdict, report::Report};

@@ -2,10 +2,13 @@
 
 import platform
 import zipfile
+from pathlib import Path
 
+import fmpy
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
+from lxml import etree
 
 from contract import CONTRACT, DISPLAY, ESTIMATORS, VARIABILITY
 from misuse.abi import Fmu
@@ -150,6 +153,25 @@ def test_contents(archive):
     assert any(n.startswith("binaries/") and system in n for n in names)
     assert all(n.isascii() and "\\" not in n and ".." not in n and not n.startswith("/") for n in names)
     assert len(set(names)) == len(names)
+
+
+def test_terminals_and_icons(archive, variables):
+    """The schema that FMPy delivers accepts the file, in an archive of FMI 2.0 as well (FMI 2.0.5, 2.3)."""
+    schema = etree.XMLSchema(file=Path(fmpy.__file__).parent / "schema/fmi3/fmi3TerminalsAndIcons.xsd")
+    with zipfile.ZipFile(archive) as file:
+        root = etree.fromstring(file.read("terminalsAndIcons/terminalsAndIcons.xml"))
+        names = file.namelist()
+        pictures = [n for n in names if n.endswith(".png")]
+        assert all(file.read(n).startswith(b"\x89PNG") for n in pictures)
+    schema.assertValid(root)
+    assert root.get("fmiVersion") == "3.0"
+    assert ("model.png" in names) == (archive.parent.name == "fmi2")
+    for picture in ["icon", *(e.get("iconBaseName") for e in root.iter("TerminalGraphicalRepresentation"))]:
+        assert {f"terminalsAndIcons/{picture}.png", f"terminalsAndIcons/{picture}.svg"} <= set(names)
+    for terminal in root.iter("Terminal"):
+        members = terminal.findall("TerminalMemberVariable")
+        assert len({m.get("memberName") for m in members}) == len(members) > 0
+        assert all(m.get("variableName") in variables for m in members)
 
 
 def test_archives_that_must_exist(archives):

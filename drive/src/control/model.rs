@@ -12,7 +12,7 @@ use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
 use crate::math::wrap;
 use crate::plant::inverter::{dead_time_loss, limit_to_hexagon};
 use fmu_core::unit::{AMPERE, RADIAN, SPEED, VOLT};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
 
 /// Greatest turn of the estimate in one sample in rad: beyond it nothing is estimated any more.
@@ -368,6 +368,10 @@ impl Model for SensorlessController {
     };
 
     const TABLE: &'static Table<Block<Self>> = TABLE;
+
+    const TERMINALS: &'static [Terminal] = crate::terminals::CONTROLLER;
+
+    const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
     const STATE_VERSION: u16 = 3;
 

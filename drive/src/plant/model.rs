@@ -9,7 +9,7 @@ use crate::plant::machine;
 use crate::plant::mechanics::{MECHANICS, Mechanics};
 use crate::plant::saturation::{SATURATION, Saturation};
 use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, Table};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, Table, Terminal};
 use nalgebra::Vector4;
 use serde::{Deserialize, Serialize};
 
@@ -154,6 +154,10 @@ impl Model for PmsmPlant {
     };
 
     const TABLE: &'static Table<Block<Self>> = TABLE;
+
+    const TERMINALS: &'static [Terminal] = crate::terminals::PLANT;
+
+    const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
     const STATE_VERSION: u16 = 2;
 

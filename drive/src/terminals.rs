@@ -1,0 +1,120 @@
+//! What is connected together: terminals of the models, and their icons.
+//!
+//! `phases` and `sensor` are there twice, on the plant and mirrored on the controller: members of one name belong together.
+//! The inverter is inside the plant, so the phases carry references and measured values, and a connection makes them equal
+//! (signals). Where power leaves the model, at the shaft and at the DC link, the torque and the current are flows: they
+//! sum up to zero with those of whatever is connected.
+
+use fmu_core::{Member, Terminal};
+
+/// Terminals of `PmsmPlant`.
+pub(crate) const PLANT: &[Terminal] =
+    &[
+        Terminal::plug("phases", "Voltage references from the controller, measured currents to it", PHASE_MEMBERS)
+            .drawn(&icon::PHASES, -100.0, 40.0),
+        Terminal::plug(
+            "sensor",
+            "What a shaft sensor measures: mechanical speed and electrical angle",
+            &[Member::signal("speed"), Member::signal("theta_e")],
+        )
+        .drawn(&icon::SENSOR, -100.0, -40.0),
+        SHAFT,
+        DC_LINK,
+    ];
+
+/// Terminals of `SensorlessController`.
+pub(crate) const CONTROLLER: &[Terminal] = &[
+    Terminal::plug("phases", "Voltage references to the plant, measured currents from it", PHASE_MEMBERS).drawn(
+        &icon::PHASES,
+        100.0,
+        40.0,
+    ),
+    Terminal::plug(
+        "sensor",
+        "A shaft sensor, read by the sensored estimator only: mechanical speed and electrical angle",
+        &[Member::signal("speed").of("speed_meas"), Member::signal("theta_e").of("theta_meas")],
+    )
+    .drawn(&icon::SENSOR, 100.0, -40.0),
+];
+
+/// Terminals of `PmsmDrive`.
+pub(crate) const DRIVE: &[Terminal] = &[SHAFT, DC_LINK];
+
+const PHASE_MEMBERS: &[Member] = &[
+    Member::signal("u_a"),
+    Member::signal("u_b"),
+    Member::signal("u_c"),
+    Member::signal("i_a"),
+    Member::signal("i_b"),
+    Member::signal("i_c"),
+];
+
+/// The shaft's end: the load sees speed and angle, and takes its torque out.
+const SHAFT: Terminal = Terminal::plug(
+    "shaft",
+    "The shaft's end: mechanical speed and angle to the load, the torque that it takes",
+    &[Member::signal("speed"), Member::signal("angle"), Member::outflow("tau_load")],
+)
+.drawn(&icon::SHAFT, 100.0, 0.0);
+
+const DC_LINK: Terminal =
+    Terminal::plug("dc_link", "DC link of the inverter", &[Member::signal("u_dc")]).drawn(&icon::DC_LINK, 0.0, 100.0);
+
+/// What terminals look like.
+mod icon {
+    use fmu_core::Icon;
+
+    pub(super) const PHASES: Icon =
+        Icon { name: "phases", svg: include_str!("../icons/phases.svg"), color: [217, 72, 15] };
+    pub(super) const SENSOR: Icon =
+        Icon { name: "sensor", svg: include_str!("../icons/sensor.svg"), color: [43, 138, 62] };
+    pub(super) const SHAFT: Icon = Icon { name: "shaft", svg: include_str!("../icons/shaft.svg"), color: [73, 80, 87] };
+    pub(super) const DC_LINK: Icon =
+        Icon { name: "dc_link", svg: include_str!("../icons/dc_link.svg"), color: [24, 100, 171] };
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{PmsmDrive, PmsmPlant, SensorlessController};
+    use fmu_core::{Causality, Description, Model};
+
+    fn described<M: Model>() -> Description {
+        Description::of::<M>().unwrap_or_else(|e| panic!("{}: {e}", M::INFO.name))
+    }
+
+    #[test]
+    fn every_model_has_the_variables_of_its_terminals() {
+        let [plant, controller, drive] =
+            [described::<PmsmPlant>(), described::<SensorlessController>(), described::<PmsmDrive>()];
+        let names = |d: &Description| d.terminals.iter().map(|t| t.name.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&plant), ["phases", "sensor", "shaft", "dc_link"]);
+        assert_eq!(names(&controller), ["phases", "sensor"]);
+        assert_eq!(names(&drive), ["shaft", "dc_link"]);
+        assert!([plant, controller, drive].iter().all(|d| d.icon.is_some()));
+    }
+
+    /// Of every pair of members one side sends and the other receives, in the same unit.
+    #[test]
+    fn plant_and_controller_are_mirrored() {
+        let (plant, controller) = (described::<PmsmPlant>(), described::<SensorlessController>());
+        for one in &controller.terminals {
+            let other = plant.terminals.iter().find(|t| t.name == one.name).unwrap();
+            assert_eq!(one.members.len(), other.members.len());
+            for (a, b) in one.members.iter().zip(&other.members) {
+                assert_eq!((&a.name, a.kind), (&b.name, b.kind));
+                let (a, b) = (controller.variable(&a.variable).unwrap(), plant.variable(&b.variable).unwrap());
+                let pair = (a.causality, b.causality);
+                let sent = [(Causality::Input, Causality::Output), (Causality::Output, Causality::Input)];
+                assert!(sent.contains(&pair), "{} and {}: {pair:?}", a.name, b.name);
+                assert_eq!(a.kind, b.kind, "{} and {}", a.name, b.name);
+            }
+        }
+    }
+
+    /// A drive can be put in the plant's place.
+    #[test]
+    fn plant_and_drive_have_the_same_power_terminals() {
+        let (plant, drive) = (described::<PmsmPlant>(), described::<PmsmDrive>());
+        assert!(drive.terminals.iter().all(|t| plant.terminals.contains(t)));
+    }
+}
