@@ -94,7 +94,9 @@ fn names(subject: &Subject) -> Verdict {
         };
         level(&file.terminals);
         let terminals = all(&file.terminals);
-        terminals.iter().for_each(|t| level(&t.terminals));
+        for t in &terminals {
+            level(&t.terminals);
+        }
         for t in terminals.iter().filter(|t| ["plug", "bus"].contains(&&*t.matching_rule)) {
             let mut seen: Vec<&str> = Vec::new();
             for m in &t.members {
