@@ -7,7 +7,7 @@
 use crate::control::model::ControllerOutputs;
 use crate::control::tables::{self, LOCK_LOST};
 use crate::pair::Pair;
-use crate::plant::model as plant;
+use crate::plant::{model::PlantOutputs, tables as plant};
 use fmu_core::unit::{AMPERE, NEWTON_METRE, ONE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
@@ -27,11 +27,15 @@ pub struct DriveInputs {
     pub tau_load: f64,
     /// DC-link voltage in V, >= 0, of the inverter and as the controller measures it.
     pub u_dc: f64,
+    /// Imposed mechanical speed of the shaft in rad/s.
+    pub speed_shaft: f64,
+    /// Imposed mechanical angle of the shaft in rad, at the beginning of the communication step.
+    pub angle_shaft: f64,
 }
 
 impl Default for DriveInputs {
     fn default() -> Self {
-        Self { speed_ref: 0.0, tau_load: 0.0, u_dc: 325.0 }
+        Self { speed_ref: 0.0, tau_load: 0.0, u_dc: 325.0, speed_shaft: 0.0, angle_shaft: 0.0 }
     }
 }
 
@@ -39,7 +43,7 @@ impl Default for DriveInputs {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DriveOutputs {
     /// The plant's.
-    pub plant: plant::PlantOutputs,
+    pub plant: PlantOutputs,
     /// The controller's.
     pub controller: ControllerOutputs,
 }
@@ -51,6 +55,15 @@ pub struct PmsmDrive {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,
+}
+
+impl PmsmDrive {
+    fn set_inputs(&mut self) {
+        let Self { inputs, pair } = self;
+        pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
+        let plant = &mut pair.plant.model.inputs;
+        (plant.speed_shaft, plant.angle_shaft) = (inputs.speed_shaft, inputs.angle_shaft);
+    }
 }
 
 impl Model for PmsmDrive {
@@ -70,6 +83,8 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
+    const STATE_VERSION: u16 = 2;
+
     fn derive(&mut self) {
         self.pair.plant.model.derive();
         self.pair.controller.model.derive();
@@ -82,9 +97,8 @@ impl Model for PmsmDrive {
     }
 
     fn initialise(&mut self) {
-        let Self { inputs, pair } = self;
-        pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
-        pair.initialise();
+        self.set_inputs();
+        self.pair.initialise();
     }
 
     fn output(&self, _now: Elapsed, out: &mut DriveOutputs) {
@@ -93,8 +107,8 @@ impl Model for PmsmDrive {
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        self.set_inputs();
         let Self { inputs, pair } = self;
-        pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
         let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
         let end = step.end();
         if step.h > MOST_SAMPLES * grid.period {
@@ -105,6 +119,8 @@ impl Model for PmsmDrive {
         while end.since(pair.now) > grid.width() {
             let (left, next) = (end.since(pair.now), to_next_sample(grid, pair.now));
             let before = pair.now;
+            // An imposed shaft turns on with the held speed, over all samples of the step.
+            pair.plant.model.inputs.angle_shaft = inputs.angle_shaft + inputs.speed_shaft * before.since(step.start);
             pair.step(if next <= left + grid.width() { next } else { left })?;
             if pair.now == before {
                 return Err(Fault::new(format!(
@@ -135,6 +151,16 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
             }),
             V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)
                 .at_least(0.0),
+            V::input("speed_shaft", &SPEED, "Speed of the shaft; read with plant.mechanics.imposed only", |m| {
+                &mut m.model.inputs.speed_shaft
+            }),
+            V::input(
+                "angle_shaft",
+                &RADIAN,
+                "Angle of the shaft, mechanical; read with plant.mechanics.imposed only",
+                |m| &mut m.model.inputs.angle_shaft,
+            )
+            .unbounded(),
             V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),
             V::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |m| &mut m.out.controller }),
             V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
@@ -227,5 +253,38 @@ mod tests {
             assert!((out.speed - reference.speed).abs() < 1e-4, "h = {h}: {} {}", out.speed, reference.speed);
             assert!((out.i_q - reference.i_q).abs() < 1e-4, "h = {h}: {} {}", out.i_q, reference.i_q);
         }
+    }
+
+    #[test]
+    fn an_imposed_shaft_turns_on_within_a_step() {
+        // 0.3 s of a drive train that speeds up in steps of 1 ms, seen by the drive in one step and by the pair in ten.
+        let mut pair = Pair::default();
+        pair.plant.model.parameters.mechanics.imposed = true;
+        // A sensor: a sensorless drive against a shaft that does not yield can lose it, and then enlarges any rounding.
+        pair.controller.model.parameters.estimator = 13;
+        let mut drive = Block::<PmsmDrive>::default();
+        drive.model.pair = pair.clone();
+        drive.initialise();
+        pair.start().unwrap();
+        let (mut now, mut angle) = (Elapsed::ZERO, 0.0);
+        for k in 0..300_u32 {
+            let speed = 0.2 * f64::from(k);
+            let inputs = &mut drive.model.inputs;
+            (inputs.speed_ref, inputs.speed_shaft, inputs.angle_shaft) = (speed + 1.0, speed, angle);
+            let step = Step { start: now, h: 1e-3 };
+            drive.step(&step).unwrap();
+            now = step.end();
+            for sample in 0..10_u32 {
+                pair.set_inputs(speed + 1.0, 0.0, 325.0);
+                let inputs = &mut pair.plant.model.inputs;
+                (inputs.speed_shaft, inputs.angle_shaft) = (speed, angle + speed * 1e-4 * f64::from(sample));
+                pair.step(1e-4).unwrap();
+            }
+            angle += 1e-3 * speed;
+            let (ours, theirs) = (&drive.out.plant, &pair.plant.out);
+            assert!((ours.angle - angle).abs() < 1e-9 && (ours.theta_e - theirs.theta_e).abs() < 1e-9);
+            assert!((ours.powers.tau_shaft - theirs.powers.tau_shaft).abs() < 1e-6, "{ours:?} {theirs:?}");
+        }
+        assert!(drive.out.plant.powers.tau_shaft.abs() > 1.0, "{:?}", drive.out.plant.powers);
     }
 }

@@ -1,6 +1,9 @@
 //! The rotor and what is coupled to it: one inertia with viscous and Coulomb friction.
 //!
 //! J d speed/dt = tau_e - tau_load - B speed - tau_coulomb tanh(speed / w_coulomb).
+//!
+//! With an imposed speed the drive train outside integrates: speed and angle come in, tau_e minus friction goes out, and J
+//! belongs to the drive train.
 
 use crate::math::tanh;
 use fmu_core::unit::{KG_M2, NEWTON_METRE, NM_S_PER_RAD, SPEED};
@@ -18,11 +21,13 @@ pub struct Mechanics {
     pub tau_coulomb: f64,
     /// Speed in rad/s over which the Coulomb torque changes sign, > 0.
     pub w_coulomb: f64,
+    /// Speed and angle come from a drive train outside.
+    pub imposed: bool,
 }
 
 impl Default for Mechanics {
     fn default() -> Self {
-        Self { J: 1.5e-3, B: 2e-4, tau_coulomb: 0.03, w_coulomb: 0.3 }
+        Self { J: 1.5e-3, B: 2e-4, tau_coulomb: 0.03, w_coulomb: 0.3, imposed: false }
     }
 }
 
@@ -51,6 +56,12 @@ pub const MECHANICS: &Table<Mechanics> = &Table::new(
             P::parameter("tau_coulomb", &NEWTON_METRE, "Coulomb friction torque", |m| &mut m.tau_coulomb).at_least(0.0),
             P::parameter("w_coulomb", &SPEED, "Speed over which the Coulomb torque changes sign", |m| &mut m.w_coulomb)
                 .above(0.0),
+            P::boolean_parameter(
+                "imposed",
+                "Speed and angle come in as speed_shaft and angle_shaft, tau_shaft goes out, and the inertia belongs to \
+                 the drive train; false: the shaft turns freely under tau_load",
+                |m| &mut m.imposed,
+            ),
         ]
     },
 );

@@ -4,4 +4,6 @@ pub mod inverter;
 pub mod machine;
 pub mod mechanics;
 pub mod model;
+pub mod power;
 pub mod saturation;
+pub mod tables;

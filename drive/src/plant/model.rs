@@ -3,12 +3,11 @@
 use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
 use crate::integrate::rk4;
 use crate::math::wrap;
-use crate::motor::{MOTOR, Motor};
-use crate::plant::inverter::{INVERTER, Inverter, dead_time_loss, limit_to_hexagon};
+use crate::plant::inverter::{dead_time_loss, limit_to_hexagon};
 use crate::plant::machine;
-use crate::plant::mechanics::{MECHANICS, Mechanics};
-use crate::plant::saturation::{SATURATION, Saturation};
-use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
+use crate::plant::power::Powers;
+use crate::plant::tables::{OUTPUTS, PARAMETERS, PlantParameters};
+use fmu_core::unit::{NEWTON_METRE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, Table, Terminal};
 use nalgebra::Vector4;
 use serde::{Deserialize, Serialize};
@@ -26,38 +25,18 @@ pub struct PlantInputs {
     pub u: Phases,
     /// DC-link voltage in V, >= 0.
     pub u_dc: f64,
-    /// Load torque in N.m, positive against positive speed.
+    /// Load torque in N.m, positive against positive speed; not read with an imposed speed.
     pub tau_load: f64,
+    /// Imposed mechanical speed of the shaft in rad/s.
+    pub speed_shaft: f64,
+    /// Imposed mechanical angle of the shaft in rad, at the beginning of the step.
+    pub angle_shaft: f64,
 }
 
 impl Default for PlantInputs {
     fn default() -> Self {
-        Self { u: Phases::default(), u_dc: 325.0, tau_load: 0.0 }
+        Self { u: Phases::default(), u_dc: 325.0, tau_load: 0.0, speed_shaft: 0.0, angle_shaft: 0.0 }
     }
-}
-
-/// Parameters.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PlantParameters {
-    /// The machine.
-    pub motor: Motor,
-    /// Its saturation.
-    pub saturation: Saturation,
-    /// The inverter.
-    pub inverter: Inverter,
-    /// Inertia and friction.
-    pub mechanics: Mechanics,
-    /// State at the start.
-    pub initial: Initial,
-}
-
-/// Where the rotor is and how fast it turns at the start.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Initial {
-    /// Electrical rotor angle in rad.
-    pub theta_e: f64,
-    /// Mechanical speed in rad/s.
-    pub speed: f64,
 }
 
 /// What the integration advances.
@@ -102,6 +81,8 @@ pub struct PlantOutputs {
     pub i_d: f64,
     /// Current across the magnet in A.
     pub i_q: f64,
+    /// What flows between DC link, machine and shaft.
+    pub powers: Powers,
 }
 
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
@@ -121,6 +102,20 @@ impl PmsmPlant {
         inverter.i_zero * motor.L_d.min(motor.L_q) / inverter.u_dead(self.inputs.u_dc)
     }
 
+    /// The state at the beginning of a step: an imposed shaft is where the drive train says. What differs from the angle
+    /// that the last step ended with turns the rotor under the flux linkage of the stator, which no jump changes.
+    #[inline]
+    fn at_the_shaft(&self) -> State {
+        let PlantParameters { motor, mechanics, .. } = &self.parameters;
+        let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
+        if !mechanics.imposed {
+            return self.state;
+        }
+        let axis = |angle: f64| Axis::<Rotor>::at(f64::from(motor.n_p) * angle);
+        let psi = axis(angle_shaft).from_stator(axis(self.state.angle).to_stator(self.state.psi));
+        State { psi, speed: speed_shaft, angle: angle_shaft }
+    }
+
     /// Derivative of the state with the stator voltage `u` held.
     #[inline]
     fn derivative(&self, x: &Vector4<f64>, u: AlphaBeta) -> Vector4<f64> {
@@ -137,7 +132,11 @@ impl PmsmPlant {
         };
         let u = axis.from_stator(u);
         let d_psi = machine::flux_derivative(motor, psi, u, i, n_p * speed);
-        let acceleration = mechanics.acceleration(machine::torque(motor, psi, i), self.inputs.tau_load, speed);
+        let acceleration = if mechanics.imposed {
+            0.0
+        } else {
+            mechanics.acceleration(machine::torque(motor, psi, i), self.inputs.tau_load, speed)
+        };
         Vector4::new(d_psi.d(), d_psi.q(), acceleration, speed)
     }
 }
@@ -159,15 +158,17 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 2;
+    const STATE_VERSION: u16 = 3;
 
     fn initialise(&mut self) {
-        let PlantParameters { motor, initial, .. } = &self.parameters;
-        self.state = State {
-            psi: machine::flux(motor, Dq::ZERO),
-            speed: initial.speed,
-            angle: initial.theta_e / f64::from(motor.n_p),
+        let PlantParameters { motor, mechanics, initial, .. } = &self.parameters;
+        let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
+        let (speed, angle) = if mechanics.imposed {
+            (speed_shaft, angle_shaft)
+        } else {
+            (initial.speed, initial.theta_e / f64::from(motor.n_p))
         };
+        self.state = State { psi: machine::flux(motor, Dq::ZERO), speed, angle };
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
@@ -175,14 +176,17 @@ impl Model for PmsmPlant {
         let State { psi, speed, angle } = self.state;
         let i = machine::current(motor, saturation, psi);
         let theta_e = f64::from(motor.n_p) * angle;
+        let phases = Phases::from_stator(Axis::<Rotor>::at(theta_e).to_stator(i));
+        let tau_e = machine::torque(motor, psi, i);
         *out = PlantOutputs {
-            i: Phases::from_stator(Axis::<Rotor>::at(theta_e).to_stator(i)),
+            i: phases,
             speed,
             angle,
             theta_e: wrap(theta_e),
-            tau_e: machine::torque(motor, psi, i),
+            tau_e,
             i_d: i.d(),
             i_q: i.q(),
+            powers: Powers::new(&self.parameters, &self.inputs, phases, tau_e, speed),
         };
     }
 
@@ -195,7 +199,7 @@ impl Model for PmsmPlant {
             return Err(Fault::value("the step size", format!("{} s", step.h), format!("at most {longest} s")));
         }
         let h = step.h / count;
-        let mut x = self.state.to_vector();
+        let mut x = self.at_the_shaft().to_vector();
         let mut left = count;
         while left > 0.0 {
             x = rk4(x, h, |x| self.derivative(x, u));
@@ -231,48 +235,15 @@ const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             V::input("tau_load", &NEWTON_METRE, "Load torque at the shaft, positive against positive speed", |m| {
                 &mut m.model.inputs.tau_load
             }),
+            V::input("speed_shaft", &SPEED, "Speed of the shaft; read with mechanics.imposed only", |m| {
+                &mut m.model.inputs.speed_shaft
+            }),
+            V::input("angle_shaft", &RADIAN, "Angle of the shaft, mechanical; read with mechanics.imposed only", |m| {
+                &mut m.model.inputs.angle_shaft
+            })
+            .unbounded(),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-        ]
-    },
-);
-
-type O = Row<PlantOutputs>;
-
-/// The plant's outputs.
-pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
-    const {
-        &[
-            O::output("i_a", &AMPERE, "Stator current of phase a, positive into the machine", |o| &mut o.i.a),
-            O::output("i_b", &AMPERE, "Stator current of phase b", |o| &mut o.i.b),
-            O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
-            O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed),
-            O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle).unbounded(),
-            O::output(
-                "theta_e",
-                &RADIAN,
-                "Electrical rotor angle from phase a to the magnet axis, in (-pi, pi]",
-                |o| &mut o.theta_e,
-            ),
-            O::output("tau_e", &NEWTON_METRE, "Electromagnetic torque", |o| &mut o.tau_e),
-            O::output("i_d", &AMPERE, "Stator current along the true magnet axis", |o| &mut o.i_d),
-            O::output("i_q", &AMPERE, "Stator current across the true magnet axis", |o| &mut o.i_q),
-        ]
-    },
-);
-
-type P = Row<PlantParameters>;
-
-/// The plant's parameters.
-pub const PARAMETERS: &Table<PlantParameters> = &Table::new(
-    const {
-        &[
-            P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
-            P::part("saturation.", &Part { table: SATURATION, lens: |p| &mut p.saturation }),
-            P::part("inverter.", &Part { table: INVERTER, lens: |p| &mut p.inverter }),
-            P::part("mechanics.", &Part { table: MECHANICS, lens: |p| &mut p.mechanics }),
-            P::parameter("initial.theta_e", &RADIAN, "Electrical rotor angle at the start", |p| &mut p.initial.theta_e),
-            P::parameter("initial.speed", &SPEED, "Mechanical rotor speed at the start", |p| &mut p.initial.speed),
         ]
     },
 );

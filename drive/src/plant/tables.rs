@@ -1,0 +1,76 @@
+//! The plant's parameters, and the tables of its parameters and outputs.
+
+use crate::motor::{MOTOR, Motor};
+use crate::plant::inverter::{INVERTER, Inverter};
+use crate::plant::mechanics::{MECHANICS, Mechanics};
+use crate::plant::model::PlantOutputs;
+use crate::plant::power::POWERS;
+use crate::plant::saturation::{SATURATION, Saturation};
+use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED};
+use fmu_core::{Part, Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Parameters.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlantParameters {
+    /// The machine.
+    pub motor: Motor,
+    /// Its saturation.
+    pub saturation: Saturation,
+    /// The inverter.
+    pub inverter: Inverter,
+    /// Inertia and friction.
+    pub mechanics: Mechanics,
+    /// State at the start.
+    pub initial: Initial,
+}
+
+/// Where the rotor is and how fast it turns at the start.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Initial {
+    /// Electrical rotor angle in rad.
+    pub theta_e: f64,
+    /// Mechanical speed in rad/s.
+    pub speed: f64,
+}
+
+type O = Row<PlantOutputs>;
+
+/// The plant's outputs.
+pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
+    const {
+        &[
+            O::output("i_a", &AMPERE, "Stator current of phase a, positive into the machine", |o| &mut o.i.a),
+            O::output("i_b", &AMPERE, "Stator current of phase b", |o| &mut o.i.b),
+            O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
+            O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed),
+            O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle).unbounded(),
+            O::output(
+                "theta_e",
+                &RADIAN,
+                "Electrical rotor angle from phase a to the magnet axis, in (-pi, pi]",
+                |o| &mut o.theta_e,
+            ),
+            O::output("tau_e", &NEWTON_METRE, "Electromagnetic torque", |o| &mut o.tau_e),
+            O::output("i_d", &AMPERE, "Stator current along the true magnet axis", |o| &mut o.i_d),
+            O::output("i_q", &AMPERE, "Stator current across the true magnet axis", |o| &mut o.i_q),
+            O::part("", &Part { table: POWERS, lens: |o| &mut o.powers }),
+        ]
+    },
+);
+
+type P = Row<PlantParameters>;
+
+/// The plant's parameters.
+pub const PARAMETERS: &Table<PlantParameters> = &Table::new(
+    const {
+        &[
+            P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
+            P::part("saturation.", &Part { table: SATURATION, lens: |p| &mut p.saturation }),
+            P::part("inverter.", &Part { table: INVERTER, lens: |p| &mut p.inverter }),
+            P::part("mechanics.", &Part { table: MECHANICS, lens: |p| &mut p.mechanics }),
+            P::parameter("initial.theta_e", &RADIAN, "Electrical rotor angle at the start", |p| &mut p.initial.theta_e),
+            P::parameter("initial.speed", &SPEED, "Mechanical rotor speed at the start", |p| &mut p.initial.speed),
+        ]
+    },
+);
