@@ -16,15 +16,16 @@ const STYLE: &str = include_str!("documentation.css");
 /// The whole page.
 pub fn page(d: &Description, version: FmiVersion) -> String {
     let name = escape(&d.name);
-    let mut out = format!(
+    let head = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
          <header>\n<h1>{name}</h1>\n<p class=\"summary\">{}</p>\n<p>Version {} · FMI {version} for co-simulation · {}</p>\n\
-         </header>\n<main>\n",
+         </header>\n",
         escape(&d.description),
         escape(&d.version),
         escape(&d.author),
     );
+    let mut out = String::new();
     if !d.documentation.is_empty() {
         put!(out, "<section>\n{}\n</section>\n", d.documentation.trim());
     }
@@ -41,11 +42,32 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
     put!(
         out,
         "<h2>Licence</h2>\n<p>{} <br>{}. The full texts, and those of the libraries in the binary, are in \
-         <a href=\"licenses/license.txt\">licenses/license.txt</a>.</p>\n</main>\n</body>\n</html>\n",
+         <a href=\"licenses/license.txt\">licenses/license.txt</a>.</p>\n",
         escape(&d.copyright),
         escape(&d.license),
     );
-    out
+    let (contents, body) = with_contents(&out);
+    format!("{head}{contents}<main>\n{body}</main>\n</body>\n</html>\n")
+}
+
+/// A list of the headings that lead to their places, and the body with these places.
+fn with_contents(body: &str) -> (String, String) {
+    let mut parts = body.split("<h2>");
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    let mut list = String::from("<nav>\n<ul>\n");
+    for part in parts {
+        let title = part.split("</h2>").next().unwrap_or_default();
+        let place = place(title);
+        put!(list, "<li><a href=\"#{place}\">{title}</a></li>\n");
+        put!(out, "<h2 id=\"{place}\">{part}");
+    }
+    (list + "</ul>\n</nav>\n", out)
+}
+
+/// The name of a heading's place: its letters and digits, joined; the enumerations' places are their names, in capitals.
+fn place(title: &str) -> String {
+    let words = title.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+    words.map(str::to_lowercase).collect::<Vec<_>>().join("-")
 }
 
 /// The recommended experiment, and what happens at other steps.
@@ -84,7 +106,7 @@ fn parameters(d: &Description) -> String {
     for p in prefixes {
         let variables: Vec<_> = all.iter().copied().filter(|v| prefix(&v.name) == p).collect();
         if !p.is_empty() {
-            put!(out, "<h3>{}</h3>\n", escape(p));
+            put!(out, "<h3 id=\"parameters-{}\">{}</h3>\n", place(p), escape(p));
         }
         out += &table(&variables);
     }
@@ -253,6 +275,16 @@ mod tests {
     #[test]
     fn markup_in_a_description_stays_text() {
         assert_eq!(escape("a < b & \"c\""), "a &lt; b &amp; &quot;c&quot;");
+    }
+
+    #[test]
+    fn headings_become_contents() {
+        let (contents, body) = with_contents("<p>a</p><h2>One &amp; two</h2><p>b</p><h2 id=\"X\">X</h2><h2>Three</h2>");
+        assert_eq!(
+            body,
+            "<p>a</p><h2 id=\"one-amp-two\">One &amp; two</h2><p>b</p><h2 id=\"X\">X</h2><h2 id=\"three\">Three</h2>"
+        );
+        assert!(contents.contains("<li><a href=\"#one-amp-two\">One &amp; two</a></li>\n<li><a href=\"#three\">"));
     }
 
     #[test]

@@ -15,6 +15,7 @@
 
 pub mod bench;
 pub mod control;
+pub mod documentation;
 pub mod estimator;
 pub mod frame;
 pub mod integrate;

@@ -73,7 +73,7 @@ impl Model for PmsmDrive {
         name: "PmsmDrive",
         description: "Sensorless drive: permanent-magnet synchronous machine, inverter and controller in one",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-3 },
-        documentation: include_str!("../docs/pmsm_drive.html"),
+        documentation: crate::documentation::DRIVE,
         ..crate::PROJECT
     };
 

@@ -2,7 +2,7 @@
 
 pub mod figures;
 pub mod packed;
-mod plots;
+pub mod plots;
 mod report;
 pub mod scenario;
 

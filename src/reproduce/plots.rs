@@ -30,6 +30,8 @@ const GREY: RGBColor = RGBColor(150, 150, 150);
 
 /// Most points of a curve; the eye sees no more at the size of a panel.
 const POINTS: usize = 600;
+/// Greatest distance of a point that is left out from the curve drawn, in units of the panel's width and height.
+const UNSEEN: f64 = 5e-4;
 
 impl Panel<'_> {
     fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<()> {
@@ -42,10 +44,10 @@ impl Panel<'_> {
         let high = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let margin = (0.08 * (high - low)).max(1e-3);
         let mut chart = ChartBuilder::on(area)
-            .caption(self.title, ("sans-serif", 15))
+            .caption(self.title, ("sans-serif", 18))
             .margin(8)
-            .x_label_area_size(34)
-            .y_label_area_size(58)
+            .x_label_area_size(38)
+            .y_label_area_size(64)
             .build_cartesian_2d(self.window.0..self.window.1, low - margin..high + margin)
             .map_err(drawing)?;
         chart
@@ -56,13 +58,14 @@ impl Panel<'_> {
             .y_label_formatter(&tick)
             .light_line_style(TRANSPARENT)
             .bold_line_style(RGBColor(225, 225, 225))
-            .label_style(("sans-serif", 12))
+            .label_style(("sans-serif", 15))
             .draw()
             .map_err(drawing)?;
         let stride = (to - from).div_ceil(POINTS).max(1);
         for Curve { name, color, values } in &self.curves {
             let style = color.stroke_width(if *color == GREY { 1 } else { 2 });
-            let points = (from..to).step_by(stride).map(|k| (t[k], values[k]));
+            let points: Vec<_> = (from..to).step_by(stride).map(|k| (t[k], values[k])).collect();
+            let points = seen(&points, (self.window.1 - self.window.0, high - low + 2.0 * margin));
             let series = chart.draw_series(LineSeries::new(points, style)).map_err(drawing)?;
             series.label(*name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
         }
@@ -72,11 +75,33 @@ impl Panel<'_> {
                 .position(self.legend.clone())
                 .background_style(WHITE.mix(0.8))
                 .border_style(GREY)
-                .label_font(("sans-serif", 12))
+                .label_font(("sans-serif", 15))
                 .draw()
                 .map_err(drawing)?;
         }
         Ok(())
+    }
+}
+
+/// The points of a curve without which it would look different (Douglas and Peucker 1973); `size` is that of the panel.
+fn seen(points: &[(f64, f64)], size: (f64, f64)) -> Vec<(f64, f64)> {
+    let [first, between @ .., last] = points else { return points.to_vec() };
+    let place = |p: &(f64, f64)| ((p.0 - first.0) / size.0, (p.1 - first.1) / size.1);
+    let (x, y) = place(last);
+    let length = x.hypot(y).max(f64::MIN_POSITIVE);
+    let distance = |p: &(f64, f64)| {
+        let (a, b) = place(p);
+        (a * y - b * x).abs() / length
+    };
+    let farthest = (0..between.len()).max_by(|a, b| distance(&between[*a]).total_cmp(&distance(&between[*b])));
+    match farthest {
+        Some(k) if distance(&between[k]) > UNSEEN => {
+            let (mut left, right) = (seen(&points[..=k + 1], size), seen(&points[k + 1..], size));
+            left.pop();
+            left.extend(right);
+            left
+        }
+        _ => vec![*first, *last],
     }
 }
 
@@ -133,7 +158,7 @@ fn error<'a>(title: &'static str, trace: &'a Trace, window: (f64, f64)) -> Panel
 ///
 /// # Errors
 /// When drawing fails.
-pub(super) fn figure_4(start: &Trace, steps: [&Trace; 4]) -> Result<String> {
+pub fn figure_4(start: &Trace, steps: [&Trace; 4]) -> Result<String> {
     let angles = vec![
         Curve { name: "true", color: RED_INK, values: &start.theta_e },
         Curve { name: "estimated", color: BLUE_INK, values: &start.theta_est },
@@ -166,7 +191,7 @@ pub(super) fn second_start(start: &Trace) -> Result<String> {
 ///
 /// # Errors
 /// When drawing fails.
-pub(super) fn figure_5(at_0: &Trace, at_1000: &Trace) -> Result<String> {
+pub fn figure_5(at_0: &Trace, at_1000: &Trace) -> Result<String> {
     let (left, right) = ((0.3, 2.5), (0.8, 2.0));
     page(&[
         speed("(a) 2 N.m at 0 rpm: speed", at_0, left),
@@ -176,4 +201,18 @@ pub(super) fn figure_5(at_0: &Trace, at_1000: &Trace) -> Result<String> {
         error("(e) angle error", at_0, left),
         error("(f) angle error", at_1000, right),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_curve_keeps_its_corners() {
+        let curve: Vec<_> = (0..=100).map(|k| (f64::from(k), f64::from((k - 40).max(0)))).collect();
+        assert_eq!(seen(&curve, (100.0, 60.0)), [(0.0, 0.0), (40.0, 0.0), (100.0, 60.0)]);
+        let peak: Vec<_> = (0..=100).map(|k| (f64::from(k), if k == 7 { 1.0 } else { 0.0 })).collect();
+        assert!(seen(&peak, (100.0, 1.0)).contains(&(7.0, 1.0)));
+        assert_eq!(seen(&curve[..1], (1.0, 1.0)), curve[..1]);
+    }
 }

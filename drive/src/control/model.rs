@@ -363,7 +363,7 @@ impl Model for SensorlessController {
         name: "SensorlessController",
         description: "Sensorless speed control of a permanent-magnet synchronous machine, zero speed included",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
-        documentation: include_str!("../../docs/sensorless_controller.html"),
+        documentation: crate::documentation::CONTROLLER,
         ..crate::PROJECT
     };
 

@@ -148,7 +148,7 @@ impl Model for PmsmPlant {
         name: "PmsmPlant",
         description: "Permanent-magnet synchronous machine with average inverter and mechanics",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
-        documentation: include_str!("../../docs/pmsm_plant.html"),
+        documentation: crate::documentation::PLANT,
         ..crate::PROJECT
     };
 

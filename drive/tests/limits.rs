@@ -1,0 +1,212 @@
+//! The numbers of `drive/docs/limits.html`, the limits that every documentation page tells: each row is that of a run.
+#![allow(missing_docs, non_snake_case)]
+
+use drive::Pair;
+use drive::math::wrap;
+use std::f64::consts::PI;
+
+const PAGE: &str = include_str!("../docs/limits.html");
+const RPM: f64 = PI / 30.0;
+const T_S: f64 = 1e-4;
+/// Resistance of the reference motor in Ohm.
+const R: f64 = 2.0;
+
+/// The page must have this row.
+fn holds(cells: &[String]) {
+    let row = format!("<tr><td>{}</td></tr>", cells.join("</td><td>"));
+    assert!(PAGE.contains(&row), "drive/docs/limits.html has another row than\n{row}");
+}
+
+/// A number as the page has it.
+fn number(x: f64, decimals: usize) -> String {
+    let half = 0.5 * 0.1_f64.powi(i32::try_from(decimals).unwrap());
+    let text = format!("{:.decimals$}", if x.abs() < half { 0.0 } else { x });
+    text.replace('-', "−")
+}
+
+fn degrees(x: f64) -> String {
+    number(x, 1) + "°"
+}
+
+fn with(R_hat: f64) -> Pair {
+    let mut pair = Pair::default();
+    pair.controller.model.parameters.motor.R_s = R_hat;
+    pair
+}
+
+/// Angle error θ^ - θ in deg.
+fn error(pair: &Pair) -> f64 {
+    wrap(pair.controller.out.theta_est - pair.plant.out.theta_e).to_degrees()
+}
+
+/// Runs a pair in steps of `h` (s); `each` sees it before every step with the time.
+fn run(pair: &mut Pair, h: f64, duration: f64, mut each: impl FnMut(f64, &mut Pair)) {
+    pair.start().unwrap();
+    let mut k = 0_u32;
+    while f64::from(k) * h < duration - 0.5 * h {
+        each(f64::from(k) * h, pair);
+        pair.step(h).unwrap();
+        k += 1;
+    }
+}
+
+/// The value of an input that comes at `from` (s).
+fn from(from: f64, t: f64, value: f64) -> f64 {
+    if t >= from - 1e-9 { value } else { 0.0 }
+}
+
+/// Lowest and highest speed in rpm, greatest angle error in deg.
+#[derive(Debug)]
+struct Seen(f64, f64, f64);
+
+impl Seen {
+    fn none() -> Self {
+        Self(f64::INFINITY, f64::NEG_INFINITY, 0.0)
+    }
+
+    fn see(&mut self, pair: &Pair) {
+        let speed = pair.plant.out.speed / RPM;
+        *self = Self(self.0.min(speed), self.1.max(speed), self.2.max(error(pair).abs()));
+    }
+
+    /// Whether the speed stays and the rotor is where the estimate is.
+    fn held(&self) -> bool {
+        self.1 - self.0 < 5.0 && self.2 < 60.0
+    }
+}
+
+#[test]
+fn resistance_at_standstill() {
+    for factor in [0.8, 0.9, 0.95, 1.0, 1.01, 1.02, 1.1, 1.2] {
+        let mut pair = with(factor * R);
+        run(&mut pair, T_S, 10.5, |t, p| p.plant.model.inputs.tau_load = from(0.5, t, 2.0));
+        let (speed, i) = (pair.plant.out.speed / RPM, pair.controller.out.i);
+        let verdict = if speed.abs() < 0.5 { "held" } else { "runs away" };
+        holds(&[
+            format!("{factor}"),
+            number(speed, 1) + " rpm",
+            number(i.d, 2) + " A",
+            number(i.q, 2) + " A",
+            degrees(error(&pair)),
+            verdict.into(),
+        ]);
+        let mut light = with(factor * R);
+        run(&mut light, T_S, 2.0, |t, p| p.controller.model.inputs.speed_ref = from(1.0, t, 500.0 * RPM));
+        assert!(
+            (light.plant.out.speed / RPM - 500.0).abs() < 0.5,
+            "without a load each of these drives starts and turns"
+        );
+    }
+}
+
+#[test]
+fn false_lock() {
+    let end = |R_hat: f64| {
+        let mut pair = with(R_hat);
+        pair.plant.model.parameters.initial.theta_e = PI / 3.0;
+        run(&mut pair, T_S, 2.0, |_, p| p.controller.model.inputs.speed_ref = 500.0 * RPM);
+        (pair.plant.out.speed / RPM, error(&pair))
+    };
+    let (speed, angle) = end(R);
+    assert!(
+        speed.abs() < 1.0 && PAGE.contains(&format!("ends at 0 rpm with {}", degrees(angle))),
+        "{speed} rpm, {angle} deg"
+    );
+    assert!((end(0.9 * R).0 - 500.0).abs() < 1.0);
+}
+
+#[test]
+fn torque_at_zero_speed() {
+    for i_0 in [3.0, 4.0, 5.0, 6.0, 7.0] {
+        let mut pair = with(0.9 * R);
+        let par = &mut pair.controller.model.parameters;
+        (par.zero_speed.i_0, par.limit.i) = (i_0, 9.0);
+        let (mut load, mut lost) = (0.0, false);
+        run(&mut pair, T_S, 11.0, |t, p| {
+            p.plant.model.inputs.tau_load = (0.5 * (t - 0.5)).max(0.0);
+            lost |= p.plant.out.speed < -30.0 * RPM;
+            if !lost {
+                load = p.plant.model.inputs.tau_load;
+            }
+        });
+        assert!(lost);
+        holds(&[format!("{i_0} A"), number(load, 2) + " N.m"]);
+    }
+}
+
+#[test]
+fn generating_load_at_low_speed() {
+    for (factor, load) in [(0.8, 1.0), (0.9, 0.5), (0.9, 1.0), (0.9, 2.0), (0.99, 1.0), (1.0, 2.0)] {
+        let mut cells = vec![format!("{factor}"), format!("{load} N.m")];
+        for speed in [5.0, 10.0, 20.0, 30.0, 50.0, 75.0, 100.0, 200.0] {
+            let (mut pair, mut seen) = (with(factor * R), Seen::none());
+            run(&mut pair, T_S, 6.0, |t, p| {
+                p.controller.model.inputs.speed_ref = from(0.1, t, speed * RPM);
+                p.plant.model.inputs.tau_load = from(1.0, t, -load);
+                if t > 4.0 {
+                    seen.see(p);
+                }
+            });
+            cells.push(if seen.held() { degrees(error(&pair)) } else { "not held".into() });
+        }
+        holds(&cells);
+    }
+}
+
+#[test]
+fn communication_step() {
+    for samples in [0.7, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0] {
+        let mut cells = vec![format!("{samples} T<sub>s</sub>")];
+        for speed in [500.0, 1000.0, 1500.0] {
+            let (mut pair, mut seen) = (Pair::default(), Seen::none());
+            run(&mut pair, samples * T_S, 1.4, |t, p| {
+                p.controller.model.inputs.speed_ref = from(0.1, t, speed * RPM);
+                if t > 1.1 {
+                    seen.see(p);
+                }
+            });
+            let swings = format!("swings by {} rpm", number(seen.1 - seen.0, 0));
+            cells.push(match &seen {
+                Seen(.., angle) if *angle > 90.0 => "lost".into(),
+                _ if seen.held() => degrees(error(&pair)),
+                _ => swings,
+            });
+        }
+        holds(&cells);
+    }
+}
+
+#[test]
+fn dead_time() {
+    let drive = |dead: bool, compensated: f64| {
+        let mut pair = Pair::default();
+        if dead {
+            pair.plant.model.parameters.inverter.dead_time = 2e-6;
+            pair.controller.model.parameters.compensation.u_dead = 6.5 * compensated;
+        }
+        pair
+    };
+    for (name, dead, compensated) in [
+        ("no dead time", false, 0.0),
+        ("0 %", true, 0.0),
+        ("90 %", true, 0.9),
+        ("100 %", true, 1.0),
+        ("110 %", true, 1.1),
+    ] {
+        let mut cells = vec![name.to_owned()];
+        for speed in [20.0, 1000.0] {
+            let (mut pair, mut seen) = (drive(dead, compensated), Seen::none());
+            run(&mut pair, T_S, 3.0, |t, p| {
+                p.controller.model.inputs.speed_ref = from(0.1, t, speed * RPM);
+                if t > 1.0 {
+                    seen.see(p);
+                }
+            });
+            cells.push(format!("{} to {} rpm", number(seen.0, 0), number(seen.1, 0)));
+        }
+        let mut pair = drive(dead, compensated);
+        run(&mut pair, T_S, 6.5, |t, p| p.plant.model.inputs.tau_load = from(0.5, t, 2.0));
+        cells.push(format!("{} at {} rpm", degrees(error(&pair)), number(pair.plant.out.speed / RPM, 1)));
+        holds(&cells);
+    }
+}
