@@ -85,7 +85,8 @@ fn links_lead_somewhere() {
         let text = std::fs::read_to_string(page).unwrap();
         let mut rest = text.as_str();
         while let Some((before, after)) = rest.split_once("](") {
-            let (target, path) = (after.split(')').next().unwrap_or_default(), after.split([')', '#']).next().unwrap_or_default());
+            let (target, path) =
+                (after.split(')').next().unwrap_or_default(), after.split([')', '#']).next().unwrap_or_default());
             rest = after;
             if ["http://", "https://"].iter().any(|scheme| path.starts_with(scheme)) || path.is_empty() {
                 continue;
@@ -93,7 +94,8 @@ fn links_lead_somewhere() {
             let file = page.with_file_name(path);
             // A name as the text of a link to a source stands in that source.
             let name = before.rsplit('[').next().and_then(|t| t.strip_prefix('`')?.strip_suffix('`'));
-            let named = |name: &str| !path.ends_with(".rs") || std::fs::read_to_string(&file).is_ok_and(|s| s.contains(name));
+            let named =
+                |name: &str| !path.ends_with(".rs") || std::fs::read_to_string(&file).is_ok_and(|s| s.contains(name));
             if !file.exists() || !name.is_none_or(named) {
                 broken.push(format!("{}: {} {target}", page.display(), name.unwrap_or_default()));
             }
