@@ -73,7 +73,7 @@ fn pages_need_nothing_from_outside() {
 /// Every relative link of README, the pages at the root and `docs` leads to a file.
 #[test]
 fn links_lead_somewhere() {
-    let mut pages: Vec<PathBuf> = vec![root().to_owned(), root().join("docs")]
+    let mut pages: Vec<PathBuf> = [root().to_owned(), root().join("docs")]
         .iter()
         .flat_map(|folder| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()))
         .filter(|path| path.extension().is_some_and(|e| e == "md"))

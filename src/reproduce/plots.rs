@@ -88,7 +88,7 @@ fn seen(points: &[(f64, f64)], size: (f64, f64)) -> Vec<(f64, f64)> {
     let [first, between @ .., last] = points else { return points.to_vec() };
     let place = |p: &(f64, f64)| ((p.0 - first.0) / size.0, (p.1 - first.1) / size.1);
     let (x, y) = place(last);
-    let length = x.hypot(y).max(f64::MIN_POSITIVE);
+    let length = (x * x + y * y).sqrt().max(f64::MIN_POSITIVE);
     let distance = |p: &(f64, f64)| {
         let (a, b) = place(p);
         (a * y - b * x).abs() / length
