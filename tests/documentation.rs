@@ -94,8 +94,8 @@ fn links_lead_somewhere() {
             let file = page.with_file_name(path);
             // A name as the text of a link to a source stands in that source.
             let name = before.rsplit('[').next().and_then(|t| t.strip_prefix('`')?.strip_suffix('`'));
-            let named =
-                |name: &str| !path.ends_with(".rs") || std::fs::read_to_string(&file).is_ok_and(|s| s.contains(name));
+            let source = file.extension().is_some_and(|e| e == "rs");
+            let named = |name: &str| !source || std::fs::read_to_string(&file).is_ok_and(|s| s.contains(name));
             if !file.exists() || !name.is_none_or(named) {
                 broken.push(format!("{}: {} {target}", page.display(), name.unwrap_or_default()));
             }
