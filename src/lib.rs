@@ -1,7 +1,8 @@
 //! The command line tool `fmu`, as a library so that tests can use its parts.
 //!
 //! - [`commands`]: what the command line does, one module a command.
-//! - [`workspace`], [`pack`], [`documentation`], [`icons`], [`licences`]: from Rust sources to `.fmu` files.
+//! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licences`]: from Rust sources to `.fmu`
+//!   files.
 //! - [`importer`]: runs any co-simulation FMU; the only place with `unsafe` code.
 //! - [`check`]: whether an FMU keeps to its standard.
 //! - [`cosimulation`]: several FMUs connected; [`plot`]: what they did, as a picture.
@@ -10,8 +11,10 @@
 pub mod check;
 pub mod commands;
 pub mod compare;
+pub mod compile;
 pub mod cosimulation;
 pub mod documentation;
+pub mod elf;
 pub mod icons;
 pub mod importer;
 pub mod licences;
@@ -19,6 +22,7 @@ pub mod pack;
 pub mod platform;
 pub mod plot;
 pub mod reproduce;
+pub mod target;
 pub mod tune;
 pub mod workspace;
 

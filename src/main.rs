@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use fmu::check::probe;
-use fmu::commands::{build, check, compare, reproduce, simulate, tune};
+use fmu::commands::{build, check, compare, merge, reproduce, simulate, tune};
 use std::process::ExitCode;
 
 /// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.
@@ -18,6 +18,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Build(build::Build),
+    Merge(merge::Merge),
     Simulate(simulate::Simulate),
     Check(check::Check),
     Reproduce(reproduce::Reproduce),
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
             }
             ExitCode::SUCCESS
         }),
+        Command::Merge(args) => merge::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Simulate(args) => simulate::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(args) => check::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),

@@ -29,14 +29,26 @@ impl Platform {
 
     /// The platform that this program runs on; another Unix passes for Linux.
     pub fn host() -> Self {
-        match (consts::OS, consts::ARCH) {
-            ("windows", "aarch64") => Self::ArmWindows,
-            ("windows", _) => Self::X64Windows,
-            ("macos", "aarch64") => Self::ArmDarwin,
-            ("macos", _) => Self::X64Darwin,
-            (_, "aarch64") => Self::ArmLinux,
-            _ => Self::X64Linux,
+        let unix = || Self::of("linux", consts::ARCH);
+        Self::of(consts::OS, consts::ARCH).or_else(unix).unwrap_or(Self::X64Linux)
+    }
+
+    /// That of an operating system and a processor, as Rust calls them.
+    pub fn of(os: &str, processor: &str) -> Option<Self> {
+        match (os, processor) {
+            ("linux", "x86_64") => Some(Self::X64Linux),
+            ("linux", "aarch64") => Some(Self::ArmLinux),
+            ("windows", "x86_64") => Some(Self::X64Windows),
+            ("windows", "aarch64") => Some(Self::ArmWindows),
+            ("macos", "x86_64") => Some(Self::X64Darwin),
+            ("macos", "aarch64") => Some(Self::ArmDarwin),
+            _ => None,
         }
+    }
+
+    /// That of a folder under `binaries/`, if it is one of these.
+    pub fn of_folder(folder: &str, version: FmiVersion) -> Option<Self> {
+        Self::ALL.into_iter().find(|p| p.folders(version).contains(&folder))
     }
 
     /// The platform tuple of FMI 3.0 (FMI 3.0.2, 2.5.1.4.1).
@@ -105,5 +117,12 @@ mod tests {
             assert_eq!(platform.tuple().parse(), Ok(platform));
         }
         assert!("x86_64-plan9".parse::<Platform>().is_err());
+        for platform in Platform::ALL {
+            for version in [FmiVersion::V2, FmiVersion::V3] {
+                assert_eq!(Platform::of_folder(platform.folders(version)[0], version), Some(platform));
+            }
+        }
+        assert_eq!(Platform::of_folder("x86_64-linux", FmiVersion::V2), Some(Platform::X64Linux));
+        assert_eq!(Platform::of_folder("linux64", FmiVersion::V3), None);
     }
 }

@@ -1,12 +1,11 @@
-//! The Cargo workspace around the current folder: what it holds, and compiling it.
+//! The Cargo workspace around the current folder, and what it holds.
 
-use anyhow::{Context, Result, anyhow, bail};
+use crate::target::{cargo, host_triple};
+use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 use std::collections::{HashMap, HashSet};
-use std::env;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 /// A Cargo workspace.
 pub struct Workspace {
@@ -23,7 +22,7 @@ pub struct Workspace {
 /// A package, as Cargo describes it.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Package {
-    id: String,
+    pub(crate) id: String,
     /// Name.
     pub name: String,
     /// Version.
@@ -73,21 +72,6 @@ struct DependencyKind {
     kind: Option<String>,
 }
 
-#[derive(Deserialize)]
-struct Artifact {
-    reason: String,
-    package_id: Option<String>,
-    target: Option<ArtifactTarget>,
-    #[serde(default)]
-    filenames: Vec<PathBuf>,
-}
-
-#[derive(Deserialize)]
-struct ArtifactTarget {
-    name: String,
-    crate_types: Vec<String>,
-}
-
 impl Package {
     /// Its folder.
     pub fn folder(&self) -> &Path {
@@ -105,14 +89,6 @@ impl Package {
     fn is_linked(&self) -> bool {
         !self.targets.iter().any(|t| t.kind.iter().any(|k| k == "proc-macro"))
     }
-}
-
-/// What to compile.
-pub enum Selection<'a> {
-    /// The cdylibs of these packages.
-    Packages(&'a [String]),
-    /// A cdylib among the examples.
-    Example(&'a str),
 }
 
 impl Workspace {
@@ -174,89 +150,4 @@ impl Workspace {
         linked.sort_by(|a, b| (&a.name, &a.version).cmp(&(&b.name, &b.version)));
         linked
     }
-
-    /// Compiles, optimised, in a target folder of its own (a `cargo` that waits for this program holds the usual one);
-    /// returns each cdylib with the name of its package. Paths of this machine stay out of the binaries, so that builds
-    /// at two places agree byte for byte.
-    ///
-    /// # Errors
-    /// Cargo fails; it has then told why.
-    pub fn compile(&self, selection: &Selection<'_>) -> Result<Vec<(String, PathBuf)>> {
-        let mut build = cargo();
-        build.args(["build", "--release", "--message-format", "json-render-diagnostics", "--target-dir"]);
-        build.arg(self.target.join("fmu-build"));
-        match selection {
-            Selection::Packages(names) => build.args(names.iter().flat_map(|name| ["--package", name])),
-            Selection::Example(name) => build.args(["--example", name]),
-        };
-        build.env("CARGO_ENCODED_RUSTFLAGS", self.flags());
-        let output = build.stdin(Stdio::null()).stderr(Stdio::inherit()).output().context("cargo cannot be run")?;
-        if !output.status.success() {
-            return Err(crate::Failed(format!("cargo build failed ({})", output.status)).into());
-        }
-        let wanted = |target: &ArtifactTarget| match selection {
-            Selection::Packages(_) => true,
-            Selection::Example(name) => target.name == *name,
-        };
-        let mut libraries = Vec::new();
-        for line in String::from_utf8_lossy(&output.stdout).lines() {
-            let Ok(Artifact { reason, package_id: Some(id), target: Some(target), filenames }) =
-                serde_json::from_str(line)
-            else {
-                continue;
-            };
-            let is_cdylib = target.crate_types.iter().any(|t| t == "cdylib") && wanted(&target);
-            let package = self.packages.iter().find(|p| p.id == id);
-            let library =
-                filenames.into_iter().find(|f| f.extension().is_some_and(|e| e == std::env::consts::DLL_EXTENSION));
-            if let ("compiler-artifact", true, Some(package), Some(library)) =
-                (reason.as_str(), is_cdylib, package, library)
-            {
-                let selected = match selection {
-                    Selection::Packages(names) => names.contains(&package.name),
-                    Selection::Example(_) => true,
-                };
-                if selected {
-                    libraries.push((package.name.clone(), library));
-                }
-            }
-        }
-        libraries.sort();
-        Ok(libraries)
-    }
-
-    /// The flags for rustc: the user's, and the removal of local paths.
-    fn flags(&self) -> OsString {
-        const SEPARATOR: &str = "\u{1f}";
-        let words = |text: String| text.split_whitespace().collect::<Vec<_>>().join(SEPARATOR);
-        let users = env::var("CARGO_ENCODED_RUSTFLAGS").or_else(|_| env::var("RUSTFLAGS").map(words));
-        let home = env::var_os("CARGO_HOME").map(PathBuf::from);
-        let home = home.or_else(|| env::home_dir().map(|h| h.join(".cargo")));
-        let mut flags = OsString::from(users.unwrap_or_default());
-        let mut remap = |from: &Path, to: &str| {
-            if !flags.is_empty() {
-                flags.push(SEPARATOR);
-            }
-            flags.push("--remap-path-prefix=");
-            flags.push(from);
-            flags.push(format!("={to}"));
-        };
-        remap(&self.root, ".");
-        if let Some(home) = home {
-            remap(&home, "/cargo");
-        }
-        flags
-    }
-}
-
-fn cargo() -> Command {
-    Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-}
-
-fn host_triple() -> Result<String> {
-    let rustc = env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let output = Command::new(rustc).arg("-vV").output().context("rustc cannot be run")?;
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let host = text.lines().find_map(|line| line.strip_prefix("host: "));
-    host.map(str::to_owned).ok_or_else(|| anyhow!("rustc -vV names no host"))
 }

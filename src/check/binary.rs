@@ -3,10 +3,11 @@
 use super::bench::{Bench, Blocked, fine};
 use super::subject::Binary;
 use super::{Check, Level, Levels, Run, Subject, Verdict};
+use crate::elf::{FLOOR, NEEDED, dynamic, is_system, newest_glibc, strings};
 use model_description::FmiVersion;
 use object::elf;
-use object::read::elf::{Dyn, FileHeader, ProgramHeader, SectionHeader};
-use object::{Architecture, BinaryFormat, Object, ObjectSymbol, read::elf::ElfFile64};
+use object::read::elf::{ElfFile64, ProgramHeader};
+use object::{Architecture, BinaryFormat, Object, ObjectSymbol};
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
@@ -185,20 +186,6 @@ fn others(subject: &Subject) -> Verdict {
     })
 }
 
-/// The entries of the dynamic section.
-fn dynamic(file: &ElfFile64<'_>) -> Result<Vec<(i64, u64)>, object::Error> {
-    let (endian, data) = (file.endian(), file.data());
-    let header = file.elf_header();
-    let sections = header.sections(endian, data)?;
-    let mut entries = Vec::new();
-    for section in sections.iter() {
-        if let Some((list, _)) = section.dynamic(endian, data)? {
-            entries.extend(list.iter().map(|d| (d.d_tag(endian).0, d.d_val(endian))));
-        }
-    }
-    Ok(entries)
-}
-
 fn unloadable(subject: &Subject) -> Verdict {
     elf(subject, |_, file| {
         let mut findings = Vec::new();
@@ -220,37 +207,13 @@ fn unloadable(subject: &Subject) -> Verdict {
     })
 }
 
-/// Strings of dynamic entries with this tag.
-fn strings(file: &ElfFile64<'_>, tag: i64) -> Result<Vec<String>, object::Error> {
-    let (endian, data) = (file.endian(), file.data());
-    let sections = file.elf_header().sections(endian, data)?;
-    let mut found = Vec::new();
-    for section in sections.iter() {
-        let Some((list, link)) = section.dynamic(endian, data)? else { continue };
-        let names = sections.strings(endian, data, link)?;
-        for entry in list.iter().filter(|d| d.d_tag(endian).0 == tag) {
-            let offset = u32::try_from(entry.d_val(endian)).unwrap_or(u32::MAX);
-            let text = names.get(offset).map_err(|()| object_error())?;
-            found.push(String::from_utf8_lossy(text).into_owned());
-        }
-    }
-    Ok(found)
-}
-
-fn object_error() -> object::Error {
-    // The crate has no public constructor; parsing nothing gives one.
-    object::File::parse(&[][..]).err().unwrap_or_else(|| unreachable!("nothing is no file"))
-}
-
-const NEEDED: i64 = 1;
 const RPATH: i64 = 15;
 const RUNPATH: i64 = 29;
 
 fn needed(subject: &Subject) -> Verdict {
-    let system = ["libc.so", "libm.so", "libpthread.so", "libdl.so", "librt.so", "ld-linux"];
     elf(subject, |binary, file| {
         let shipped = |name: &str| subject.zip.find(&format!("binaries/{}/{name}", binary.folder)).is_some();
-        let foreign = |n: &String| !system.iter().any(|s| n.starts_with(s)) && !shipped(n);
+        let foreign = |n: &String| !is_system(n) && !shipped(n);
         Ok(strings(file, NEEDED)?.into_iter().filter(foreign).map(|n| format!("needs {n}")).collect())
     })
 }
@@ -267,24 +230,8 @@ fn rpath(subject: &Subject) -> Verdict {
 
 fn floor(subject: &Subject) -> Verdict {
     elf(subject, |_, file| {
-        let mut newest: Option<(Vec<u32>, String)> = None;
-        let (endian, data) = (file.endian(), file.data());
-        let sections = file.elf_header().sections(endian, data)?;
-        if let Some((mut needs, link)) = sections.gnu_verneed(endian, data)? {
-            let names = sections.strings(endian, data, link)?;
-            while let Some((_, mut versions)) = needs.next()? {
-                while let Some(version) = versions.next()? {
-                    let name = String::from_utf8_lossy(version.name(endian, names)?).into_owned();
-                    let Some(number) = name.strip_prefix("GLIBC_") else { continue };
-                    let parts: Vec<u32> = number.split('.').filter_map(|p| p.parse().ok()).collect();
-                    if newest.as_ref().is_none_or(|(n, _)| *n < parts) {
-                        newest = Some((parts, name));
-                    }
-                }
-            }
-        }
-        let bad = newest.filter(|(parts, _)| *parts > vec![2, 17]);
-        Ok(bad.map(|(_, name)| format!("needs {name}")).into_iter().collect())
+        let newest = newest_glibc(file)?.filter(|newest| *newest > FLOOR);
+        Ok(newest.map(|newest| format!("needs {newest}")).into_iter().collect())
     })
 }
 

@@ -59,6 +59,12 @@ impl Report {
         self.violated().all(|f| f.level != Level::Must)
     }
 
+    /// Whether every requirement that applies holds.
+    pub fn is_clean(&self) -> bool {
+        let is_clean = |f: &Finding| matches!(f.verdict, Verdict::Pass(_) | Verdict::NotApplicable(_));
+        self.findings.iter().all(is_clean)
+    }
+
     /// How many of which verdict.
     pub fn counts(&self) -> Counts {
         let mut counts = Counts::default();

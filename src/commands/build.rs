@@ -1,15 +1,19 @@
 //! `fmu build`: compiles models and packs them.
 
+use crate::compile::{Library, Selection, compile};
+use crate::elf::{FLOOR, Needs};
 use crate::icons;
 use crate::importer::describe;
 use crate::licences::Licences;
 use crate::pack::{self, Moment};
 use crate::platform::Platform;
-use crate::workspace::{Package, Selection, Workspace};
+use crate::target::{Target, Tools, ZIG};
+use crate::workspace::{Package, Workspace};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use fmu_core::Description;
 use model_description::FmiVersion;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -24,6 +28,14 @@ use std::path::{Path, PathBuf};
 ///   a library that is already built, or several of one model for several platforms
 ///                                  fmu build --library target/release/libmy_fmu.so
 ///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
+///
+/// For other platforms, by Rust's names of them; the FMUs then hold a binary for each of these, and only these:
+///   fmu build --target x86_64-unknown-linux-gnu,aarch64-unknown-linux-gnu,x86_64-pc-windows-gnu
+/// It needs Rust's standard library for each (rustup target add TRIPLE), mingw for Windows, cargo-zigbuild with ziglang for
+/// Linux and macOS. A build for this machine is made all the same, if it is not asked for: it describes the model.
+///
+/// Linux binaries need glibc 2.17 (2012) where cargo-zigbuild is in PATH; otherwise what this machine's linker makes them
+/// need, which is told. CARGO_TARGET_TRIPLE_LINKER, in Cargo's spelling, names another linker.
 ///
 /// With SOURCE_DATE_EPOCH set, the same sources give the same bytes.
 #[derive(Debug, Default, Args)]
@@ -47,6 +59,9 @@ pub struct Build {
     /// A library that is already built; PLATFORM= if it is not for this machine
     #[arg(long, value_name = "[PLATFORM=]FILE")]
     pub library: Vec<String>,
+    /// What to build for, instead of this machine; several with commas, or by repeating it
+    #[arg(long, value_name = "TRIPLE", value_delimiter = ',', conflicts_with = "library")]
+    pub target: Vec<String>,
 }
 
 /// A compiled model, ready to be packed.
@@ -69,11 +84,14 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     let (models, out) = if args.library.is_empty() {
         let workspace = Workspace::find()?;
         let out = args.out.clone().unwrap_or_else(|| workspace.target.join("fmu"));
-        (compile(&workspace, args)?, out)
+        (compiled(&workspace, args)?, out)
     } else {
         let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("fmu")), Ok);
         (vec![given(&args.library)?], out.context("--out says where to write to when there is no workspace")?)
     };
+    for note in notes(&models) {
+        eprintln!("note: {note}");
+    }
     let mut written = Vec::new();
     for model in &models {
         for &version in &versions {
@@ -88,9 +106,16 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     Ok(written)
 }
 
-fn compile(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
-    let built = if let Some(example) = &args.example {
-        workspace.compile(&Selection::Example(example))?
+fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
+    // Before anything is compiled: what is missing for the last target is told at once.
+    let tools = Tools::find()?;
+    let targets = match &args.target[..] {
+        [] => vec![tools.host()],
+        triples => targets(&tools, triples)?,
+    };
+    let names: Vec<String>;
+    let selection = if let Some(example) = &args.example {
+        Selection::Example(example)
     } else {
         let packages = match &args.package {
             Some(name) => {
@@ -99,21 +124,67 @@ fn compile(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
             }
             None => choose(&workspace.fmus(), &args.fmus)?,
         };
-        let names: Vec<String> = packages.iter().map(|p| p.name.clone()).collect();
-        workspace.compile(&Selection::Packages(&names))?
+        names = packages.iter().map(|p| p.name.clone()).collect();
+        Selection::Packages(&names)
     };
-    if built.is_empty() {
+    let mut built: BTreeMap<String, Vec<(Platform, PathBuf)>> = BTreeMap::new();
+    let mut describing: Option<Vec<Library>> = None;
+    for target in &targets {
+        let libraries = compile(workspace, selection, target)?;
+        for (package, library) in &libraries {
+            built.entry(package.clone()).or_default().push((target.platform, library.clone()));
+        }
+        if target.platform == Platform::host() {
+            describing = Some(libraries);
+        }
+    }
+    let describing = match describing {
+        Some(libraries) => libraries,
+        None => compile(workspace, selection, &tools.host())?,
+    };
+    if describing.is_empty() {
         bail!("nothing that was compiled is a cdylib: set crate-type = [\"cdylib\"]");
     }
-    let model = |(package, library): &(String, PathBuf)| {
+    let model = |(package, own): &Library| {
         let licences = match args.example {
             // Cargo does not tell which dependencies of its package an example uses; the exporter it uses for certain.
             Some(_) => Licences::of_package(workspace, "fmu-export"),
             None => Licences::of_package(workspace, package),
         };
-        load(&[(Platform::host(), library.clone())], licences)
+        load(own, built.get(package).map_or(&[], Vec::as_slice), licences)
     };
-    built.iter().map(model).collect()
+    describing.iter().map(model).collect()
+}
+
+/// The targets of these names, each for another platform.
+fn targets(tools: &Tools, triples: &[String]) -> Result<Vec<Target>> {
+    let mut targets: Vec<Target> = Vec::new();
+    for triple in triples {
+        let target = tools.target(triple)?;
+        match targets.iter().find(|t| t.platform == target.platform) {
+            Some(same) if same.triple == target.triple => {}
+            Some(same) => bail!("--target {triple}: is for {}, as {} is; take one", target.platform, same.triple),
+            None => targets.push(target),
+        }
+    }
+    Ok(targets)
+}
+
+/// What the Linux binaries need of the importing machine beyond what each has: a line for all that need the same.
+fn notes(models: &[Model]) -> Vec<String> {
+    let mut by_needs: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for Model { description, binaries, .. } in models {
+        for (platform, bytes) in binaries {
+            if let Ok(needs) = Needs::of(bytes)
+                && !needs.are_modest()
+            {
+                by_needs.entry(format!("for {platform} needs {needs}")).or_default().push(&description.name);
+            }
+        }
+    }
+    let remedy = format!("built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most");
+    let note = |(needs, names): (String, Vec<&str>)| format!("{} {needs} where it runs; {remedy}", names.join(", "));
+    by_needs.into_iter().map(note).collect()
 }
 
 /// The packages that are meant: by their names, or by those of their FMUs, which only differ in how words are joined.
@@ -140,14 +211,15 @@ fn given(libraries: &[String]) -> Result<Model> {
         None => Ok((Platform::host(), PathBuf::from(text))),
     };
     let libraries = libraries.iter().map(parse).collect::<Result<Vec<_>>>()?;
-    load(&libraries, Licences::default())
-}
-
-fn load(libraries: &[(Platform, PathBuf)], licences: Licences) -> Result<Model> {
     let own = libraries.iter().find(|(platform, _)| *platform == Platform::host());
     let (_, own) = own.ok_or_else(|| {
         anyhow!("one library must be for this machine ({}): it describes the model", Platform::host())
     })?;
+    load(own, &libraries, Licences::default())
+}
+
+/// A model of these libraries, described by one for this machine.
+fn load(own: &Path, libraries: &[(Platform, PathBuf)], licences: Licences) -> Result<Model> {
     let description = describe(own)?;
     let read = |(platform, path): &(Platform, PathBuf)| Ok((*platform, read(path)?));
     Ok(Model { description, binaries: libraries.iter().map(read).collect::<Result<_>>()?, licences })

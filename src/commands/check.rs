@@ -12,7 +12,8 @@ use std::time::Duration;
 /// and hard (it leaves it open, and a robust FMU does it). Each probe of the binary runs in a process of its own, so a
 /// crash or a hang is a finding. The FMU's code runs on this machine with your rights: check only what you would run.
 ///
-/// Exit status: 0 when no must is violated, 1 when one is, 2 when the file is no FMU at all.
+/// Exit status: 0 when no must is violated, 1 when one is, 2 when the file is no FMU at all. With --strict, a violated
+/// should or hard, and a check that is not determined, count like a must.
 ///
 ///   fmu check target/fmu/fmi3/PmsmPlant.fmu
 ///   fmu check other.fmu --format html > report.html
@@ -35,6 +36,9 @@ pub struct Check {
     /// Seconds that one probe of the binary may take [default: 10]
     #[arg(long, value_name = "S")]
     pub patience: Option<f64>,
+    /// Exit status 1 unless everything that applies passes
+    #[arg(long)]
+    pub strict: bool,
     /// List all checks and end
     #[arg(long)]
     pub list: bool,
@@ -52,7 +56,7 @@ pub enum Format {
     Html,
 }
 
-/// Runs the command; whether no must is violated.
+/// Runs the command; whether no must is violated, or with `strict` whether everything that applies passes.
 ///
 /// # Errors
 /// The file is no FMU, or an id does not exist.
@@ -82,5 +86,5 @@ pub fn run(args: &Check) -> Result<bool> {
         Format::Json => println!("{}", report.json()?),
         Format::Html => print!("{}", report.html()),
     }
-    Ok(report.conforms())
+    Ok(if args.strict { report.is_clean() } else { report.conforms() })
 }

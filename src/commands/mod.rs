@@ -3,6 +3,7 @@
 pub mod build;
 pub mod check;
 pub mod compare;
+pub mod merge;
 pub mod reproduce;
 pub mod simulate;
 pub mod tune;

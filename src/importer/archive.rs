@@ -3,6 +3,7 @@
 use super::Error;
 use crate::platform::Platform;
 use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -68,6 +69,26 @@ impl Archive {
         self.extract_into(dir.path(), &[&binaries, "resources/"]).map_err(|e| wrong(&self.path, &e))?;
         let binary = dir.path().join(&binaries).join(name);
         Ok((dir, binary))
+    }
+
+    /// Every file, with its name.
+    pub(super) fn files(&mut self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
+        let (mut files, mut left) = (BTreeMap::new(), LIMIT);
+        for (index, name) in self.names.iter().enumerate() {
+            let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, format!("{name}: {cause}"));
+            let entry = self.zip.by_index(index).map_err(|e| wrong(&e))?;
+            if entry.is_dir() {
+                continue;
+            }
+            let mut bytes = Vec::new();
+            entry.take(left + 1).read_to_end(&mut bytes).map_err(|e| wrong(&e))?;
+            let size = u64::try_from(bytes.len()).unwrap_or(u64::MAX);
+            left = left.checked_sub(size).ok_or_else(|| wrong(&format!("unpacks to more than {LIMIT} bytes")))?;
+            if files.insert(name.clone(), bytes).is_some() {
+                return Err(wrong(&"is there twice"));
+            }
+        }
+        Ok(files)
     }
 
     fn extract_into(&mut self, dir: &Path, prefixes: &[&str]) -> io::Result<()> {

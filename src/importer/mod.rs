@@ -36,10 +36,21 @@ use archive::Archive;
 use log::Log;
 use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
 use standard::{Outcome, Refusal, Standard};
+use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
+
+/// The description of an `.fmu` file, and all its files.
+///
+/// # Errors
+/// The file is missing, no archive, or has no readable description.
+pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u8>>), Error> {
+    let mut archive = Archive::open(path)?;
+    let files = archive.files()?;
+    Ok((archive.description, files))
+}
 
 /// The functions of a library, the library, and the folder it lies in; dropped in this order.
 struct Loaded<F> {

@@ -1,0 +1,185 @@
+//! Compiling the libraries of a workspace, for this machine or another.
+
+use crate::elf::FLOOR;
+use crate::platform::Platform;
+use crate::target::{BUILD_STD, Linker, Target, cargo, rustc};
+use crate::workspace::Workspace;
+use anyhow::{Context, Result};
+use serde::Deserialize;
+use std::env;
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// What to compile.
+#[derive(Clone, Copy, Debug)]
+pub enum Selection<'a> {
+    /// The cdylibs of these packages.
+    Packages(&'a [String]),
+    /// A cdylib among the examples.
+    Example(&'a str),
+}
+
+/// A library, and the package that it belongs to.
+pub type Library = (String, PathBuf);
+
+#[derive(Deserialize)]
+struct Artifact {
+    reason: String,
+    package_id: Option<String>,
+    target: Option<ArtifactTarget>,
+    #[serde(default)]
+    filenames: Vec<PathBuf>,
+}
+
+#[derive(Deserialize)]
+struct ArtifactTarget {
+    name: String,
+    crate_types: Vec<String>,
+}
+
+/// Compiles, optimised, in a target folder of its own (a `cargo` that waits for this program holds the usual one);
+/// returns each cdylib. Paths of this machine stay out of the binaries, so that builds at two places agree byte for byte.
+///
+/// # Errors
+/// Cargo fails; it has then told why.
+pub fn compile(workspace: &Workspace, selection: Selection<'_>, target: &Target) -> Result<Vec<Library>> {
+    let darwin = is_darwin(target);
+    let mut libraries = Vec::new();
+    match selection {
+        // The name by which macOS knows a library is written into it; without this one it is the path that it was linked
+        // to. An argument for one library only: one Cargo each.
+        Selection::Packages(names) if darwin => {
+            for name in names {
+                let one = Selection::Packages(std::slice::from_ref(name));
+                let mut rustc = build("rustc", workspace, one, target);
+                rustc.arg("--lib").arg("--").args(install_name(name));
+                libraries.extend(run(workspace, rustc, one, target)?);
+            }
+        }
+        Selection::Example(name) if darwin => {
+            let mut rustc = build("rustc", workspace, selection, target);
+            rustc.arg("--").args(install_name(name));
+            libraries = run(workspace, rustc, selection, target)?;
+        }
+        _ => libraries = run(workspace, build("build", workspace, selection, target), selection, target)?,
+    }
+    libraries.sort();
+    Ok(libraries)
+}
+
+fn is_darwin(target: &Target) -> bool {
+    matches!(target.platform, Platform::X64Darwin | Platform::ArmDarwin)
+}
+
+fn install_name(name: &str) -> [String; 2] {
+    ["-C".into(), format!("link-arg=-Wl,-install_name,@rpath/lib{}.dylib", name.replace('-', "_"))]
+}
+
+/// The command, but for what follows `--`.
+fn build(verb: &str, workspace: &Workspace, selection: Selection<'_>, target: &Target) -> Command {
+    let mut build = match target.linker {
+        Linker::Usual => cargo(),
+        Linker::Zig => Command::new("cargo-zigbuild"),
+    };
+    build.arg(if verb == "build" && target.linker == Linker::Zig { "zigbuild" } else { verb });
+    build.args(["--release", "--message-format", "json-render-diagnostics", "--target-dir"]);
+    build.arg(workspace.target.join("fmu-build"));
+    let linux = matches!(target.platform, Platform::X64Linux | Platform::ArmLinux);
+    match target.linker {
+        // zig links with the C library of this version.
+        Linker::Zig if linux => build.args(["--target", &format!("{}.{}.{}", target.triple, FLOOR.0, FLOOR.1)]),
+        Linker::Usual if target.is_host => &mut build,
+        _ => build.args(["--target", &target.triple]),
+    };
+    match selection {
+        Selection::Packages(names) => build.args(names.iter().flat_map(|name| ["--package", name])),
+        Selection::Example(name) => build.args(["--example", name]),
+    };
+    build.env("CARGO_ENCODED_RUSTFLAGS", flags(&workspace.root, target));
+    if target.is_host {
+        // It has one, and Cargo wants --target otherwise.
+        build.env_remove(BUILD_STD);
+    }
+    if is_darwin(target) && env::var_os("MACOSX_DEPLOYMENT_TARGET").is_none() {
+        // The oldest with 64-bit ARM.
+        build.env("MACOSX_DEPLOYMENT_TARGET", "11.0");
+    }
+    build
+}
+
+/// Runs the command; returns the cdylibs that it made.
+fn run(workspace: &Workspace, mut build: Command, selection: Selection<'_>, target: &Target) -> Result<Vec<Library>> {
+    let program = build.get_program().to_string_lossy().into_owned();
+    let output = build.stdin(Stdio::null()).stderr(Stdio::inherit()).output();
+    let output = output.with_context(|| format!("{program} cannot be run"))?;
+    if !output.status.success() {
+        let what = format!("building for {} failed ({})", target.triple, output.status);
+        return Err(crate::Failed(what).into());
+    }
+    let wanted = |target: &ArtifactTarget| match selection {
+        Selection::Packages(_) => true,
+        Selection::Example(name) => target.name == *name,
+    };
+    let mut libraries = Vec::new();
+    for line in String::from_utf8_lossy(&output.stdout).lines() {
+        let Ok(Artifact { reason, package_id: Some(id), target: Some(artifact), filenames }) =
+            serde_json::from_str(line)
+        else {
+            continue;
+        };
+        let is_cdylib = artifact.crate_types.iter().any(|t| t == "cdylib") && wanted(&artifact);
+        let package = workspace.packages.iter().find(|p| p.id == id);
+        let extension = target.platform.extension();
+        let library = filenames.into_iter().find(|f| f.extension().is_some_and(|e| e == extension));
+        if let ("compiler-artifact", true, Some(package), Some(library)) =
+            (reason.as_str(), is_cdylib, package, library)
+        {
+            let selected = match selection {
+                Selection::Packages(names) => names.contains(&package.name),
+                Selection::Example(_) => true,
+            };
+            if selected {
+                libraries.push((package.name.clone(), library));
+            }
+        }
+    }
+    Ok(libraries)
+}
+
+/// The flags for rustc: the user's, and the removal of local paths and of the time.
+fn flags(root: &Path, target: &Target) -> OsString {
+    const SEPARATOR: &str = "\u{1f}";
+    let words = |text: String| text.split_whitespace().collect::<Vec<_>>().join(SEPARATOR);
+    let users = env::var("CARGO_ENCODED_RUSTFLAGS").or_else(|_| env::var("RUSTFLAGS").map(words));
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| env::home_dir().map(|h| h.join(".cargo")));
+    let mut flags = OsString::from(users.unwrap_or_default());
+    let mut add = |flag: &OsStr| {
+        if !flags.is_empty() {
+            flags.push(SEPARATOR);
+        }
+        flags.push(flag);
+    };
+    let remap = |from: &Path, to: &str| {
+        let mut flag = OsString::from("--remap-path-prefix=");
+        flag.push(from);
+        flag.push(format!("={to}"));
+        flag
+    };
+    add(&remap(root, "."));
+    if let Some(home) = home {
+        add(&remap(&home, "/cargo"));
+    }
+    if env::var_os(BUILD_STD).is_some()
+        && let Ok(output) = rustc().args(["--print", "sysroot"]).output()
+    {
+        let root = String::from_utf8_lossy(&output.stdout);
+        add(&remap(&Path::new(root.trim()).join("lib/rustlib/src/rust"), "/rust"));
+    }
+    if target.triple.ends_with("-windows-gnu") {
+        // A DLL has a place for when it was linked.
+        add(OsStr::new("-Clink-arg=-Wl,--no-insert-timestamp"));
+    }
+    flags
+}

@@ -1,0 +1,169 @@
+//! The Rust targets that FMUs are built for, and whether what a build for one needs is on this machine.
+
+use crate::platform::Platform;
+use anyhow::{Context, Result, anyhow, bail};
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// How to get zig as a linker.
+pub const ZIG: &str = "pip install cargo-zigbuild ziglang";
+
+/// By this Cargo builds the standard library from source.
+pub(crate) const BUILD_STD: &str = "CARGO_UNSTABLE_BUILD_STD";
+
+/// A target that can be built for here.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Target {
+    /// Its name, as rustc has it.
+    pub triple: String,
+    /// What FMI calls it.
+    pub platform: Platform,
+    /// Whether it is the machine that builds.
+    pub is_host: bool,
+    /// What links it.
+    pub linker: Linker,
+}
+
+/// What links a target's libraries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Linker {
+    /// The one that rustc takes, or the one that the user told Cargo.
+    Usual,
+    /// zig, through cargo-zigbuild: it has the C library of every Linux and of macOS.
+    Zig,
+}
+
+/// The compiler and its helpers on this machine.
+#[derive(Debug)]
+pub struct Tools {
+    host: String,
+    /// Or what is missing.
+    zig: Result<(), String>,
+}
+
+impl Tools {
+    /// Looks for them.
+    ///
+    /// # Errors
+    /// rustc cannot be run.
+    pub fn find() -> Result<Self> {
+        Ok(Self { host: host_triple()?, zig: zig() })
+    }
+
+    /// The target of this machine.
+    pub fn host(&self) -> Target {
+        let platform = Platform::host();
+        let linker = self.linker(&self.host, platform, "gnu").unwrap_or(Linker::Usual);
+        Target { triple: self.host.clone(), platform, is_host: true, linker }
+    }
+
+    /// A target by its name, with all that a build for it needs.
+    ///
+    /// # Errors
+    /// rustc does not know it, FMI has no platform for it, its standard library or a linker is missing: what, and how to
+    /// get it.
+    pub fn target(&self, triple: &str) -> Result<Target> {
+        let wrong = |cause: String| anyhow!("--target {triple}: {cause}");
+        let mut rustc = rustc();
+        rustc.args(["--print", "cfg", "--print", "target-libdir", "--target", triple]);
+        let output = rustc.stdin(Stdio::null()).output().context("rustc cannot be run")?;
+        if !output.status.success() {
+            return Err(wrong("rustc has no such target; rustc --print target-list names all".into()));
+        }
+        let text = String::from_utf8_lossy(&output.stdout);
+        let value = |key: &str| {
+            let line = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix("=\""));
+            line.map_or("", |rest| rest.trim_end_matches('"'))
+        };
+        let (os, processor, environment) = (value("target_os"), value("target_arch"), value("target_env"));
+        let known = || Platform::ALL.map(Platform::tuple).join(", ");
+        let platform = Platform::of(os, processor)
+            .ok_or_else(|| wrong(format!("is no platform of FMUs here; there are {}", known())))?;
+        if os == "linux" && environment != "gnu" {
+            // A process has one C library, and importers have that of GNU.
+            let instead = format!("{processor}-unknown-linux-gnu");
+            return Err(wrong(format!("importers on Linux do not load a library for {environment}; take {instead}")));
+        }
+        let linker = self.linker(triple, platform, environment).map_err(wrong)?;
+        let libraries = text.lines().find(|line| Path::new(line).is_absolute()).unwrap_or_default();
+        if !has_std(Path::new(libraries)) && env::var_os(BUILD_STD).is_none() {
+            return Err(wrong(format!("Rust's standard library for it is missing: rustup target add {triple}")));
+        }
+        Ok(Target { triple: triple.into(), platform, is_host: triple == self.host, linker })
+    }
+
+    /// What links a target, or what is missing.
+    fn linker(&self, triple: &str, platform: Platform, environment: &str) -> Result<Linker, String> {
+        let users = format!("CARGO_TARGET_{}_LINKER", triple.to_uppercase().replace(['-', '.'], "_"));
+        if env::var_os(users).is_some() {
+            return Ok(Linker::Usual);
+        }
+        let native = triple == self.host;
+        match platform {
+            Platform::X64Linux | Platform::ArmLinux => match &self.zig {
+                Ok(()) => Ok(Linker::Zig),
+                Err(_) if native => Ok(Linker::Usual),
+                Err(missing) => Err(missing.clone()),
+            },
+            // macOS builds for both of its processors.
+            Platform::X64Darwin | Platform::ArmDarwin if cfg!(target_os = "macos") => Ok(Linker::Usual),
+            Platform::X64Darwin | Platform::ArmDarwin => self.zig.clone().map(|()| Linker::Zig),
+            Platform::X64Windows | Platform::ArmWindows if cfg!(windows) => Ok(Linker::Usual),
+            Platform::X64Windows | Platform::ArmWindows if environment == "msvc" => {
+                Err("is linked on Windows only; take x86_64-pc-windows-gnu".into())
+            }
+            Platform::X64Windows if find("x86_64-w64-mingw32-gcc").is_none() => {
+                Err("its linker x86_64-w64-mingw32-gcc is missing: apt install gcc-mingw-w64-x86-64-win32".into())
+            }
+            Platform::X64Windows | Platform::ArmWindows => Ok(Linker::Usual),
+        }
+    }
+}
+
+/// The compiler.
+pub fn rustc() -> Command {
+    Command::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()))
+}
+
+/// Cargo.
+pub fn cargo() -> Command {
+    Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
+/// The target that the compiler itself is for.
+///
+/// # Errors
+/// rustc cannot be run.
+pub fn host_triple() -> Result<String> {
+    let output = rustc().arg("-vV").output().context("rustc cannot be run")?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let Some(host) = text.lines().find_map(|line| line.strip_prefix("host: ")) else {
+        bail!("rustc -vV names no host")
+    };
+    Ok(host.to_owned())
+}
+
+/// Whether cargo-zigbuild is here and finds a zig.
+fn zig() -> Result<(), String> {
+    if find("cargo-zigbuild").is_none() {
+        return Err(format!("its linker zig needs cargo-zigbuild, which is not in PATH: {ZIG}"));
+    }
+    let asked = Command::new("cargo-zigbuild").args(["zig", "cc", "--", "--version"]).stdin(Stdio::null()).output();
+    match asked {
+        Ok(output) if output.status.success() => Ok(()),
+        _ => Err(format!("its linker zig is missing, cargo-zigbuild finds none: {ZIG}")),
+    }
+}
+
+fn has_std(libraries: &Path) -> bool {
+    let is_std = |name: &str| name.starts_with("libstd-");
+    let files = libraries.read_dir().into_iter().flatten().flatten();
+    files.into_iter().any(|file| file.file_name().to_str().is_some_and(is_std))
+}
+
+/// A program in `PATH`.
+pub fn find(program: &str) -> Option<PathBuf> {
+    let name = format!("{program}{}", env::consts::EXE_SUFFIX);
+    env::split_paths(&env::var_os("PATH")?).map(|folder| folder.join(&name)).find(|path| path.is_file())
+}
