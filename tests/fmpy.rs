@@ -14,6 +14,11 @@ fn fmpy_validates_and_cosimulates() {
 }
 
 #[test]
+fn tuning_a_running_drive() {
+    pytest("fmpy", "tuning", &["test_tuning.py"], &[]);
+}
+
+#[test]
 fn misuse_of_the_c_interface() {
     pytest("fmpy", "misuse", &["test_misuse.py"], &[]);
 }

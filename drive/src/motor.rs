@@ -46,7 +46,7 @@ pub const MOTOR: &Table<Motor> = &Table::new(
     const {
         &[
             P::integer_parameter("n_p", "Number of pole pairs", |m| &mut m.n_p).at_least(1.0).at_most(1000.0),
-            P::parameter("R_s", &OHM, "Stator resistance", |m| &mut m.R_s).above(0.0),
+            P::parameter("R_s", &OHM, "Stator resistance", |m| &mut m.R_s).above(0.0).tunable(),
             P::parameter("L_d", &HENRY, "Inductance along the magnet axis", |m| &mut m.L_d).above(0.0),
             P::parameter("L_q", &HENRY, "Inductance across the magnet axis", |m| &mut m.L_q).above(0.0),
             P::parameter("psi_M", &WEBER, "Peak flux linkage of the magnet", |m| &mut m.psi_M).above(0.0),

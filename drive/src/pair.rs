@@ -1,7 +1,7 @@
 //! Plant and controller side by side, exchanging values as an importer does: all outputs read, all inputs set, both
 //! stepped (Jacobi). The native reference that the packed FMUs must equal bit for bit.
 
-use crate::control::model::ControllerInputs;
+use crate::control::signals::ControllerInputs;
 use crate::{PmsmPlant, SensorlessController};
 use fmu_core::{Block, Elapsed, Fault, Model, Step};
 use serde::{Deserialize, Serialize};
@@ -50,6 +50,7 @@ impl Pair {
     #[inline]
     pub fn step(&mut self, h: f64) -> Result<(), Fault> {
         self.plant.model.inputs.u = self.controller.out.u;
+        self.plant.model.inputs.enable = self.controller.out.enabled;
         let ControllerInputs { i, theta_meas, speed_meas, .. } = &mut self.controller.model.inputs;
         *i = self.plant.out.i;
         *theta_meas = self.plant.out.theta_e;

@@ -4,8 +4,8 @@
 //! communication step that is a multiple of T_s it gives the pair's results bit for bit. At any other communication step
 //! plant and controller also stop at the sample instants between, which an importer's exchange cannot do.
 
-use crate::control::model::ControllerOutputs;
-use crate::control::tables::{self, LOCK_LOST};
+use crate::control::signals::ControllerOutputs;
+use crate::control::tables::{self, ENABLED, LOCK_LOST};
 use crate::pair::Pair;
 use crate::plant::{model::PlantOutputs, tables as plant};
 use fmu_core::unit::{AMPERE, NEWTON_METRE, ONE, RADIAN, SPEED, VOLT};
@@ -31,11 +31,23 @@ pub struct DriveInputs {
     pub speed_shaft: f64,
     /// Imposed mechanical angle of the shaft in rad, at the beginning of the communication step.
     pub angle_shaft: f64,
+    /// Torque reference in N.m, in torque mode.
+    pub tau_ref: f64,
+    /// The drive works; false: the controller stands at its start, the gates are off.
+    pub enable: bool,
 }
 
 impl Default for DriveInputs {
     fn default() -> Self {
-        Self { speed_ref: 0.0, tau_load: 0.0, u_dc: 325.0, speed_shaft: 0.0, angle_shaft: 0.0 }
+        Self {
+            speed_ref: 0.0,
+            tau_load: 0.0,
+            u_dc: 325.0,
+            speed_shaft: 0.0,
+            angle_shaft: 0.0,
+            tau_ref: 0.0,
+            enable: true,
+        }
     }
 }
 
@@ -63,6 +75,8 @@ impl PmsmDrive {
         pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
         let plant = &mut pair.plant.model.inputs;
         (plant.speed_shaft, plant.angle_shaft) = (inputs.speed_shaft, inputs.angle_shaft);
+        let controller = &mut pair.controller.model.inputs;
+        (controller.tau_ref, controller.enable) = (inputs.tau_ref, inputs.enable);
     }
 }
 
@@ -161,6 +175,17 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 |m| &mut m.model.inputs.angle_shaft,
             )
             .unbounded(),
+            V::input(
+                "tau_ref",
+                &NEWTON_METRE,
+                "Torque reference; read with controller.speed_loop.torque_mode only",
+                |m| &mut m.model.inputs.tau_ref,
+            ),
+            V::boolean_input(
+                "enable",
+                "The drive works; false: the controller stands at its start, and the gates are off as `enabled` goes false",
+                |m| &mut m.model.inputs.enable,
+            ),
             V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),
             V::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |m| &mut m.out.controller }),
             V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
@@ -187,6 +212,7 @@ const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
             O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
             O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
+            O::boolean_output("enabled", ENABLED, |o| &mut o.enabled),
             O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| {
                 &mut o.u.a
             }),

@@ -282,3 +282,48 @@ fn null_pointers_and_no_variables() {
         assert_eq!(fmi2GetReal(fmu.it, &X, usize::MAX / 4, &mut 0.0), ERROR);
     }
 }
+
+#[test]
+fn tunable_parameters_that_do_not_fit_together_change_nothing() {
+    for version in [2, 3] {
+        let fmu = Fmu::started(version);
+        assert_eq!(fmu.set(&[GAIN, U], &[3.0, 2.0]), OK);
+        assert_eq!(fmu.step(0.0, 0.1), OK);
+        // gain above 9 needs n = 2: the whole call is discarded, the input in it too, and the simulation can go on.
+        assert_eq!(fmu.set(&[U, GAIN], &[7.0, 9.5]), DISCARD);
+        let message = fmu.journal.0.borrow_mut().pop().unwrap();
+        assert_eq!((message.status, message.category.as_str()), (DISCARD, "logStatusDiscard"));
+        assert!(
+            message.text.contains("gain = 9.5 is not allowed: at most 9 with n = 1; nothing was set"),
+            "{message:?}"
+        );
+        assert_eq!((fmu.get(U), fmu.get(GAIN), fmu.state()), (2.0, 3.0, 's'));
+        // A vector longer than what a set remembers value by value.
+        let (references, mut values) = ([U, U, U, U, U, U, U, U, U, K, GAIN], [5.0; 11]);
+        values[10] = 9.5;
+        assert_eq!(fmu.set(&references, &values), DISCARD);
+        assert_eq!((fmu.get(U), fmu.get(K), fmu.get(GAIN), fmu.state()), (2.0, 0.0, 3.0, 's'));
+        assert_eq!(fmu.step(0.1, 0.1), OK);
+        assert_eq!(fmu.get(DOUBLE_GAIN), 6.0);
+        // In one call those that fit together; and before the start the order does not matter.
+        let fmu = Fmu::entered(version);
+        assert_eq!((fmu.set(&[GAIN], &[9.5]), fmu.set_integer(N, 2), fmu.exit()), (OK, OK, OK));
+    }
+}
+
+#[test]
+fn a_tuned_value_is_saved_restored_and_reset() {
+    for version in [2, 3] {
+        let fmu = Fmu::started(version);
+        assert_eq!((fmu.set(&[GAIN], &[3.0]), fmu.step(0.0, 0.1)), (OK, OK));
+        let mut state = null_mut();
+        assert_eq!((fmu.set(&[GAIN], &[4.0]), fmu.save(&mut state)), (OK, OK));
+        assert_eq!((fmu.set(&[GAIN], &[5.0]), fmu.step(0.1, 0.1)), (OK, OK));
+        assert_eq!((fmu.get(GAIN), fmu.get(DOUBLE_GAIN)), (5.0, 10.0));
+        // Set, but not seen by a step yet: saved as it was.
+        assert_eq!((fmu.restore(state), fmu.get(GAIN), fmu.get(DOUBLE_GAIN)), (OK, 4.0, 6.0));
+        assert_eq!((fmu.step(0.1, 0.1), fmu.get(DOUBLE_GAIN)), (OK, 8.0));
+        assert_eq!((fmu.free_state(&mut state), fmu.reset(), fmu.enter(0.0, None)), (OK, OK, OK));
+        assert_eq!((fmu.get(GAIN), fmu.get(DOUBLE_GAIN)), (1.0, 2.0));
+    }
+}

@@ -61,6 +61,8 @@ pub struct CurrentGains {
     d: AxisGains,
     q: AxisGains,
     reference_feed_forward: bool,
+    /// Feed-forward of the references in Ohm.
+    R: f64,
 }
 
 impl CurrentGains {
@@ -70,6 +72,7 @@ impl CurrentGains {
             d: AxisGains::new(par, motor.L_d, motor.R_s),
             q: AxisGains::new(par, motor.L_q, motor.R_s),
             reference_feed_forward: par.reference_feed_forward,
+            R: if par.reference_feed_forward { motor.R_s } else { 0.0 },
         }
     }
 }
@@ -86,7 +89,7 @@ impl CurrentController {
     pub fn command(&self, gains: &CurrentGains, motor: &Motor, i_ref: DqHat, i: DqHat, w: f64) -> DqHat {
         let error = i_ref - i;
         let forward = if gains.reference_feed_forward { i_ref } else { i };
-        let resistive = if gains.reference_feed_forward { i_ref * motor.R_s } else { DqHat::ZERO };
+        let resistive = if gains.reference_feed_forward { i_ref * gains.R } else { DqHat::ZERO };
         DqHat::new(
             gains.d.k_p * error.d() + self.integral.d()
                 - gains.d.active_resistance * i.d()
@@ -96,6 +99,18 @@ impl CurrentController {
                 + w * (motor.L_d * forward.d() + motor.psi_M)
                 + resistive.q(),
         )
+    }
+
+    /// From the gains `old` to `new` without a jump of the command at the reference `i_ref` and the current `i` (A).
+    pub fn retune(&mut self, old: &CurrentGains, new: &CurrentGains, i_ref: DqHat, i: DqHat) {
+        let error = i_ref - i;
+        let direct = |gains: &CurrentGains| {
+            DqHat::new(
+                gains.d.k_p * error.d() - gains.d.active_resistance * i.d(),
+                gains.q.k_p * error.q() - gains.q.active_resistance * i.q(),
+            ) + i_ref * gains.R
+        };
+        self.integral += direct(old) - direct(new);
     }
 
     /// The controller in a frame `angle` (rad) behind the one that it was in: the same voltage.
@@ -126,7 +141,9 @@ type P = Row<CurrentLoop>;
 pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
     const {
         &[
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the current loop", |p| &mut p.bandwidth).above(0.0),
+            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the current loop", |p| &mut p.bandwidth)
+                .above(0.0)
+                .tunable(),
             P::boolean_parameter(
                 "active_resistance",
                 "false: Kp = wc L, Ki = wc R; true: Ki = wc^2 L with active resistance wc L - R",
@@ -135,7 +152,8 @@ pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
             P::parameter("integral", &ONE, "Integral gain Ki in units of wc^2 L; 0: as active_resistance says", |p| {
                 &mut p.integral
             })
-            .at_least(0.0),
+            .at_least(0.0)
+            .tunable(),
             P::boolean_parameter(
                 "reference_feed_forward",
                 "Decoupling from the current references, with R, as in Kim & Sul (31); false: from the measured currents",

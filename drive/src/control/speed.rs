@@ -2,7 +2,11 @@
 //!
 //! i_q,ref = K_p (b w_ref - w) + I, K_p = J w_s / K, dI/dt = (K_p w_s / t_is)(w_ref - w), with K = 1.5 n_p psi_M and all
 //! speeds mechanical. The integrator holds while i_q is at its limit and the error drives it further in.
+//!
+//! With `ramp` the reference goes to the set point no faster than that. In torque mode there is no speed loop: the torque
+//! reference divided by K is the set point, within the same limits.
 
+use crate::control::start::RAD_PER_S2;
 use fmu_core::unit::{ONE, RAD_PER_S};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
@@ -16,11 +20,24 @@ pub struct SpeedLoop {
     pub t_is: f64,
     /// Weight of the set point on the proportional part, 0..1.
     pub b: f64,
+    /// Greatest change of the reference in rad/s2, mechanical, >= 0; 0: none.
+    pub ramp: f64,
+    /// The torque reference rules instead of the speed's.
+    pub torque_mode: bool,
 }
 
 impl Default for SpeedLoop {
     fn default() -> Self {
-        Self { bandwidth: 80.0, t_is: 4.0, b: 0.5 }
+        Self { bandwidth: 80.0, t_is: 4.0, b: 0.5, ramp: 0.0, torque_mode: false }
+    }
+}
+
+impl SpeedLoop {
+    /// The reference (rad/s) a sample of `T_s` (s) after it was `last`, on its way to `w_ref` (rad/s).
+    #[inline]
+    pub fn ramped(&self, last: f64, w_ref: f64, T_s: f64) -> f64 {
+        let most = self.ramp * T_s;
+        if self.ramp > 0.0 && (w_ref - last).abs() > most { last + most.copysign(w_ref - last) } else { w_ref }
     }
 }
 
@@ -63,6 +80,12 @@ impl SpeedController {
 }
 
 impl SpeedController {
+    /// From the gains `old` to `new` without a jump of the output at the speed reference `w_ref` and the speed `w` (rad/s).
+    pub fn retune(&mut self, old: &SpeedGains, new: &SpeedGains, w_ref: f64, w: f64) {
+        let proportional = |gains: &SpeedGains| gains.k_p * (gains.b * w_ref - w);
+        self.integral += proportional(old) - proportional(new);
+    }
+
     /// Starts with the output `i_q` (A) at the speed reference `w_ref` and the speed `w` (rad/s).
     pub fn take_over(gains: &SpeedGains, w_ref: f64, w: f64, i_q: f64) -> Self {
         Self { integral: i_q - gains.k_p * (gains.b * w_ref - w) }
@@ -75,11 +98,24 @@ type P = Row<SpeedLoop>;
 pub const SPEED_LOOP: &Table<SpeedLoop> = &Table::new(
     const {
         &[
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the speed loop", |p| &mut p.bandwidth).above(0.0),
-            P::parameter("t_is", &ONE, "Integral time in units of 1/bandwidth", |p| &mut p.t_is).above(0.0),
+            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the speed loop", |p| &mut p.bandwidth)
+                .above(0.0)
+                .tunable(),
+            P::parameter("t_is", &ONE, "Integral time in units of 1/bandwidth", |p| &mut p.t_is).above(0.0).tunable(),
             P::parameter("b", &ONE, "Weight of the set point on the proportional part", |p| &mut p.b)
                 .at_least(0.0)
-                .at_most(1.0),
+                .at_most(1.0)
+                .tunable(),
+            P::parameter("ramp", &RAD_PER_S2, "Greatest rate of the speed reference, mechanical; 0: none", |p| {
+                &mut p.ramp
+            })
+            .at_least(0.0)
+            .tunable(),
+            P::boolean_parameter(
+                "torque_mode",
+                "The torque reference tau_ref rules, within the limits, and speed_ref does nothing; false: speed control",
+                |p| &mut p.torque_mode,
+            ),
         ]
     },
 );
@@ -93,6 +129,21 @@ mod tests {
         let gains = SpeedGains::new(&SpeedLoop::default(), 1.5e-3, 0.675);
         assert!((gains.k_p - 1.5e-3 * 80.0 / 0.675).abs() < 1e-15);
         assert!((gains.k_i - gains.k_p * 20.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_reference_comes_to_the_set_point_and_stays() {
+        let ramp = SpeedLoop { ramp: 100.0, ..SpeedLoop::default() };
+        let (mut w, mut n) = (5.0, 0);
+        while (w + 2.0_f64).abs() > 1e-12 {
+            let next = ramp.ramped(w, -2.0, 1e-3);
+            assert!((w - next).abs() <= 0.1 + 1e-12 && next < w);
+            (w, n) = (next, n + 1);
+        }
+        // Seventy steps, and one more for their rounding.
+        assert!((70..=71).contains(&n), "{n}");
+        assert_eq!(ramp.ramped(w, -2.0, 1e-3).to_bits(), (-2.0_f64).to_bits());
+        assert_eq!(SpeedLoop::default().ramped(5.0, -2.0, 1e-3).to_bits(), (-2.0_f64).to_bits());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! 1. Two alignments of `t_align`: the current on the axis 90 degrees behind `initial.theta_est`, then on it. One alone has
 //!    a dead point where the rotor is half a turn away.
-//! 2. Waits for a speed reference; then the frame speeds up by `acceleration` to `speed`, to the side of the reference.
+//! 2. Waits for a reference, of speed or in torque mode of torque; then the frame speeds up by `acceleration` to `speed`, to the side of the reference.
 //! 3. Holds that speed for `settle`, then hands over: the angle is the frame's and that of the EMF in it,
 //!    theta = theta_f + atan2(-s e_d, s e_q), e = v - R i - j w_f (L_d i_d + j L_q i_q), low-passed. The integrators of the
 //!    current controller are turned into the new frame, that of the speed controller takes the torque over.
@@ -12,7 +12,6 @@
 //!
 //! Limits: the load must stay below K I; at standstill the voltage errors of the inverter are in e_q.
 
-use crate::control::model::ControllerInputs;
 use crate::estimator::interval::Interval;
 use crate::estimator::{Context, Sample};
 use crate::frame::DqHat;
@@ -23,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Mechanical acceleration.
-const RAD_PER_S2: Quantity =
+pub(crate) const RAD_PER_S2: Quantity =
     Quantity::new("AngularAcceleration", Unit::si("rad/s2", Exponents::mechanical(0, 0, -2, 0).with_rad(1)));
 
 /// Damping ratio of the rotor on the current vector.
@@ -109,13 +108,14 @@ pub enum Led {
 }
 
 impl Lead {
-    /// One sample; `theta_est` (rad) is where the second alignment brings the rotor.
+    /// One sample; `theta_est` (rad) is where the second alignment brings the rotor, `reference` what says to which side to
+    /// turn.
     pub fn update(
         &mut self,
         par: &StartParameters,
         context: &Context,
         theta_est: f64,
-        inputs: &ControllerInputs,
+        reference: f64,
         sample: &Sample,
     ) -> Led {
         let Context { motor, T_s, J, .. } = *context;
@@ -136,10 +136,10 @@ impl Lead {
 
         self.n += 1.0;
         let t = self.n * T_s;
-        let (rated, side) = (n_p * par.speed, if inputs.speed_ref < 0.0 { -1.0 } else { 1.0 });
+        let (rated, side) = (n_p * par.speed, if reference < 0.0 { -1.0 } else { 1.0 });
         match self.stage {
             Stage::Behind if t >= par.t_align => self.enter(Stage::On),
-            Stage::On if t >= par.t_align && inputs.speed_ref != 0.0 => self.enter(Stage::Ramp),
+            Stage::On if t >= par.t_align && reference != 0.0 => self.enter(Stage::Ramp),
             Stage::Ramp => {
                 // The side is chosen once: at the first sample of the ramp.
                 let side = if self.w == 0.0 { side } else { self.w.signum() };

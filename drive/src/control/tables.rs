@@ -2,9 +2,9 @@
 
 use crate::control::current::{CURRENT_LOOP, CurrentLoop};
 use crate::control::lock::{LOCK, LockParameters};
-use crate::control::model::ControllerOutputs;
 use crate::control::polarity::{POLARITY, PolarityParameters};
 use crate::control::sensor::{SENSOR, Sensor};
+use crate::control::signals::ControllerOutputs;
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
 use crate::control::start::{START, StartParameters};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
@@ -163,16 +163,19 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
             P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
             P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
-                .above(0.0),
-            P::parameter("limit.i_q", &AMPERE, "Greatest magnitude of i_q", |p| &mut p.limit.i_q).above(0.0),
+                .above(0.0)
+                .tunable(),
+            P::parameter("limit.i_q", &AMPERE, "Greatest magnitude of i_q", |p| &mut p.limit.i_q).above(0.0).tunable(),
             P::parameter("limit.i", &AMPERE, "Greatest magnitude of the current; i_d has priority over i_q", |p| {
                 &mut p.limit.i
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
             P::parameter("limit.tau", &NEWTON_METRE, "Greatest magnitude of the torque reference", |p| {
                 &mut p.limit.tau
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
             P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
             P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
@@ -198,6 +201,9 @@ type O = Row<ControllerOutputs>;
 pub const LOCK_LOST: &str =
     "Whether the estimate fits the voltage: 0 it is at the rotor, 1 and more it is lost, 10 at most";
 
+/// What the output says.
+pub const ENABLED: &str = "The controller is at work: the voltage references are its own";
+
 /// The controller's outputs.
 pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
     const {
@@ -216,6 +222,7 @@ pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d", |o| &mut o.i_ref.d),
             O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q", |o| &mut o.i_ref.q),
             O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
+            O::boolean_output("enabled", ENABLED, |o| &mut o.enabled),
         ]
     },
 );

@@ -39,11 +39,13 @@ pub const ZERO_SPEED: &Table<ZeroSpeed> = &Table::new(
             P::parameter("i_0", &AMPERE, "Current along the estimated magnet axis at standstill, eq (25)", |p| {
                 &mut p.i_0
             })
-            .at_least(0.0),
+            .at_least(0.0)
+            .tunable(),
             P::parameter("w_0", &SPEED, "Mechanical speed at which that current has fallen to 1/e, eq (25)", |p| {
                 &mut p.w_0
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
         ]
     },
 );

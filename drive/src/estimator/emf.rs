@@ -124,7 +124,8 @@ pub const EMF: &Table<EmfParameters> = &Table::new(
             P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the EMF: poles of its observer or filter", |p| {
                 &mut p.bandwidth
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
             P::parameter(
                 "w_sign",
                 &RAD_PER_S,

@@ -89,11 +89,13 @@ pub const FOLLOWER: &Table<FollowerParameters> = &Table::new(
             P::parameter("bandwidth", &RAD_PER_S, "Gain of the angle error, voltage and current model", |p| {
                 &mut p.bandwidth
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
             P::parameter("filter", &RAD_PER_S, "Bandwidth of the calculated speed, voltage and current model", |p| {
                 &mut p.filter
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
             P::boolean_parameter(
                 "integral",
                 "Integrate the angle error, so that a bias of the speed turns nothing; false: as printed",

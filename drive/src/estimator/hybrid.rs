@@ -114,7 +114,8 @@ pub const HYBRID: &Table<HybridParameters> = &Table::new(
             P::parameter("bandwidth", &RAD_PER_S, "Pole of the tracker where only the EMF counts", |p| {
                 &mut p.bandwidth
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
         ]
     },
 );

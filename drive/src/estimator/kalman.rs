@@ -218,19 +218,23 @@ pub const KALMAN: &Table<KalmanParameters> = &Table::new(
             P::parameter("voltage_d", &V2_S, "Noise density of the voltage along the estimated magnet axis", |p| {
                 &mut p.voltage_d
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
             P::parameter("voltage_q", &V2_S, "Noise density of the voltage across the estimated magnet axis", |p| {
                 &mut p.voltage_q
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
             P::parameter("acceleration", &RAD2_PER_S3, "Noise density of the electrical acceleration", |p| {
                 &mut p.acceleration
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
             P::parameter("current", &A2_S, "Noise density of the measured current: variance times T_s", |p| {
                 &mut p.current
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
         ]
     },
 );

@@ -133,6 +133,12 @@ pub trait Estimating: Sized {
         *self = Self::start(context, sample, theta, w).0;
     }
 
+    /// Parameters went from those of `old` to those of `new` after this sample. What the estimate was stays; where a gain
+    /// acts directly on angle or speed the state takes up the difference.
+    fn retune(&mut self, old: &Context, new: &Context) {
+        let _ = (old, new);
+    }
+
     /// Whether the parameters suit this estimator.
     ///
     /// # Errors
@@ -212,6 +218,13 @@ macro_rules! estimators {
             pub fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
                 match self {
                     $(Self::$name(state) => state.update(context, sample),)*
+                }
+            }
+
+            /// As [`Estimating::retune`].
+            pub fn retune(&mut self, old: &Context, new: &Context) {
+                match self {
+                    $(Self::$name(state) => state.retune(old, new),)*
                 }
             }
 

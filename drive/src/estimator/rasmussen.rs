@@ -80,14 +80,36 @@ impl Estimating for Rasmussen {
         self.i = sample.i;
         self.theta += T_s * self.w;
 
-        let axis = Axis::<Estimated>::at(self.theta);
-        let psi_r = axis.from_stator(self.psi_s) - inductive(motor, axis.from_stator(sample.i));
+        let psi_r = self.psi_r(motor);
         let g_2 = par.w_n * par.w_n / motor.psi_M;
-        let g_1 = 2.0 * par.zeta * par.w_n / motor.psi_M;
+        let g_1 = par.g_1(motor);
         self.w_i += T_s * g_2 * psi_r.q();
         self.w = g_1 * psi_r.q() + self.w_i;
         self.v = DqHat::new(-par.c_1 * (psi_r.d() - motor.psi_M), -par.c_2 * psi_r.q());
         Estimate::new(self.theta, self.w, sample)
+    }
+
+    /// w^ = g_1 psi_rq^ + w_I stays where g_1 changes.
+    fn retune(&mut self, old: &Context, new: &Context) {
+        let g_1 = |context: &Context| context.par.observer.g_1(context.motor);
+        self.w_i += (g_1(old) - g_1(new)) * self.psi_r(new.motor).q();
+    }
+}
+
+impl RasmussenParameters {
+    /// Proportional gain of the speed adaptation in rad/s per Wb.
+    #[inline]
+    fn g_1(&self, motor: &Motor) -> f64 {
+        2.0 * self.zeta * self.w_n / motor.psi_M
+    }
+}
+
+impl Rasmussen {
+    /// Flux linkage of the magnet in Wb as the observer has it at the last sample, in the estimated frame.
+    #[inline]
+    fn psi_r(&self, motor: &Motor) -> DqHat {
+        let axis = Axis::<Estimated>::at(self.theta);
+        axis.from_stator(self.psi_s) - inductive(motor, axis.from_stator(self.i))
     }
 }
 
@@ -103,11 +125,16 @@ type P = Row<RasmussenParameters>;
 pub const OBSERVER: &Table<RasmussenParameters> = &Table::new(
     const {
         &[
-            P::parameter("c_1", &PER_SECOND, "Feedback of the d flux error, eq (21)", |p| &mut p.c_1).at_least(0.0),
-            P::parameter("c_2", &PER_SECOND, "Feedback of the q flux, eq (21)", |p| &mut p.c_2).at_least(0.0),
-            P::parameter("w_n", &RAD_PER_S, "Natural frequency of the speed adaptation", |p| &mut p.w_n).above(0.0),
+            P::parameter("c_1", &PER_SECOND, "Feedback of the d flux error, eq (21)", |p| &mut p.c_1)
+                .at_least(0.0)
+                .tunable(),
+            P::parameter("c_2", &PER_SECOND, "Feedback of the q flux, eq (21)", |p| &mut p.c_2).at_least(0.0).tunable(),
+            P::parameter("w_n", &RAD_PER_S, "Natural frequency of the speed adaptation", |p| &mut p.w_n)
+                .above(0.0)
+                .tunable(),
             P::parameter("zeta", &ONE, "Damping of the speed adaptation; 0 is the integral form (16)", |p| &mut p.zeta)
-                .at_least(0.0),
+                .at_least(0.0)
+                .tunable(),
         ]
     },
 );

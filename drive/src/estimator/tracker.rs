@@ -114,7 +114,8 @@ pub const TRACKER: &Table<TrackerParameters> = &Table::new(
             P::parameter("bandwidth", &RAD_PER_S, "Pole of the tracker, of multiplicity two or three", |p| {
                 &mut p.bandwidth
             })
-            .above(0.0),
+            .above(0.0)
+            .tunable(),
         ]
     },
 );

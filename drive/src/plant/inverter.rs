@@ -33,13 +33,6 @@ impl Inverter {
     pub fn u_dead(&self, u_dc: f64) -> f64 {
         self.dead_time / self.T_pwm * u_dc
     }
-
-    /// The part of the DC link's current (A) that the legs with the currents `i` (A) do not draw for their dead time.
-    #[inline]
-    pub fn dead_time_current(&self, i: Phases) -> f64 {
-        let leg = |i: f64| (i / self.i_zero).clamp(-1.0, 1.0) * i;
-        self.dead_time / self.T_pwm * (leg(i.a) + leg(i.b) + leg(i.c))
-    }
 }
 
 /// The voltage (V) that legs lose which lose up to `u_dead` (V) with the currents `i` (A).

@@ -1,6 +1,7 @@
 //! The plant: machine, mechanics and inverter, and the model `PmsmPlant` made of them.
 
 pub mod inverter;
+pub mod legs;
 pub mod machine;
 pub mod mechanics;
 pub mod model;

@@ -3,7 +3,8 @@
 use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
 use crate::integrate::rk4;
 use crate::math::wrap;
-use crate::plant::inverter::{dead_time_loss, limit_to_hexagon};
+use crate::plant::inverter::limit_to_hexagon;
+use crate::plant::legs::Legs;
 use crate::plant::machine;
 use crate::plant::power::Powers;
 use crate::plant::tables::{OUTPUTS, PARAMETERS, PlantParameters};
@@ -31,11 +32,14 @@ pub struct PlantInputs {
     pub speed_shaft: f64,
     /// Imposed mechanical angle of the shaft in rad, at the beginning of the step.
     pub angle_shaft: f64,
+    /// The gates switch; false: only the diodes conduct.
+    pub enable: bool,
 }
 
 impl Default for PlantInputs {
     fn default() -> Self {
-        Self { u: Phases::default(), u_dc: 325.0, tau_load: 0.0, speed_shaft: 0.0, angle_shaft: 0.0 }
+        let u = Phases::default();
+        Self { u, u_dc: 325.0, tau_load: 0.0, speed_shaft: 0.0, angle_shaft: 0.0, enable: true }
     }
 }
 
@@ -96,10 +100,12 @@ pub struct PmsmPlant {
 }
 
 impl PmsmPlant {
-    /// Time constant in s of a current near zero, where the dead time is a resistance; infinite without one.
-    fn zero_current_time(&self) -> f64 {
+    /// What stands against the currents.
+    #[inline]
+    fn legs(&self) -> Legs {
         let PlantParameters { motor, inverter, .. } = &self.parameters;
-        inverter.i_zero * motor.L_d.min(motor.L_q) / inverter.u_dead(self.inputs.u_dc)
+        let PlantInputs { u_dc, enable, .. } = self.inputs;
+        if enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
     }
 
     /// The state at the beginning of a step: an imposed shaft is where the drive train says. What differs from the angle
@@ -118,26 +124,40 @@ impl PmsmPlant {
 
     /// Derivative of the state with the stator voltage `u` held.
     #[inline]
-    fn derivative(&self, x: &Vector4<f64>, u: AlphaBeta) -> Vector4<f64> {
-        let PlantParameters { motor, saturation, inverter, mechanics, .. } = &self.parameters;
+    fn derivative(&self, x: &Vector4<f64>, u: AlphaBeta, legs: &Legs) -> Vector4<f64> {
+        let PlantParameters { motor, saturation, .. } = &self.parameters;
         let State { psi, speed, angle } = State::from_vector(x);
         let n_p = f64::from(motor.n_p);
         let i = machine::current(motor, saturation, psi);
         let axis = Axis::<Rotor>::at(n_p * angle);
-        let u = if inverter.dead_time > 0.0 {
-            let legs = Phases::from_stator(axis.to_stator(i));
-            u - dead_time_loss(inverter.u_dead(self.inputs.u_dc), inverter.i_zero, legs)
-        } else {
-            u
-        };
-        let u = axis.from_stator(u);
+        let u = axis.from_stator(u - legs.loss(axis, i));
         let d_psi = machine::flux_derivative(motor, psi, u, i, n_p * speed);
-        let acceleration = if mechanics.imposed {
-            0.0
-        } else {
-            mechanics.acceleration(machine::torque(motor, psi, i), self.inputs.tau_load, speed)
-        };
+        let acceleration = self.acceleration(machine::torque(motor, psi, i), speed);
         Vector4::new(d_psi.d(), d_psi.q(), acceleration, speed)
+    }
+
+    /// Angular acceleration in rad/s2; none where the drive train imposes the speed.
+    #[inline]
+    fn acceleration(&self, tau_e: f64, speed: f64) -> f64 {
+        let mechanics = &self.parameters.mechanics;
+        if mechanics.imposed { 0.0 } else { mechanics.acceleration(tau_e, self.inputs.tau_load, speed) }
+    }
+
+    /// One substep of `h` (s) with the gates off.
+    fn coast(&self, x: &Vector4<f64>, h: f64, legs: &Legs) -> Vector4<f64> {
+        match self.blocked(x, legs) {
+            Some(x) => rk4(x, h, |x| Vector4::new(0.0, 0.0, self.acceleration(0.0, x[2]), x[2])),
+            None => rk4(*x, h, |x| self.derivative(x, AlphaBeta::ZERO, legs)),
+        }
+    }
+
+    /// The state without current, where the diodes block.
+    fn blocked(&self, x: &Vector4<f64>, legs: &Legs) -> Option<Vector4<f64>> {
+        let PlantParameters { motor, saturation, .. } = &self.parameters;
+        let State { psi, speed, angle } = State::from_vector(x);
+        let (n_p, i) = (f64::from(motor.n_p), machine::current(motor, saturation, psi));
+        let free = State { psi: machine::flux(motor, Dq::ZERO), speed, angle };
+        legs.block(motor, Axis::at(n_p * angle), i, n_p * speed).then(|| free.to_vector())
     }
 }
 
@@ -186,13 +206,13 @@ impl Model for PmsmPlant {
             tau_e,
             i_d: i.d(),
             i_q: i.q(),
-            powers: Powers::new(&self.parameters, &self.inputs, phases, tau_e, speed),
+            powers: Powers::new(&self.parameters, &self.inputs, &self.legs(), phases, tau_e, speed),
         };
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
-        let substep = LONGEST_SUBSTEP.min(0.5 * self.zero_current_time());
+        let legs = self.legs();
+        let substep = LONGEST_SUBSTEP.min(0.5 * legs.time(&self.parameters.motor));
         let count = (step.h / substep - 1e-9).ceil().max(1.0);
         if count > MOST_SUBSTEPS {
             let longest = MOST_SUBSTEPS * substep;
@@ -201,9 +221,18 @@ impl Model for PmsmPlant {
         let h = step.h / count;
         let mut x = self.at_the_shaft().to_vector();
         let mut left = count;
-        while left > 0.0 {
-            x = rk4(x, h, |x| self.derivative(x, u));
-            left -= 1.0;
+        if self.inputs.enable {
+            let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
+            while left > 0.0 {
+                x = rk4(x, h, |x| self.derivative(x, u, &legs));
+                left -= 1.0;
+            }
+        } else {
+            while left > 0.0 {
+                x = self.coast(&x, h, &legs);
+                left -= 1.0;
+            }
+            x = self.blocked(&x, &legs).unwrap_or(x);
         }
         let state = State::from_vector(&x);
         if !state.is_finite() {
@@ -242,6 +271,9 @@ const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
                 &mut m.model.inputs.angle_shaft
             })
             .unbounded(),
+            V::boolean_input("enable", "The gates switch; false: off, only the diodes conduct", |m| {
+                &mut m.model.inputs.enable
+            }),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
         ]

@@ -6,8 +6,8 @@
 //! p_in   = p_loss + p_mech + d/dt (magnetic energy + J speed^2 / 2)
 //! ```
 //!
-//! u_x is the voltage that the leg gives on the mean of a PWM period, after the hexagon and with what the dead time takes;
-//! switches and diodes lose nothing. The magnetic energy is 0.75 (L_d i_d^2 + L_q i_q^2) where nothing saturates. With an
+//! u_x is the voltage that the leg gives on the mean of a PWM period, after the hexagon and with what the dead time takes,
+//! or that of its diodes while the gates are off; switches and diodes lose nothing. The magnetic energy is 0.75 (L_d i_d^2 + L_q i_q^2) where nothing saturates. With an
 //! imposed speed tau_shaft is tau_e minus friction and the kinetic energy is the drive train's; otherwise tau_shaft is
 //! tau_load, and J stores the rest.
 //!
@@ -16,6 +16,7 @@
 //! 0 V still sees the current of the legs that are connected to it.
 
 use crate::frame::Phases;
+use crate::plant::legs::Legs;
 use crate::plant::model::PlantInputs;
 use crate::plant::tables::PlantParameters;
 use fmu_core::unit::{AMPERE, NEWTON_METRE, WATT};
@@ -40,20 +41,16 @@ pub struct Powers {
 impl Powers {
     /// With the stator currents `i` (A), the electromagnetic torque `tau_e` (N.m) and the mechanical `speed` (rad/s).
     #[inline]
-    pub fn new(par: &PlantParameters, inputs: &PlantInputs, i: Phases, tau_e: f64, speed: f64) -> Self {
-        let PlantParameters { motor, inverter, mechanics, .. } = par;
+    pub fn new(par: &PlantParameters, inputs: &PlantInputs, legs: &Legs, i: Phases, tau_e: f64, speed: f64) -> Self {
+        let PlantParameters { motor, mechanics, .. } = par;
         let friction = mechanics.friction(speed);
         let tau_shaft = if mechanics.imposed { tau_e - friction } else { inputs.tau_load };
-        // Currents sum to zero, so that a common part of the voltages has no power.
         let u = &inputs.u;
-        let apparent = (u.a - u.c) * i.a + (u.b - u.c) * i.b;
         let full = inputs.u_dc.max(u.span());
-        let mut i_dc = if full > 0.0 { apparent / full } else { 0.0 };
-        if inverter.dead_time > 0.0 {
-            i_dc -= inverter.dead_time_current(i);
-        }
+        // Currents sum to zero, so that a common part of the voltages has no power.
+        let apparent = if inputs.enable { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { 0.0 };
         // -0 A, the product of no current and a negative voltage, is 0 A.
-        i_dc += 0.0;
+        let i_dc = if full > 0.0 { apparent / full } else { 0.0 } - legs.feed(i) + 0.0;
         let copper = motor.R_s * (i.a * i.a + i.b * i.b + i.c * i.c);
         Self { i_dc, p_in: inputs.u_dc * i_dc, p_mech: tau_shaft * speed, p_loss: copper + friction * speed, tau_shaft }
     }

@@ -1,0 +1,88 @@
+//! What goes into the controller and what comes out of it.
+
+use crate::frame::{DqHat, Phases};
+use serde::{Deserialize, Serialize};
+
+/// Inputs, read at the sample instants.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ControllerInputs {
+    /// Measured stator currents in A.
+    pub i: Phases,
+    /// Measured DC-link voltage in V, >= 0.
+    pub u_dc: f64,
+    /// Mechanical speed reference in rad/s.
+    pub speed_ref: f64,
+    /// Electrical angle of a sensor in rad.
+    pub theta_meas: f64,
+    /// Mechanical speed of a sensor in rad/s.
+    pub speed_meas: f64,
+    /// Torque reference in N.m, in torque mode.
+    pub tau_ref: f64,
+    /// The controller works; false: it stands at its start and commands 0 V.
+    pub enable: bool,
+}
+
+impl ControllerInputs {
+    /// Whether all of them are numbers.
+    pub fn is_finite(&self) -> bool {
+        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _ } = self;
+        [i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref].iter().all(|x| x.is_finite())
+    }
+}
+
+impl Default for ControllerInputs {
+    fn default() -> Self {
+        Self {
+            i: Phases::default(),
+            u_dc: 325.0,
+            speed_ref: 0.0,
+            theta_meas: 0.0,
+            speed_meas: 0.0,
+            tau_ref: 0.0,
+            enable: true,
+        }
+    }
+}
+
+/// Outputs: what sample k computed, shown from t_k + T_s on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ControllerOutputs {
+    /// Stator voltage references in V, inside the hexagon of u_dc.
+    pub u: Phases,
+    /// Estimated mechanical speed in rad/s.
+    pub speed_est: f64,
+    /// Estimated electrical angle in rad, in (-pi, pi], for the instant t_k + T_s.
+    pub theta_est: f64,
+    /// Stator current in the estimated rotor frame in A.
+    pub i: DqParts,
+    /// Its reference in A.
+    pub i_ref: DqParts,
+    /// Whether the estimate is at the rotor: 0 yes, 1 and more no.
+    pub lock_lost: f64,
+    /// Whether the controller is at work.
+    pub enabled: bool,
+}
+
+impl ControllerOutputs {
+    /// Whether all of them are numbers.
+    pub fn is_finite(&self) -> bool {
+        let Self { u, speed_est, theta_est, i, i_ref, lock_lost, enabled: _ } = self;
+        let all = [u.a, u.b, u.c, *speed_est, *theta_est, i.d, i.q, i_ref.d, i_ref.q, *lock_lost];
+        all.iter().all(|x| x.is_finite())
+    }
+}
+
+/// The two components of a vector, as variables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DqParts {
+    /// Along the estimated magnet axis.
+    pub d: f64,
+    /// Across it.
+    pub q: f64,
+}
+
+impl From<DqHat> for DqParts {
+    fn from(v: DqHat) -> Self {
+        Self { d: v.d(), q: v.q() }
+    }
+}
