@@ -5,7 +5,7 @@
 //!   files.
 //! - [`importer`]: runs any co-simulation FMU; the only place with `unsafe` code.
 //! - [`check`]: whether an FMU keeps to its standard.
-//! - [`cosimulation`]: several FMUs connected; [`plot`]: what they did, as a picture.
+//! - [`cosimulation`]: several FMUs connected; [`ssp`]: systems of FMUs as files; [`plot`]: what they did, as a picture.
 //! - [`reproduce`]: the paper's experiments; [`compare`]: the estimators side by side, natively; [`tune`]: values for a machine.
 
 pub mod check;
@@ -22,6 +22,7 @@ pub mod pack;
 pub mod platform;
 pub mod plot;
 pub mod reproduce;
+pub mod ssp;
 pub mod target;
 pub mod tune;
 pub mod workspace;

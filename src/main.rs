@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use fmu::check::probe;
-use fmu::commands::{build, check, compare, merge, reproduce, simulate, tune};
+use fmu::commands::{build, check, compare, merge, reproduce, simulate, ssp, tune};
 use std::process::ExitCode;
 
 /// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.
@@ -24,6 +24,7 @@ enum Command {
     Reproduce(reproduce::Reproduce),
     Compare(compare::Compare),
     Tune(tune::Tune),
+    Ssp(ssp::Ssp),
     #[command(hide = true)]
     Probe(probe::Probe),
 }
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Ssp(args) => ssp::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Compare(args) => compare::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
     };
     outcome.unwrap_or_else(|error| {

@@ -30,3 +30,26 @@ fn every_estimator_as_natively() {
     fs::write(&file, common::estimators::experiments().to_string()).expect("a file below the target folder");
     pytest("fmpy", "estimators", &["test_estimators.py"], &[("FMU_ESTIMATORS", &file)]);
 }
+
+/// Systems as SSP files, and what `fmu simulate` makes of them when their inputs come one step late.
+#[test]
+fn the_closed_loop_as_an_ssp() {
+    let folder = scratch().join(format!("fmpy-ssp-{}", process::id()));
+    fs::create_dir_all(&folder).expect("a folder below the target folder");
+    let fmu = |arguments: &[&str]| {
+        let output = process::Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).output().expect("fmu");
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    let path = |name: &str| folder.join(name).to_str().expect("UTF-8").to_owned();
+    let motor = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/ipmsm-2.2kw.toml");
+    for (name, more, u_dc) in
+        [("fmi2", &[][..], 325), ("fmi3", &["--fmi", "3"], 325), ("motor", &["--motor", motor], 540)]
+    {
+        let ssp = path(&format!("{name}.ssp"));
+        fmu(&[&["ssp", "--out", &ssp], more].concat());
+        let inputs = ["speed_ref=0:0,0.1001:50", "tau_load=0:0,0.4001:1", &format!("u_dc=0:0,0.0001:{u_dc}")];
+        let inputs: Vec<&str> = inputs.into_iter().flat_map(|input| ["--input", input]).collect();
+        fmu(&[&["simulate", &ssp, "--stop", "0.6", "--csv", &path(&format!("{name}.csv"))], &inputs[..]].concat());
+    }
+    pytest("fmpy", "ssp", &["test_ssp.py"], &[("FMU_SSP", &folder)]);
+}

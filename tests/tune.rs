@@ -96,9 +96,9 @@ fn values_are_those_of_the_rules() {
         ("start.mode", "CurrentFrequency"),
         ("current.mtpa", "true"),
     ] {
-        let parameter = ssv::read(&text).unwrap().into_iter().find(|(n, _)| n == name).unwrap();
-        let same =
-            parameter.1 == value || (parameter.1.parse::<f64>().unwrap() - value.parse::<f64>().unwrap()).abs() < 1e-12;
+        let parameter = ssv::read(&text).unwrap().into_iter().find(|p| p.name == name).unwrap();
+        let same = parameter.value == value
+            || (parameter.value.parse::<f64>().unwrap() - value.parse::<f64>().unwrap()).abs() < 1e-12;
         assert!(same, "{parameter:?}");
     }
 }

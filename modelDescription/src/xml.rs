@@ -21,18 +21,18 @@ pub struct Element {
 
 impl Element {
     /// An element with nothing in it.
-    pub(crate) fn new(name: &str) -> Self {
+    pub fn new(name: &str) -> Self {
         Self { name: name.into(), ..Self::default() }
     }
 
     /// The same with one more attribute.
-    pub(crate) fn with(mut self, name: &str, value: impl Into<String>) -> Self {
+    pub fn with(mut self, name: &str, value: impl Into<String>) -> Self {
         self.attributes.push((name.into(), value.into()));
         self
     }
 
     /// The same with one more attribute, unless there is no value for it.
-    pub(crate) fn with_some(self, name: &str, value: Option<impl Into<String>>) -> Self {
+    pub fn with_some(self, name: &str, value: Option<impl Into<String>>) -> Self {
         match value {
             Some(value) => self.with(name, value),
             None => self,
@@ -40,14 +40,19 @@ impl Element {
     }
 
     /// The same with one more attribute, unless the text is empty.
-    pub(crate) fn with_text(self, name: &str, value: &str) -> Self {
+    pub fn with_text(self, name: &str, value: &str) -> Self {
         self.with_some(name, Some(value).filter(|text| !text.is_empty()))
     }
 
     /// The same with more children.
-    pub(crate) fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
+    pub fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
         self.children.extend(children);
         self
+    }
+
+    /// The XML document whose root this is, in UTF-8.
+    pub fn to_xml(&self) -> String {
+        print(self)
     }
 
     /// The root element of an XML document.

@@ -6,4 +6,5 @@ pub mod compare;
 pub mod merge;
 pub mod reproduce;
 pub mod simulate;
+pub mod ssp;
 pub mod tune;

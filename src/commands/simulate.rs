@@ -1,8 +1,10 @@
 //! `fmu simulate`: co-simulates FMUs.
 
 use crate::Failed;
-use crate::cosimulation::{Point, Recording, Schedule, Settings, System};
+use crate::cosimulation::{Point, Recording, Schedule, Settings};
 use crate::importer::{Fmu, Message};
+use crate::ssp::load::Loaded;
+use crate::ssp::values;
 use crate::tune::ssv;
 use crate::{pack, plot};
 use anyhow::{Context, Result, anyhow, bail};
@@ -25,6 +27,8 @@ use std::time::{Duration, Instant};
 /// Start the motor and turn it at 1000 rpm (104.7 rad/s):
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
 ///     --input SensorlessController.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
+/// The same from an SSP file of `fmu ssp`, or of any other tool; names without a dot are those of the system's connectors:
+///   fmu simulate drive.ssp --input speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
 /// The same, connected by terminals:
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --terminal p.phases=c.phases --terminal p.sensor=c.sensor \
 ///     --input c.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
@@ -35,7 +39,7 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Simulate {
-    /// FMUs, each with a name of your choice or that of the file
+    /// FMUs, each with a name of your choice or that of the file; or one SSP file
     #[arg(value_name = "[NAME=]FILE", required = true)]
     pub fmus: Vec<String>,
     /// Connect an output to an input (repeatable)
@@ -88,8 +92,9 @@ pub struct Simulate {
 /// # Errors
 /// A file is no FMU that runs here, a name is wrong, or an FMU fails.
 pub fn run(args: &Simulate) -> Result<()> {
-    let mut system = System::default();
-    let settings = prepare(&mut system, args)?;
+    let mut loaded = open(args)?;
+    let settings = prepare(&mut loaded, args)?;
+    let Loaded { mut system, .. } = loaded;
     let mut progress = Progress::new(settings);
     let mut hook = |point: &mut Point<'_>| {
         if args.logging {
@@ -106,15 +111,29 @@ pub fn run(args: &Simulate) -> Result<()> {
     write(&outcome?, args)
 }
 
-/// Everything before the run.
-fn prepare(system: &mut System, args: &Simulate) -> Result<Settings> {
-    let mut experiments = Vec::new();
+/// The FMUs, or those of an SSP file.
+fn open(args: &Simulate) -> Result<Loaded> {
+    let mut loaded = Loaded::default();
     for text in &args.fmus {
         let (name, path) = name_and_path(text)?;
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
+            if args.fmus.len() > 1 {
+                bail!("{}: an SSP is simulated alone: its FMUs are inside", path.display());
+            }
+            loaded = Loaded::open(path, args.logging)?;
+            loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
+            break;
+        }
         let fmu = Fmu::open(path)?;
-        experiments.push(fmu.description().default_experiment);
-        system.add(&name, &fmu, args.logging)?;
+        loaded.experiments.push(fmu.description().default_experiment);
+        loaded.system.add(&name, &fmu, args.logging)?;
     }
+    Ok(loaded)
+}
+
+/// Everything before the run.
+fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
+    let Loaded { system, .. } = loaded;
     for text in &args.connect {
         let (from, to) = halves(text, "--connect OUTPUT=INPUT")?;
         system.connect(from, to)?;
@@ -129,39 +148,37 @@ fn prepare(system: &mut System, args: &Simulate) -> Result<Settings> {
         match text.split_once('=') {
             Some((port, points)) => {
                 let schedule = Schedule::parse(points).map_err(|cause| anyhow!("--input {text}: {cause}"))?;
-                system.input(port, schedule)?;
+                loaded.input(port, &schedule)?;
             }
             None => {
                 for (port, schedule) in
                     Schedule::read_csv(Path::new(text)).map_err(|cause| anyhow!("--input {cause}"))?
                 {
-                    system.input(&port, schedule)?;
+                    loaded.input(&port, &schedule)?;
                 }
             }
         }
     }
     if args.auto_connect {
-        for (from, to) in system.connect_by_name()? {
+        for (from, to) in loaded.system.connect_by_name()? {
             eprintln!("connected {from} -> {to}");
         }
     }
     for text in &args.parameters {
         let (instance, file) = halves(text, "--parameters INSTANCE=FILE.ssv")?;
         let content = std::fs::read_to_string(file).with_context(|| format!("reading {file}"))?;
-        let values = ssv::read(&content).map_err(|cause| anyhow!("{file}: {cause}"))?;
-        for (name, value) in values {
-            system.set(&format!("{instance}.{name}"), &value).with_context(|| file.to_owned())?;
-        }
+        let given = ssv::read(&content).map_err(|cause| anyhow!("{file}: {cause}"))?;
+        values::set(&mut loaded.system, instance, file, &given)?;
     }
     for text in &args.set {
         let (port, value) = halves(text, "--set VARIABLE=VALUE")?;
-        system.set(port, value)?;
+        loaded.set(port, value)?;
     }
     if args.record.is_empty() {
-        system.record_outputs()?;
+        loaded.record_outputs()?;
     }
-    args.record.iter().try_for_each(|port| system.record(port))?;
-    Ok(settings(args, &experiments))
+    args.record.iter().try_for_each(|port| loaded.record(port))?;
+    Ok(settings(args, &loaded.experiments))
 }
 
 /// What is not said is taken from the FMUs.

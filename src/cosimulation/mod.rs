@@ -45,6 +45,8 @@ pub struct System {
     terminals: Vec<Result<Option<TerminalsAndIcons>, Error>>,
     wiring: Wiring,
     records: Vec<Port>,
+    /// Names of the recorded columns.
+    columns: Vec<String>,
 }
 
 /// A variable of one of the instances.
@@ -151,9 +153,27 @@ impl System {
     /// # Errors
     /// There is no such variable, or it is no number.
     pub fn record(&mut self, port: &str) -> Result<(), Error> {
+        self.record_as(port, port)
+    }
+
+    /// The same under another name.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    pub fn record_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
         let port = self.scalar(port)?;
         self.records.push(port);
+        self.columns.push(name.into());
         Ok(())
+    }
+
+    /// Whether a connection or a schedule feeds an input, written `instance.variable`.
+    ///
+    /// # Errors
+    /// There is no such variable.
+    pub fn is_fed(&self, port: &str) -> Result<bool, Error> {
+        let port = self.port(port)?;
+        Ok(self.wiring.feeds(port.instance, &port.name))
     }
 
     /// Records all outputs of all instances.

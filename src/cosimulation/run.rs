@@ -40,7 +40,8 @@ impl System {
     ) -> Result<Recording, Error> {
         let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
         let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
-        let mut recording = Recording::new(self.records.iter().map(|p| self.column(p)));
+        let mut recording =
+            Recording::new(self.records.iter().zip(&self.columns).map(|(p, name)| self.column(p, name)));
         let Self { instances, .. } = self;
         for instance in instances.iter_mut() {
             instance.setup(settings.start, Some(settings.stop))?;
@@ -89,7 +90,7 @@ impl System {
         Ok(recording)
     }
 
-    fn column(&self, port: &Port) -> Column {
+    fn column(&self, port: &Port, name: &str) -> Column {
         let instance = &self.instances[port.instance];
         let description = instance.description();
         let variable = description.variable(&port.name);
@@ -97,11 +98,6 @@ impl System {
         let shown = variable.and_then(|v| v.display_unit.as_ref());
         let definition = unit.as_ref().and_then(|u| description.unit(u));
         let display = definition.zip(shown).and_then(|(unit, name)| unit.display_unit(name));
-        Column {
-            name: format!("{}.{}", instance.name(), port.name),
-            unit: unit.unwrap_or_default(),
-            display: display.cloned(),
-            values: Vec::new(),
-        }
+        Column { name: name.into(), unit: unit.unwrap_or_default(), display: display.cloned(), values: Vec::new() }
     }
 }

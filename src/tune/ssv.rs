@@ -16,8 +16,14 @@ fn escape(text: &str) -> String {
 
 /// The file.
 pub fn text(name: &str, settings: &[Setting]) -> String {
-    let mut text = format!("{HEAD} name=\"{}\" generationTool=\"fmu tune\">\n  <ssv:Parameters>\n", escape(name));
-    for Setting { name, value, .. } in settings {
+    text_of(name, settings.iter().map(|s| (s.name, &s.value)))
+}
+
+/// The file of any names and values.
+pub fn text_of<'a>(name: &str, values: impl IntoIterator<Item = (&'a str, &'a Value)>) -> String {
+    let mut text =
+        format!("{HEAD} name=\"{}\" generationTool=\"{}\">\n  <ssv:Parameters>\n", escape(name), crate::pack::TOOL);
+    for (name, value) in values {
         let (kind, value) = match value {
             Value::Real(x) => ("Real", x.to_string()),
             Value::Integer(i) => ("Integer", i.to_string()),
@@ -34,24 +40,46 @@ pub fn text(name: &str, settings: &[Setting]) -> String {
     text
 }
 
-/// Names and values of a file, the values as a user writes them.
+/// A value of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Parameter {
+    /// Name of the variable.
+    pub name: String,
+    /// Its value, as a user writes it.
+    pub value: String,
+    /// Its unit, where the file tells it.
+    pub unit: Option<String>,
+    /// Line of the element.
+    pub line: usize,
+}
+
+/// The values of a file.
 ///
 /// # Errors
 /// Says what is no parameter set.
-pub fn read(text: &str) -> Result<Vec<(String, String)>, String> {
-    let root = Element::parse(text).map_err(|e| e.to_string())?;
+pub fn read(text: &str) -> Result<Vec<Parameter>, String> {
+    parameters(&Element::parse(text).map_err(|e| e.to_string())?)
+}
+
+/// The values of a parameter set.
+///
+/// # Errors
+/// The element is none, or a parameter has no name or no value.
+pub fn parameters(root: &Element) -> Result<Vec<Parameter>, String> {
     let local = |element: &Element| element.name.rsplit(':').next().unwrap_or_default().to_owned();
-    if local(&root) != "ParameterSet" {
-        return Err(format!("is no ParameterSet of SSP but {}", root.name));
+    if local(root) != "ParameterSet" {
+        return Err(format!("line {}: is no ParameterSet of SSP but {}", root.line, root.name));
     }
     let sets = root.children.iter().filter(|c| local(c) == "Parameters");
     sets.flat_map(|set| &set.children)
+        .filter(|c| local(c) == "Parameter")
         .map(|parameter| {
             let at = |what: &str| format!("line {}: {what}", parameter.line);
             let name = parameter.get("name").ok_or_else(|| at("a parameter without a name"))?;
-            let value = parameter.children.iter().find(|c| !["Annotations", "MetaData"].contains(&local(c).as_str()));
-            let value = value.and_then(|v| v.get("value")).ok_or_else(|| at(&format!("{name} has no value")))?;
-            Ok((name.to_owned(), value.to_owned()))
+            let typed = parameter.children.iter().find(|c| !["Annotations", "MetaData"].contains(&local(c).as_str()));
+            let value = typed.and_then(|v| v.get("value")).ok_or_else(|| at(&format!("{name} has no value")))?;
+            let unit = typed.and_then(|v| v.get("unit")).map(str::to_owned);
+            Ok(Parameter { name: name.to_owned(), value: value.to_owned(), unit, line: parameter.line })
         })
         .collect()
 }
@@ -69,7 +97,8 @@ mod tests {
             setting("current.mtpa", Value::Boolean(true)),
             setting("estimator", Value::Item("ExtendedEmf".into())),
         ];
-        let back = read(&text("a \"b\" <c>", &settings)).unwrap();
+        let back: Vec<_> =
+            read(&text("a \"b\" <c>", &settings)).unwrap().into_iter().map(|p| (p.name, p.value)).collect();
         let expected = [
             ("motor.R_s", "0.30000000000000004"),
             ("motor.n_p", "3"),

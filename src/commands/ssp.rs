@@ -1,0 +1,83 @@
+//! `fmu ssp`: the closed loop of plant and controller as one file.
+
+use super::build::{self, Build};
+use crate::pack::{self, Moment};
+use crate::ssp::drive::{self, COMPONENTS, Values};
+use crate::tune::{self, ssv};
+use anyhow::{Context, Result, anyhow, bail};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Packs plant and controller, connected and with the values of a machine, as one SSP file (SSP 1.0).
+///
+/// The system has the inputs speed_ref, tau_load and u_dc and the outputs of both FMUs, named as those of PmsmDrive. Values
+/// come from a machine's file, as with `fmu tune`, or from SSV files for the components controller and plant; without either
+/// the FMUs keep their start values.
+///
+///   fmu ssp --motor motors/ipmsm-2.2kw.toml --out drive.ssp
+///   fmu simulate drive.ssp --input speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg
+///
+/// SSP 1.0 is older than FMI 3.0: many importers of SSP take FMUs of FMI 2.0 only. With SOURCE_DATE_EPOCH set, the same sources
+/// give the same bytes.
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub struct Ssp {
+    /// The standard of the FMUs: 2 or 3
+    #[arg(long, value_name = "VERSION", default_value = "2", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
+    pub fmi: String,
+    /// File of the machine, as `fmu tune` reads it
+    #[arg(long, value_name = "MOTOR.toml", conflicts_with = "parameters")]
+    pub motor: Option<PathBuf>,
+    /// Values for controller or plant, SSV of SSP 1.0 (repeatable)
+    #[arg(long, value_name = "COMPONENT=FILE.ssv")]
+    pub parameters: Vec<String>,
+    /// Where the SSP goes
+    #[arg(long, value_name = "FILE.ssp")]
+    pub out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The FMUs do not build, values do not fit, or the file cannot be written.
+pub fn run(args: &Ssp) -> Result<()> {
+    let moment = Moment::of_environment()?;
+    let values = values(args)?;
+    let dir = tempfile::tempdir()?;
+    let fmus = COMPONENTS.map(|(_, fmu, _)| fmu.to_owned()).to_vec();
+    let built =
+        build::run(&Build { fmus, fmi: Some(args.fmi.clone()), out: Some(dir.path().into()), ..Build::default() })?;
+    let folder = built.first().and_then(|f| f.parent()).context("nothing was built")?;
+    let files = drive::files(folder, &values, moment)?;
+    pack::write(&args.out, &pack::archive(&files, moment)?)?;
+    println!("{}", args.out.display());
+    Ok(())
+}
+
+/// The values, each with its file.
+fn values(args: &Ssp) -> Result<Vec<Values>> {
+    if let Some(motor) = &args.motor {
+        let tuned = tune::tune(motor)?;
+        let of = |component: &str, settings: &[tune::rules::Setting]| Values {
+            component: component.into(),
+            file: motor.display().to_string(),
+            text: ssv::text(&format!("{} {component}", tuned.name), settings),
+        };
+        return Ok(vec![of("controller", &tuned.controller), of("plant", &tuned.plant)]);
+    }
+    let mut values: Vec<Values> = Vec::new();
+    for text in &args.parameters {
+        let (component, file) =
+            text.split_once('=').ok_or_else(|| anyhow!("{text}: is not --parameters COMPONENT=FILE.ssv"))?;
+        if !COMPONENTS.iter().any(|(name, ..)| *name == component) {
+            let names: Vec<&str> = COMPONENTS.iter().map(|(name, ..)| *name).collect();
+            bail!("--parameters {text}: there is no component {component}; there are {}", names.join(" and "));
+        }
+        if values.iter().any(|v| v.component == component) {
+            bail!("--parameters {text}: {component} has a file already: put the values of both into one");
+        }
+        let content = std::fs::read_to_string(file).with_context(|| file.to_owned())?;
+        values.push(Values { component: component.into(), file: file.into(), text: content });
+    }
+    Ok(values)
+}

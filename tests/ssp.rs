@@ -1,0 +1,238 @@
+//! The closed loop as an SSP file: written by `fmu ssp`, run by `fmu simulate`, and what is said of files that are wrong.
+#![allow(missing_docs)]
+
+mod common;
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+fn fmu(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).env("SOURCE_DATE_EPOCH", "1700000000").output().unwrap()
+}
+
+fn done(arguments: &[&str]) -> String {
+    let output = fmu(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The arguments fail with this status and one line that has all the parts; before it the compiler may say that it is done.
+fn fails(arguments: &[&str], status: i32, parts: &[&str]) {
+    let output = fmu(arguments);
+    let said = String::from_utf8(output.stderr).unwrap();
+    let (compiler, error): (Vec<&str>, Vec<&str>) = said.lines().partition(|line| line.starts_with("    Finished"));
+    assert_eq!((output.status.code(), error.len()), (Some(status), 1), "{arguments:?}: {compiler:?} {error:?}");
+    let error = error[0];
+    for part in parts {
+        assert!(error.contains(part), "{part:?} is not in {error}");
+    }
+}
+
+/// A folder with `fmi2.ssp` and `fmi3.ssp` without values, and `motor.ssp` of FMI 2.0 with those of a machine.
+fn folder() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("ssp-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+        done(&["ssp", "--out", &path("fmi2.ssp")]);
+        done(&["ssp", "--fmi", "3", "--out", &path("fmi3.ssp")]);
+        let motor = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/ipmsm-2.2kw.toml");
+        done(&["ssp", "--motor", motor, "--out", &path("motor.ssp")]);
+        folder
+    })
+}
+
+fn ssp(name: &str) -> String {
+    folder().join(name).to_str().unwrap().to_owned()
+}
+
+/// An entry of an archive as text.
+fn entry(path: &str, name: &str) -> String {
+    let mut text = String::new();
+    zip::ZipArchive::new(File::open(path).unwrap()).unwrap().by_name(name).unwrap().read_to_string(&mut text).unwrap();
+    text
+}
+
+/// The system runs as the pair connected by hand, in both standards, bit for bit.
+#[test]
+fn simulate_runs_it_as_the_pair() {
+    for standard in ["fmi2", "fmi3"] {
+        let archive =
+            |name: &str| common::archives().join(standard).join(name).with_extension("fmu").display().to_string();
+        let (p, c) = (format!("p={}", archive("PmsmPlant")), format!("c={}", archive("SensorlessController")));
+        let time = ["--stop", "0.3", "--csv", "-"];
+        let pair = ["simulate", &p, &c, "--terminal", "p.phases=c.phases", "--terminal", "p.sensor=c.sensor"];
+        let pair_inputs = ["--input", "c.speed_ref=0:0,0.02:52.36", "--input", "p.tau_load=0:0,0.15:1"];
+        let record = ["--record", "p.speed,c.speed_est,p.i_d,c.i_d,c.u_a"];
+        let by_hand = done(&[&pair[..], &pair_inputs, &time, &record].concat());
+        let system = ["simulate", &ssp(&format!("{standard}.ssp"))];
+        let inputs = ["--input", "speed_ref=0:0,0.02:52.36", "--input", "tau_load=0:0,0.15:1"];
+        let record = ["--record", "speed,speed_est,i_d,i_d_est,u_a"];
+        let by_ssp = done(&[&system[..], &inputs, &time, &record].concat());
+        assert_eq!(by_ssp.lines().next(), Some("time,speed,speed_est,i_d,i_d_est,u_a"));
+        assert!(by_ssp.lines().skip(1).eq(by_hand.lines().skip(1)), "{standard}");
+        assert_eq!(by_ssp.lines().count(), 3002);
+        // Inner names work too, and without --record all outputs of the system are written.
+        let inner = [&system[..], &["--set", "plant.motor.R_s=3", "--set", "u_dc=300"], &time].concat();
+        let all = done(&inner);
+        assert!(all.starts_with("time,u_a,"), "{}", all.lines().next().unwrap());
+    }
+}
+
+/// The system has the inputs and the outputs of the drive that is one FMU.
+#[test]
+fn its_connectors_are_those_of_pmsm_drive() {
+    let text = entry(&ssp("fmi3.ssp"), "SystemStructure.ssd");
+    let head = text.split_once("<ssd:Elements>").unwrap().0;
+    let of_kind = |kind: &str| {
+        let connectors = head.split("<ssd:Connector ").filter(|c| c.contains(&format!("kind=\"{kind}\"")));
+        let mut names: Vec<_> = connectors.map(|c| c.split('"').nth(1).unwrap().to_owned()).collect();
+        names.sort();
+        names
+    };
+    let drive = fmu_core::Description::of::<drive::PmsmDrive>().unwrap();
+    for (kind, causality) in [("input", fmu_core::Causality::Input), ("output", fmu_core::Causality::Output)] {
+        let mut expected: Vec<_> =
+            drive.variables.iter().filter(|v| v.causality == causality).map(|v| v.name.clone()).collect();
+        expected.sort();
+        assert_eq!(of_kind(kind), expected, "{kind}");
+    }
+}
+
+/// A machine's values are in the file and in what the system does.
+#[test]
+fn a_motor_comes_with_it() {
+    let path = ssp("motor.ssp");
+    assert!(entry(&path, "resources/plant.ssv").contains("\"motor.R_s\"><ssv:Real value=\"3.6\"/>"));
+    assert!(entry(&path, "resources/SensorlessDrive.ssv").contains("\"u_dc\"><ssv:Real value=\"540\"/>"));
+    let run = ["simulate", &path, "--input", "speed_ref=0:0,0.6:78.5", "--stop", "3", "--csv", "-", "--record"];
+    let csv = done(&[&run[..], &["speed,speed_est"]].concat());
+    let last: Vec<f64> = csv.lines().last().unwrap().split(',').map(|x| x.parse().unwrap()).collect();
+    assert!((last[1] / 78.5 - 1.0).abs() < 0.02 && (last[2] / last[1] - 1.0).abs() < 0.02, "{last:?}");
+}
+
+#[test]
+fn the_same_sources_give_the_same_bytes() {
+    let again = folder().join("again.ssp");
+    done(&["ssp", "--out", again.to_str().unwrap()]);
+    assert!(std::fs::read(again).unwrap() == std::fs::read(ssp("fmi2.ssp")).unwrap(), "two SSPs differ");
+}
+
+/// A copy of an SSP with one text of one file changed.
+fn changed(from: &str, name: &str, old: &str, new: &str) -> (tempfile::TempDir, String) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.ssp");
+    let mut source = zip::ZipArchive::new(File::open(from).unwrap()).unwrap();
+    let mut target = zip::ZipWriter::new(File::create(&path).unwrap());
+    for index in 0..source.len() {
+        let mut entry = source.by_index(index).unwrap();
+        let (entry_name, mut bytes) = (entry.name().unwrap().into_owned(), Vec::new());
+        entry.read_to_end(&mut bytes).unwrap();
+        if entry_name == name {
+            let text = String::from_utf8(bytes).unwrap();
+            assert!(text.contains(old), "{old} is not in {name}");
+            bytes = text.replacen(old, new, 1).into_bytes();
+        }
+        target.start_file(entry_name, zip::write::SimpleFileOptions::default()).unwrap();
+        target.write_all(&bytes).unwrap();
+    }
+    target.finish().unwrap();
+    (dir, path.to_str().unwrap().to_owned())
+}
+
+#[test]
+fn a_wrong_structure_is_told_with_file_line_and_remedy() {
+    let connection = |to: &str| {
+        format!("startElement=\"controller\" startConnector=\"u_a\" endElement=\"plant\" endConnector=\"{to}\"")
+    };
+    let good = connection("u_a");
+    for (old, new, parts) in [
+        (&*good, connection("u_x"), &["plant has no connector u_x; it has u_a, u_b"][..]),
+        (
+            &*good,
+            connection("i_a"),
+            &["connects controller.u_a (output) with plant.i_a (output): expected an output and an input"],
+        ),
+        (&*good, connection("u_b"), &["plant.u_b is fed twice: remove one of the connections"]),
+        (&*good, good.replace("\"plant\"", "\"motor\""), &["there is no component motor; there are controller, plant"]),
+        (
+            "source=\"resources/PmsmPlant.fmu\"",
+            "source=\"resources/Motor.fmu\"".into(),
+            &["has no resources/Motor.fmu"],
+        ),
+    ] {
+        let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", old, &new);
+        let place = if new.contains("Motor.fmu") { "x.ssp: " } else { "x.ssp: SystemStructure.ssd: line " };
+        fails(&["simulate", &path], 2, &[&[path.as_str(), place], parts].concat());
+    }
+    let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", "<ssd:System ", "<ssd:System <");
+    fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "not well-formed XML"]);
+    let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", "unit=\"rad/s\"", "unit=\"rpm\"");
+    fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "units are not converted"]);
+    let plain = folder().join("plain.ssp");
+    std::fs::write(&plain, "hello").unwrap();
+    fails(&["simulate", plain.to_str().unwrap()], 2, &["plain.ssp: not a ZIP archive"]);
+    let fmu = common::archives().join("fmi2/PmsmPlant.fmu").display().to_string();
+    fails(&["simulate", &ssp("fmi2.ssp"), &fmu], 2, &["fmi2.ssp: an SSP is simulated alone"]);
+    fails(
+        &["simulate", &ssp("fmi2.ssp"), "--input", "speed_rev=1"],
+        2,
+        &["speed_rev: is no input of the system", "speed_ref"],
+    );
+}
+
+#[test]
+fn wrong_values_are_told_with_file_line_and_remedy() {
+    let parameters = |old: &str, new: &str| {
+        let text = entry(&ssp("motor.ssp"), "resources/plant.ssv");
+        assert!(text.contains(old), "{old}");
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.ssv");
+        std::fs::write(&path, text.replacen(old, new, 1)).unwrap();
+        (dir, path.to_str().unwrap().to_owned())
+    };
+    let out = folder().join("never.ssp");
+    let out = out.to_str().unwrap();
+    for (old, new, status, part) in [
+        ("motor.R_s", "motor.R", 2, "PmsmPlant has no variable motor.R: correct the name, or remove the parameter"),
+        ("value=\"3.6\"", "value=\"3.6\" unit=\"mOhm\"", 2, "motor.R_s is given in mOhm, and PmsmPlant has it in Ohm"),
+        ("value=\"3.6\"", "value=\"much\"", 2, "motor.R_s = much"),
+        ("value=\"3.6\"", "value=\"-1\"", 1, "motor.R_s = -1 is not allowed"),
+    ] {
+        let (_dir, path) = parameters(old, new);
+        fails(&["ssp", "--parameters", &format!("plant={path}"), "--out", out], status, &["p.ssv: line ", part]);
+    }
+    let (_dir, path) = parameters("motor.R_s", "motor.R_s");
+    fails(
+        &["ssp", "--parameters", &format!("p={path}"), "--out", out],
+        2,
+        &["no component p; there are controller and plant"],
+    );
+    fails(&["ssp", "--parameters", "plant=nothing.ssv", "--out", out], 2, &["nothing.ssv: No such file"]);
+    let dir = tempfile::tempdir().unwrap();
+    let motor = dir.path().join("m.toml");
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/motors/reference.toml")).unwrap();
+    std::fs::write(&motor, text.replacen("R_s", "R", 1)).unwrap();
+    fails(&["ssp", "--motor", motor.to_str().unwrap(), "--out", out], 2, &["m.toml:7:1: unknown field `R`", "R_s"]);
+    assert!(!Path::new(out).exists());
+    // In an SSP a value for a name that is not there is ignored (SSP 1.0), and that is told; a value that is wrong is an error.
+    let (_dir, path) = changed(&ssp("motor.ssp"), "resources/plant.ssv", "motor.R_s", "motor.R");
+    let output = fmu(&["simulate", &path, "--stop", "0.001"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        output.status.success()
+            && said.contains("resources/plant.ssv: line ")
+            && said.contains("there is no plant.motor.R; the value is ignored"),
+        "{said}"
+    );
+    let (_dir, path) = changed(&ssp("motor.ssp"), "resources/plant.ssv", "value=\"3.6\"", "value=\"-1\"");
+    fails(
+        &["simulate", &path, "--stop", "0.001"],
+        1,
+        &["x.ssp: resources/plant.ssv: line ", "motor.R_s = -1 is not allowed"],
+    );
+}
