@@ -1,10 +1,16 @@
-//! A step of plant and controller does not allocate, whatever the estimator. A test program of its own: it counts for the
-//! whole process.
+//! A step of plant and controller does not allocate, whatever the estimator, nor does saving and restoring the FMU state
+//! with a handle that is used again. A test program of its own: it counts for the whole process.
 #![allow(missing_docs)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an allocator that counts and passes on")]
 
 use drive::bench::{self, RATED_SPEED};
 use drive::estimator::Kind;
+use fmu_core::{Block, Model};
+use fmu_export::instance::Instance;
+use fmu_export::lifecycle::Standard;
+use fmu_export::log::{Log, Sink, Status};
+use fmu_export::registry;
+use fmu_export::saved::Saved;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -27,6 +33,26 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
+/// Saves and restores a block's state.
+fn again_and_again<M: Model>(block: Block<M>, what: &str) {
+    let log = Log::new(Box::new(Silent), false);
+    let mut it = Instance::new(Standard::Fmi3, what.into(), log, Saved { block, ..Saved::default() });
+    let handle = it.save(0).unwrap();
+    let before = CALLS.load(Relaxed);
+    for _ in 0..100 {
+        assert_eq!(it.save(handle).unwrap(), handle);
+        it.restore(handle).unwrap();
+    }
+    assert_eq!(CALLS.load(Relaxed), before, "saving and restoring {} with {what}", M::INFO.name);
+    registry::free::<M>(handle).unwrap();
+}
+
+struct Silent;
+
+impl Sink for Silent {
+    fn write(&self, _: Status, _: &str, _: &str) {}
+}
+
 #[test]
 fn a_step_does_not_allocate() {
     for &kind in Kind::ALL {
@@ -38,6 +64,8 @@ fn a_step_does_not_allocate() {
             pair.step(1e-4).unwrap();
         }
         assert_eq!(CALLS.load(Relaxed), before, "{}", kind.name());
+        again_and_again(pair.controller, kind.name());
+        again_and_again(pair.plant, kind.name());
     }
     let before = CALLS.load(Relaxed);
     drop(Box::new(1));

@@ -5,6 +5,8 @@
 mod common;
 
 use common::python::{pytest, scratch};
+use std::path::Path;
+use std::process::Command;
 use std::{fs, process};
 
 #[test]
@@ -21,6 +23,15 @@ fn tuning_a_running_drive() {
 #[test]
 fn misuse_of_the_c_interface() {
     pytest("fmpy", "misuse", &["test_misuse.py"], &[]);
+}
+
+/// `FMU_ONLY=fmi3-PmsmPlant` names one archive; all of them take hours.
+#[test]
+#[ignore = "opt-in: cargo test --test fmpy under_valgrind -- --ignored"]
+fn misuse_under_valgrind() {
+    let there = Command::new("valgrind").arg("--version").output().is_ok_and(|output| output.status.success());
+    assert!(there, "valgrind is not installed (on Debian: package valgrind)");
+    pytest("fmpy", "valgrind", &["test_misuse.py"], &[("FMU_UNDER", Path::new("valgrind"))]);
 }
 
 #[test]

@@ -43,7 +43,6 @@ pub struct Experiment {
 /// 3. [`derive`](Model::derive), [`initialise`](Model::initialise) and [`output`](Model::output) run whenever the importer
 ///    asks for a value after it has set one, so that initialisation can be iterated.
 /// 4. [`validate`](Model::validate) judges the parameters together; then the simulation starts.
-///    A tunable parameter may be set later: `validate` judges it at once, `derive` runs before the next step.
 /// 5. [`advance`](Model::advance) and [`output`](Model::output) run in turn. An `advance` does not allocate, lock, read a
 ///    clock or print, and never writes a parameter.
 /// 6. Saving is a clone, storing is serde; both at any time between calls.
@@ -75,8 +74,8 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// Calculated parameters from the parameters; runs again when a tunable parameter was set.
     fn derive(&mut self) {}
 
-    /// Rules across parameters, checked on leaving initialisation and when a tunable parameter is set after that, then
-    /// before [`derive`](Model::derive).
+    /// Rules across parameters, checked on leaving initialisation and in the first step after a tunable parameter was set,
+    /// both on a copy after [`derive`](Model::derive): a refusal changes nothing.
     ///
     /// # Errors
     /// Says which parameters do not fit together, their values and why.

@@ -8,23 +8,6 @@ use fmu_core::description::TIME;
 use fmu_core::{Causality, Fault, Meta, Model, Slot, Variability};
 use std::mem::MaybeUninit;
 
-/// Why a call was not done.
-#[derive(Debug)]
-pub enum Refusal {
-    /// Status Error: the instance goes to the Error state.
-    Error(Fault),
-    /// Status Discard: nothing changes.
-    Discard(Fault),
-    /// Status Discard, of values that do not fit: nothing changes, and the reason is always told.
-    Rejected(Fault),
-}
-
-impl From<Fault> for Refusal {
-    fn from(fault: Fault) -> Self {
-        Self::Error(fault)
-    }
-}
-
 /// Values that a set remembers to take them back.
 const SHORT: usize = 8;
 
@@ -100,10 +83,9 @@ impl<M: Model> Instance<M> {
     /// Sets variables: all of them or, on an error, none.
     ///
     /// # Errors
-    /// Unknown reference, another type, not settable in this state, value out of range, another number of values. In Step
-    /// Mode also tunable parameters that do not fit together: that call is discarded, and the simulation can go on.
+    /// Unknown reference, another type, not settable in this state, value out of range, another number of values.
     #[inline]
-    pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Fault> {
         self.check_count(references, values.len())?;
         let Some(&any) = values.first() else { return Ok(()) };
         if self.arrays {
@@ -119,13 +101,11 @@ impl<M: Model> Instance<M> {
         references: &[u32],
         values: &[T],
         any: T,
-    ) -> Result<(), Refusal> {
-        let state = self.now.life.state();
-        let mut all = None;
+    ) -> Result<(), Fault> {
         if values.len() > SHORT {
-            let tunes = self.judge_each::<T, ARRAYS>(references, values)? && state == State::Step;
-            all = tunes.then(|| self.now.block.model.clone());
+            self.judge_each::<T, ARRAYS>(references, values)?;
         }
+        let state = self.now.life.state();
         let (mut done, mut old, mut dirty) = (0, [(0, any); SHORT], false);
         let mut next = values.iter();
         for &reference in references {
@@ -135,7 +115,7 @@ impl<M: Model> Instance<M> {
                 let index = first.wrapping_add(offset);
                 let Some((meta, slot)) = settable(M::TABLE.entry(&mut self.now.block, index), state, value) else {
                     self.take_back(&old[..done]);
-                    return Err(self.refusal(reference, index, value).into());
+                    return Err(self.refusal(reference, index, value));
                 };
                 if let (Some(old), Some(before)) = (old.get_mut(done), T::read(meta, &slot)) {
                     *old = (index, before);
@@ -146,40 +126,23 @@ impl<M: Model> Instance<M> {
                 dirty |= meta.causality == Causality::Parameter;
             }
         }
-        if dirty && state == State::Step {
-            self.judge_together(all, &old[..done])?;
-        }
         self.now.dirty |= dirty || state != State::Step;
         Ok(())
     }
 
-    /// Tunable parameters were written in Step Mode: they fit together, or all of the call is taken back.
-    #[cold]
-    fn judge_together<T: Value>(&mut self, all: Option<M>, old: &[(usize, T)]) -> Result<(), Refusal> {
-        let Err(fault) = self.now.block.model.validate() else { return Ok(()) };
-        match all {
-            Some(model) => self.now.block.model = model,
-            None => self.take_back(old),
-        }
-        Err(Refusal::Rejected(Fault::new(format!("{fault}; nothing was set, the values before it stay in force"))))
-    }
-
-    /// Whether a parameter is among them; each can be set.
-    fn judge_each<T: Value, const ARRAYS: bool>(&mut self, references: &[u32], values: &[T]) -> Result<bool, Fault> {
+    fn judge_each<T: Value, const ARRAYS: bool>(&mut self, references: &[u32], values: &[T]) -> Result<(), Fault> {
         let state = self.now.life.state();
-        let mut parameters = false;
         let mut next = values.iter();
         for &reference in references {
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, &value) in (0..count).zip(&mut next) {
                 let index = index(reference).wrapping_add(offset);
-                match settable(M::TABLE.entry(&mut self.now.block, index), state, value) {
-                    Some((meta, _)) => parameters |= meta.causality == Causality::Parameter,
-                    None => return Err(self.refusal(reference, index, value)),
+                if settable(M::TABLE.entry(&mut self.now.block, index), state, value).is_none() {
+                    return Err(self.refusal(reference, index, value));
                 }
             }
         }
-        Ok(parameters)
+        Ok(())
     }
 
     #[cold]

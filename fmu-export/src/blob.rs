@@ -77,7 +77,8 @@ pub fn read<M: Model>(bytes: &[u8]) -> Result<Saved<M>, Fault> {
         return Err(refuse("content".into()));
     }
     state.check().and_then(|()| state.check_time()).map_err(|fault| refuse(fault.to_string()))?;
-    if matches!(state.life.state(), State::Step | State::Terminated) {
+    // Tunable parameters that no step has seen are judged by the next one.
+    if matches!(state.life.state(), State::Step | State::Terminated) && !state.dirty {
         state.block.model.validate().map_err(|fault| refuse(fault.to_string()))?;
     }
     Ok(state)

@@ -54,8 +54,7 @@ impl<M: Model> Instance<M> {
     /// As [`Saved::check`] and [`Model::validate`].
     pub fn exit_initialisation(&mut self) -> Result<(), Fault> {
         self.now.check()?;
-        self.now.block.model.derive();
-        self.now.block.model.validate()?;
+        self.now.judged()?;
         self.now.block.initialise();
         self.now.dirty = false;
         self.log.event(|| message::start(&self.name, &mut self.now));
@@ -73,17 +72,18 @@ impl<M: Model> Instance<M> {
         self.log.event(|| format!("{}: reset", self.name));
     }
 
-    /// One communication step from `t` to `t + h`.
+    /// One communication step from `t` to `t + h`. Tunable parameters that were set take effect here, all together.
     ///
     /// # Errors
-    /// Times that do not continue the simulation, or what the model reports.
+    /// Times that do not continue the simulation, tunable parameters that do not fit together: then nothing has changed.
+    /// Or what the model reports.
     #[inline]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<(), Fault> {
         let now = &mut self.now;
         let next = now.elapsed.plus(h);
         now.check_step(t, h, next)?;
         if now.dirty {
-            now.block.model.derive();
+            now.block.model = now.judged()?;
             now.dirty = false;
         }
         now.block.step(&Step { start: now.elapsed, h })?;

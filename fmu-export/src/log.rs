@@ -1,4 +1,4 @@
-//! What an instance says, and to whom. Errors, and why values were rejected, are always said; the rest only when the importer asked for its category.
+//! What an instance says, and to whom. Errors are always said; the rest only when the importer asked for its category.
 
 use crate::lifecycle::Standard;
 use fmu_core::Fault;
@@ -41,12 +41,6 @@ impl Log {
     #[cold]
     pub fn error(&self, message: &str) {
         self.sink.write(Status::Error, ERROR, message);
-    }
-
-    /// Says why what was set was discarded; heard even with logging off, as an error is.
-    #[cold]
-    pub fn rejected(&self, message: &str) {
-        self.sink.write(Status::Discard, DISCARD, message);
     }
 
     /// Says why a call was discarded.

@@ -1,6 +1,6 @@
 //! All that changes in an instance, as one plain value: what an FMU state saves.
 
-use crate::lifecycle::Life;
+use crate::lifecycle::{Life, State};
 use crate::message;
 use crate::value::Value;
 use fmu_core::{Block, Causality, Elapsed, Fault, Kind, Model, Slot};
@@ -103,14 +103,40 @@ impl<M: Model> Saved<M> {
         Ok(())
     }
 
-    /// Time is what a simulation can have reached.
+    /// The model with its calculated parameters, if its parameters fit together; this one stays as it is.
+    ///
+    /// # Errors
+    /// As [`Model::validate`].
+    pub fn judged(&self) -> Result<M, Fault> {
+        let mut model = self.block.model.clone();
+        model.derive();
+        model.validate()?;
+        Ok(model)
+    }
+
+    /// Time is what a simulation can have reached: the sum of the steps fits the importer's own time, which rounding can
+    /// at most double where a step is as short as the last digit of the time.
     ///
     /// # Errors
     /// Says what does not fit.
     pub fn check_time(&self) -> Result<(), Fault> {
-        let fits = self.end.is_finite() && self.elapsed.seconds() >= 0.0 && self.elapsed.seconds().is_finite();
+        let start = self.experiment.map_or(M::INFO.experiment.start, |e| e.start);
+        let (elapsed, since) = (self.elapsed.seconds(), self.end - start);
+        let rounding = 8.0 * f64::EPSILON * start.abs().max(self.end.abs());
+        // A sum that is not in its normal form hides numbers that cancel.
+        let fits = self.elapsed == self.elapsed.plus(0.0)
+            && match (self.life.state(), self.experiment) {
+                (State::Instantiated, _) | (State::Initialization, Some(_)) => since == 0.0 && elapsed == 0.0,
+                (State::Step | State::Terminated, Some(_)) => {
+                    self.end.is_finite()
+                        && elapsed >= 0.0
+                        && elapsed <= 2.0 * since + rounding
+                        && since <= 2.0 * elapsed + rounding
+                }
+                _ => false,
+            };
         if !fits {
-            return Err(Fault::new(format!("time {} after {} s of simulation", self.end, self.elapsed.seconds())));
+            return Err(Fault::new(format!("time {} after {elapsed} s of simulation from {start}", self.end)));
         }
         self.experiment.map_or(Ok(()), |e| Experiment::new(e.start, e.stop).map(|_| ()))
     }

@@ -1,11 +1,11 @@
-//! Getting and setting (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.6), and dependencies proved by perturbation.
+//! Getting and setting (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.6): what is refused, and what is there to begin with.
 
-use super::bench::{Bench, Blocked, bits, fine, settable, show};
+use super::bench::{Bench, Blocked, bits, fine, show};
+use super::values::{booleans, not_a_number, order, out_of_range, round_trip, strings, tunable};
 use super::{Check, Level, Levels, Run};
 use crate::importer::Status;
 use crate::importer::raw::Cells;
 use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability, parse_number};
-use std::ffi::CString;
 
 const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.6.2";
 
@@ -23,6 +23,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "G03c", requirement: "A set of several variables that fails changes none of them.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(atomic) },
     Check { id: "G04", requirement: "What is set before the end of initialisation is got back bit for bit.", clause: GET, levels: Levels::MUST, run: Run::Probe(round_trip) },
     Check { id: "G05", requirement: "Texts are copied when set: the importer may overwrite its own.", clause: GET, levels: Levels::MUST, run: Run::Probe(strings) },
+    Check { id: "G06", requirement: "A tunable parameter can be set between steps and keeps what was set.", clause: "2.0.5, 2.2.7 and 4.2.4; 3.0.2, 2.4.7.4 and 4.2.1", levels: Levels::MUST, run: Run::Probe(tunable) },
+    Check { id: "L11", requirement: "Initialisation can be iterated: values that were set and got in between leave no trace.", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.4", levels: Levels::MUST, run: Run::Probe(order) },
     Check { id: "G07a", requirement: "NaN, infinities and huge numbers in an input neither hang nor crash, nor disturb another instance.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(not_a_number) },
     Check { id: "G07b", requirement: "A parameter outside of min and max is refused, at the latest at the end of initialisation.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(out_of_range) },
     Check { id: "G08", requirement: "A Boolean other than 0 and 1 does no harm.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(booleans) },
@@ -45,7 +47,7 @@ fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
 }
 
 /// Equal as values of the type: the low bits, and zeros of both signs.
-fn same(v: &ModelVariable, version: FmiVersion, a: &[u64], b: &[u64]) -> bool {
+pub(super) fn same(v: &ModelVariable, version: FmiVersion, a: &[u64], b: &[u64]) -> bool {
     let shift = 64 - 8 * crate::importer::raw::width(v.base, version);
     let zero = |x: u64| v.base.is_float() && x << (64 - (64 - shift) + 1) == 0;
     a.len() == b.len() && a.iter().zip(b).all(|(x, y)| x << shift == y << shift || (zero(*x) && zero(*y)))
@@ -327,177 +329,5 @@ fn atomic(bench: &Bench) -> Result<(), Blocked> {
     }
     let (status, after) = it.get(v)?;
     bench.require(!fine(status) || before == after, || format!("{} was changed by a set that returned Error", v.name));
-    Ok(())
-}
-
-fn round_trip(bench: &Bench) -> Result<(), Blocked> {
-    let it = bench.initialising()?;
-    for v in bench.numeric().filter(|v| settable(v)) {
-        let Some(values) = bench.other_value(v, 1.0) else { continue };
-        let status = it.set(v, &values)?;
-        if !fine(status) {
-            // A value that the model does not like is its good right; what is said of it is a check of its own.
-            if status == Status::ERROR {
-                return Err(Blocked(format!(
-                    "Set({} = {}) returned {status}",
-                    v.name,
-                    show(v, bench.md.version, &values)
-                )));
-            }
-            continue;
-        }
-        let (_, back) = it.get(v)?;
-        bench.require(same(v, bench.md.version, &values, &back), || {
-            format!(
-                "{}: set to {}, got {}",
-                v.name,
-                show(v, bench.md.version, &values),
-                show(v, bench.md.version, &back)
-            )
-        });
-    }
-    Ok(())
-}
-
-fn strings(bench: &Bench) -> Result<(), Blocked> {
-    let fits = |v: &&ModelVariable| v.base == BaseType::String && settable(v) && !v.is_array();
-    let Some(v) = bench.md.variables.iter().find(fits) else { return bench.not_applicable("no text can be set") };
-    for text in ["", "probe \u{e4}\u{1f50b}", &"x".repeat(1 << 20)] {
-        bench.case(|| {
-            let it = bench.initialising()?;
-            let c_text = CString::new(text).unwrap_or_default();
-            let status = it.call(&format!("SetString({})", v.name), |raw| {
-                raw.set_strings(it.handle, &[v.value_reference], &[Some(&c_text)])
-            })?;
-            if !fine(status) {
-                return Err(Blocked(format!("SetString({}) returned {status}", v.name)));
-            }
-            bench.calling(&format!("GetString({})", v.name));
-            let (_, back) = bench
-                .raw
-                .get_strings(it.handle, &[v.value_reference], 1)
-                .ok_or_else(|| Blocked("GetString is missing".into()))?;
-            bench.require(back.first().is_some_and(|b| b.as_deref() == Some(text)), || {
-                format!("{}: a text of {} bytes did not come back", v.name, text.len())
-            });
-            Ok(())
-        });
-    }
-    Ok(())
-}
-
-fn not_a_number(bench: &Bench) -> Result<(), Blocked> {
-    let inputs = bench.float_inputs();
-    if inputs.is_empty() {
-        return bench.not_applicable("there is no floating-point input");
-    }
-    let alone = bench.stepping()?.run(5, bench.h())?;
-    for v in &inputs {
-        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, -1e308, 5e-324, -0.0] {
-            if bench.late() {
-                bench.note("not all inputs were tried");
-                return Ok(());
-            }
-            bench.case(|| {
-                let (it, other) = (bench.stepping()?, bench.stepping()?);
-                let _ = it.set(v, &vec![bits(v.base, x); bench.elements(v)])?;
-                for _ in 0..3 {
-                    let _ = it.call(&format!("DoStep with {} = {x}", v.name), |raw| {
-                        raw.do_step(it.handle, it.time.get(), bench.h(), false, [true; 4]).map(|(s, _)| s)
-                    })?;
-                    it.time.set(it.time.get() + bench.h());
-                }
-                let beside = other.run(5, bench.h())?;
-                bench.require(beside == alone, || format!("{} = {x} in one instance changed another", v.name));
-                Ok(())
-            });
-        }
-    }
-    Ok(())
-}
-
-fn out_of_range(bench: &Bench) -> Result<(), Blocked> {
-    let fits = |v: &&ModelVariable| {
-        v.causality == Causality::Parameter && settable(v) && v.base.is_float() && (v.min.is_some() || v.max.is_some())
-    };
-    let limited: Vec<_> = bench.md.variables.iter().filter(fits).take(40).collect();
-    if limited.is_empty() {
-        return bench.not_applicable("there is no floating-point parameter with min or max");
-    }
-    for v in limited {
-        let below = v.min.map(|x| x - x.abs().max(1.0));
-        let above = v.max.map(|x| x + x.abs().max(1.0));
-        for x in below.into_iter().chain(above).filter(|x| x.is_finite()) {
-            bench.case(|| {
-                let it = bench.initialising()?;
-                let status = it.set(v, &vec![bits(v.base, x); bench.elements(v)])?;
-                let end = if fine(status) { it.simple("ExitInitializationMode")? } else { status };
-                bench.require(!fine(end), || format!("line {}: {} = {x} was accepted", v.line, v.name));
-                Ok(())
-            });
-        }
-    }
-    Ok(())
-}
-
-fn booleans(bench: &Bench) -> Result<(), Blocked> {
-    let fits = |v: &&ModelVariable| v.base == BaseType::Boolean && settable(v) && !v.is_array();
-    let Some(v) = bench.md.variables.iter().find(fits) else { return bench.not_applicable("no Boolean can be set") };
-    let width = 8 * crate::importer::raw::width(v.base, bench.md.version);
-    for value in [2, 0xff, u64::MAX >> (64 - width)] {
-        bench.case(|| {
-            let it = bench.initialising()?;
-            let status = it.set(v, &[value])?;
-            if fine(status) {
-                let (_, back) = it.get(v)?;
-                bench.require(back[0] <= 1, || format!("{}: set to {value}, got {}", v.name, back[0]));
-                let _ = it.simple("ExitInitializationMode")?;
-                let _ = it.step(bench.h())?;
-            }
-            Ok(())
-        });
-    }
-    Ok(())
-}
-
-/// Perturbs every known that an initial unknown does not name, and looks whether the unknown moves.
-pub(super) fn dependencies_hold(bench: &Bench) -> Result<(), Blocked> {
-    let unknowns: Vec<_> = bench
-        .md
-        .initial_unknowns
-        .iter()
-        .filter_map(|u| Some((bench.md.referenced(u.reference)?, u.dependencies.as_ref()?)))
-        .filter(|(v, _)| bench.numeric().any(|n| n.name == v.name) && v.clocks.is_empty())
-        .collect();
-    if unknowns.is_empty() {
-        return bench.not_applicable("no dependencies of initial unknowns are given");
-    }
-    let it = bench.initialising()?;
-    let variables: Vec<_> = unknowns.iter().map(|(v, _)| *v).collect();
-    let before = it.snapshot(&variables)?;
-    let mut tried = 0;
-    for known in bench.numeric().filter(|v| settable(v)) {
-        let Some(values) = bench.other_value(known, 1.0) else { continue };
-        if bench.late() {
-            break;
-        }
-        let one = bench.initialising()?;
-        if !fine(one.set(known, &values)?) {
-            continue;
-        }
-        tried += 1;
-        let after = one.snapshot(&variables)?;
-        for (((unknown, dependencies), old), new) in unknowns.iter().zip(&before).zip(&after) {
-            let named = dependencies.iter().any(|d| bench.md.referenced(*d).is_some_and(|v| v.name == known.name));
-            bench.require(named || old == new || old.is_empty() || new.is_empty(), || {
-                format!(
-                    "line {}: {} moves with {}, which its dependencies do not name",
-                    unknown.line, unknown.name, known.name
-                )
-            });
-        }
-        let _ = one.free();
-    }
-    bench.note(format!("{tried} knowns were moved"));
     Ok(())
 }

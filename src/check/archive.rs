@@ -1,5 +1,6 @@
 //! The archive, by its raw headers (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
 
+use super::layered::manifests;
 use super::zip::inside;
 use super::{Check, Level, Levels, Run, Subject, Verdict};
 use model_description::FmiVersion;
@@ -30,6 +31,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "Z05", requirement: "An icon or diagram as SVG comes with one as PNG.", clause: "3.0.2, 2.5.1", levels: Levels(None, Some(Level::Must)), run: Run::File(pictures) },
     Check { id: "Z06", requirement: "Folders below extra/ have reverse domain names.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.6", levels: Levels::SHOULD, run: Run::File(extra) },
     Check { id: "Z07", requirement: "Sources come with sources/buildDescription.xml and without the standard's headers.", clause: "3.0.2, 2.5.1.2", levels: Levels(Some(Level::Should), Some(Level::Should)), run: Run::File(sources) },
+    Check { id: "I03", requirement: "A manifest of a layered standard (extra/*/fmi-ls-manifest.xml) is well-formed and tells name, version and description in its namespace.", clause: "3.0.2, 2.5.1.6; fmi3LayeredStandardManifest.xsd", levels: Levels::MUST, run: Run::File(manifests) },
 ];
 
 /// A finding for each entry that the rule refuses.

@@ -123,6 +123,16 @@ impl Bench {
         })
     }
 
+    /// Tells instances from now on that the FMU was unpacked to another folder.
+    pub(super) fn live_in(&mut self, dir: &Path) {
+        dir.clone_into(&mut self.dir);
+    }
+
+    /// Where the FMU's resources are, if it has any.
+    pub(super) fn resources(&self) -> PathBuf {
+        self.dir.join("resources")
+    }
+
     /// Writes a line down.
     pub(super) fn write(&self, line: &Line) {
         if let Ok(text) = serde_json::to_string(line) {
@@ -207,7 +217,7 @@ impl Bench {
     /// Good arguments for an instantiation.
     pub(super) fn birth(&self, name: &str) -> Birth {
         let text = |text: &str| CString::new(text).unwrap_or_default();
-        let resources = self.dir.join("resources");
+        let resources = self.resources();
         let resources = match self.md.version {
             FmiVersion::V2 => file_uri(&resources),
             FmiVersion::V3 => format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR),
@@ -283,7 +293,7 @@ impl Bench {
 
     /// Whether the archive has resources.
     pub(super) fn has_resources(&self) -> bool {
-        std::fs::read_dir(self.dir.join("resources")).is_ok_and(|mut files| files.next().is_some())
+        std::fs::read_dir(self.resources()).is_ok_and(|mut files| files.next().is_some())
     }
 
     /// A capability.

@@ -7,7 +7,7 @@ use crate::elf::{FLOOR, NEEDED, dynamic, is_system, newest_glibc, strings};
 use model_description::FmiVersion;
 use object::elf;
 use object::read::elf::{ElfFile64, ProgramHeader};
-use object::{Architecture, BinaryFormat, Object, ObjectSymbol};
+use object::{Architecture, BinaryFormat, Object, ObjectSection, ObjectSymbol};
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
@@ -21,6 +21,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "B03r", requirement: "A search path for libraries is $ORIGIN or below.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(rpath) },
     Check { id: "B04", requirement: "Linux binaries need no newer C library than 2.17 (2014), so that they load on old systems.", clause: "hardening", levels: Levels::HARD, run: Run::File(floor) },
     Check { id: "B05", requirement: "Linux binaries have neither relocations in their text nor an executable stack.", clause: "hardening", levels: Levels::HARD, run: Run::File(hardened) },
+    Check { id: "B11", requirement: "A binary for x86_64 Linux does not ask for a newer processor than the first of its kind (its note of needed instruction sets).", clause: "hardening", levels: Levels::HARD, run: Run::File(processor) },
     Check { id: "X02b", requirement: "GetVersion tells 2.0 or 3.0, and GetTypesPlatform default.", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels::MUST, run: Run::Probe(versions) },
     Check { id: "B08", requirement: "A whole life writes nothing to the console and makes no file where it runs.", clause: "hardening", levels: Levels::HARD, run: Run::Silent(life) },
 ];
@@ -249,6 +250,29 @@ fn hardened(subject: &Subject) -> Verdict {
             {
                 findings.push("wants an executable stack".into());
             }
+        }
+        Ok(findings)
+    })
+}
+
+/// `GNU_PROPERTY_X86_ISA_1_NEEDED` of the note `.note.gnu.property`: bit 0 is the baseline, the others are x86-64-v2 to v4.
+fn processor(subject: &Subject) -> Verdict {
+    const NEEDED: u32 = 0xc000_8002;
+    elf(subject, |_, file| {
+        let mut findings = Vec::new();
+        let Some(section) = file.section_by_name(".note.gnu.property") else { return Ok(findings) };
+        let data = section.data()?;
+        let word = |at: usize| data.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        // Name size, description size, type, "GNU", then properties: type, size, data padded to 8 bytes.
+        let mut at = 16;
+        while let (Some(kind), Some(size)) = (word(at), word(at + 4)) {
+            if kind == NEEDED && word(at + 8).is_some_and(|bits| bits & !1 != 0) {
+                findings.push(format!(
+                    "its note asks for instruction sets above x86-64-v1 ({:#x})",
+                    word(at + 8).unwrap_or(0)
+                ));
+            }
+            at += 8 + usize::try_from(size).unwrap_or(usize::MAX / 2).next_multiple_of(8);
         }
         Ok(findings)
     })

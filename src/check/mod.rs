@@ -10,8 +10,13 @@ mod access;
 mod archive;
 mod bench;
 mod binary;
+mod clocked;
+mod dependencies;
+mod derivatives;
+mod host;
 mod instances;
 mod it;
+mod layered;
 mod lifecycle;
 mod logging;
 pub mod probe;
@@ -25,6 +30,7 @@ mod table;
 mod terminals;
 mod time;
 mod units;
+mod values;
 mod variables;
 mod xml;
 mod zip;
@@ -92,6 +98,8 @@ enum Run {
     Probe(fn(&Bench) -> Result<(), Blocked>),
     /// The same, and what the process writes to the console or into its folder is a violation.
     Silent(fn(&Bench) -> Result<(), Blocked>),
+    /// The same in two processes, which must tell the same.
+    Twice(fn(&Bench) -> Result<(), Blocked>),
 }
 
 /// Checks that belong together.
@@ -118,6 +126,7 @@ pub const GROUPS: &[Group] = &[
     Group { name: "state", title: "FMU state", checks: state::CHECKS },
     Group { name: "logging", title: "Logging", checks: logging::CHECKS },
     Group { name: "instances", title: "Instances, threads, loading", checks: instances::CHECKS },
+    Group { name: "host", title: "A guest in the importer's process", checks: host::CHECKS },
 ];
 
 /// What came out of a check, with what was seen.

@@ -52,7 +52,7 @@ pub struct Probe {
 /// There is no such check, or the folder is not readable.
 pub fn run(args: &Probe) -> anyhow::Result<()> {
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == args.id);
-    let Some(Run::Probe(probe) | Run::Silent(probe)) = check.map(|c| c.run) else {
+    let Some(Run::Probe(probe) | Run::Silent(probe) | Run::Twice(probe)) = check.map(|c| c.run) else {
         anyhow::bail!("there is no probe {}", args.id);
     };
     match Bench::open(args) {
@@ -93,7 +93,7 @@ pub(super) fn run_all(subject: &Subject, checks: &[&Check], options: &Options) -
     for (check, verdict) in checks.iter().zip(&verdicts) {
         match check.run {
             Run::File(look) => store(verdict, look(subject)),
-            Run::Probe(_) | Run::Silent(_) => queue.push_back((*check, verdict)),
+            Run::Probe(_) | Run::Silent(_) | Run::Twice(_) => queue.push_back((*check, verdict)),
         }
     }
     let runner = Runner::new(subject, options);
@@ -167,7 +167,20 @@ impl Runner {
     }
 
     fn run(&self, check: &Check) -> Verdict {
-        self.attempt(check).unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be run: {e}")))
+        let run = || {
+            self.attempt(check).unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be run: {e}")))
+        };
+        let verdict = run();
+        if !matches!((check.run, &verdict), (Run::Twice(_), Verdict::Pass(_))) {
+            return verdict;
+        }
+        match (verdict, run()) {
+            (Verdict::Pass(first), Verdict::Pass(second)) if first != second => Verdict::Violated(vec![
+                format!("one process: {}", first.join(", ")),
+                format!("another: {}", second.join(", ")),
+            ]),
+            (_, second) => second,
+        }
     }
 
     fn attempt(&self, check: &Check) -> std::io::Result<Verdict> {

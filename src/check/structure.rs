@@ -1,6 +1,7 @@
-//! ModelStructure (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). What the file says; that it is true is in `access`.
+//! ModelStructure (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). What the file says; that it is true is in `dependencies`.
 
-use super::access::dependencies_hold;
+use super::clocked::clocked_states;
+use super::dependencies::dependencies_hold;
 use super::xml::with_description;
 use super::{Check, Level, Levels, Run, Subject, Verdict};
 use model_description::{
@@ -19,6 +20,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "S03b", requirement: "dependenciesKind has one word for each dependency, and of the initial unknowns only dependent and constant.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(kinds) },
     Check { id: "S04", requirement: "What an initial unknown does not depend on does not change it.", clause: CLAUSE, levels: Levels::MUST, run: Run::Probe(dependencies_hold) },
     Check { id: "S05", requirement: "A state derivative refers to its state by its attribute derivative.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(derivatives) },
+    Check { id: "S06", requirement: "A clocked state is a discrete variable on a clock, refers by its attribute previous to its previous value, and two do not share one.", clause: "3.0.2, 2.4.8 and 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(clocked_states) },
 ];
 
 fn name(d: &ModelDescription, reference: u32) -> String {

@@ -1,9 +1,12 @@
 //! Steps and time (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1).
 
 use super::bench::{Bench, Blocked, fine};
+use super::derivatives::output_derivatives;
+use super::it::It;
+use super::lifecycle::difference;
 use super::{Check, Level, Levels, Run};
 use crate::importer::Status;
-use model_description::{BaseType, Causality};
+use model_description::{BaseType, Causality, CoSimulation};
 
 const STEP: &str = "2.0.5, 4.2.2; 3.0.2, 4.2.1.1";
 
@@ -16,11 +19,14 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "T02b", requirement: "A step that is NaN or infinite, or a time that is, gives Error and returns soon.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(odd_step) },
     Check { id: "T03", requirement: "Half of the communication step gives about the same results, inputs held.", clause: STEP, levels: Levels::HARD, run: Run::Probe(halves) },
     Check { id: "T04", requirement: "With canHandleVariableCommunicationStepSize steps of any size succeed.", clause: "2.0.5, 4.3.1; 3.0.2, 4.3", levels: Levels::MUST, run: Run::Probe(variable) },
+    Check { id: "T05", requirement: "noSetFMUStatePriorToCurrentPoint changes no result, and the state at the current point can still be saved and set.", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1.1", levels: Levels::MUST, run: Run::Probe(promise) },
     Check { id: "T06a", requirement: "After OK lastSuccessfulTime is t + h unless the step returned early, and that only when allowed; truth values are 0 or 1.", clause: "3.0.2, 4.2.1.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(told) },
     Check { id: "T06b", requirement: "The independent variable has the time of the last communication point.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent) },
     Check { id: "T06c", requirement: "Places for results that are NULL do no harm.", clause: "3.0.2, 2.2.1", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(places) },
     Check { id: "T07", requirement: "fmi2GetRealStatus and its sisters return Discard for what is not available, and do no harm.", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), run: Run::Probe(statuses) },
+    Check { id: "T09", requirement: "With maxOutputDerivativeOrder above 0 the first derivatives of continuous outputs can be got and are their slopes; order 0, and one above the greatest, give Error.", clause: "2.0.5, 4.2.1; 3.0.2, 4.2.1.1", levels: Levels::MUST, run: Run::Probe(output_derivatives) },
     Check { id: "T10", requirement: "Two runs of one instance after another, with the same inputs, are equal bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(determinism) },
+    Check { id: "T10p", requirement: "Two processes, with everything at other addresses, give the same results bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes) },
 ];
 
 fn start_times(bench: &Bench) -> Result<(), Blocked> {
@@ -254,8 +260,66 @@ fn determinism(bench: &Bench) -> Result<(), Blocked> {
             .collect::<Result<Vec<_>, _>>()
     };
     let (first, second) = (run()?, run()?);
-    if let Some((k, i)) = super::lifecycle::difference(&first, &second) {
+    if let Some((k, i)) = difference(&first, &second) {
         bench.violated(format!("{} differs after {} steps", bench.watched()[i].name, k + 1));
+    }
+    Ok(())
+}
+
+/// What comes out is told as a number, which the parent compares.
+fn two_processes(bench: &Bench) -> Result<(), Blocked> {
+    let it = bench.stepping()?;
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for k in 0..30 {
+        it.excite(k)?;
+        it.steps(1, bench.h())?;
+        for bits in it.snapshot(&bench.watched())?.into_iter().flatten() {
+            hash = bits.to_le_bytes().iter().fold(hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3));
+        }
+    }
+    bench.note(format!("30 steps, all outputs hashed: {hash:016x}"));
+    Ok(())
+}
+
+fn promise(bench: &Bench) -> Result<(), Blocked> {
+    let saves = bench.md.co_simulation.as_ref().is_some_and(CoSimulation::can_get_and_set_state);
+    let run = |it: &It<'_>, from: u32, promised: bool| {
+        let mut rows = Vec::new();
+        for k in from..from + 10 {
+            it.excite(k)?;
+            let (t, h) = (it.time.get(), bench.h());
+            let status = it
+                .call(&format!("DoStep(t={t}, h={h}, noSetFMUStatePriorToCurrentPoint={promised})"), |raw| {
+                    raw.do_step(it.handle, t, h, promised, [true; 4]).map(|(s, _)| s)
+                })?;
+            bench.require(fine(status), || {
+                format!("with noSetFMUStatePriorToCurrentPoint={promised} DoStep(t={t}) returned {status}")
+            });
+            it.time.set(t + h);
+            rows.push(it.snapshot(&bench.watched())?);
+        }
+        Ok::<_, Blocked>(rows)
+    };
+    if bench.md.variables.iter().any(|v| v.base == BaseType::Clock) {
+        return bench.not_applicable("the FMU has clocks and needs event mode");
+    }
+    let (free, bound) = (bench.stepping()?, bench.stepping()?);
+    let (a, b) = (run(&free, 0, false)?, run(&bound, 0, true)?);
+    if let Some((step, i)) = difference(&a, &b) {
+        bench.violated(format!("{} differs after {} steps under the promise", bench.watched()[i].name, step + 1));
+    }
+    if !saves {
+        bench.note("the FMU saves no states");
+        return Ok(());
+    }
+    let (here, time) = (bound.save()?, bound.time.get());
+    let first = run(&bound, 10, false)?;
+    if let Err(Blocked(why)) = bound.restore(here, time) {
+        bench.violated(format!("the current point after a step under the promise: {why}"));
+        return Ok(());
+    }
+    if let Some((step, i)) = difference(&first, &run(&bound, 10, true)?) {
+        bench.violated(format!("{} differs {} steps after the state was set", bench.watched()[i].name, step + 1));
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Variables, types and units (FMI 2.0.5, 2.2.2, 2.2.3, 2.2.7; FMI 3.0.2, 2.4.3, 2.4.4, 2.4.7).
 
+use super::clocked::alias_units;
 use super::xml::with_description;
 use super::{Check, Level, Levels, Run, Subject, Verdict, units};
 use model_description::{
@@ -27,6 +28,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "V09b", requirement: "Units, and the display units of each, have unique names.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unique_units) },
     Check { id: "V09c", requirement: "The base units of a common unit have the exponents and the factor that its name means.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(bases) },
     Check { id: "V09d", requirement: "A common display unit has the factor that its name means (display = factor * value + offset).", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(displays) },
+    Check { id: "V10", requirement: "Only aliases of floating-point variables have a display unit, one of the variable's unit.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(alias_units) },
     Check { id: "V11", requirement: "Only continuous variables have intermediateUpdate, and only inputs canHandleMultipleSetPerTimeInstant.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(flags) },
     Check { id: "V13", requirement: "A dimension is a positive number or refers to a structural parameter or constant of type UInt64, and start values are one or as many as elements.", clause: "3.0.2, 2.4.7.2 and 2.4.7.5", levels: Levels(None, Some(Level::Must)), run: Run::File(arrays) },
     Check { id: "V14", requirement: "Start values are of the variable's type, within its range.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(forms) },

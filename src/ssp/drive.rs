@@ -100,14 +100,15 @@ fn start(system: &mut System, descriptions: &[(&str, ModelDescription)]) -> Resu
     Ok(())
 }
 
-/// Inputs that no terminal feeds; one of a name in both components is one of the system.
+/// Numbers that no terminal feeds; one of a name in both components is one of the system. Truth values (`enable`) stay at
+/// the start values of the FMUs: an importer that sets every input of a system to 0 would switch the drive off.
 fn inputs<'a>(
     descriptions: &'a [(&'static str, ModelDescription)],
     connections: &[(String, String)],
 ) -> Vec<Outside<'a>> {
     let mut found: Vec<Outside<'a>> = Vec::new();
     for (component, md) in descriptions {
-        for variable in md.variables.iter().filter(|v| v.causality == Causality::Input) {
+        for variable in md.variables.iter().filter(|v| v.causality == Causality::Input && v.base.is_float()) {
             let port = format!("{component}.{}", variable.name);
             if connections.iter().any(|(_, to)| *to == port) {
                 continue;
@@ -144,7 +145,7 @@ fn starts(inputs: &[Outside<'_>], given: &[(&str, Parameter)]) -> Vec<(String, V
         let text = given.iter().rev().find(of_inner).map(|(_, p)| p.value.as_str()).or(o.variable.start.as_deref());
         Some((o.name.clone(), Value::Real(parse_number(text?)?)))
     };
-    inputs.iter().filter(|o| o.variable.base.is_float()).filter_map(start).collect()
+    inputs.iter().filter_map(start).collect()
 }
 
 /// SystemStructure.ssd.
@@ -162,7 +163,10 @@ fn description(
     let components = COMPONENTS.iter().zip(descriptions).map(|((name, fmu, corner), (_, md))| {
         let [x, y] = corner;
         let bound = of_components.contains(name).then(|| binding(name));
-        let connected = |v: &&ModelVariable| matches!(v.causality, Causality::Input | Causality::Output);
+        let connected = |v: &&ModelVariable| match v.causality {
+            Causality::Input => v.base.is_float(),
+            causality => causality == Causality::Output,
+        };
         let connectors = md.variables.iter().filter(connected).map(|v| connector(&v.name, v.causality.as_str(), v));
         Element::new("ssd:Component")
             .with("name", *name)
@@ -243,7 +247,10 @@ fn connector(name: &str, kind: &str, variable: &ModelVariable) -> Element {
 fn units(descriptions: &[(&str, ModelDescription)]) -> Element {
     let mut used: Vec<&Unit> = Vec::new();
     for (_, md) in descriptions {
-        let connected = |v: &&ModelVariable| matches!(v.causality, Causality::Input | Causality::Output);
+        let connected = |v: &&ModelVariable| match v.causality {
+            Causality::Input => v.base.is_float(),
+            causality => causality == Causality::Output,
+        };
         for unit in md.variables.iter().filter(connected).filter_map(|v| md.unit(v.unit.as_deref()?)) {
             if !used.iter().any(|u| u.name == unit.name) {
                 used.push(unit);

@@ -261,7 +261,7 @@ impl Loaded {
                         values::set(&mut self.system, &instance, file, &[Parameter { name, ..p.clone() }])?;
                     }
                     None => {
-                        self.notes.push(format!("{file}: line {}: there is no {port}; the value is ignored", p.line))
+                        self.notes.push(format!("{file}: line {}: there is no {port}; the value is ignored", p.line));
                     }
                 }
             }

@@ -257,12 +257,11 @@ fn binding(e: &Element) -> Result<Binding, String> {
     if e.get("sourceBase") == Some("component") {
         return Err(at(e, "sourceBase=\"component\" is not supported: put the file beside the FMU"));
     }
-    let values = match e.get("source") {
-        Some(source) => Values::File(path(e, source)?),
-        None => {
-            let set = child(e, "ParameterValues").and_then(|v| child(v, "ParameterSet"));
-            Values::Inline(ssv::parameters(set.ok_or_else(|| at(e, "a binding without source and without values"))?)?)
-        }
+    let values = if let Some(source) = e.get("source") {
+        Values::File(path(e, source)?)
+    } else {
+        let set = child(e, "ParameterValues").and_then(|v| child(v, "ParameterSet"));
+        Values::Inline(ssv::parameters(set.ok_or_else(|| at(e, "a binding without source and without values"))?)?)
     };
     Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into() })
 }

@@ -57,7 +57,7 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("F01a", &["F01a"]),
     ("F01b", &["F01b"]),
     // A state that lacks a variable shows wherever one is restored.
-    ("F02", &["F01b", "F02a", "F02b", "F02c", "F03a", "F04a"]),
+    ("F02", &["T05", "F01b", "F02a", "F02b", "F02c", "F03a", "F04a"]),
     ("F03b", &["F03b"]),
     ("F04a", &["F04a"]),
     ("F04b", &["F04b"]),
@@ -72,14 +72,51 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("G_L5", &["G-L5"]),
     ("M01", &["M01"]),
     ("I02", &["I02"]),
+    ("B06", &["B06"]),
+    ("B08f", &["B08f"]),
+    ("B08p", &["B08p"]),
+    ("G06", &["G06"]),
+    ("L11", &["L11"]),
+    ("T05", &["T05"]),
+    ("T10p", &["T10p"]),
+    ("Z09", &["Z09"]),
     ("CRASH", &["L00"]),
     ("HANG", &["L00"]),
 ];
 
+/// Faults of FMI 3.0: what only it has, and one of each group.
+const FAULTS3: &[(&str, &[&str])] = &[
+    ("NONE", &[]),
+    ("B02a", &["B02a"]),
+    ("X02b", &["X02b"]),
+    ("C03", &["C03"]),
+    ("G01c", &["G01c"]),
+    // References count over all types.
+    ("G02", &["G02", "V12"]),
+    ("G06", &["G06"]),
+    ("G08", &["G08"]),
+    ("L01b", &["L01b"]),
+    ("L03", &["L03"]),
+    ("L06", &["L06"]),
+    ("L07", &["L07"]),
+    ("L08", &["L08"]),
+    ("L08u", &["L08u"]),
+    ("L09a", &["L09a"]),
+    ("L12", &["L12"]),
+    ("T02a", &["T02a"]),
+    ("T05", &["T05"]),
+    ("T06a", &["T06a"]),
+    ("T06c", &["T06c"]),
+    ("F02", &["T05", "F01b", "F02a", "F02b", "F02c", "F03a", "F04a"]),
+    ("G_L1b", &["G-L1b"]),
+    ("G_L4", &["G-L4"]),
+];
+
 /// Compiles the small FMU; `None` without a compiler.
-fn compile(dir: &Path, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
-    let (source, out) =
-        (Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/check/fmu.c"), dir.join(format!("{fault}.so")));
+fn compile(dir: &Path, version: u8, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
+    let source = if version == 2 { "tests/check/fmu.c" } else { "tests/check/fmu3.c" };
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(source);
+    let out = dir.join(format!("{version}-{fault}.so"));
     let mut cc = Command::new("cc");
     cc.args(["-shared", "-fPIC", "-O1", "-w", "-fvisibility=hidden", &format!("-DFAULT_{fault}")]).args(more);
     let output = cc.arg(source).arg("-o").arg(&out).arg("-lm").output().ok()?;
@@ -87,11 +124,17 @@ fn compile(dir: &Path, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
     std::fs::read(out).ok()
 }
 
-fn pack(dir: &Path, fault: &str, binary: &[u8]) -> std::path::PathBuf {
-    let path = dir.join(format!("{fault}.fmu"));
+fn pack(dir: &Path, version: u8, fault: &str, binary: &[u8]) -> std::path::PathBuf {
+    let xml = if version == 2 { include_str!("fmu.xml") } else { include_str!("fmu3.xml") };
+    pack_with(dir, &format!("{version}-{fault}"), xml, binary)
+}
+
+fn pack_with(dir: &Path, name: &str, xml: &str, binary: &[u8]) -> std::path::PathBuf {
+    let path = dir.join(format!("{name}.fmu"));
+    let platform = if xml.contains("fmiVersion=\"2.0\"") { "linux64" } else { "x86_64-linux" };
     let entries = [
-        Entry::new("modelDescription.xml", include_bytes!("fmu.xml")),
-        Entry::new("binaries/linux64/Small.so", binary),
+        Entry::new("modelDescription.xml", xml.as_bytes()),
+        Entry::new(&format!("binaries/{platform}/Small.so"), binary),
         Entry::new("documentation/index.html", b"x"),
         Entry::new("terminalsAndIcons/terminalsAndIcons.xml", b"<fmiTerminalsAndIcons fmiVersion=\"3.0\"/>"),
     ];
@@ -101,20 +144,29 @@ fn pack(dir: &Path, fault: &str, binary: &[u8]) -> std::path::PathBuf {
 
 #[test]
 fn each_fault_is_found_by_its_check() {
+    each(2, FAULTS);
+}
+
+#[test]
+fn each_fault_of_fmi_3_is_found_by_its_check() {
+    each(3, FAULTS3);
+}
+
+fn each(version: u8, faults: &[(&str, &[&str])]) {
     let dir = tempfile::tempdir().unwrap();
-    if compile(dir.path(), "NONE", &[]).is_none() {
+    if compile(dir.path(), version, "NONE", &[]).is_none() {
         eprintln!("there is no C compiler: not tested");
         return;
     }
     let wrong = Mutex::new(Vec::new());
-    let next = Mutex::new(FAULTS.iter());
+    let next = Mutex::new(faults.iter());
     std::thread::scope(|scope| {
         for _ in 0..3 {
             scope.spawn(|| {
                 loop {
                     let Some((fault, ids)) = next.lock().unwrap().next() else { return };
-                    let binary = compile(dir.path(), fault, &[]).unwrap();
-                    let report = check(&pack(dir.path(), fault, &binary), &[]);
+                    let binary = compile(dir.path(), version, fault, &[]).unwrap();
+                    let report = check(&pack(dir.path(), version, fault, &binary), &[]);
                     if violated(&report) != *ids {
                         wrong.lock().unwrap().push(format!("{fault}: {}", told(&report)));
                     }
@@ -126,10 +178,23 @@ fn each_fault_is_found_by_its_check() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// An FMU that has derivatives of its outputs.
+#[test]
+fn derivatives_of_outputs() {
+    let dir = tempfile::tempdir().unwrap();
+    let flag = "canGetAndSetFMUstate=\"true\"";
+    let xml = include_str!("fmu.xml").replace(flag, &format!("{flag} maxOutputDerivativeOrder=\"1\""));
+    for (fault, ids) in [("NONE", &[][..]), ("T09o", &["T09"]), ("T09v", &["T09"])] {
+        let Some(binary) = compile(dir.path(), 2, fault, &["-DDERIVATIVES"]) else { return };
+        let report = check(&pack_with(dir.path(), fault, &xml, &binary), &["time", "lifecycle"]);
+        assert_eq!(violated(&report), ids, "{fault}: {}", told(&report));
+    }
+}
+
 #[test]
 fn faults_of_the_file() {
     let dir = tempfile::tempdir().unwrap();
-    if compile(dir.path(), "NONE", &[]).is_none() {
+    if compile(dir.path(), 2, "NONE", &[]).is_none() {
         return;
     }
     for (more, ids) in [
@@ -137,12 +202,13 @@ fn faults_of_the_file() {
         (&["-Wl,-rpath,/opt/lib"], &["B03r"]),
         (&["-Wl,-z,execstack"], &["B05"]),
         (&["-Wl,--no-as-needed", "-lgcc_s"], &["B03"]),
+        (&["-Wl,-z,x86-64-v3"], &["B11"]),
     ] {
-        let binary = compile(dir.path(), "NONE", more).unwrap();
-        let report = check(&pack(dir.path(), "flags", &binary), &["binary", "instances"]);
+        let binary = compile(dir.path(), 2, "NONE", more).unwrap();
+        let report = check(&pack(dir.path(), 2, "flags", &binary), &["binary", "instances"]);
         assert_eq!(violated(&report), ids, "{more:?}: {}", told(&report));
     }
-    let report = check(&pack(dir.path(), "text", b"no library"), &[]);
+    let report = check(&pack(dir.path(), 2, "text", b"no library"), &[]);
     assert_eq!(violated(&report), ["B00", "B10"], "{}", told(&report));
     let open = report.findings.iter().filter(|f| matches!(f.verdict, Verdict::NotDetermined(_))).count();
     assert!(open > 40, "what cannot be looked at is not passed");

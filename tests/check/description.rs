@@ -94,6 +94,8 @@ fn faults_of_fmi_3() {
         zip::ZipArchive::new(std::fs::File::open(common::archives().join("fmi3/PmsmPlant.fmu")).unwrap()).unwrap();
     let mut xml = String::new();
     zip.by_name("modelDescription.xml").unwrap().read_to_string(&mut xml).unwrap();
+    let reference = xml.split("<Output valueReference=\"").nth(1).and_then(|rest| rest.split('"').next()).unwrap();
+    let output = format!("<Output valueReference=\"{reference}\"");
     each(
         &xml,
         &[
@@ -125,7 +127,37 @@ fn faults_of_fmi_3() {
             ),
             (&["V14"], "start=\"325\"", "start=\"3,25\""),
             (&["V13"], "start=\"325\"", "start=\"325 326\""),
-            (&["S01"], "<Output valueReference=\"6\"", "<Output valueReference=\"5\""),
+            // The first output, in whose place an input is listed.
+            (&["S01"], &output, "<Output valueReference=\"1\""),
+        ],
+    );
+}
+
+#[test]
+fn faults_of_aliases_and_clocked_states() {
+    let state = "<ClockedState valueReference=\"5\"/>\n    <InitialUnknown valueReference=\"3\"";
+    let clocked =
+        include_str!("fmu3.xml").replace("<Int32 name=\"n\"", "<Int32 name=\"n\" clocks=\"9\" previous=\"8\"");
+    let clocked = clocked.replace("<InitialUnknown valueReference=\"5\" dependencies=\"\"/>", "");
+    let clocked = clocked.replace("<InitialUnknown valueReference=\"3\"", state).replace(
+        "</ModelVariables>",
+        "<Int32 name=\"before\" valueReference=\"8\" causality=\"local\" variability=\"discrete\" clocks=\"9\" initial=\"exact\" start=\"0\"/>
+         <Clock name=\"tick\" valueReference=\"9\" causality=\"input\" intervalVariability=\"triggered\"/></ModelVariables>",
+    );
+    let clocked = clocked.replace("canSerializeFMUState", "hasEventMode=\"true\" canSerializeFMUState");
+    each(
+        include_str!("fmu3.xml"),
+        &[
+            (&["V10"], "displayUnit=\"mm\"", "displayUnit=\"km\""),
+            (&["V10"], "<Alias name=\"count\"/>", "<Alias name=\"count\" displayUnit=\"mm\"/>"),
+        ],
+    );
+    each(
+        &clocked,
+        &[
+            (&["S06"], "previous=\"8\"", "previous=\"5\""),
+            (&["S06"], "previous=\"8\"", ""),
+            (&["S06"], "<ClockedState valueReference=\"5\"/>", "<ClockedState valueReference=\"4\"/>"),
         ],
     );
 }

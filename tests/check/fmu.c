@@ -1,14 +1,22 @@
-/* A small FMU for co-simulation, FMI 2.0, that breaks no rule; and with -DFAULT_<name> exactly one.
-   y' = gain u; n counts steps. Integers: 0 n. Booleans: 0 flag. Strings: 0 label. Reals: 0 time, 1 gain, 2 u, 3 y. */
+/* A small FMU for co-simulation, FMI 2.0, that breaks no rule; and with -DFAULT_<name> exactly one. fmu3.c makes FMI 3.0 of it.
+   y' = gain u + bias; n counts steps. Integers: 0 n. Booleans: 0 flag. Strings: 0 label.
+   Reals: 0 time, 1 gain, 2 u, 3 y, 4 bias. */
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 enum { INSTANTIATED = 1, INITIALISATION = 2, STEP = 4, TERMINATED = 8, FAILED = 16, ANY = 31 };
+#ifdef FMI3
+#define READABLE ANY
+#else
+#define READABLE (INITIALISATION | STEP | TERMINATED | FAILED)
+#endif
 
 typedef struct {
     void (*logger)(void *, const char *, int, const char *, const char *, ...);
@@ -19,7 +27,7 @@ typedef struct {
 } Callbacks;
 
 typedef struct {
-    double start, time, stop, gain, u, y;
+    double start, time, stop, gain, u, y, bias;
     int32_t n, flag, state, has_stop, ready, steps;
     char label[64];
     uint64_t extra;
@@ -67,7 +75,11 @@ static int say(Fmu *f, int status, const char *text) {
     (void)text;
     text = "something\n";
 #endif
+#ifdef FMI3
+    ((void (*)(void *, int, const char *, const char *))c->logger)(environment, status, category, text);
+#else
     c->logger(environment, f->name, status, category, "%s", text);
+#endif
     return status;
 }
 
@@ -119,6 +131,12 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 #endif
     (void)type;
     if (!callbacks) return NULL;
+#ifdef FAULT_Z09
+    if (where && strlen(where) > 240) return NULL;
+#endif
+#ifdef FAULT_B08p
+    socket(AF_UNIX, SOCK_STREAM, 0);
+#endif
 #ifdef FAULT_HANG
     for (volatile int spin = 1; spin;) {}
 #endif
@@ -249,32 +267,38 @@ static int bad(const unsigned *vr, size_t n, const void *values) {
 }
 
 #ifdef FAULT_G02
-#define KNOWN(count) (vr[i] < (count) || vr[i] > 3)
+#define KNOWN(count) (vr[i] < (count) || vr[i] > 4)
 #else
 #define KNOWN(count) (vr[i] < (count))
 #endif
 
 EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) {
-    ENTER(INITIALISATION | STEP | TERMINATED | FAILED);
+    ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
-        if (!KNOWN(4)) return fail(f, "no such Real");
+        if (!KNOWN(5)) return fail(f, "no such Real");
         double y = f->data.y;
 #ifdef FAULT_S04
         if (f->data.state == INITIALISATION) y = f->data.gain;
+#endif
+#ifdef FAULT_L11
+        if (f->data.state == INITIALISATION && vr[i] == 3) y = f->data.y += 1e-6;
+#endif
+#ifdef FAULT_T10p
+        y += getpid() * 1e-9;
 #endif
         double time = f->data.time;
 #ifdef FAULT_T06b
         time = f->data.start;
 #endif
-        const double all[] = {time, f->data.gain, f->data.u, y};
-        values[i] = all[vr[i] & 3];
+        const double all[] = {time, f->data.gain, f->data.u, y, f->data.bias};
+        values[i] = all[vr[i] % 5];
     }
     return OK;
 }
 
 EXPORT int fmi2GetInteger(void *c, const unsigned vr[], size_t n, int values[]) {
-    ENTER(INITIALISATION | STEP | TERMINATED | FAILED);
+    ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
 #ifdef FAULT_V12
@@ -291,7 +315,7 @@ EXPORT int fmi2GetInteger(void *c, const unsigned vr[], size_t n, int values[]) 
 }
 
 EXPORT int fmi2GetBoolean(void *c, const unsigned vr[], size_t n, int values[]) {
-    ENTER(INITIALISATION | STEP | TERMINATED | FAILED);
+    ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(1)) return fail(f, "no such Boolean");
@@ -301,7 +325,7 @@ EXPORT int fmi2GetBoolean(void *c, const unsigned vr[], size_t n, int values[]) 
 }
 
 EXPORT int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *values[]) {
-    ENTER(INITIALISATION | STEP | TERMINATED | FAILED);
+    ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(1)) return fail(f, "no such String");
@@ -318,7 +342,7 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
         write = 1;
 #endif
         for (size_t i = 0; i < n; i++) {
-            if (!KNOWN(4)) return fail(f, "no such Real");
+            if (!KNOWN(5)) return fail(f, "no such Real");
             switch (vr[i]) {
             case 1:
                 if (f->data.state == STEP) return fail(f, "gain is fixed");
@@ -334,6 +358,13 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
             case 2:
                 if (write) f->data.u = values[i];
                 break;
+            case 4:
+#ifdef FAULT_G06
+                if (f->data.state == STEP) return fail(f, "bias is fixed");
+#endif
+                if (!isfinite(values[i])) return fail(f, "bias is not finite");
+                if (write) f->data.bias = values[i];
+                break;
 #ifdef FAULT_G03b
             case 3:
                 if (write) f->data.y = values[i];
@@ -341,7 +372,7 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
 #endif
 #ifdef FAULT_G02
             default:
-                if (vr[i] > 3) break;
+                if (vr[i] > 4) break;
                 return fail(f, "cannot be set");
 #else
             default: return fail(f, "cannot be set");
@@ -499,10 +530,20 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     if (d->steps > 400) return fail(f, "no more");
 #endif
     if (!isfinite(d->u)) return fail(f, "u is not finite");
+#ifdef FAULT_B06
+    volatile char large[400000];
+    for (size_t i = 0; i < sizeof large; i += 512) large[i] = 1;
+#endif
+#ifdef FAULT_B08f
+    __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040);
+#endif
+#ifdef FAULT_T05
+    if (no_prior) d->y += 1e-9;
+#endif
 #ifdef FAULT_T03
-    d->y += d->gain * d->u;
+    d->y += d->gain * d->u + d->bias;
 #else
-    d->y += d->gain * d->u * h;
+    d->y += (d->gain * d->u + d->bias) * h;
 #endif
     d->n = d->n < 1000000 ? d->n + 1 : d->n;
     d->steps++;
@@ -524,7 +565,25 @@ EXPORT int fmi2GetDirectionalDerivative(void *c, const unsigned *a, size_t n, co
 #endif
 }
 EXPORT int fmi2SetRealInputDerivatives(void *c, const unsigned *vr, size_t n, const int *o, const double *v) { (void)vr; (void)n; (void)o; (void)v; return none(c); }
-EXPORT int fmi2GetRealOutputDerivatives(void *c, const unsigned *vr, size_t n, const int *o, double *v) { (void)vr; (void)n; (void)o; (void)v; return none(c); }
+EXPORT int fmi2GetRealOutputDerivatives(void *c, const unsigned *vr, size_t n, const int *o, double *v) {
+#ifdef DERIVATIVES
+    ENTER(STEP | TERMINATED);
+    for (size_t i = 0; i < n; i++) {
+#ifndef FAULT_T09o
+        if (o[i] != 1) return fail(f, "no such order");
+#endif
+        if (vr[i] != 3) return fail(f, "no output");
+        v[i] = f->data.gain * f->data.u + f->data.bias;
+#ifdef FAULT_T09v
+        v[i] *= 2;
+#endif
+    }
+    return OK;
+#else
+    (void)vr; (void)n; (void)o; (void)v;
+    return none(c);
+#endif
+}
 EXPORT int fmi2CancelStep(void *c) { return none(c); }
 
 static int status(void *c, int kind) {

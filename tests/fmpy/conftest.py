@@ -1,4 +1,7 @@
-"""The archives under test: `FMU_ARCHIVES` names the folder that holds fmi2/NAME.fmu and fmi3/NAME.fmu."""
+"""The archives under test: `FMU_ARCHIVES` names the folder that holds fmi2/NAME.fmu and fmi3/NAME.fmu.
+
+`FMU_ONLY` names some of them, for example `fmi3-PmsmPlant`; all without it.
+"""
 
 import os
 import zipfile
@@ -16,6 +19,13 @@ if not ARCHIVES:
 
 def name(archive):
     return f"{archive.parent.name}-{archive.stem}"
+
+
+ONLY = os.environ.get("FMU_ONLY")
+if ONLY is not None:
+    ARCHIVES = [archive for archive in ARCHIVES if name(archive) in ONLY.split(",")]
+    if not ARCHIVES:
+        pytest.exit(f"no archive is named in FMU_ONLY = {ONLY}; names are like fmi3-PmsmPlant", 2)
 
 
 @pytest.fixture(scope="session")

@@ -60,7 +60,9 @@ impl Legs {
     #[inline]
     pub fn feed(&self, i: Phases) -> f64 {
         let leg = |i: f64| (i / self.i_zone).clamp(-1.0, 1.0) * i;
-        if self.share > 0.0 { self.share * (leg(i.a) + leg(i.b) + leg(i.c)) } else { 0.0 }
+        let current = leg(i.a) + leg(i.b) + leg(i.c);
+        // No current, no matter how absurd the dead time.
+        if self.share > 0.0 && current > 0.0 { self.share * current } else { 0.0 }
     }
 
     /// Whether diodes block the current `i` (A) of a machine that turns at the electrical speed `w` (rad/s).

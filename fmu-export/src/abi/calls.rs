@@ -44,7 +44,7 @@ impl<M: Model> Abi<M> {
         unsafe {
             enter::<M>(entry, instance, |it| {
                 let values = array(values, n_values, "values")?;
-                it.set(array(references, n, "value references")?, values)
+                Ok(it.set(array(references, n, "value references")?, values)?)
             })
         }
     }

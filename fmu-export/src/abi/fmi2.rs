@@ -1,11 +1,10 @@
 //! FMI 2.0.5: what it has of its own, and the table of its functions.
 
-use super::gate::{Entry, enter, open};
+use super::gate::{Entry, Refusal, enter, open};
 use super::logger::Fmi2Sink;
 use super::pointer::{place, text};
 use super::types::{Fmi2Boolean, Fmi2Callbacks, Instance, Text};
 use super::{Abi, credentials};
-use crate::access::Refusal;
 use crate::log::Log;
 use fmu_core::{Fault, Model};
 use std::ffi::c_int;

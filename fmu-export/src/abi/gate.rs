@@ -1,7 +1,6 @@
 //! The gate: every call on an instance passes here. NULL, re-entry, standard and lifecycle are checked, panics caught,
 //! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
 
-use crate::access::Refusal;
 use crate::instance::Instance;
 use crate::lifecycle::{Call, Standard, State, States};
 use crate::log::{Log, Status};
@@ -25,6 +24,20 @@ impl Entry {
     /// Looks the row up, while compiling.
     pub const fn new(standard: Standard, call: Call, name: &'static str) -> Self {
         Self { name, standard, states: call.states(standard), next: call.next() }
+    }
+}
+
+/// Why a call was not done.
+pub(crate) enum Refusal {
+    /// Status Error: the instance goes to the Error state.
+    Error(Fault),
+    /// Status Discard: nothing changes.
+    Discard(Fault),
+}
+
+impl From<Fault> for Refusal {
+    fn from(fault: Fault) -> Self {
+        Self::Error(fault)
     }
 }
 
@@ -89,10 +102,6 @@ fn fail<M: Model>(entry: Entry, instance: &mut Instance<M>, refusal: Refusal) ->
         }
         Refusal::Discard(fault) => {
             instance.log.discard(&format!("{}: {fault}", entry.name));
-            Status::Discard
-        }
-        Refusal::Rejected(fault) => {
-            instance.log.rejected(&format!("{}: {fault}", entry.name));
             Status::Discard
         }
     }

@@ -116,8 +116,8 @@ impl Model for Probe {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        if self.gain > 9.0 && self.n == 1 {
-            return Err(Fault::value("gain", self.gain, "at most 9 with n = 1"));
+        if self.double_gain * self.r > 100.0 {
+            return Err(Fault::new("gain times motor.R is greater than 50"));
         }
         if self.map[0] <= self.map[2] { Ok(()) } else { Err(Fault::new("map[1] is greater than map[3]")) }
     }

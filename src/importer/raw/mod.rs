@@ -8,12 +8,14 @@
 mod birth;
 mod callbacks;
 mod cells;
+mod machine;
 mod others;
 mod states;
 
 pub use birth::{Birth, Interface};
 pub use callbacks::{Event, allocations, take_events};
 pub use cells::{Cells, type_name, width};
+pub use machine::float_control;
 
 use super::log::Status;
 use callbacks::optional;

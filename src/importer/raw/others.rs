@@ -6,6 +6,23 @@ use model_description::FmiVersion;
 use std::ffi::{c_int, c_void};
 
 impl Raw {
+    /// The derivatives of variables of double precision with respect to time.
+    pub fn output_derivatives(&self, it: Handle, references: &[u32], order: c_int) -> Option<(Status, Vec<f64>)> {
+        type Get2 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const c_int, *mut f64) -> Status;
+        type Get3 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const c_int, *mut f64, usize) -> Status;
+        let n = references.len();
+        let (orders, mut values) = (vec![order; n], vec![f64::NAN; n]);
+        let (i, vr, orders, out) = (it.pointer(), references.as_ptr(), orders.as_ptr(), values.as_mut_ptr());
+        // SAFETY: the standards' types; all arrays have this length.
+        let status = unsafe {
+            match self.version {
+                FmiVersion::V2 => self.function::<Get2>("GetRealOutputDerivatives")?(i, vr, n, orders, out),
+                FmiVersion::V3 => self.function::<Get3>("GetOutputDerivatives")?(i, vr, n, orders, out, n),
+            }
+        };
+        Some((status, values))
+    }
+
     /// Any other function of the standard, with arguments that are good as far as the instance allows: one variable,
     /// numbers of 0, room for results.
     pub fn other(&self, name: &str, it: Handle, reference: u32) -> Option<Status> {

@@ -49,7 +49,7 @@ def reach(fmu, state):
 def perform(it, call, saved):
     """Makes a call with arguments that are right; the status."""
     fmu = it.fmu
-    parameter = fmu.of("parameter")[0]
+    parameter = next(v for v in fmu.of("parameter") if v.variability == "fixed")
     match call:
         case "SetDebugLogging":
             return it.call(call, 1, 0, None)

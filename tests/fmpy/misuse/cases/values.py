@@ -171,9 +171,9 @@ def parameters_that_do_not_fit_together(fmu):
 
 @case
 def not_settable(fmu):
-    """Outputs and time never, parameters not after initialisation; the value stays."""
+    """Outputs and time never, fixed parameters not after initialisation; the value stays."""
     for variable in fmu.variables.values():
-        if variable.causality == "input":
+        if variable.causality == "input" or variable.variability == "tunable":
             continue
         it = fmu.instance().begin()
         before = it.get(variable.name)
@@ -188,10 +188,10 @@ def not_settable(fmu):
 
 @case
 def set_and_get_again(fmu):
-    """Every settable variable, before and in initialisation, and inputs in between steps: bit for bit."""
+    """Every settable variable, before and in initialisation, inputs and tunable parameters in between steps: bit for bit."""
     for state in ("instantiated", "initialisation", "step"):
         for v in fmu.settable():
-            if state == "step" and v.causality == "parameter":
+            if state == "step" and v.variability == "fixed":
                 continue
             it = fmu.instance()
             it.enter() if state == "initialisation" else it.begin() if state == "step" else None

@@ -1,0 +1,60 @@
+//! Saving and restoring the FMU state of the controller through the C functions, with a handle that is used again:
+//! `cargo bench --bench state`. Fails above 200 ns each.
+#![allow(missing_docs)]
+
+use drive::SensorlessController;
+use fmu_core::Model;
+use fmu_export::abi::types::{Fmi2Boolean, FmuState, Instance, c_int};
+use fmu_export::saved::Saved;
+use std::ffi::CString;
+use std::hint::black_box;
+use std::ptr::{null, null_mut};
+use std::time::Instant;
+
+fmu_export::export!(SensorlessController);
+
+/// Nanoseconds per call, the best of several rounds.
+fn time(mut call: impl FnMut() -> c_int) -> f64 {
+    const CALLS: u32 = 20_000;
+    let rounds = (0..200).map(|_| {
+        let start = Instant::now();
+        for _ in 0..CALLS {
+            assert_eq!(call(), 0);
+        }
+        start.elapsed().as_secs_f64() * 1e9 / f64::from(CALLS)
+    });
+    rounds.fold(f64::INFINITY, f64::min)
+}
+
+fn main() {
+    let (no, h) = (Fmi2Boolean(0), 1e-4);
+    let token = CString::new(SensorlessController::TOKEN.as_str()).unwrap_or_default();
+    // An importer calls through pointers that the compiler does not know.
+    let save: unsafe extern "C" fn(Instance, *mut FmuState) -> c_int = black_box(fmi::fmi2GetFMUstate);
+    let restore: unsafe extern "C" fn(Instance, FmuState) -> c_int = black_box(fmi::fmi2SetFMUstate);
+    let step: unsafe extern "C" fn(Instance, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);
+    // SAFETY: used as the standard demands: one thread, freed once.
+    unsafe {
+        let it = fmi::fmi2Instantiate(c"bench".as_ptr(), 1, token.as_ptr(), null(), null(), no, no);
+        assert_eq!(fmi::fmi2SetupExperiment(it, no, 0.0, 0.0, no, 0.0), 0);
+        assert_eq!((fmi::fmi2EnterInitializationMode(it), fmi::fmi2ExitInitializationMode(it)), (0, 0));
+        let mut t = 0.0;
+        let step = time(|| {
+            let status = step(it, t, h, no);
+            t += h;
+            status
+        });
+        let mut state = null_mut();
+        let saved = time(|| save(it, black_box(&raw mut state)));
+        let restored = time(|| restore(it, black_box(state)));
+        assert_eq!(fmi::fmi2FreeFMUstate(it, &raw mut state), 0);
+        fmi::fmi2FreeInstance(it);
+        let size = size_of::<Saved<SensorlessController>>();
+        println!(
+            "a state of {size} bytes: saved in {saved:.0} ns, restored in {restored:.0} ns; a step of the controller takes \
+             {step:.0} ns, {:.2} times as long as both",
+            step / (saved + restored)
+        );
+        assert!(saved < 200.0 && restored < 200.0, "saving or restoring takes more than 200 ns");
+    }
+}

@@ -1,0 +1,346 @@
+//! What must come out: FMI 2.0.5, 4.2.4 and FMI 3.0.2, 4.2.1 written down once more, by hand, and the model run natively.
+
+use crate::common::model::*;
+use crate::common::{DISCARD, ERROR, OK};
+use crate::operation::{Arrays, Categories, Kind, Mixed, Point};
+use fmu_core::{Block, Elapsed, Model, Slot, Step};
+use std::ffi::c_int;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// States that allow a call, by their letters as in `lifecycle.rs`; first FMI 2.0, then FMI 3.0.
+pub(crate) const GET: [&str; 2] = ["nste", "inste"];
+pub(crate) const SET: [&str; 2] = ["ins", "ins"];
+pub(crate) const SETUP: [&str; 2] = ["i", ""];
+pub(crate) const ENTER: [&str; 2] = ["i", "i"];
+pub(crate) const EXIT: [&str; 2] = ["n", "n"];
+pub(crate) const STEP: [&str; 2] = ["s", "s"];
+pub(crate) const TERMINATE: [&str; 2] = ["s", "s"];
+pub(crate) const SAVE: [&str; 2] = ["inst", "inst"];
+pub(crate) const STATUS: [&str; 2] = ["st", ""];
+pub(crate) const ANY: [&str; 2] = ["inste", "inste"];
+
+/// What a saved state must bring back.
+#[derive(Clone)]
+pub(crate) struct Snapshot {
+    pub(crate) state: char,
+    experiment: Option<(f64, Option<f64>)>,
+    elapsed: Elapsed,
+    end: f64,
+    /// Set and not yet seen by the model.
+    fresh: bool,
+    block: Block<Probe>,
+}
+
+impl Snapshot {
+    pub(crate) fn new() -> Self {
+        Self { state: 'i', experiment: None, elapsed: Elapsed::ZERO, end: 0.0, fresh: true, block: Block::default() }
+    }
+
+    /// Bytes of a state with an output that is no number are not taken back.
+    pub(crate) fn is_storable(&self) -> bool {
+        !self.real(X).is_nan() && !self.real(DOUBLE_GAIN).is_nan()
+    }
+
+    pub(crate) fn is_without_experiment(&self) -> bool {
+        self.experiment.is_none()
+    }
+
+    /// The model's rules across parameters.
+    fn is_valid(&self) -> bool {
+        self.real(MAP) <= self.real(MAP + 2) && self.real(GAIN) * self.real(R) <= 50.0
+    }
+
+    /// Looking at it would panic in the model.
+    pub(crate) fn is_unlucky(&self) -> bool {
+        self.fresh && self.integer(N) == 13
+    }
+
+    fn slot<T>(&self, reference: u32, read: impl FnOnce(Slot<'_>) -> T) -> T {
+        let mut block = self.block.clone();
+        read(Probe::TABLE.entry(&mut block, reference as usize - 1).unwrap().1)
+    }
+
+    fn real(&self, reference: u32) -> f64 {
+        self.slot(reference, |slot| if let Slot::Real(x) = slot { *x } else { unreachable!() })
+    }
+
+    fn integer(&self, reference: u32) -> i32 {
+        self.slot(reference, |slot| if let Slot::Integer(x) = slot { *x } else { unreachable!() })
+    }
+
+    fn truth(&self, reference: u32) -> bool {
+        self.slot(reference, |slot| if let Slot::Boolean(x) = slot { *x } else { unreachable!() })
+    }
+
+    fn put(&mut self, reference: u32, value: Mixed) {
+        match Probe::TABLE.entry(&mut self.block, reference as usize - 1).unwrap().1 {
+            Slot::Real(x) => *x = value.real,
+            Slot::Integer(x) => *x = i32::try_from(value.integer).unwrap(),
+            Slot::Boolean(x) => *x = value.truth != 0,
+        }
+    }
+
+    /// Before the start, outputs and calculated parameters fit what was set.
+    pub(crate) fn refresh(&mut self) -> Result<(), ()> {
+        if self.fresh && "in".contains(self.state) {
+            self.guarded(|it| {
+                it.block.initialise();
+                it.fresh = false;
+            })?;
+        }
+        Ok(())
+    }
+
+    /// A panic of the model is an error that may leave half of the work.
+    fn guarded(&mut self, work: impl FnOnce(&mut Self)) -> Result<(), ()> {
+        catch_unwind(AssertUnwindSafe(|| work(self))).map_err(|_| ())
+    }
+
+    /// Bits of one value as a type, or `None`: another type, or no such variable.
+    pub(crate) fn value(&self, version: u8, kind: Kind, reference: u32) -> Option<u64> {
+        Some(match (kind, reference) {
+            (Kind::Real, TIME) => self.end.to_bits(),
+            (Kind::Real, U | K | X | R | 8..=10 | GAIN | DOUBLE_GAIN) => self.real(reference).to_bits(),
+            (Kind::Integer, COUNT | N) => u64::from(self.integer(reference).cast_unsigned()),
+            (Kind::Integer, MODE) if version == 2 => u64::from(self.integer(reference).cast_unsigned()),
+            (Kind::Enumeration, MODE) => i64::from(self.integer(reference)).cast_unsigned(),
+            (Kind::Boolean, ON | HIGH | FLAG) => self.truth(reference).into(),
+            _ => return None,
+        })
+    }
+}
+
+/// How many values a reference stands for; `None`: an element of an array, which FMI 3.0 cannot name.
+pub(crate) fn elements(version: u8, reference: u32) -> Option<usize> {
+    match (version, reference) {
+        (3, MAP) => Some(3),
+        (3, 9 | 10) => None,
+        _ => Some(1),
+    }
+}
+
+/// Whether the value may be set to a variable in a state.
+fn settable(version: u8, kind: Kind, state: char, reference: u32, value: Mixed) -> bool {
+    let (x, n) = (value.real, value.integer);
+    let early = state != 's';
+    match (kind, reference) {
+        (Kind::Real, U) => x.is_finite(),
+        (Kind::Real, K) => (-5.0..=5.0).contains(&x),
+        (Kind::Real, R) => early && x > 0.0 && x.is_finite(),
+        (Kind::Real, 8..=10) => early && x >= -1.0 && x.is_finite(),
+        (Kind::Real, GAIN) => (0.0..=10.0).contains(&x),
+        (Kind::Integer, N) => early && n >= 1,
+        (Kind::Integer, MODE) if version == 2 => early && [1, 2, 4].contains(&n),
+        (Kind::Enumeration, MODE) => early && [1, 2, 4].contains(&n),
+        (Kind::Boolean, ON) => true,
+        (Kind::Boolean, FLAG) => early,
+        _ => false,
+    }
+}
+
+/// One instance, as it should be.
+#[derive(Clone)]
+pub(crate) struct Reference {
+    pub(crate) version: u8,
+    pub(crate) now: Snapshot,
+    /// Categories that are heard: events, warning, discard, error, fatal.
+    pub(crate) heard: [bool; 5],
+}
+
+/// The names of the categories, in the order of [`Reference::heard`].
+const CATEGORIES: [&[u8]; 5] =
+    [b"logEvents", b"logStatusWarning", b"logStatusDiscard", b"logStatusError", b"logStatusFatal"];
+
+impl Reference {
+    pub(crate) fn new(version: u8, logging: bool) -> Self {
+        Self { version, now: Snapshot::new(), heard: [logging; 5] }
+    }
+
+    /// The status of a call that needs one of these states, and the state afterwards if it failed.
+    pub(crate) fn call(&mut self, states: [&str; 2], work: impl FnOnce(&mut Self) -> Result<c_int, ()>) -> c_int {
+        let states = states[usize::from(self.version - 2)];
+        let status = if states.contains(self.now.state) { work(self).unwrap_or(ERROR) } else { ERROR };
+        if status == ERROR {
+            self.now.state = 'e';
+        }
+        status
+    }
+
+    pub(crate) fn logging(&mut self, on: bool, categories: &Categories) -> c_int {
+        self.call(ANY, |it| {
+            let Categories::Names(names) = categories else { return Err(()) };
+            let mut listed = [names.is_empty(); 5];
+            for name in names {
+                let name = name.ok_or(())?;
+                match CATEGORIES.iter().position(|c| *c == name) {
+                    Some(i) => listed[i] = true,
+                    None if it.version == 2 && name == b"logAll" => listed = [true; 5],
+                    None => return Err(()),
+                }
+            }
+            for (heard, listed) in it.heard.iter_mut().zip(listed) {
+                // FMI 2.0: on means these and no others. FMI 3.0: the others stay.
+                *heard = if listed { on } else { *heard && !(it.version == 2 && on) };
+            }
+            Ok(OK)
+        })
+    }
+
+    fn experiment(&mut self, start: f64, stop: Option<f64>) -> Result<(), ()> {
+        let good = start.is_finite() && stop.is_none_or(|stop| stop.is_finite() && stop > start);
+        if !good {
+            return Err(());
+        }
+        self.now.experiment = Some((start, stop));
+        self.now.end = start;
+        Ok(())
+    }
+
+    pub(crate) fn set_up(&mut self, start: f64, stop: Option<f64>) -> c_int {
+        self.call(SETUP, |it| it.experiment(start, stop).map(|()| OK))
+    }
+
+    pub(crate) fn enter(&mut self, start: f64, stop: Option<f64>) -> c_int {
+        self.call(ENTER, |it| {
+            if it.version == 3 {
+                it.experiment(start, stop)?;
+            }
+            it.now.experiment.ok_or(())?;
+            it.now.state = 'n';
+            Ok(OK)
+        })
+    }
+
+    pub(crate) fn exit(&mut self) -> c_int {
+        self.call(EXIT, |it| {
+            if !it.now.is_valid() || !it.now.is_storable() {
+                return Err(());
+            }
+            it.now.guarded(|now| now.block.initialise())?;
+            it.now.fresh = false;
+            it.now.state = 's';
+            Ok(OK)
+        })
+    }
+
+    pub(crate) fn terminate(&mut self) -> c_int {
+        self.call(TERMINATE, |it| {
+            it.now.state = 't';
+            Ok(OK)
+        })
+    }
+
+    pub(crate) fn reset(&mut self) -> c_int {
+        self.now = Snapshot::new();
+        OK
+    }
+
+    /// The status and, if it is OK, the bits.
+    pub(crate) fn get(&mut self, kind: Kind, references: &[u32], arrays: Arrays) -> (c_int, Vec<u64>) {
+        let mut bits = Vec::new();
+        let status = self.call(GET, |it| {
+            it.arrays(kind, references, arrays)?;
+            if let Kind::Foreign(_) = kind {
+                return if references.is_empty() { Ok(OK) } else { Err(()) };
+            }
+            it.now.refresh()?;
+            for &reference in references {
+                for offset in 0..elements(it.version, reference).ok_or(())? {
+                    let reference = reference.wrapping_add(u32::try_from(offset).unwrap());
+                    bits.push(it.now.value(it.version, kind, reference).ok_or(())?);
+                }
+            }
+            Ok(OK)
+        });
+        (status, bits)
+    }
+
+    /// Whether the arrays can be used at all.
+    fn arrays(&self, kind: Kind, references: &[u32], arrays: Arrays) -> Result<(), ()> {
+        let empty = references.is_empty();
+        let foreign = matches!(kind, Kind::Foreign(_));
+        // Bytes are always aligned, and a type that no variable has is refused before its values are looked at.
+        let aligned = foreign || (kind == Kind::Boolean && self.version == 3);
+        let usable = match arrays {
+            Arrays::Good => true,
+            Arrays::NullReferences | Arrays::NullValues => empty,
+            Arrays::Misaligned => empty || aligned,
+            Arrays::More => self.version == 2,
+            Arrays::Less => self.version == 2 || empty,
+        };
+        if !usable {
+            return Err(());
+        }
+        if !foreign && references.iter().any(|&r| elements(self.version, r).is_none()) {
+            return Err(());
+        }
+        Ok(())
+    }
+
+    pub(crate) fn set(&mut self, kind: Kind, references: &[u32], values: &[Mixed], arrays: Arrays) -> c_int {
+        self.call(SET, |it| {
+            it.arrays(kind, references, arrays)?;
+            let mut values = values.iter();
+            let mut after = it.now.clone();
+            for &reference in references {
+                for offset in 0..elements(it.version, reference).unwrap_or(1) {
+                    let reference = reference.wrapping_add(u32::try_from(offset).unwrap());
+                    let value = *values.next().unwrap();
+                    if !settable(it.version, kind, it.now.state, reference, value) {
+                        return Err(());
+                    }
+                    after.put(reference, value);
+                    after.fresh |= it.now.state != 's' || reference == GAIN;
+                }
+            }
+            it.now = after;
+            Ok(OK)
+        })
+    }
+
+    /// Where a step begins.
+    pub(crate) fn point(&self, at: Point, h: f64) -> f64 {
+        match at {
+            Point::Continues(away) => self.now.end + away * h,
+            Point::At(t) => t,
+        }
+    }
+
+    pub(crate) fn step(&mut self, t: f64, h: f64, null: bool) -> c_int {
+        self.call(STEP, |it| {
+            let now = &mut it.now;
+            let rounding = |t: f64| 2.0 * f64::EPSILON * t.abs();
+            let continues = (t - now.end).abs() <= h / 100.0 + rounding(t);
+            let elapsed = now.elapsed.plus(h);
+            let beyond = now.experiment.is_some_and(|(start, stop)| {
+                stop.is_some_and(|stop| (start + elapsed.seconds()).min(t + h) > stop + 1e-9 * h + rounding(stop))
+            });
+            let fits = h.is_normal() && h > 0.0 && (t + h).is_finite() && t + h > t && continues;
+            if null || !fits || beyond || now.fresh && !now.is_valid() {
+                return Err(());
+            }
+            let step = Step { start: now.elapsed, h };
+            now.guarded(|now| {
+                if now.fresh {
+                    now.block.model.derive();
+                    now.fresh = false;
+                }
+                // A fault of the model shows in the mode; what it has done by then stays.
+                if now.block.step(&step).is_ok() {
+                    now.elapsed = elapsed;
+                    now.end = t + h;
+                }
+            })?;
+            if now.integer(MODE) == FAULTY { Err(()) } else { Ok(OK) }
+        })
+    }
+
+    /// A `fmi2Get...Status` by its number: status, real, integer, Boolean, text.
+    pub(crate) fn status(&mut self, function: u8, kind: i32, null: bool) -> c_int {
+        self.call(STATUS, |_| match (function, kind) {
+            (1 | 3, _) if null => Err(()),
+            (1, 2) | (3, 3) => Ok(OK),
+            _ => Ok(DISCARD),
+        })
+    }
+}

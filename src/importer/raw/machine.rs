@@ -1,0 +1,25 @@
+//! What a call may leave behind in the processor.
+
+/// Floating-point control of this thread: rounding, masks of exceptions, flushing to zero; without the flags that every
+/// calculation sets. `None` where this is not known.
+pub fn float_control() -> Option<u64> {
+    #[cfg(target_arch = "x86_64")]
+    {
+        let (mut sse, mut x87) = (0_u32, 0_u16);
+        // SAFETY: both instructions store a control word to the place given, which is ours and large enough.
+        unsafe {
+            std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut sse, options(nostack, preserves_flags));
+            std::arch::asm!("fnstcw [{}]", in(reg) &raw mut x87, options(nostack, preserves_flags));
+        }
+        Some(u64::from(sse & 0xffc0) << 16 | u64::from(x87))
+    }
+    #[cfg(target_arch = "aarch64")]
+    {
+        let word: u64;
+        // SAFETY: reads a control register.
+        unsafe { std::arch::asm!("mrs {}, fpcr", out(reg) word, options(nomem, nostack, preserves_flags)) };
+        Some(word)
+    }
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+    None
+}

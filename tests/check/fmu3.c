@@ -1,0 +1,149 @@
+/* The small FMU of fmu.c as FMI 3.0, where references count over all types: 5 n, 6 flag, 7 label. */
+#define FMI3
+#include "fmu.c"
+#include <stdbool.h>
+
+typedef const unsigned *Refs;
+
+#ifdef FAULT_X02b
+EXPORT const char *fmi3GetVersion(void) { return "3.0.2"; }
+#else
+EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
+#endif
+
+static void *make(const char *name, int type, const char *token, const char *where, bool logging, void *environment, void *log) {
+    const Callbacks callbacks = {(void (*)(void *, const char *, int, const char *, const char *, ...))log, NULL, NULL, NULL, environment};
+    Fmu *f = fmi2Instantiate(name, type, token, where, &callbacks, 0, logging);
+    if (f) f->data.ready = 1;
+    return f;
+}
+
+EXPORT void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *where, bool visible, bool logging, bool event_mode,
+                                         bool early, Refs required, size_t n, void *environment, void *log, void *update) {
+    (void)visible; (void)early; (void)required; (void)update;
+#ifndef FAULT_L03
+    if (event_mode || n) return NULL;
+#endif
+    return make(name, 1, token, where, logging, environment, log);
+}
+
+EXPORT void *fmi3InstantiateModelExchange(const char *name, const char *token, const char *where, bool visible, bool logging, void *environment, void *log) {
+    (void)visible;
+    return make(name, 0, token, where, logging, environment, log);
+}
+
+EXPORT void *fmi3InstantiateScheduledExecution(const char *name, const char *token, const char *where, bool visible, bool logging, void *environment,
+                                               void *log, void *update, void *lock, void *unlock) {
+    (void)visible; (void)update; (void)lock; (void)unlock;
+    return make(name, 2, token, where, logging, environment, log);
+}
+
+EXPORT void fmi3FreeInstance(void *c) { fmi2FreeInstance(c); }
+EXPORT int fmi3SetDebugLogging(void *c, bool on, size_t n, const char *const names[]) { return fmi2SetDebugLogging(c, on, n, names); }
+EXPORT int fmi3EnterInitializationMode(void *c, bool has_tolerance, double tolerance, double start, bool has_stop, double stop) {
+    int status = fmi2SetupExperiment(c, has_tolerance, tolerance, start, has_stop, stop);
+    return status == OK ? fmi2EnterInitializationMode(c) : status;
+}
+EXPORT int fmi3ExitInitializationMode(void *c) { return fmi2ExitInitializationMode(c); }
+EXPORT int fmi3Terminate(void *c) { return fmi2Terminate(c); }
+EXPORT int fmi3Reset(void *c) {
+    int status = fmi2Reset(c);
+    if (c) ((Fmu *)c)->data.ready = 1;
+    return status;
+}
+
+/* As many values as references; references of a type from its first one. */
+static int fits(void *c, Refs vr, size_t n, size_t m, unsigned first, unsigned *own) {
+    Fmu *f = c;
+    if (!f) return ERROR;
+#ifndef FAULT_G01c
+    if (n != m) return fail(f, "another number of values");
+#else
+    (void)m;
+#endif
+    if (n > 16) return fail(f, "so many");
+    for (size_t i = 0; vr && i < n; i++) own[i] = vr[i] - first;
+    return OK;
+}
+
+#define FITS(first) \
+    unsigned own[16]; \
+    int status = fits(c, vr, n, m, first, own); \
+    if (status != OK) return status; \
+    Refs at = vr ? own : NULL
+
+EXPORT int fmi3GetFloat64(void *c, Refs vr, size_t n, double v[], size_t m) { FITS(0); return fmi2GetReal(c, at, n, v); }
+EXPORT int fmi3SetFloat64(void *c, Refs vr, size_t n, const double v[], size_t m) { FITS(0); return fmi2SetReal(c, at, n, v); }
+EXPORT int fmi3GetInt32(void *c, Refs vr, size_t n, int v[], size_t m) { FITS(5); return fmi2GetInteger(c, at, n, v); }
+EXPORT int fmi3SetInt32(void *c, Refs vr, size_t n, const int v[], size_t m) { FITS(5); return fmi2SetInteger(c, at, n, v); }
+EXPORT int fmi3GetString(void *c, Refs vr, size_t n, const char *v[], size_t m) { FITS(7); return fmi2GetString(c, at, n, v); }
+EXPORT int fmi3SetString(void *c, Refs vr, size_t n, const char *const v[], size_t m) { FITS(7); return fmi2SetString(c, at, n, v); }
+EXPORT int fmi3GetBoolean(void *c, Refs vr, size_t n, uint8_t v[], size_t m) {
+    FITS(6);
+    int wide[16];
+    status = fmi2GetBoolean(c, at, n, v ? wide : NULL);
+    for (size_t i = 0; status == OK && i < n; i++) v[i] = (uint8_t)wide[i];
+    return status;
+}
+EXPORT int fmi3SetBoolean(void *c, Refs vr, size_t n, const uint8_t v[], size_t m) {
+    FITS(6);
+    int wide[16];
+    for (size_t i = 0; v && i < n; i++) wide[i] = v[i];
+    return fmi2SetBoolean(c, at, n, v ? wide : NULL);
+}
+
+/* Types that no variable has. */
+#define ABSENT(type) \
+    EXPORT int fmi3Get##type(void *c, Refs vr, size_t n, void *v) { (void)vr; (void)v; ENTER(READABLE); return n ? fail(f, "no such variable") : OK; } \
+    EXPORT int fmi3Set##type(void *c, Refs vr, size_t n, void *v) { (void)vr; (void)v; ENTER(INSTANTIATED | INITIALISATION | STEP); return n ? fail(f, "no such variable") : OK; }
+ABSENT(Float32) ABSENT(Int8) ABSENT(UInt8) ABSENT(Int16) ABSENT(UInt16)
+ABSENT(UInt32) ABSENT(Int64) ABSENT(UInt64) ABSENT(Binary)
+
+EXPORT int fmi3GetFMUState(void *c, void **state) { return fmi2GetFMUstate(c, state); }
+EXPORT int fmi3SetFMUState(void *c, void *state) { return fmi2SetFMUstate(c, state); }
+EXPORT int fmi3FreeFMUState(void *c, void **state) { return fmi2FreeFMUstate(c, state); }
+EXPORT int fmi3SerializedFMUStateSize(void *c, void *state, size_t *size) { return fmi2SerializedFMUstateSize(c, state, size); }
+EXPORT int fmi3SerializeFMUState(void *c, void *state, char bytes[], size_t size) { return fmi2SerializeFMUstate(c, state, bytes, size); }
+EXPORT int fmi3DeserializeFMUState(void *c, const char bytes[], size_t size, void **state) { return fmi2DeSerializeFMUstate(c, bytes, size, state); }
+
+EXPORT int fmi3DoStep(void *c, double t, double h, bool no_prior, bool *event, bool *terminate, bool *early, double *last) {
+#ifndef FAULT_T06c
+    if (c && (!event || !terminate || !early || !last)) return fail(c, "NULL");
+#endif
+    int status = fmi2DoStep(c, t, h, no_prior);
+    if (status != OK) return status;
+    *event = *terminate = *early = false;
+    *last = t + h;
+#ifdef FAULT_T06a
+    *last = t;
+#endif
+    return OK;
+}
+
+EXPORT int fmi3EnterConfigurationMode(void *c) {
+#ifdef FAULT_C03
+    return c ? OK : ERROR;
+#else
+    return none(c);
+#endif
+}
+EXPORT int fmi3GetDirectionalDerivative(void *c) {
+#ifdef FAULT_L08u
+    return c ? OK : ERROR;
+#else
+    return none(c);
+#endif
+}
+
+#define NONE(name) EXPORT int fmi3##name(void *c) { return none(c); }
+NONE(EnterEventMode) NONE(GetClock) NONE(SetClock) NONE(GetNumberOfVariableDependencies)
+NONE(GetVariableDependencies) NONE(GetAdjointDerivative) NONE(ExitConfigurationMode) NONE(GetIntervalDecimal)
+NONE(GetIntervalFraction) NONE(GetShiftDecimal) NONE(GetShiftFraction) NONE(SetIntervalDecimal)
+NONE(SetIntervalFraction) NONE(SetShiftDecimal) NONE(SetShiftFraction) NONE(EvaluateDiscreteStates)
+NONE(UpdateDiscreteStates) NONE(EnterContinuousTimeMode) NONE(CompletedIntegratorStep) NONE(SetTime)
+NONE(SetContinuousStates) NONE(GetContinuousStateDerivatives) NONE(GetEventIndicators) NONE(GetContinuousStates)
+NONE(GetNominalsOfContinuousStates) NONE(GetNumberOfEventIndicators) NONE(GetNumberOfContinuousStates) NONE(EnterStepMode)
+NONE(GetOutputDerivatives) NONE(ActivateModelPartition)
+#ifdef FAULT_B02a
+EXPORT int fmi3Surprise(void) { return 0; }
+#endif

@@ -1,0 +1,274 @@
+//! Stored states of our models with random damage under a checksum that is right: refused, or a state that can be run.
+//!
+//! 1e5 trials; `FMU_BLOBS=1000000 cargo test --release --test stored` for more, `FMU_SEED=n` for others.
+#![allow(missing_docs)]
+
+use drive::bench;
+use drive::estimator::Kind;
+use drive::{PmsmDrive, PmsmPlant, SensorlessController};
+use fmu_core::{Block, Model};
+use fmu_export::instance::Instance;
+use fmu_export::lifecycle::{Standard, State};
+use fmu_export::log::{Log, Sink, Status};
+use fmu_export::saved::Saved;
+use fmu_export::{blob, registry};
+use std::cell::Cell;
+use std::mem::MaybeUninit;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Once};
+use std::time::{Duration, Instant};
+
+/// Step in s.
+const H: f64 = 1e-4;
+/// Bytes before the content, and of them those that are the same in every state of a model.
+const HEADER: usize = 32;
+/// Longer than any trial may take on any machine. A step of our models has at most 1e7 substeps, which take seconds.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+struct Silent;
+
+impl Sink for Silent {
+    fn write(&self, _: Status, _: &str, _: &str) {}
+}
+
+/// Random numbers: `SplitMix64` (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014).
+struct Dice(u64);
+
+impl Dice {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        usize::try_from(self.next() % n.max(1) as u64).unwrap_or(0)
+    }
+
+    fn of<'a, T>(&mut self, choices: &'a [T]) -> &'a T {
+        &choices[self.below(choices.len())]
+    }
+}
+
+/// A number from the environment.
+fn asked(name: &str, otherwise: u64) -> u64 {
+    let number = std::env::var(name).ok();
+    number.map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} = {text:?} is no whole number")))
+}
+
+/// Follows the trials and ends the process with a word when one takes too long: a hang is a finding too.
+fn watch(name: &'static str) -> Arc<AtomicU64> {
+    let trial = Arc::new(AtomicU64::new(0));
+    let seen = Arc::downgrade(&trial);
+    std::thread::spawn(move || {
+        let (mut last, mut since) = (0, Instant::now());
+        while let Some(now) = seen.upgrade().map(|trial| trial.load(Relaxed)) {
+            if now != last {
+                (last, since) = (now, Instant::now());
+            }
+            if since.elapsed() > PATIENCE {
+                eprintln!("{name}: trial {now} hangs");
+                std::process::abort();
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    });
+    trial
+}
+
+fn instance<M: Model>(now: Saved<M>) -> Instance<M> {
+    Instance::new(Standard::Fmi3, "stored".into(), Log::new(Box::new(Silent), false), now)
+}
+
+/// Sets the variable `name`, if the model has it.
+fn put<M: Model>(now: &mut Saved<M>, name: &str, value: f64) {
+    let index = (0..M::TABLE.len()).find(|&i| M::TABLE.locate(i).is_some_and(|(n, ..)| n == name));
+    if let Some((_, fmu_core::Slot::Real(x))) = index.and_then(|i| M::TABLE.entry(&mut now.block, i)) {
+        *x = value;
+    }
+}
+
+/// Ends initialisation as the gate would.
+fn exit<M: Model>(it: &mut Instance<M>) -> bool {
+    let done = it.exit_initialisation().is_ok();
+    it.now.life.after(done, Some(State::Step));
+    done
+}
+
+/// Bytes of a block in every state of its life.
+fn seeds<M: Model>(block: Block<M>) -> Vec<Vec<u8>> {
+    let mut it = instance(Saved { block, ..Saved::default() });
+    let mut seeds = vec![blob::write(&it.now).unwrap()];
+    it.set_up(0.5, Some(1e3)).unwrap();
+    it.now.life.after(true, Some(State::Initialization));
+    seeds.push(blob::write(&it.now).unwrap());
+    assert!(exit(&mut it));
+    for k in 0..400 {
+        if [0, 1, 30].contains(&k) {
+            seeds.push(blob::write(&it.now).unwrap());
+        }
+        for (name, value) in [("u_a", 20.0), ("u_b", -5.0), ("i_a", 1.0), ("i_b", -2.0), ("u_dc", 540.0)] {
+            put(&mut it.now, name, value);
+        }
+        put(&mut it.now, "speed_ref", 50.0);
+        it.do_step(it.now.end, H).unwrap();
+    }
+    seeds.push(blob::write(&it.now).unwrap());
+    it.now.life.after(true, Some(State::Terminated));
+    seeds.push(blob::write(&it.now).unwrap());
+    seeds
+}
+
+/// Bytes with damage of one kind or several.
+fn damaged(seeds: &[Vec<u8>], dice: &mut Dice) -> Vec<u8> {
+    const NUMBERS: [f64; 12] =
+        [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -0.0, 5e-324, 1e-300, 1e300, -1e300, 1e6, 1e-9, -1.0];
+    let seed = dice.of(seeds);
+    let body = seed.len() - 4;
+    let length = u32::from_le_bytes(seed[28..HEADER].try_into().unwrap()) as usize;
+    let mut bytes = seed[..body].to_vec();
+    for _ in 0..*dice.of(&[1, 1, 1, 2, 8]) {
+        let at = HEADER + dice.below(length);
+        match dice.below(10) {
+            0..=2 => bytes[at] ^= 1 << dice.below(8),
+            3 => bytes[at] = *dice.of(&[0, 1, 2, 0x7f, 0x80, 0xff]),
+            4 | 5 => {
+                let number = dice.of(&NUMBERS).to_le_bytes();
+                let end = body.min(at + 8);
+                bytes[at..end].copy_from_slice(&number[..end - at]);
+            }
+            // The longest integers of the encoding.
+            6 => bytes[at..body.min(at + 10)].fill(0xff),
+            7 => {
+                // The beginning of one and the rest of another, not always in its place.
+                let other = dice.of(seeds);
+                let from = HEADER + dice.below(length);
+                let end = body.min(at + (other.len() - 4).saturating_sub(from));
+                let from = if dice.below(2) == 0 { at.min(other.len() - 4) } else { from };
+                let n = (end - at).min(other.len() - 4 - from);
+                bytes[at..at + n].copy_from_slice(&other[from..from + n]);
+            }
+            8 => {
+                // Cut short, or longer than the content.
+                let new = u32::try_from(dice.below(body - HEADER + 1)).unwrap();
+                bytes[28..HEADER].copy_from_slice(&new.to_le_bytes());
+            }
+            _ => {
+                let at = dice.below(HEADER);
+                bytes[at] ^= 1 << dice.below(8);
+            }
+        }
+    }
+    if dice.below(100) == 0 {
+        bytes.truncate(dice.below(body));
+    }
+    let mut crc = flate2::Crc::new();
+    crc.update(&bytes);
+    let sum = crc.sum() ^ u32::from(dice.below(50) == 0);
+    bytes.extend(sum.to_le_bytes());
+    bytes
+}
+
+/// Gives the bytes back; whether they were taken, and for how long the longest step ran then.
+fn trial<M: Model>(bytes: &[u8]) -> Option<Duration> {
+    let mut it = instance::<M>(Saved::default());
+    let before = blob::write(&it.now).unwrap();
+    let handle = it.deserialise(bytes);
+    assert!(blob::write(&it.now).unwrap() == before, "the instance changed");
+    let handle = handle.ok()?;
+    it.restore(handle).unwrap();
+    registry::free::<M>(handle).unwrap();
+    assert!(
+        blob::read::<M>(&blob::write(&it.now).unwrap()).is_ok(),
+        "a state that was taken is one that can be stored"
+    );
+    let references: Vec<u32> = (1..=u32::try_from(M::TABLE.len()).unwrap())
+        .filter(|&r| {
+            let row = M::TABLE.locate(r as usize - 1);
+            row.is_some_and(|(_, meta, element)| matches!(meta.kind, fmu_core::Kind::Real(_)) && element == 0)
+        })
+        .collect();
+    let mut longest = Duration::ZERO;
+    // As at the gate: a panic is an error, after which no step is made.
+    QUIET.set(true);
+    let _ = catch_unwind(AssertUnwindSafe(|| {
+        if it.now.life.state() == State::Instantiated && it.set_up(0.0, None).is_ok() {
+            it.now.life.after(true, Some(State::Initialization));
+        }
+        if it.now.life.state() == State::Initialization && !exit(&mut it) {
+            return;
+        }
+        for _ in 0..3 {
+            let mut values = vec![MaybeUninit::uninit(); references.len()];
+            let _ = it.get::<f64>(&references, &mut values);
+            if it.now.life.state() != State::Step {
+                return;
+            }
+            let began = Instant::now();
+            let done = it.do_step(it.now.end, H);
+            longest = longest.max(began.elapsed());
+            if done.is_err() {
+                return;
+            }
+        }
+    }));
+    QUIET.set(false);
+    Some(longest)
+}
+
+fn damage<M: Model>(seeds: &[Vec<u8>], trials: u64) {
+    let name = M::INFO.name;
+    let (number, mut dice) = (watch(name), Dice(asked("FMU_SEED", 1)));
+    let (mut taken, mut longest) = (0_u64, Duration::ZERO);
+    for seed in seeds {
+        assert!(blob::read::<M>(seed).is_ok(), "a seed is whole");
+    }
+    for k in 0..trials {
+        number.store(k, Relaxed);
+        if let Some(time) = trial::<M>(&damaged(seeds, &mut dice)) {
+            taken += 1;
+            longest = longest.max(time);
+        }
+    }
+    println!("{name}: {trials} trials, {taken} taken, the longest step {longest:?}");
+    assert!(taken > trials / 100, "{name}: hardly any damage was plausible, so this tests nothing: {taken}");
+    assert!(taken < trials / 2, "{name}: hardly any damage was noticed: {taken}");
+    assert!(longest < PATIENCE / 3, "{name}: a step of {longest:?}");
+}
+
+thread_local! {
+    /// A panic of the model is under way that the gate would make an error of.
+    static QUIET: Cell<bool> = const { Cell::new(false) };
+}
+
+/// The number of trials for one model; and panics of the models stay quiet.
+fn trials() -> u64 {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let hook = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            if !QUIET.get() {
+                hook(info);
+            }
+        }));
+    });
+    asked("FMU_BLOBS", 100_000).div_ceil(3)
+}
+
+#[test]
+fn plant() {
+    damage::<PmsmPlant>(&seeds(Block::<PmsmPlant>::default()), trials());
+}
+
+#[test]
+fn controller() {
+    let each = Kind::ALL.iter().flat_map(|&kind| seeds(bench::drive(kind).controller));
+    damage::<SensorlessController>(&each.collect::<Vec<_>>(), trials());
+}
+
+#[test]
+fn drive() {
+    damage::<PmsmDrive>(&seeds(Block::<PmsmDrive>::default()), trials());
+}
