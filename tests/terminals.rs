@@ -39,6 +39,7 @@ fn the_pair_connected_by_terminals_alone_is_the_one_wired_by_hand() {
             ("c.u_a", "p.u_a"),
             ("c.u_b", "p.u_b"),
             ("c.u_c", "p.u_c"),
+            ("c.enabled", "p.enable"),
             ("p.i_a", "c.i_a"),
             ("p.i_b", "c.i_b"),
             ("p.i_c", "c.i_c"),
@@ -49,7 +50,7 @@ fn the_pair_connected_by_terminals_alone_is_the_one_wired_by_hand() {
         }
         let mut by_terminals = system(standard);
         // Either side may come first.
-        assert_eq!(by_terminals.connect_terminals("p.phases", "c.phases").unwrap().len(), 6);
+        assert_eq!(by_terminals.connect_terminals("p.phases", "c.phases").unwrap().len(), 7);
         assert_eq!(by_terminals.connect_terminals("c.sensor", "p.sensor").unwrap().len(), 2);
         let (by_hand, by_terminals) = (run(by_hand), run(by_terminals));
         assert_eq!(by_hand.columns.len(), by_terminals.columns.len());
@@ -80,6 +81,7 @@ fn what_does_not_fit_is_told_in_one_line() {
     let instance = |name: &str, path: &Path| format!("{name}={}", path.display());
     let given = [
         instance("p", &plant),
+        instance("q", &plant),
         instance("c", &controller),
         instance("d", &drive),
         instance("bare", &bare),
@@ -87,16 +89,17 @@ fn what_does_not_fit_is_told_in_one_line() {
     ];
     for (connection, parts) in [
         ("p.phases", &["p.phases: is not --terminal INSTANCE.TERMINAL=INSTANCE.TERMINAL"][..]),
-        ("p.phases=q.phases", &["q.phases: is not INSTANCE.TERMINAL; the instances are p, c, d, bare, broken"]),
+        ("p.phases=r.phases", &["r.phases: is not INSTANCE.TERMINAL; the instances are p, q, c, d, bare, broken"]),
         ("p.phases=c.phase", &["c: has no terminal phase; it has phases, sensor"]),
         (
             "p.phases=c.sensor",
             &["p.phases: does not fit c.sensor: phases is a plug, and its member u_a is missing in sensor"],
         ),
-        ("p.shaft=d.shaft", &["member tau_load is an outflow on both sides, which takes a change of sign"]),
+        ("p.shaft=d.shaft", &["member tau is an outflow on both sides, which takes a change of sign"]),
+        ("p.dc_link=d.dc_link", &["member i_dc is an inflow on both sides"]),
         (
-            "p.dc_link=d.dc_link",
-            &["member u_dc is input p.u_dc here and input d.u_dc there, expected an output and an input"],
+            "p.sensor=q.sensor",
+            &["member speed is output p.speed here and output q.speed there, expected an output and an input"],
         ),
         ("bare.phases=c.phases", &["bare: has no terminal phases; its FMU has no terminals: connect its variables"]),
         (

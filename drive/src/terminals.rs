@@ -8,27 +8,32 @@
 use fmu_core::{Member, Terminal};
 
 /// Terminals of `PmsmPlant`.
-pub(crate) const PLANT: &[Terminal] =
-    &[
-        Terminal::plug("phases", "Voltage references from the controller, measured currents to it", PHASE_MEMBERS)
-            .drawn(&icon::PHASES, -100.0, 40.0),
-        Terminal::plug(
-            "sensor",
-            "What a shaft sensor measures: mechanical speed and electrical angle",
-            &[Member::signal("speed"), Member::signal("theta_e")],
-        )
-        .drawn(&icon::SENSOR, -100.0, -40.0),
-        SHAFT,
-        DC_LINK,
-    ];
+pub(crate) const PLANT: &[Terminal] = &[
+    Terminal::plug(
+        "phases",
+        "Voltage references and enable from the controller, measured currents to it",
+        &phases(Member::signal("enable")),
+    )
+    .drawn(&icon::PHASES, -100.0, 40.0),
+    Terminal::plug(
+        "sensor",
+        "What a shaft sensor measures: mechanical speed and electrical angle",
+        &[Member::signal("speed"), Member::signal("theta_e")],
+    )
+    .drawn(&icon::SENSOR, -100.0, -40.0),
+    SHAFT,
+    SHAFT_IMPOSED,
+    DC_LINK,
+];
 
 /// Terminals of `SensorlessController`.
 pub(crate) const CONTROLLER: &[Terminal] = &[
-    Terminal::plug("phases", "Voltage references to the plant, measured currents from it", PHASE_MEMBERS).drawn(
-        &icon::PHASES,
-        100.0,
-        40.0,
-    ),
+    Terminal::plug(
+        "phases",
+        "Voltage references and enable to the plant, measured currents from it",
+        &phases(Member::signal("enable").of("enabled")),
+    )
+    .drawn(&icon::PHASES, 100.0, 40.0),
     Terminal::plug(
         "sensor",
         "A shaft sensor, read by the sensored estimator only: mechanical speed and electrical angle",
@@ -38,27 +43,47 @@ pub(crate) const CONTROLLER: &[Terminal] = &[
 ];
 
 /// Terminals of `PmsmDrive`.
-pub(crate) const DRIVE: &[Terminal] = &[SHAFT, DC_LINK];
+pub(crate) const DRIVE: &[Terminal] = &[SHAFT, SHAFT_IMPOSED, DC_LINK];
 
-const PHASE_MEMBERS: &[Member] = &[
-    Member::signal("u_a"),
-    Member::signal("u_b"),
-    Member::signal("u_c"),
-    Member::signal("i_a"),
-    Member::signal("i_b"),
-    Member::signal("i_c"),
-];
+/// What goes between controller and inverter.
+const fn phases(enable: Member) -> [Member; 7] {
+    [
+        Member::signal("u_a"),
+        Member::signal("u_b"),
+        Member::signal("u_c"),
+        enable,
+        Member::signal("i_a"),
+        Member::signal("i_b"),
+        Member::signal("i_c"),
+    ]
+}
 
 /// The shaft's end: the load sees speed and angle, and takes its torque out.
 const SHAFT: Terminal = Terminal::plug(
     "shaft",
-    "The shaft's end: mechanical speed and angle to the load, the torque that it takes",
-    &[Member::signal("speed"), Member::signal("angle"), Member::outflow("tau_load")],
+    "The shaft's end, turning freely: speed and angle to the load, the torque that it takes",
+    &[Member::signal("speed"), Member::signal("angle"), Member::outflow("tau").of("tau_load")],
 )
-.drawn(&icon::SHAFT, 100.0, 0.0);
+.drawn(&icon::SHAFT, 100.0, 40.0);
 
-const DC_LINK: Terminal =
-    Terminal::plug("dc_link", "DC link of the inverter", &[Member::signal("u_dc")]).drawn(&icon::DC_LINK, 0.0, 100.0);
+/// The same the other way round, with `mechanics.imposed`.
+const SHAFT_IMPOSED: Terminal = Terminal::plug(
+    "shaft_imposed",
+    "The shaft's end where the drive train imposes speed and angle (mechanics.imposed), the torque on the train",
+    &[
+        Member::signal("speed").of("speed_shaft"),
+        Member::signal("angle").of("angle_shaft"),
+        Member::outflow("tau").of("tau_shaft"),
+    ],
+)
+.drawn(&icon::SHAFT, 100.0, -40.0);
+
+const DC_LINK: Terminal = Terminal::plug(
+    "dc_link",
+    "DC link of the inverter: its voltage, and the current drawn from it",
+    &[Member::signal("u_dc"), Member::inflow("i_dc")],
+)
+.drawn(&icon::DC_LINK, 0.0, 100.0);
 
 /// What terminals look like.
 mod icon {
@@ -87,9 +112,9 @@ mod tests {
         let [plant, controller, drive] =
             [described::<PmsmPlant>(), described::<SensorlessController>(), described::<PmsmDrive>()];
         let names = |d: &Description| d.terminals.iter().map(|t| t.name.clone()).collect::<Vec<_>>();
-        assert_eq!(names(&plant), ["phases", "sensor", "shaft", "dc_link"]);
+        assert_eq!(names(&plant), ["phases", "sensor", "shaft", "shaft_imposed", "dc_link"]);
         assert_eq!(names(&controller), ["phases", "sensor"]);
-        assert_eq!(names(&drive), ["shaft", "dc_link"]);
+        assert_eq!(names(&drive), ["shaft", "shaft_imposed", "dc_link"]);
         assert!([plant, controller, drive].iter().all(|d| d.icon.is_some()));
     }
 

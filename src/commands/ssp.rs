@@ -10,9 +10,9 @@ use std::path::PathBuf;
 
 /// Packs plant and controller, connected and with the values of a machine, as one SSP file (SSP 1.0).
 ///
-/// The system has the inputs speed_ref, tau_load and u_dc and the outputs of both FMUs, named as those of PmsmDrive. Values
-/// come from a machine's file, as with `fmu tune`, or from SSV files for the components controller and plant; without either
-/// the FMUs keep their start values.
+/// The system has the inputs (speed_ref, tau_load, u_dc and more) and the outputs that PmsmDrive has. Values come from a
+/// machine's file, as with `fmu tune`, or from SSV files for the components controller and plant; without either the FMUs keep
+/// their start values.
 ///
 ///   fmu ssp --motor motors/ipmsm-2.2kw.toml --out drive.ssp
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg

@@ -163,8 +163,9 @@ fn description(
     let components = COMPONENTS.iter().zip(descriptions).map(|((name, fmu, corner), (_, md))| {
         let [x, y] = corner;
         let bound = of_components.contains(name).then(|| binding(name));
+        let fed = |v: &ModelVariable| connections.iter().any(|(_, to)| *to == format!("{name}.{}", v.name));
         let connected = |v: &&ModelVariable| match v.causality {
-            Causality::Input => v.base.is_float(),
+            Causality::Input => v.base.is_float() || fed(v),
             causality => causality == Causality::Output,
         };
         let connectors = md.variables.iter().filter(connected).map(|v| connector(&v.name, v.causality.as_str(), v));
