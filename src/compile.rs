@@ -97,6 +97,15 @@ fn build(verb: &str, workspace: &Workspace, selection: Selection<'_>, target: &T
         Selection::Example(name) => build.args(["--example", name]),
     };
     build.env("CARGO_ENCODED_RUSTFLAGS", flags(&workspace.root, target));
+    // A panic becomes a status at the C interface, whatever the workspace asks for its programs.
+    build.env("CARGO_PROFILE_RELEASE_PANIC", "unwind");
+    // The whole library optimised as one, and no names in it beside those exported: unless the caller says otherwise.
+    for (setting, value) in [("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "symbols")] {
+        let name = format!("CARGO_PROFILE_RELEASE_{setting}");
+        if env::var_os(&name).is_none() {
+            build.env(name, value);
+        }
+    }
     if target.is_host {
         // It has one, and Cargo wants --target otherwise.
         build.env_remove(BUILD_STD);
@@ -182,4 +191,24 @@ fn flags(root: &Path, target: &Target) -> OsString {
         add(OsStr::new("-Clink-arg=-Wl,--no-insert-timestamp"));
     }
     flags
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::target::Tools;
+
+    /// What a profile of the workspace says of panics is not asked: Cargo takes the environment first.
+    #[test]
+    fn an_fmu_is_compiled_so_that_a_panic_unwinds() {
+        let workspace = Workspace::find().unwrap();
+        let host = Tools::find().unwrap().host();
+        for verb in ["build", "rustc"] {
+            let build = build(verb, &workspace, Selection::Example("own_fmu"), &host);
+            let set: Vec<_> = build.get_envs().collect();
+            let panic = OsStr::new("CARGO_PROFILE_RELEASE_PANIC");
+            assert!(set.contains(&(panic, Some(OsStr::new("unwind")))), "{set:?}");
+            assert!(build.get_args().any(|a| a == "--release"));
+        }
+    }
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
@@ -128,21 +128,14 @@ fn the_same_sources_give_the_same_bytes() {
 fn changed(from: &str, name: &str, old: &str, new: &str) -> (tempfile::TempDir, String) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.ssp");
-    let mut source = zip::ZipArchive::new(File::open(from).unwrap()).unwrap();
-    let mut target = zip::ZipWriter::new(File::create(&path).unwrap());
-    for index in 0..source.len() {
-        let mut entry = source.by_index(index).unwrap();
-        let (entry_name, mut bytes) = (entry.name().unwrap().into_owned(), Vec::new());
-        entry.read_to_end(&mut bytes).unwrap();
-        if entry_name == name {
-            let text = String::from_utf8(bytes).unwrap();
-            assert!(text.contains(old), "{old} is not in {name}");
-            bytes = text.replacen(old, new, 1).into_bytes();
+    common::rewrite(Path::new(from), &path, |entry, bytes| {
+        if entry != name {
+            return Some(bytes);
         }
-        target.start_file(entry_name, zip::write::SimpleFileOptions::default()).unwrap();
-        target.write_all(&bytes).unwrap();
-    }
-    target.finish().unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        assert!(text.contains(old), "{old} is not in {name}");
+        Some(text.replacen(old, new, 1).into_bytes())
+    });
     (dir, path.to_str().unwrap().to_owned())
 }
 

@@ -71,13 +71,9 @@ fn what_does_not_fit_is_told_in_one_line() {
     let bare = dir.path().join("bare.fmu");
     strip(&plant, &bare, "terminalsAndIcons/");
     let broken = dir.path().join("broken.fmu");
-    rewrite(
-        &plant,
-        &broken,
-        |name, bytes| {
-            if name.ends_with("terminalsAndIcons.xml") { Some(b"<a/>".into()) } else { Some(bytes) }
-        },
-    );
+    common::rewrite(&plant, &broken, |name, bytes| {
+        if name.ends_with("terminalsAndIcons.xml") { Some(b"<a/>".into()) } else { Some(bytes) }
+    });
     let instance = |name: &str, path: &Path| format!("{name}={}", path.display());
     let given = [
         instance("p", &plant),
@@ -157,21 +153,5 @@ fn the_files_are_in_the_archives() {
 
 /// Copies an archive without a folder.
 fn strip(from: &Path, to: &Path, folder: &str) {
-    rewrite(from, to, |name, bytes| (!name.starts_with(folder)).then_some(bytes));
-}
-
-/// Copies an archive entry by entry.
-fn rewrite(from: &Path, to: &Path, each: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) {
-    let mut source = zip::ZipArchive::new(std::fs::File::open(from).unwrap()).unwrap();
-    let mut target = zip::ZipWriter::new(std::fs::File::create(to).unwrap());
-    for index in 0..source.len() {
-        let mut entry = source.by_index(index).unwrap();
-        let (name, mut bytes) = (entry.name().unwrap().into_owned(), Vec::new());
-        std::io::copy(&mut entry, &mut bytes).unwrap();
-        if let Some(bytes) = each(&name, bytes) {
-            target.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
-            std::io::Write::write_all(&mut target, &bytes).unwrap();
-        }
-    }
-    target.finish().unwrap();
+    common::rewrite(from, to, |name, bytes| (!name.starts_with(folder)).then_some(bytes));
 }

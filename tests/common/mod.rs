@@ -8,6 +8,7 @@ pub mod python;
 use drive::Pair;
 use fmu::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
 use fmu_core::{Block, Model, Slot};
+use std::path::{Path, PathBuf};
 
 /// Sets the variable `name` of a block; integers and Booleans from their number.
 pub fn set<M: Model>(block: &mut Block<M>, name: &str, value: f64) {
@@ -82,10 +83,26 @@ impl ClosedLoop for Native {
 }
 
 /// Folder with the packed FMUs of both standards, `fmi2/` and `fmi3/`, built once a test program.
-pub fn archives() -> &'static std::path::Path {
-    static FOLDER: std::sync::OnceLock<std::path::PathBuf> = std::sync::OnceLock::new();
+pub fn archives() -> &'static Path {
+    static FOLDER: std::sync::OnceLock<PathBuf> = std::sync::OnceLock::new();
     FOLDER.get_or_init(|| {
         let files = fmu::commands::build::run(&fmu::commands::build::Build::default()).expect("FMUs that build");
-        files[0].parent().and_then(std::path::Path::parent).expect("DIR/fmi2/NAME.fmu").to_owned()
+        files[0].parent().and_then(Path::parent).expect("DIR/fmi2/NAME.fmu").to_owned()
     })
+}
+
+/// Copies an archive entry by entry, each with new bytes or not at all.
+pub fn rewrite(from: &Path, to: &Path, each: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) {
+    let mut source = zip::ZipArchive::new(std::fs::File::open(from).unwrap()).unwrap();
+    let mut target = zip::ZipWriter::new(std::fs::File::create(to).unwrap());
+    for index in 0..source.len() {
+        let mut entry = source.by_index(index).unwrap();
+        let (name, mut bytes) = (entry.name().unwrap().into_owned(), Vec::new());
+        std::io::copy(&mut entry, &mut bytes).unwrap();
+        if let Some(bytes) = each(&name, bytes) {
+            target.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+            std::io::Write::write_all(&mut target, &bytes).unwrap();
+        }
+    }
+    target.finish().unwrap();
 }
