@@ -2,6 +2,9 @@
 //! `cargo bench --bench state`. The goal is 200 ns each.
 #![allow(missing_docs)]
 
+#[path = "../fmu-export/benches/timing/mod.rs"]
+mod timing;
+
 use drive::SensorlessController;
 use fmu_core::Model;
 use fmu_export::abi::types::{Fmi2Boolean, FmuState, Instance, c_int};
@@ -9,22 +12,9 @@ use fmu_export::saved::Saved;
 use std::ffi::CString;
 use std::hint::black_box;
 use std::ptr::{null, null_mut};
-use std::time::Instant;
+use timing::time;
 
 fmu_export::export!(SensorlessController);
-
-/// Nanoseconds per call, the best of several rounds.
-fn time(mut call: impl FnMut() -> c_int) -> f64 {
-    const CALLS: u32 = 20_000;
-    let rounds = (0..200).map(|_| {
-        let start = Instant::now();
-        for _ in 0..CALLS {
-            assert_eq!(call(), 0);
-        }
-        start.elapsed().as_secs_f64() * 1e9 / f64::from(CALLS)
-    });
-    rounds.fold(f64::INFINITY, f64::min)
-}
 
 fn main() {
     let (no, h) = (Fmi2Boolean(0), 1e-4);

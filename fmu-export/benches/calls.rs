@@ -2,6 +2,8 @@
 //! functions. `cargo bench -p fmu-export`. The goal is 60 ns together.
 #![allow(missing_docs)]
 
+mod timing;
+
 use fmu_core::unit::VOLT;
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table};
 use fmu_export::abi::types::{Fmi2Boolean, Instance, References, c_int};
@@ -9,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::ffi::CString;
 use std::hint::black_box;
 use std::ptr::null;
-use std::time::Instant;
+use timing::time;
 
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct Empty {
@@ -61,19 +63,6 @@ impl Model for Empty {
 }
 
 fmu_export::export!(Empty);
-
-/// Nanoseconds per call, the best of several rounds.
-fn time(mut call: impl FnMut() -> c_int) -> f64 {
-    const CALLS: u32 = 100_000;
-    let rounds = (0..200).map(|_| {
-        let start = Instant::now();
-        for _ in 0..CALLS {
-            assert_eq!(call(), 0);
-        }
-        start.elapsed().as_secs_f64() * 1e9 / f64::from(CALLS)
-    });
-    rounds.fold(f64::INFINITY, f64::min)
-}
 
 fn main() {
     let no = Fmi2Boolean(0);
