@@ -1,4 +1,4 @@
-//! FMUs of other tools, from PyPI: no false alarm. They come from PyPI.
+//! FMUs of other tools, which come from PyPI: no false alarm.
 
 use crate::{check, common, told, violated};
 use std::path::Path;
