@@ -53,7 +53,9 @@ pub fn run(args: &Merge) -> Result<()> {
         (name, Entry { bytes, executable })
     };
     let files = merge(parts)?.into_iter().map(entry).collect();
-    pack::write(&args.out, &pack::archive(&files, moment)?)
+    pack::write(&args.out, &pack::archive(&files, moment)?)?;
+    println!("{}", args.out.display());
+    Ok(())
 }
 
 /// The files of all parts.
