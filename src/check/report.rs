@@ -155,6 +155,15 @@ impl Report {
             escape(&self.heading()),
             escape(&self.summary())
         );
+        // What is wrong first.
+        if self.violated().next().is_some() {
+            out.push_str("<ul>\n");
+            for f in self.violated() {
+                let (level, requirement) = (level(f.level), escape(f.requirement));
+                let _ = writeln!(out, "<li><a href=\"#{0}\">{0}</a> ({level}): {requirement}</li>", f.id);
+            }
+            out.push_str("</ul>\n");
+        }
         for (title, findings) in self.groups() {
             let _ = writeln!(out, "<h2>{}</h2>\n<table>", escape(title));
             for f in findings {

@@ -1,7 +1,7 @@
 //! It survives whatever file it is given.
 
-use crate::common;
 use crate::zip::{Entry, write};
+use crate::{check, common};
 use std::path::Path;
 use std::process::Command;
 
@@ -61,6 +61,8 @@ fn bad_intent_is_harmless() {
     let xml = Entry::new("modelDescription.xml", include_bytes!("fmu.xml"));
     write(&path, &[xml.clone(), Entry::new("resources/../../../../tmp/evil-of-fmu-check", b"x")]);
     assert_eq!(status(&path, &[]).0, Some(1));
+    // The page begins with what is violated.
+    assert!(check(&path, &["archive"]).html().contains("<li><a href=\"#Z01b\">Z01b</a> (must)"));
     assert!(!Path::new("/tmp/evil-of-fmu-check").exists());
     let deep = format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?><a fmiVersion=\"2.0\">{}", "<a>".repeat(200_000));
     write(&path, &[Entry::new("modelDescription.xml", deep.as_bytes())]);
@@ -83,6 +85,6 @@ fn the_command_line() {
         "{json}"
     );
     let (_, html) = run(&["--only", "archive", "--format", "html"]);
-    assert!(html.starts_with("<!DOCTYPE html>") && html.contains("id=\"Z01a\""));
+    assert!(html.starts_with("<!DOCTYPE html>") && html.contains("id=\"Z01a\"") && !html.contains("href"));
     assert_eq!(run(&["--only", "nonsense"]).0, Some(2));
 }
