@@ -6,7 +6,7 @@
 use drive::estimator::Kind;
 use drive::frame::{AlphaBeta, Phases};
 use drive::plant::tables::PlantParameters;
-use drive::{Pair, PmsmDrive, PmsmPlant, bench};
+use drive::{Pair, PmsmDrive, PmsmPlant, SensorlessController, bench};
 use fmu_core::{Block, Elapsed, Model, Step};
 use std::f64::consts::FRAC_PI_2;
 
@@ -198,6 +198,43 @@ fn an_enabled_controller_starts_like_at_t_0() {
         let apart = now.iter().zip(&later).position(|(a, b)| a != b);
         assert_eq!(apart, None, "{}: sample", kind.name());
         assert!(now[2999].1 && f64::from_bits(now[2999].0[5]).abs() > 0.0, "{}: it moves", kind.name());
+    }
+}
+
+/// Bits of what the controller commands and estimates over 400 samples of prescribed inputs.
+fn commands(controller: &mut Block<SensorlessController>, now: &mut Elapsed) -> Vec<[u64; 5]> {
+    let sample = |k: u32| {
+        let (sin, cos) = (0.02 * f64::from(k)).sin_cos();
+        let inputs = &mut controller.model.inputs;
+        inputs.i = Phases { a: 2.0 * cos, b: 2.0 * sin - cos, c: -2.0 * sin - cos };
+        (inputs.speed_ref, inputs.theta_meas, inputs.speed_meas) = (20.0, 0.02 * f64::from(k % 100), 66.0);
+        let step = Step { start: *now, h: T_S };
+        controller.step(&step).unwrap();
+        *now = step.end();
+        let out = &controller.out;
+        [out.u.a, out.u.b, out.u.c, out.theta_est, out.speed_est].map(f64::to_bits)
+    };
+    (0..400).map(sample).collect()
+}
+
+#[test]
+fn a_controller_that_ran_and_was_off_begins_anew() {
+    for &kind in Kind::ALL {
+        let mut new = bench::drive(kind).controller;
+        new.model.parameters.sensor.noise = 0.0;
+        let (mut fresh, mut used) = (new.clone(), new);
+        fresh.initialise();
+        used.initialise();
+        let mut now = Elapsed::ZERO;
+        let first = commands(&mut used, &mut now);
+        used.model.inputs.enable = false;
+        commands(&mut used, &mut now);
+        used.model.inputs.enable = true;
+        let again = commands(&mut used, &mut now);
+        assert!(first == commands(&mut fresh, &mut { Elapsed::ZERO }), "{}: the same at first", kind.name());
+        let apart = again.iter().zip(&first).position(|(a, b)| a != b);
+        assert_eq!(apart, None, "{}: sample", kind.name());
+        assert!(first.iter().any(|out| f64::from_bits(out[0]).abs() > 1.0), "{}: a voltage", kind.name());
     }
 }
 
