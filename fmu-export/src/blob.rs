@@ -73,7 +73,7 @@ pub fn read<M: Model>(bytes: &[u8]) -> Result<Saved<M>, Fault> {
     }
     let (mut state, rest): (Saved<M>, &[u8]) =
         postcard::take_from_bytes(&room[..length]).map_err(|e| refuse(format!("content: {e}")))?;
-    if !rest.is_empty() || state.life.state() == State::Error {
+    if !rest.is_empty() {
         return Err(refuse("content".into()));
     }
     state.check().and_then(|()| state.check_time()).map_err(|fault| refuse(fault.to_string()))?;
