@@ -198,10 +198,15 @@ fn forged(fmu: &Fmu, from: f64, to: f64) -> Vec<u8> {
     let mut bytes = fmu.bytes();
     let at = bytes.windows(8).position(|w| w == from.to_le_bytes()).expect("the value is in the state");
     bytes[at..at + 8].copy_from_slice(&to.to_le_bytes());
+    seal(&mut bytes);
+    bytes
+}
+
+/// Writes the checksum that fits.
+fn seal(bytes: &mut [u8]) {
     let body = bytes.len() - 4;
     let checksum = reference_crc(&bytes[..body]);
     bytes[body..].copy_from_slice(&checksum.to_le_bytes());
-    bytes
 }
 
 /// CRC-32 by its definition as a polynomial division, bit by bit from the other end than the library's.
@@ -237,6 +242,47 @@ fn values_that_no_importer_could_have_set_are_noticed() {
     assert!(forge(7.654_321, 10.5).contains("gain = 10.5 is not allowed: at least 0 and at most 10"));
     assert!(forge(7.654_321, f64::NAN).contains("gain = NaN"));
     assert!(forge(0.123_456, f64::INFINITY).contains("u = inf"));
+}
+
+#[test]
+fn a_time_that_no_simulation_came_to_is_noticed() {
+    let (start, h) = (2.0, 0.123);
+    let answer = |from: f64, to: f64| {
+        let fmu = Fmu::new(3);
+        assert_eq!((fmu.enter(start, None), fmu.exit(), fmu.step(start, h)), (OK, OK, OK));
+        let mut state = null_mut();
+        if fmu.deserialise(&forged(&fmu, from, to), &mut state) == OK {
+            assert_eq!(fmu.free_state(&mut state), OK);
+            return "taken".to_owned();
+        }
+        fmu.error()
+    };
+    assert_eq!(answer(h, h * (1.0 + 1e-9)), "taken");
+    // The time since the start, and the last communication point.
+    for (from, to) in
+        [(h, 3.0 * h), (h, -h), (h, f64::NAN), (start + h, start + 3.0 * h), (start + h, f64::INFINITY), (start, 0.0)]
+    {
+        let said = answer(from, to);
+        assert!(said.contains("s of simulation from"), "{from} {to}: {said}");
+    }
+}
+
+#[test]
+fn bytes_of_another_fmu_are_told_from_damaged_ones() {
+    for (place, why) in [
+        (0, "they do not begin like one"),
+        (8, "written by another version of this FMU"),
+        (10, "written by another version of this FMU"),
+        (12, "another model, or another version than"),
+        (27, "another model, or another version than"),
+    ] {
+        let fmu = Fmu::started(2);
+        let mut bytes = fmu.bytes();
+        bytes[place] ^= 1;
+        seal(&mut bytes);
+        assert_eq!(fmu.deserialise(&bytes, &mut null_mut()), ERROR);
+        assert!(fmu.error().contains(why), "{place}: {}", fmu.error());
+    }
 }
 
 impl Fmu {
