@@ -139,6 +139,38 @@ fn changed(from: &str, name: &str, old: &str, new: &str) -> (tempfile::TempDir, 
     (dir, path.to_str().unwrap().to_owned())
 }
 
+/// SSPs of other tools: a connection has no direction, a prefix goes before names, the system's times before its parts'.
+#[test]
+fn what_other_tools_write_runs_too() {
+    let run = |path: &str, stop: &[&str]| {
+        let arguments = ["simulate", path, "--input", "speed_ref=0:0,0.01:50", "--csv", "-"];
+        done(&[&arguments[..], stop].concat())
+    };
+    let (structure, until) = ("SystemStructure.ssd", ["--stop", "0.05"]);
+    let expected = run(&ssp("motor.ssp"), &until);
+    let (_dir, turned) = changed(
+        &ssp("motor.ssp"),
+        structure,
+        "startElement=\"controller\" startConnector=\"u_a\" endElement=\"plant\"",
+        "startElement=\"plant\" startConnector=\"u_a\" endElement=\"controller\"",
+    );
+    assert!(run(&turned, &until) == expected, "a connection from its input to its output");
+    // The plant's values are bound to the system, with the plant's name before theirs.
+    let inner = "<ssd:ParameterBinding source=\"resources/plant.ssv\"/>";
+    let outer = "<ssd:ParameterBinding source=\"resources/SensorlessDrive.ssv\"/>";
+    let both = format!("{outer}{}", inner.replace(" source=", " prefix=\"plant.\" source="));
+    let (_dir, without) = changed(&ssp("motor.ssp"), structure, inner, &outer.replace("SensorlessDrive", "none"));
+    let (_dir_too, prefixed) = changed(&without, structure, outer, &both);
+    let none = "<ssd:ParameterBinding source=\"resources/none.ssv\"/>";
+    let (_dir_three, prefixed) = changed(&prefixed, structure, none, "");
+    assert!(run(&prefixed, &until) == expected, "values with a prefix");
+    let (_dir, late) =
+        changed(&ssp("motor.ssp"), structure, "startTime=\"0\" stopTime=\"1\"", "startTime=\"0.5\" stopTime=\"0.7\"");
+    let csv = run(&late, &[]);
+    let times: Vec<&str> = csv.lines().skip(1).map(|line| line.split(',').next().unwrap()).collect();
+    assert_eq!((times[0], times[times.len() - 1]), ("0.5", "0.7"));
+}
+
 #[test]
 fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     let connection = |to: &str| {
@@ -153,6 +185,11 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
             &["connects controller.u_a (output) with plant.i_a (output): expected an output and an input"],
         ),
         (&*good, connection("u_b"), &["plant.u_b is fed twice: remove one of the connections"]),
+        (
+            "startConnector=\"enabled\" endConnector=\"enabled\"",
+            "startConnector=\"enabled\" endConnector=\"lock_lost\"".into(),
+            &["the output lock_lost is connected twice: remove one of the connections"],
+        ),
         (&*good, good.replace("\"plant\"", "\"motor\""), &["there is no component motor; there are controller, plant"]),
         (
             "source=\"resources/PmsmPlant.fmu\"",
