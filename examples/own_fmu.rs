@@ -1,7 +1,7 @@
 //! An FMU of your own in one file: a capacitor charged through a resistor.
 //!
 //! ```sh
-//! cargo run --release -- build --example own_fmu
+//! cargo run --release -- build --package own-fmu
 //! cargo run --release -- simulate target/fmu/fmi3/RcCircuit.fmu --set RcCircuit.R=2000 --input RcCircuit.u=0:0,0.5:5 \
 //!     --stop 5 --step 0.1 --csv -
 //! ```

@@ -11,15 +11,6 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// What to compile.
-#[derive(Clone, Copy, Debug)]
-pub enum Selection<'a> {
-    /// The cdylibs of these packages.
-    Packages(&'a [String]),
-    /// A cdylib among the examples.
-    Example(&'a str),
-}
-
 /// A library, and the package that it belongs to.
 pub type Library = (String, PathBuf);
 
@@ -34,35 +25,27 @@ struct Artifact {
 
 #[derive(Deserialize)]
 struct ArtifactTarget {
-    name: String,
     crate_types: Vec<String>,
 }
 
-/// Compiles, optimised, in a target folder of its own (a `cargo` that waits for this program holds the usual one);
-/// returns each cdylib. Paths of this machine stay out of the binaries, so that builds at two places agree byte for byte.
+/// Compiles the cdylibs of these packages, optimised, in a target folder of its own (a `cargo` that waits for this program
+/// holds the usual one). Paths of this machine stay out of the binaries, so that builds at two places agree byte for byte.
 ///
 /// # Errors
 /// Cargo fails; it has then told why.
-pub fn compile(workspace: &Workspace, selection: Selection<'_>, target: &Target) -> Result<Vec<Library>> {
-    let darwin = is_darwin(target);
+pub fn compile(workspace: &Workspace, packages: &[String], target: &Target) -> Result<Vec<Library>> {
     let mut libraries = Vec::new();
-    match selection {
+    if is_darwin(target) {
         // The name by which macOS knows a library is written into it; without this one it is the path that it was linked
         // to. An argument for one library only: one Cargo each.
-        Selection::Packages(names) if darwin => {
-            for name in names {
-                let one = Selection::Packages(std::slice::from_ref(name));
-                let mut rustc = build("rustc", workspace, one, target);
-                rustc.arg("--lib").arg("--").args(install_name(name));
-                libraries.extend(run(workspace, rustc, one, target)?);
-            }
+        for name in packages {
+            let one = std::slice::from_ref(name);
+            let mut rustc = build("rustc", workspace, one, target);
+            rustc.arg("--lib").arg("--").args(install_name(name));
+            libraries.extend(run(workspace, rustc, one, target)?);
         }
-        Selection::Example(name) if darwin => {
-            let mut rustc = build("rustc", workspace, selection, target);
-            rustc.arg("--").args(install_name(name));
-            libraries = run(workspace, rustc, selection, target)?;
-        }
-        _ => libraries = run(workspace, build("build", workspace, selection, target), selection, target)?,
+    } else {
+        libraries = run(workspace, build("build", workspace, packages, target), packages, target)?;
     }
     libraries.sort();
     Ok(libraries)
@@ -77,7 +60,7 @@ fn install_name(name: &str) -> [String; 2] {
 }
 
 /// The command, but for what follows `--`.
-fn build(verb: &str, workspace: &Workspace, selection: Selection<'_>, target: &Target) -> Command {
+fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target) -> Command {
     let mut build = match target.linker {
         Linker::Usual => cargo(),
         Linker::Zig => Command::new("cargo-zigbuild"),
@@ -92,10 +75,7 @@ fn build(verb: &str, workspace: &Workspace, selection: Selection<'_>, target: &T
         Linker::Usual if target.is_host => &mut build,
         _ => build.args(["--target", &target.triple]),
     };
-    match selection {
-        Selection::Packages(names) => build.args(names.iter().flat_map(|name| ["--package", name])),
-        Selection::Example(name) => build.args(["--example", name]),
-    };
+    build.args(packages.iter().flat_map(|name| ["--package", name]));
     build.env("CARGO_ENCODED_RUSTFLAGS", flags(&workspace.root, target));
     // A panic becomes a status at the C interface, whatever the workspace asks for its programs.
     build.env("CARGO_PROFILE_RELEASE_PANIC", "unwind");
@@ -118,7 +98,7 @@ fn build(verb: &str, workspace: &Workspace, selection: Selection<'_>, target: &T
 }
 
 /// Runs the command; returns the cdylibs that it made.
-fn run(workspace: &Workspace, mut build: Command, selection: Selection<'_>, target: &Target) -> Result<Vec<Library>> {
+fn run(workspace: &Workspace, mut build: Command, packages: &[String], target: &Target) -> Result<Vec<Library>> {
     let program = build.get_program().to_string_lossy().into_owned();
     let output = build.stdin(Stdio::null()).stderr(Stdio::inherit()).output();
     let output = output.with_context(|| format!("{program} cannot be run"))?;
@@ -126,10 +106,6 @@ fn run(workspace: &Workspace, mut build: Command, selection: Selection<'_>, targ
         let what = format!("building for {} failed ({})", target.triple, output.status);
         return Err(crate::Failed(what).into());
     }
-    let wanted = |target: &ArtifactTarget| match selection {
-        Selection::Packages(_) => true,
-        Selection::Example(name) => target.name == *name,
-    };
     let mut libraries = Vec::new();
     for line in String::from_utf8_lossy(&output.stdout).lines() {
         let Ok(Artifact { reason, package_id: Some(id), target: Some(artifact), filenames }) =
@@ -137,20 +113,15 @@ fn run(workspace: &Workspace, mut build: Command, selection: Selection<'_>, targ
         else {
             continue;
         };
-        let is_cdylib = artifact.crate_types.iter().any(|t| t == "cdylib") && wanted(&artifact);
+        let is_cdylib = artifact.crate_types.iter().any(|t| t == "cdylib");
         let package = workspace.packages.iter().find(|p| p.id == id);
         let extension = target.platform.extension();
         let library = filenames.into_iter().find(|f| f.extension().is_some_and(|e| e == extension));
         if let ("compiler-artifact", true, Some(package), Some(library)) =
             (reason.as_str(), is_cdylib, package, library)
+            && packages.contains(&package.name)
         {
-            let selected = match selection {
-                Selection::Packages(names) => names.contains(&package.name),
-                Selection::Example(_) => true,
-            };
-            if selected {
-                libraries.push((package.name.clone(), library));
-            }
+            libraries.push((package.name.clone(), library));
         }
     }
     Ok(libraries)
@@ -204,7 +175,7 @@ mod tests {
         let workspace = Workspace::find().unwrap();
         let host = Tools::find().unwrap().host();
         for verb in ["build", "rustc"] {
-            let build = build(verb, &workspace, Selection::Example("own_fmu"), &host);
+            let build = build(verb, &workspace, &["own-fmu".into()], &host);
             let set: Vec<_> = build.get_envs().collect();
             let panic = OsStr::new("CARGO_PROFILE_RELEASE_PANIC");
             assert!(set.contains(&(panic, Some(OsStr::new("unwind")))), "{set:?}");

@@ -103,18 +103,20 @@ pub(crate) fn newest_glibc(file: &ElfFile64<'_>) -> Result<Option<Glibc>, object
     let names = sections.strings(endian, data, link)?;
     while let Some((_, mut versions)) = needs.next()? {
         while let Some(version) = versions.next()? {
-            let name = String::from_utf8_lossy(version.name(endian, names)?).into_owned();
-            let Some(number) = name.strip_prefix("GLIBC_") else { continue };
-            // 2.2.5 is 2.2 here; PRIVATE is no version; relative relocations came with 2.36.
-            let mut parts = number.split('.').map(str::parse);
-            match (parts.next(), parts.next()) {
-                (Some(Ok(major)), Some(Ok(minor))) => newest = newest.max(Some(Glibc(major, minor))),
-                _ if number == "ABI_DT_RELR" => newest = newest.max(Some(Glibc(2, 36))),
-                _ => {}
-            }
+            newest = newest.max(version_of(&String::from_utf8_lossy(version.name(endian, names)?)));
         }
     }
     Ok(newest)
+}
+
+/// The version that a symbol's version names: 2.2.5 is 2.2 here, PRIVATE is none, relative relocations came with 2.36.
+fn version_of(name: &str) -> Option<Glibc> {
+    let number = name.strip_prefix("GLIBC_")?;
+    let mut parts = number.split('.').map(str::parse);
+    match (parts.next(), parts.next()) {
+        (Some(Ok(major)), Some(Ok(minor))) => Some(Glibc(major, minor)),
+        _ => (number == "ABI_DT_RELR").then_some(Glibc(2, 36)),
+    }
 }
 
 #[cfg(test)]
@@ -131,6 +133,15 @@ mod tests {
         assert!(!needs(Some(Glibc(2, 4)), &["libgcc_s.so.1"]).are_modest());
         let text = needs(Some(Glibc(2, 34)), &["libgcc_s.so.1"]).to_string();
         assert_eq!(text, "GLIBC_2.34 and libgcc_s.so.1");
+    }
+
+    #[test]
+    fn the_newest_version_is_the_greatest_number() {
+        let names = ["GLIBC_2.2.5", "GLIBC_2.34", "GLIBC_2.4", "GCC_3.0", "GLIBC_PRIVATE"];
+        let versions = names.map(version_of);
+        assert_eq!(versions, [Some(Glibc(2, 2)), Some(Glibc(2, 34)), Some(Glibc(2, 4)), None, None]);
+        assert_eq!(versions.into_iter().max(), Some(Some(Glibc(2, 34))));
+        assert_eq!(version_of("GLIBC_ABI_DT_RELR"), Some(Glibc(2, 36)));
     }
 
     #[test]

@@ -192,5 +192,5 @@ fn builds_are_reproducible() {
 fn help_has_an_example_for_the_pair() {
     let help = text(&fmu(&["simulate", "--help"]).stdout);
     assert!(help.contains("PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect"), "{help}");
-    assert!(text(&fmu(&["build", "--help"]).stdout).contains("fmu build --example own_fmu"));
+    assert!(text(&fmu(&["build", "--help"]).stdout).contains("fmu build --package own-fmu"));
 }

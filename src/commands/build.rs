@@ -1,6 +1,6 @@
 //! `fmu build`: compiles models and packs them.
 
-use crate::compile::{Library, Selection, compile};
+use crate::compile::{Library, compile};
 use crate::elf::{FLOOR, Needs};
 use crate::icons;
 use crate::importer::describe;
@@ -23,8 +23,7 @@ use std::path::{Path, PathBuf};
 /// (pmsm-plant) or of the FMU (PmsmPlant).
 ///
 /// An FMU of your own is any cdylib with one line `fmu_export::export!(MyModel);`:
-///   an example of a package        fmu build --example own_fmu
-///   a package anywhere             fmu build --package my-fmu
+///   a package of the workspace     fmu build --package own-fmu
 ///   a library that is already built, or several of one model for several platforms
 ///                                  fmu build --library target/release/libmy_fmu.so
 ///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
@@ -42,7 +41,7 @@ use std::path::{Path, PathBuf};
 #[command(verbatim_doc_comment)]
 pub struct Build {
     /// FMUs to build, by package or FMU name
-    #[arg(value_name = "FMU", conflicts_with_all = ["package", "example", "library"])]
+    #[arg(value_name = "FMU", conflicts_with_all = ["package", "library"])]
     pub fmus: Vec<String>,
     /// The standard: 2 or 3; both without this option
     #[arg(long, value_name = "VERSION", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
@@ -51,11 +50,8 @@ pub struct Build {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// A package with a cdylib, of this workspace
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["example", "library"])]
-    pub package: Option<String>,
-    /// An example whose crate-type is cdylib, of this workspace
     #[arg(long, value_name = "NAME", conflicts_with = "library")]
-    pub example: Option<String>,
+    pub package: Option<String>,
     /// A library that is already built; PLATFORM= if it is not for this machine
     #[arg(long, value_name = "[PLATFORM=]FILE")]
     pub library: Vec<String>,
@@ -113,24 +109,18 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
         [] => vec![tools.host()],
         triples => targets(&tools, triples)?,
     };
-    let names: Vec<String>;
-    let selection = if let Some(example) = &args.example {
-        Selection::Example(example)
-    } else {
-        let packages = match &args.package {
-            Some(name) => {
-                let package = workspace.package(name).filter(|p| p.has_cdylib());
-                vec![package.ok_or_else(|| anyhow!("{name} is no package with crate-type = [\"cdylib\"] here"))?]
-            }
-            None => choose(&workspace.fmus(), &args.fmus)?,
-        };
-        names = packages.iter().map(|p| p.name.clone()).collect();
-        Selection::Packages(&names)
+    let packages = match &args.package {
+        Some(name) => {
+            let package = workspace.package(name).filter(|p| p.has_cdylib());
+            vec![package.ok_or_else(|| anyhow!("{name} is no package with crate-type = [\"cdylib\"] here"))?]
+        }
+        None => choose(&workspace.fmus(), &args.fmus)?,
     };
+    let names: Vec<String> = packages.iter().map(|p| p.name.clone()).collect();
     let mut built: BTreeMap<String, Vec<(Platform, PathBuf)>> = BTreeMap::new();
     let mut describing: Option<Vec<Library>> = None;
     for target in &targets {
-        let libraries = compile(workspace, selection, target)?;
+        let libraries = compile(workspace, &names, target)?;
         for (package, library) in &libraries {
             built.entry(package.clone()).or_default().push((target.platform, library.clone()));
         }
@@ -140,18 +130,13 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
     }
     let describing = match describing {
         Some(libraries) => libraries,
-        None => compile(workspace, selection, &tools.host())?,
+        None => compile(workspace, &names, &tools.host())?,
     };
     if describing.is_empty() {
         bail!("nothing that was compiled is a cdylib: set crate-type = [\"cdylib\"]");
     }
     let model = |(package, own): &Library| {
-        let licences = match args.example {
-            // Cargo does not tell which dependencies of its package an example uses; the exporter it uses for certain.
-            Some(_) => Licences::of_package(workspace, "fmu-export"),
-            None => Licences::of_package(workspace, package),
-        };
-        load(own, built.get(package).map_or(&[], Vec::as_slice), licences)
+        load(own, built.get(package).map_or(&[], Vec::as_slice), Licences::of_package(workspace, package))
     };
     describing.iter().map(model).collect()
 }

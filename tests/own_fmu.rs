@@ -1,0 +1,74 @@
+//! The example of an FMU of one's own: built as its first lines say, run, and checked.
+#![allow(missing_docs)]
+
+use fmu::check::{self, Level};
+use fmu::commands::build::{self, Build};
+use fmu::cosimulation::{Recording, Schedule, Settings, System};
+use fmu::importer::Fmu;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+/// RcCircuit.fmu of both standards.
+fn archives() -> &'static [PathBuf] {
+    static FILES: OnceLock<Vec<PathBuf>> = OnceLock::new();
+    FILES.get_or_init(|| {
+        let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("own-fmu");
+        build::run(&Build { package: Some("own-fmu".into()), out: Some(out), ..Build::default() }).unwrap()
+    })
+}
+
+fn run(mut system: System, stop: f64) -> Recording {
+    system.record_outputs().unwrap();
+    let settings = Settings { start: 0.0, stop, step: 0.1, sequential: false };
+    system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap()
+}
+
+#[test]
+fn it_charges_as_its_equation_says() {
+    for file in archives() {
+        let mut system = System::default();
+        system.add("rc", &Fmu::open(file).unwrap(), false).unwrap();
+        system.set("rc.R", "2000").unwrap();
+        system.input("rc.u", Schedule::parse("5").unwrap()).unwrap();
+        let recording = run(system, 5.0);
+        assert_eq!(recording.time.len(), 51);
+        for (t, u_c) in recording.time.iter().zip(&recording.column("rc.u_c").unwrap().values) {
+            let expected = 5.0 * (1.0 - (-t / 2.0).exp());
+            assert!((u_c - expected).abs() < 1e-12, "{t} s: {u_c} V, {expected} V");
+        }
+    }
+}
+
+/// A value comes through a chain of FMUs within initialisation, whatever their order.
+#[test]
+fn a_chain_is_consistent_at_the_start() {
+    for file in archives() {
+        let fmu = Fmu::open(file).unwrap();
+        for order in [["a", "b", "c"], ["c", "b", "a"]] {
+            let mut system = System::default();
+            for name in order {
+                system.add(name, &fmu, false).unwrap();
+            }
+            system.input("a.u", Schedule::parse("8").unwrap()).unwrap();
+            system.set("a.R", "2").unwrap();
+            for (from, to) in [("a", "b"), ("b", "c")] {
+                system.connect(&format!("{from}.i"), &format!("{to}.u")).unwrap();
+                system.set(&format!("{to}.R"), "2").unwrap();
+            }
+            let i = run(system, 0.1).column("c.i").unwrap().values[0];
+            assert!((i - 1.0).abs() < 1e-15, "{order:?}: {i} A");
+        }
+    }
+}
+
+#[test]
+fn it_violates_no_must() {
+    let program = Some(PathBuf::from(env!("CARGO_BIN_EXE_fmu")));
+    for file in archives() {
+        let report = check::run(file, &check::Options { program: program.clone(), ..Default::default() }).unwrap();
+        let must: Vec<_> = report.violated().filter(|f| f.level == Level::Must).collect();
+        assert!(must.is_empty(), "{}", report.text(false));
+        assert!(report.findings.len() > 100);
+    }
+}
