@@ -122,6 +122,7 @@ fn version_of(name: &str) -> Option<Glibc> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use object::{Object, ObjectSection};
 
     #[test]
     fn what_is_modest() {
@@ -149,6 +150,11 @@ mod tests {
     fn this_program_needs_the_c_library() {
         let bytes = std::fs::read(std::env::current_exe().unwrap()).unwrap();
         let needs = Needs::of(&bytes).unwrap();
+        // The names of all versions stand among the strings of the dynamic symbols.
+        let file = ElfFile64::<object::Endianness>::parse(&*bytes).unwrap();
+        let strings = file.section_by_name(".dynstr").unwrap().data().unwrap();
+        let names = strings.split(|byte| *byte == 0).map(String::from_utf8_lossy);
+        assert_eq!(needs.glibc, names.filter_map(|name| version_of(&name)).max());
         assert!(needs.glibc >= Some(Glibc(2, 2)), "{needs:?}");
         assert!(Needs::of(&bytes[..100]).is_err());
     }
