@@ -201,6 +201,22 @@ fn structure() {
 }
 
 #[test]
+fn an_array_output_stands_once_in_fmi3_and_by_elements_in_fmi2() {
+    let mut three = sample();
+    let speed = three.variables.iter_mut().find(|v| v.name == "speed").unwrap();
+    (speed.dimension, speed.value_reference) = (Some(3), 100);
+    for (version, count) in [(FmiVersion::V2, 3), (FmiVersion::V3, 1)] {
+        let md = read(write(&three, version, &generation())).unwrap();
+        let of_speed = |unknowns: &[Unknown]| {
+            let name = |u: &Unknown| md.referenced(u.reference).unwrap().name.clone();
+            unknowns.iter().filter(|u| name(u).starts_with("speed")).count()
+        };
+        assert_eq!((of_speed(&md.outputs), md.outputs.len()), (count, count + 2), "S01");
+        assert_eq!((of_speed(&md.initial_unknowns), md.initial_unknowns.len()), (count, count + 3), "S02");
+    }
+}
+
+#[test]
 fn a_model_without_outputs_has_no_empty_list() {
     let bare = Description { variables: Vec::new(), ..sample() };
     for version in VERSIONS {
