@@ -3,6 +3,10 @@
 //! u_d = K_p e_d + I_d - w^ L_q i_q, u_q = K_p e_q + I_q + w^ (L_d i_d + psi_M), one PI per axis with K_p = w_c L and
 //! K_i = w_c R^; or, with active resistance, K_i = w_c^2 L and -(w_c L - R^) i besides. What the hexagon cuts off drives
 //! the integrators back: I += T_s K_i (e + (u_limited - u) / K_p).
+//!
+//! The structure is that of Rasmussen 2006, Fig. 2; the paper gives no gains. These cancel the pole of the axis, so that the loop is
+//! of first order with w_c (internal model control); active resistance and back-calculation are the field's common practice.
+//! u in V, i in A, w_c and w^ in rad/s (electrical).
 
 use crate::frame::{Axis, DqHat, Estimated};
 use crate::motor::Motor;

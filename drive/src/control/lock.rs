@@ -12,6 +12,8 @@
 //! sees more, where the machine values are good.
 //! Limits: an angle shows in the EMF alone. Below |w| psi_M = lock.u / 2, the creep of a Rasmussen observer with R^ > R
 //! among it, nothing shows that a rotor is lost.
+//!
+//! Derived here from Kim & Sul 2011, eq (1), for every estimator alike. u in V, psi in Wb, theta in rad, w in rad/s (electrical).
 
 use crate::estimator::Sample;
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};

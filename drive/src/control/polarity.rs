@@ -8,6 +8,9 @@
 //!
 //! With the flux linkage x = V T_s `samples` the peaks are x / L_d + c_2 x^2 and x / L_d - c_2 x^2, nearly.
 //! Limits: the rotor stands still; where nothing saturates the noise decides.
+//!
+//! The saliency cannot tell the ends apart (Kim & Sul 2011, eq (36): the angle is in it as 2 theta); the sequence of pulses is derived
+//! here from the saturation of [`saturation`](crate::plant::saturation). V in V, x in Wb, L in H, c_2 in A/Wb2.
 
 use crate::estimator::{Context, Sample};
 use crate::frame::{Axis, DqHat, Estimated};

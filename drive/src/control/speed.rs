@@ -5,6 +5,9 @@
 //!
 //! With `ramp` the reference goes to the set point no faster than that. In torque mode there is no speed loop: the torque
 //! reference divided by K is the set point, within the same limits.
+//!
+//! The structure is that of Rasmussen 2006, Fig. 2; the paper gives no gains: K_p cancels the inertia, so that w_s is the loop's
+//! crossover in rad/s, and b < 1 lessens the overshoot. w in rad/s, K in N.m/A, J in kg.m2, K_p in A.s/rad.
 
 use crate::control::start::RAD_PER_S2;
 use fmu_core::unit::{ONE, RAD_PER_S};

@@ -2,7 +2,8 @@
 //!
 //! 1. Two alignments of `t_align`: the current on the axis 90 degrees behind `initial.theta_est`, then on it. One alone has
 //!    a dead point where the rotor is half a turn away.
-//! 2. Waits for a reference, of speed or in torque mode of torque; then the frame speeds up by `acceleration` to `speed`, to the side of the reference.
+//! 2. Waits for a reference, of speed or in torque mode of torque; then the frame speeds up by `acceleration` to `speed`, to
+//!    the side of the reference.
 //! 3. Holds that speed for `settle`, then hands over: the angle is the frame's and that of the EMF in it,
 //!    theta = theta_f + atan2(-s e_d, s e_q), e = v - R i - j w_f (L_d i_d + j L_q i_q), low-passed. The integrators of the
 //!    current controller are turned into the new frame, that of the speed controller takes the torque over.
@@ -11,6 +12,9 @@
 //! so i_q = -2 zeta w_0 J / (n_p K) (e_q / psi_M - w_f), at most I, is a damping torque, at standstill too.
 //!
 //! Limits: the load must stay below K I; at standstill the voltage errors of the inverter are in e_q.
+//!
+//! Neither paper starts so: the sequence and the damping are derived here for the methods on the EMF (Kim & Sul 2011, section II),
+//! which see nothing at standstill. Angles in rad (electrical), w_0 and w_f in rad/s (electrical), i in A, K in N.m/A.
 
 use crate::estimator::interval::Interval;
 use crate::estimator::{Context, Sample};

@@ -6,6 +6,9 @@
 //!
 //! Low-pass behind the demodulation: the mean over one period of the carrier, zero at its multiples, where what is left
 //! of the fundamental and of the part without an angle comes to lie.
+//!
+//! For Kim & Sul 2011, eq (38) to (45), Figs. 7 and 9, which draw the filters as blocks: the transfer functions are derived here.
+//! w_h in rad/s, T_s in s.
 
 use crate::estimator::Context;
 use crate::frame::Vector;

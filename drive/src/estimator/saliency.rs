@@ -4,6 +4,8 @@
 //! and D = (1/L_d - 1/L_q) / 2: the angle is in D only, and as twice itself. So no injection tells the two ends of the
 //! magnet apart; [`polarity`](crate::control::polarity) does. Limits, of all of them: saliency is needed, and
 //! cross-saturation turns the axis of the inductances itself, by -9 to -21 deg at rated load.
+//!
+//! Kim & Sul 2011, eq (33) to (37), inverted: there the voltage is a function of the current. S and D in 1/H.
 
 use crate::estimator::Sample;
 use crate::frame::{Axis, DqHat, Estimated};

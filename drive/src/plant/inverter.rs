@@ -4,6 +4,9 @@
 //! While both switches are off the current chooses the diode: over a PWM period the leg's voltage is off by
 //! -u_dead sign(i) with u_dead = dead_time u_dc / T_pwm. Below i_zero the current crosses zero within the dead time (the
 //! ripple, the capacitances of the switches) and the error falls linearly: -u_dead i / i_zero.
+//!
+//! The hexagon follows from three legs between the rails, here; the dead time is the field's usual mean-value model, in neither
+//! paper. u in V, i in A, times in s.
 
 use crate::frame::{AlphaBeta, Phases};
 use fmu_core::unit::{AMPERE, SECOND};

@@ -7,6 +7,8 @@
 //! Diodes block: where no current is above i_zone and no line-to-line EMF above u_dc, the currents are zero and stay so.
 //! What is left in the zone goes at once, 0.75 L i_zone^2 of energy. i_zone is `inverter.i_zero`, or more where the machine
 //! would leave that zone faster than the shortest substep resolves.
+//!
+//! Derived here from the ideal diode bridge; `drive/tests/gates_off.rs` compares it with such a bridge in stator axes. u in V, i in A.
 
 use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
 use crate::motor::Motor;

@@ -4,6 +4,9 @@
 //!
 //! With an imposed speed the drive train outside integrates: speed and angle come in, tau_e minus friction goes out, and J
 //! belongs to the drive train.
+//!
+//! Rasmussen 2006 has the torque, not the load: friction is that of the assumed machine. J in kg.m2, B in N.m.s/rad, torques in N.m,
+//! speeds in rad/s (mechanical).
 
 use crate::math::tanh;
 use fmu_core::unit::{KG_M2, NEWTON_METRE, NM_S_PER_RAD, SPEED};

@@ -7,13 +7,15 @@
 //! ```
 //!
 //! u_x is the voltage that the leg gives on the mean of a PWM period, after the hexagon and with what the dead time takes,
-//! or that of its diodes while the gates are off; switches and diodes lose nothing. The magnetic energy is 0.75 (L_d i_d^2 + L_q i_q^2) where nothing saturates. With an
-//! imposed speed tau_shaft is tau_e minus friction and the kinetic energy is the drive train's; otherwise tau_shaft is
-//! tau_load, and J stores the rest.
+//! or that of its diodes while the gates are off; switches and diodes lose nothing. The magnetic energy is
+//! 0.75 (L_d i_d^2 + L_q i_q^2) where nothing saturates. With an imposed speed tau_shaft is tau_e minus friction and the
+//! kinetic energy is the drive train's; otherwise tau_shaft is tau_load, and J stores the rest.
 //!
 //! At a communication point all of them are those of the end of the step: the state there, with the voltages, the load
 //! and u_dc that were held in that step. A new voltage shows with the next step. i_dc is defined without u_dc: a link of
 //! 0 V still sees the current of the legs that are connected to it.
+//!
+//! Definitions; the balance is derived from the voltage equation of [`machine`](crate::plant::machine), and tested.
 
 use crate::frame::Phases;
 use crate::plant::legs::Legs;

@@ -5,6 +5,8 @@
 //!
 //! c_2 > 0 tells the two ends of the magnet apart: current along it (x > 0) meets a smaller inductance than against it.
 //! Limits: a polynomial, good to about the flux at which d i_d / d psi_d = 1 / L_d + 2 c_2 x + 3 c_3 x^2 stays positive.
+//!
+//! Neither paper saturates: a polynomial chosen here that has an energy. Flux linkages in Wb, c_2 and c_x in A/Wb2, c_3 in A/Wb3.
 
 use crate::frame::Dq;
 use crate::motor::Motor;
