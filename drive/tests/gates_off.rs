@@ -3,38 +3,27 @@
 #![allow(missing_docs)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 
+mod common;
+
+use common::{Bench, T_S};
 use drive::estimator::Kind;
 use drive::frame::{AlphaBeta, Phases};
 use drive::plant::tables::PlantParameters;
-use drive::{Pair, PmsmDrive, PmsmPlant, SensorlessController, bench};
+use drive::{Pair, PmsmDrive, SensorlessController, bench};
 use fmu_core::{Block, Elapsed, Model, Step};
 use std::f64::consts::FRAC_PI_2;
 
-const T_S: f64 = 1e-4;
-
-/// A plant with its gates off, and its time.
-struct Off {
-    block: Block<PmsmPlant>,
-    now: Elapsed,
+/// A plant with its gates off.
+fn off(set: impl FnOnce(&mut PlantParameters)) -> Bench {
+    let mut off = Bench::new(set);
+    off.block.model.inputs.enable = false;
+    // What the controller asks for does not matter.
+    off.block.model.inputs.u.a = 100.0;
+    off.block.initialise();
+    off
 }
 
-impl Off {
-    fn new(set: impl FnOnce(&mut PlantParameters)) -> Self {
-        let mut block = Block::<PmsmPlant>::default();
-        set(&mut block.model.parameters);
-        block.model.inputs.enable = false;
-        // What the controller asks for does not matter.
-        block.model.inputs.u.a = 100.0;
-        block.initialise();
-        Self { block, now: Elapsed::ZERO }
-    }
-
-    fn step(&mut self, h: f64) {
-        let step = Step { start: self.now, h };
-        self.block.step(&step).unwrap();
-        self.now = step.end();
-    }
-
+impl Bench {
     /// One step of a shaft that is imposed at `speed` (rad/s).
     fn turn(&mut self, speed: f64, h: f64) {
         let angle = self.block.out.angle;
@@ -48,7 +37,7 @@ impl Off {
 fn no_current_below_the_voltage_of_the_link() {
     // 395 rad/s: the line-to-line EMF of 308 V stays below 325 V. Friction alone slows the rotor down.
     let (w_0, t) = (395.0, 0.5);
-    let mut off = Off::new(|par| par.initial.speed = w_0);
+    let mut off = off(|par| par.initial.speed = w_0);
     for _ in 0..5000 {
         off.step(1e-4);
         let out = &off.block.out;
@@ -63,13 +52,13 @@ fn no_current_below_the_voltage_of_the_link() {
 
 #[test]
 fn a_current_decays_into_the_link_and_stays_away() {
-    let mut off = Off::new(|par| par.mechanics.imposed = true);
+    let mut off = off(|par| par.mechanics.imposed = true);
     (off.block.model.inputs.enable, off.block.model.inputs.u) = (true, Phases::default());
     for _ in 0..100 {
         off.turn(100.0, T_S);
     }
     assert!(off.block.out.i.a.abs() > 1.0, "{:?}", off.block.out.i);
-    let stored = |off: &Off| {
+    let stored = |off: &Bench| {
         let out = &off.block.out;
         0.75 * 6e-3 * (out.i_d * out.i_d + out.i_q * out.i_q)
     };
@@ -77,7 +66,7 @@ fn a_current_decays_into_the_link_and_stays_away() {
     off.turn(100.0, 1e-15);
     let (mut h_left, mut balance) = (0.0, -stored(&off));
     for k in 0..2000 {
-        let net = |off: &Off| off.block.out.powers.p_in - off.block.out.powers.p_loss - off.block.out.powers.p_mech;
+        let net = |off: &Bench| off.block.out.powers.p_in - off.block.out.powers.p_loss - off.block.out.powers.p_mech;
         let before = net(&off);
         off.turn(100.0, 1e-6);
         balance -= 0.5e-6 * (before + net(&off));
@@ -117,7 +106,7 @@ fn a_machine_above_the_link_generates_through_the_diodes() {
     // 600 rad/s, 468 V line to line. The zone near zero costs accuracy in proportion to its width.
     let expected = rectified(1800.0);
     for (i_zero, tolerance) in [(0.1, 0.015), (0.06, 0.009)] {
-        let mut off = Off::new(|par| (par.mechanics.imposed, par.inverter.i_zero) = (true, i_zero));
+        let mut off = off(|par| (par.mechanics.imposed, par.inverter.i_zero) = (true, i_zero));
         let (mut p_in, mut balance) = (0.0, 0.0);
         // Three electrical periods of 3.49 ms after 10 ms.
         for k in 0..20_472_u32 {
@@ -132,7 +121,7 @@ fn a_machine_above_the_link_generates_through_the_diodes() {
         assert!((p_in / expected - 1.0).abs() < tolerance, "{p_in} W into the link, by ideal diodes {expected} W");
         assert!(balance.abs() < 2e-3 * p_in.abs(), "{balance} W of {p_in} W");
     }
-    let mut off = Off::new(|par| par.mechanics.imposed = true);
+    let mut off = off(|par| par.mechanics.imposed = true);
     for _ in 0..100 {
         off.turn(600.0, T_S);
     }
@@ -147,7 +136,7 @@ fn a_machine_above_the_link_generates_through_the_diodes() {
 
 #[test]
 fn without_a_link_the_diodes_short_the_machine() {
-    let mut off = Off::new(|par| par.initial.speed = 100.0);
+    let mut off = off(|par| par.initial.speed = 100.0);
     off.block.model.inputs.u_dc = 0.0;
     off.step(2e-3);
     let out = &off.block.out;
@@ -156,7 +145,7 @@ fn without_a_link_the_diodes_short_the_machine() {
 
 #[test]
 fn a_narrow_zone_does_not_take_for_ever() {
-    let mut off = Off::new(|par| (par.initial.speed, par.inverter.i_zero) = (600.0, 1e-12));
+    let mut off = off(|par| (par.initial.speed, par.inverter.i_zero) = (600.0, 1e-12));
     // At most a hundred substeps in a period, whatever i_zero: else this one would be refused.
     off.step(5.0);
     assert!(off.block.out.i.a == 0.0 && off.block.out.speed < 420.0, "{:?}", off.block.out);

@@ -2,33 +2,13 @@
 #![allow(missing_docs)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 
-use drive::PmsmPlant;
+mod common;
+
+use common::{Bench, T_S};
 use drive::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
 use drive::plant::tables::PlantParameters;
-use fmu_core::{Block, Elapsed, Step};
-
-const T_S: f64 = 1e-4;
-
-/// A plant and its time.
-struct Bench {
-    block: Block<PmsmPlant>,
-    now: Elapsed,
-}
 
 impl Bench {
-    fn new(set: impl FnOnce(&mut PlantParameters)) -> Self {
-        let mut block = Block::<PmsmPlant>::default();
-        set(&mut block.model.parameters);
-        block.initialise();
-        Self { block, now: Elapsed::ZERO }
-    }
-
-    fn step(&mut self, h: f64) {
-        let step = Step { start: self.now, h };
-        self.block.step(&step).unwrap();
-        self.now = step.end();
-    }
-
     /// The voltage that keeps the current `i` (A) of a linear machine with these parameters, turned by half a sample.
     fn hold(&mut self, i: Dq) {
         let motor = &self.block.model.parameters.motor;
