@@ -119,6 +119,8 @@ pub const WEBER: Quantity = Quantity::new("FluxLinkage", Unit::si("Wb", Exponent
 pub const NEWTON_METRE: Quantity = Quantity::new("Torque", Unit::si("N.m", Exponents::mechanical(1, 2, -2, 0)));
 /// Power in W.
 pub const WATT: Quantity = Quantity::new("Power", Unit::si("W", Exponents::mechanical(1, 2, -3, 0)));
+/// Energy in J.
+pub const JOULE: Quantity = Quantity::new("Energy", Unit::si("J", Exponents::mechanical(1, 2, -2, 0)));
 /// Moment of inertia in kg.m2.
 pub const KG_M2: Quantity = Quantity::new("Inertia", Unit::si("kg.m2", Exponents::mechanical(1, 2, 0, 0)));
 /// Viscous friction in N.m.s/rad.

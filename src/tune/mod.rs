@@ -5,6 +5,7 @@
 
 pub mod check;
 pub mod motor;
+mod native;
 pub mod rules;
 pub mod ssv;
 

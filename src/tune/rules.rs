@@ -5,10 +5,18 @@
 //! c_1 = 4 |R - R^| i_0 / psi_M within 50..200 1/s, c_2 = c_1 / 50; K i_0 = 1.35 times the rated torque; w_0 = 30 rad/s
 //! electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest electrical
 //! acceleration alpha = n_p K i_q / J. R^ = 0.9 R: the safe side at standstill, where R^ > R runs away.
+//!
+//! The current loop is stable with every current that is used: its gain, w_c L or with active resistance 2 w_c L - R, acts
+//! on the incremental inductance, which saturation lowers; and while the frame is not yet at the rotor, in a start, the gain
+//! of one axis acts on the inductance of the other. With the sample of delay i[k+2] = i[k+1] - (gain T_s / L) i[k], which
+//! oscillates without end at gain T_s / L = 1: half of that is allowed (gain margin 6 dB), and w_c is lowered to it.
 
 use super::check::check;
 use super::motor::{Data, MotorFile, Number};
 use anyhow::{Result, bail};
+use drive::frame::Dq;
+use drive::motor::Motor;
+use drive::plant::{machine, saturation::Saturation};
 use std::f64::consts::TAU;
 
 /// A value for a variable.
@@ -82,6 +90,7 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     } else {
         controller.extend(extended_emf(data, &mut notes));
     }
+    cap_current_loop(data, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
     Ok(Tuned { name: data.name.clone(), source: data.source.clone(), plant, controller, notes })
 }
@@ -181,6 +190,66 @@ fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
         notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to 600 Hz were tried"));
     }
     Ok(())
+}
+
+/// Greatest product of the current loop's gain and T_s / L: half of the one at which it oscillates.
+const MOST_GAIN: f64 = 0.5;
+
+/// Lowers the bandwidth of the current loop to what the least inductance allows, and says so.
+fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<String>) {
+    let value = |name: &str| controller.iter().find(|s| s.name == name).map(|s| &s.value);
+    let number = |name: &str| if let Some(Value::Real(x)) = value(name) { *x } else { 0.0 };
+    let Data { machine, rating, bandwidth, .. } = data;
+    // A start may have its current on one axis and as much damping on the other.
+    let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
+    let least = least_inductance(data, i);
+    let greatest = machine.L_d.get_ref().max(*machine.L_q.get_ref());
+    let gain = MOST_GAIN * least / number("T_s");
+    let most = match value("current.active_resistance") {
+        Some(Value::Boolean(true)) => (gain + number("motor.R_s")) / (2.0 * greatest),
+        _ => gain / greatest,
+    };
+    let wanted = *bandwidth.current.get_ref();
+    if most < wanted {
+        let (asked, given) = (wanted / TAU, most / TAU);
+        notes.push(format!(
+            "current.bandwidth is {given:.0} Hz, not the {asked:.0} Hz of bandwidth.current: at {i:.1} A the incremental \
+             inductance falls to {:.1} mH, and the loop would oscillate in the start, where the frame is not at the rotor yet",
+            1e3 * least
+        ));
+        for setting in controller.iter_mut().filter(|s| s.name == "current.bandwidth") {
+            setting.value = Value::Real(most);
+            setting.rule = format!("lowered from {asked:.0} Hz: gain T_s / L <= {MOST_GAIN} with the least inductance");
+        }
+    }
+}
+
+/// The least incremental inductance in H of the plant with a current of `i` (A) in any direction.
+fn least_inductance(data: &Data, i: f64) -> f64 {
+    let (m, of) = (&data.machine, |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref()));
+    let motor = Motor {
+        n_p: *m.n_p.get_ref(),
+        R_s: *m.R_s.get_ref(),
+        L_d: *m.L_d.get_ref(),
+        L_q: *m.L_q.get_ref(),
+        psi_M: *m.psi_M.get_ref(),
+    };
+    let saturation = data.saturation.as_ref().map_or_else(Saturation::default, |s| Saturation {
+        c_2: of(&s.c_2),
+        c_3: of(&s.c_3),
+        c_x: of(&s.c_x),
+    });
+    let at = |angle: f64| {
+        let psi = |r: f64| Dq::new(motor.psi_M + r * angle.cos(), r * angle.sin());
+        let (mut low, mut high) = (0.0, i * motor.L_d.max(motor.L_q));
+        for _ in 0..50 {
+            let r = 0.5 * (low + high);
+            let above = machine::current(&motor, &saturation, psi(r)).magnitude() > i;
+            *(if above { &mut high } else { &mut low }) = r;
+        }
+        saturation.least_inductance(&motor, psi(low))
+    };
+    (0..72).map(|k| at(f64::from(k) * TAU / 72.0)).fold(f64::INFINITY, f64::min)
 }
 
 fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setting>> {

@@ -78,7 +78,7 @@ def test_the_plants_resistance_acts_in_the_next_step(drives):
     drive.run(1), other.run(1)
     loss, before = (unit.get_reals(unit.of("p_loss"))[0] for unit in drives)
     friction = 2e-4 * SPEED**2 + 0.03 * SPEED
-    # Twice the resistance, and a current that has fallen by less than 2 Ohm T_s / L in that step.
+    # Twice the resistance, and a current that has fallen by less than 2 Ohm T_s / L by the end of that step.
     assert 2.0 * (1.0 - 2.0 * T_S / 6e-3) ** 2 < (loss - friction) / (before - friction) < 2.0
 
 

@@ -120,10 +120,10 @@ impl SensorlessController {
 
         let axis = Axis::<Estimated>::at(theta);
         let i_hat = axis.from_stator(controlled);
-        let i_ref = if let Some(Led::Frame(.., i_ref)) = led {
-            i_ref
+        let (i_ref, current_limited) = if let Some(Led::Frame(.., i_ref)) = led {
+            (i_ref, false)
         } else if state.search.is_some() {
-            DqHat::ZERO
+            (DqHat::ZERO, false)
         } else {
             let old = (tuned && !begins).then_some(&last_gains.speed);
             state.references(kind, gains, old, par, inputs, speed)
@@ -145,7 +145,7 @@ impl SensorlessController {
             Injection::Estimated(u) => acting.to_stator(u),
         };
         let whole = acting.to_stator(wanted) + injected;
-        let command = limit_to_hexagon(Phases::from_stator(whole), inputs.u_dc);
+        let (command, mut voltage_limited) = within_hexagon(whole, inputs.u_dc);
         let cut = acting.from_stator(command - injected) - wanted;
         state.current.integrate(&gains.current, i_ref - i_hat, cut, T_s);
         let share = if whole.magnitude() > 0.0 { command.magnitude() / whole.magnitude() } else { 1.0 };
@@ -153,7 +153,9 @@ impl SensorlessController {
         let compensated = if par.compensation.u_dead > 0.0 {
             let legs = Phases::from_stator(acting.to_stator(i_ref));
             let loss = dead_time_loss(par.compensation.u_dead, par.compensation.i_zero, legs);
-            limit_to_hexagon(Phases::from_stator(command + loss), inputs.u_dc)
+            let (compensated, limited) = within_hexagon(command + loss, inputs.u_dc);
+            voltage_limited |= limited;
+            compensated
         } else {
             command
         };
@@ -177,8 +179,16 @@ impl SensorlessController {
             i_ref: i_ref.into(),
             lock_lost,
             enabled: true,
+            voltage_limited,
+            current_limited,
         }
     }
+}
+
+/// The voltage `u` (V) within the hexagon of `u_dc` (V), and whether it was outside.
+fn within_hexagon(u: AlphaBeta, u_dc: f64) -> (AlphaBeta, bool) {
+    let phases = Phases::from_stator(u);
+    (limit_to_hexagon(phases, u_dc), phases.span() > u_dc)
 }
 
 impl Model for SensorlessController {
@@ -198,7 +208,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 4;
+    const STATE_VERSION: u16 = 5;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;

@@ -61,12 +61,16 @@ pub struct ControllerOutputs {
     pub lock_lost: f64,
     /// Whether the controller is at work.
     pub enabled: bool,
+    /// Whether the hexagon of u_dc limited the voltage references.
+    pub voltage_limited: bool,
+    /// Whether a current or torque limit limited the current references.
+    pub current_limited: bool,
 }
 
 impl ControllerOutputs {
     /// Whether all of them are numbers.
     pub fn is_finite(&self) -> bool {
-        let Self { u, speed_est, theta_est, i, i_ref, lock_lost, enabled: _ } = self;
+        let Self { u, speed_est, theta_est, i, i_ref, lock_lost, .. } = self;
         let all = [u.a, u.b, u.c, *speed_est, *theta_est, i.d, i.q, i_ref.d, i_ref.q, *lock_lost];
         all.iter().all(|x| x.is_finite())
     }

@@ -67,10 +67,10 @@ pub struct SpeedController {
 }
 
 impl SpeedController {
-    /// Reference of i_q in A at the speed reference `w_ref` and the speed `w` (rad/s), within +-`limit` (A); one sample
-    /// of `T_s` (s).
+    /// Reference of i_q in A at the speed reference `w_ref` and the speed `w` (rad/s), within +-`limit` (A), and what it would
+    /// be without the limit; one sample of `T_s` (s).
     #[inline]
-    pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limit: f64, T_s: f64) -> f64 {
+    pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limit: f64, T_s: f64) -> (f64, f64) {
         let error = w_ref - w;
         let wanted = gains.k_p * (gains.b * w_ref - w) + self.integral;
         let i_q_ref = wanted.clamp(-limit, limit);
@@ -78,7 +78,7 @@ impl SpeedController {
         if !further_in {
             self.integral += T_s * gains.k_i * error;
         }
-        i_q_ref
+        (i_q_ref, wanted)
     }
 }
 
@@ -153,7 +153,8 @@ mod tests {
     fn the_integrator_holds_at_the_limit_only_when_driven_in() {
         let gains = SpeedGains::new(&SpeedLoop::default(), 1.5e-3, 0.675);
         let mut held = SpeedController { integral: 7.0 };
-        assert!((held.update(&gains, 10.0, 0.0, 6.0, 1e-4) - 6.0).abs() < 1e-15);
+        let (i_q_ref, wanted) = held.update(&gains, 10.0, 0.0, 6.0, 1e-4);
+        assert!((i_q_ref - 6.0).abs() < 1e-15 && wanted > 7.0);
         assert!((held.integral - 7.0).abs() < 1e-15, "the error drives it in: held");
         held.update(&gains, -1.0, 0.0, 6.0, 1e-4);
         assert!(held.integral < 7.0, "the error drives it out: it moves");

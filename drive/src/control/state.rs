@@ -164,7 +164,8 @@ impl State {
         (estimate, led, searching)
     }
 
-    /// The current references (A) at the estimated mechanical `speed` (rad/s); `old` gains of a speed loop tuned now.
+    /// The current references (A) at the estimated mechanical `speed` (rad/s), and whether a limit cut them; `old` gains of
+    /// a speed loop tuned now.
     #[inline]
     pub(super) fn references(
         &mut self,
@@ -174,26 +175,34 @@ impl State {
         par: &ControllerParameters,
         inputs: &ControllerInputs,
         speed: f64,
-    ) -> DqHat {
+    ) -> (DqHat, bool) {
         self.w_ref = par.speed_loop.ramped(self.w_ref, inputs.speed_ref, par.T_s);
         let w_ref = self.w_ref;
         if let Some(old) = old {
             self.speed.retune(old, &gains.speed, w_ref, speed);
         }
         let mut torque = |limit: f64| {
-            if par.speed_loop.torque_mode {
-                (inputs.tau_ref / gains.k).clamp(-limit, limit)
+            let (i_q_ref, wanted) = if par.speed_loop.torque_mode {
+                let wanted = inputs.tau_ref / gains.k;
+                (wanted.clamp(-limit, limit), wanted)
             } else {
                 self.speed.update(&gains.speed, w_ref, speed, limit, par.T_s)
-            }
+            };
+            (i_q_ref, wanted.abs() > limit)
         };
         // The low-speed law is Rasmussen's; it would only be a loss where the angle is known.
         if kind == Kind::Rasmussen {
             let i_d_ref = par.zero_speed.i_d_ref(speed);
-            return DqHat::new(i_d_ref, torque(par.limit.i_q_beside(i_d_ref).min(gains.i_tau)));
+            let (i_q_ref, limited) = torque(par.limit.i_q_beside(i_d_ref).min(gains.i_tau));
+            return (DqHat::new(i_d_ref, i_q_ref), limited);
         }
-        let i_q_ref = torque(gains.i_tau);
-        if par.current.mtpa { max_torque_per_ampere(&par.motor, gains.k * i_q_ref) } else { DqHat::new(0.0, i_q_ref) }
+        let (i_q_ref, limited) = torque(gains.i_tau);
+        let i_ref = if par.current.mtpa {
+            max_torque_per_ampere(&par.motor, gains.k * i_q_ref)
+        } else {
+            DqHat::new(0.0, i_q_ref)
+        };
+        (i_ref, limited)
     }
 
     /// The magnet is found: the loops begin at rest.

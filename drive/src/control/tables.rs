@@ -204,6 +204,24 @@ pub const LOCK_LOST: &str =
 /// What the output says.
 pub const ENABLED: &str = "The controller is at work: the voltage references are its own";
 
+/// What says that a limit is reached: the last outputs of the controller and of the drive.
+pub const LIMITED: &Table<ControllerOutputs> = &Table::new(
+    const {
+        &[
+            O::boolean_output(
+                "voltage_limited",
+                "The hexagon of u_dc limited the voltage references of the last sample",
+                |o| &mut o.voltage_limited,
+            ),
+            O::boolean_output(
+                "current_limited",
+                "limit.i_q, limit.i or limit.tau limited the current references of the last sample",
+                |o| &mut o.current_limited,
+            ),
+        ]
+    },
+);
+
 /// The controller's outputs.
 pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
     const {
@@ -223,6 +241,7 @@ pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q", |o| &mut o.i_ref.q),
             O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
             O::boolean_output("enabled", ENABLED, |o| &mut o.enabled),
+            O::part("", &Part { table: LIMITED, lens: |o| o }),
         ]
     },
 );

@@ -25,6 +25,13 @@ pub fn flux_derivative(motor: &Motor, psi: Dq, u: Dq, i: Dq, w: f64) -> Dq {
     u - i * motor.R_s - psi.turned() * w
 }
 
+/// Magnetic energy in J at the flux linkage `psi` (Wb), without the magnet's own: 0 without current.
+#[inline]
+pub fn magnetic_energy(motor: &Motor, saturation: &Saturation, psi: Dq) -> f64 {
+    let (x, q) = (psi.d() - motor.psi_M, psi.q());
+    0.75 * (x * x / motor.L_d + q * q / motor.L_q) + saturation.energy(motor, psi)
+}
+
 /// Electromagnetic torque in N.m.
 #[inline]
 pub fn torque(motor: &Motor, psi: Dq, i: Dq) -> f64 {

@@ -41,10 +41,16 @@ impl Mechanics {
         self.B * speed + self.tau_coulomb * tanh(speed / self.w_coulomb)
     }
 
-    /// Angular acceleration in rad/s2.
+    /// Torque of the shaft on the load in N.m: `tau_load`, or with an imposed speed `tau_e` minus `friction` (N.m).
     #[inline]
-    pub fn acceleration(&self, tau_e: f64, tau_load: f64, speed: f64) -> f64 {
-        (tau_e - tau_load - self.friction(speed)) / self.J
+    pub fn tau_shaft(&self, tau_e: f64, tau_load: f64, friction: f64) -> f64 {
+        if self.imposed { tau_e - friction } else { tau_load }
+    }
+
+    /// Angular acceleration in rad/s2 by electromagnetic, shaft and friction torque (N.m); none where the drive train imposes the speed.
+    #[inline]
+    pub fn acceleration(&self, tau_e: f64, tau_shaft: f64, friction: f64) -> f64 {
+        if self.imposed { 0.0 } else { (tau_e - tau_shaft - friction) / self.J }
     }
 }
 
@@ -78,6 +84,6 @@ mod tests {
         let m = Mechanics::default();
         assert!((m.friction(10.0) - (2e-3 + 0.03)).abs() < 1e-9);
         assert_eq!(m.friction(-0.2).to_bits(), (-m.friction(0.2)).to_bits());
-        assert!((m.acceleration(1.0, 0.4, 0.0) - 400.0).abs() < 1e-9);
+        assert!((m.acceleration(1.0, 0.4, m.friction(0.0)) - 400.0).abs() < 1e-9);
     }
 }

@@ -6,11 +6,11 @@ use crate::math::wrap;
 use crate::plant::inverter::limit_to_hexagon;
 use crate::plant::legs::Legs;
 use crate::plant::machine;
-use crate::plant::power::Powers;
+use crate::plant::power::{Energy, Powers};
 use crate::plant::tables::{OUTPUTS, PARAMETERS, PlantParameters};
 use fmu_core::unit::{NEWTON_METRE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, Table, Terminal};
-use nalgebra::Vector4;
+use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 /// Longest step of the integration in s. At 4500 rpm of the reference motor a current is off by less than 1e-5 A.
@@ -43,7 +43,10 @@ impl Default for PlantInputs {
     }
 }
 
-/// What the integration advances.
+/// What the integration advances: the state, and the energies of the step beside it.
+type Vector = SVector<f64, 7>;
+
+/// The state of machine and shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct State {
     /// Stator flux linkage in Wb.
@@ -55,11 +58,13 @@ struct State {
 }
 
 impl State {
-    fn to_vector(self) -> Vector4<f64> {
-        Vector4::new(self.psi.d(), self.psi.q(), self.speed, self.angle)
+    /// With the energy that has passed in the step so far.
+    fn to_vector(self, energy: &Energy) -> Vector {
+        let Self { psi, speed, angle } = self;
+        Vector::from([psi.d(), psi.q(), speed, angle, energy.r#in, energy.mech, energy.loss])
     }
 
-    fn from_vector(x: &Vector4<f64>) -> Self {
+    fn from_vector(x: &Vector) -> Self {
         Self { psi: Dq::new(x[0], x[1]), speed: x[2], angle: x[3] }
     }
 
@@ -85,8 +90,12 @@ pub struct PlantOutputs {
     pub i_d: f64,
     /// Current across the magnet in A.
     pub i_q: f64,
-    /// What flows between DC link, machine and shaft.
+    /// Power between DC link, machine and shaft, mean over the last step.
     pub powers: Powers,
+    /// Torque of the shaft on the load in N.m.
+    pub tau_shaft: f64,
+    /// Energy since the start.
+    pub energy: Energy,
 }
 
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
@@ -97,6 +106,10 @@ pub struct PmsmPlant {
     /// Parameters.
     pub parameters: PlantParameters,
     state: State,
+    /// Means over the last step.
+    powers: Powers,
+    /// Since the start.
+    energy: Energy,
 }
 
 impl PmsmPlant {
@@ -108,23 +121,35 @@ impl PmsmPlant {
         if enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
     }
 
-    /// The state at the beginning of a step: an imposed shaft is where the drive train says. What differs from the angle
-    /// that the last step ended with turns the rotor under the flux linkage of the stator, which no jump changes.
+    /// Stator current in the rotor frame and in the phases, in A.
     #[inline]
-    fn at_the_shaft(&self) -> State {
-        let PlantParameters { motor, mechanics, .. } = &self.parameters;
+    fn currents(&self) -> (Dq, Phases) {
+        let PlantParameters { motor, saturation, .. } = &self.parameters;
+        let i = machine::current(motor, saturation, self.state.psi);
+        let axis = Axis::<Rotor>::at(f64::from(motor.n_p) * self.state.angle);
+        (i, Phases::from_stator(axis.to_stator(i)))
+    }
+
+    /// The state at the beginning of a step, and the energy of getting there: an imposed shaft is where the drive train
+    /// says. What differs from the angle that the last step ended with turns the rotor under the flux linkage of the
+    /// stator, which no jump changes; the magnetic field does work on the shaft then.
+    #[inline]
+    fn at_the_shaft(&self) -> (State, Energy) {
+        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         if !mechanics.imposed {
-            return self.state;
+            return (self.state, Energy::default());
         }
         let axis = |angle: f64| Axis::<Rotor>::at(f64::from(motor.n_p) * angle);
         let psi = axis(angle_shaft).from_stator(axis(self.state.angle).to_stator(self.state.psi));
-        State { psi, speed: speed_shaft, angle: angle_shaft }
+        let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
+        let energy = Energy { mech: stored(self.state.psi) - stored(psi), ..Energy::default() };
+        (State { psi, speed: speed_shaft, angle: angle_shaft }, energy)
     }
 
-    /// Derivative of the state with the stator voltage `u` held.
+    /// Derivative of state and energies with the stator voltage `u` held.
     #[inline]
-    fn derivative(&self, x: &Vector4<f64>, u: AlphaBeta, legs: &Legs) -> Vector4<f64> {
+    fn derivative(&self, x: &Vector, u: AlphaBeta, legs: &Legs) -> Vector {
         let PlantParameters { motor, saturation, .. } = &self.parameters;
         let State { psi, speed, angle } = State::from_vector(x);
         let n_p = f64::from(motor.n_p);
@@ -132,32 +157,40 @@ impl PmsmPlant {
         let axis = Axis::<Rotor>::at(n_p * angle);
         let u = axis.from_stator(u - legs.loss(axis, i));
         let d_psi = machine::flux_derivative(motor, psi, u, i, n_p * speed);
-        let acceleration = self.acceleration(machine::torque(motor, psi, i), speed);
-        Vector4::new(d_psi.d(), d_psi.q(), acceleration, speed)
+        let copper = 1.5 * motor.R_s * i.dot(i);
+        self.motion(d_psi, machine::torque(motor, psi, i), speed, (1.5 * u.dot(i), copper))
     }
 
-    /// Angular acceleration in rad/s2; none where the drive train imposes the speed.
+    /// The derivative with the mechanical part: voltage `d_psi` (V), torque `tau_e` (N.m), `speed` (rad/s), and the
+    /// electrical power in and lost (W).
     #[inline]
-    fn acceleration(&self, tau_e: f64, speed: f64) -> f64 {
+    fn motion(&self, d_psi: Dq, tau_e: f64, speed: f64, (p_in, copper): (f64, f64)) -> Vector {
         let mechanics = &self.parameters.mechanics;
-        if mechanics.imposed { 0.0 } else { mechanics.acceleration(tau_e, self.inputs.tau_load, speed) }
+        let friction = mechanics.friction(speed);
+        let tau_shaft = mechanics.tau_shaft(tau_e, self.inputs.tau_load, friction);
+        let acceleration = mechanics.acceleration(tau_e, tau_shaft, friction);
+        let p_loss = copper + friction * speed;
+        Vector::from([d_psi.d(), d_psi.q(), acceleration, speed, p_in, tau_shaft * speed, p_loss])
     }
 
     /// One substep of `h` (s) with the gates off.
-    fn coast(&self, x: &Vector4<f64>, h: f64, legs: &Legs) -> Vector4<f64> {
+    fn coast(&self, x: &Vector, h: f64, legs: &Legs) -> Vector {
         match self.blocked(x, legs) {
-            Some(x) => rk4(x, h, |x| Vector4::new(0.0, 0.0, self.acceleration(0.0, x[2]), x[2])),
+            Some(x) => rk4(x, h, |x| self.motion(Dq::ZERO, 0.0, x[2], (0.0, 0.0))),
             None => rk4(*x, h, |x| self.derivative(x, AlphaBeta::ZERO, legs)),
         }
     }
 
-    /// The state without current, where the diodes block.
-    fn blocked(&self, x: &Vector4<f64>, legs: &Legs) -> Option<Vector4<f64>> {
+    /// The state without current, where the diodes block; the energy of what was left of it is lost.
+    fn blocked(&self, x: &Vector, legs: &Legs) -> Option<Vector> {
         let PlantParameters { motor, saturation, .. } = &self.parameters;
         let State { psi, speed, angle } = State::from_vector(x);
         let (n_p, i) = (f64::from(motor.n_p), machine::current(motor, saturation, psi));
-        let free = State { psi: machine::flux(motor, Dq::ZERO), speed, angle };
-        legs.block(motor, Axis::at(n_p * angle), i, n_p * speed).then(|| free.to_vector())
+        legs.block(motor, Axis::at(n_p * angle), i, n_p * speed).then(|| {
+            let free = machine::flux(motor, Dq::ZERO);
+            let left = machine::magnetic_energy(motor, saturation, psi);
+            Vector::from([free.d(), free.q(), speed, angle, x[4], x[5], x[6] + left])
+        })
     }
 }
 
@@ -178,7 +211,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 3;
+    const STATE_VERSION: u16 = 4;
 
     fn initialise(&mut self) {
         let PlantParameters { motor, mechanics, initial, .. } = &self.parameters;
@@ -189,24 +222,29 @@ impl Model for PmsmPlant {
             (initial.speed, initial.theta_e / f64::from(motor.n_p))
         };
         self.state = State { psi: machine::flux(motor, Dq::ZERO), speed, angle };
+        self.energy = Energy::default();
+        // No current yet: nothing but the shaft has a power.
+        let friction = mechanics.friction(speed);
+        let tau_shaft = mechanics.tau_shaft(0.0, self.inputs.tau_load, friction);
+        self.powers = Powers { p_mech: tau_shaft * speed, p_loss: friction * speed, ..Powers::default() };
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
+        let PlantParameters { motor, mechanics, .. } = &self.parameters;
         let State { psi, speed, angle } = self.state;
-        let i = machine::current(motor, saturation, psi);
-        let theta_e = f64::from(motor.n_p) * angle;
-        let phases = Phases::from_stator(Axis::<Rotor>::at(theta_e).to_stator(i));
+        let (i, phases) = self.currents();
         let tau_e = machine::torque(motor, psi, i);
         *out = PlantOutputs {
             i: phases,
             speed,
             angle,
-            theta_e: wrap(theta_e),
+            theta_e: wrap(f64::from(motor.n_p) * angle),
             tau_e,
             i_d: i.d(),
             i_q: i.q(),
-            powers: Powers::new(&self.parameters, &self.inputs, &self.legs(), phases, tau_e, speed),
+            powers: self.powers,
+            tau_shaft: mechanics.tau_shaft(tau_e, self.inputs.tau_load, mechanics.friction(speed)),
+            energy: self.energy,
         };
     }
 
@@ -219,7 +257,8 @@ impl Model for PmsmPlant {
             return Err(Fault::value("the step size", format!("{} s", step.h), format!("at most {longest} s")));
         }
         let h = step.h / count;
-        let mut x = self.at_the_shaft().to_vector();
+        let (state, energy) = self.at_the_shaft();
+        let mut x = state.to_vector(&energy);
         let mut left = count;
         if self.inputs.enable {
             let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
@@ -234,8 +273,8 @@ impl Model for PmsmPlant {
             }
             x = self.blocked(&x, &legs).unwrap_or(x);
         }
-        let state = State::from_vector(&x);
-        if !state.is_finite() {
+        let (state, energy) = (State::from_vector(&x), Energy { r#in: x[4], mech: x[5], loss: x[6] });
+        if !(state.is_finite() && energy.is_finite()) {
             return Err(Fault::new(format!(
                 "the machine's state left the finite numbers within a step of {} s; the step before it ended with \
                  psi_d = {} Wb, psi_q = {} Wb, speed = {} rad/s",
@@ -246,6 +285,8 @@ impl Model for PmsmPlant {
             )));
         }
         self.state = state;
+        self.energy.add(&energy);
+        self.powers = Powers::mean(&energy, step.h, &self.inputs, &legs, || self.currents().1);
         Ok(())
     }
 }

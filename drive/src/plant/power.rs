@@ -1,4 +1,4 @@
-//! Power between DC link, machine and shaft, and the current that the inverter draws from the link.
+//! Power between DC link, machine and shaft, its mean over a step, and the energy since the start.
 //!
 //! ```text
 //! i_dc   = sum of m_x i_x over the legs, m_x = u_x / u_dc the mean switching state      p_in = u_dc i_dc
@@ -6,26 +6,30 @@
 //! p_in   = p_loss + p_mech + d/dt (magnetic energy + J speed^2 / 2)
 //! ```
 //!
-//! u_x is the voltage that the leg gives on the mean of a PWM period, after the hexagon and with what the dead time takes,
+//! u_x is the voltage that the leg gives on average over a PWM period, after the hexagon and with what the dead time takes,
 //! or that of its diodes while the gates are off; switches and diodes lose nothing. The magnetic energy is
 //! 0.75 (L_d i_d^2 + L_q i_q^2) where nothing saturates. With an imposed speed tau_shaft is tau_e minus friction and the
 //! kinetic energy is the drive train's; otherwise tau_shaft is tau_load, and J stores the rest.
 //!
-//! At a communication point all of them are those of the end of the step: the state there, with the voltages, the load
-//! and u_dc that were held in that step. A new voltage shows with the next step. i_dc is defined without u_dc: a link of
-//! 0 V still sees the current of the legs that are connected to it.
+//! A voltage that is held while the rotor turns makes the power rise or fall within the step, so a value at an instant is no
+//! measure of the power: the outputs are means over the plant's last step, integrated beside the state by the same method,
+//! and `energy.in`, `energy.mech` and `energy.loss` are the sums of power and time. Before the first step the powers are those
+//! of the start. i_dc is defined without u_dc as well: a link of 0 V still sees the current of the legs that are connected to
+//! it; there it is the value at the end of the step.
+//!
+//! Two things move energy at an instant and count in the step in which they do: an imposed angle that jumps does the work of the
+//! magnetic field on the shaft, and what is left of the current when the diodes block is lost.
 //!
 //! Definitions; the balance is derived from the voltage equation of [`machine`](crate::plant::machine), and tested.
 
 use crate::frame::Phases;
 use crate::plant::legs::Legs;
 use crate::plant::model::PlantInputs;
-use crate::plant::tables::PlantParameters;
-use fmu_core::unit::{AMPERE, NEWTON_METRE, WATT};
+use fmu_core::unit::{AMPERE, JOULE, WATT};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// The powers at an instant; motor sign, from the DC link to the load.
+/// Powers; motor sign, from the DC link to the load.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Powers {
     /// Current that the inverter draws from the DC link in A.
@@ -36,44 +40,111 @@ pub struct Powers {
     pub p_mech: f64,
     /// Copper loss and friction in W.
     pub p_loss: f64,
-    /// Torque of the shaft on the load in N.m.
-    pub tau_shaft: f64,
 }
 
 impl Powers {
-    /// With the stator currents `i` (A), the electromagnetic torque `tau_e` (N.m) and the mechanical `speed` (rad/s).
+    /// Means over a step of `h` (s) in which `energy` passed; `i` gives the stator currents (A) at its end.
     #[inline]
-    pub fn new(par: &PlantParameters, inputs: &PlantInputs, legs: &Legs, i: Phases, tau_e: f64, speed: f64) -> Self {
-        let PlantParameters { motor, mechanics, .. } = par;
-        let friction = mechanics.friction(speed);
-        let tau_shaft = if mechanics.imposed { tau_e - friction } else { inputs.tau_load };
-        let u = &inputs.u;
-        let full = inputs.u_dc.max(u.span());
-        // Currents sum to zero, so that a common part of the voltages has no power.
-        let apparent = if inputs.enable { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { 0.0 };
-        // -0 A, the product of no current and a negative voltage, is 0 A.
-        let i_dc = if full > 0.0 { apparent / full } else { 0.0 } - legs.feed(i) + 0.0;
-        let copper = motor.R_s * (i.a * i.a + i.b * i.b + i.c * i.c);
-        Self { i_dc, p_in: inputs.u_dc * i_dc, p_mech: tau_shaft * speed, p_loss: copper + friction * speed, tau_shaft }
+    pub fn mean(energy: &Energy, h: f64, inputs: &PlantInputs, legs: &Legs, i: impl FnOnce() -> Phases) -> Self {
+        // -0 W, the product of no current and a negative voltage, is 0 W.
+        let p_in = energy.r#in / h + 0.0;
+        let i_dc = if inputs.u_dc > 0.0 { p_in / inputs.u_dc } else { link_current(inputs, legs, i()) };
+        Self { i_dc, p_in, p_mech: energy.mech / h, p_loss: energy.loss / h }
+    }
+
+    /// The mean of this one and `last`, which is to count for the share `share` (0..1).
+    #[inline]
+    pub fn with(self, last: Self, share: f64) -> Self {
+        let mean = |a: f64, b: f64| a + (b - a) * share;
+        Self {
+            i_dc: mean(self.i_dc, last.i_dc),
+            p_in: mean(self.p_in, last.p_in),
+            p_mech: mean(self.p_mech, last.p_mech),
+            p_loss: mean(self.p_loss, last.p_loss),
+        }
     }
 }
 
-type O = Row<Powers>;
+/// Current (A) that the inverter draws from the DC link at an instant with the stator currents `i` (A).
+fn link_current(inputs: &PlantInputs, legs: &Legs, i: Phases) -> f64 {
+    let u = &inputs.u;
+    let full = inputs.u_dc.max(u.span());
+    // Currents sum to zero, so that a common part of the voltages has no power.
+    let apparent = if inputs.enable { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { 0.0 };
+    if full > 0.0 { apparent / full - legs.feed(i) + 0.0 } else { 0.0 - legs.feed(i) }
+}
+
+/// Energy that passed, in J; motor sign, from the DC link to the load.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Energy {
+    /// From the DC link.
+    pub r#in: f64,
+    /// To the load at the shaft.
+    pub mech: f64,
+    /// Lost: copper and friction.
+    pub loss: f64,
+}
+
+impl Energy {
+    /// Counts what passed in a step.
+    #[inline]
+    pub fn add(&mut self, step: &Self) {
+        self.r#in += step.r#in;
+        self.mech += step.mech;
+        self.loss += step.loss;
+    }
+
+    /// Whether all of them are numbers.
+    pub fn is_finite(&self) -> bool {
+        self.r#in.is_finite() && self.mech.is_finite() && self.loss.is_finite()
+    }
+}
+
+type P = Row<Powers>;
 
 /// The powers' variables.
 pub const POWERS: &Table<Powers> = &Table::new(
     const {
         &[
-            O::output("i_dc", &AMPERE, "Current that the inverter draws from the DC link", |o| &mut o.i_dc),
-            O::output("p_in", &WATT, "Power from the DC link, u_dc i_dc", |o| &mut o.p_in),
-            O::output("p_mech", &WATT, "Power delivered to the load at the shaft, tau_shaft speed", |o| &mut o.p_mech),
-            O::output("p_loss", &WATT, "Copper loss of the stator and friction", |o| &mut o.p_loss),
-            O::output(
-                "tau_shaft",
-                &NEWTON_METRE,
-                "Torque of the shaft on the load: tau_load, or with mechanics.imposed tau_e minus friction",
-                |o| &mut o.tau_shaft,
+            P::output(
+                "i_dc",
+                &AMPERE,
+                "Current that the inverter draws from the DC link, mean over the last step (PmsmDrive: over the last T_s)",
+                |p| &mut p.i_dc,
             ),
+            P::output(
+                "p_in",
+                &WATT,
+                "Power from the DC link, u_dc i_dc, mean over the last step (PmsmDrive: over the last T_s)",
+                |p| &mut p.p_in,
+            ),
+            P::output(
+                "p_mech",
+                &WATT,
+                "Power delivered to the load at the shaft, tau_shaft speed, mean over the last step (PmsmDrive: over the last T_s)",
+                |p| &mut p.p_mech,
+            ),
+            P::output(
+                "p_loss",
+                &WATT,
+                "Copper loss of the stator and friction, mean over the last step (PmsmDrive: over the last T_s)",
+                |p| &mut p.p_loss,
+            ),
+        ]
+    },
+);
+
+type E = Row<Energy>;
+
+/// The energies' variables; their owner gives the prefix `energy.`.
+pub const ENERGY: &Table<Energy> = &Table::new(
+    const {
+        &[
+            E::output("in", &JOULE, "Energy from the DC link since the start, the integral of p_in", |e| &mut e.r#in),
+            E::output("mech", &JOULE, "Energy delivered to the load since the start, the integral of p_mech", |e| {
+                &mut e.mech
+            }),
+            E::output("loss", &JOULE, "Energy lost since the start, the integral of p_loss", |e| &mut e.loss),
         ]
     },
 );

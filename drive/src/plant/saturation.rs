@@ -42,6 +42,22 @@ impl Saturation {
         let (x, q) = (psi.d() - motor.psi_M, psi.q());
         Dq::new((self.c_2 + self.c_3 * x) * x * x + 0.5 * self.c_x * q * q, self.c_x * x * q)
     }
+
+    /// The least incremental inductance (H) of the machine at the flux linkage `psi` (Wb) over all directions:
+    /// 1 over the greatest eigenvalue of d i / d psi, which is symmetric.
+    pub fn least_inductance(&self, motor: &Motor, psi: Dq) -> f64 {
+        let (x, q) = (psi.d() - motor.psi_M, psi.q());
+        let by_d = 1.0 / motor.L_d + (2.0 * self.c_2 + 3.0 * self.c_3 * x) * x;
+        let (by_q, cross) = (1.0 / motor.L_q + self.c_x * x, self.c_x * q);
+        1.0 / (0.5 * (by_d + by_q) + (0.5 * (by_d - by_q)).hypot(cross))
+    }
+
+    /// The energy (J) beyond the linear machine's at the flux linkage `psi` (Wb): 1.5 of the integral of i d psi.
+    #[inline]
+    pub fn energy(&self, motor: &Motor, psi: Dq) -> f64 {
+        let (x, q) = (psi.d() - motor.psi_M, psi.q());
+        1.5 * ((self.c_2 / 3.0 + 0.25 * self.c_3 * x) * x * x * x + 0.5 * self.c_x * x * q * q)
+    }
 }
 
 type P = Row<Saturation>;
@@ -66,9 +82,19 @@ mod tests {
     fn is_reciprocal_and_tells_north_from_south() {
         let (motor, s) = (Motor::default(), Saturation { c_2: 40.0, c_3: 40.0, c_x: 7.0 });
         let (psi, h) = (Dq::new(0.21, -0.08), 1e-6);
-        let by = |v: Dq| (s.current(&motor, psi + v) - s.current(&motor, psi - v)) * (0.5 / h);
+        let linear = |v: Dq| Dq::new(v.d() / motor.L_d, v.q() / motor.L_q);
+        let by = |v: Dq| (s.current(&motor, psi + v) - s.current(&motor, psi - v) + linear(v) * 2.0) * (0.5 / h);
         let (by_d, by_q) = (by(Dq::new(h, 0.0)), by(Dq::new(0.0, h)));
         assert!((by_d.q() - by_q.d()).abs() < 1e-9, "{by_d:?} {by_q:?}");
+        let work = |v: Dq| (s.energy(&motor, psi + v) - s.energy(&motor, psi - v)) * (0.5 / h) / 1.5;
+        let i = s.current(&motor, psi);
+        assert!((work(Dq::new(h, 0.0)) - i.d()).abs() < 1e-9 && (work(Dq::new(0.0, h)) - i.q()).abs() < 1e-9);
+        let of = |angle: f64| {
+            let direction = Dq::new(angle.cos(), angle.sin());
+            1.0 / by(direction * h).dot(direction)
+        };
+        let least = (0..3600).map(|k| of(f64::from(k).to_radians() / 10.0)).fold(f64::INFINITY, f64::min);
+        assert!((s.least_inductance(&motor, psi) / least - 1.0).abs() < 1e-5, "{least} H");
         let along = |x: f64| s.current(&motor, Dq::new(motor.psi_M + x, 0.0)).d();
         assert!(along(0.1) > 0.0 && along(0.1) > -along(-0.1));
     }

@@ -4,7 +4,7 @@ use crate::motor::{MOTOR, Motor};
 use crate::plant::inverter::{INVERTER, Inverter};
 use crate::plant::mechanics::{MECHANICS, Mechanics};
 use crate::plant::model::PlantOutputs;
-use crate::plant::power::POWERS;
+use crate::plant::power::{ENERGY, POWERS};
 use crate::plant::saturation::{SATURATION, Saturation};
 use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED};
 use fmu_core::{Part, Row, Table};
@@ -55,6 +55,13 @@ pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
             O::output("i_d", &AMPERE, "Stator current along the true magnet axis", |o| &mut o.i_d),
             O::output("i_q", &AMPERE, "Stator current across the true magnet axis", |o| &mut o.i_q),
             O::part("", &Part { table: POWERS, lens: |o| &mut o.powers }),
+            O::output(
+                "tau_shaft",
+                &NEWTON_METRE,
+                "Torque of the shaft on the load: tau_load, or with mechanics.imposed tau_e minus friction",
+                |o| &mut o.tau_shaft,
+            ),
+            O::part("energy.", &Part { table: ENERGY, lens: |o| &mut o.energy }),
         ]
     },
 );

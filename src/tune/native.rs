@@ -1,0 +1,32 @@
+//! The tuned values in the native models: the closed loop as the packed FMUs run it.
+
+use super::rules::{Setting, Tuned, Value};
+use drive::Pair;
+use fmu_core::{Block, Kind, Model, Slot};
+
+impl Tuned {
+    /// Plant and controller with these values, at rest.
+    ///
+    /// # Panics
+    /// A value has no variable: [`check`](super::check) has refused it before.
+    pub fn pair(&self) -> Pair {
+        let mut pair = Pair::default();
+        self.plant.iter().for_each(|setting| set(&mut pair.plant, setting));
+        self.controller.iter().for_each(|setting| set(&mut pair.controller, setting));
+        pair
+    }
+}
+
+fn set<M: Model>(block: &mut Block<M>, setting: &Setting) {
+    let index = (0..M::TABLE.len()).find(|&i| M::TABLE.locate(i).is_some_and(|(name, ..)| name == setting.name));
+    let (meta, slot) = index.and_then(|i| M::TABLE.entry(block, i)).expect("a variable of the model");
+    match (slot, &setting.value, meta.kind) {
+        (Slot::Real(x), Value::Real(value), _) => *x = *value,
+        (Slot::Integer(x), Value::Integer(value), _) => *x = *value,
+        (Slot::Boolean(x), Value::Boolean(value), _) => *x = *value,
+        (Slot::Integer(x), Value::Item(name), Kind::Enumeration(e)) => {
+            *x = e.items.iter().find(|item| item.name == name).expect("an item of the enumeration").value;
+        }
+        _ => unreachable!("{} has another type", setting.name),
+    }
+}
