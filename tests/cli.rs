@@ -151,6 +151,33 @@ fn the_pair_runs_alike_in_both_standards() {
     assert_ne!(run("fmi3", &["--sequential"]), three, "one step less on the way from plant to controller");
 }
 
+/// What no FMU refuses and yet may make a result wrong is told after the run, whose exit status stays 0.
+#[test]
+fn inputs_left_alone_and_long_steps_are_told() {
+    let warned = |more: &[&str]| {
+        let drive = format!("d={}", archive("fmi3", "PmsmDrive").display());
+        let output = fmu(&[&["simulate", &drive, "--stop", "0.01"][..], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{more:?}");
+        text(&output.stderr)
+    };
+    let told = warned(&["--step", "0.002"]);
+    let lines: Vec<_> = told.lines().collect();
+    assert_eq!(lines.len(), 2, "{told}");
+    assert!(lines[0].starts_with("warning: d: inputs left at their start values: "), "{told}");
+    for value in ["speed_ref = 0 rad/s", "tau_load = 0 N.m", "u_dc = 325 V", "--set"] {
+        assert!(lines[0].contains(value), "{value}: {told}");
+    }
+    assert_eq!(
+        lines[1],
+        "warning: d: the step of 0.002 s is longer than the stepSize of its DefaultExperiment, 0.001 s; --step 0.001 shows \
+         whether the results depend on it"
+    );
+    // What is fed or set is no surprise, whatever its value; a step up to stepSize is none either.
+    let told = warned(&["--input", "d.speed_ref=0:0,0.005:10", "--set", "d.tau_load=0", "--step", "0.001"]);
+    assert!(told.lines().count() == 1 && told.contains("u_dc") && !told.contains("speed_ref ="), "{told}");
+    assert!(!told.contains("tau_load"), "{told}");
+}
+
 #[test]
 fn results_are_written() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Calls during a simulation do not allocate. A test crate of its own: it counts for the whole process.
+//! Calls during a simulation do not allocate. A test program of its own: it replaces the allocator.
 #![allow(missing_docs)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -11,11 +11,12 @@ mod counting;
 
 use common::model::*;
 use common::*;
-use counting::calls;
+use counting::{calls, neighbor};
 use std::ptr::null_mut;
 
 #[test]
 fn no_allocation_while_simulating() {
+    let _neighbor = neighbor();
     for version in [2, 3] {
         let fmu = Fmu::started(version);
         let mut state = null_mut();

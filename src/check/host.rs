@@ -205,8 +205,8 @@ fn surroundings(bench: &Bench) -> Result<(), Blocked> {
         it.free()?;
     }
     let mut found = before.differences(&Surroundings::now(&own));
-    // A thread that was told to end may still be on its way.
-    for _ in 0..20 {
+    // A thread that was told to end may still be on its way, for long on a busy machine.
+    for _ in 0..200 {
         if found.is_empty() {
             break;
         }

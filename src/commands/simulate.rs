@@ -1,7 +1,7 @@
 //! `fmu simulate`: co-simulates FMUs.
 
 use crate::Failed;
-use crate::cosimulation::{Point, Recording, Schedule, Settings};
+use crate::cosimulation::{Point, Recording, Schedule, Settings, System};
 use crate::importer::{Fmu, Message};
 use crate::ssp::load::Loaded;
 use crate::ssp::values;
@@ -10,7 +10,7 @@ use crate::{pack, plot};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use model_description::Experiment;
+use model_description::{Experiment, ModelVariable};
 use std::io::{self, BufWriter, IsTerminal};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -108,7 +108,37 @@ pub fn run(args: &Simulate) -> Result<()> {
     if args.logging {
         show(&system.take_messages());
     }
-    write(&outcome?, args)
+    let written = write(&outcome?, args);
+    warnings(&system, &settings).iter().for_each(|text| eprintln!("warning: {text}"));
+    written
+}
+
+/// What may make a result wrong that no FMU refuses: inputs that keep their start values, a step that is too long.
+fn warnings(system: &System, settings: &Settings) -> Vec<String> {
+    let mut found = Vec::new();
+    for (index, instance) in system.instances().iter().enumerate() {
+        let name = instance.name();
+        let value = |v: &ModelVariable| {
+            let unit = v.unit.as_ref().map(|unit| format!(" {unit}")).unwrap_or_default();
+            format!("{} = {}{unit}", v.name, v.start.as_deref().unwrap_or("(no start value)"))
+        };
+        let inputs: Vec<_> = system.untouched(index).into_iter().map(value).collect();
+        if !inputs.is_empty() {
+            found.push(format!(
+                "{name}: inputs left at their start values: {}; connect them, feed them with --input, or set them with --set",
+                inputs.join(", ")
+            ));
+        }
+        let step = instance.description().default_experiment.step;
+        if let Some(longest) = step.filter(|longest| settings.step > longest * (1.0 + 1e-9)) {
+            found.push(format!(
+                "{name}: the step of {} s is longer than the stepSize of its DefaultExperiment, {longest} s; --step {longest} \
+                 shows whether the results depend on it",
+                settings.step
+            ));
+        }
+    }
+    found
 }
 
 /// The FMUs, or those of an SSP file.

@@ -44,6 +44,8 @@ pub struct System {
     /// Of each instance; what is wrong with them only matters to who asks for them.
     terminals: Vec<Result<Option<TerminalsAndIcons>, Error>>,
     wiring: Wiring,
+    /// Variables that were set from outside.
+    set: Vec<Port>,
     records: Vec<Port>,
     /// Names of the recorded columns.
     columns: Vec<String>,
@@ -88,7 +90,9 @@ impl System {
     /// There is no such variable, the text is no value of its type, or the FMU refuses.
     pub fn set(&mut self, port: &str, text: &str) -> Result<(), Error> {
         let port = self.port(port)?;
-        self.instances[port.instance].set_text(&port.name, text)
+        self.instances[port.instance].set_text(&port.name, text)?;
+        self.set.push(port);
+        Ok(())
     }
 
     /// Connects an output to an input, both written `instance.variable`.
@@ -174,6 +178,17 @@ impl System {
     pub fn is_fed(&self, port: &str) -> Result<bool, Error> {
         let port = self.port(port)?;
         Ok(self.wiring.feeds(port.instance, &port.name))
+    }
+
+    /// The inputs of an instance that nothing feeds and nobody has set: they keep their start values.
+    pub fn untouched(&self, instance: usize) -> Vec<&ModelVariable> {
+        let touched = |name: &str| {
+            self.wiring.feeds(instance, name) || self.set.iter().any(|p| p.instance == instance && p.name == name)
+        };
+        let is_free = |v: &&ModelVariable| {
+            v.causality == Causality::Input && v.base != BaseType::Clock && !touched(&v.name)
+        };
+        self.instances[instance].description().variables.iter().filter(is_free).collect()
     }
 
     /// Records all outputs of all instances.

@@ -2,7 +2,7 @@
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 use crate::zip::{Entry, write};
-use crate::{check, told, violated};
+use crate::{check, check_within, told, violated};
 use fmu::check::Verdict;
 use std::path::Path;
 use std::process::Command;
@@ -166,7 +166,8 @@ fn each(version: u8, faults: &[(&str, &[&str])]) {
                 loop {
                     let Some((fault, ids)) = next.lock().unwrap().next() else { return };
                     let binary = compile(dir.path(), version, fault, &[]).unwrap();
-                    let report = check(&pack(dir.path(), version, fault, &binary), &[]);
+                    let seconds = if *fault == "HANG" { 4 } else { 120 };
+                    let report = check_within(&pack(dir.path(), version, fault, &binary), &[], seconds);
                     if violated(&report) != *ids {
                         wrong.lock().unwrap().push(format!("{fault}: {}", told(&report)));
                     }

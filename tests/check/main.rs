@@ -16,11 +16,16 @@ use fmu::check::{Options, Verdict, report::Report};
 use std::path::Path;
 use std::time::Duration;
 
-/// All findings about a file.
+/// All findings about a file. Time decides nothing here, however busy the machine is.
 pub fn check(path: &Path, only: &[&str]) -> Report {
+    check_within(path, only, 120)
+}
+
+/// The same with the seconds that a probe may take: few for an FMU that hangs.
+pub fn check_within(path: &Path, only: &[&str], seconds: u64) -> Report {
     let options = Options {
         only: only.iter().map(ToString::to_string).collect(),
-        patience: Some(Duration::from_secs(4)),
+        patience: Some(Duration::from_secs(seconds)),
         program: Some(env!("CARGO_BIN_EXE_fmu").into()),
     };
     fmu::check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))

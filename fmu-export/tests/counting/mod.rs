@@ -1,21 +1,32 @@
-//! An allocator that counts its calls, in the whole process.
+//! An allocator that counts the calls of each thread: what the test runner's own thread does is not counted.
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an allocator that counts and passes on")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::hint::black_box;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 struct Counting;
 
-static CALLS: AtomicU64 = AtomicU64::new(0);
+thread_local! {
+    /// Neither this start value nor dropping a number allocates.
+    static CALLS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// Counts one call; a thread that ends may have no counter anymore.
+fn count() {
+    let _ = CALLS.try_with(|calls| calls.set(calls.get() + 1));
+}
 
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        CALLS.fetch_add(1, Relaxed);
+        count();
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        CALLS.fetch_add(1, Relaxed);
+        count();
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -23,7 +34,23 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// How often memory was asked for or given back.
+/// How often this thread asked for memory or gave some back.
 pub(crate) fn calls() -> u64 {
-    CALLS.load(Relaxed)
+    CALLS.get()
+}
+
+/// Another thread that allocates until this is dropped, as the test runner's thread may at any time.
+#[must_use]
+pub(crate) fn neighbor() -> Arc<AtomicU64> {
+    let done = Arc::new(AtomicU64::new(0));
+    let seen = Arc::downgrade(&done);
+    std::thread::spawn(move || {
+        while let Some(done) = seen.upgrade() {
+            drop(black_box(Box::new(done.fetch_add(1, Relaxed))));
+        }
+    });
+    while done.load(Relaxed) < 2 {
+        std::thread::yield_now();
+    }
+    done
 }

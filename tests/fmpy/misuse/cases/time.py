@@ -30,9 +30,10 @@ def huge_steps(fmu):
     trace = alone(fmu, 10)
     for h in (1e9, 1e15, 1e300, 1.7e308):
         it = fmu.instance().begin()
-        began = clock.monotonic()
+        began = clock.thread_time()
         status = it.step(h)
-        assert clock.monotonic() - began < 1, f"a step of {h} s took {clock.monotonic() - began} s"
+        took = clock.thread_time() - began
+        assert took < 1, f"a step of {h} s took {took} s of this thread"
         refused(it, status)
         recovers(it, trace)
         it.free()
