@@ -1,11 +1,11 @@
-//! The packed pair in importers other than FMPy: Ecos, libcosim, an fmucontainer, and on demand fmi-sim and rust-fmi.
-//! Each runs a start-up and a load step, and is compared with the native run of the same exchange order.
+//! The packed FMUs in importers other than FMPy: Ecos, libcosim, an fmucontainer, PathSim, and on demand jaxonomy, fmi-sim and
+//! rust-fmi. Each runs a start-up and a load step, and is compared with the native run of the same exchange order.
 #![allow(missing_docs)]
 
 mod common;
 
 use common::importers::{self, DRIVE_STEP, Experiment};
-use common::python::{environment, pytest, run, scratch};
+use common::python::{environment, pytest, pytest_with, run, scratch};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, fs, process};
@@ -18,10 +18,18 @@ fn references() -> PathBuf {
 }
 
 #[test]
-fn ecos_libcosim_and_fmucontainer() {
+fn ecos_libcosim_fmucontainer_and_pathsim() {
     let file = references();
-    let files = ["test_ecos.py", "test_libcosim.py", "test_fmucontainer.py"];
+    let files = ["test_ecos.py", "test_libcosim.py", "test_fmucontainer.py", "test_pathsim.py"];
     pytest("importers", "importers", &files, &[("FMU_REFERENCE", &file)]);
+}
+
+/// jaxonomy runs the whole drive.
+#[test]
+#[ignore = "needs PyPI, and installs 1.4 GB with JAX: a minute or two"]
+fn jaxonomy() {
+    let file = references();
+    pytest_with("jaxonomy.txt", "importers", "jaxonomy", &["test_jaxonomy.py"], &[("FMU_REFERENCE", &file)]);
 }
 
 /// A command of Cargo that builds bindings to C headers: libclang comes from PyPI, the headers of the compiler from gcc.

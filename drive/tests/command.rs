@@ -1,5 +1,5 @@
-//! The command leads the angle by what the rotor turns until the middle of the interval in which it acts: 1.5 samples with
-//! one sample of delay, half a sample without (Rasmussen 2006, Fig. 2, sampled). In the closed loop the integrators hide a
+//! The command leads the angle by what the rotor turns until the middle of the interval in which it acts: half a
+//! sample and the delay (Rasmussen 2006, Fig. 2, sampled). In the closed loop the integrators hide a
 //! wrong lead, so the first command is looked at.
 #![allow(missing_docs)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
@@ -12,7 +12,7 @@ use std::f64::consts::FRAC_PI_2;
 #[test]
 fn the_first_command_is_turned_to_where_it_acts() {
     let (T_s, theta, speed) = (1e-4, 0.7, 120.0);
-    for (delay, lead) in [(1, 1.5), (0, 0.5)] {
+    for (delay, lead) in [(1, 1.5), (0, 0.5), (2, 2.5)] {
         for sign in [1.0, -1.0] {
             let mut controller = Block::<SensorlessController>::default();
             let par = &mut controller.model.parameters;

@@ -96,7 +96,9 @@ const EXPECTED: [Expected; 12] = [
 fn variables_come_back() {
     for version in VERSIONS {
         let (md, sample) = (sample_read(version), sample());
-        let time = &md.variables[0];
+        // OMSimulator counts value references of FMI 3.0 from 1: time, which is 0, stands behind all others there.
+        let place = if version == FmiVersion::V2 { 0 } else { md.variables.len() - 1 };
+        let time = &md.variables[place];
         assert_eq!((time.name.as_str(), time.value_reference, time.unit.as_deref()), ("time", 0, Some("s")), "V03");
         assert_eq!((time.causality, time.variability), (Causality::Independent, Variability::Continuous), "V03");
         assert_eq!((&time.start, time.initial), (&None, None), "V03");

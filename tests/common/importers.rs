@@ -49,6 +49,8 @@ enum Order {
     /// The plant is stepped first, and the controller gets the currents at the end of this very step: the command of the
     /// sample acts in the next one already, `timing.delay` = 0.
     PlantFirst,
+    /// The controller is stepped first, and the plant gets its command in this very step: `timing.delay` = 0.
+    ControllerFirst,
 }
 
 fn step(pair: &mut Pair, order: Order) -> Result<(), Fault> {
@@ -56,10 +58,16 @@ fn step(pair: &mut Pair, order: Order) -> Result<(), Fault> {
         return pair.step(T_S);
     }
     let step = Step { start: pair.now, h: T_S };
+    if order == Order::ControllerFirst {
+        pair.controller.model.inputs.i = pair.plant.out.i;
+        pair.controller.step(&step)?;
+    }
     pair.plant.model.inputs.u = pair.controller.out.u;
     pair.plant.step(&step)?;
-    pair.controller.model.inputs.i = pair.plant.out.i;
-    pair.controller.step(&step)?;
+    if order == Order::PlantFirst {
+        pair.controller.model.inputs.i = pair.plant.out.i;
+        pair.controller.step(&step)?;
+    }
     pair.now = step.end();
     Ok(())
 }
@@ -84,13 +92,14 @@ fn trace(experiment: &Experiment, order: Order) -> Value {
     json!({"delay": pair.controller.model.parameters.delay, "speed": speed, "i_q": i_q, "theta_est": theta_est, "i_q_ref": i_q_ref})
 }
 
-/// All experiments as JSON, each in both orders.
+/// All experiments as JSON, each in every order, and with the whole drive.
 pub fn references() -> Value {
     let one = |e: &Experiment| {
         json!({
             "name": e.name, "theta_e": e.theta_e, "speed_ref": e.speed_ref, "load": e.load, "every": EVERY,
             "steps": times(T_S, e.duration).count(),
             "jacobi": trace(e, Order::Jacobi), "plant first": trace(e, Order::PlantFirst),
+            "controller first": trace(e, Order::ControllerFirst), "drive": drive_speed(e, 0.0),
         })
     };
     experiments().iter().map(one).collect()

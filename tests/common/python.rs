@@ -11,8 +11,13 @@ use std::{env, fs, io, process};
 
 /// Runs `files` of the folder tests/`folder`/ with pytest on freshly packed archives, with variables of the environment.
 pub fn pytest(folder: &str, name: &str, files: &[&str], variables: &[(&str, &Path)]) {
+    pytest_with("requirements.txt", folder, name, files, variables);
+}
+
+/// As [`pytest`], with the folder's file of `requirements`.
+pub fn pytest_with(requirements: &str, folder: &str, name: &str, files: &[&str], variables: &[(&str, &Path)]) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(folder);
-    let python = environment(&folder.join("requirements.txt"));
+    let python = environment(&folder.join(requirements));
     let archives = super::archives();
     let temporary = scratch().join(format!("pytest-{name}-{}", process::id()));
     let output = Command::new(&python)

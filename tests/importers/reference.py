@@ -5,7 +5,8 @@ import os
 from bisect import bisect_right
 from pathlib import Path
 
-T_S = 1e-4  # s: communication step of every importer here
+T_S = 1e-4  # s: communication step of the pair
+DRIVE_STEP = 1e-3  # s: communication step of the whole drive
 PHASES = "abc"
 LINKS = [("plant", f"i_{p}", "controller", f"i_{p}") for p in PHASES] + [("controller", f"u_{p}", "plant", f"u_{p}") for p in PHASES]
 RECORDED = [("plant", "speed"), ("plant", "i_q"), ("controller", "theta_est"), ("controller", "i_q_ref")]
@@ -28,6 +29,10 @@ class Experiment:
         """Load torque in N.m during step k."""
         return at(self.entry["load"], k * T_S)
 
+    def inputs(self, t):
+        """Speed reference in rad/s and load torque in N.m at t in s."""
+        return at(self.entry["speed_ref"], t), at(self.entry["load"], t)
+
     def changes(self, k):
         """Inputs that change at the beginning of step k: instance, variable, value."""
         for instance, variable, value in (("controller", "speed_ref", self.speed_ref), ("plant", "tau_load", self.load)):
@@ -46,6 +51,15 @@ class Experiment:
             for (_, name), value, expected in zip(RECORDED, row, (column[k] for column in native)):
                 assert abs(value - expected) <= rounding, f"{name} at {k * self.every * T_S:.3f} s: {value}, native {expected}"
         speed = [row[0] for row in rows]
+        assert max(map(abs, speed)) > 10.0, "the rotor moved"
+
+
+    def check_drive(self, speed, rounding):
+        """The drive's speed at every communication point is the native one, within the rounding (rad/s)."""
+        native = self.entry["drive"]
+        assert len(speed) == len(native)
+        off = [abs(a - b) for a, b in zip(speed, native)]
+        assert max(off) <= rounding, f"{max(off)} rad/s at {off.index(max(off)) * DRIVE_STEP:.3f} s"
         assert max(map(abs, speed)) > 10.0, "the rotor moved"
 
 

@@ -92,8 +92,12 @@ impl SensorlessController {
         if first {
             in_use.take_up(par);
         }
-        // The command that acted since the last sample: with a delay of one it is not the newest.
-        let acted = state.commands[usize::from(par.delay != 0)];
+        // The command that acted since the last sample: the newest one without a delay.
+        let acted = match (par.delay, state.commands) {
+            (0, [newest, ..]) => newest,
+            (1, [_, older, _]) => older,
+            (_, [.., oldest]) => oldest,
+        };
         let sample = Sample {
             k: state.k,
             i,
@@ -149,7 +153,8 @@ impl SensorlessController {
         let cut = acting.from_stator(command - injected) - wanted;
         state.current.integrate(&gains.current, i_ref - i_hat, cut, T_s);
         let share = if whole.magnitude() > 0.0 { command.magnitude() / whole.magnitude() } else { 1.0 };
-        state.commands = [Command { u: command, injected: injected * share }, state.commands[0]];
+        let [newest, older, _] = state.commands;
+        state.commands = [Command { u: command, injected: injected * share }, newest, older];
         let compensated = if par.compensation.u_dead > 0.0 {
             let legs = Phases::from_stator(acting.to_stator(i_ref));
             let loss = dead_time_loss(par.compensation.u_dead, par.compensation.i_zero, legs);

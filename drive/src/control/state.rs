@@ -66,8 +66,8 @@ pub(super) struct State {
     pub(super) search: Option<Search>,
     pub(super) speed: SpeedController,
     pub(super) current: CurrentController,
-    /// Commands of the last sample and of the one before it.
-    pub(super) commands: [Command; 2],
+    /// Commands of the last samples, the newest first: the one at `timing.delay` acted since the last sample.
+    pub(super) commands: [Command; 3],
     /// Current of the last sample in A.
     pub(super) i_last: AlphaBeta,
     /// References of the last sample in A.

@@ -74,7 +74,7 @@ const COMPENSATION: &Table<Compensation> = &Table::new(
 pub struct ControllerParameters {
     /// Sample period in s, > 0.
     pub T_s: f64,
-    /// Samples from taking the currents to the voltage acting: 1 (Jacobi exchange) or 0.
+    /// Samples from taking the currents to the voltage acting: 0, 1 (Jacobi exchange) or 2.
     pub delay: i32,
     /// Value of the estimator in [`ESTIMATORS`].
     pub estimator: i32,
@@ -148,11 +148,12 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::integer_parameter(
                 "timing.delay",
                 "Samples from taking the currents to the voltage acting, as the importer exchanges values: 1 (all \
-                 outputs read, then all inputs set) or 0 (the plant gets this step's command in this step)",
+                 outputs read, then all inputs set), 0 (one FMU gets what the other has computed in this step) or 2 \
+                 (voltages or currents take a step more)",
                 |p| &mut p.delay,
             )
             .at_least(0.0)
-            .at_most(1.0),
+            .at_most(2.0),
             P::enumeration_parameter("estimator", &ESTIMATORS, "Estimator of rotor angle and speed", |p| {
                 &mut p.estimator
             }),

@@ -49,8 +49,8 @@ pub struct Sample {
     /// Stator current measured at sample k - 1, in A; at the first sample that of sample 0.
     pub i_last: AlphaBeta,
     /// Stator voltage command that acted in [k - 1, k), in V: limited, injection included, without dead-time
-    /// compensation. Held in stator axes. With a delay of one it is the command of sample k - 2, and so is the injection
-    /// in it: a carrier is told from `u_injected`, never from the sign that was asked for last.
+    /// compensation. Held in stator axes. It is the command of sample k - 1 - delay, and so is the injection in it: a
+    /// carrier is told from `u_injected`, never from the sign that was asked for last.
     pub u: AlphaBeta,
     /// The injected part of `u`, in V, reduced as `u` was where the limit cut it.
     pub u_injected: AlphaBeta,

@@ -121,7 +121,7 @@ mod tests {
     use crate::estimator::testing::{finds_the_rotor, injected, salient};
 
     #[test]
-    fn finds_the_rotor_with_both_delays() {
+    fn finds_the_rotor_with_every_delay() {
         finds_the_rotor::<NearPwmInjection>(&EstimatorParameters::default(), 0.05);
     }
 
@@ -133,7 +133,7 @@ mod tests {
         for degrees in [-28.0_f64, -10.0, 5.0, 28.0] {
             let mut tracker = Tracker::default();
             let theta_tilde = degrees.to_radians();
-            injected::<NearPwmInjection>(&par, &salient(), 0.0, theta_tilde, 1.0, 10, |state| tracker = state.tracker);
+            injected::<NearPwmInjection>(&par, &salient(), 0.0, theta_tilde, 1, 10, |state| tracker = state.tracker);
             let e = tracker.w_frame / (2.0 * par.tracker.bandwidth);
             assert!((e - theta_tilde).to_degrees().abs() < 0.05, "{degrees} deg: {}", e.to_degrees());
         }

@@ -122,7 +122,7 @@ mod tests {
     use crate::estimator::testing::finds_the_rotor;
 
     #[test]
-    fn finds_the_rotor_with_both_demodulations_and_both_delays() {
+    fn finds_the_rotor_with_both_demodulations_and_every_delay() {
         let mut par = EstimatorParameters::default();
         for demodulation in [1, MEASUREMENT_AXES] {
             par.pulsating.demodulation = demodulation;

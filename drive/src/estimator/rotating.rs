@@ -76,7 +76,7 @@ mod tests {
     use crate::estimator::testing::{finds_the_rotor, injected, salient};
 
     #[test]
-    fn finds_the_rotor_with_both_delays() {
+    fn finds_the_rotor_with_every_delay() {
         finds_the_rotor::<RotatingInjection>(&EstimatorParameters::default(), 0.1);
     }
 
@@ -85,7 +85,7 @@ mod tests {
     fn resistance_would_turn_the_angle() {
         let par = EstimatorParameters::default();
         let motor = crate::motor::Motor { R_s: 7.2, ..salient() };
-        let rest = |plant| injected::<RotatingInjection>(&par, plant, 0.0, 0.1, 1.0, 4000, |_| ());
+        let rest = |plant| injected::<RotatingInjection>(&par, plant, 0.0, 0.1, 1, 4000, |_| ());
         let expected = 3.6 * Admittance::of(&salient()).sum / par.carrier.frequency;
         let turned = rest(&motor);
         assert!((turned - expected).abs() < 0.05 * expected.abs(), "{turned} rad, expected {expected} rad");

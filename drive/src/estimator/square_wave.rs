@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn finds_the_rotor_with_both_periods_and_both_delays() {
+    fn finds_the_rotor_with_both_periods_and_every_delay() {
         finds_the_rotor::<SquareWaveInjection>(&with(2), 0.05);
         finds_the_rotor::<SquareWaveInjection>(&with(4), 0.05);
     }
@@ -170,7 +170,7 @@ mod tests {
         for degrees in [-40.0_f64, -10.0, 5.0, 30.0, 80.0] {
             let theta_tilde = degrees.to_radians();
             let mut tracker = Tracker::default();
-            injected::<SquareWaveInjection>(&par, &motor, 0.0, theta_tilde, 1.0, 10, |state| tracker = state.tracker);
+            injected::<SquareWaveInjection>(&par, &motor, 0.0, theta_tilde, 1, 10, |state| tracker = state.tracker);
             let e = tracker.w_frame / (2.0 * par.tracker.bandwidth);
             assert!((e - 0.5 * (2.0 * theta_tilde).sin()).abs() < 1e-6, "{degrees} deg: {e}");
         }

@@ -72,27 +72,29 @@ pub(crate) fn injected<E: Estimating>(
     plant: &Motor,
     w: f64,
     theta_tilde: f64,
-    delay: f64,
+    delay: usize,
     n: u32,
     mut each: impl FnMut(&E),
 ) -> f64 {
     const PARTS: u32 = 20;
     let (hat, T_s) = (salient(), 1e-4);
-    let context = Context { par, motor: &hat, current: &CurrentLoop::default(), J: 15e-3, T_s, delay };
+    let lead = [0.5, 1.5, 2.5][delay];
+    let context = Context { par, motor: &hat, current: &CurrentLoop::default(), J: 15e-3, T_s, delay: lead - 0.5 };
     let rotor = |theta: f64| Axis::<Rotor>::at(theta);
     let (mut theta, mut psi, mut i_last) = (0.3_f64, Dq::ZERO, AlphaBeta::ZERO);
     let first = Sample { k: 0, ..Sample::default() };
     let (mut estimator, mut estimate) = E::start(&context, &first, theta - theta_tilde, w);
-    let mut pending = AlphaBeta::ZERO;
+    // What was asked for at the last samples, the newest first.
+    let mut asked = [AlphaBeta::ZERO; 3];
     for k in 1..=n {
-        let acting = Axis::<Estimated>::at(estimate.theta + (delay + 0.5) * T_s * estimate.w);
-        let asked = match estimate.injection {
+        let acting = Axis::<Estimated>::at(estimate.theta + lead * T_s * estimate.w);
+        let newest = match estimate.injection {
             Injection::None => AlphaBeta::ZERO,
             Injection::Stator(u) => u,
             Injection::Estimated(u) => acting.to_stator(u),
         };
-        let u = if delay > 0.5 { pending } else { asked };
-        pending = asked;
+        asked = [newest, asked[0], asked[1]];
+        let u = asked[delay];
         // The flux linkage of the injection alone, in stator axes: d psi/dt = u - R i, by Heun's method.
         let h = T_s / f64::from(PARTS);
         let current = |theta: f64, psi: AlphaBeta| {
@@ -116,10 +118,10 @@ pub(crate) fn injected<E: Estimating>(
     wrap(theta - estimate.theta)
 }
 
-/// From 40 degrees on either side, at standstill and turning, with both delays, the estimate must come to the rotor within
+/// From 40 degrees on either side, at standstill and turning, with every delay, the estimate must come to the rotor within
 /// `tolerance` (deg), and from 130 degrees to its other end.
 pub(crate) fn finds_the_rotor<E: Estimating>(par: &EstimatorParameters, tolerance: f64) {
-    for delay in [0.0, 1.0] {
+    for delay in [0, 1, 2] {
         for w in [0.0, 47.0, -47.0] {
             for (from, to) in [(40.0_f64, 0.0), (-40.0, 0.0), (130.0, 180.0)] {
                 let error = injected::<E>(par, &salient(), w, from.to_radians(), delay, 3000, |_| ()).to_degrees();

@@ -1,4 +1,6 @@
-//! `ModelVariables`: time, then the variables in the order of their value references.
+//! `ModelVariables`: the variables in the order of their value references, and time: first in FMI 2.0, last in FMI 3.0.
+//! OMSimulator takes value references of FMI 3.0 for places in the list, counted from 1 (ComponentFMU3CS.cpp,
+//! `initializeDependencyGraph_outputs`): with time, whose value reference is 0, at the end they are.
 //!
 //! FMI 2.0.5, 2.2.7; FMI 3.0.2, 2.4.7. Unit and display unit stand on the variable as well as in its type definition:
 //! both standards allow it, and importers that do not look type definitions up find them there.
@@ -17,7 +19,11 @@ pub(super) fn variables(description: &Description, version: FmiVersion) -> Eleme
         FmiVersion::V2 => scalars(v),
         FmiVersion::V3 => vec![variable(v)],
     });
-    Element::new("ModelVariables").children([time(version)]).children(variables)
+    let all = Element::new("ModelVariables");
+    match version {
+        FmiVersion::V2 => all.children([time(version)]).children(variables),
+        FmiVersion::V3 => all.children(variables).children([time(version)]),
+    }
 }
 
 /// The independent variable: no start value, no `initial`.
