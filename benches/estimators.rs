@@ -4,11 +4,11 @@
 #![allow(missing_docs, non_snake_case)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use drive::bench;
 use drive::estimator::{Context, Estimator, Injection, Kind, Sample};
 use drive::frame::{AlphaBeta, Axis, Dq, DqHat, Rotor};
 use drive::plant::machine::{self, flux};
 use drive::plant::saturation::Saturation;
+use drive_study::runner;
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
@@ -25,7 +25,7 @@ fn context(par: &drive::control::tables::ControllerParameters) -> Context<'_> {
 
 /// Samples of a machine that turns steadily at its rated current, its estimator's injection one sample late.
 fn record(kind: Kind, context: &Context) -> Vec<Sample> {
-    let (motor, i) = (bench::machine(), Dq::new(-0.84, 5.59));
+    let (motor, i) = (runner::machine(), Dq::new(-0.84, 5.59));
     let at = |theta: f64, v: Dq| -> AlphaBeta { Axis::<Rotor>::at(theta).to_stator(v) };
     let current = |theta: f64, injected: AlphaBeta| {
         let axis = Axis::<Rotor>::at(theta);
@@ -65,7 +65,7 @@ fn turned(theta: f64, u: DqHat) -> AlphaBeta {
 
 fn update(c: &mut Criterion) {
     for &kind in Kind::ALL {
-        let pair = bench::drive(kind);
+        let pair = runner::drive(kind);
         let context = context(&pair.controller.model.parameters);
         let samples = record(kind, &context);
         let (mut estimator, _) = Estimator::start(kind, &context, &samples[N - 1], 0.0, W);

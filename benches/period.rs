@@ -6,8 +6,8 @@ mod common;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use drive::Pair;
-use fmu::importer::{Fmu, Instance};
-use fmu::reproduce::scenario::RPM;
+use drive_study::reproduce::scenario::RPM;
+use fmu_import::{Fmu, Instance};
 
 const T_S: f64 = 1e-4;
 

@@ -1,10 +1,10 @@
 //! Compiling the libraries of a workspace, for this machine or another.
 
-use crate::elf::FLOOR;
-use crate::platform::Platform;
 use crate::target::{BUILD_STD, Linker, Target, cargo, rustc};
 use crate::workspace::Workspace;
 use anyhow::{Context, Result};
+use fmu_import::elf::FLOOR;
+use fmu_import::platform::Platform;
 use serde::Deserialize;
 use std::env;
 use std::ffi::{OsStr, OsString};

@@ -1,8 +1,10 @@
 //! The command `fmu`.
 
+#![forbid(unsafe_code)]
+
 use clap::{Parser, Subcommand};
-use fmu::check::probe;
-use fmu::commands::{build, check, compare, merge, reproduce, simulate, ssp, tune};
+use fmu::commands::{build, compare, merge, reproduce, simulate, ssp, tune};
+use fmu_check::{command as check, probe};
 use std::process::ExitCode;
 
 /// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.

@@ -2,9 +2,9 @@
 
 use crate::documentation;
 use crate::licences::Licences;
-use crate::platform::Platform;
 use anyhow::{Context, Result};
 use fmu_core::Description;
+use fmu_import::platform::Platform;
 use model_description::{FmiVersion, Generation, date_from_epoch};
 use std::collections::BTreeMap;
 use std::fs;

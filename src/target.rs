@@ -1,7 +1,7 @@
 //! The Rust targets that FMUs are built for, and whether what a build for one needs is on this machine.
 
-use crate::platform::Platform;
 use anyhow::{Context, Result, anyhow, bail};
+use fmu_import::platform::Platform;
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

@@ -6,8 +6,8 @@
 mod counting;
 
 use counting::{calls, neighbor};
-use drive::bench::{self, RATED_SPEED};
 use drive::estimator::Kind;
+use drive_study::runner::{self, RATED_SPEED};
 use fmu_core::{Block, Model};
 use fmu_export::instance::Instance;
 use fmu_export::lifecycle::Standard;
@@ -39,7 +39,7 @@ impl Sink for Silent {
 fn a_step_does_not_allocate() {
     let _neighbor = neighbor();
     for &kind in Kind::ALL {
-        let mut pair = bench::turning(bench::drive(kind), 0.1);
+        let mut pair = runner::turning(runner::drive(kind), 0.1);
         pair.start().unwrap();
         pair.set_inputs(0.1 * RATED_SPEED, 2.0, 540.0);
         let before = calls();

@@ -1,9 +1,9 @@
 //! The grid of estimators and scenarios: its reduced form against the golden copy, its figures, its command line.
 #![allow(missing_docs)]
 
-use fmu::compare::scenario::Effort;
-use fmu::compare::subject::Entry;
-use fmu::compare::{self, Cell, Selection, table};
+use drive_study::compare::scenario::Effort;
+use drive_study::compare::subject::Entry;
+use drive_study::compare::{self, Cell, Selection, table};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};

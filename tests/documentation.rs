@@ -5,11 +5,11 @@ mod common;
 
 use common::Native;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController, documentation as fragments};
-use fmu::documentation;
-use fmu::reproduce::plots;
-use fmu::reproduce::scenario::{
+use drive_study::reproduce::plots;
+use drive_study::reproduce::scenario::{
     ClosedLoop, LOAD_0, LOAD_1000, START, STEP_20, STEP_500, STEP_1000, STEP_1500, Scenario, Trace,
 };
+use fmu::documentation;
 use fmu_core::{Description, Model};
 use model_description::FmiVersion;
 use std::collections::BTreeSet;

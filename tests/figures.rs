@@ -7,8 +7,8 @@ mod common;
 
 use common::{Native, error, pair, run};
 use drive::Pair;
-use fmu::reproduce::scenario::{ALL, ClosedLoop, RPM, Scenario};
-use fmu::reproduce::{figures, scenario};
+use drive_study::reproduce::scenario::{ALL, ClosedLoop, RPM, Scenario};
+use drive_study::reproduce::{figures, scenario};
 
 /// Communication step: the controller's sample period.
 const T_S: f64 = 1e-4;

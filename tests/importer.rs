@@ -3,7 +3,7 @@
 
 mod common;
 
-use fmu::importer::{Error, Fmu, Instance, Values};
+use fmu_import::{Error, Fmu, Instance, Values};
 
 fn open(standard: &str, name: &str) -> Fmu {
     Fmu::open(common::archives().join(standard).join(name).with_extension("fmu")).unwrap()

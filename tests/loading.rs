@@ -5,7 +5,7 @@
 
 mod common;
 
-use fmu::importer::Fmu;
+use fmu_import::Fmu;
 use std::path::Path;
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};

@@ -4,9 +4,10 @@
 mod common;
 
 use fmu::commands::merge::{self, Merge};
-use fmu::importer::{Fmu, contents};
 use fmu::pack::{Entry, Moment, archive, write};
-use fmu::{check, platform::Platform};
+use fmu_check as check;
+use fmu_import::platform::Platform;
+use fmu_import::{Fmu, contents};
 use model_description::FmiVersion;
 use std::collections::BTreeMap;
 use std::fs;

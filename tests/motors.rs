@@ -2,7 +2,7 @@
 #![allow(missing_docs)]
 
 use drive::{Pair, PmsmDrive};
-use fmu::tune::{self, motor::MotorFile, rules::Tuned};
+use drive_study::tune::{self, motor::MotorFile, rules::Tuned};
 use fmu_core::{Block, Elapsed, Step};
 use std::collections::VecDeque;
 use std::path::Path;

@@ -1,10 +1,10 @@
 //! The example of an FMU of one's own: built as its first lines say, run, and checked.
 #![allow(missing_docs)]
 
-use fmu::check::{self, Level};
 use fmu::commands::build::{self, Build};
-use fmu::cosimulation::{Recording, Schedule, Settings, System};
-use fmu::importer::Fmu;
+use fmu_check::Level;
+use fmu_import::Fmu;
+use fmu_import::cosimulation::{Recording, Schedule, Settings, System};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -66,7 +66,8 @@ fn a_chain_is_consistent_at_the_start() {
 fn it_violates_no_must() {
     let program = Some(PathBuf::from(env!("CARGO_BIN_EXE_fmu")));
     for file in archives() {
-        let report = check::run(file, &check::Options { program: program.clone(), ..Default::default() }).unwrap();
+        let report =
+            fmu_check::run(file, &fmu_check::Options { program: program.clone(), ..Default::default() }).unwrap();
         let must: Vec<_> = report.violated().filter(|f| f.level == Level::Must).collect();
         assert!(must.is_empty(), "{}", report.text(false));
         assert!(report.findings.len() > 100);

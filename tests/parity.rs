@@ -4,9 +4,9 @@
 mod common;
 
 use common::Native;
-use fmu::importer::{Fmu, Values};
-use fmu::reproduce::packed::Packed;
-use fmu::reproduce::scenario::{ALL, ClosedLoop, RPM, Scenario, at};
+use drive_study::reproduce::packed::Packed;
+use drive_study::reproduce::scenario::{ALL, ClosedLoop, RPM, Scenario, at};
+use fmu_import::{Fmu, Values};
 
 fn compare(scenario: &Scenario, h: f64) {
     let native = Native.run(scenario, h).unwrap();

@@ -3,9 +3,9 @@
 //! 1e5 trials; `FMU_BLOBS=1000000 cargo test --release --test stored` for more, `FMU_SEED=n` for others.
 #![allow(missing_docs)]
 
-use drive::bench;
 use drive::estimator::Kind;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController};
+use drive_study::runner;
 use fmu_core::{Block, Model};
 use fmu_export::instance::Instance;
 use fmu_export::lifecycle::{Standard, State};
@@ -264,7 +264,7 @@ fn plant() {
 
 #[test]
 fn controller() {
-    let each = Kind::ALL.iter().flat_map(|&kind| seeds(bench::drive(kind).controller));
+    let each = Kind::ALL.iter().flat_map(|&kind| seeds(runner::drive(kind).controller));
     damage::<SensorlessController>(&each.collect::<Vec<_>>(), trials());
 }
 

@@ -3,8 +3,8 @@
 
 mod common;
 
-use fmu::cosimulation::{Recording, Schedule, Settings, System};
-use fmu::importer::Fmu;
+use fmu_import::Fmu;
+use fmu_import::cosimulation::{Recording, Schedule, Settings, System};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -3,7 +3,9 @@
 
 mod common;
 
-use fmu::tune::{self, motor::MotorFile, rules, ssv};
+use drive_study::tune::{self, motor::MotorFile, rules};
+use fmu::ssv;
+use fmu_import::ssp::ssv::read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -96,7 +98,7 @@ fn values_are_those_of_the_rules() {
         ("start.mode", "CurrentFrequency"),
         ("current.mtpa", "true"),
     ] {
-        let parameter = ssv::read(&text).unwrap().into_iter().find(|p| p.name == name).unwrap();
+        let parameter = read(&text).unwrap().into_iter().find(|p| p.name == name).unwrap();
         let same = parameter.value == value
             || (parameter.value.parse::<f64>().unwrap() - value.parse::<f64>().unwrap()).abs() < 1e-12;
         assert!(same, "{parameter:?}");

@@ -13,7 +13,6 @@
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
 #![allow(non_snake_case)]
 
-pub mod bench;
 pub mod control;
 pub mod documentation;
 pub mod estimator;

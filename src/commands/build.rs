@@ -1,17 +1,17 @@
 //! `fmu build`: compiles models and packs them.
 
 use crate::compile::{Library, compile};
-use crate::elf::{FLOOR, Needs};
 use crate::icons;
-use crate::importer::describe;
 use crate::licences::Licences;
 use crate::pack::{self, Moment};
-use crate::platform::Platform;
 use crate::target::{Target, Tools, ZIG};
 use crate::workspace::{Package, Workspace};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use fmu_core::Description;
+use fmu_import::describe;
+use fmu_import::elf::{FLOOR, Needs};
+use fmu_import::platform::Platform;
 use model_description::FmiVersion;
 use std::collections::BTreeMap;
 use std::fs;

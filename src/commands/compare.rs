@@ -1,11 +1,11 @@
 //! `fmu compare`: every estimator through every scenario.
 
-use crate::compare::scenario::{self, Effort, SCENARIOS};
-use crate::compare::subject::Entry;
-use crate::compare::{self, Cell, Selection, table};
 use crate::workspace::Workspace;
 use anyhow::{Result, anyhow};
 use clap::Args;
+use drive_study::compare::scenario::{self, Effort, SCENARIOS};
+use drive_study::compare::subject::Entry;
+use drive_study::compare::{self, Cell, Selection, table};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;

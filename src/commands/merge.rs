@@ -1,10 +1,10 @@
 //! `fmu merge`: one archive out of several of the same FMU, each with binaries for other platforms.
 
-use crate::importer::contents;
 use crate::pack::{self, Entry, Moment};
-use crate::platform::Platform;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
+use fmu_import::contents;
+use fmu_import::platform::Platform;
 use model_description::{FmiVersion, ModelDescription};
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,7 +1,6 @@
 //! The commands of the command line.
 
 pub mod build;
-pub mod check;
 pub mod compare;
 pub mod merge;
 pub mod reproduce;

@@ -25,7 +25,7 @@ pub fn run(args: &Reproduce) -> Result<bool> {
     let fmus = target.join("fmu");
     build::run(&Build { out: Some(fmus.clone()), ..Build::default() })?;
     let out = args.out.clone().unwrap_or_else(|| target.join("reproduce"));
-    let (table, holds) = crate::reproduce::run(&fmus, &out)?;
+    let (table, holds) = drive_study::reproduce::run(&fmus, &out)?;
     println!("{table}");
     println!("{}", out.join("report.html").display());
     Ok(holds)

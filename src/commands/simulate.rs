@@ -1,14 +1,14 @@
 //! `fmu simulate`: co-simulates FMUs.
 
 use crate::Failed;
-use crate::cosimulation::{Point, Recording, Schedule, Settings, System};
-use crate::importer::{Fmu, Message};
-use crate::ssp::load::Loaded;
-use crate::ssp::values;
-use crate::tune::ssv;
-use crate::{pack, plot};
+use crate::pack;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
+use drive_study::plot;
+use fmu_import::cosimulation::{Point, Recording, Schedule, Settings, System};
+use fmu_import::ssp::load::Loaded;
+use fmu_import::ssp::{ssv, values};
+use fmu_import::{Fmu, Message};
 use indicatif::{ProgressBar, ProgressStyle};
 use model_description::{Experiment, ModelVariable};
 use std::io::{self, BufWriter, IsTerminal};
@@ -109,7 +109,9 @@ pub fn run(args: &Simulate) -> Result<()> {
         show(&system.take_messages());
     }
     let written = write(&outcome?, args);
-    warnings(&system, &settings).iter().for_each(|text| eprintln!("warning: {text}"));
+    for text in warnings(&system, &settings) {
+        eprintln!("warning: {text}");
+    }
     written
 }
 

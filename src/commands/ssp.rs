@@ -2,10 +2,11 @@
 
 use super::build::{self, Build};
 use crate::pack::{self, Moment};
-use crate::ssp::drive::{self, COMPONENTS, Values};
-use crate::tune::{self, ssv};
+use crate::ssp::{self, COMPONENTS, Values};
+use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
+use drive_study::tune;
 use std::path::PathBuf;
 
 /// Packs plant and controller, connected and with the values of a machine, as one SSP file (SSP 1.0).
@@ -48,7 +49,7 @@ pub fn run(args: &Ssp) -> Result<()> {
     let built =
         build::run(&Build { fmus, fmi: Some(args.fmi.clone()), out: Some(dir.path().into()), ..Build::default() })?;
     let folder = built.first().and_then(|f| f.parent()).context("nothing was built")?;
-    let files = drive::files(folder, &values, moment)?;
+    let files = ssp::files(folder, &values, moment)?;
     pack::write(&args.out, &pack::archive(&files, moment)?)?;
     println!("{}", args.out.display());
     Ok(())

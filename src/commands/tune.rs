@@ -1,11 +1,12 @@
 //! `fmu tune`: parameter values of the FMUs for a machine.
 
-use crate::tune::rules::{Setting, Value};
-use crate::tune::{self};
 use crate::workspace::Workspace;
+use crate::{pack, ssv};
 use anyhow::Result;
 use clap::Args;
-use std::path::PathBuf;
+use drive_study::tune::rules::{Setting, Value};
+use drive_study::tune::{self, rules::Tuned};
+use std::path::{Path, PathBuf};
 
 /// Turns a machine and bandwidths into parameter values of PmsmPlant and SensorlessController.
 ///
@@ -36,7 +37,7 @@ pub struct Tune {
 pub fn run(args: &Tune) -> Result<()> {
     let tuned = tune::tune(&args.motor)?;
     let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("tune")), Ok)?;
-    let files = tune::write(&tuned, &out)?;
+    let files = write(&tuned, &out)?;
     println!("{}\n{}", tuned.name, tuned.source);
     for (model, settings) in [("PmsmPlant", &tuned.plant), ("SensorlessController", &tuned.controller)] {
         println!("\n{model}");
@@ -52,6 +53,16 @@ pub fn run(args: &Tune) -> Result<()> {
         println!("{}", file.display());
     }
     Ok(())
+}
+
+/// Writes `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder; returns their paths.
+fn write(tuned: &Tuned, folder: &Path) -> Result<[PathBuf; 2]> {
+    let write = |model: &str, settings: &[Setting]| {
+        let path = folder.join(format!("{}.{model}.ssv", tuned.name));
+        pack::write(&path, ssv::text(&format!("{} {model}", tuned.name), settings).as_bytes())?;
+        anyhow::Ok(path)
+    };
+    Ok([write("PmsmPlant", &tuned.plant)?, write("SensorlessController", &tuned.controller)?])
 }
 
 fn shown(value: &Value) -> String {

@@ -3,7 +3,7 @@
 
 use crate::zip::{Entry, write};
 use crate::{check, check_within, told, violated};
-use fmu::check::Verdict;
+use fmu_check::Verdict;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Mutex;

@@ -48,7 +48,7 @@ fn pythonfmu() {
     std::fs::write(dir.path().join("counter.py"), COUNTER).unwrap();
     run(tool("pythonfmu").args(["build", "-f", "counter.py"]).current_dir(dir.path()));
     let report = check(&dir.path().join("Counter.fmu"), &[]);
-    let must: Vec<_> = report.violated().filter(|f| f.level == fmu::check::Level::Must).map(|f| f.id).collect();
+    let must: Vec<_> = report.violated().filter(|f| f.level == fmu_check::Level::Must).map(|f| f.id).collect();
     assert_eq!(must, ["S02a"], "{}", told(&report));
 }
 
@@ -63,7 +63,7 @@ fn fmucontainer() {
     let mut container = tool("fmu_manipulation_toolbox.cli.fmucontainer");
     run(container.args(["-container", "pair.csv:0.0001", "-no-auto-link", "-fmu-directory"]).arg(dir.path()));
     let report = check(&dir.path().join("pair.fmu"), &[]);
-    let must: Vec<_> = report.violated().filter(|f| f.level == fmu::check::Level::Must).map(|f| f.id).collect();
+    let must: Vec<_> = report.violated().filter(|f| f.level == fmu_check::Level::Must).map(|f| f.id).collect();
     assert_eq!(must, ["L12"], "{}", told(&report));
     assert!(violated(&report).contains(&"L08n"));
 }

@@ -12,7 +12,7 @@ mod survives;
 mod terminals;
 mod zip;
 
-use fmu::check::{Options, Verdict, report::Report};
+use fmu_check::{Options, Verdict, report::Report};
 use std::path::Path;
 use std::time::Duration;
 
@@ -28,7 +28,7 @@ pub fn check_within(path: &Path, only: &[&str], seconds: u64) -> Report {
         patience: Some(Duration::from_secs(seconds)),
         program: Some(env!("CARGO_BIN_EXE_fmu").into()),
     };
-    fmu::check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))
+    fmu_check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The ids of the violated checks.
@@ -63,7 +63,7 @@ fn the_page_has_the_list() {
     let page = std::fs::read_to_string(&path).unwrap();
     let (before, after) = page.split_once("<!-- list -->\n").unwrap();
     let (_, after) = after.split_once("<!-- end of list -->").unwrap();
-    let expected = format!("{before}<!-- list -->\n{}<!-- end of list -->{after}", fmu::check::report::list());
+    let expected = format!("{before}<!-- list -->\n{}<!-- end of list -->{after}", fmu_check::report::list());
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         std::fs::write(&path, expected).unwrap();
     } else {

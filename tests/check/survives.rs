@@ -47,7 +47,7 @@ fn changed_bytes_are_judged() {
             bytes[at] = u8::try_from(random >> 24).unwrap();
         }
         std::fs::write(&path, bytes).unwrap();
-        if let Ok(report) = fmu::check::run(&path, &fmu::check::Options::default()) {
+        if let Ok(report) = fmu_check::run(&path, &fmu_check::Options::default()) {
             assert!(!report.text(true).is_empty() && !report.html().is_empty() && report.json().is_ok());
         }
     }

@@ -1,9 +1,9 @@
 //! A start and a load step for every estimator, run natively and told to fmpy: parameters, inputs and what must come out.
 
-use drive::bench::{self, RATED_SPEED, RATED_TORQUE};
 use drive::control::start::{CURRENT_FREQUENCY, INJECTION};
 use drive::estimator::Kind;
 use drive::{Pair, math};
+use drive_study::runner::{self, RATED_SPEED, RATED_TORQUE};
 use fmu_core::{Block, Causality, Model, Slot};
 use serde_json::{Map, Value, json};
 
@@ -58,14 +58,14 @@ fn load_step(kind: Kind) -> Experiment {
         pair.controller.model.parameters.speed_est = 100.0;
         (pair, 100.0, 1.0)
     } else {
-        (bench::turning(bench::drive(kind), speed), speed * RATED_SPEED, 0.3 * RATED_TORQUE)
+        (runner::turning(runner::drive(kind), speed), speed * RATED_SPEED, 0.3 * RATED_TORQUE)
     };
     let name = format!("{}: load step", kind.name());
     Experiment { name, pair, speed_ref: vec![(0.0, speed)], load: vec![(0.2, load)], duration: 0.8 }
 }
 
 fn start(kind: Kind) -> Experiment {
-    let mut pair = if kind == Kind::Rasmussen { Pair::default() } else { bench::drive(kind) };
+    let mut pair = if kind == Kind::Rasmussen { Pair::default() } else { runner::drive(kind) };
     pair.plant.model.parameters.initial.theta_e = 2.0;
     let (mode, speed) = match kind as i32 {
         1 => (1, 50.0),
@@ -76,7 +76,7 @@ fn start(kind: Kind) -> Experiment {
     };
     pair.controller.model.parameters.start.mode = mode;
     if mode == INJECTION {
-        pair = bench::with_saturation(pair);
+        pair = runner::with_saturation(pair);
         pair.controller.model.parameters.c_2 = 40.0;
     }
     let name = format!("{}: start", kind.name());

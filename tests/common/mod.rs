@@ -6,7 +6,7 @@ pub mod importers;
 pub mod python;
 
 use drive::Pair;
-use fmu::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
+use drive_study::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
 use fmu_core::{Block, Model, Slot};
 use std::path::{Path, PathBuf};
 

@@ -1,0 +1,167 @@
+//! What is read off a run. Angle errors are theta - theta^ in deg, speeds in pu.
+
+use crate::reproduce::figures::Expected;
+use crate::runner;
+use drive::Pair;
+
+/// A number of a cell. Infinite: never reached, or the rotor was lost.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measure {
+    /// What it is.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What it must be, where there is a figure.
+    pub expected: Option<Expected>,
+}
+
+impl Measure {
+    /// A number that nothing is expected of, yet.
+    pub fn new(name: &'static str, unit: &'static str, value: f64) -> Self {
+        Self { name, unit, value: if value.is_finite() { value } else { f64::INFINITY }, expected: None }
+    }
+}
+
+/// A run over time, thinned to a millisecond.
+#[derive(Clone, Debug, Default)]
+pub struct Trace {
+    /// Time in s.
+    pub t: Vec<f64>,
+    /// Speed reference in pu.
+    pub reference: Vec<f64>,
+    /// True speed in pu.
+    pub speed: Vec<f64>,
+    /// Angle error in deg.
+    pub error: Vec<f64>,
+    /// Stator current in A, alpha and beta, at every sample; of an injected signal only.
+    pub current: Vec<[f64; 2]>,
+    /// Electrical angle in deg, true and estimated, with them.
+    pub angles: Vec<[f64; 2]>,
+}
+
+/// Angle error in deg beyond which the rotor is lost: no torque is left.
+const LOST: f64 = 90.0;
+/// Band in pu within which a speed has settled.
+const BAND: f64 = 0.02;
+
+/// Follows a run against its reference.
+#[derive(Clone, Debug, Default)]
+pub struct Follow {
+    n: f64,
+    squares: f64,
+    last_outside: Option<f64>,
+    last: f64,
+    /// Angle error.
+    pub angle: runner::Statistics,
+    /// Deepest fall of the speed below its reference, along it, in pu.
+    pub dip: f64,
+    trace: Trace,
+}
+
+impl Follow {
+    /// The state of the drive at the time `t` (s), measured; the speed should be `reference` (pu).
+    pub fn add(&mut self, t: f64, reference: f64, pair: &Pair) {
+        let (speed, error) = (runner::speed(pair), runner::angle_error(pair));
+        let off = speed - reference;
+        self.n += 1.0;
+        self.squares += off * off;
+        self.angle.add(error);
+        self.dip = self.dip.max(if reference < 0.0 { off } else { -off });
+        if off.abs() >= BAND {
+            self.last_outside = Some(t);
+        }
+        self.last = t;
+    }
+
+    /// The state at the time `t` (s), for the plot.
+    pub fn trace(&mut self, t: f64, reference: f64, pair: &Pair) {
+        if self.trace.t.last().is_none_or(|last| t - last > 1e-3 - 1e-9) {
+            self.trace.t.push(t);
+            self.trace.reference.push(reference);
+            self.trace.speed.push(runner::speed(pair));
+            self.trace.error.push(runner::angle_error(pair));
+        }
+    }
+
+    /// Whether the rotor was lost, or nothing was measured at all.
+    pub fn lost(&self) -> bool {
+        self.n == 0.0 || self.angle.peak.is_nan() || self.angle.peak > LOST || !self.squares.is_finite()
+    }
+
+    fn or_lost(&self, x: f64) -> f64 {
+        if self.lost() { f64::INFINITY } else { x }
+    }
+
+    /// Root mean square of the speed error.
+    pub fn rms(&self) -> Measure {
+        Measure::new("rms speed error", "pu", self.or_lost((self.squares / self.n).sqrt()))
+    }
+
+    /// Greatest angle error.
+    pub fn peak(&self) -> Measure {
+        Measure::new("peak angle error", "deg", self.or_lost(self.angle.peak))
+    }
+
+    /// Mean angle error, under a name.
+    pub fn mean(&self, name: &'static str) -> Measure {
+        Measure::new(name, "deg", self.or_lost(self.angle.mean()))
+    }
+
+    /// Standard deviation of the angle error.
+    pub fn std(&self) -> Measure {
+        Measure::new("std of the angle error", "deg", self.or_lost(self.angle.std()))
+    }
+
+    /// Time from `from` (s) until the speed stays within 2 % of rated; infinite if it never does.
+    pub fn settled(&self, from: f64) -> Measure {
+        Measure::new("settling time", "s", self.or_lost(self.settled_anyway(from)))
+    }
+
+    /// The same in s for a start, in which the angle may be anything at first.
+    pub fn settled_anyway(&self, from: f64) -> f64 {
+        match self.last_outside {
+            Some(t) if t >= self.last - 1e-9 => f64::INFINITY,
+            Some(t) => (t - from).max(0.0),
+            None => 0.0,
+        }
+    }
+
+    /// Hands out the run over time.
+    pub fn into_trace(self) -> Trace {
+        self.trace
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(speed: f64, error: f64) -> Pair {
+        let mut pair = Pair::default();
+        pair.plant.out.speed = speed * runner::RATED_SPEED;
+        pair.plant.out.theta_e = error.to_radians();
+        pair
+    }
+
+    #[test]
+    fn settles_where_it_last_leaves_the_band() {
+        let mut f = Follow::default();
+        for (t, speed) in [(1.0, 0.5), (1.1, 0.4), (1.2, 0.47), (1.3, 0.49), (1.4, 0.5)] {
+            f.add(t, 0.5, &at(speed, 3.0));
+        }
+        assert!((f.settled(1.0).value - 0.2).abs() < 1e-12 && (f.dip - 0.1).abs() < 1e-12);
+        assert!((f.peak().value - 3.0).abs() < 1e-9 && !f.lost());
+        f.add(1.5, 0.5, &at(0.0, 0.0));
+        assert!(f.settled(1.0).value.is_infinite());
+    }
+
+    #[test]
+    fn a_lost_rotor_has_no_numbers() {
+        let mut f = Follow::default();
+        assert!(f.lost());
+        f.add(0.0, 0.5, &at(0.5, 120.0));
+        assert!(f.lost() && f.rms().value.is_infinite() && f.peak().value.is_infinite());
+    }
+}

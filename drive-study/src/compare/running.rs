@@ -1,0 +1,234 @@
+//! The scenarios of a drive that runs: start, ramp, reversal, load steps, rated load, lowest speed, bandwidth.
+
+use super::Outcome;
+use super::measure::{Follow, Measure};
+use super::scenario::Effort;
+use super::subject::{Class, Subject};
+use crate::runner;
+use drive::estimator::tracker::MECHANICAL_OBSERVER;
+use fmu_core::Fault;
+use std::f64::consts::TAU;
+
+/// Straight line from `a` at the time `from` to `b` at `to`, flat outside.
+fn line(t: f64, from: f64, a: f64, to: f64, b: f64) -> f64 {
+    a + (b - a) * ((t - from) / (to - from)).clamp(0.0, 1.0)
+}
+
+/// Standstill to half the rated speed from angles all around: how many fail, and the worst of those that do not.
+pub(super) fn start(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
+    let (count, every) = if effort == Effort::Full { (24_u32, 15.0) } else { (4, 105.0) };
+    let speed = if subject.class == Class::Injection { 0.1 } else { 0.5 };
+    // A start without a voltage that the dead time bends would be too easy.
+    let starting = subject.starting().with_dead_time(true);
+    let (mut failed, mut peak, mut settling) = (0.0, 0.0_f64, 0.0_f64);
+    for k in 0..count {
+        let load = if k % 2 == 0 { 0.0 } else { 0.3 };
+        let target = if k % 4 < 2 { speed } else { -speed };
+        let angle: f64 = every * f64::from(k);
+        let at = starting.with(|p| p.plant.model.parameters.initial.theta_e = angle.to_radians());
+        let mut follow = Follow::default();
+        let mut after = Follow::default();
+        let survived = at.run(2.5, |t, p| {
+            let reference = if t > 0.6 { target } else { 0.0 };
+            at.set(p, reference, Subject::opposing(p, load));
+            if t > 0.6 {
+                follow.add(t, target, p);
+            }
+            if t > 1.5 {
+                after.add(t, target, p);
+            }
+        })?;
+        let settled = follow.settled_anyway(0.6);
+        if !survived || after.lost() || !settled.is_finite() {
+            failed += 1.0;
+            continue;
+        }
+        (peak, settling) = (peak.max(after.angle.peak), settling.max(settled));
+    }
+    let measures = vec![
+        Measure::new("failed starts", "of all", failed),
+        Measure::new("peak angle error", "deg", peak),
+        Measure::new("settling time", "s", settling),
+    ];
+    Ok(Outcome::Measured(measures, None))
+}
+
+/// From standstill to rated speed, measured from 0.15 pu on.
+pub(super) fn ramp(subject: &Subject, _effort: Effort) -> Result<Outcome, Fault> {
+    if let Some(why) = subject.class.no_speed(1.0) {
+        return Ok(Outcome::NotApplicable(why));
+    }
+    let (subject, mut follow) = (subject.starting(), Follow::default());
+    let survived = subject.run(3.2, |t, p| {
+        let reference = if t < 0.5 { 0.0 } else { line(t, 1.4, 0.15, 2.4, 1.0) };
+        subject.set(p, reference, Subject::opposing(p, 0.3));
+        follow.trace(t, reference, p);
+        if t > 1.4 {
+            follow.add(t, reference, p);
+        }
+    })?;
+    Ok(dynamic(follow, survived, 2.4, false))
+}
+
+/// Through standstill to the other side. The hybrid runs the profile that the review's list has a figure for.
+pub(super) fn reversal(subject: &Subject) -> Result<Outcome, Fault> {
+    if subject.class == Class::Hybrid {
+        return both_ways(subject);
+    }
+    let top = if subject.class == Class::Injection { 0.1 } else { 0.5 };
+    let (turning, mut follow) = (subject.turning(top), Follow::default());
+    let survived = turning.run(2.5, |t, p| {
+        let reference = line(t, 0.7, top, 1.2, -top);
+        turning.set(p, reference, Subject::opposing(p, 0.3));
+        follow.trace(t, reference, p);
+        if t > 0.5 {
+            follow.add(t, reference, p);
+        }
+    })?;
+    Ok(dynamic(follow, survived, 1.2, false))
+}
+
+/// 0 -> 0.95 -> -0.95 -> 0 pu under a constant 0.8 pu of load. The list does not say how steep its ramps were and the peak
+/// follows them: 0.375 s from rest to speed give it.
+fn both_ways(subject: &Subject) -> Result<Outcome, Fault> {
+    let (top, ramp, stay, begin) = (0.95, 0.375, 0.5, 0.8);
+    let (back, home) = (begin + ramp + stay, begin + 3.0 * ramp + 2.0 * stay);
+    let mut follow = Follow::default();
+    let survived = subject.run(home + ramp + 0.5, |t, p| {
+        let up = line(t, begin, 0.0, begin + ramp, top);
+        let reference = up - line(t, back, 0.0, back + 2.0 * ramp, 2.0 * top) + line(t, home, 0.0, home + ramp, top);
+        subject.set(p, reference, line(t, 0.1, 0.0, 0.4, 0.8));
+        follow.trace(t, reference, p);
+        follow.add(t, reference, p);
+    })?;
+    Ok(dynamic(follow, survived, home + ramp, false))
+}
+
+/// A load step at a constant speed.
+pub(super) fn load_step(subject: &Subject, speed: f64, load: f64) -> Result<Outcome, Fault> {
+    let none = if speed == 0.0 { subject.class.no_standstill() } else { None };
+    if let Some(why) = none.or(subject.class.no_speed(speed)) {
+        return Ok(Outcome::NotApplicable(why));
+    }
+    let (turning, mut follow) = (subject.turning(speed), Follow::default());
+    let survived = turning.run(if speed == 0.0 { 4.0 } else { 2.0 }, |t, p| {
+        turning.set(p, speed, if t >= 0.5 - 1e-9 { load } else { 0.0 });
+        if t <= 2.0 {
+            follow.trace(t, speed, p);
+        }
+        if t > 0.5 {
+            follow.add(t, speed, p);
+        }
+    })?;
+    Ok(dynamic(follow, survived, 0.5, true))
+}
+
+fn dynamic(follow: Follow, survived: bool, from: f64, with_dip: bool) -> Outcome {
+    let dip = with_dip.then(|| Measure::new("dip", "pu", if follow.lost() { f64::INFINITY } else { follow.dip }));
+    let mut measures = vec![follow.rms(), follow.peak(), follow.settled(from)];
+    measures.extend(dip);
+    if !survived {
+        for m in &mut measures {
+            m.value = f64::INFINITY;
+        }
+    }
+    Outcome::Measured(measures, Some(follow.into_trace()))
+}
+
+/// Rated load at a constant speed, the last half second of it.
+pub(super) fn rated(subject: &Subject, speed: f64) -> Result<Outcome, Fault> {
+    let none = if speed == 0.0 { subject.class.no_standstill() } else { None };
+    if let Some(why) = none.or(subject.class.no_speed(speed.abs())) {
+        return Ok(Outcome::NotApplicable(why));
+    }
+    let follow = slowed_down(subject, speed)?;
+    Ok(Outcome::Measured(vec![follow.mean("mean angle error"), follow.std(), follow.rms()], None))
+}
+
+/// Takes rated load, comes to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and is measured for 0.5 s. It takes the load at
+/// 0.5 pu, so that what is found is how low it may go and not how low it may start.
+pub(super) fn slowed_down(subject: &Subject, speed: f64) -> Result<Follow, Fault> {
+    let side = if speed < 0.0 { -1.0 } else { 1.0 };
+    // Injection has no voltage for half the speed: it takes the load where it is.
+    let first = if subject.class == Class::Injection { speed } else { side * speed.abs().max(0.5) };
+    let (turning, mut follow) = (subject.turning(first), Follow::default());
+    let arrival = 1.2 + (first - speed).abs() / 0.5;
+    let survived = turning.run(arrival + 2.0, |t, p| {
+        let reference = line(t, 1.2, first, arrival.max(1.2 + 1e-9), speed);
+        turning.set(p, reference, side * line(t, 0.1, 0.0, 0.4, 1.0));
+        if t > arrival + 1.5 {
+            follow.add(t, speed, p);
+        }
+    })?;
+    Ok(if survived { follow } else { Follow::default() })
+}
+
+/// Whether the drive follows speed and rotor: 30 deg and 2 % of rated.
+fn holds(subject: &Subject, speed: f64) -> Result<bool, Fault> {
+    let follow = slowed_down(subject, speed)?;
+    Ok(!follow.lost() && follow.angle.peak < 30.0 && follow.settled(0.0).value == 0.0)
+}
+
+fn lowest_of(subject: &Subject, speeds: impl IntoIterator<Item = f64>) -> Result<Outcome, Fault> {
+    let mut lowest = f64::INFINITY;
+    for speed in speeds {
+        if !holds(subject, speed)? {
+            break;
+        }
+        lowest = speed;
+    }
+    Ok(Outcome::Measured(vec![Measure::new("held down to", "pu", lowest)], None))
+}
+
+/// Lowest speed at which rated load is held, from above.
+pub(super) fn lowest(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
+    let all: &[f64] = if effort == Effort::Full {
+        &[0.2, 0.15, 0.12, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02, 0.01, 0.0]
+    } else {
+        &[0.2, 0.1, 0.05, 0.03, 0.02, 0.0]
+    };
+    let low = if subject.class.no_standstill().is_some() { 1e-9 } else { 0.0 };
+    lowest_of(subject, all.iter().copied().filter(|&speed| speed >= low))
+}
+
+/// The same without the term that the review drops, for those that have it.
+pub(super) fn as_printed(subject: &Subject) -> Result<Outcome, Fault> {
+    if !["DirectEmf", "EmfObserver", "ExtendedEmf", "VoltageFeedback"].contains(&subject.entry.kind.name()) {
+        return Ok(Outcome::NotApplicable("has no frame-speed term to drop"));
+    }
+    let printed = subject.with(|p| p.controller.model.parameters.estimators.emf.frame_term = false);
+    lowest_of(&printed, (10..=30_u32).rev().map(|k| 0.01 * f64::from(k)))
+}
+
+/// Bandwidth (-3 dB) of the speed loop at half the speed, by the true speed.
+pub(super) fn bandwidth(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
+    if effort == Effort::Reduced {
+        return Ok(Outcome::NotApplicable("left out of the reduced grid"));
+    }
+    subject.pair.clone().start()?;
+    let speed = if subject.class == Class::Injection { 0.1 } else { 0.5 };
+    let bandwidth = runner::speed_bandwidth(&subject.pair, speed);
+    Ok(Outcome::Measured(vec![Measure::new("speed bandwidth", "Hz", bandwidth)], None))
+}
+
+/// The same with the speed loop (and the mechanical observer) of the review's faster figure.
+pub(super) fn bandwidth_fast(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
+    // Speed loop and tracker in Hz: the mechanical observer is what makes the fast speed loop possible.
+    let (loop_hz, observer_hz) = match subject.entry.kind.name() {
+        "VoltageModel" | "CurrentModel" | "KalmanFilter" => (26.0, None),
+        "ExtendedEmf" => (60.0, Some(15.0)),
+        "RotatingInjection" => (34.0, Some(25.0)),
+        "PulsatingInjection" => (45.0, Some(25.0)),
+        "SquareWaveInjection" => (36.0, Some(25.0)),
+        "NearPwmInjection" => (30.0, Some(25.0)),
+        _ => return Ok(Outcome::NotApplicable("no faster figure")),
+    };
+    let fast = subject.with(|p| {
+        let par = &mut p.controller.model.parameters;
+        par.speed_loop.bandwidth = TAU * loop_hz;
+        if let Some(hz) = observer_hz {
+            (par.estimators.tracker.kind, par.estimators.tracker.bandwidth) = (MECHANICAL_OBSERVER, TAU * hz);
+        }
+    });
+    bandwidth(&fast, effort)
+}

@@ -1,0 +1,48 @@
+//! What an injected voltage costs, and what it shows: the current of the carrier and the angle found in it.
+
+use super::Outcome;
+use super::measure::{Measure, Trace};
+use super::subject::{Class, Subject};
+use crate::runner;
+use fmu_core::Fault;
+
+const NOTHING: Outcome = Outcome::NotApplicable("injects nothing");
+
+fn injects(subject: &Subject) -> bool {
+    matches!(subject.class, Class::Injection | Class::Hybrid)
+}
+
+/// RMS of the carrier's current (magnitude of its space vector) and its copper loss, 1.5 R i^2.
+pub(super) fn cost(subject: &Subject) -> Result<Outcome, Fault> {
+    if !injects(subject) {
+        return Ok(NOTHING);
+    }
+    subject.pair.clone().start()?;
+    let rms = runner::injected_current(subject.pair.clone());
+    let r_s = subject.pair.plant.model.parameters.motor.R_s;
+    let measures = vec![Measure::new("i_hf rms", "A", rms), Measure::new("copper loss", "W", 1.5 * r_s * rms * rms)];
+    Ok(Outcome::Measured(measures, None))
+}
+
+/// Half a second at 0.05 pu: currents and angles at every sample, which [`super::plots`] draws as Fig. 8 and 11.
+pub(super) fn response(subject: &Subject) -> Result<Outcome, Fault> {
+    if !injects(subject) {
+        return Ok(NOTHING);
+    }
+    let (turning, mut trace, mut error) = (subject.turning(0.05), Trace::default(), runner::Statistics::default());
+    turning.run(0.5, |t, p| {
+        turning.set(p, 0.05, 0.0);
+        if t > 0.2 {
+            error.add(runner::angle_error(p));
+        }
+        let i = p.plant.out.i.to_stator();
+        trace.t.push(t);
+        trace.current.push([i.alpha(), i.beta()]);
+        trace.angles.push([p.plant.out.theta_e.to_degrees(), p.controller.out.theta_est.to_degrees()]);
+    })?;
+    let measures = vec![
+        Measure::new("mean angle error", "deg", error.mean()),
+        Measure::new("std of the angle error", "deg", error.std()),
+    ];
+    Ok(Outcome::Measured(measures, Some(trace)))
+}

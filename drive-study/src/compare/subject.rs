@@ -1,0 +1,189 @@
+//! An estimator with the drive that it is compared on.
+//!
+//! All run on the 2.2 kW machine with interior magnets, with the gains of the review's figures ([`crate::runner`]), but
+//! for Rasmussen's observer: it is for machines without saliency, so it runs on its own reference motor with its own gains
+//! (the start values of the FMUs, R^ = 0.9 R), where 1 pu of torque is the 2 N.m of the paper's load steps.
+//! 1 pu of speed is 1500 rpm on both.
+
+use crate::runner;
+use crate::runner::RATED_SPEED;
+use drive::Pair;
+use drive::control::start::{CURRENT_FREQUENCY, INJECTION};
+use drive::control::tables::ControllerParameters;
+use drive::estimator::Kind;
+use drive::estimator::pulsating::MEASUREMENT_AXES;
+use drive::math::tanh;
+use fmu_core::Fault;
+use std::f64::consts::TAU;
+
+/// What an estimator lives on, as far as it decides which scenarios it can take part in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// Rasmussen's flux observer: starts by itself and holds standstill by a current along the estimated magnet axis.
+    FluxObserver,
+    /// The EMF of the magnet: nothing at standstill, so an I-f start leads the rotor to 0.15 pu.
+    BackEmf,
+    /// The saliency, by an injected voltage: standstill and low speed, no more voltage above 0.2 pu.
+    Injection,
+    /// Injection below, the EMF above.
+    Hybrid,
+    /// A sensor: the yardstick.
+    Sensored,
+}
+
+impl Class {
+    /// The class of an estimator; one that this list does not know lives on the EMF.
+    pub fn of(kind: Kind) -> Self {
+        match kind.name() {
+            "Rasmussen" => Self::FluxObserver,
+            "Sensored" => Self::Sensored,
+            "Hybrid" => Self::Hybrid,
+            name if name.ends_with("Injection") => Self::Injection,
+            _ => Self::BackEmf,
+        }
+    }
+
+    /// Why nothing can be said at standstill.
+    pub fn no_standstill(self) -> Option<&'static str> {
+        (self == Self::BackEmf).then_some("no EMF at standstill")
+    }
+
+    /// Why nothing can be said at `speed` (pu).
+    pub fn no_speed(self, speed: f64) -> Option<&'static str> {
+        (self == Self::Injection && speed > 0.2)
+            .then_some("injection above 0.2 pu is limited by the voltage: Hybrid goes on from there")
+    }
+}
+
+/// A row of the grid: an estimator, or a variant of one that the review has figures for.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// The estimator.
+    pub kind: Kind,
+    /// Its name, or that of the variant.
+    pub name: &'static str,
+    set: fn(&mut ControllerParameters),
+}
+
+const VARIANTS: &[Entry] = &[
+    Entry {
+        kind: Kind::PulsatingInjection,
+        name: "PulsatingInjection-45deg",
+        set: |p| p.estimators.pulsating.demodulation = MEASUREMENT_AXES,
+    },
+    Entry {
+        kind: Kind::SquareWaveInjection,
+        name: "SquareWaveInjection-4",
+        set: |p| {
+            p.estimators.square_wave.samples = 4;
+            p.speed_loop.bandwidth = TAU * 8.0;
+        },
+    },
+];
+
+impl Entry {
+    /// All estimators there are, each with its variants.
+    pub fn all() -> Vec<Self> {
+        let one = |&kind: &Kind| Self { kind, name: kind.name(), set: |_| () };
+        let with_variants = |kind: &Kind| {
+            let variants = VARIANTS.iter().copied().filter(|v| v.kind == *kind);
+            std::iter::once(one(kind)).chain(variants).collect::<Vec<_>>()
+        };
+        Kind::ALL.iter().flat_map(with_variants).collect()
+    }
+}
+
+/// An estimator and its drive.
+#[derive(Clone)]
+pub struct Subject {
+    /// The row.
+    pub entry: Entry,
+    /// What it lives on.
+    pub class: Class,
+    /// The drive at rest.
+    pub pair: Pair,
+    /// 1 pu of torque in N.m.
+    pub torque: f64,
+}
+
+impl Subject {
+    /// The subject of a row.
+    pub fn new(entry: Entry) -> Self {
+        let class = Class::of(entry.kind);
+        let (mut pair, torque) = match class {
+            Class::FluxObserver => (Pair::default(), 2.0),
+            _ => (runner::drive(entry.kind), runner::RATED_TORQUE),
+        };
+        (entry.set)(&mut pair.controller.model.parameters);
+        Self { entry, class, pair, torque }
+    }
+
+    /// The same with other parameters.
+    pub fn with(&self, change: impl FnOnce(&mut Pair)) -> Self {
+        let mut other = self.clone();
+        change(&mut other.pair);
+        other
+    }
+
+    /// With 2 us of dead time in the inverter, compensated or not.
+    pub fn with_dead_time(&self, compensated: bool) -> Self {
+        self.with(|p| {
+            p.plant.model.parameters.inverter.dead_time = 2e-6;
+            let u_dead = p.plant.model.parameters.inverter.u_dead(p.plant.model.inputs.u_dc);
+            p.controller.model.parameters.compensation.u_dead = if compensated { u_dead } else { 0.0 };
+        })
+    }
+
+    /// Turning at `speed` (pu), angle and speed known.
+    pub fn turning(&self, speed: f64) -> Self {
+        self.with(|p| *p = runner::turning(p.clone(), speed))
+    }
+
+    /// As it starts from an unknown angle: by I-f, by polarity pulses (which need the saturation), or by itself.
+    pub fn starting(&self) -> Self {
+        self.with(|p| {
+            let mode = &mut p.controller.model.parameters.start.mode;
+            match self.class {
+                Class::FluxObserver | Class::Sensored => {}
+                Class::BackEmf => *mode = CURRENT_FREQUENCY,
+                Class::Injection | Class::Hybrid => {
+                    *mode = INJECTION;
+                    *p = runner::with_saturation(p.clone());
+                    p.controller.model.parameters.c_2 = p.plant.model.parameters.saturation.c_2;
+                }
+            }
+        })
+    }
+
+    /// Runs for `duration` (s): `each` sees the drive before every step with the time, sets its inputs by
+    /// [`set`](Self::set) and reads its outputs. False when a step fails: a drive that was lost.
+    ///
+    /// # Errors
+    /// The parameters do not fit together.
+    pub fn run(&self, duration: f64, mut each: impl FnMut(f64, &mut Pair)) -> Result<bool, Fault> {
+        let mut pair = self.pair.clone();
+        pair.start()?;
+        let h = pair.controller.model.parameters.T_s;
+        let mut k = 0_u32;
+        while f64::from(k) * h < duration - 0.5 * h {
+            each(f64::from(k) * h, &mut pair);
+            if pair.step(h).is_err() {
+                return Ok(false);
+            }
+            k += 1;
+        }
+        each(f64::from(k) * h, &mut pair);
+        Ok(true)
+    }
+
+    /// Sets speed reference and load, both in pu.
+    pub fn set(&self, pair: &mut Pair, speed: f64, load: f64) {
+        pair.controller.model.inputs.speed_ref = speed * RATED_SPEED;
+        pair.plant.model.inputs.tau_load = load * self.torque;
+    }
+
+    /// A load in pu that opposes the motion.
+    pub fn opposing(pair: &Pair, load: f64) -> f64 {
+        load * tanh(pair.plant.out.speed / 2.0)
+    }
+}

@@ -1,0 +1,12 @@
+//! What is done with the drive: [`reproduce`], the paper's experiments through packed FMUs; [`compare`], the estimators side by
+//! side; [`tune`], parameter values for a machine; [`runner`], the closed loop that all of them run; [`plot`], curves as SVG.
+
+#![forbid(unsafe_code)]
+// The papers' symbols keep their case: J, T_s.
+#![allow(non_snake_case)]
+
+pub mod compare;
+pub mod plot;
+pub mod reproduce;
+pub mod runner;
+pub mod tune;

@@ -1,0 +1,104 @@
+//! Torque reference instead of speed control, and the ramp of the speed reference.
+#![allow(missing_docs)]
+
+use drive::Pair;
+use drive::estimator::Kind;
+use drive_study::runner;
+
+const T_S: f64 = 1e-4;
+
+/// A drive on the sensor in torque mode, at 0.2 of the rated speed, after 50 ms of `tau_ref` (N.m).
+fn torque(tau_ref: f64, set: impl FnOnce(&mut Pair)) -> Pair {
+    let mut pair = runner::drive(Kind::Sensored);
+    pair.controller.model.parameters.speed_loop.torque_mode = true;
+    pair.plant.model.parameters.mechanics.J = 100.0;
+    pair.plant.model.parameters.initial.speed = 0.2 * runner::RATED_SPEED;
+    set(&mut pair);
+    pair.start().unwrap();
+    pair.controller.model.inputs.tau_ref = tau_ref;
+    for _ in 0..500 {
+        // The speed reference does nothing.
+        pair.set_inputs(-1e3, 0.0, 540.0);
+        pair.step(T_S).unwrap();
+    }
+    pair
+}
+
+#[test]
+fn the_torque_is_the_reference() {
+    for mtpa in [false, true] {
+        for tau in [-10.0, -1.0, 0.0, 3.0, 14.0] {
+            let pair = torque(tau, |pair| pair.controller.model.parameters.current.mtpa = mtpa);
+            assert!((pair.plant.out.tau_e - tau).abs() < 0.15, "{tau} N.m: {}", pair.plant.out.tau_e);
+            assert_eq!(pair.controller.out.i_ref.d < -1e-3, mtpa && tau != 0.0);
+        }
+    }
+}
+
+#[test]
+fn within_the_limits() {
+    let pair = torque(1e6, |pair| pair.controller.model.parameters.limit.tau = 5.0);
+    assert!((pair.plant.out.tau_e - 5.0).abs() < 0.15, "limit.tau: {}", pair.plant.out.tau_e);
+    let limited = |pair: &mut Pair| {
+        let par = &mut pair.controller.model.parameters;
+        (par.limit.i_q, par.current.mtpa) = (4.0, false);
+    };
+    let pair = torque(-1e6, limited);
+    assert!((pair.controller.out.i_ref.q + 4.0).abs() < 1e-12, "limit.i_q: {:?}", pair.controller.out.i_ref);
+}
+
+#[test]
+fn beside_the_low_speed_current() {
+    // Rasmussen at standstill with a locked rotor: i_d = 5 A has priority over i_q, and the torque is that of i_q.
+    let mut pair = Pair::default();
+    pair.controller.model.parameters.speed_loop.torque_mode = true;
+    pair.plant.model.parameters.mechanics.imposed = true;
+    pair.start().unwrap();
+    for tau in [0.675, -100.0] {
+        pair.controller.model.inputs.tau_ref = tau;
+        pair.set_inputs(0.0, 0.0, 325.0);
+        pair.step(T_S).unwrap();
+        pair.step(T_S).unwrap();
+        let i_ref = pair.controller.out.i_ref;
+        let i_q = (tau / 0.675).max(-(7.5 * 7.5 - i_ref.d * i_ref.d).sqrt());
+        assert!((i_ref.q - i_q).abs() < 1e-9 && (i_ref.d - 5.0).abs() < 1e-2, "{tau} N.m: {i_ref:?}");
+    }
+}
+
+#[test]
+fn the_i_f_start_waits_for_a_torque() {
+    let mut pair = runner::drive(Kind::ExtendedEmf);
+    let par = &mut pair.controller.model.parameters;
+    (par.speed_loop.torque_mode, par.start.mode) = (true, 2);
+    pair.start().unwrap();
+    let mut run = |tau: f64, samples: u32| {
+        pair.controller.model.inputs.tau_ref = tau;
+        for _ in 0..samples {
+            pair.set_inputs(1.0, 0.0, 540.0);
+            pair.step(T_S).unwrap();
+        }
+        pair.plant.out.speed
+    };
+    assert!(run(0.0, 8000).abs() < 0.5, "a speed reference does not start it");
+    let speed = run(-2.0, 8000);
+    assert!(speed < -0.2 * runner::RATED_SPEED, "{speed} rad/s: to the side of the torque, and on with it");
+}
+
+#[test]
+fn the_ramp_leads_the_speed() {
+    let mut pair = Pair::default();
+    pair.controller.model.parameters.speed_loop.ramp = 100.0;
+    pair.start().unwrap();
+    let mut worst = 0.0_f64;
+    for k in 0..10_000_u32 {
+        pair.set_inputs(if k < 1000 { 0.0 } else { 50.0 }, 0.0, 325.0);
+        pair.step(T_S).unwrap();
+        let t = T_S * f64::from(k);
+        if (0.2..0.6).contains(&t) {
+            worst = worst.max((pair.plant.out.speed - 100.0 * (t - 0.1)).abs());
+        }
+    }
+    // Set-point weight 0.5 and a slope: behind by slope (1 - b) t_is / w_s - ... , 2.5 rad/s at most.
+    assert!(worst < 4.0, "{worst} rad/s beside the ramp");
+    assert!((pair.plant.out.speed - 50.0).abs() < 0.2, "{}", pair.plant.out.speed);
+}

@@ -1,0 +1,34 @@
+//! The command `fmu-check`: [`fmu_check`] by itself, the same as `fmu check`.
+
+#![forbid(unsafe_code)]
+
+use clap::{Parser, Subcommand};
+use fmu_check::{command, probe};
+use std::process::ExitCode;
+
+#[derive(Debug, Parser)]
+#[command(name = "fmu-check", version, subcommand_negates_reqs = true, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(flatten)]
+    check: command::Check,
+    #[command(subcommand)]
+    probe: Option<Hidden>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Hidden {
+    #[command(hide = true)]
+    Probe(probe::Probe),
+}
+
+fn main() -> ExitCode {
+    let Cli { check, probe } = Cli::parse();
+    let outcome = match probe {
+        Some(Hidden::Probe(args)) => probe::run(&args).map(|()| ExitCode::SUCCESS),
+        None => command::run(&check).map(|holds| ExitCode::from(u8::from(!holds))),
+    };
+    outcome.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::from(2)
+    })
+}

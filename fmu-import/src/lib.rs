@@ -1,0 +1,190 @@
+//! An importer of our own: runs any co-simulation FMU of FMI 2.0 and FMI 3.0, ours or not, with one face for both.
+//!
+//! This module is the only place of the command line tool that has `unsafe` code. What it cannot check is the FMU: its
+//! code runs in this process with every right of it.
+//!
+//! ```no_run
+//! # fn main() -> Result<(), fmu_import::Error> {
+//! let fmu = fmu_import::Fmu::open("target/fmu/fmi3/PmsmPlant.fmu")?;
+//! let mut plant = fmu.instantiate("plant", false)?;
+//! plant.setup(0.0, Some(1.0))?;
+//! plant.enter_initialization()?;
+//! plant.exit_initialization()?;
+//! let _ = plant.do_step(0.0, 1e-4)?;
+//! println!("{}", plant.get("speed")?);
+//! # Ok(()) }
+//! ```
+
+mod archive;
+pub mod cosimulation;
+pub mod elf;
+mod error;
+mod fmi2;
+mod fmi3;
+mod instance;
+mod library;
+mod log;
+pub mod platform;
+pub mod raw;
+pub mod ssp;
+mod standard;
+mod value;
+
+pub use error::Error;
+pub use instance::{Instance, State};
+pub use library::describe;
+pub use log::{Message, Status};
+pub use value::Values;
+
+use archive::Archive;
+use log::Log;
+use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
+use standard::{Outcome, Refusal, Standard};
+use std::collections::BTreeMap;
+use std::ffi::CString;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tempfile::TempDir;
+
+/// The description of an `.fmu` file, and all its files.
+///
+/// # Errors
+/// The file is missing, no archive, or has no readable description.
+pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u8>>), Error> {
+    let mut archive = Archive::open(path)?;
+    let files = archive.files()?;
+    Ok((archive.description, files))
+}
+
+/// The functions of a library, the library, and the folder it lies in; dropped in this order.
+struct Loaded<F> {
+    api: F,
+    _library: libloading::Library,
+    _dir: Arc<TempDir>,
+}
+
+/// The functions of either standard.
+enum Functions {
+    V2(Arc<Loaded<fmi2::Functions>>),
+    V3(Arc<Loaded<fmi3::Functions>>),
+}
+
+/// An FMU: unpacked, described, its binary loaded. Every `Fmu` has a copy of the binary of its own.
+pub struct Fmu {
+    path: PathBuf,
+    description: Arc<ModelDescription>,
+    terminals: Result<Option<TerminalsAndIcons>, Error>,
+    functions: Functions,
+    dir: Arc<TempDir>,
+}
+
+impl Fmu {
+    /// Opens an `.fmu` file of FMI 2.0 or FMI 3.0.
+    ///
+    /// # Errors
+    /// The file is missing, no archive, has no readable description, no co-simulation interface, no binary for this
+    /// platform, or a binary that lacks a function.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let mut archive = Archive::open(path)?;
+        let (dir, binary) = archive.extract()?;
+        let terminals = archive.terminals();
+        let (description, dir) = (archive.description, Arc::new(dir));
+        let library = library::load(&binary).map_err(|e| Error::file(path, e.cause()))?;
+        let functions = match description.version {
+            FmiVersion::V2 => {
+                // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that
+                // they go to keeps the library.
+                unsafe { fmi2::Functions::load(&library) }
+                    .map(|api| Functions::V2(Arc::new(Loaded { api, _library: library, _dir: dir.clone() })))
+            }
+            FmiVersion::V3 => {
+                // SAFETY: as above.
+                unsafe { fmi3::Functions::load(&library) }
+                    .map(|api| Functions::V3(Arc::new(Loaded { api, _library: library, _dir: dir.clone() })))
+            }
+        };
+        let functions = functions.map_err(|cause| Error::file(path, cause))?;
+        Ok(Self { path: path.into(), description: Arc::new(description), terminals, functions, dir })
+    }
+
+    /// What its modelDescription.xml says.
+    pub fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    /// What its terminalsAndIcons.xml says, where it has one.
+    ///
+    /// # Errors
+    /// The file cannot be read; the FMU runs all the same.
+    pub fn terminals(&self) -> Result<Option<&TerminalsAndIcons>, Error> {
+        self.terminals.as_ref().map(Option::as_ref).map_err(Clone::clone)
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Makes an instance; with `logging`, the FMU tells more than errors.
+    ///
+    /// # Errors
+    /// The FMU refuses, or a name has a null byte.
+    pub fn instantiate(&self, name: &str, logging: bool) -> Result<Instance, Error> {
+        let c_name = text(name, name)?;
+        let token = text(name, &self.description.token)?;
+        let resources = self.dir.path().join("resources");
+        let log = Arc::<Log>::default();
+        let standard: Outcome<Box<dyn Standard>> = match &self.functions {
+            Functions::V2(functions) => {
+                let uri = text(name, &file_uri(&resources))?;
+                fmi2::Instance::new(functions.clone(), &c_name, &token, &uri, &log, logging).map(|i| Box::new(i) as _)
+            }
+            Functions::V3(functions) => {
+                // FMI 3.0 wants a path of this system with a separator at its end (FMI 3.0.2, 2.3.1).
+                let path = text(name, &format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR))?;
+                fmi3::Instance::new(functions.clone(), &c_name, &token, &path, &log, logging).map(|i| Box::new(i) as _)
+            }
+        };
+        match standard {
+            Ok(standard) => Ok(Instance::new(name, self.description.clone(), standard, log)),
+            Err(refusal) => Err(explain(name, refusal, log.reason())),
+        }
+    }
+}
+
+fn text(instance: &str, text: &str) -> Result<CString, Error> {
+    CString::new(text).map_err(|_| Error::usage(instance, format!("{text:?} has a null byte")))
+}
+
+/// Makes an error of a refusal and of what the FMU said meanwhile.
+fn explain(instance: &str, refusal: Refusal, message: Option<String>) -> Error {
+    let instance = instance.to_owned();
+    match refusal {
+        Refusal::Status(function, status) => Error::Call { instance, function, status: status.to_string(), message },
+        Refusal::Null(function) => Error::Call { instance, function, status: "no instance".into(), message },
+        Refusal::Impossible(cause) => Error::Usage { instance, cause },
+    }
+}
+
+/// `file:///` and the path, other characters than those of RFC 3986 percent-encoded.
+pub fn file_uri(path: &Path) -> String {
+    let path = path.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
+    let root = if path.starts_with('/') { "file://" } else { "file:///" };
+    let encode = |byte: u8| {
+        let plain = byte.is_ascii_alphanumeric() || b"-._~/:".contains(&byte);
+        if plain { char::from(byte).to_string() } else { format!("%{byte:02X}") }
+    };
+    root.chars().map(String::from).chain(path.bytes().map(encode)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(unix)]
+    fn uris_are_encoded() {
+        assert_eq!(file_uri(Path::new("/tmp/a b#ü")), "file:///tmp/a%20b%23%C3%BC");
+    }
+}

@@ -1,0 +1,85 @@
+//! Shared libraries: loading one, and finding its functions.
+
+use super::Error;
+use libloading::Library;
+use std::ffi::{c_int, c_void};
+use std::path::Path;
+
+/// Declares a struct of C functions, each with the symbol it is found under, and a loader that names a missing one.
+/// A function behind `Option` may be missing.
+macro_rules! symbols {
+    ($(#[$doc:meta])* $name:ident { $($field:ident: $symbol:literal = $kind:ty,)* ; $($optional:ident: $other:literal = $other_kind:ty,)* }) => {
+        $(#[$doc])*
+        pub(crate) struct $name {
+            $(pub(crate) $field: $kind,)*
+            $(pub(crate) $optional: Option<$other_kind>,)*
+        }
+
+        impl $name {
+            /// Finds every function.
+            ///
+            /// # Safety
+            /// Where the library has these symbols, they are functions of the standard's types. The struct is not used
+            /// after the library is closed.
+            pub(crate) unsafe fn load(library: &libloading::Library) -> Result<Self, String> {
+                Ok(Self {
+                    $(
+                        // SAFETY: the caller promises the type.
+                        $field: unsafe { library.get::<$kind>($symbol) }
+                            .map(|symbol| *symbol)
+                            .map_err(|_| format!("the function {} is missing", $symbol))?,
+                    )*
+                    $(
+                        // SAFETY: as above.
+                        $optional: unsafe { library.get::<$other_kind>($other) }.ok().map(|symbol| *symbol),
+                    )*
+                })
+            }
+        }
+    };
+}
+pub(super) use symbols;
+
+/// Loads a shared library.
+pub(super) fn load(path: &Path) -> Result<Library, Error> {
+    // SAFETY: loading runs the library's initialisers. That is what running an FMU means: its code has every right of
+    // this process, and the user named the file.
+    unsafe { Library::new(path) }.map_err(|e| Error::file(path, reason(&e)))
+}
+
+/// The system's words; libloading keeps them one level down.
+fn reason(error: &libloading::Error) -> String {
+    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
+}
+
+type Sink = extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize);
+type Describe = unsafe extern "C" fn(sink: Sink, context: *mut c_void) -> c_int;
+
+/// The description that a library made with `fmu_export::export!` hands out.
+///
+/// # Errors
+/// The file is no library for this platform, was not made by this exporter, or by another version of it.
+pub fn describe(path: &Path) -> Result<fmu_core::Description, Error> {
+    extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {
+        if context.is_null() || bytes.is_null() {
+            return;
+        }
+        // SAFETY: the context is the vector below, borrowed by nobody else during the call; the library promises `len`
+        // bytes.
+        let (text, bytes) = unsafe { (&mut *context.cast::<Vec<u8>>(), std::slice::from_raw_parts(bytes, len)) };
+        text.extend_from_slice(bytes);
+    }
+    let library = load(path)?;
+    let mut json: Vec<u8> = Vec::new();
+    // SAFETY: the symbol belongs to this exporter, which gives it this type.
+    let describe = unsafe { library.get::<Describe>("fmu_description") }.map_err(|_| {
+        Error::file(path, "has no function fmu_description: not a library made with fmu_export::export!")
+    })?;
+    // SAFETY: the function calls the sink with the context, before it returns; both live until then.
+    let status = unsafe { describe(collect, (&raw mut json).cast()) };
+    if status != 0 {
+        let said = String::from_utf8_lossy(&json);
+        return Err(Error::file(path, format!("fmu_description returned {status}: {said}")));
+    }
+    serde_json::from_slice(&json).map_err(|e| Error::file(path, format!("the description is of another version: {e}")))
+}

@@ -1,0 +1,303 @@
+//! An SSP as a system of our co-simulation.
+
+use super::ssv::{self, Parameter};
+use super::structure::{Binding, Connection, Connector, End, Structure, Values};
+use super::{DESCRIPTION, values};
+use crate::Fmu;
+use crate::cosimulation::{Schedule, System};
+use anyhow::{Context, Result, anyhow, bail};
+use model_description::Experiment;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use zip::ZipArchive;
+
+/// Most bytes of one file of the archive.
+const LIMIT: u64 = 2 << 30;
+
+/// A system, ready to run.
+#[derive(Default)]
+pub struct Loaded {
+    /// Its FMUs, connected and with their values.
+    pub system: System,
+    /// Default experiments: its own times, the FMUs' steps.
+    pub experiments: Vec<Experiment>,
+    /// Names of the system's inputs, each with the inputs `component.variable` that it feeds.
+    pub inputs: Vec<(String, Vec<String>)>,
+    /// Names of the system's outputs, each with the output `component.variable` that it is.
+    pub outputs: Vec<(String, String)>,
+    /// Values for names that the system does not have, which SSP 1.0 lets pass (4.4, ParameterBindings).
+    pub notes: Vec<String>,
+}
+
+/// The archive, with its path for errors.
+struct Package<'a> {
+    path: &'a Path,
+    zip: ZipArchive<File>,
+}
+
+impl Package<'_> {
+    fn bytes(&mut self, name: &str) -> Result<Vec<u8>> {
+        let of = || self.path.display().to_string();
+        let mut bytes = Vec::new();
+        match self.zip.by_name(name) {
+            Ok(entry) => entry.take(LIMIT).read_to_end(&mut bytes).with_context(of)?,
+            Err(zip::result::ZipError::FileNotFound) => bail!("{}: has no {name}", of()),
+            Err(e) => bail!("{}: {name}: {e}", of()),
+        };
+        Ok(bytes)
+    }
+
+    fn text(&mut self, name: &str) -> Result<String> {
+        String::from_utf8(self.bytes(name)?).map_err(|_| anyhow!("{}: {name} is not UTF-8", self.path.display()))
+    }
+}
+
+impl Loaded {
+    /// Opens an SSP file.
+    ///
+    /// # Errors
+    /// Names the file, the place in it, what is wrong and what to do.
+    pub fn open(path: &Path, logging: bool) -> Result<Self> {
+        let of = || path.display().to_string();
+        let file = File::open(path).with_context(of)?;
+        let zip = ZipArchive::new(file).map_err(|e| anyhow!("{}: not a ZIP archive, or cut short: {e}", of()))?;
+        let mut package = Package { path, zip };
+        let text = package.text(DESCRIPTION)?;
+        let in_description = |cause: String| anyhow!("{}: {DESCRIPTION}: {cause}", of());
+        let structure = Structure::read(&text).map_err(in_description)?;
+        let mut loaded = Self::default();
+        loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
+        let dir = tempfile::tempdir()?;
+        for (index, component) in structure.components.iter().enumerate() {
+            let fmu = dir.path().join(format!("{index}.fmu"));
+            std::fs::write(&fmu, package.bytes(&component.source)?)?;
+            let fmu = Fmu::open(&fmu).map_err(|e| anyhow!("{}: {}: {}", of(), component.source, e.cause()))?;
+            let experiment = fmu.description().default_experiment;
+            // The system's times go before those of its parts.
+            let times = structure.start.or(structure.stop).is_some();
+            let part = Experiment { step: experiment.step, ..Experiment::default() };
+            loaded.experiments.push(if times { part } else { experiment });
+            loaded.system.add(&component.name, &fmu, logging)?;
+            loaded.check_connectors(&component.connectors, &component.name).map_err(in_description)?;
+        }
+        for connection in &structure.connections {
+            let wrong = |cause: String| in_description(format!("line {}: {cause}", connection.line));
+            loaded.connect(&structure, connection).map_err(wrong)?;
+        }
+        // Inner values first: those of the system replace them.
+        for component in &structure.components {
+            for binding in &component.bindings {
+                let (file, parameters) = package.parameters(binding)?;
+                loaded.bind(&file, &parameters, &format!("{}.", component.name))?;
+            }
+        }
+        for binding in &structure.bindings {
+            let (file, parameters) = package.parameters(binding)?;
+            loaded.bind(&file, &parameters, "")?;
+        }
+        Ok(loaded)
+    }
+
+    /// Feeds an input over time: one of the system's, or `component.variable`.
+    ///
+    /// # Errors
+    /// There is none of this name, or it is fed already.
+    pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<()> {
+        for port in self.targets(name)? {
+            self.system.input(&port, schedule.clone())?;
+        }
+        Ok(())
+    }
+
+    /// Sets a value: of an input of the system, or of `component.variable`.
+    ///
+    /// # Errors
+    /// There is none of this name, or the FMU refuses the value.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<()> {
+        for port in self.targets(name)? {
+            self.system.set(&port, value)?;
+        }
+        Ok(())
+    }
+
+    /// Records a connector of the system, or `component.variable`.
+    ///
+    /// # Errors
+    /// There is none of this name, or it is no number.
+    pub fn record(&mut self, name: &str) -> Result<()> {
+        let output = self.outputs.iter().find(|(n, _)| n == name).map(|(_, source)| source.clone());
+        let port = match output {
+            Some(source) => source,
+            None => self.targets(name)?.swap_remove(0),
+        };
+        Ok(self.system.record_as(&port, name)?)
+    }
+
+    /// Records all outputs of the system, or those of all FMUs where it has none.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    pub fn record_outputs(&mut self) -> Result<()> {
+        if self.outputs.is_empty() {
+            return Ok(self.system.record_outputs()?);
+        }
+        self.outputs.clone().iter().try_for_each(|(name, _)| self.record(name))
+    }
+
+    /// What is behind a name: the inputs that one of the system feeds, or the name itself.
+    fn targets(&self, name: &str) -> Result<Vec<String>> {
+        if let Some((_, targets)) = self.inputs.iter().find(|(n, _)| n == name) {
+            return Ok(targets.clone());
+        }
+        let of_system = !(self.inputs.is_empty() && self.outputs.is_empty());
+        if of_system && !name.contains('.') {
+            let names: Vec<&str> = self.inputs.iter().map(|(n, _)| n.as_str()).collect();
+            bail!("{name}: is no input of the system; it has {}", names.join(", "));
+        }
+        Ok(vec![name.to_owned()])
+    }
+
+    /// Every connector of a component is a variable of its FMU, of that causality.
+    fn check_connectors(&self, connectors: &[Connector], component: &str) -> Result<(), String> {
+        let Some(instance) = self.system.instances().iter().find(|i| i.name() == component) else { return Ok(()) };
+        let md = instance.description();
+        for Connector { name, kind, line, .. } in connectors {
+            match md.variable(name) {
+                None => {
+                    let of_kind: Vec<&str> =
+                        md.variables.iter().filter(|v| v.causality.as_str() == kind).map(|v| v.name.as_str()).collect();
+                    let known = format!("its variables of kind {kind} are {}", of_kind.join(", "));
+                    return Err(format!(
+                        "line {line}: {component} ({}) has no variable {name}; {known}",
+                        md.model_name
+                    ));
+                }
+                Some(v) if v.causality.as_str() != kind => {
+                    return Err(format!(
+                        "line {line}: {component}.{name} is {} and not {kind}: correct kind",
+                        v.causality
+                    ));
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn connect(&mut self, structure: &Structure, c: &Connection) -> Result<(), String> {
+        let (start, end) = (find(structure, &c.start)?, find(structure, &c.end)?);
+        let kind = |end: &End, connector: &Connector| (end.element.is_some(), connector.kind.clone());
+        let (one, other) = (kind(&c.start, start), kind(&c.end, end));
+        // What comes out of an element or into the system sends; start and end say nothing of direction.
+        let sends = |(element, kind): &(bool, String)| kind == if *element { "output" } else { "input" };
+        let takes = |(element, kind): &(bool, String)| kind == if *element { "input" } else { "output" };
+        let (from, to) = match (sends(&one) && takes(&other), sends(&other) && takes(&one)) {
+            (true, _) => (&c.start, &c.end),
+            (_, true) => (&c.end, &c.start),
+            _ => {
+                return Err(format!(
+                    "connects {} ({}) with {} ({}): expected an output and an input of components, or one of them and the \
+                     same kind of the system",
+                    c.start, start.kind, c.end, end.kind
+                ));
+            }
+        };
+        if let (Some(a), Some(b), false) = (&start.unit, &end.unit, c.no_conversion)
+            && a != b
+        {
+            return Err(format!(
+                "connects {} in {a} with {} in {b}: units are not converted, give both in one",
+                c.start, c.end
+            ));
+        }
+        let port = |end: &End| end.element.as_ref().map(|element| format!("{element}.{}", end.connector));
+        match (port(from), port(to)) {
+            (_, Some(target)) if self.is_fed(&target)? => {
+                Err(format!("{target} is fed twice: remove one of the connections"))
+            }
+            (Some(source), Some(target)) => self.system.connect(&source, &target).map_err(|e| e.to_string()),
+            (None, Some(target)) => {
+                match self.inputs.iter_mut().find(|(name, _)| *name == from.connector) {
+                    Some((_, targets)) => targets.push(target),
+                    None => self.inputs.push((from.connector.clone(), vec![target])),
+                }
+                Ok(())
+            }
+            (Some(source), None) => {
+                if self.outputs.iter().any(|(name, _)| *name == to.connector) {
+                    return Err(format!(
+                        "the output {} is connected twice: remove one of the connections",
+                        to.connector
+                    ));
+                }
+                self.outputs.push((to.connector.clone(), source));
+                Ok(())
+            }
+            (None, None) => Err("connects the system with itself, which is not supported: remove it".into()),
+        }
+    }
+
+    fn is_fed(&self, target: &str) -> Result<bool, String> {
+        let outside = self.inputs.iter().any(|(_, targets)| targets.iter().any(|t| t == target));
+        Ok(outside || self.system.is_fed(target).map_err(|e| e.to_string())?)
+    }
+
+    /// Sets the values of a binding; names begin with `prefix` and those of the system's connectors stand for themselves.
+    fn bind(&mut self, file: &str, parameters: &[Parameter], prefix: &str) -> Result<()> {
+        for p in parameters {
+            let full = format!("{prefix}{}", p.name);
+            let ports = match self.inputs.iter().find(|(name, _)| prefix.is_empty() && *name == p.name) {
+                Some((_, targets)) => targets.clone(),
+                None => vec![full],
+            };
+            for port in ports {
+                let has = |i: &crate::Instance| {
+                    let variable = port.strip_prefix(i.name())?.strip_prefix('.')?;
+                    i.description().variable(variable).map(|_| (i.name().to_owned(), variable.to_owned()))
+                };
+                match self.system.instances().iter().find_map(has) {
+                    Some((instance, name)) => {
+                        values::set(&mut self.system, &instance, file, &[Parameter { name, ..p.clone() }])?;
+                    }
+                    None => {
+                        self.notes.push(format!("{file}: line {}: there is no {port}; the value is ignored", p.line));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The connector at an end of a connection.
+fn find<'a>(structure: &'a Structure, end: &End) -> Result<&'a Connector, String> {
+    let (of, connectors) = match &end.element {
+        None => (format!("the system {}", structure.name), &structure.connectors),
+        Some(element) => {
+            let names: Vec<&str> = structure.components.iter().map(|c| c.name.as_str()).collect();
+            let none = || format!("there is no component {element}; there are {}", names.join(", "));
+            (element.clone(), &structure.component(element).ok_or_else(none)?.connectors)
+        }
+    };
+    let names = || connectors.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
+    let found = connectors.iter().find(|c| c.name == end.connector);
+    found.ok_or_else(|| format!("{of} has no connector {}; it has {}", end.connector, names()))
+}
+
+impl Package<'_> {
+    /// The values of a binding, its prefix before every name, with what to call their file.
+    fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>)> {
+        let path = self.path.display().to_string();
+        let (file, parameters) = match &binding.values {
+            Values::Inline(parameters) => (format!("{path}: {DESCRIPTION}"), parameters.clone()),
+            Values::File(name) => {
+                let file = format!("{path}: {name}");
+                let read = ssv::read(&self.text(name)?).map_err(|cause| anyhow!("{file}: {cause}"))?;
+                (file, read)
+            }
+        };
+        let named = |p: Parameter| Parameter { name: format!("{}{}", binding.prefix, p.name), ..p };
+        Ok((file, parameters.into_iter().map(named).collect()))
+    }
+}

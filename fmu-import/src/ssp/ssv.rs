@@ -1,0 +1,62 @@
+//! Parameter values from a file of SSP 1.0 (System Structure Parameter Values).
+
+use model_description::Element;
+
+/// A value of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Parameter {
+    /// Name of the variable.
+    pub name: String,
+    /// Its value, as a user writes it.
+    pub value: String,
+    /// Its unit, where the file tells it.
+    pub unit: Option<String>,
+    /// Line of the element.
+    pub line: usize,
+}
+
+/// The values of a file.
+///
+/// # Errors
+/// Says what is no parameter set.
+pub fn read(text: &str) -> Result<Vec<Parameter>, String> {
+    parameters(&Element::parse(text).map_err(|e| e.to_string())?)
+}
+
+/// The values of a parameter set.
+///
+/// # Errors
+/// The element is none, or a parameter has no name or no value.
+pub fn parameters(root: &Element) -> Result<Vec<Parameter>, String> {
+    let local = |element: &Element| element.name.rsplit(':').next().unwrap_or_default().to_owned();
+    if local(root) != "ParameterSet" {
+        return Err(format!("line {}: is no ParameterSet of SSP but {}", root.line, root.name));
+    }
+    let sets = root.children.iter().filter(|c| local(c) == "Parameters");
+    sets.flat_map(|set| &set.children)
+        .filter(|c| local(c) == "Parameter")
+        .map(|parameter| {
+            let at = |what: &str| format!("line {}: {what}", parameter.line);
+            let name = parameter.get("name").ok_or_else(|| at("a parameter without a name"))?;
+            let typed = parameter.children.iter().find(|c| !["Annotations", "MetaData"].contains(&local(c).as_str()));
+            let value = typed.and_then(|v| v.get("value")).ok_or_else(|| at(&format!("{name} has no value")))?;
+            let unit = typed.and_then(|v| v.get("unit")).map(str::to_owned);
+            Ok(Parameter { name: name.to_owned(), value: value.to_owned(), unit, line: parameter.line })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_parameter_set_is_refused() {
+        assert!(read("<a/>").unwrap_err().contains("no ParameterSet"));
+        assert!(
+            read("<ParameterSet><Parameters>\n<Parameter/></Parameters></ParameterSet>")
+                .unwrap_err()
+                .contains("line 2")
+        );
+    }
+}

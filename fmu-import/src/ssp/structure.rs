@@ -1,0 +1,339 @@
+//! SystemStructure.ssd, read (SSP 1.0, 4). What it has that our co-simulation cannot do is an error with its line, so that
+//! nothing is left out in silence.
+
+use super::FMU_TYPE;
+use super::ssv::{self, Parameter};
+use model_description::{Element, parse_number};
+
+/// A system of FMUs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Structure {
+    /// Name of the system.
+    pub name: String,
+    /// Start time in s.
+    pub start: Option<f64>,
+    /// Stop time in s.
+    pub stop: Option<f64>,
+    /// Its FMUs.
+    pub components: Vec<Component>,
+    /// What it has to the outside.
+    pub connectors: Vec<Connector>,
+    /// Who is connected to whom.
+    pub connections: Vec<Connection>,
+    /// Values by names `component.variable`, and of the system's own connectors.
+    pub bindings: Vec<Binding>,
+}
+
+/// An FMU of the system.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Component {
+    /// Name.
+    pub name: String,
+    /// Its archive, a path within the SSP.
+    pub source: String,
+    /// Variables that can be connected.
+    pub connectors: Vec<Connector>,
+    /// Values of its variables.
+    pub bindings: Vec<Binding>,
+    /// Line of the element.
+    pub line: usize,
+}
+
+/// A variable that can be connected.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Connector {
+    /// Name; of a component, that of the variable.
+    pub name: String,
+    /// `input`, `output`, `parameter`, `calculatedParameter` or `inout`.
+    pub kind: String,
+    /// Unit, where the file tells it.
+    pub unit: Option<String>,
+    /// Line of the element.
+    pub line: usize,
+}
+
+/// Two connectors; which of them sends follows from their kinds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Connection {
+    /// One end.
+    pub start: End,
+    /// The other.
+    pub end: End,
+    /// Whether values are taken as they are whatever the units.
+    pub no_conversion: bool,
+    /// Line of the element.
+    pub line: usize,
+}
+
+/// An end of a connection.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct End {
+    /// The component; `None` for the system itself.
+    pub element: Option<String>,
+    /// Name of the connector.
+    pub connector: String,
+}
+
+impl std::fmt::Display for End {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.element {
+            Some(element) => write!(f, "{element}.{}", self.connector),
+            None => write!(f, "{} of the system", self.connector),
+        }
+    }
+}
+
+/// Parameter values of a component or of the system.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Binding {
+    /// File within the SSP, or the values themselves.
+    pub values: Values,
+    /// Put before every name.
+    pub prefix: String,
+}
+
+/// Where values are.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// In a file of the archive.
+    File(String),
+    /// In the description itself.
+    Inline(Vec<Parameter>),
+}
+
+/// Name without its namespace prefix.
+fn local(element: &Element) -> &str {
+    element.name.rsplit(':').next().unwrap_or_default()
+}
+
+fn child<'a>(parent: &'a Element, name: &str) -> Option<&'a Element> {
+    parent.children.iter().find(|c| local(c) == name)
+}
+
+/// The children of a child, or none.
+fn list<'a>(parent: &'a Element, name: &str) -> impl Iterator<Item = &'a Element> {
+    child(parent, name).into_iter().flat_map(|e| &e.children).filter(|e| local(e) != "Annotations")
+}
+
+fn at(e: &Element, what: impl std::fmt::Display) -> String {
+    format!("line {}: {what}", e.line)
+}
+
+fn required(e: &Element, name: &str) -> Result<String, String> {
+    e.get(name).map(str::to_owned).ok_or_else(|| at(e, format!("<{}> has no attribute {name}", e.name)))
+}
+
+/// What is there and not supported, with what to do.
+fn unsupported(e: &Element, what: &str) -> String {
+    at(e, format!("<{}>: {what}", e.name))
+}
+
+impl Structure {
+    /// Reads the text of a SystemStructure.ssd.
+    ///
+    /// # Errors
+    /// The line, and what is missing, wrong or not supported there.
+    pub fn read(text: &str) -> Result<Self, String> {
+        let root = Element::parse(text).map_err(|e| e.to_string())?;
+        if local(&root) != "SystemStructureDescription" {
+            return Err(at(
+                &root,
+                format!("the root element is <{}>, expected <SystemStructureDescription>", root.name),
+            ));
+        }
+        let system =
+            child(&root, "System").ok_or_else(|| at(&root, format!("<{}> has no element <System>", root.name)))?;
+        if let Some(e) = child(system, "SignalDictionaries") {
+            return Err(unsupported(e, "signal dictionaries are not supported: connect the components directly"));
+        }
+        let experiment = child(&root, "DefaultExperiment");
+        let time = |name: &str| {
+            let read = |text: &str| parse_number(text).ok_or_else(|| format!("{name}={text:?} is no number"));
+            experiment
+                .and_then(|e| Some((e, e.get(name)?)))
+                .map(|(e, text)| read(text).map_err(|w| at(e, w)))
+                .transpose()
+        };
+        let components = list(system, "Elements").map(component).collect::<Result<Vec<_>, _>>()?;
+        let twice = components.iter().enumerate().find(|(k, c)| components[..*k].iter().any(|b| b.name == c.name));
+        if let Some((_, Component { name, line, .. })) = twice {
+            return Err(format!("line {line}: two components have the name {name}: rename one"));
+        }
+        Ok(Self {
+            name: required(system, "name")?,
+            start: time("startTime")?,
+            stop: time("stopTime")?,
+            components,
+            connectors: connectors(system)?,
+            connections: list(system, "Connections").map(connection).collect::<Result<_, _>>()?,
+            bindings: bindings(system)?,
+        })
+    }
+
+    /// The component of this name.
+    pub fn component(&self, name: &str) -> Option<&Component> {
+        self.components.iter().find(|c| c.name == name)
+    }
+}
+
+fn component(e: &Element) -> Result<Component, String> {
+    if local(e) != "Component" {
+        return Err(unsupported(
+            e,
+            "only components are supported: put the parts of an inner system beside each other",
+        ));
+    }
+    let source = required(e, "source")?;
+    let kind = e.get("type").unwrap_or(FMU_TYPE);
+    if kind != FMU_TYPE {
+        return Err(at(e, format!("type={kind:?} is not supported, expected {FMU_TYPE}")));
+    }
+    if e.get("implementation") == Some("ModelExchange") {
+        return Err(at(e, "implementation=\"ModelExchange\" is not supported, expected CoSimulation or any"));
+    }
+    Ok(Component {
+        name: required(e, "name")?,
+        source: path(e, &source)?,
+        connectors: connectors(e)?,
+        bindings: bindings(e)?,
+        line: e.line,
+    })
+}
+
+/// A relative URI as a path within the archive.
+fn path(e: &Element, uri: &str) -> Result<String, String> {
+    let bad =
+        || at(e, format!("source={uri:?} is no file within the archive, expected for example resources/plant.fmu"));
+    let mut bytes = Vec::new();
+    let mut rest = uri.strip_prefix("./").unwrap_or(uri).bytes();
+    while let Some(byte) = rest.next() {
+        bytes.push(if byte == b'%' {
+            let digit = |b: Option<u8>| b.and_then(|b| char::from(b).to_digit(16));
+            let value = digit(rest.next()).zip(digit(rest.next())).map(|(high, low)| 16 * high + low);
+            value.and_then(|v| u8::try_from(v).ok()).ok_or_else(bad)?
+        } else {
+            byte
+        });
+    }
+    let path = String::from_utf8(bytes).map_err(|_| bad())?;
+    let inside = !path.contains([':', '\\']) && !path.starts_with('/') && path.split('/').all(|part| part != "..");
+    if inside && !path.is_empty() { Ok(path) } else { Err(bad()) }
+}
+
+fn connectors(e: &Element) -> Result<Vec<Connector>, String> {
+    let one = |c: &Element| {
+        let unit = c.children.iter().find_map(|kind| kind.get("unit")).map(str::to_owned);
+        Ok(Connector { name: required(c, "name")?, kind: required(c, "kind")?, unit, line: c.line })
+    };
+    list(e, "Connectors").map(one).collect()
+}
+
+fn connection(e: &Element) -> Result<Connection, String> {
+    if let Some(t) = e.children.iter().find(|c| local(c).ends_with("Transformation")) {
+        return Err(unsupported(t, "transformations are not supported: remove it, or put it into a component"));
+    }
+    let end = |element: &str, connector: &str| {
+        Ok::<_, String>(End { element: e.get(element).map(str::to_owned), connector: required(e, connector)? })
+    };
+    Ok(Connection {
+        start: end("startElement", "startConnector")?,
+        end: end("endElement", "endConnector")?,
+        no_conversion: matches!(e.get("suppressUnitConversion"), Some("true" | "1")),
+        line: e.line,
+    })
+}
+
+fn bindings(e: &Element) -> Result<Vec<Binding>, String> {
+    list(e, "ParameterBindings").map(binding).collect()
+}
+
+fn binding(e: &Element) -> Result<Binding, String> {
+    if let Some(mapping) = child(e, "ParameterMapping") {
+        return Err(unsupported(
+            mapping,
+            "mappings are not supported: give the values under the names of the variables",
+        ));
+    }
+    if e.get("sourceBase") == Some("component") {
+        return Err(at(e, "sourceBase=\"component\" is not supported: put the file beside the FMU"));
+    }
+    let values = if let Some(source) = e.get("source") {
+        Values::File(path(e, source)?)
+    } else {
+        let set = child(e, "ParameterValues").and_then(|v| child(v, "ParameterSet"));
+        Values::Inline(ssv::parameters(set.ok_or_else(|| at(e, "a binding without source and without values"))?)?)
+    };
+    Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn system(inside: &str) -> Result<Structure, String> {
+        Structure::read(&format!(
+            "<s:SystemStructureDescription><s:System name='x'>\n{inside}</s:System></s:SystemStructureDescription>"
+        ))
+    }
+
+    #[test]
+    fn what_is_there_is_read() {
+        let s = system(
+            "<s:Connectors><s:Connector name='u' kind='input'><c:Real unit='V'/></s:Connector></s:Connectors>
+            <s:ParameterBindings><s:ParameterBinding prefix='a.' source='./resources/a%20b.ssv'/><s:ParameterBinding>
+            <s:ParameterValues><v:ParameterSet><v:Parameters><v:Parameter name='a.x'><v:Real value='3' unit='V'/></v:Parameter>
+            </v:Parameters></v:ParameterSet></s:ParameterValues></s:ParameterBinding></s:ParameterBindings>
+            <s:Elements><s:Component name='a' source='resources/a.fmu'/></s:Elements>
+            <s:Connections><s:Connection startConnector='u' endElement='a' endConnector='v'/></s:Connections>",
+        )
+        .unwrap();
+        assert_eq!(s.connectors[0].unit.as_deref(), Some("V"));
+        assert_eq!((&s.bindings[0].values, &*s.bindings[0].prefix), (&Values::File("resources/a b.ssv".into()), "a."));
+        let Values::Inline(values) = &s.bindings[1].values else { panic!("inline") };
+        assert_eq!((values[0].name.as_str(), values[0].unit.as_deref()), ("a.x", Some("V")));
+        assert_eq!(
+            (s.connections[0].start.to_string(), s.connections[0].end.to_string()),
+            ("u of the system".into(), "a.v".into())
+        );
+    }
+
+    #[test]
+    fn what_is_not_supported_is_told_with_its_line() {
+        let component = |attributes: &str| system(&format!("<Elements><Component name='a' {attributes}/></Elements>"));
+        for (structure, part) in [
+            (Structure::read("<a/>"), "line 1: the root element is <a>"),
+            (system("<Elements><System name='i'/></Elements>"), "line 2: <System>: only components"),
+            (
+                system("<Elements><SignalDictionaryReference name='i'/></Elements>"),
+                "line 2: <SignalDictionaryReference>",
+            ),
+            (system("<SignalDictionaries/>"), "signal dictionaries"),
+            (component(""), "line 2: <Component> has no attribute source"),
+            (component("source='../a.fmu'"), "is no file within the archive"),
+            (component("source='http://a/b.fmu'"), "is no file within the archive"),
+            (component("source='a%zz.fmu'"), "is no file within the archive"),
+            (component("source='a.fmu' implementation='ModelExchange'"), "expected CoSimulation"),
+            (component("source='a.ssp' type='application/x-ssp-package'"), "type=\"application/x-ssp-package\""),
+            (
+                system("<Elements><Component name='a' source='a'/><Component name='a' source='a'/></Elements>"),
+                "two components",
+            ),
+            (
+                system(
+                    "<Connections><Connection startConnector='a' endConnector='b'><LinearTransformation/></Connection></Connections>",
+                ),
+                "<LinearTransformation>: transformations",
+            ),
+            (
+                system(
+                    "<ParameterBindings><ParameterBinding source='a'><ParameterMapping/></ParameterBinding></ParameterBindings>",
+                ),
+                "<ParameterMapping>: mappings",
+            ),
+            (system("<ParameterBindings><ParameterBinding/></ParameterBindings>"), "without source and without values"),
+        ] {
+            let error = structure.unwrap_err();
+            assert!(error.contains(part), "{error}: {part}");
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! The closed loop of plant and controller as an SSP, from the packed FMUs: connected by their terminals, what is left over
+//! led to the outside under the names that `PmsmDrive` has.
+
+use crate::pack::{Entry, Moment, TOOL};
+use crate::ssv;
+use anyhow::{Context, Result};
+use drive_study::tune::rules::Value;
+use fmu_import::Fmu;
+use fmu_import::cosimulation::{Settings, System};
+use fmu_import::ssp::ssv::{Parameter, read};
+use fmu_import::ssp::{DESCRIPTION, FMU_TYPE, values};
+use model_description::{
+    BaseType, BaseUnit, Causality, Element, ModelDescription, ModelVariable, Unit, format_number, parse_number,
+};
+use std::collections::BTreeMap;
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Name of the system.
+const NAME: &str = "SensorlessDrive";
+
+/// Names of the components, the FMUs, and where a diagram shows them: lower left corner and width in the system's geometry.
+pub const COMPONENTS: [(&str, &str, [f64; 2]); 2] =
+    [("controller", "SensorlessController", [60.0, 50.0]), ("plant", "PmsmPlant", [240.0, 50.0])];
+
+/// Terminals that connect them.
+const TERMINALS: [&str; 2] = ["phases", "sensor"];
+
+/// Width and height of a component in a diagram.
+const SIZE: f64 = 100.0;
+
+/// Parameter values for one of the components, with the file that they come from.
+pub struct Values {
+    /// Name of the component.
+    pub component: String,
+    /// What to call the file in errors.
+    pub file: String,
+    /// The text of the SSV file.
+    pub text: String,
+}
+
+/// A connector of the system.
+struct Outside<'a> {
+    name: String,
+    variable: &'a ModelVariable,
+    /// The connectors of components that it belongs to, with their components.
+    inner: Vec<(&'static str, &'a str)>,
+}
+
+/// The files of an SSP around the FMUs in `folder`.
+///
+/// # Errors
+/// An FMU cannot be read, or values do not fit: file, line and what to do. The system is started once, so that what is written
+/// runs.
+pub fn files(folder: &Path, parameters: &[Values], moment: Moment) -> Result<BTreeMap<String, Entry>> {
+    let mut system = System::default();
+    let mut files = BTreeMap::new();
+    let mut put = |name: String, bytes: Vec<u8>| files.insert(name, Entry { bytes, executable: false });
+    let mut descriptions = Vec::new();
+    for (name, fmu, _) in COMPONENTS {
+        let path = folder.join(fmu).with_extension("fmu");
+        put(format!("resources/{fmu}.fmu"), fs::read(&path).with_context(|| path.display().to_string())?);
+        let fmu = Fmu::open(&path)?;
+        descriptions.push((name, fmu.description().clone()));
+        system.add(name, &fmu, false)?;
+    }
+    let mut connections = Vec::new();
+    let [(one, ..), (other, ..)] = COMPONENTS;
+    for terminal in TERMINALS {
+        connections.extend(system.connect_terminals(&format!("{one}.{terminal}"), &format!("{other}.{terminal}"))?);
+    }
+    let mut given: Vec<(&str, Parameter)> = Vec::new();
+    for v in parameters {
+        let read = read(&v.text).map_err(|cause| anyhow::anyhow!("{}: {cause}", v.file))?;
+        values::set(&mut system, &v.component, &v.file, &read)?;
+        given.extend(read.into_iter().map(|p| (v.component.as_str(), p)));
+        put(binding_file(&v.component), v.text.clone().into_bytes());
+    }
+    start(&mut system, &descriptions).context("the system does not start with these values")?;
+    let inputs = inputs(&descriptions, &connections);
+    let starts = starts(&inputs, &given);
+    let starts = starts.iter().map(|(name, value)| (name.as_str(), value));
+    put(binding_file(NAME), ssv::text_of(NAME, starts).into_bytes());
+    let of_components: Vec<&str> = parameters.iter().map(|v| v.component.as_str()).collect();
+    let xml = description(&descriptions, &connections, &inputs, &outputs(&descriptions), &of_components, moment);
+    put(DESCRIPTION.into(), xml.into_bytes());
+    Ok(files)
+}
+
+fn binding_file(name: &str) -> String {
+    format!("resources/{name}.ssv")
+}
+
+/// One step, which says of values whether they fit together.
+fn start(system: &mut System, descriptions: &[(&str, ModelDescription)]) -> Result<()> {
+    let step = descriptions.iter().filter_map(|(_, d)| d.default_experiment.step).fold(f64::INFINITY, f64::min);
+    let step = if step.is_finite() { step } else { 1e-4 };
+    let settings = Settings { start: 0.0, stop: step, step, sequential: false };
+    system.run(&settings, |_| Ok(ControlFlow::Continue(())))?;
+    Ok(())
+}
+
+/// Numbers that no terminal feeds; one of a name in both components is one of the system. Truth values (`enable`) stay at
+/// the start values of the FMUs: an importer that sets every input of a system to 0 would switch the drive off.
+fn inputs<'a>(
+    descriptions: &'a [(&'static str, ModelDescription)],
+    connections: &[(String, String)],
+) -> Vec<Outside<'a>> {
+    let mut found: Vec<Outside<'a>> = Vec::new();
+    for (component, md) in descriptions {
+        for variable in md.variables.iter().filter(|v| v.causality == Causality::Input && v.base.is_float()) {
+            let port = format!("{component}.{}", variable.name);
+            if connections.iter().any(|(_, to)| *to == port) {
+                continue;
+            }
+            let inner = (*component, variable.name.as_str());
+            match found.iter_mut().find(|o| o.name == variable.name) {
+                Some(outside) => outside.inner.push(inner),
+                None => found.push(Outside { name: variable.name.clone(), variable, inner: vec![inner] }),
+            }
+        }
+    }
+    found
+}
+
+/// All outputs. A name that both have is the plant's; the controller's is that of an estimate.
+fn outputs<'a>(descriptions: &'a [(&'static str, ModelDescription)]) -> Vec<Outside<'a>> {
+    let outputs = |md: &'a ModelDescription| md.variables.iter().filter(|v| v.causality == Causality::Output);
+    let plant = |name: &str| {
+        descriptions.iter().any(|(component, md)| *component == "plant" && outputs(md).any(|v| v.name == name))
+    };
+    let one = |component: &'static str, variable: &'a ModelVariable| {
+        let taken = component != "plant" && plant(&variable.name);
+        let name = if taken { format!("{}_est", variable.name) } else { variable.name.clone() };
+        Outside { name, variable, inner: vec![(component, variable.name.as_str())] }
+    };
+    descriptions.iter().flat_map(|(component, md)| outputs(md).map(|v| one(component, v))).collect()
+}
+
+/// Start values of the system's inputs: those given for the components, or those of the FMUs.
+fn starts(inputs: &[Outside<'_>], given: &[(&str, Parameter)]) -> Vec<(String, Value)> {
+    let start = |o: &Outside<'_>| {
+        let of_inner =
+            |(c, p): &&(&str, Parameter)| o.inner.iter().any(|(component, name)| c == component && p.name == *name);
+        let text = given.iter().rev().find(of_inner).map(|(_, p)| p.value.as_str()).or(o.variable.start.as_deref());
+        Some((o.name.clone(), Value::Real(parse_number(text?)?)))
+    };
+    inputs.iter().filter_map(start).collect()
+}
+
+/// SystemStructure.ssd.
+fn description(
+    descriptions: &[(&'static str, ModelDescription)],
+    connections: &[(String, String)],
+    inputs: &[Outside<'_>],
+    outputs: &[Outside<'_>],
+    of_components: &[&str],
+    moment: Moment,
+) -> String {
+    let outside = |kind: &str, all: &[Outside<'_>]| -> Vec<Element> {
+        all.iter().map(|o| connector(&o.name, kind, o.variable)).collect()
+    };
+    let components = COMPONENTS.iter().zip(descriptions).map(|((name, fmu, corner), (_, md))| {
+        let [x, y] = corner;
+        let bound = of_components.contains(name).then(|| binding(name));
+        let fed = |v: &ModelVariable| connections.iter().any(|(_, to)| *to == format!("{name}.{}", v.name));
+        let connected = |v: &&ModelVariable| match v.causality {
+            Causality::Input => v.base.is_float() || fed(v),
+            causality => causality == Causality::Output,
+        };
+        let connectors = md.variables.iter().filter(connected).map(|v| connector(&v.name, v.causality.as_str(), v));
+        Element::new("ssd:Component")
+            .with("name", *name)
+            .with("type", FMU_TYPE)
+            .with("source", format!("resources/{fmu}.fmu"))
+            .with("implementation", "CoSimulation")
+            .children([Element::new("ssd:Connectors").children(connectors)])
+            .children([corners("ssd:ElementGeometry", [*x, *y, x + SIZE, y + SIZE])])
+            .children(bound)
+    });
+    let from_outside = inputs
+        .iter()
+        .flat_map(|o| o.inner.iter().map(|(element, name)| connection((None, &o.name), (Some(element), name))));
+    let inside = connections.iter().map(|(from, to)| connection(split(from), split(to)));
+    let to_outside = outputs
+        .iter()
+        .flat_map(|o| o.inner.iter().map(|(element, name)| connection((Some(element), name), (None, &o.name))));
+    let all: Vec<Element> = from_outside.chain(inside).chain(to_outside).collect();
+    let system = Element::new("ssd:System")
+        .with("name", NAME)
+        .with(
+            "description",
+            "Sensorless drive of a permanent-magnet synchronous machine. Exchange values at every communication point, all \
+             outputs before all inputs, at a step of T_s of the controller or a divisor: then timing.delay = 1 is true.",
+        )
+        .children([Element::new("ssd:Connectors").children(outside("input", inputs)).children(outside("output", outputs))])
+        .children([binding(NAME)])
+        .children([Element::new("ssd:Elements").children(components)])
+        .children([Element::new("ssd:Connections").children(all)])
+        .children([corners("ssd:SystemGeometry", [0.0, 0.0, 400.0, 200.0])]);
+    let experiments = || descriptions.iter().map(|(_, md)| md.default_experiment);
+    let time = |t: Option<f64>| t.map(format_number);
+    let experiment = Element::new("ssd:DefaultExperiment")
+        .with_some("startTime", time(experiments().filter_map(|x| x.start).reduce(f64::min)))
+        .with_some("stopTime", time(experiments().filter_map(|x| x.stop).reduce(f64::max)));
+    let root = Element::new("ssd:SystemStructureDescription")
+        .with("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription")
+        .with("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon")
+        .with("version", "1.0")
+        .with("name", NAME)
+        .with("generationTool", TOOL)
+        .with("generationDateAndTime", moment.date_and_time())
+        .children([system, units(descriptions), experiment]);
+    root.to_xml()
+}
+
+fn split(port: &str) -> (Option<&str>, &str) {
+    port.split_once('.').map_or((None, port), |(element, name)| (Some(element), name))
+}
+
+fn connection(start: (Option<&str>, &str), end: (Option<&str>, &str)) -> Element {
+    Element::new("ssd:Connection")
+        .with_some("startElement", start.0)
+        .with("startConnector", start.1)
+        .with_some("endElement", end.0)
+        .with("endConnector", end.1)
+}
+
+fn binding(name: &str) -> Element {
+    let one = Element::new("ssd:ParameterBinding").with("source", binding_file(name));
+    Element::new("ssd:ParameterBindings").children([one])
+}
+
+fn connector(name: &str, kind: &str, variable: &ModelVariable) -> Element {
+    let base = match variable.base {
+        BaseType::Float32 | BaseType::Float64 => {
+            let unit = variable.unit.as_deref().filter(|u| !u.is_empty());
+            Some(Element::new("ssc:Real").with_some("unit", unit))
+        }
+        BaseType::Boolean => Some(Element::new("ssc:Boolean")),
+        BaseType::Enumeration | BaseType::String | BaseType::Binary | BaseType::Clock => None,
+        _ => Some(Element::new("ssc:Integer")),
+    };
+    Element::new("ssd:Connector").with("name", name).with("kind", kind).children(base)
+}
+
+/// The units of all connectors.
+fn units(descriptions: &[(&str, ModelDescription)]) -> Element {
+    let mut used: Vec<&Unit> = Vec::new();
+    for (_, md) in descriptions {
+        let connected = |v: &&ModelVariable| match v.causality {
+            Causality::Input => v.base.is_float(),
+            causality => causality == Causality::Output,
+        };
+        for unit in md.variables.iter().filter(connected).filter_map(|v| md.unit(v.unit.as_deref()?)) {
+            if !used.iter().any(|u| u.name == unit.name) {
+                used.push(unit);
+            }
+        }
+    }
+    used.sort_by(|a, b| a.name.cmp(&b.name));
+    let unit = |u: &&Unit| {
+        let base = u.base.map_or(Element::new("ssc:BaseUnit"), |base| {
+            let exponents = BaseUnit::NAMES.into_iter().zip(base.exponents).filter(|(_, n)| *n != 0);
+            let element = exponents.fold(Element::new("ssc:BaseUnit"), |e, (name, n)| e.with(name, n.to_string()));
+            let differs = |x: f64, default: f64| (x.to_bits() != default.to_bits()).then(|| format_number(x));
+            element.with_some("factor", differs(base.factor, 1.0)).with_some("offset", differs(base.offset, 0.0))
+        });
+        Element::new("ssc:Unit").with("name", &*u.name).children([base])
+    };
+    Element::new("ssd:Units").children(used.iter().map(unit))
+}
+
+fn corners(name: &str, corners: [f64; 4]) -> Element {
+    let names = ["x1", "y1", "x2", "y2"];
+    names.into_iter().zip(corners).fold(Element::new(name), |e, (name, x)| e.with(name, format_number(x)))
+}
