@@ -185,9 +185,8 @@ impl System {
         let touched = |name: &str| {
             self.wiring.feeds(instance, name) || self.set.iter().any(|p| p.instance == instance && p.name == name)
         };
-        let is_free = |v: &&ModelVariable| {
-            v.causality == Causality::Input && v.base != BaseType::Clock && !touched(&v.name)
-        };
+        let is_free =
+            |v: &&ModelVariable| v.causality == Causality::Input && v.base != BaseType::Clock && !touched(&v.name);
         self.instances[instance].description().variables.iter().filter(is_free).collect()
     }
 
