@@ -2,6 +2,8 @@
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;
+use drive::bench;
+use drive::estimator::Kind;
 use drive::math::wrap;
 use std::f64::consts::PI;
 
@@ -161,6 +163,26 @@ fn torque_at_zero_speed() {
     }
 }
 
+/// How far up each injection holds rated load, in tenths of the rated speed.
+#[test]
+fn injection_at_speed() {
+    let up_to = |kind: Kind| {
+        let speeds = (1..=10).map(|k| 0.1 * f64::from(k));
+        let held = speeds.take_while(|&speed| bench::steady(bench::drive(kind), speed, 1.0).holds());
+        held.last().map_or("0".into(), |speed| format!("{speed:.1}"))
+    };
+    let held = |kind: Kind| (kind.name(), up_to(kind));
+    let [rotating, pulsating, square, near] =
+        [Kind::RotatingInjection, Kind::PulsatingInjection, Kind::SquareWaveInjection, Kind::NearPwmInjection]
+            .map(held);
+    assert!(rotating.1 == pulsating.1 && pulsating.1 == square.1, "{rotating:?}, {pulsating:?}, {square:?}");
+    let sentence = format!(
+        "is held up to {} with {}, {} and {}, up to {} with\n{}.",
+        square.1, rotating.0, pulsating.0, square.0, near.1, near.0
+    );
+    assert!(PAGE.contains(&sentence), "{sentence}");
+}
+
 #[test]
 fn generating_load_at_low_speed() {
     for (factor, load) in [(0.8, 1.0), (0.9, 0.5), (0.9, 1.0), (0.9, 2.0), (0.99, 1.0), (1.0, 2.0)] {
@@ -217,6 +239,11 @@ fn dead_time() {
         }
         pair
     };
+    let plant = drive(true, 0.0, false).plant.model;
+    let (u, motor) = (plant.parameters.inverter.u_dead(325.0), &plant.parameters.motor);
+    let speed = u / (f64::from(motor.n_p) * motor.psi_M) / RPM;
+    let sentence = format!("cost a leg {u:.1} V, the EMF of {speed:.0} rpm");
+    assert!(PAGE.contains(&sentence), "{sentence}");
     for (name, dead, compensated, real_sensors) in [
         ("no dead time", false, 0.0, false),
         ("no dead time, real sensors", false, 0.0, true),
