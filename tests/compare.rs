@@ -1,9 +1,10 @@
 //! The grid of estimators and scenarios: its reduced form against the golden copy, its figures, its command line.
 #![allow(missing_docs)]
 
-use drive_study::compare::scenario::Effort;
+use drive_study::compare::measure::Measure;
+use drive_study::compare::scenario::{Effort, SCENARIOS};
 use drive_study::compare::subject::Entry;
-use drive_study::compare::{self, Cell, Selection, table};
+use drive_study::compare::{self, Cell, Selection, html, table};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -15,11 +16,19 @@ fn grid() -> &'static [Cell] {
     GRID.get_or_init(|| compare::run(&Selection::all(Effort::Reduced), || ()))
 }
 
+/// The cells of these estimators in these scenarios.
+fn of(cells: &[Cell], estimators: &[&str], scenarios: &[&str]) -> Vec<Cell> {
+    let wanted = |c: &&Cell| estimators.contains(&c.entry.name) && scenarios.contains(&c.scenario.id);
+    cells.iter().filter(wanted).cloned().collect()
+}
+
 /// Value or reason of each estimator, scenario and measure of a CSV.
 fn values(csv: &str) -> BTreeMap<String, String> {
     let line = |line: &str| {
         let fields: Vec<&str> = line.splitn(7, ',').collect();
-        let value = if fields[2].is_empty() { fields[6] } else { fields[4] };
+        // A reason is followed by the machine.
+        let reason = || fields[6].rsplit_once(",\"").map_or(fields[6], |(reason, _)| reason);
+        let value = if fields[2].is_empty() { reason() } else { fields[4] };
         (fields[..3].join(", "), value.to_owned())
     };
     csv.lines().skip(1).map(line).collect()
@@ -61,6 +70,68 @@ fn every_figure_is_inside_its_tolerance() {
     assert!(grid().iter().flat_map(Cell::measures).filter(|m| m.expected.is_some()).count() > 100);
 }
 
+/// The table of estimators in the documentation has the numbers that `fmu compare` prints, at full effort.
+#[test]
+fn the_limits_of_the_estimators_are_those_of_the_grid() {
+    const FULL: [&str; 3] = ["lowest", "lowest-dead", "arriving"];
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("drive/docs/limits.html");
+    let page = std::fs::read_to_string(&path).unwrap();
+    let entries: Vec<Entry> =
+        Entry::all().into_iter().filter(|e| !["Rasmussen", "Sensored"].contains(&e.name)).collect();
+    let scenarios = SCENARIOS.iter().filter(|s| FULL.contains(&s.id)).collect();
+    let full = compare::run(&Selection { entries: entries.clone(), scenarios, effort: Effort::Full }, || ());
+    let shown = |name: &str, scenario: &str, measures: &[&str]| -> String {
+        let cells = if FULL.contains(&scenario) { &full } else { grid() };
+        let [cell] = &of(cells, &[name], &[scenario])[..] else { panic!("{name}, {scenario}") };
+        let value = |m: &Measure| {
+            let text = table::number(m).replace('-', "−");
+            if m.unit == "deg" && m.value.is_finite() { text + "°" } else { text }
+        };
+        if cell.measures().is_empty() {
+            return "–".into();
+        }
+        let of = |measure: &&str| value(cell.measures().iter().find(|m| m.name == *measure).unwrap());
+        measures.iter().map(of).collect::<Vec<_>>().join(" / ")
+    };
+    let held = ["held down to"];
+    let rows = entries.iter().map(|e| {
+        let cells = [
+            e.name.to_owned(),
+            shown(e.name, "lowest", &held),
+            shown(e.name, "lowest-dead", &held),
+            shown(e.name, "as-printed", &held),
+            shown(e.name, "arriving", &held),
+            shown(e.name, "generating-0.02", &["mean angle error"]),
+            shown(e.name, "generating-0.05", &["mean angle error"]),
+            shown(e.name, "generating-0.1", &["mean angle error"]),
+            shown(e.name, "wrong-l-q", &["+20 %", "-20 %"]),
+            shown(e.name, "load-0.5", &["dip", "peak angle error"]),
+            shown(e.name, "load-0", &["dip", "peak angle error"]),
+        ];
+        format!("<tr><td>{}</td></tr>\n", cells.join("</td><td>"))
+    });
+    let rows: String = rows.collect();
+    let (before, rest) = page.split_once("full at 0</th></tr>\n").expect("the heading of the table");
+    let (kept, after) = rest.split_once("</table>").unwrap();
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(&path, format!("{before}full at 0</th></tr>\n{rows}</table>{after}")).unwrap();
+        return;
+    }
+    assert_eq!(kept, rows, "drive/docs/limits.html is old: UPDATE_GOLDEN=1 cargo test --test compare writes it");
+    let both_ways = shown("Hybrid", "reversal", &["peak angle error"]);
+    assert!(page.contains(&format!("under 0.8 of the load: error {both_ways}")), "{both_ways}");
+}
+
+/// The README shows what the command prints.
+#[test]
+fn the_readme_shows_what_is_printed() {
+    let estimators = ["Rasmussen", "ExtendedEmf", "VoltageModel", "SquareWaveInjection", "Sensored"];
+    let text = table::text(&of(grid(), &estimators, &["load-0", "load-0.1", "load-0.5", "load-1"]));
+    let (printed, _) = text.split_once("\n  load-0: ").unwrap();
+    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
+    assert!(readme.contains(printed), "README.md shows another table than\n{printed}");
+}
+
 #[test]
 fn what_is_outside_is_marked() {
     let mut cells: Vec<Cell> = grid().iter().filter(|c| c.entry.name == "DirectEmf").cloned().collect();
@@ -72,6 +143,19 @@ fn what_is_outside_is_marked() {
     assert!(text.contains("0.200✗"), "{text}");
     assert!(text.contains("OUTSIDE: DirectEmf, load-0.5, dip: 0.200 pu, expected 0.093"), "{text}");
     assert!(table::markdown(&cells).contains("| DirectEmf"));
+}
+
+/// Rasmussen's row is of another machine, and every table says so.
+#[test]
+fn another_machine_is_told_in_its_row() {
+    let cells = of(grid(), &["Rasmussen", "ExtendedEmf"], &["generating-0.1"]);
+    let row = "Rasmussen (reference motor, 2 N.m)";
+    for text in [table::text(&cells), table::markdown(&cells), html::page(&cells, &[])] {
+        assert!(text.contains(row) && !text.contains("ExtendedEmf ("), "{text}");
+    }
+    let csv = table::csv(&cells);
+    assert!(csv.lines().all(|line| line.starts_with("ExtendedEmf") == line.contains("2.2 kW")), "{csv}");
+    assert!(csv.contains(",\"reference motor, 2 N.m\""), "{csv}");
 }
 
 fn fmu(arguments: &[&str]) -> Output {

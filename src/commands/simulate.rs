@@ -24,6 +24,9 @@ use std::time::{Duration, Instant};
 /// the other one step later. With --sequential the FMUs step in the order given, each with what those before it have just
 /// computed.
 ///
+/// After the run a line on standard error warns of inputs that kept their start values, for nothing feeds or sets them, and of
+/// a step longer than an FMU's DefaultExperiment has.
+///
 /// Start the motor and turn it at 1000 rpm (104.7 rad/s):
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
 ///     --input SensorlessController.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg

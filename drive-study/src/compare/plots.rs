@@ -56,9 +56,9 @@ fn together(id: &str, cells: &[&Cell]) -> Result<Plot> {
     let mut columns = Vec::new();
     for cell in cells {
         let Some(trace) = cell.trace() else { continue };
-        let name = cell.entry.name;
-        columns.push(column(name.into(), "speed in pu", full(&trace.speed)));
-        columns.push(column(name.into(), "angle error in deg", full(&trace.error)));
+        let name = cell.entry.label();
+        columns.push(column(name.clone(), "speed in pu", full(&trace.speed)));
+        columns.push(column(name, "angle error in deg", full(&trace.error)));
     }
     recording.columns = columns;
     let title = format!("{id}: {}", cells[0].scenario.title);

@@ -145,17 +145,23 @@ pub(super) fn rated(subject: &Subject, speed: f64) -> Result<Outcome, Fault> {
     Ok(Outcome::Measured(vec![follow.mean("mean angle error"), follow.std(), follow.rms()], None))
 }
 
-/// Takes rated load, comes to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and is measured for 0.5 s. It takes the load at
-/// 0.5 pu, so that what is found is how low it may go and not how low it may start.
+/// Takes rated load and comes to `speed` (pu). It takes the load at 0.5 pu, so that what is found is how low it may go and
+/// not how low it may start.
 pub(super) fn slowed_down(subject: &Subject, speed: f64) -> Result<Follow, Fault> {
     let side = if speed < 0.0 { -1.0 } else { 1.0 };
     // Injection has no voltage for half the speed: it takes the load where it is.
     let first = if subject.class == Class::Injection { speed } else { side * speed.abs().max(0.5) };
+    loaded(subject, first, speed, side)
+}
+
+/// Takes `load` (pu) at `first` (pu) within 0.3 s, comes to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and is measured for
+/// 0.5 s.
+fn loaded(subject: &Subject, first: f64, speed: f64, load: f64) -> Result<Follow, Fault> {
     let (turning, mut follow) = (subject.turning(first), Follow::default());
     let arrival = 1.2 + (first - speed).abs() / 0.5;
     let survived = turning.run(arrival + 2.0, |t, p| {
         let reference = line(t, 1.2, first, arrival.max(1.2 + 1e-9), speed);
-        turning.set(p, reference, side * line(t, 0.1, 0.0, 0.4, 1.0));
+        turning.set(p, reference, line(t, 0.1, 0.0, 0.4, load));
         if t > arrival + 1.5 {
             follow.add(t, speed, p);
         }
@@ -164,15 +170,29 @@ pub(super) fn slowed_down(subject: &Subject, speed: f64) -> Result<Follow, Fault
 }
 
 /// Whether the drive follows speed and rotor: 30 deg and 2 % of rated.
-fn holds(subject: &Subject, speed: f64) -> Result<bool, Fault> {
-    let follow = slowed_down(subject, speed)?;
-    Ok(!follow.lost() && follow.angle.peak < 30.0 && follow.settled(0.0).value == 0.0)
+fn holds(follow: &Follow) -> bool {
+    !follow.lost() && follow.angle.peak < 30.0 && follow.settled(0.0).value == 0.0
 }
 
-fn lowest_of(subject: &Subject, speeds: impl IntoIterator<Item = f64>) -> Result<Outcome, Fault> {
+/// Rated load that drives, arriving at `speed` (pu) within 0.3 s.
+pub(super) fn generating(subject: &Subject, speed: f64) -> Result<Outcome, Fault> {
+    let follow = loaded(subject, speed, speed, -1.0)?;
+    let mut measures = vec![follow.mean("mean angle error"), follow.std(), follow.rms()];
+    if !holds(&follow) {
+        for m in &mut measures {
+            m.value = f64::INFINITY;
+        }
+    }
+    Ok(Outcome::Measured(measures, None))
+}
+
+/// How rated load comes to a speed that is tried.
+type Approach = fn(&Subject, f64) -> Result<Follow, Fault>;
+
+fn lowest_of(subject: &Subject, approach: Approach, speeds: impl IntoIterator<Item = f64>) -> Result<Outcome, Fault> {
     let mut lowest = f64::INFINITY;
     for speed in speeds {
-        if !holds(subject, speed)? {
+        if !holds(&approach(subject, speed)?) {
             break;
         }
         lowest = speed;
@@ -182,13 +202,22 @@ fn lowest_of(subject: &Subject, speeds: impl IntoIterator<Item = f64>) -> Result
 
 /// Lowest speed at which rated load is held, from above.
 pub(super) fn lowest(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
+    lowest_by(subject, effort, slowed_down)
+}
+
+/// Lowest speed at which rated load may arrive, within 0.3 s.
+pub(super) fn arriving(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
+    lowest_by(subject, effort, |subject, speed| loaded(subject, speed, speed, 1.0))
+}
+
+fn lowest_by(subject: &Subject, effort: Effort, approach: Approach) -> Result<Outcome, Fault> {
     let all: &[f64] = if effort == Effort::Full {
         &[0.2, 0.15, 0.12, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02, 0.01, 0.0]
     } else {
         &[0.2, 0.1, 0.05, 0.03, 0.02, 0.0]
     };
     let low = if subject.class.no_standstill().is_some() { 1e-9 } else { 0.0 };
-    lowest_of(subject, all.iter().copied().filter(|&speed| speed >= low))
+    lowest_of(subject, approach, all.iter().copied().filter(|&speed| speed >= low))
 }
 
 /// The same without the term that the review drops, for those that have it.
@@ -197,7 +226,7 @@ pub(super) fn as_printed(subject: &Subject) -> Result<Outcome, Fault> {
         return Ok(Outcome::NotApplicable("has no frame-speed term to drop"));
     }
     let printed = subject.with(|p| p.controller.model.parameters.estimators.emf.frame_term = false);
-    lowest_of(&printed, (10..=30_u32).rev().map(|k| 0.01 * f64::from(k)))
+    lowest_of(&printed, slowed_down, (10..=30_u32).rev().map(|k| 0.01 * f64::from(k)))
 }
 
 /// Bandwidth (-3 dB) of the speed loop at half the speed, by the true speed.

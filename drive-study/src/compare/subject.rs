@@ -82,6 +82,22 @@ const VARIANTS: &[Entry] = &[
 ];
 
 impl Entry {
+    /// The machine that it runs on, and what 1 pu of torque is there.
+    pub fn machine(&self) -> &'static str {
+        match Class::of(self.kind) {
+            Class::FluxObserver => "reference motor, 2 N.m",
+            _ => "2.2 kW machine, 14 N.m",
+        }
+    }
+
+    /// Its name in a table, with the machine where it is not that of the others.
+    pub fn label(&self) -> String {
+        match Class::of(self.kind) {
+            Class::FluxObserver => format!("{} ({})", self.name, self.machine()),
+            _ => self.name.into(),
+        }
+    }
+
     /// All estimators there are, each with its variants.
     pub fn all() -> Vec<Self> {
         let one = |&kind: &Kind| Self { kind, name: kind.name(), set: |_| () };

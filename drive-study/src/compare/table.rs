@@ -13,7 +13,7 @@ pub struct Block {
     /// Heading of each column: name of the scenario, and what the numbers are.
     pub headings: Vec<(String, String)>,
     /// Estimator, its texts, and whether each holds.
-    pub rows: Vec<(&'static str, Vec<(String, bool)>)>,
+    pub rows: Vec<(String, Vec<(String, bool)>)>,
     /// Notes under the table.
     pub notes: Vec<String>,
 }
@@ -75,8 +75,8 @@ fn block(group: &'static str, cells: &[Cell]) -> Block {
             scenarios.push(cell.scenario.id);
             notes.push(format!("{}: {}", cell.scenario.id, cell.scenario.title));
         }
-        if !estimators.contains(&cell.entry.name) {
-            estimators.push(cell.entry.name);
+        if !estimators.contains(&cell.entry.label()) {
+            estimators.push(cell.entry.label());
         }
     }
     let of = |id: &'static str| inside.iter().copied().filter(move |c| c.scenario.id == id);
@@ -85,12 +85,12 @@ fn block(group: &'static str, cells: &[Cell]) -> Block {
         let names: Vec<_> = measured.iter().map(|m| format!("{} [{}]", m.name, m.unit)).collect();
         (id.to_owned(), names.join(", "))
     };
-    let row = |name: &&'static str| {
+    let row = |name: &String| {
         let text = |id: &&'static str| {
-            let cell = of(id).find(|c| c.entry.name == *name);
+            let cell = of(id).find(|c| c.entry.label() == *name);
             cell.map_or_else(|| (String::new(), true), |c| (cell_text(c), c.holds()))
         };
-        (*name, scenarios.iter().map(text).collect())
+        (name.clone(), scenarios.iter().map(text).collect())
     };
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for cell in &inside {
@@ -138,7 +138,7 @@ pub fn text(cells: &[Cell]) -> String {
     for block in blocks(cells) {
         let mut rows = vec![std::iter::once(String::new()).chain(block.headings.iter().map(|h| h.0.clone())).collect()];
         rows.extend(block.rows.iter().map(|(name, cells)| {
-            std::iter::once((*name).to_owned()).chain(cells.iter().map(|c| c.0.clone())).collect::<Vec<_>>()
+            std::iter::once(name.clone()).chain(cells.iter().map(|c| c.0.clone())).collect::<Vec<_>>()
         }));
         let _ = writeln!(text, "{}", block.title);
         text.push_str(&aligned(&rows, "  ", "   ", "", |_| String::new()));
@@ -216,7 +216,7 @@ pub fn markdown(cells: &[Cell]) -> String {
         let mut rows =
             vec![std::iter::once("estimator".to_owned()).chain(block.headings.iter().map(heading)).collect()];
         rows.extend(block.rows.iter().map(|(name, cells)| {
-            std::iter::once((*name).to_owned()).chain(cells.iter().map(|c| c.0.clone())).collect::<Vec<_>>()
+            std::iter::once(name.clone()).chain(cells.iter().map(|c| c.0.clone())).collect::<Vec<_>>()
         }));
         let rule = |widths: &[usize]| {
             let lines: Vec<_> = widths.iter().map(|w| "-".repeat(w + 2)).collect();
@@ -235,22 +235,22 @@ pub fn markdown(cells: &[Cell]) -> String {
 
 /// Every number with what is expected of it, one a line.
 pub fn csv(cells: &[Cell]) -> String {
-    let mut text = String::from("estimator,scenario,measure,unit,value,expected,verdict\n");
+    let mut text = String::from("estimator,scenario,measure,unit,value,expected,verdict,machine\n");
     for cell in cells {
-        let (name, id) = (cell.entry.name, cell.scenario.id);
+        let (name, id, machine) = (cell.entry.name, cell.scenario.id, cell.entry.machine());
         match &cell.outcome {
             Outcome::NotApplicable(why) => {
-                let _ = writeln!(text, "{name},{id},,,,,\"not applicable: {why}\"");
+                let _ = writeln!(text, "{name},{id},,,,,\"not applicable: {why}\",\"{machine}\"");
             }
             Outcome::Refused(message) => {
-                let _ = writeln!(text, "{name},{id},,,,,\"refused: {}\"", message.replace('"', "'"));
+                let _ = writeln!(text, "{name},{id},,,,,\"refused: {}\",\"{machine}\"", message.replace('"', "'"));
             }
             Outcome::Measured(measures, _) => {
                 for m in measures {
                     let expected = m.expected.map(|e| e.to_string()).unwrap_or_default();
                     let verdict = m.expected.map_or("", |e| if e.holds(m.value) { "inside" } else { "outside" });
                     let Measure { name: measure, unit, value, .. } = m;
-                    let _ = writeln!(text, "{name},{id},{measure},{unit},{value},{expected},{verdict}");
+                    let _ = writeln!(text, "{name},{id},{measure},{unit},{value},{expected},{verdict},\"{machine}\"");
                 }
             }
         }
