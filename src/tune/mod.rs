@@ -8,9 +8,12 @@ pub mod motor;
 pub mod rules;
 pub mod ssv;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
+use drive::{PmsmPlant, SensorlessController};
+use fmu_core::description::{self, Variable, VariableKind};
+use fmu_core::{Description, Model};
 use motor::MotorFile;
-use rules::Tuned;
+use rules::{Setting, Tuned, Value};
 use std::path::{Path, PathBuf};
 
 /// Reads a machine's file and derives the values of both FMUs.
@@ -23,15 +26,62 @@ pub fn tune(path: &Path) -> Result<Tuned> {
     rules::tune(&motor)
 }
 
-/// Writes `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder; returns their paths.
+/// Writes `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder, each with what [`needed`] leaves; returns
+/// their paths.
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write(tuned: &Tuned, folder: &Path) -> Result<[PathBuf; 2]> {
-    let write = |model: &str, settings: &[rules::Setting]| {
+pub fn write(tuned: &Tuned, folder: &Path, integers: bool) -> Result<[PathBuf; 2]> {
+    let write = |model: &str, settings: &[Setting]| {
         let path = folder.join(format!("{}.{model}.ssv", tuned.name));
         crate::pack::write(&path, ssv::text(&format!("{} {model}", tuned.name), settings).as_bytes())?;
         anyhow::Ok(path)
     };
-    Ok([write("PmsmPlant", &tuned.plant)?, write("SensorlessController", &tuned.controller)?])
+    let (plant, controller) = needed(tuned, integers)?;
+    Ok([write("PmsmPlant", &plant)?, write("SensorlessController", &controller)?])
+}
+
+/// What importers have to be told, of plant and controller: the settings that differ from the start values of the FMUs. An
+/// enumeration's value is the name of its item, or with `integers` the integer behind it.
+///
+/// # Errors
+/// A model cannot be described.
+pub fn needed(tuned: &Tuned, integers: bool) -> Result<(Vec<Setting>, Vec<Setting>)> {
+    Ok((
+        of_model::<PmsmPlant>(&tuned.plant, integers)?,
+        of_model::<SensorlessController>(&tuned.controller, integers)?,
+    ))
+}
+
+fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {
+    let description = Description::of::<M>().map_err(|e| anyhow!("{e}"))?;
+    let one = |setting: &Setting| {
+        let variable = description.variable(setting.name);
+        let number = variable.and_then(|v| item_value(v, &setting.value)).map(Value::Integer);
+        let start = variable.and_then(|v| v.start.as_ref()?.first());
+        let same = start.is_some_and(|start| is(number.as_ref().unwrap_or(&setting.value), *start));
+        let value = number.filter(|_| integers).unwrap_or_else(|| setting.value.clone());
+        (!same).then(|| Setting { value, ..setting.clone() })
+    };
+    Ok(settings.iter().filter_map(one).collect())
+}
+
+/// The integer behind an item of an enumeration.
+fn item_value(variable: &Variable, value: &Value) -> Option<i32> {
+    match (&variable.kind, value) {
+        (VariableKind::Enumeration { items, .. }, Value::Item(item)) => {
+            items.iter().find(|(_, name, _)| name == item).map(|(value, ..)| *value)
+        }
+        _ => None,
+    }
+}
+
+/// Whether a value is the start value, to the last bit.
+fn is(value: &Value, start: description::Value) -> bool {
+    match (value, start) {
+        (Value::Real(x), description::Value::Real(start)) => x.to_bits() == start.to_bits(),
+        (Value::Integer(x), description::Value::Integer(start)) => *x == start,
+        (Value::Boolean(x), description::Value::Boolean(start)) => *x == start,
+        _ => false,
+    }
 }
