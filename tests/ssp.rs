@@ -118,7 +118,9 @@ fn what_not_every_importer_takes_is_an_option() {
         assert!(!structure(&plain).contains(part) && structure(&all).contains(part), "{part}");
     }
     let master = "<oms:FixedStepMaster description=\"oms-ma\" stepSize=\"0.0001\" relativeTolerance=\"0.0001\"/>";
+    let python = "<oms:SimulationInformation name=\"oms_ma_default\" method=\"oms_ma\" fixedStepSize=\"0.0001\">";
     assert!(structure(&plain).contains("<ssc:Annotation type=\"org.openmodelica\">"));
+    assert!(structure(&plain).contains(python));
     assert!(structure(&plain).contains(master), "the step is T_s");
     let values = |path: &str| entry(path, "resources/controller.ssv");
     assert!(values(&plain).contains("<ssv:Parameter name=\"estimator\"><ssv:Enumeration value=\"ExtendedEmf\"/>"));

@@ -126,7 +126,9 @@ fn files_have_what_differs_from_the_start_values() {
     for path in motors() {
         let tuned = tune::tune(&path).unwrap();
         let (plant, controller) = tune::needed(&tuned, false).unwrap();
-        for ((description, all), needed) in starts.iter().zip([&tuned.plant, &tuned.controller]).zip([plant, controller]) {
+        for ((description, all), needed) in
+            starts.iter().zip([&tuned.plant, &tuned.controller]).zip([plant, controller])
+        {
             let read = |settings| ssv::read(&ssv::text("x", settings)).unwrap();
             let differs = |p: &ssv::Parameter| start(description, &p.name) != p.value;
             let values = |parameters: Vec<ssv::Parameter>| -> Vec<_> {

@@ -178,14 +178,18 @@ fn step(descriptions: &[(&str, ModelDescription)], given: &[(&str, Parameter)]) 
     given.or_else(start).and_then(parse_number).unwrap_or(1e-4)
 }
 
-/// For OMSimulator: its master of fixed step, Jacobi, which carries all outputs over before all inputs (OMSimulator, oms.xsd and
-/// SystemWC.cpp).
+/// For OMSimulator: its master of fixed step, Jacobi, which carries all outputs over before all inputs. The command line reads the
+/// element inside (oms.xsd, SystemWC.cpp), the Python package the attributes under the name of its own choice (system.py).
 fn simulation_information(step: f64) -> Element {
     let master = Element::new("oms:FixedStepMaster")
         .with("description", "oms-ma")
         .with("stepSize", format_number(step))
         .with("relativeTolerance", format_number(1e-4));
-    let information = Element::new("oms:SimulationInformation").children([master]);
+    let information = Element::new("oms:SimulationInformation")
+        .with("name", "oms_ma_default")
+        .with("method", "oms_ma")
+        .with("fixedStepSize", format_number(step))
+        .children([master]);
     let annotation = Element::new("ssc:Annotation")
         .with("type", "org.openmodelica")
         .children([Element::new("oms:Annotations").children([information])]);

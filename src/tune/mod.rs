@@ -47,10 +47,7 @@ pub fn write(tuned: &Tuned, folder: &Path, integers: bool) -> Result<[PathBuf; 2
 /// # Errors
 /// A model cannot be described.
 pub fn needed(tuned: &Tuned, integers: bool) -> Result<(Vec<Setting>, Vec<Setting>)> {
-    Ok((
-        of_model::<PmsmPlant>(&tuned.plant, integers)?,
-        of_model::<SensorlessController>(&tuned.controller, integers)?,
-    ))
+    Ok((of_model::<PmsmPlant>(&tuned.plant, integers)?, of_model::<SensorlessController>(&tuned.controller, integers)?))
 }
 
 fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {
