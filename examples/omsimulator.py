@@ -1,8 +1,8 @@
-"""Load step of 2 N.m at standstill in OMSimulator (not run by us: OMSimulator has no wheel here).
+"""Load step of 2 N.m at standstill in OMSimulator (not in the tests: its package downloads the program while it is installed).
 
-    cargo run --release -- build
+    cargo run --release -- build --fmi 2
     pip install OMSimulator
-    python examples/omsimulator.py target/fmu/fmi3
+    python examples/omsimulator.py target/fmu/fmi2
 
 With OMSimulator 3's `SSP` class; before it: `OMSimulator()`, `newModel`, `addSystem(..., system_wc)`, `addSubModel`,
 `addConnection`, `setFixedStepSize`, `setReal`, `simulate`, of the same meaning. Its fixed-step master `oms_ma` steps all
@@ -13,7 +13,7 @@ import sys
 
 from OMSimulator import SSP, CRef
 
-folder = sys.argv[1] if len(sys.argv) > 1 else "target/fmu/fmi3"
+folder = sys.argv[1] if len(sys.argv) > 1 else "target/fmu/fmi2"
 FMUS = {"plant": "PmsmPlant", "controller": "SensorlessController"}
 T_S = 1e-4  # s: the controller's sample period
 

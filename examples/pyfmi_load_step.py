@@ -1,10 +1,10 @@
-"""Load step of 2 N.m at standstill in PyFMI (not run by us: PyFMI comes from conda-forge).
+"""Load step of 2 N.m at standstill in PyFMI (not in the tests: PyFMI comes from conda-forge).
 
     cargo run --release -- build --fmi 2
     conda install -c conda-forge pyfmi
     python examples/pyfmi_load_step.py target/fmu/fmi2
 
-PyFMI couples FMI 2.0 FMUs only. Its master steps both and then exchanges, so `timing.delay` stays 1.
+PyFMI imports co-simulation FMUs of FMI 2.0 only. Its master steps both and then exchanges, so `timing.delay` stays 1.
 """
 
 import sys

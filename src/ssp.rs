@@ -1,5 +1,5 @@
 //! The closed loop of plant and controller as an SSP, from the packed FMUs: connected by their terminals, what is left over
-//! led to the outside under the names that `PmsmDrive` has.
+//! led to the outside under the names that `PmsmDrive` has. What some importer stumbles over is there on demand only.
 
 use crate::pack::{Entry, Moment, TOOL};
 use crate::ssv;
@@ -40,6 +40,15 @@ pub struct Values {
     pub text: String,
 }
 
+/// What not every importer takes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options {
+    /// Whether truth values are connected, of which there is one: `enabled` of the controller to `enable` of the plant.
+    pub gates: bool,
+    /// Whether the system has a size in a diagram.
+    pub geometry: bool,
+}
+
 /// A connector of the system.
 struct Outside<'a> {
     name: String,
@@ -53,7 +62,12 @@ struct Outside<'a> {
 /// # Errors
 /// An FMU cannot be read, or values do not fit: file, line and what to do. The system is started once, so that what is written
 /// runs.
-pub fn files(folder: &Path, parameters: &[Values], moment: Moment) -> Result<BTreeMap<String, Entry>> {
+pub fn files(
+    folder: &Path,
+    parameters: &[Values],
+    options: Options,
+    moment: Moment,
+) -> Result<BTreeMap<String, Entry>> {
     let mut system = System::default();
     let mut files = BTreeMap::new();
     let mut put = |name: String, bytes: Vec<u8>| files.insert(name, Entry { bytes, executable: false });
@@ -70,6 +84,13 @@ pub fn files(folder: &Path, parameters: &[Values], moment: Moment) -> Result<BTr
     for terminal in TERMINALS {
         connections.extend(system.connect_terminals(&format!("{one}.{terminal}"), &format!("{other}.{terminal}"))?);
     }
+    let is_number = |port: &str| {
+        let variable = |(name, md): &(&str, ModelDescription)| {
+            Some(md.variable(port.strip_prefix(name)?.strip_prefix('.')?)?.base.is_float())
+        };
+        descriptions.iter().find_map(variable) == Some(true)
+    };
+    connections.retain(|(from, _)| options.gates || is_number(from));
     let mut given: Vec<(&str, Parameter)> = Vec::new();
     for v in parameters {
         let read = read(&v.text).map_err(|cause| anyhow::anyhow!("{}: {cause}", v.file))?;
@@ -83,7 +104,9 @@ pub fn files(folder: &Path, parameters: &[Values], moment: Moment) -> Result<BTr
     let starts = starts.iter().map(|(name, value)| (name.as_str(), value));
     put(binding_file(NAME), ssv::text_of(NAME, starts).into_bytes());
     let of_components: Vec<&str> = parameters.iter().map(|v| v.component.as_str()).collect();
-    let xml = description(&descriptions, &connections, &inputs, &outputs(&descriptions), &of_components, moment);
+    let step = step(&descriptions, &given);
+    let outputs = outputs(&descriptions);
+    let xml = description(&descriptions, &connections, &inputs, &outputs, &of_components, (options, step), moment);
     put(DESCRIPTION.into(), xml.into_bytes());
     Ok(files)
 }
@@ -149,6 +172,31 @@ fn starts(inputs: &[Outside<'_>], given: &[(&str, Parameter)]) -> Vec<(String, V
     inputs.iter().filter_map(start).collect()
 }
 
+/// The communication step in s: the controller's sample period.
+fn step(descriptions: &[(&str, ModelDescription)], given: &[(&str, Parameter)]) -> f64 {
+    let start = || descriptions.iter().find_map(|(_, md)| md.variable("T_s")?.start.as_deref());
+    let given = given.iter().rev().find(|(_, p)| p.name == "T_s").map(|(_, p)| p.value.as_str());
+    given.or_else(start).and_then(parse_number).unwrap_or(1e-4)
+}
+
+/// For OMSimulator: its master of fixed step, Jacobi, which carries all outputs over before all inputs. The command line reads the
+/// element inside (oms.xsd, SystemWC.cpp), the Python package the attributes under the name of its own choice (system.py).
+fn simulation_information(step: f64) -> Element {
+    let master = Element::new("oms:FixedStepMaster")
+        .with("description", "oms-ma")
+        .with("stepSize", format_number(step))
+        .with("relativeTolerance", format_number(1e-4));
+    let information = Element::new("oms:SimulationInformation")
+        .with("name", "oms_ma_default")
+        .with("method", "oms_ma")
+        .with("fixedStepSize", format_number(step))
+        .children([master]);
+    let annotation = Element::new("ssc:Annotation")
+        .with("type", "org.openmodelica")
+        .children([Element::new("oms:Annotations").children([information])]);
+    Element::new("ssd:Annotations").children([annotation])
+}
+
 /// SystemStructure.ssd.
 fn description(
     descriptions: &[(&'static str, ModelDescription)],
@@ -156,6 +204,7 @@ fn description(
     inputs: &[Outside<'_>],
     outputs: &[Outside<'_>],
     of_components: &[&str],
+    (options, step): (Options, f64),
     moment: Moment,
 ) -> String {
     let outside = |kind: &str, all: &[Outside<'_>]| -> Vec<Element> {
@@ -198,7 +247,8 @@ fn description(
         .children([binding(NAME)])
         .children([Element::new("ssd:Elements").children(components)])
         .children([Element::new("ssd:Connections").children(all)])
-        .children([corners("ssd:SystemGeometry", [0.0, 0.0, 400.0, 200.0])]);
+        .children(options.geometry.then(|| corners("ssd:SystemGeometry", [0.0, 0.0, 400.0, 200.0])))
+        .children([simulation_information(step)]);
     let experiments = || descriptions.iter().map(|(_, md)| md.default_experiment);
     let time = |t: Option<f64>| t.map(format_number);
     let experiment = Element::new("ssd:DefaultExperiment")
@@ -207,6 +257,7 @@ fn description(
     let root = Element::new("ssd:SystemStructureDescription")
         .with("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription")
         .with("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon")
+        .with("xmlns:oms", "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd")
         .with("version", "1.0")
         .with("name", NAME)
         .with("generationTool", TOOL)

@@ -105,6 +105,40 @@ fn its_connectors_are_those_of_pmsm_drive() {
     }
 }
 
+/// What some importer refuses or cannot do is there on demand only, and how OMSimulator steps the system stands in it.
+#[test]
+fn what_not_every_importer_takes_is_an_option() {
+    let folder = folder();
+    let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    let motor = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/ipmsm-2.2kw.toml");
+    done(&["ssp", "--motor", motor, "--integers", "--gates", "--geometry", "--out", &path("all.ssp")]);
+    let (plain, all) = (ssp("motor.ssp"), ssp("all.ssp"));
+    let structure = |path: &str| entry(path, "SystemStructure.ssd");
+    for part in ["<ssd:SystemGeometry ", "startConnector=\"enabled\" endElement=\"plant\" endConnector=\"enable\""] {
+        assert!(!structure(&plain).contains(part) && structure(&all).contains(part), "{part}");
+    }
+    let master = "<oms:FixedStepMaster description=\"oms-ma\" stepSize=\"0.0001\" relativeTolerance=\"0.0001\"/>";
+    let python = "<oms:SimulationInformation name=\"oms_ma_default\" method=\"oms_ma\" fixedStepSize=\"0.0001\">";
+    assert!(structure(&plain).contains("<ssc:Annotation type=\"org.openmodelica\">"));
+    assert!(structure(&plain).contains(python));
+    assert!(structure(&plain).contains(master), "the step is T_s");
+    let values = |path: &str| entry(path, "resources/controller.ssv");
+    assert!(values(&plain).contains("<ssv:Parameter name=\"estimator\"><ssv:Enumeration value=\"ExtendedEmf\"/>"));
+    assert!(values(&all).contains("<ssv:Parameter name=\"estimator\"><ssv:Integer value=\"4\"/>"));
+    assert!(!values(&all).contains("Enumeration"));
+    // Nothing of it changes what comes out.
+    let run = |path: &str| {
+        let time = ["--input", "speed_ref=0:0,0.02:52.36", "--stop", "0.3", "--csv", "-"];
+        done(&[&["simulate", path][..], &time].concat())
+    };
+    assert!(run(&plain) == run(&all));
+    let slower = std::fs::read_to_string(motor).unwrap().replace("[control]\n", "[control]\nT_s = 2e-4\n");
+    let slower = if slower.contains("T_s") { slower } else { slower + "\n[control]\nT_s = 2e-4\n" };
+    std::fs::write(folder.join("slower.toml"), slower).unwrap();
+    done(&["ssp", "--motor", &path("slower.toml"), "--out", &path("slower.ssp")]);
+    assert!(structure(&ssp("slower.ssp")).contains("stepSize=\"0.0002\""));
+}
+
 /// A machine's values are in the file and in what the system does.
 #[test]
 fn a_motor_comes_with_it() {

@@ -5,7 +5,7 @@ mod common;
 
 use drive_study::tune::{self, motor::MotorFile, rules};
 use fmu::ssv;
-use fmu_import::ssp::ssv::read;
+use fmu_import::ssp::ssv::{Parameter, read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -103,6 +103,51 @@ fn values_are_those_of_the_rules() {
             || (parameter.value.parse::<f64>().unwrap() - value.parse::<f64>().unwrap()).abs() < 1e-12;
         assert!(same, "{parameter:?}");
     }
+}
+
+/// Only what differs from the start values is written, and all of that; enumerations as integers on demand.
+#[test]
+fn files_have_what_differs_from_the_start_values() {
+    let starts = [
+        fmu_core::Description::of::<drive::PmsmPlant>().unwrap(),
+        fmu_core::Description::of::<drive::SensorlessController>().unwrap(),
+    ];
+    let start = |description: &fmu_core::Description, name: &str| {
+        use fmu_core::description::{Value, VariableKind};
+        let variable = description.variable(name).unwrap();
+        let item = |i: i32| match &variable.kind {
+            VariableKind::Enumeration { items, .. } => items.iter().find(|(value, ..)| *value == i).unwrap().1.clone(),
+            _ => i.to_string(),
+        };
+        match variable.start.as_ref().unwrap()[0] {
+            Value::Real(x) => x.to_string(),
+            Value::Integer(i) => item(i),
+            Value::Boolean(b) => b.to_string(),
+        }
+    };
+    for path in motors() {
+        let tuned = tune::tune(&path).unwrap();
+        let (plant, controller) = tune::needed(&tuned, false).unwrap();
+        for ((description, all), needed) in
+            starts.iter().zip([&tuned.plant, &tuned.controller]).zip([plant, controller])
+        {
+            let written = |settings| read(&ssv::text("x", settings)).unwrap();
+            let differs = |p: &Parameter| start(description, &p.name) != p.value;
+            let values =
+                |parameters: Vec<Parameter>| -> Vec<_> { parameters.into_iter().map(|p| (p.name, p.value)).collect() };
+            let expected = written(all).into_iter().filter(differs).collect();
+            assert_eq!(values(written(&needed)), values(expected), "{}: {}", path.display(), description.name);
+        }
+    }
+    let salient = motors().into_iter().find(|p| p.ends_with("ipmsm-2.2kw.toml")).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let tuned = fmu(&["tune", salient.to_str().unwrap(), "--integers", "--out", dir.path().to_str().unwrap()]);
+    assert!(tuned.status.success(), "{}", String::from_utf8_lossy(&tuned.stderr));
+    let text = std::fs::read_to_string(dir.path().join("ipmsm-2.2kw.SensorlessController.ssv")).unwrap();
+    for parameter in ["\"estimator\"><ssv:Integer value=\"4\"/>", "\"start.mode\"><ssv:Integer value=\"2\"/>"] {
+        assert!(text.contains(parameter), "{parameter} is not in {text}");
+    }
+    assert!(!text.contains("\"motor.n_p\""), "3 pole pairs are the start value");
 }
 
 /// The reference motor with one line of it changed.

@@ -27,11 +27,13 @@ enum Order {
     LateVoltages,
     /// Jacobi, with a unit delay in the currents.
     LateCurrents,
+    /// Jacobi, with a unit delay in both: one sample more than the controller knows.
+    BothLate,
 }
 
 impl Order {
-    const ALL: [Self; 5] =
-        [Self::Jacobi, Self::ControllerFirst, Self::PlantFirst, Self::LateVoltages, Self::LateCurrents];
+    const ALL: [Self; 6] =
+        [Self::Jacobi, Self::ControllerFirst, Self::PlantFirst, Self::LateVoltages, Self::LateCurrents, Self::BothLate];
 
     /// What the pages call it.
     fn name(self) -> &'static str {
@@ -41,6 +43,7 @@ impl Order {
             Self::PlantFirst => "plant first, its currents in the same step",
             Self::LateVoltages => "Jacobi, voltages one step late",
             Self::LateCurrents => "Jacobi, currents one step late",
+            Self::BothLate => "Jacobi, both one step late",
         }
     }
 
@@ -50,6 +53,7 @@ impl Order {
             Self::ControllerFirst | Self::PlantFirst => 0,
             Self::Jacobi => 1,
             Self::LateVoltages | Self::LateCurrents => 2,
+            Self::BothLate => 3,
         }
     }
 }
@@ -80,10 +84,11 @@ fn steady(order: Order, delay: i32, load: f64) -> Steady {
                 p.controller.model.inputs.i = p.plant.out.i;
                 p.controller.step(&step).unwrap();
             }
-            Order::Jacobi | Order::LateVoltages | Order::LateCurrents => {
+            Order::Jacobi | Order::LateVoltages | Order::LateCurrents | Order::BothLate => {
                 let now = (p.controller.out.u, p.plant.out.i);
-                p.plant.model.inputs.u = if order == Order::LateVoltages { u } else { now.0 };
-                p.controller.model.inputs.i = if order == Order::LateCurrents { i } else { now.1 };
+                let late = |one: Order| order == one || order == Order::BothLate;
+                p.plant.model.inputs.u = if late(Order::LateVoltages) { u } else { now.0 };
+                p.controller.model.inputs.i = if late(Order::LateCurrents) { i } else { now.1 };
                 (u, i) = now;
                 p.plant.step(&step).unwrap();
                 p.controller.step(&step).unwrap();
@@ -116,7 +121,7 @@ fn order_and_delay() {
             // theta^ is recorded a period early, or late, where the currents are younger, or older, than the step.
             let recorded = match order {
                 Order::PlantFirst => 1.0,
-                Order::LateCurrents => -1.0,
+                Order::LateCurrents | Order::BothLate => -1.0,
                 _ => 0.0,
             };
             assert!((angle - 2.7 * (off + recorded)).abs() < 0.03, "{order:?}, delay {delay}: {angle} deg");

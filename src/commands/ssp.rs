@@ -2,7 +2,7 @@
 
 use super::build::{self, Build};
 use crate::pack::{self, Moment};
-use crate::ssp::{self, COMPONENTS, Values};
+use crate::ssp::{self, COMPONENTS, Options, Values};
 use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -18,8 +18,8 @@ use std::path::PathBuf;
 ///   fmu ssp --motor motors/ipmsm-2.2kw.toml --out drive.ssp
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg
 ///
-/// SSP 1.0 is older than FMI 3.0: many importers of SSP take FMUs of FMI 2.0 only. With SOURCE_DATE_EPOCH set, the same sources
-/// give the same bytes.
+/// SSP 1.0 is older than FMI 3.0: many importers of SSP take FMUs of FMI 2.0 only. OMSimulator's command line runs the file as
+/// it is, with --integers if a machine is given. With SOURCE_DATE_EPOCH set, the same sources give the same bytes.
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Ssp {
@@ -32,6 +32,16 @@ pub struct Ssp {
     /// Values for controller or plant, SSV of SSP 1.0 (repeatable)
     #[arg(long, value_name = "COMPONENT=FILE.ssv")]
     pub parameters: Vec<String>,
+    /// Writes the machine's enumerations as integers, for importers that read no names (OMSimulator)
+    #[arg(long, requires = "motor")]
+    pub integers: bool,
+    /// Connects `enabled` of the controller to `enable` of the plant, for a drive that is switched off; some importers have no
+    /// Boolean connections
+    #[arg(long)]
+    pub gates: bool,
+    /// Writes the size of the diagram, SystemGeometry, which some importers refuse (OMSimulator)
+    #[arg(long)]
+    pub geometry: bool,
     /// Where the SSP goes
     #[arg(long, value_name = "FILE.ssp")]
     pub out: PathBuf,
@@ -49,7 +59,8 @@ pub fn run(args: &Ssp) -> Result<()> {
     let built =
         build::run(&Build { fmus, fmi: Some(args.fmi.clone()), out: Some(dir.path().into()), ..Build::default() })?;
     let folder = built.first().and_then(|f| f.parent()).context("nothing was built")?;
-    let files = ssp::files(folder, &values, moment)?;
+    let options = Options { gates: args.gates, geometry: args.geometry };
+    let files = ssp::files(folder, &values, options, moment)?;
     pack::write(&args.out, &pack::archive(&files, moment)?)?;
     println!("{}", args.out.display());
     Ok(())
@@ -64,7 +75,8 @@ fn values(args: &Ssp) -> Result<Vec<Values>> {
             file: motor.display().to_string(),
             text: ssv::text(&format!("{} {component}", tuned.name), settings),
         };
-        return Ok(vec![of("controller", &tuned.controller), of("plant", &tuned.plant)]);
+        let (plant, controller) = tune::needed(&tuned, args.integers)?;
+        return Ok(vec![of("controller", &controller), of("plant", &plant)]);
     }
     let mut values: Vec<Values> = Vec::new();
     for text in &args.parameters {

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 /// Turns a machine and bandwidths into parameter values of PmsmPlant and SensorlessController.
 ///
 /// MOTOR.toml holds machine, mechanics, ratings, DC link and the bandwidths of current loop, speed loop and observer; the
-/// folder motors/ has examples. Writes NAME.PmsmPlant.ssv and NAME.SensorlessController.ssv (SSP 1.0), which importers
-/// read:
+/// folder motors/ has examples. Writes NAME.PmsmPlant.ssv and NAME.SensorlessController.ssv (SSP 1.0) with the values that
+/// differ from the start values of the FMUs, for importers:
 ///
 ///   fmu tune motors/ipmsm-2.2kw.toml --out target/tune
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
@@ -28,6 +28,9 @@ pub struct Tune {
     /// Where the files go [default: tune in Cargo's target folder]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Writes enumerations as integers, for importers that read no names (OMSimulator)
+    #[arg(long)]
+    pub integers: bool,
 }
 
 /// Runs the command.
@@ -37,7 +40,7 @@ pub struct Tune {
 pub fn run(args: &Tune) -> Result<()> {
     let tuned = tune::tune(&args.motor)?;
     let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("tune")), Ok)?;
-    let files = write(&tuned, &out)?;
+    let files = write(&tuned, &out, args.integers)?;
     println!("{}\n{}", tuned.name, tuned.source);
     for (model, settings) in [("PmsmPlant", &tuned.plant), ("SensorlessController", &tuned.controller)] {
         println!("\n{model}");
@@ -55,14 +58,16 @@ pub fn run(args: &Tune) -> Result<()> {
     Ok(())
 }
 
-/// Writes `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder; returns their paths.
-fn write(tuned: &Tuned, folder: &Path) -> Result<[PathBuf; 2]> {
+/// Writes `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder, each with what [`tune::needed`] leaves; returns
+/// their paths.
+fn write(tuned: &Tuned, folder: &Path, integers: bool) -> Result<[PathBuf; 2]> {
     let write = |model: &str, settings: &[Setting]| {
         let path = folder.join(format!("{}.{model}.ssv", tuned.name));
         pack::write(&path, ssv::text(&format!("{} {model}", tuned.name), settings).as_bytes())?;
         anyhow::Ok(path)
     };
-    Ok([write("PmsmPlant", &tuned.plant)?, write("SensorlessController", &tuned.controller)?])
+    let (plant, controller) = tune::needed(tuned, integers)?;
+    Ok([write("PmsmPlant", &plant)?, write("SensorlessController", &controller)?])
 }
 
 fn shown(value: &Value) -> String {

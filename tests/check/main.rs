@@ -69,7 +69,7 @@ fn the_page_has_the_list() {
     } else {
         assert!(page == expected, "docs/check.md is old: UPDATE_GOLDEN=1 cargo test --test check writes it");
     }
-    let checks = fmu::check::report::list().lines().filter(|l| l.starts_with("| ") && !l.starts_with("| id")).count();
+    let checks = fmu_check::report::list().lines().filter(|l| l.starts_with("| ") && !l.starts_with("| id")).count();
     for (file, text) in
         [("README.md", include_str!("../../README.md")), ("CHANGELOG.md", include_str!("../../CHANGELOG.md"))]
     {

@@ -54,7 +54,7 @@ def test_drive(archives, experiment, standard, reals):
     connections = [Connection(source, drive[name]) for source, name in sources]
     blocks = [speed_ref, load, u_dc, drive]
     rows = run(blocks, connections, [(drive, "speed")], DRIVE_STEP, len(experiment.entry["drive"]))
-    experiment.check_drive([row[0] for row in rows], 1e-6)
+    experiment.check_drive([row[0] for row in rows], 0.0)
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -71,7 +71,7 @@ def test_pair(archives, experiment, order, reals):
     connections += [Connection(u_dc, *(block["u_dc"] for block in pair.values()))]
     blocks = [speed_ref, load, u_dc, *(pair[name] for name in ORDERS[order])]
     rows = run(blocks, connections, [(pair[a], x) for a, x in RECORDED], T_S, experiment.steps)
-    experiment.check(rows[:: experiment.every], order, rounding=1e-6)
+    experiment.check(rows[:: experiment.every], order)
 
 
 @pytest.mark.parametrize("standard", STANDARDS)

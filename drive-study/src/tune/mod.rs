@@ -8,9 +8,12 @@ pub mod motor;
 mod native;
 pub mod rules;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
+use drive::{PmsmPlant, SensorlessController};
+use fmu_core::description::{self, Variable, VariableKind};
+use fmu_core::{Description, Model};
 use motor::MotorFile;
-use rules::Tuned;
+use rules::{Setting, Tuned, Value};
 use std::path::Path;
 
 /// Reads a machine's file and derives the values of both FMUs.
@@ -21,4 +24,46 @@ pub fn tune(path: &Path) -> Result<Tuned> {
     let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
     let motor = MotorFile::parse(&text, path)?;
     rules::tune(&motor)
+}
+
+/// What importers have to be told, of plant and controller: the settings that differ from the start values of the FMUs. An
+/// enumeration's value is the name of its item, or with `integers` the integer behind it.
+///
+/// # Errors
+/// A model cannot be described.
+pub fn needed(tuned: &Tuned, integers: bool) -> Result<(Vec<Setting>, Vec<Setting>)> {
+    Ok((of_model::<PmsmPlant>(&tuned.plant, integers)?, of_model::<SensorlessController>(&tuned.controller, integers)?))
+}
+
+fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {
+    let description = Description::of::<M>().map_err(|e| anyhow!("{e}"))?;
+    let one = |setting: &Setting| {
+        let variable = description.variable(setting.name);
+        let number = variable.and_then(|v| item_value(v, &setting.value)).map(Value::Integer);
+        let start = variable.and_then(|v| v.start.as_ref()?.first());
+        let same = start.is_some_and(|start| is(number.as_ref().unwrap_or(&setting.value), *start));
+        let value = number.filter(|_| integers).unwrap_or_else(|| setting.value.clone());
+        (!same).then(|| Setting { value, ..setting.clone() })
+    };
+    Ok(settings.iter().filter_map(one).collect())
+}
+
+/// The integer behind an item of an enumeration.
+fn item_value(variable: &Variable, value: &Value) -> Option<i32> {
+    match (&variable.kind, value) {
+        (VariableKind::Enumeration { items, .. }, Value::Item(item)) => {
+            items.iter().find(|(_, name, _)| name == item).map(|(value, ..)| *value)
+        }
+        _ => None,
+    }
+}
+
+/// Whether a value is the start value, to the last bit.
+fn is(value: &Value, start: description::Value) -> bool {
+    match (value, start) {
+        (Value::Real(x), description::Value::Real(start)) => x.to_bits() == start.to_bits(),
+        (Value::Integer(x), description::Value::Integer(start)) => *x == start,
+        (Value::Boolean(x), description::Value::Boolean(start)) => *x == start,
+        _ => false,
+    }
 }
