@@ -4,7 +4,7 @@ use super::bench::{Bench, Blocked, bits, fine, show};
 use super::values::{booleans, not_a_number, order, out_of_range, round_trip, strings, tunable};
 use super::{Check, Level, Levels, Run};
 use fmu_import::Status;
-use fmu_import::raw::Cells;
+use fmu_import::raw::Buffer;
 use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability, parse_number};
 
 const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.6.2";
@@ -128,7 +128,7 @@ fn nothing(bench: &Bench) -> Result<(), Blocked> {
         bench.case(|| {
             let it = bench.stepping()?;
             for set in [false, true] {
-                let (kind, none) = (if set { "Set" } else { "Get" }, Option::<&mut Cells>::None);
+                let (kind, none) = (if set { "Set" } else { "Get" }, Option::<&mut Buffer>::None);
                 let status = it.call(&format!("{kind}({base}, NULL, 0, NULL, 0)"), |raw| {
                     if set {
                         raw.set(it.handle, base, None, 0, none, 0)
@@ -154,9 +154,9 @@ fn null(bench: &Bench) -> Result<(), Blocked> {
                 else {
                     return Ok(());
                 };
-                let mut cells = Cells::of(v.base, bench.md.version, &[bits(v.base, 0.0)]);
+                let mut buffer = Buffer::of(v.base, bench.md.version, &[bits(v.base, 0.0)]);
                 let list = [v.value_reference];
-                let (list, place) = (references.then_some(&list[..]), values.then_some(&mut cells));
+                let (list, place) = (references.then_some(&list[..]), values.then_some(&mut buffer));
                 let call = format!(
                     "{}({}, {}, 1, {}, 1)",
                     if set { "Set" } else { "Get" },
@@ -190,11 +190,11 @@ fn counts(bench: &Bench) -> Result<(), Blocked> {
             else {
                 return Ok(());
             };
-            let mut cells = Cells::of(v.base, bench.md.version, &vec![bits(v.base, 0.0); n]);
+            let mut buffer = Buffer::of(v.base, bench.md.version, &vec![bits(v.base, 0.0); n]);
             let list = [v.value_reference];
             let call = format!("{}({}, nValueReferences=1, nValues={n})", if set { "Set" } else { "Get" }, v.name);
             let status = it.call(&call, |raw| {
-                let place = Some(&mut cells);
+                let place = Some(&mut buffer);
                 if set {
                     raw.set(it.handle, v.base, Some(&list), 1, place, n)
                 } else {
@@ -202,7 +202,7 @@ fn counts(bench: &Bench) -> Result<(), Blocked> {
                 }
             })?;
             bench.require(status == Status::ERROR, || format!("{call} returned {status}"));
-            bench.require(cells.intact(), || format!("{call} wrote behind the {n} values"));
+            bench.require(buffer.intact(), || format!("{call} wrote behind the {n} values"));
             Ok(())
         });
     }
@@ -233,10 +233,10 @@ fn unknown(bench: &Bench) -> Result<(), Blocked> {
 /// A getter or setter that must return Error.
 fn refuse(bench: &Bench, base: BaseType, reference: u32, set: bool, what: &str) -> Result<(), Blocked> {
     let it = bench.stepping()?;
-    let mut cells = Cells::of(base, bench.md.version, &[bits(base, 0.0)]);
+    let mut buffer = Buffer::of(base, bench.md.version, &[bits(base, 0.0)]);
     let call = format!("{}({base}, reference={reference})", if set { "Set" } else { "Get" });
     let status = it.call(&call, |raw| {
-        let place = Some(&mut cells);
+        let place = Some(&mut buffer);
         if set {
             raw.set(it.handle, base, Some(&[reference]), 1, place, 1)
         } else {
@@ -319,10 +319,10 @@ fn atomic(bench: &Bench) -> Result<(), Blocked> {
     let Some(values) = bench.other_value(v, 3.0) else { return Ok(()) };
     let it = bench.stepping()?;
     let before = it.get(v)?.1;
-    let mut cells = Cells::of(v.base, bench.md.version, &[values[0], 0]);
+    let mut buffer = Buffer::of(v.base, bench.md.version, &[values[0], 0]);
     let list = [v.value_reference, free_reference(bench)];
     let status = it.call(&format!("Set({}, and a reference that does not exist)", v.name), |raw| {
-        raw.set(it.handle, v.base, Some(&list), 2, Some(&mut cells), 2)
+        raw.set(it.handle, v.base, Some(&list), 2, Some(&mut buffer), 2)
     })?;
     if fine(status) {
         return Err(Blocked("a reference that does not exist is not refused".into()));

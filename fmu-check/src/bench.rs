@@ -5,7 +5,7 @@
 
 use super::it::It;
 use fmu_import::file_uri;
-use fmu_import::raw::{Birth, Interface, Raw, width};
+use fmu_import::raw::{Arguments, Interface, Raw, width};
 use model_description::{
     BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, ModelVariable, Variability,
 };
@@ -215,7 +215,7 @@ impl Bench {
     }
 
     /// Good arguments for an instantiation.
-    pub(super) fn birth(&self, name: &str) -> Birth {
+    pub(super) fn arguments(&self, name: &str) -> Arguments {
         let text = |text: &str| CString::new(text).unwrap_or_default();
         let resources = self.resources();
         let resources = match self.md.version {
@@ -224,7 +224,7 @@ impl Bench {
         };
         self.born.set(self.born.get() + 1);
         let clocks = self.md.variables.iter().any(|v| v.base == BaseType::Clock);
-        Birth {
+        Arguments {
             name: Some(text(name)),
             token: Some(text(&self.md.token)),
             resources: Some(text(&resources)),
@@ -240,10 +240,10 @@ impl Bench {
     }
 
     /// Instantiates; `None` for NULL.
-    pub(super) fn instantiate(&self, birth: &Birth) -> Result<Option<It<'_>>, Blocked> {
-        self.calling(&format!("{}({:?})", self.instantiation(), birth.name.as_deref().unwrap_or_default()));
-        let handle = self.raw.instantiate(birth).map_err(Blocked)?;
-        Ok(handle.map(|handle| It::new(self, handle, birth.event_mode)))
+    pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<It<'_>>, Blocked> {
+        self.calling(&format!("{}({:?})", self.instantiation(), arguments.name.as_deref().unwrap_or_default()));
+        let handle = self.raw.instantiate(arguments).map_err(Blocked)?;
+        Ok(handle.map(|handle| It::new(self, handle, arguments.event_mode)))
     }
 
     /// Name of the function that makes instances for co-simulation.
@@ -257,7 +257,7 @@ impl Bench {
     /// A new instance that works.
     pub(super) fn fresh(&self) -> Result<It<'_>, Blocked> {
         self.prepare(|| {
-            let made = self.instantiate(&self.birth("probe"))?;
+            let made = self.instantiate(&self.arguments("probe"))?;
             made.ok_or_else(|| Blocked(format!("{} returned NULL", self.instantiation())))
         })
     }

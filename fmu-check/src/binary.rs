@@ -4,6 +4,7 @@ use super::bench::{Bench, Blocked, fine};
 use super::subject::Binary;
 use super::{Check, Level, Levels, Run, Subject, Verdict};
 use fmu_import::elf::{FLOOR, NEEDED, dynamic, is_system, newest_glibc, strings};
+use fmu_import::raw::{Simple, Text};
 use model_description::FmiVersion;
 use object::elf;
 use object::read::elf::{ElfFile64, ProgramHeader};
@@ -284,15 +285,15 @@ fn loads(_: &Bench) -> Result<(), Blocked> {
 }
 
 fn versions(bench: &Bench) -> Result<(), Blocked> {
-    let mut texts = vec![("GetVersion", bench.md.version.to_string())];
+    let mut texts = vec![(Text::GetVersion, bench.md.version.to_string())];
     if bench.md.version == FmiVersion::V2 {
-        texts.push(("GetTypesPlatform", "default".into()));
+        texts.push((Text::GetTypesPlatform, "default".into()));
     }
     for (name, expected) in texts {
-        bench.calling(&bench.raw.name(name));
+        bench.calling(&bench.raw.name(name.as_str()));
         let told = bench.raw.text(name);
         bench.require(told.as_ref() == Some(&expected), || {
-            format!("{} returned {told:?}, expected {expected:?}", bench.raw.name(name))
+            format!("{} returned {told:?}, expected {expected:?}", bench.raw.name(name.as_str()))
         });
     }
     Ok(())
@@ -306,7 +307,7 @@ fn life(bench: &Bench) -> Result<(), Blocked> {
         let _ = it.step(bench.h())?;
         let _ = it.snapshot(&bench.watched())?;
     }
-    let status = it.simple("Terminate")?;
+    let status = it.simple(Simple::Terminate)?;
     bench.note(format!("Terminate returned {status}"));
     if fine(status) {
         it.free()?;

@@ -3,7 +3,7 @@
 use super::bench::{Bench, Blocked};
 use super::lifecycle::difference;
 use super::{Check, Levels, Run};
-use fmu_import::raw::{Raw, float_control};
+use fmu_import::raw::{Raw, Simple, float_control};
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,7 +61,7 @@ fn small_stack(bench: &Bench) -> Result<(), Blocked> {
             it.steps(1, twin.h())?;
             let _ = it.snapshot(&twin.watched())?;
         }
-        let _ = it.simple("Terminate")?;
+        let _ = it.simple(Simple::Terminate)?;
         it.free()
     };
     let thread = std::thread::Builder::new().stack_size(STACK).spawn(work).map_err(|e| failed(&e))?;
@@ -109,7 +109,7 @@ fn floating_point(bench: &Bench) -> Result<(), Blocked> {
             return Ok(());
         }
     }
-    let _ = it.simple("Terminate")?;
+    let _ = it.simple(Simple::Terminate)?;
     it.free()?;
     look("the end of the life");
     Ok(())
@@ -201,7 +201,7 @@ fn surroundings(bench: &Bench) -> Result<(), Blocked> {
             it.steps(1, twin.h())?;
             let _ = it.snapshot(&twin.watched())?;
         }
-        let _ = it.simple("Terminate")?;
+        let _ = it.simple(Simple::Terminate)?;
         it.free()?;
     }
     let mut found = before.differences(&Surroundings::now(&own));

@@ -44,7 +44,7 @@ fn turns(bench: &Bench) -> Result<(), Blocked> {
     // That they can be made at all is what is asked here.
     let mut all = Vec::new();
     for k in 0..8 {
-        let Some(it) = bench.instantiate(&bench.birth(&format!("probe {k}")))? else {
+        let Some(it) = bench.instantiate(&bench.arguments(&format!("probe {k}")))? else {
             bench.violated(format!("instance {} beside {k} others could not be made", k + 2));
             return Ok(());
         };
@@ -173,7 +173,7 @@ fn leaks(bench: &Bench) -> Result<(), Blocked> {
     let cycle = |n: usize| {
         bench.many(&format!("{n} instances, made, stepped and freed"), || {
             for _ in 0..n {
-                let Some(it) = bench.instantiate(&bench.birth("probe"))? else {
+                let Some(it) = bench.instantiate(&bench.arguments("probe"))? else {
                     return Err(Blocked("no instance".into()));
                 };
                 it.enter()?;

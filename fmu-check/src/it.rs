@@ -2,7 +2,7 @@
 
 use super::bench::{Bench, Blocked, fine, show};
 use fmu_import::Status;
-use fmu_import::raw::{Cells, Handle, Raw, SavedState};
+use fmu_import::raw::{Buffer, Handle, Raw, SavedState, Simple};
 use model_description::{FmiVersion, ModelVariable};
 use std::cell::Cell;
 
@@ -34,8 +34,8 @@ impl It<'_> {
     }
 
     /// A function without arguments.
-    pub(super) fn simple(&self, name: &str) -> Result<Status, Blocked> {
-        self.call(name, |raw| raw.simple(name, self.handle))
+    pub(super) fn simple(&self, name: Simple) -> Result<Status, Blocked> {
+        self.call(name.as_str(), |raw| raw.simple(name, self.handle))
     }
 
     fn must(&self, name: &str, status: Status) -> Result<(), Blocked> {
@@ -58,14 +58,14 @@ impl It<'_> {
         })?;
         self.must(name, status)?;
         if self.bench.md.version == FmiVersion::V2 {
-            self.must("EnterInitializationMode", self.simple("EnterInitializationMode")?)?;
+            self.must("EnterInitializationMode", self.simple(Simple::EnterInitializationMode)?)?;
         }
         Ok(())
     }
 
     /// From initialisation mode to where steps are made.
     pub(super) fn exit(&self) -> Result<(), Blocked> {
-        self.must("ExitInitializationMode", self.simple("ExitInitializationMode")?)?;
+        self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
         if self.event_mode { self.events() } else { Ok(()) }
     }
 
@@ -83,7 +83,7 @@ impl It<'_> {
                 break;
             }
         }
-        self.must("EnterStepMode", self.simple("EnterStepMode")?)
+        self.must("EnterStepMode", self.simple(Simple::EnterStepMode)?)
     }
 
     /// A step, from where the last one ended.
@@ -101,7 +101,7 @@ impl It<'_> {
         let call = if self.bench.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?})") };
         let status = self.call(&call, |raw| raw.do_step(self.handle, t, h, false, [true; 4]).map(|(s, _)| s))?;
         if self.event_mode && fine(status) {
-            self.must("EnterEventMode", self.simple("EnterEventMode")?)?;
+            self.must("EnterEventMode", self.simple(Simple::EnterEventMode)?)?;
             self.events()?;
         }
         Ok(status)
@@ -118,22 +118,22 @@ impl It<'_> {
     /// A variable's values.
     pub(super) fn get(&self, v: &ModelVariable) -> Result<(Status, Vec<u64>), Blocked> {
         let n = self.bench.elements(v);
-        let mut cells = Cells::room(v.base, self.bench.md.version, n);
+        let mut buffer = Buffer::room(v.base, self.bench.md.version, n);
         let status = self.call(&format!("Get({})", v.name), |raw| {
-            raw.get(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut cells), n)
+            raw.get(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), n)
         })?;
-        if !cells.intact() {
+        if !buffer.intact() {
             return Err(Blocked(format!("getting {} wrote behind its {n} values", v.name)));
         }
-        Ok((status, cells.bits()))
+        Ok((status, buffer.bits()))
     }
 
     /// Sets a variable's values.
     pub(super) fn set(&self, v: &ModelVariable, values: &[u64]) -> Result<Status, Blocked> {
-        let mut cells = Cells::of(v.base, self.bench.md.version, values);
+        let mut buffer = Buffer::of(v.base, self.bench.md.version, values);
         let call = format!("Set({} = {})", v.name, show(v, self.bench.md.version, values));
         self.call(&call, |raw| {
-            raw.set(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut cells), values.len())
+            raw.set(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), values.len())
         })
     }
 

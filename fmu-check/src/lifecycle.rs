@@ -6,7 +6,7 @@ use super::it::It;
 use super::table::{allowed, configuration, nobody, refused, unsupported};
 use super::{Check, Level, Levels, Run};
 use fmu_import::Status;
-use fmu_import::raw::{Handle, Interface};
+use fmu_import::raw::{Handle, Interface, Simple};
 use model_description::{Causality, FmiVersion};
 use std::ffi::CString;
 
@@ -38,15 +38,15 @@ fn plain(bench: &Bench) -> Result<(), Blocked> {
     let it = bench.stepping()?;
     it.steps(10, bench.h())?;
     let _ = it.snapshot(&bench.watched())?;
-    let status = it.simple("Terminate")?;
+    let status = it.simple(Simple::Terminate)?;
     bench.require(fine(status), || format!("{} returned {status}", bench.raw.name("Terminate")));
     Ok(())
 }
 
 fn token(bench: &Bench) -> Result<(), Blocked> {
-    let mut birth = bench.birth("probe");
-    birth.token = CString::new("{00000000-wrong-token}").ok();
-    let made = bench.instantiate(&birth)?;
+    let mut arguments = bench.arguments("probe");
+    arguments.token = CString::new("{00000000-wrong-token}").ok();
+    let made = bench.instantiate(&arguments)?;
     bench.require(made.is_none(), || format!("{} with another token made an instance", bench.instantiation()));
     Ok(())
 }
@@ -57,13 +57,13 @@ fn names(bench: &Bench) -> Result<(), Blocked> {
         [("instanceName = NULL", None, true), ("instanceName = \"\"", empty, true), ("the token NULL", None, false)];
     for (what, value, name) in cases {
         bench.case(|| {
-            let mut birth = bench.birth("probe");
+            let mut arguments = bench.arguments("probe");
             if name {
-                birth.name = value;
+                arguments.name = value;
             } else {
-                birth.token = value;
+                arguments.token = value;
             }
-            let made = bench.instantiate(&birth)?;
+            let made = bench.instantiate(&arguments)?;
             bench.require(made.is_none(), || format!("{} with {what} made an instance", bench.instantiation()));
             Ok(())
         });
@@ -71,9 +71,9 @@ fn names(bench: &Bench) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// From a birth to a few steps and an error.
-fn short_life(bench: &Bench, birth: &fmu_import::raw::Birth, what: &str) -> Result<(), Blocked> {
-    let Some(it) = bench.instantiate(birth)? else {
+/// From a arguments to a few steps and an error.
+fn short_life(bench: &Bench, arguments: &fmu_import::raw::Arguments, what: &str) -> Result<(), Blocked> {
+    let Some(it) = bench.instantiate(arguments)? else {
         bench.violated(format!("{} with {what} returned NULL", bench.instantiation()));
         return Ok(());
     };
@@ -88,16 +88,16 @@ fn short_life(bench: &Bench, birth: &fmu_import::raw::Birth, what: &str) -> Resu
 fn mute(bench: &Bench) -> Result<(), Blocked> {
     let v2 = bench.md.version == FmiVersion::V2;
     bench.case(|| {
-        let mut birth = bench.birth("probe");
-        (birth.logger, birth.logging) = (false, true);
-        short_life(bench, &birth, "a log callback that is NULL")
+        let mut arguments = bench.arguments("probe");
+        (arguments.logger, arguments.logging) = (false, true);
+        short_life(bench, &arguments, "a log callback that is NULL")
     });
     if v2 {
         bench.case(|| {
-            let mut birth = bench.birth("probe");
-            (birth.callbacks, birth.logging) = (false, true);
+            let mut arguments = bench.arguments("probe");
+            (arguments.callbacks, arguments.logging) = (false, true);
             // NULL is not allowed here, so NULL is a good answer.
-            if let Some(it) = bench.instantiate(&birth)? {
+            if let Some(it) = bench.instantiate(&arguments)? {
                 it.free()?;
             }
             Ok(())
@@ -114,18 +114,18 @@ fn homeless(bench: &Bench) -> Result<(), Blocked> {
     let odd = if v2 { "file:/no%20such/pl%C3%A4ce#1" } else { "/no such/pl\u{e4}ce #1/" };
     for (what, path) in [("the resource path NULL", None), ("a resource path that does not exist", Some(odd))] {
         bench.case(|| {
-            let mut birth = bench.birth("probe");
-            birth.resources = path.and_then(|p| CString::new(p).ok());
-            short_life(bench, &birth, what)
+            let mut arguments = bench.arguments("probe");
+            arguments.resources = path.and_then(|p| CString::new(p).ok());
+            short_life(bench, &arguments, what)
         });
     }
     Ok(())
 }
 
 fn callbacks(bench: &Bench) -> Result<(), Blocked> {
-    let mut birth = bench.birth("probe");
-    (birth.lasting, birth.logging) = (false, true);
-    short_life(bench, &birth, "good arguments")?;
+    let mut arguments = bench.arguments("probe");
+    (arguments.lasting, arguments.logging) = (false, true);
+    short_life(bench, &arguments, "good arguments")?;
     let late = fmu_import::raw::take_events().iter().filter(|e| e.late).count();
     bench.require(late == 0, || format!("{late} messages went through the struct after fmi2Instantiate had returned"));
     Ok(())
@@ -145,9 +145,9 @@ fn interfaces(bench: &Bench) -> Result<(), Blocked> {
     }
     for (what, interface, event_mode) in cases {
         bench.case(|| {
-            let mut birth = bench.birth("probe");
-            (birth.interface, birth.event_mode) = (interface, event_mode);
-            let made = bench.instantiate(&birth)?;
+            let mut arguments = bench.arguments("probe");
+            (arguments.interface, arguments.event_mode) = (interface, event_mode);
+            let made = bench.instantiate(&arguments)?;
             bench.require(made.is_none(), || format!("an instantiation for {what} made an instance"));
             Ok(())
         });
@@ -179,7 +179,7 @@ pub(super) fn in_state(bench: &Bench, state: State) -> Result<It<'_>, Blocked> {
         }
         Terminated => {
             let it = in_state(bench, Step)?;
-            let status = it.simple("Terminate")?;
+            let status = it.simple(Simple::Terminate)?;
             if fine(status) { Ok(it) } else { Err(Blocked(format!("Terminate returned {status}"))) }
         }
         Error => {
@@ -197,7 +197,7 @@ impl It<'_> {
         if self.step_at(t, -h)? == Status::ERROR {
             return Ok(format!("DoStep(h={})", -h));
         }
-        if self.simple("ExitInitializationMode")? == Status::ERROR {
+        if self.simple(Simple::ExitInitializationMode)? == Status::ERROR {
             return Ok("ExitInitializationMode in step mode".into());
         }
         Err(Blocked("neither a negative step nor a call in a wrong state returned Error".into()))
@@ -238,7 +238,7 @@ fn reset(bench: &Bench) -> Result<(), Blocked> {
                 it.excite(1)?;
                 it.steps(3, bench.h())?;
             }
-            let status = it.simple("Reset")?;
+            let status = it.simple(Simple::Reset)?;
             if !fine(status) {
                 bench.violated(format!("Reset after {state:?} returned {status}"));
                 return Ok(());
@@ -262,7 +262,7 @@ fn reset(bench: &Bench) -> Result<(), Blocked> {
                 let _ = it.set(v, &values)?;
             }
         }
-        let _ = it.simple("Reset")?;
+        let _ = it.simple(Simple::Reset)?;
         it.experiment(bench.start(), None);
         let second = run(&it)?;
         if let Some((k, i)) = difference(&first, &second) {
@@ -292,7 +292,7 @@ fn after_error(bench: &Bench) -> Result<(), Blocked> {
 fn recovery(bench: &Bench) -> Result<(), Blocked> {
     let it = in_state(bench, Step)?;
     let how = it.provoke()?;
-    let status = it.simple("Reset")?;
+    let status = it.simple(Simple::Reset)?;
     if !fine(status) {
         bench.violated(format!("after {how} had returned Error, Reset returned {status}"));
         return Ok(());
@@ -308,7 +308,7 @@ fn terminated(bench: &Bench) -> Result<(), Blocked> {
     let it = in_state(bench, Step)?;
     let watched = bench.watched();
     let before = it.snapshot(&watched)?;
-    let status = it.simple("Terminate")?;
+    let status = it.simple(Simple::Terminate)?;
     if !fine(status) {
         return Err(Blocked(format!("Terminate returned {status}")));
     }

@@ -24,12 +24,12 @@ pub(super) const CHECKS: &[Check] = &[
 /// A life with mistakes in it, and what was logged; the environment and the name that it was made with.
 fn talk(bench: &Bench, logging: bool) -> Result<(Vec<Event>, usize, String), Blocked> {
     let _ = take_events();
-    let mut birth = bench.birth("a probe's name");
-    birth.logging = logging;
-    let environment = birth.environment;
-    let it = bench.instantiate(&birth)?.ok_or_else(|| Blocked("no instance".into()))?;
+    let mut arguments = bench.arguments("a probe's name");
+    arguments.logging = logging;
+    let environment = arguments.environment;
+    let it = bench.instantiate(&arguments)?.ok_or_else(|| Blocked("no instance".into()))?;
     // The FMU keeps its own copy of the name.
-    drop(birth);
+    drop(arguments);
     it.enter()?;
     it.exit()?;
     it.steps(5, bench.h())?;
@@ -87,9 +87,9 @@ fn unknown(bench: &Bench) -> Result<(), Blocked> {
 
 fn errors(bench: &Bench) -> Result<(), Blocked> {
     let _ = take_events();
-    let mut birth = bench.birth("probe");
-    birth.logging = true;
-    let it = bench.instantiate(&birth)?.ok_or_else(|| Blocked("no instance".into()))?;
+    let mut arguments = bench.arguments("probe");
+    arguments.logging = true;
+    let it = bench.instantiate(&arguments)?.ok_or_else(|| Blocked("no instance".into()))?;
     it.enter()?;
     it.exit()?;
     it.steps(2, bench.h())?;
@@ -142,9 +142,9 @@ fn memory(bench: &Bench) -> Result<(), Blocked> {
     }
     for given in [true, false] {
         bench.case(|| {
-            let mut birth = bench.birth("probe");
-            birth.memory = given;
-            let Some(it) = bench.instantiate(&birth)? else {
+            let mut arguments = bench.arguments("probe");
+            arguments.memory = given;
+            let Some(it) = bench.instantiate(&arguments)? else {
                 bench.violated("fmi2Instantiate with memory functions that are NULL returned NULL");
                 return Ok(());
             };

@@ -6,7 +6,7 @@ use super::it::It;
 use super::lifecycle::State::{self, Error, Initialisation, Instantiated, Step, Terminated};
 use super::lifecycle::in_state;
 use fmu_import::Status;
-use fmu_import::raw::{Cells, Handle, SavedState};
+use fmu_import::raw::{Buffer, Handle, Optional, Raw, SavedState, Simple, StepStatus};
 use model_description::{BaseType, Causality, CoSimulation, FmiVersion, ModelVariable};
 
 /// What makes a call on an instance.
@@ -38,7 +38,7 @@ fn calls<'b>(bench: &'b Bench) -> Vec<Call<'b>> {
         ALL,
         Box::new(|it| it.call("SetDebugLogging", |raw| raw.debug_logging(it.handle, false, None, 0))),
     );
-    add("Reset", ALL, Box::new(|it| it.simple("Reset")));
+    add("Reset", ALL, Box::new(|it| it.simple(Simple::Reset)));
     if v2 {
         add(
             "SetupExperiment",
@@ -51,7 +51,7 @@ fn calls<'b>(bench: &'b Bench) -> Vec<Call<'b>> {
             Box::new(|it| {
                 // SetupExperiment belongs to it; where it is not allowed its refusal does not matter.
                 let _ = it.call("SetupExperiment", |raw| raw.experiment(it.handle, None, bench.start(), None))?;
-                it.simple("EnterInitializationMode")
+                it.simple(Simple::EnterInitializationMode)
             }),
         );
     } else {
@@ -63,8 +63,8 @@ fn calls<'b>(bench: &'b Bench) -> Vec<Call<'b>> {
             }),
         );
     }
-    add("ExitInitializationMode", &[Initialisation], Box::new(|it| it.simple("ExitInitializationMode")));
-    add("Terminate", &[Step], Box::new(|it| it.simple("Terminate")));
+    add("ExitInitializationMode", &[Initialisation], Box::new(|it| it.simple(Simple::ExitInitializationMode)));
+    add("Terminate", &[Step], Box::new(|it| it.simple(Simple::Terminate)));
     add(
         "DoStep",
         &[Step],
@@ -183,6 +183,17 @@ fn absent(bench: &Bench) -> Vec<&'static str> {
     functions(bench.md.version).into_iter().filter(fits).collect()
 }
 
+/// A function by its name, with arguments that are as good as possible.
+fn unadorned(raw: &Raw, name: &str, handle: Handle, reference: u32) -> Option<Status> {
+    if let Some(name) = Simple::named(name) {
+        raw.simple(name, handle)
+    } else if let Some(name) = StepStatus::named(name) {
+        raw.step_status(name, handle, 2).map(|(status, _)| status)
+    } else {
+        raw.optional(Optional::named(name)?, handle, reference)
+    }
+}
+
 pub(super) fn unsupported(bench: &Bench) -> Result<(), Blocked> {
     let reference = bench.watched().first().map_or(0, |v| v.value_reference);
     for name in absent(bench) {
@@ -197,7 +208,7 @@ pub(super) fn unsupported(bench: &Bench) -> Result<(), Blocked> {
                     "SerializedFMUstateSize" | "SerializedFMUStateSize" => {
                         raw.state_size(it.handle, SavedState::NULL).map(|(s, _)| s)
                     }
-                    _ => raw.other(name, it.handle, reference),
+                    _ => unadorned(raw, name, it.handle, reference),
                 })?;
                 bench.require(status == Status::ERROR, || {
                     format!("{} in {state:?} returned {status}", bench.raw.name(name))
@@ -214,7 +225,7 @@ pub(super) fn configuration(bench: &Bench) -> Result<(), Blocked> {
         return bench.not_applicable("there are structural parameters");
     }
     let it = bench.fresh()?;
-    let status = it.simple("EnterConfigurationMode")?;
+    let status = it.simple(Simple::EnterConfigurationMode)?;
     bench.require(status == Status::ERROR, || format!("fmi3EnterConfigurationMode returned {status}"));
     Ok(())
 }
@@ -248,7 +259,6 @@ pub(super) fn nobody(bench: &Bench) -> Result<(), Blocked> {
                 "DeSerializeFMUstate" | "DeserializeFMUState" => {
                     raw.deserialize(null, Some(&[0; 8]), 8).map(|(s, _)| s)
                 }
-                n if n.ends_with("Status") => raw.step_status(n, null, 2).map(|(s, _)| s),
                 n => match n
                     .strip_prefix("Get")
                     .or_else(|| n.strip_prefix("Set"))
@@ -256,14 +266,14 @@ pub(super) fn nobody(bench: &Bench) -> Result<(), Blocked> {
                     .filter(|b| !matches!(b, BaseType::Binary | BaseType::Clock))
                 {
                     Some(base) => {
-                        let mut cells = Cells::of(base, bench.md.version, &[bits(base, 0.0)]);
+                        let mut buffer = Buffer::of(base, bench.md.version, &[bits(base, 0.0)]);
                         if n.starts_with("Get") {
-                            raw.get(null, base, Some(&[0]), 1, Some(&mut cells), 1)
+                            raw.get(null, base, Some(&[0]), 1, Some(&mut buffer), 1)
                         } else {
-                            raw.set(null, base, Some(&[0]), 1, Some(&mut cells), 1)
+                            raw.set(null, base, Some(&[0]), 1, Some(&mut buffer), 1)
                         }
                     }
-                    None => raw.other(n, null, 0),
+                    None => unadorned(raw, n, null, 0),
                 },
             };
             let status = status.ok_or_else(|| Blocked(format!("{name} is missing")))?;

@@ -6,6 +6,7 @@ use super::it::It;
 use super::lifecycle::difference;
 use super::{Check, Level, Levels, Run};
 use fmu_import::Status;
+use fmu_import::raw::StepStatus;
 use model_description::{BaseType, Causality, CoSimulation};
 
 const STEP: &str = "2.0.5, 4.2.2; 3.0.2, 4.2.1.1";
@@ -226,21 +227,22 @@ fn places(bench: &Bench) -> Result<(), Blocked> {
 }
 
 fn statuses(bench: &Bench) -> Result<(), Blocked> {
-    for name in ["GetStatus", "GetRealStatus", "GetIntegerStatus", "GetBooleanStatus", "GetStringStatus"] {
+    use StepStatus::{GetBooleanStatus, GetIntegerStatus, GetRealStatus, GetStatus, GetStringStatus};
+    for name in [GetStatus, GetRealStatus, GetIntegerStatus, GetBooleanStatus, GetStringStatus] {
         for kind in [0, 1, 2, 3, 99] {
             bench.case(|| {
                 let it = bench.stepping()?;
                 it.steps(1, bench.h())?;
-                let status = it.call(&format!("{name}(kind={kind})"), |raw| {
+                let status = it.call(&format!("{name:?}(kind={kind})"), |raw| {
                     raw.step_status(name, it.handle, kind).map(|(s, _)| s)
                 })?;
                 let known = [Status::OK, Status::WARNING, Status::DISCARD].contains(&status) || kind == 99;
                 // A number of a status that this function does not tell at all may be an error.
                 let fits = matches!(
                     (name, kind),
-                    ("GetStatus", 0) | ("GetRealStatus", 2) | ("GetBooleanStatus", 3) | ("GetStringStatus", 1)
+                    (GetStatus, 0) | (GetRealStatus, 2) | (GetBooleanStatus, 3) | (GetStringStatus, 1)
                 );
-                bench.require(known || !fits, || format!("fmi2{name}({kind}) returned {status}"));
+                bench.require(known || !fits, || format!("fmi2{name:?}({kind}) returned {status}"));
                 Ok(())
             });
         }

@@ -4,6 +4,7 @@ use super::access::same;
 use super::bench::{Bench, Blocked, bits, fine, settable, show};
 use super::lifecycle::difference;
 use fmu_import::Status;
+use fmu_import::raw::Simple;
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 use std::ffi::CString;
 
@@ -108,7 +109,7 @@ pub(super) fn out_of_range(bench: &Bench) -> Result<(), Blocked> {
             bench.case(|| {
                 let it = bench.initialising()?;
                 let status = it.set(v, &vec![bits(v.base, x); bench.elements(v)])?;
-                let end = if fine(status) { it.simple("ExitInitializationMode")? } else { status };
+                let end = if fine(status) { it.simple(Simple::ExitInitializationMode)? } else { status };
                 bench.require(!fine(end), || format!("line {}: {} = {x} was accepted", v.line, v.name));
                 Ok(())
             });
@@ -128,7 +129,7 @@ pub(super) fn booleans(bench: &Bench) -> Result<(), Blocked> {
             if fine(status) {
                 let (_, back) = it.get(v)?;
                 bench.require(back[0] <= 1, || format!("{}: set to {value}, got {}", v.name, back[0]));
-                let _ = it.simple("ExitInitializationMode")?;
+                let _ = it.simple(Simple::ExitInitializationMode)?;
                 let _ = it.step(bench.h())?;
             }
             Ok(())

@@ -1,8 +1,8 @@
 //! One instance of an FMU, the same for both standards.
 
-use super::log::{Log, Message, Status};
 use super::standard::{Experiment, Outcome, Refusal, Standard};
 use super::{Error, Values, explain};
+use crate::abi::log::{Log, Message, Status};
 use model_description::{BaseType, Dimension, ModelDescription, ModelVariable};
 use std::ffi::c_void;
 use std::ops::ControlFlow;

@@ -1,7 +1,11 @@
 //! An importer of our own: runs any co-simulation FMU of FMI 2.0 and FMI 3.0, ours or not, with one face for both.
 //!
-//! This module is the only place of the command line tool that has `unsafe` code. What it cannot check is the FMU: its
-//! code runs in this process with every right of it.
+//! - [`Fmu`] and [`Instance`]: one FMU, as a well-behaved importer calls it; [`raw`]: single calls, as a checker makes them.
+//! - [`cosimulation`]: several FMUs connected; [`ssp`]: systems of FMUs from files.
+//! - [`elf`], [`platform`]: what a binary is made for.
+//!
+//! `abi` is the only module with `unsafe` code: every pointer that goes to an FMU points to memory of the size that the standard
+//! asks for. What no importer can check is the FMU itself: its code runs in this process with all of its rights.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_import::Error> {
@@ -15,31 +19,32 @@
 //! # Ok(()) }
 //! ```
 
+#![deny(unsafe_code)]
+
+#[allow(unsafe_code)]
+mod abi;
 mod archive;
 pub mod cosimulation;
 pub mod elf;
 mod error;
-mod fmi2;
-mod fmi3;
 mod instance;
-mod library;
-mod log;
 pub mod platform;
-pub mod raw;
 pub mod ssp;
 mod standard;
 mod value;
 
+pub use abi::library::describe;
+pub use abi::log::{Message, Status};
+pub use abi::raw;
 pub use error::Error;
 pub use instance::{Instance, State};
-pub use library::describe;
-pub use log::{Message, Status};
 pub use value::Values;
 
+use abi::Functions;
+use abi::log::Log;
 use archive::Archive;
-use log::Log;
 use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
-use standard::{Outcome, Refusal, Standard};
+use standard::Refusal;
 use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::path::{Path, PathBuf};
@@ -54,19 +59,6 @@ pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u
     let mut archive = Archive::open(path)?;
     let files = archive.files()?;
     Ok((archive.description, files))
-}
-
-/// The functions of a library, the library, and the folder it lies in; dropped in this order.
-struct Loaded<F> {
-    api: F,
-    _library: libloading::Library,
-    _dir: Arc<TempDir>,
-}
-
-/// The functions of either standard.
-enum Functions {
-    V2(Arc<Loaded<fmi2::Functions>>),
-    V3(Arc<Loaded<fmi3::Functions>>),
 }
 
 /// An FMU: unpacked, described, its binary loaded. Every `Fmu` has a copy of the binary of its own.
@@ -90,21 +82,8 @@ impl Fmu {
         let (dir, binary) = archive.extract()?;
         let terminals = archive.terminals();
         let (description, dir) = (archive.description, Arc::new(dir));
-        let library = library::load(&binary).map_err(|e| Error::file(path, e.cause()))?;
-        let functions = match description.version {
-            FmiVersion::V2 => {
-                // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that
-                // they go to keeps the library.
-                unsafe { fmi2::Functions::load(&library) }
-                    .map(|api| Functions::V2(Arc::new(Loaded { api, _library: library, _dir: dir.clone() })))
-            }
-            FmiVersion::V3 => {
-                // SAFETY: as above.
-                unsafe { fmi3::Functions::load(&library) }
-                    .map(|api| Functions::V3(Arc::new(Loaded { api, _library: library, _dir: dir.clone() })))
-            }
-        };
-        let functions = functions.map_err(|cause| Error::file(path, cause))?;
+        let functions =
+            Functions::load(&binary, description.version, &dir).map_err(|e| Error::file(path, e.cause()))?;
         Ok(Self { path: path.into(), description: Arc::new(description), terminals, functions, dir })
     }
 
@@ -135,18 +114,13 @@ impl Fmu {
         let token = text(name, &self.description.token)?;
         let resources = self.dir.path().join("resources");
         let log = Arc::<Log>::default();
-        let standard: Outcome<Box<dyn Standard>> = match &self.functions {
-            Functions::V2(functions) => {
-                let uri = text(name, &file_uri(&resources))?;
-                fmi2::Instance::new(functions.clone(), &c_name, &token, &uri, &log, logging).map(|i| Box::new(i) as _)
-            }
-            Functions::V3(functions) => {
-                // FMI 3.0 wants a path of this system with a separator at its end (FMI 3.0.2, 2.3.1).
-                let path = text(name, &format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR))?;
-                fmi3::Instance::new(functions.clone(), &c_name, &token, &path, &log, logging).map(|i| Box::new(i) as _)
-            }
+        let resources = match self.description.version {
+            FmiVersion::V2 => file_uri(&resources),
+            // FMI 3.0 wants a path of this system with a separator at its end (FMI 3.0.2, 2.3.1).
+            FmiVersion::V3 => format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR),
         };
-        match standard {
+        let resources = text(name, &resources)?;
+        match self.functions.instantiate(&c_name, &token, &resources, &log, logging) {
             Ok(standard) => Ok(Instance::new(name, self.description.clone(), standard, log)),
             Err(refusal) => Err(explain(name, refusal, log.reason())),
         }

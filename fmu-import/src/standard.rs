@@ -1,7 +1,7 @@
 //! What the two standards have in common, as the facade uses it.
 
-use super::log::Status;
 use super::value::Values;
+use crate::abi::log::Status;
 use model_description::BaseType;
 use std::ffi::c_void;
 use std::ops::ControlFlow;

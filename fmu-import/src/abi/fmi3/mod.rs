@@ -4,9 +4,10 @@ mod functions;
 
 pub(super) use functions::Functions;
 
-use super::log::{Log, Status, copy_text};
-use super::standard::{Experiment, Outcome, Refusal, Standard, judge, misfit, narrow};
-use super::value::Values;
+use crate::abi::Loaded;
+use crate::abi::log::{Log, Status, copy_text};
+use crate::standard::{Experiment, Outcome, Refusal, Standard, judge, misfit, narrow};
+use crate::value::Values;
 use functions::{Component, Get, Set, Simple};
 use model_description::BaseType;
 use std::ffi::{CString, c_char, c_void};
@@ -26,7 +27,7 @@ unsafe extern "C" fn log_message(
 
 /// An instance.
 pub(super) struct Instance {
-    functions: Arc<super::Loaded<Functions>>,
+    functions: Arc<Loaded<Functions>>,
     component: Component,
     /// FMI 3.0 hears of the times on entering initialisation mode.
     experiment: Experiment,
@@ -41,7 +42,7 @@ macro_rules! function {
 
 impl Instance {
     pub(super) fn new(
-        functions: Arc<super::Loaded<Functions>>,
+        functions: Arc<Loaded<Functions>>,
         name: &CString,
         token: &CString,
         resources: &CString,

@@ -1,25 +1,27 @@
 //! Raw calls of an FMU's binary, for the checker: every function of both standards, with arguments that a well-behaved
 //! importer would never pass.
 //!
-//! The functions here are safe to call as far as this side goes: arrays are as long as the count that goes with them, or
-//! NULL. What the FMU does with NULL or with a wrong state is what the checker wants to know; it calls from a process of
-//! its own. Instances and states are plain numbers here, so that freed and foreign ones can be passed on purpose.
+//! Arrays are as long as the count that goes with them, or NULL, and a function is named by a type whose values all have one C
+//! signature, so no call from here passes memory or arguments that the standard's function cannot take. What the FMU does with
+//! NULL, a freed instance or a call in the wrong state is what the checker wants to know; it calls from a process of its own.
 
-mod birth;
+mod buffer;
 mod callbacks;
-mod cells;
-mod machine;
-mod others;
+mod instantiate;
+mod names;
+mod optional;
+mod processor;
 mod states;
 
-pub use birth::{Birth, Interface};
+pub use buffer::{Buffer, type_name, width};
 pub use callbacks::{Event, allocations, take_events};
-pub use cells::{Cells, type_name, width};
-pub use machine::float_control;
+pub use instantiate::{Arguments, Interface};
+pub use names::{Optional, Simple, StepStatus, Text};
+pub use processor::float_control;
 
 use super::log::Status;
+use buffer::CANARY;
 use callbacks::optional;
-use cells::CANARY;
 use libloading::Library;
 use model_description::{BaseType, FmiVersion};
 use std::ffi::{CStr, c_char, c_int, c_void};
@@ -41,7 +43,7 @@ impl Handle {
 
 /// An FMU state, as the address that the FMU gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SavedState(pub usize);
+pub struct SavedState(usize);
 
 impl SavedState {
     /// No state.
@@ -75,7 +77,7 @@ pub struct Raw {
     version: FmiVersion,
 }
 
-type Simple = unsafe extern "C" fn(*mut c_void) -> Status;
+type OfInstance = unsafe extern "C" fn(*mut c_void) -> Status;
 type Get2 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void) -> Status;
 type Get3 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void, usize) -> Status;
 
@@ -85,7 +87,7 @@ impl Raw {
     /// # Errors
     /// What the system says.
     pub fn open(path: &Path, version: FmiVersion) -> Result<Self, String> {
-        super::library::load(path).map(|library| Self { library, version }).map_err(|e| e.cause())
+        crate::abi::library::load(path).map(|library| Self { library, version }).map_err(|e| e.cause())
     }
 
     /// Loads a binary with its symbols visible to all that are loaded later, and resolved at once.
@@ -123,7 +125,7 @@ impl Raw {
 
     /// Whether there is a function of this name, without prefix.
     pub fn has(&self, name: &str) -> bool {
-        self.function::<Simple>(name).is_some()
+        self.function::<OfInstance>(name).is_some()
     }
 
     /// A function by its name without prefix. The type must be that of the standard, which every caller below sees to.
@@ -132,9 +134,9 @@ impl Raw {
         unsafe { self.library.get::<T>(self.name(name)) }.ok().map(|f| *f)
     }
 
-    /// `GetVersion` or `GetTypesPlatform`.
-    pub fn text(&self, name: &str) -> Option<String> {
-        let function: unsafe extern "C" fn() -> *const c_char = self.function(name)?;
+    /// What the FMU says of itself.
+    pub fn text(&self, name: Text) -> Option<String> {
+        let function: unsafe extern "C" fn() -> *const c_char = self.function(name.as_str())?;
         // SAFETY: the standard's type; the text is a constant of the FMU.
         unsafe { optional(function()) }
     }
@@ -147,10 +149,14 @@ impl Raw {
         Some(())
     }
 
-    /// A function with nothing but the instance.
-    pub fn simple(&self, name: &str, it: Handle) -> Option<Status> {
-        let f: Simple = self.function(name)?;
-        // SAFETY: the callers only name functions of this type.
+    /// A function with nothing but the instance. `fmi3EnterInitializationMode` is none of them: see
+    /// [`experiment`](Self::experiment).
+    pub fn simple(&self, name: Simple, it: Handle) -> Option<Status> {
+        if name == Simple::EnterInitializationMode && self.version == FmiVersion::V3 {
+            return None;
+        }
+        let f: OfInstance = self.function(name.as_str())?;
+        // SAFETY: all functions that `Simple` names have this type.
         Some(unsafe { f(it.pointer()) })
     }
 
@@ -183,7 +189,7 @@ impl Raw {
         base: BaseType,
         references: Option<&[u32]>,
         n: usize,
-        values: Option<&mut Cells>,
+        values: Option<&mut Buffer>,
         n_values: usize,
     ) -> Option<Status> {
         let (references, values) = checked(references, n, values, n_values.max(n));
@@ -197,7 +203,7 @@ impl Raw {
         base: BaseType,
         references: Option<&[u32]>,
         n: usize,
-        values: Option<&mut Cells>,
+        values: Option<&mut Buffer>,
         n_values: usize,
     ) -> Option<Status> {
         let (references, values) = checked(references, n, values, n_values.max(n));
@@ -224,17 +230,17 @@ impl Raw {
 
     /// Texts; NULL pointers come back as `None`.
     pub fn get_strings(&self, it: Handle, references: &[u32], count: usize) -> Option<(Status, Vec<Option<String>>)> {
-        let mut cells = Cells::room(BaseType::String, self.version, count);
-        for word in &mut cells.words[..count] {
+        let mut buffer = Buffer::room(BaseType::String, self.version, count);
+        for word in &mut buffer.words[..count] {
             *word = 0;
         }
-        let status = self.get(it, BaseType::String, Some(references), references.len(), Some(&mut cells), count)?;
+        let status = self.get(it, BaseType::String, Some(references), references.len(), Some(&mut buffer), count)?;
         if !matches!(status, Status::OK | Status::WARNING) {
             return Some((status, Vec::new()));
         }
         let pointer = |word: u64| ptr::with_exposed_provenance::<c_char>(usize::try_from(word).unwrap_or(0));
         // SAFETY: C strings of the FMU, alive until its next call, or NULL.
-        Some((status, cells.bits().into_iter().map(|word| unsafe { optional(pointer(word)) }).collect()))
+        Some((status, buffer.bits().into_iter().map(|word| unsafe { optional(pointer(word)) }).collect()))
     }
 
     /// Sets texts; `None` for NULL. The buffer is overwritten afterwards.
@@ -243,8 +249,8 @@ impl Raw {
             texts.iter().map(|t| t.map(|t| t.to_bytes_with_nul().to_vec())).collect();
         let address = |copy: &Option<Vec<u8>>| copy.as_ref().map_or(0, |c| c.as_ptr().expose_provenance() as u64);
         let bits: Vec<u64> = copies.iter().map(address).collect();
-        let mut cells = Cells::of(BaseType::String, self.version, &bits);
-        let status = self.set(it, BaseType::String, Some(references), references.len(), Some(&mut cells), texts.len());
+        let mut buffer = Buffer::of(BaseType::String, self.version, &bits);
+        let status = self.set(it, BaseType::String, Some(references), references.len(), Some(&mut buffer), texts.len());
         for copy in copies.iter_mut().flatten() {
             let end = copy.len().saturating_sub(1);
             copy[..end].fill(b'#');
@@ -322,8 +328,8 @@ impl Raw {
     }
 
     /// `fmi2Get...Status` with a place for any of its results; returns the first eight bytes of it.
-    pub fn step_status(&self, name: &str, it: Handle, kind: c_int) -> Option<(Status, u64)> {
-        let f: unsafe extern "C" fn(*mut c_void, c_int, *mut u64) -> Status = self.function(name)?;
+    pub fn step_status(&self, name: StepStatus, it: Handle, kind: c_int) -> Option<(Status, u64)> {
+        let f: unsafe extern "C" fn(*mut c_void, c_int, *mut u64) -> Status = self.function(name.as_str())?;
         let mut value = CANARY;
         // SAFETY: FMI 2.0's type but for the place, which has room for each of its values.
         Some((unsafe { f(it.pointer(), kind, &raw mut value) }, value))
@@ -344,14 +350,14 @@ impl Raw {
 fn checked(
     references: Option<&[u32]>,
     n: usize,
-    values: Option<&mut Cells>,
+    values: Option<&mut Buffer>,
     count: usize,
 ) -> (*const u32, *mut c_void) {
     assert!(references.is_none_or(|r| n <= r.len()), "the references are fewer than said");
     let references = references.map_or(ptr::null(), <[u32]>::as_ptr);
-    let values = values.map_or(ptr::null_mut(), |cells| {
-        assert!(count <= cells.capacity(), "the values are fewer than said");
-        cells.words.as_mut_ptr().cast()
+    let values = values.map_or(ptr::null_mut(), |buffer| {
+        assert!(count <= buffer.capacity(), "the values are fewer than said");
+        buffer.words.as_mut_ptr().cast()
     });
     (references, values)
 }

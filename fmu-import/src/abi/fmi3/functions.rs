@@ -1,7 +1,7 @@
 //! The functions of FMI 3.0 (fmi3FunctionTypes.h), as C has them.
 
-use crate::library::symbols;
-use crate::log::Status;
+use crate::abi::library::symbols;
+use crate::abi::log::Status;
 use std::ffi::{c_char, c_void};
 
 pub(super) type Component = *mut c_void;

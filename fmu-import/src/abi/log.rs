@@ -59,7 +59,7 @@ impl fmt::Debug for Status {
 
 /// The messages of one instance. Its address is the instance environment of the callbacks, so it is shared.
 #[derive(Debug, Default)]
-pub(super) struct Log(Mutex<Messages>);
+pub(crate) struct Log(Mutex<Messages>);
 
 #[derive(Debug, Default)]
 struct Messages {
@@ -70,17 +70,17 @@ struct Messages {
 
 impl Log {
     /// What the callbacks get back as their first argument.
-    pub(super) fn environment(self: &Arc<Self>) -> *mut c_void {
+    pub(crate) fn environment(self: &Arc<Self>) -> *mut c_void {
         Arc::as_ptr(self).cast_mut().cast()
     }
 
     /// Takes all messages.
-    pub(super) fn take(&self) -> Vec<Message> {
+    pub(crate) fn take(&self) -> Vec<Message> {
         self.messages().all.drain(..).collect()
     }
 
     /// What an error tells: the last message since the last error that is not a mere remark, else the last of all since.
-    pub(super) fn reason(&self) -> Option<String> {
+    pub(crate) fn reason(&self) -> Option<String> {
         let mut messages = self.messages();
         let fresh = std::mem::take(&mut messages.fresh);
         let mut fresh = messages.all.iter().rev().take(fresh).peekable();
@@ -98,7 +98,7 @@ impl Log {
     ///
     /// # Safety
     /// `environment` is null or came from [`Log::environment`] of a log that is alive.
-    pub(super) unsafe fn receive(environment: *mut c_void, status: Status, category: String, text: String) {
+    pub(crate) unsafe fn receive(environment: *mut c_void, status: Status, category: String, text: String) {
         // SAFETY: the caller promises that the pointer is null or a living log; a log is only used by shared reference.
         let Some(log) = (unsafe { environment.cast::<Self>().as_ref() }) else { return };
         let mut messages = log.messages();
@@ -114,7 +114,7 @@ impl Log {
 ///
 /// # Safety
 /// `text` is null or ends with a null byte.
-pub(super) unsafe fn copy_text(text: *const c_char) -> String {
+pub(crate) unsafe fn copy_text(text: *const c_char) -> String {
     if text.is_null() {
         return String::new();
     }

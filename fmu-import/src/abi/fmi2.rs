@@ -1,9 +1,10 @@
 //! FMI 2.0 for co-simulation, called (FMI 2.0.5, chapters 2.1 and 4.2).
 
+use super::Loaded;
 use super::library::symbols;
 use super::log::{Log, Status, copy_text};
-use super::standard::{Experiment, Outcome, Refusal, Standard, judge, misfit, narrow};
-use super::value::Values;
+use crate::standard::{Experiment, Outcome, Refusal, Standard, judge, misfit, narrow};
+use crate::value::Values;
 use model_description::BaseType;
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::ops::ControlFlow;
@@ -93,7 +94,7 @@ unsafe extern "C" fn logger(
 
 /// An instance. Owns what the FMU may keep pointers to.
 pub(super) struct Instance {
-    functions: Arc<super::Loaded<Functions>>,
+    functions: Arc<Loaded<Functions>>,
     component: Component,
     // FMI 2.0 before its revision 5 let the FMU keep the pointer to the callbacks.
     _callbacks: Rc<Callbacks>,
@@ -108,7 +109,7 @@ macro_rules! function {
 
 impl Instance {
     pub(super) fn new(
-        functions: Arc<super::Loaded<Functions>>,
+        functions: Arc<Loaded<Functions>>,
         name: &CString,
         token: &CString,
         resources: &CString,

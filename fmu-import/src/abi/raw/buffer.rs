@@ -4,7 +4,7 @@ use model_description::{BaseType, FmiVersion};
 
 /// The values of a call, as the bytes that cross the interface; a few more follow, to see whether they are touched.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Cells {
+pub struct Buffer {
     pub(super) words: Vec<u64>,
     width: usize,
     count: usize,
@@ -14,7 +14,7 @@ pub struct Cells {
 pub(super) const CANARY: u64 = 0xc5c5_c5c5_c5c5_c5c5;
 const CANARIES: usize = 32;
 
-impl Cells {
+impl Buffer {
     /// Room for `count` values of a type, filled with a pattern.
     pub fn room(base: BaseType, version: FmiVersion, count: usize) -> Self {
         let width = width(base, version);
@@ -23,15 +23,15 @@ impl Cells {
 
     /// Values from their bits, the low ones of each.
     pub fn of(base: BaseType, version: FmiVersion, bits: &[u64]) -> Self {
-        let mut cells = Self::room(base, version, bits.len());
+        let mut buffer = Self::room(base, version, bits.len());
         for (i, value) in bits.iter().enumerate() {
-            let at = i * cells.width;
-            for (k, byte) in value.to_le_bytes()[..cells.width].iter().enumerate() {
+            let at = i * buffer.width;
+            for (k, byte) in value.to_le_bytes()[..buffer.width].iter().enumerate() {
                 let (word, shift) = ((at + k) / 8, 8 * ((at + k) % 8));
-                cells.words[word] = cells.words[word] & !(0xff << shift) | u64::from(*byte) << shift;
+                buffer.words[word] = buffer.words[word] & !(0xff << shift) | u64::from(*byte) << shift;
             }
         }
-        cells
+        buffer
     }
 
     /// The bits of the values.
@@ -79,15 +79,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_keep_their_bits() {
+    fn buffer_keep_their_bits() {
         for (base, bits) in [
             (BaseType::Float64, vec![1.5_f64.to_bits(), u64::MAX, 0]),
             (BaseType::Int16, vec![1, 0xffff, 7]),
             (BaseType::Boolean, vec![1, 0, 1, 1, 0, 0, 0, 0, 1]),
         ] {
-            let cells = Cells::of(base, FmiVersion::V3, &bits);
-            assert_eq!(cells.bits(), bits);
-            assert!(cells.intact());
+            let buffer = Buffer::of(base, FmiVersion::V3, &bits);
+            assert_eq!(buffer.bits(), bits);
+            assert!(buffer.intact());
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Shared libraries: loading one, and finding its functions.
 
-use super::Error;
+use crate::Error;
 use libloading::Library;
 use std::ffi::{c_int, c_void};
 use std::path::Path;
@@ -11,8 +11,8 @@ macro_rules! symbols {
     ($(#[$doc:meta])* $name:ident { $($field:ident: $symbol:literal = $kind:ty,)* ; $($optional:ident: $other:literal = $other_kind:ty,)* }) => {
         $(#[$doc])*
         pub(crate) struct $name {
-            $(pub(crate) $field: $kind,)*
-            $(pub(crate) $optional: Option<$other_kind>,)*
+            $(pub(in crate::abi) $field: $kind,)*
+            $(pub(in crate::abi) $optional: Option<$other_kind>,)*
         }
 
         impl $name {

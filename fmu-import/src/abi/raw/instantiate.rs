@@ -21,7 +21,7 @@ pub enum Interface {
 /// The arguments of an instantiation.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "the arguments of the standards are")]
-pub struct Birth {
+pub struct Arguments {
     /// Instance name.
     pub name: Option<CString>,
     /// Token.
@@ -51,16 +51,16 @@ impl Raw {
     ///
     /// # Errors
     /// The function is missing.
-    pub fn instantiate(&self, birth: &Birth) -> Result<Option<Handle>, String> {
+    pub fn instantiate(&self, arguments: &Arguments) -> Result<Option<Handle>, String> {
         fn text(text: Option<&CString>) -> *const c_char {
             text.map_or(ptr::null(), |t| t.as_ptr())
         }
-        let (name, token) = (text(birth.name.as_ref()), text(birth.token.as_ref()));
-        let resources = text(birth.resources.as_ref());
-        let environment: *mut c_void = ptr::without_provenance_mut(birth.environment);
+        let (name, token) = (text(arguments.name.as_ref()), text(arguments.token.as_ref()));
+        let resources = text(arguments.resources.as_ref());
+        let environment: *mut c_void = ptr::without_provenance_mut(arguments.environment);
         let pointer = match self.version {
-            FmiVersion::V2 => self.instantiate2(birth, [name, token, resources], environment),
-            FmiVersion::V3 => self.instantiate3(birth, [name, token, resources], environment),
+            FmiVersion::V2 => self.instantiate2(arguments, [name, token, resources], environment),
+            FmiVersion::V3 => self.instantiate3(arguments, [name, token, resources], environment),
         };
         let address = pointer?.expose_provenance();
         Ok((address != 0).then_some(Handle(address)))
@@ -68,7 +68,7 @@ impl Raw {
 
     fn instantiate2(
         &self,
-        b: &Birth,
+        b: &Arguments,
         texts: [*const c_char; 3],
         environment: *mut c_void,
     ) -> Result<*mut c_void, String> {
@@ -104,7 +104,7 @@ impl Raw {
 
     fn instantiate3(
         &self,
-        b: &Birth,
+        b: &Arguments,
         texts: [*const c_char; 3],
         environment: *mut c_void,
     ) -> Result<*mut c_void, String> {

@@ -1,0 +1,69 @@
+//! The C interface of both standards, from the importer's side: the only module with `unsafe` code.
+
+pub(crate) mod fmi2;
+pub(crate) mod fmi3;
+pub(crate) mod library;
+pub(crate) mod log;
+pub mod raw;
+
+use crate::Error;
+use crate::standard::{Outcome, Standard};
+use log::Log;
+use model_description::FmiVersion;
+use std::ffi::CString;
+use std::path::Path;
+use std::sync::Arc;
+use tempfile::TempDir;
+
+/// The functions of a library, the library, and the folder that it lies in; dropped in this order.
+pub(crate) struct Loaded<F> {
+    api: F,
+    _library: libloading::Library,
+    _dir: Arc<TempDir>,
+}
+
+/// The functions of either standard.
+pub(crate) enum Functions {
+    V2(Arc<Loaded<fmi2::Functions>>),
+    V3(Arc<Loaded<fmi3::Functions>>),
+}
+
+impl Functions {
+    /// Loads the binary, which lies in `dir`.
+    pub(crate) fn load(binary: &Path, version: FmiVersion, dir: &Arc<TempDir>) -> Result<Self, Error> {
+        let library = library::load(binary)?;
+        let functions = match version {
+            FmiVersion::V2 => {
+                // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that
+                // they go to keeps the library.
+                unsafe { fmi2::Functions::load(&library) }
+                    .map(|api| Self::V2(Arc::new(Loaded { api, _library: library, _dir: dir.clone() })))
+            }
+            FmiVersion::V3 => {
+                // SAFETY: as above.
+                unsafe { fmi3::Functions::load(&library) }
+                    .map(|api| Self::V3(Arc::new(Loaded { api, _library: library, _dir: dir.clone() })))
+            }
+        };
+        functions.map_err(|cause| Error::file(binary, cause))
+    }
+
+    /// An instance for co-simulation; `resources` is a URI in FMI 2.0 and a path in FMI 3.0.
+    pub(crate) fn instantiate(
+        &self,
+        name: &CString,
+        token: &CString,
+        resources: &CString,
+        log: &Arc<Log>,
+        logging: bool,
+    ) -> Outcome<Box<dyn Standard>> {
+        match self {
+            Self::V2(functions) => {
+                fmi2::Instance::new(functions.clone(), name, token, resources, log, logging).map(|i| Box::new(i) as _)
+            }
+            Self::V3(functions) => {
+                fmi3::Instance::new(functions.clone(), name, token, resources, log, logging).map(|i| Box::new(i) as _)
+            }
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Names of functions, each type of names for one C signature: safe code cannot call a function with wrong arguments.
+
+/// Declares an enumeration of names without the prefix of the standard.
+macro_rules! names {
+    ($(#[$doc:meta])* $type:ident { $($name:ident)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[expect(missing_docs, reason = "the names of the standards")]
+        pub enum $type { $($name),* }
+
+        impl $type {
+            /// The function of this name, if it is one of them.
+            pub fn named(name: &str) -> Option<Self> {
+                match name {
+                    $(stringify!($name) => Some(Self::$name),)*
+                    _ => None,
+                }
+            }
+
+            /// The name without the prefix of the standard.
+            pub fn as_str(self) -> &'static str {
+                match self {
+                    $(Self::$name => stringify!($name),)*
+                }
+            }
+        }
+    };
+}
+
+names! {
+    /// Functions of an instance and nothing else.
+    Simple {
+        Reset Terminate EnterInitializationMode ExitInitializationMode EnterConfigurationMode ExitConfigurationMode
+        EnterEventMode EnterStepMode EnterContinuousTimeMode EvaluateDiscreteStates CancelStep
+    }
+}
+
+names! {
+    /// Functions that tell a constant text.
+    Text { GetVersion GetTypesPlatform }
+}
+
+names! {
+    /// Functions that tell how an asynchronous step goes (FMI 2.0).
+    StepStatus { GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus GetStringStatus }
+}
+
+names! {
+    /// Functions of optional capabilities.
+    Optional {
+        GetBinary SetBinary GetClock SetClock
+        GetShiftDecimal SetShiftDecimal GetIntervalDecimal SetIntervalDecimal
+        GetShiftFraction SetShiftFraction GetIntervalFraction SetIntervalFraction
+        GetNumberOfVariableDependencies GetVariableDependencies GetDirectionalDerivative GetAdjointDerivative
+        GetOutputDerivatives GetRealOutputDerivatives SetRealInputDerivatives
+        UpdateDiscreteStates NewDiscreteStates CompletedIntegratorStep SetTime SetContinuousStates GetContinuousStates
+        GetContinuousStateDerivatives GetDerivatives GetEventIndicators GetNominalsOfContinuousStates
+        GetNumberOfEventIndicators GetNumberOfContinuousStates ActivateModelPartition
+    }
+}

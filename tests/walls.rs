@@ -1,0 +1,113 @@
+//! The walls of ARCHITECTURE.md: which crate knows which, and where unsafe code may stand.
+#![allow(missing_docs)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Each crate with the crates of this workspace that it may know.
+const ARROWS: &[(&str, &[&str])] = &[
+    ("fmu-core", &[]),
+    ("fmu-export", &["fmu-core"]),
+    ("model-description", &["fmu-core"]),
+    ("fmu-import", &["fmu-core", "model-description"]),
+    ("fmu-check", &["fmu-import", "model-description"]),
+    ("drive", &["fmu-core"]),
+    ("drive-study", &["drive", "fmu-core", "fmu-import"]),
+    ("pmsm-plant", &["drive", "fmu-export"]),
+    ("sensorless-controller", &["drive", "fmu-export"]),
+    ("pmsm-drive", &["drive", "fmu-export"]),
+    ("fmu", &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "model-description"]),
+];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn cargo(arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO")).args(arguments).current_dir(root()).output().unwrap();
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The crates of the workspace: folder, and the crates of the workspace that they depend on (not for tests).
+fn crates() -> BTreeMap<String, (PathBuf, BTreeSet<String>)> {
+    let json = cargo(&["metadata", "--offline", "--no-deps", "--format-version", "1"]);
+    let metadata: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
+    let text = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
+    let names: BTreeSet<String> = packages.iter().map(|p| text(&p["name"])).collect();
+    let one = |p: &serde_json::Value| {
+        let manifest = PathBuf::from(text(&p["manifest_path"]));
+        let all = p["dependencies"].as_array().unwrap().iter();
+        let known = all.filter(|d| d["kind"].is_null()).map(|d| text(&d["name"])).filter(|n| names.contains(n));
+        (text(&p["name"]), (manifest.parent().unwrap().to_owned(), known.collect()))
+    };
+    packages.iter().map(one).collect()
+}
+
+#[test]
+fn every_arrow_goes_one_way() {
+    let crates = crates();
+    for (name, allowed) in ARROWS {
+        let (_, known) = &crates[*name];
+        let allowed: BTreeSet<String> = allowed.iter().map(|&a| a.to_owned()).collect();
+        let more: Vec<_> = known.difference(&allowed).collect();
+        assert!(
+            more.is_empty(),
+            "{name} may not know {more:?}: ARCHITECTURE.md and this list say which crate knows which"
+        );
+    }
+    let listed: BTreeSet<&str> = ARROWS.iter().map(|(name, _)| *name).collect();
+    let others: Vec<_> = crates.keys().filter(|name| !listed.contains(name.as_str())).collect();
+    assert_eq!(others, ["faulty-fmu", "own-fmu"], "a new crate needs its row");
+}
+
+#[test]
+fn the_checker_knows_no_motor_and_no_plotter() {
+    let tree = cargo(&["tree", "--offline", "-p", "fmu-check", "-e", "normal", "--prefix", "none"]);
+    let known: BTreeSet<&str> = tree.lines().filter_map(|line| line.split(' ').next()).collect();
+    assert!(known.contains("fmu-import") && known.contains("quick-xml"), "{known:?}");
+    for foreign in ["drive", "drive-study", "plotters", "nalgebra", "resvg", "libm"] {
+        assert!(!known.contains(foreign), "fmu-check depends on {foreign}");
+    }
+}
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
+        if entry.is_dir() {
+            sources(&entry, found);
+        } else if entry.extension().is_some_and(|e| e == "rs") {
+            found.push(entry);
+        }
+    }
+}
+
+#[test]
+fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
+    let crates = crates();
+    for (name, _) in ARROWS {
+        let (folder, _) = &crates[*name];
+        let source = |file: &str| std::fs::read_to_string(folder.join("src").join(file)).unwrap_or_default();
+        let (lib, main) = (source("lib.rs"), source("main.rs"));
+        if ["fmu-export", "fmu-import"].contains(name) {
+            assert!(lib.contains("#![deny(unsafe_code)]"), "{name}");
+            assert_eq!(lib.matches("#[allow(unsafe_code)]").count(), 1, "{name}: the module abi alone");
+            let mut files = Vec::new();
+            sources(&folder.join("src"), &mut files);
+            for file in files.iter().filter(|f| !f.starts_with(folder.join("src/abi"))) {
+                let text = std::fs::read_to_string(file).unwrap();
+                let allows = text.matches("allow(unsafe_code)").count();
+                let expected = usize::from(file.ends_with("lib.rs"));
+                assert_eq!(allows, expected, "{}", file.display());
+            }
+        } else if folder.starts_with(root().join("fmus")) {
+            // One line each: export!, which expands to the functions of the C interface.
+            assert!(lib.lines().filter(|l| !l.starts_with("//") && !l.is_empty()).count() <= 2, "{name}: {lib}");
+        } else {
+            for text in [&lib, &main].into_iter().filter(|text| !text.is_empty()) {
+                assert!(text.contains("#![forbid(unsafe_code)]"), "{name} does not forbid unsafe code");
+            }
+        }
+    }
+}
