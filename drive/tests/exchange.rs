@@ -8,8 +8,9 @@
 //! one for t_k + 2 T_s: recorded at t_k + T_s it leads by w T_s with the right delay.
 #![allow(missing_docs, non_snake_case)]
 
-use drive::Pair;
+use drive::estimator::Kind;
 use drive::math::wrap;
+use drive::{Pair, bench};
 use fmu_core::Step;
 use std::f64::consts::PI;
 
@@ -130,5 +131,48 @@ fn order_and_delay() {
         assert!(LIMITS.contains(&html), "drive/docs/limits.html has another row than\n{html}");
         let markdown = format!("| {} |", cells.join(" | "));
         assert!(IMPORT.contains(&markdown), "docs/import.md has another row than\n{markdown}");
+    }
+}
+
+/// Mean angle error θ - θ^ (deg) of an estimator under half the rated torque, voltages `late` by a step or not.
+fn loaded(kind: Kind, speed: f64, late: bool, delay: i32) -> f64 {
+    let mut p = bench::turning(bench::drive(kind), speed);
+    p.controller.model.parameters.delay = delay;
+    p.start().unwrap();
+    let (mut u, mut mean) = (p.controller.out.u, bench::Statistics::default());
+    for k in 0..15_000_u32 {
+        let load = if k >= 3000 { 0.5 * bench::RATED_TORQUE } else { 0.0 };
+        p.set_inputs(speed * bench::RATED_SPEED, load, 540.0);
+        p.controller.model.inputs.i = p.plant.out.i;
+        p.controller.model.inputs.theta_meas = p.plant.out.theta_e;
+        p.controller.model.inputs.speed_meas = p.plant.out.speed;
+        let now = p.controller.out.u;
+        p.plant.model.inputs.u = if late { u } else { now };
+        u = now;
+        let step = Step { start: p.now, h: T_S };
+        p.plant.step(&step).unwrap();
+        p.controller.step(&step).unwrap();
+        p.now = step.end();
+        if k >= 12_000 {
+            mean.add(bench::angle_error(&p));
+        }
+    }
+    mean.mean()
+}
+
+/// Every estimator is as good with two samples as with one, where the injections work and where the EMF does; told of one in
+/// the place of two, those on the EMF are behind by w T_s.
+#[test]
+fn every_estimator_knows_two_samples() {
+    for &kind in Kind::ALL {
+        for speed in if kind.injects() { [0.0, 0.05] } else { [0.3, 0.8] } {
+            let (one, two) = (loaded(kind, speed, false, 1), loaded(kind, speed, true, 2));
+            assert!(one.abs().max(two.abs()) < 0.3, "{kind:?} at {speed}: {one} deg with one sample, {two} with two");
+            if !kind.injects() && kind != Kind::Sensored {
+                let wrong = loaded(kind, speed, true, 1);
+                let turn = (3.0 * speed * bench::RATED_SPEED * T_S).to_degrees();
+                assert!((wrong / turn + 1.0).abs() < 0.15, "{kind:?} at {speed}: {wrong} deg, not {}", -turn);
+            }
+        }
     }
 }

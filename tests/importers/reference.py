@@ -53,7 +53,6 @@ class Experiment:
         speed = [row[0] for row in rows]
         assert max(map(abs, speed)) > 10.0, "the rotor moved"
 
-
     def check_drive(self, speed, rounding):
         """The drive's speed at every communication point is the native one, within the rounding (rad/s)."""
         native = self.entry["drive"]

@@ -13,9 +13,11 @@ from reference import DRIVE_STEP
 
 
 def source(schedule):
-    """An input that steps once at most; half a step early, for its times are sums that may stay below the point they are for."""
-    assert len(schedule) <= 1
-    return Step(start_value=0.0, end_value=schedule[0][1], step_time=schedule[0][0] - 0.5 * DRIVE_STEP) if schedule else Constant(0.0)
+    """An input that steps once at most; half a step early: sums of steps may stay below the point they are for."""
+    if not schedule:
+        return Constant(0.0)
+    [(time, value)] = schedule
+    return Step(start_value=0.0, end_value=value, step_time=time - 0.5 * DRIVE_STEP)
 
 
 @pytest.mark.parametrize("standard", ["fmi2", "fmi3"])
