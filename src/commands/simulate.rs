@@ -112,7 +112,9 @@ pub fn run(args: &Simulate) -> Result<()> {
         show(&system.take_messages());
     }
     let written = write(&outcome?, args);
-    warnings(&system, &settings).iter().for_each(|text| eprintln!("warning: {text}"));
+    for text in warnings(&system, &settings) {
+        eprintln!("warning: {text}");
+    }
     written
 }
 

@@ -179,7 +179,9 @@ pub(super) fn generating(subject: &Subject, speed: f64) -> Result<Outcome, Fault
     let follow = loaded(subject, speed, speed, -1.0)?;
     let mut measures = vec![follow.mean("mean angle error"), follow.std(), follow.rms()];
     if !holds(&follow) {
-        measures.iter_mut().for_each(|m| m.value = f64::INFINITY);
+        for m in &mut measures {
+            m.value = f64::INFINITY;
+        }
     }
     Ok(Outcome::Measured(measures, None))
 }
