@@ -8,13 +8,14 @@
 //! one for t_k + 2 T_s: recorded at t_k + T_s it leads by w T_s with the right delay.
 #![allow(missing_docs, non_snake_case)]
 
+use drive::Pair;
 use drive::estimator::Kind;
 use drive::math::wrap;
-use drive::{Pair, bench};
+use drive_study::runner;
 use fmu_core::Step;
 use std::f64::consts::PI;
 
-const LIMITS: &str = include_str!("../docs/limits.html");
+const LIMITS: &str = include_str!("../../drive/docs/limits.html");
 const IMPORT: &str = include_str!("../../docs/import.md");
 const RPM: f64 = PI / 30.0;
 const T_S: f64 = 1e-4;
@@ -136,13 +137,13 @@ fn order_and_delay() {
 
 /// Mean angle error θ - θ^ (deg) of an estimator under half the rated torque, voltages `late` by a step or not.
 fn loaded(kind: Kind, speed: f64, late: bool, delay: i32) -> f64 {
-    let mut p = bench::turning(bench::drive(kind), speed);
+    let mut p = runner::turning(runner::drive(kind), speed);
     p.controller.model.parameters.delay = delay;
     p.start().unwrap();
-    let (mut u, mut mean) = (p.controller.out.u, bench::Statistics::default());
+    let (mut u, mut mean) = (p.controller.out.u, runner::Statistics::default());
     for k in 0..15_000_u32 {
-        let load = if k >= 3000 { 0.5 * bench::RATED_TORQUE } else { 0.0 };
-        p.set_inputs(speed * bench::RATED_SPEED, load, 540.0);
+        let load = if k >= 3000 { 0.5 * runner::RATED_TORQUE } else { 0.0 };
+        p.set_inputs(speed * runner::RATED_SPEED, load, 540.0);
         p.controller.model.inputs.i = p.plant.out.i;
         p.controller.model.inputs.theta_meas = p.plant.out.theta_e;
         p.controller.model.inputs.speed_meas = p.plant.out.speed;
@@ -154,7 +155,7 @@ fn loaded(kind: Kind, speed: f64, late: bool, delay: i32) -> f64 {
         p.controller.step(&step).unwrap();
         p.now = step.end();
         if k >= 12_000 {
-            mean.add(bench::angle_error(&p));
+            mean.add(runner::angle_error(&p));
         }
     }
     mean.mean()
@@ -170,7 +171,7 @@ fn every_estimator_knows_two_samples() {
             assert!(one.abs().max(two.abs()) < 0.3, "{kind:?} at {speed}: {one} deg with one sample, {two} with two");
             if !kind.injects() && kind != Kind::Sensored {
                 let wrong = loaded(kind, speed, true, 1);
-                let turn = (3.0 * speed * bench::RATED_SPEED * T_S).to_degrees();
+                let turn = (3.0 * speed * runner::RATED_SPEED * T_S).to_degrees();
                 assert!((wrong / turn + 1.0).abs() < 0.15, "{kind:?} at {speed}: {wrong} deg, not {}", -turn);
             }
         }
