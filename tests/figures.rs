@@ -203,7 +203,7 @@ fn f02_starts_from_every_angle_to_every_speed() {
 
 #[test]
 fn integral_form_16() {
-    let adaptation = [("observer.zeta", 0.0), ("observer.c_1", 400.0), ("observer.c_2", 200.0)];
+    let adaptation = [("rasmussen.zeta", 0.0), ("rasmussen.c_1", 400.0), ("rasmussen.c_2", 200.0)];
     let step = |speed: f64| {
         let mut p = pair(&[], &adaptation);
         run(&mut p, T_S, 2.0, |t, p| p.controller.model.inputs.speed_ref = if t >= 0.1 { speed * RPM } else { 0.0 });
@@ -217,7 +217,7 @@ fn integral_form_16() {
     run(&mut p, T_S, 6.0, |t, p| p.plant.model.inputs.tau_load = if t >= 0.5 { 2.0 } else { 0.0 });
     near("2 N.m at 0 rpm with (16)", error(&p), 36.3, 0.3);
     // With the baseline (50, 1) it has almost no damping and the drive is lost.
-    let mut p = pair(&[], &[("observer.zeta", 0.0)]);
+    let mut p = pair(&[], &[("rasmussen.zeta", 0.0)]);
     run(&mut p, T_S, 2.0, |t, p| p.controller.model.inputs.speed_ref = if t >= 0.1 { 500.0 * RPM } else { 0.0 });
     assert!((p.plant.out.speed / RPM - 500.0).abs() > 50.0, "(16) with (50, 1) is lost: {}", p.plant.out.speed / RPM);
 }

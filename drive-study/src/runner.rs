@@ -85,7 +85,7 @@ pub fn with_dead_time(mut pair: Pair, compensated: bool) -> Pair {
 /// The machine's saturation: it tells the magnet's poles apart.
 pub fn with_saturation(mut pair: Pair) -> Pair {
     let saturation = &mut pair.plant.model.parameters.saturation;
-    (saturation.c_2, saturation.c_3) = (40.0, 40.0);
+    (saturation.s_2, saturation.s_3) = (40.0, 40.0);
     pair
 }
 

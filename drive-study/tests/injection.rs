@@ -211,10 +211,10 @@ fn load_with_the_mechanical_observer() {
 /// at -1/2 atan2(2 b, 1/L_d - d i_q / d psi_q) from the magnet.
 #[test]
 fn cross_saturation_turns_all_alike() {
-    const C_X: f64 = 15.0;
+    const S_DQ: f64 = 15.0;
     for method in &METHODS {
         let mut pair = method.pair();
-        pair.plant.model.parameters.saturation.c_x = C_X;
+        pair.plant.model.parameters.saturation.s_dq = S_DQ;
         let (mut error, mut i_d, mut i_q) = (Statistics::default(), Statistics::default(), Statistics::default());
         run(&mut pair, 2.5, |t, p| {
             p.plant.model.inputs.tau_load = RATED_TORQUE * (t / 0.5).min(1.0);
@@ -226,23 +226,23 @@ fn cross_saturation_turns_all_alike() {
         });
         let (mut x, mut psi_q) = (0.0, 0.0);
         for _ in 0..100 {
-            x = 36e-3 * (i_d.mean() - 0.5 * C_X * psi_q * psi_q);
-            psi_q = i_q.mean() / (1.0 / 51e-3 + C_X * x);
+            x = 36e-3 * (i_d.mean() - 0.5 * S_DQ * psi_q * psi_q);
+            psi_q = i_q.mean() / (1.0 / 51e-3 + S_DQ * x);
         }
-        let turned = -0.5 * (2.0 * C_X * psi_q).atan2(1.0 / 36e-3 - 1.0 / 51e-3 - C_X * x).to_degrees();
+        let turned = -0.5 * (2.0 * S_DQ * psi_q).atan2(1.0 / 36e-3 - 1.0 / 51e-3 - S_DQ * x).to_degrees();
         method.near("error by cross-saturation", error.mean(), turned, 0.3);
-        let sentence = format!("by −{:.0}° at rated load (<code>saturation.c_x</code> = {C_X} A/Wb²)", -turned);
+        let sentence = format!("by −{:.0}° at rated load (<code>saturation.s_dq</code> = {S_DQ} A/Wb²)", -turned);
         assert!(include_str!("../../drive/docs/limits.html").contains(&sentence), "{sentence}");
     }
 }
 
 /// A start by injection and voltage pulses from an angle (deg), then to `speed` (pu): angle error in deg after 1.5 s.
-fn start_from(pair: &Pair, degrees: f64, c_2: f64, speed: f64) -> f64 {
+fn start_from(pair: &Pair, degrees: f64, s_2: f64, speed: f64) -> f64 {
     let mut pair = pair.clone();
     let par = &mut pair.controller.model.parameters;
-    (par.start.mode, par.c_2) = (INJECTION, 40.0);
+    (par.start.mode, par.s_2) = (INJECTION, 40.0);
     let plant = &mut pair.plant.model.parameters;
-    (plant.saturation.c_2, plant.saturation.c_3) = (c_2, c_2);
+    (plant.saturation.s_2, plant.saturation.s_3) = (s_2, s_2);
     plant.initial.theta_e = degrees.to_radians();
     let mut turned = 0.0_f64;
     run(&mut pair, 1.5, |t, p| {
@@ -397,7 +397,7 @@ fn a_start_that_cannot_work_is_refused() {
         assert!(message.contains(part), "{message}");
     }
     let message = refused(Kind::SquareWaveInjection, |p| p.start.mode = INJECTION);
-    assert!(message.contains("saturation.c_2 = 0 A/Wb2"), "{message}");
+    assert!(message.contains("saturation.s_2 = 0 A/Wb2"), "{message}");
 }
 
 /// A rotor that is torn away, voltages that are not there: nothing but finite numbers.

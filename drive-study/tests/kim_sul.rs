@@ -141,7 +141,7 @@ fn the_integral_is_needed() {
     for kind in MODELS {
         let printed = with(kind, |p| {
             p.motor.L_q *= 1.2;
-            p.estimators.model.integral = false;
+            p.estimators.matsui.integral = false;
         });
         assert!(!steady(printed, 0.5, 1.0).holds(), "{}", kind.name());
     }

@@ -143,7 +143,7 @@ fn run_away() {
         });
     }
     let mut pair = Pair::default();
-    pair.controller.model.parameters.estimators.observer.zeta = 0.0;
+    pair.controller.model.parameters.estimators.rasmussen.zeta = 0.0;
     let peak = watch("(16)", &mut pair, (2.0, 0.5), |_, p| p.set_inputs(500.0 * RPM, 0.0, 325.0));
     assert!(peak > 1.0, "{peak}");
 }

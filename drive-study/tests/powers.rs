@@ -28,11 +28,11 @@ impl Bench {
         let (i_d, i_q) = (self.block.out.i_d, self.block.out.i_q);
         let (mut x, mut q) = (motor.L_d * i_d, motor.L_q * i_q);
         for _ in 0..200 {
-            x = motor.L_d * (i_d - (s.c_2 + s.c_3 * x) * x * x - 0.5 * s.c_x * q * q);
-            q = motor.L_q * (i_q - s.c_x * x * q);
+            x = motor.L_d * (i_d - (s.s_2 + s.s_3 * x) * x * x - 0.5 * s.s_dq * q * q);
+            q = motor.L_q * (i_q - s.s_dq * x * q);
         }
         let linear = 0.5 * (x * x / motor.L_d + q * q / motor.L_q);
-        1.5 * (linear + s.c_2 * x * x * x / 3.0 + s.c_3 * x * x * x * x / 4.0 + 0.5 * s.c_x * x * q * q)
+        1.5 * (linear + s.s_2 * x * x * x / 3.0 + s.s_3 * x * x * x * x / 4.0 + 0.5 * s.s_dq * x * q * q)
     }
 
     fn kinetic(&self) -> f64 {
@@ -90,7 +90,7 @@ fn balanced(case @ (.., dead_time): (f64, Dq, f64), passed: f64, lost: f64) {
 /// A salient machine that saturates, at 300 rad/s, on an inverter with `dead_time` (s).
 fn hard(par: &mut PlantParameters, dead_time: f64) {
     par.motor.L_q = 9e-3;
-    (par.saturation.c_2, par.saturation.c_3, par.saturation.c_x) = (40.0, 40.0, 7.0);
+    (par.saturation.s_2, par.saturation.s_3, par.saturation.s_dq) = (40.0, 40.0, 7.0);
     (par.inverter.dead_time, par.inverter.T_pwm) = (dead_time, T_S);
     par.mechanics.tau_coulomb = 0.2;
     par.initial.speed = 300.0;

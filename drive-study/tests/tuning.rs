@@ -98,7 +98,7 @@ fn loops_and_estimators_change_without_a_bump() {
         without_a_bump(Kind::Rasmussen, name, |x| 0.6 * x, nothing);
         without_a_bump(Kind::ExtendedEmf, name, |x| 0.6 * x, nothing);
     }
-    for name in ["observer.c_1", "observer.c_2", "observer.w_n", "observer.zeta", "motor.R_s"] {
+    for name in ["rasmussen.c_1", "rasmussen.c_2", "rasmussen.w_n", "rasmussen.zeta", "motor.R_s"] {
         without_a_bump(Kind::Rasmussen, name, |x| 0.9 * x, nothing);
     }
     without_a_bump(Kind::Rasmussen, "current.integral", |_| 0.3, nothing);
@@ -115,8 +115,8 @@ fn loops_and_estimators_change_without_a_bump() {
         without_a_bump(kind, "emf.bandwidth", |x| 1.4 * x, nothing);
     }
     for kind in [VoltageModel, CurrentModel] {
-        without_a_bump(kind, "model.bandwidth", |x| 0.6 * x, nothing);
-        without_a_bump(kind, "model.filter", |x| 0.6 * x, nothing);
+        without_a_bump(kind, "matsui.bandwidth", |x| 0.6 * x, nothing);
+        without_a_bump(kind, "matsui.filter", |x| 0.6 * x, nothing);
     }
     for name in ["kalman.voltage_d", "kalman.voltage_q", "kalman.acceleration", "kalman.current"] {
         without_a_bump(KalmanFilter, name, |x| 4.0 * x, nothing);
@@ -181,14 +181,14 @@ fn step_response(set: impl FnOnce(&mut Pair)) -> Vec<f64> {
 fn a_tuned_drive_is_one_that_started_so() {
     let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let before = step_response(|_| {});
-    for (name, to) in [("speed_loop.bandwidth", 40.0), ("observer.w_n", 160.0), ("current.bandwidth", 300.0)] {
+    for (name, to) in [("speed_loop.bandwidth", 40.0), ("rasmussen.w_n", 160.0), ("current.bandwidth", 300.0)] {
         let tuned = step_response(|pair| tune(pair, name, |_| to).unwrap());
         let restarted = step_response(|pair| {
             *pair = Pair::default();
             let par = &mut pair.controller.model.parameters;
             match name {
                 "speed_loop.bandwidth" => par.speed_loop.bandwidth = to,
-                "observer.w_n" => par.estimators.observer.w_n = to,
+                "rasmussen.w_n" => par.estimators.rasmussen.w_n = to,
                 _ => par.current.bandwidth = to,
             }
             pair.start().unwrap();
@@ -219,7 +219,7 @@ fn several_sets_before_a_sample_are_one() {
     let mut untuned = pair.clone();
     for factor in [3.0, 0.1, 2.0] {
         tune(&mut pair, "speed_loop.bandwidth", |x| factor * x).unwrap();
-        tune(&mut pair, "observer.zeta", |x| x / factor).unwrap();
+        tune(&mut pair, "rasmussen.zeta", |x| x / factor).unwrap();
     }
     run(&mut pair, inputs, 1);
     run(&mut untuned, inputs, 1);
@@ -231,11 +231,11 @@ fn before_the_first_sample_a_tuned_value_is_a_start_value() {
     let mut late = Pair::default();
     late.start().unwrap();
     tune(&mut late, "current.bandwidth", |x| 0.5 * x).unwrap();
-    tune(&mut late, "observer.c_1", |x| 0.5 * x).unwrap();
+    tune(&mut late, "rasmussen.c_1", |x| 0.5 * x).unwrap();
     let mut early = Pair::default();
     let par = &mut early.controller.model.parameters;
     par.current.bandwidth *= 0.5;
-    par.estimators.observer.c_1 *= 0.5;
+    par.estimators.rasmussen.c_1 *= 0.5;
     early.start().unwrap();
     run(&mut late, (50.0, 0.0, 325.0), 1000);
     run(&mut early, (50.0, 0.0, 325.0), 1000);

@@ -11,11 +11,11 @@ pub struct Motor {
     pub n_p: i32,
     /// Stator resistance in Ohm, > 0.
     pub R_s: f64,
-    /// Inductance along the magnet in H, > 0.
+    /// d-axis inductance in H, > 0.
     pub L_d: f64,
-    /// Inductance across the magnet in H, > 0.
+    /// q-axis inductance in H, > 0.
     pub L_q: f64,
-    /// Flux linkage of the magnet in Wb, peak-valued, > 0.
+    /// Permanent-magnet flux linkage in Wb, peak-valued, > 0.
     pub psi_M: f64,
 }
 
@@ -47,9 +47,9 @@ pub const MOTOR: &Table<Motor> = &Table::new(
         &[
             P::integer_parameter("n_p", "Number of pole pairs", |m| &mut m.n_p).at_least(1.0).at_most(1000.0),
             P::parameter("R_s", &OHM, "Stator resistance", |m| &mut m.R_s).above(0.0).tunable(),
-            P::parameter("L_d", &HENRY, "Inductance along the magnet axis", |m| &mut m.L_d).above(0.0),
-            P::parameter("L_q", &HENRY, "Inductance across the magnet axis", |m| &mut m.L_q).above(0.0),
-            P::parameter("psi_M", &WEBER, "Peak flux linkage of the magnet", |m| &mut m.psi_M).above(0.0),
+            P::parameter("L_d", &HENRY, "d-axis inductance", |m| &mut m.L_d).above(0.0),
+            P::parameter("L_q", &HENRY, "q-axis inductance", |m| &mut m.L_q).above(0.0),
+            P::parameter("psi_M", &WEBER, "Permanent-magnet flux linkage (peak)", |m| &mut m.psi_M).above(0.0),
         ]
     },
 );

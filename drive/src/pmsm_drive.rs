@@ -15,8 +15,8 @@ use serde::{Deserialize, Serialize};
 #[cfg(doc)]
 use crate::{PmsmPlant, SensorlessController};
 
-/// Most samples within one communication step.
-const MOST_SAMPLES: f64 = 1e6;
+/// Maximum number of samples in one communication step.
+const MAX_SAMPLES: f64 = 1e6;
 
 /// Inputs, held over a communication step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -150,8 +150,8 @@ impl Model for PmsmDrive {
         let Self { inputs, pair, period } = self;
         let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
         let end = step.end();
-        if step.h > MOST_SAMPLES * grid.period {
-            let longest = format!("at most {} s at this T_s", MOST_SAMPLES * grid.period);
+        if step.h > MAX_SAMPLES * grid.period {
+            let longest = format!("at most {} s at this T_s", MAX_SAMPLES * grid.period);
             return Err(Fault::value("the step size", format!("{} s", step.h), longest));
         }
         pair.now = step.start;
@@ -235,8 +235,12 @@ const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
                 &mut o.theta_est
             }),
-            O::discrete_output("i_d_est", &AMPERE, "Stator current along the estimated magnet axis", |o| &mut o.i.d),
-            O::discrete_output("i_q_est", &AMPERE, "Stator current across the estimated magnet axis", |o| &mut o.i.q),
+            O::discrete_output("i_d_est", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| {
+                &mut o.i.d
+            }),
+            O::discrete_output("i_q_est", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| {
+                &mut o.i.q
+            }),
             O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
             O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
             O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),

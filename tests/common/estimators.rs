@@ -77,7 +77,7 @@ fn start(kind: Kind) -> Experiment {
     pair.controller.model.parameters.start.mode = mode;
     if mode == INJECTION {
         pair = runner::with_saturation(pair);
-        pair.controller.model.parameters.c_2 = 40.0;
+        pair.controller.model.parameters.s_2 = 40.0;
     }
     let name = format!("{}: start", kind.name());
     Experiment { name, pair, speed_ref: vec![(0.6, speed)], load: vec![], duration: 1.6 }

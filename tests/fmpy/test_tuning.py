@@ -52,8 +52,8 @@ def drives(request, archives):
         ("speed_loop.bandwidth", 40.0),
         ("speed_loop.t_is", 8.0),
         ("current.bandwidth", 800.0),
-        ("observer.w_n", 200.0),
-        ("observer.c_1", 100.0),
+        ("rasmussen.w_n", 200.0),
+        ("rasmussen.c_1", 100.0),
         ("motor.R_s", 1.6),
     ],
 )

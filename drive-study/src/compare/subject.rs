@@ -165,7 +165,7 @@ impl Subject {
                 Class::Injection | Class::Hybrid => {
                     *mode = INJECTION;
                     *p = runner::with_saturation(p.clone());
-                    p.controller.model.parameters.c_2 = p.plant.model.parameters.saturation.c_2;
+                    p.controller.model.parameters.s_2 = p.plant.model.parameters.saturation.s_2;
                 }
             }
         })

@@ -111,11 +111,11 @@ pub struct Bandwidth {
 #[serde(deny_unknown_fields)]
 pub struct Saturation {
     /// Of second order along the magnet.
-    pub c_2: Option<Number>,
+    pub s_2: Option<Number>,
     /// Of third order along the magnet.
-    pub c_3: Option<Number>,
+    pub s_3: Option<Number>,
     /// Between the axes.
-    pub c_x: Option<Number>,
+    pub s_dq: Option<Number>,
 }
 
 /// What the rules would choose by themselves.

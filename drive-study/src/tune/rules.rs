@@ -128,9 +128,9 @@ fn plant(data: &Data) -> Vec<Setting> {
     all.push(optional("mechanics.tau_coulomb", &mechanics.tau_coulomb));
     all.extend(mechanics.w_coulomb.as_ref().map(|x| given("mechanics.w_coulomb", x)));
     if let Some(s) = saturation {
-        all.push(optional("saturation.c_2", &s.c_2));
-        all.push(optional("saturation.c_3", &s.c_3));
-        all.push(optional("saturation.c_x", &s.c_x));
+        all.push(optional("saturation.s_2", &s.s_2));
+        all.push(optional("saturation.s_3", &s.s_3));
+        all.push(optional("saturation.s_dq", &s.s_dq));
     }
     all.push(given("u_dc", &data.dc_link.u_dc));
     all
@@ -235,9 +235,9 @@ fn least_inductance(data: &Data, i: f64) -> f64 {
         psi_M: *m.psi_M.get_ref(),
     };
     let saturation = data.saturation.as_ref().map_or_else(Saturation::default, |s| Saturation {
-        c_2: of(&s.c_2),
-        c_3: of(&s.c_3),
-        c_x: of(&s.c_x),
+        s_2: of(&s.s_2),
+        s_3: of(&s.s_3),
+        s_dq: of(&s.s_dq),
     });
     let at = |angle: f64| {
         let psi = |r: f64| Dq::new(motor.psi_M + r * angle.cos(), r * angle.sin());
@@ -287,10 +287,10 @@ fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setti
     Ok(vec![
         real("speed_loop.b", 0.5, "set-point weight of Rasmussen's drive"),
         real("limit.i_q", i_q, "0.8 of the greatest current"),
-        real("observer.w_n", w_n, "bandwidth.observer"),
-        real("observer.zeta", 1.0, "aperiodic"),
-        real("observer.c_1", c_1, "4 |R - R^| i_0 / psi_M, at least 50, at most 200"),
-        real("observer.c_2", c_1 / 50.0, "c_1 / 50"),
+        real("rasmussen.w_n", w_n, "bandwidth.observer"),
+        real("rasmussen.zeta", 1.0, "aperiodic"),
+        real("rasmussen.c_1", c_1, "4 |R - R^| i_0 / psi_M, at least 50, at most 200"),
+        real("rasmussen.c_2", c_1 / 50.0, "c_1 / 50"),
         real("zero_speed.i_0", i_0, "1.35 times the rated torque / K"),
         real("zero_speed.w_0", (30.0 / n_p).clamp(5.0, 40.0), "30 rad/s electrical, 5 to 40 mechanical"),
     ])

@@ -130,12 +130,14 @@ impl CurrentController {
         self.integral + DqHat::new(gains.d.k_p * error.d(), gains.q.k_p * error.q())
     }
 
-    /// Integrates one sample of `T_s` (s); `cut` (V) is the limited command minus the wanted one.
+    /// Integrates one sample of `T_s` (s); `limitation` (V) is the limited voltage minus the requested one.
     #[inline]
-    pub fn integrate(&mut self, gains: &CurrentGains, error: DqHat, cut: DqHat, T_s: f64) {
+    pub fn integrate(&mut self, gains: &CurrentGains, error: DqHat, limitation: DqHat, T_s: f64) {
         let CurrentGains { d, q, .. } = gains;
-        self.integral +=
-            DqHat::new(T_s * d.k_i * (error.d() + cut.d() / d.k_p), T_s * q.k_i * (error.q() + cut.q() / q.k_p));
+        self.integral += DqHat::new(
+            T_s * d.k_i * (error.d() + limitation.d() / d.k_p),
+            T_s * q.k_i * (error.q() + limitation.q() / q.k_p),
+        );
     }
 }
 
@@ -165,7 +167,7 @@ pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
             ),
             P::boolean_parameter(
                 "mtpa",
-                "Maximum torque per ampere; false: i_d = 0. The estimator Rasmussen has its own law for i_d",
+                "Maximum torque per ampere; false: i_d = 0. The estimator Rasmussen uses zero_speed for i_d instead",
                 |p| &mut p.mtpa,
             ),
         ]
@@ -217,7 +219,7 @@ mod tests {
             let wanted = c.command(&gains, &motor, i_ref, i, 0.0).q();
             c.integrate(&gains, i_ref - i, DqHat::new(0.0, limit - wanted), 1e-4);
         }
-        // cut = -K_p e: the integral part stays bounded at the limit instead of growing with K_i e t.
+        // limitation = -K_p e: the integral part stays bounded at the limit instead of growing with K_i e t.
         assert!((c.integral.q() - limit).abs() < 1e-6, "{:?}", c.integral);
     }
 }

@@ -32,7 +32,7 @@ const FILTER: f64 = TAU * 50.0;
 /// Parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LockParameters {
-    /// Voltage in V that is no sign of a lost rotor, > 0.
+    /// Tolerated voltage error in V, > 0.
     pub u: f64,
     /// Angle error in rad at which the lock is lost, where the EMF shows it, > 0.
     pub angle: f64,
@@ -113,8 +113,8 @@ type P = Row<LockParameters>;
 pub const LOCK: &Table<LockParameters> = &Table::new(
     const {
         &[
-            P::parameter("u", &VOLT, "Voltage that is no sign of a lost rotor", |p| &mut p.u).above(0.0),
-            P::parameter("angle", &RADIAN, "Angle error at which lock_lost is 1, where the EMF shows it", |p| {
+            P::parameter("u", &VOLT, "Voltage error tolerated before lock_lost rises", |p| &mut p.u).above(0.0),
+            P::parameter("angle", &RADIAN, "Angle error at which lock_lost is 1, where the back EMF shows it", |p| {
                 &mut p.angle
             })
             .above(0.0)

@@ -17,11 +17,11 @@ use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
 
-/// Greatest turn of the estimate in one sample in rad: beyond it nothing is estimated any more.
-const FASTEST: f64 = 20.0 * std::f64::consts::PI;
+/// Maximum rotation of the estimate in one sample in rad: a faster one is a lost estimator.
+const MAX_TURN: f64 = 20.0 * std::f64::consts::PI;
 
-/// Most samples of one communication step: a step ends, whatever the importer and T_s make of it.
-const MOST_SAMPLES: f64 = 1e7;
+/// Maximum number of samples in one communication step: bounds its duration for any step size and `T_s`.
+const MAX_SAMPLES: f64 = 1e7;
 
 /// Sensorless speed control of a permanent-magnet synchronous machine (Rasmussen, Fig. 2).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -48,7 +48,7 @@ impl SensorlessController {
         }
         let out = self.control();
         self.state.k += 1;
-        let sane = (out.speed_est * f64::from(self.parameters.motor.n_p) * self.parameters.T_s).abs() < FASTEST;
+        let sane = (out.speed_est * f64::from(self.parameters.motor.n_p) * self.parameters.T_s).abs() < MAX_TURN;
         if sane && out.is_finite() { out } else { self.start_again() }
     }
 
@@ -238,7 +238,7 @@ impl Model for SensorlessController {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        let ControllerParameters { limit, zero_speed, estimator, start, polarity, motor, T_s, c_2, .. } =
+        let ControllerParameters { limit, zero_speed, estimator, start, polarity, motor, T_s, s_2, .. } =
             &self.parameters;
         let Some(kind) = Kind::of(*estimator) else {
             return Err(Fault::value("estimator", estimator, "one of the enumeration's values"));
@@ -255,7 +255,7 @@ impl Model for SensorlessController {
                     kind.name()
                 )));
             }
-            polarity.validate(motor, *T_s, *c_2, limit.i)?;
+            polarity.validate(motor, *T_s, *s_2, limit.i)?;
         }
         let par = &self.parameters;
         kind.validate(&context(par, &par.estimators, &par.motor))?;
@@ -281,8 +281,8 @@ impl Model for SensorlessController {
         if !self.inputs.is_finite() {
             return Err(Fault::new("an input of the controller is not a finite number"));
         }
-        if end.minus_periods(self.state.samples, grid.period) > MOST_SAMPLES * grid.period {
-            let longest = format!("at most {MOST_SAMPLES} sample periods of {} s", grid.period);
+        if end.minus_periods(self.state.samples, grid.period) > MAX_SAMPLES * grid.period {
+            let longest = format!("at most {MAX_SAMPLES} sample periods of {} s", grid.period);
             return Err(Fault::value("the step size", format!("{} s", step.h), longest));
         }
         while grid.passed(self.state.samples, end) {
@@ -310,18 +310,18 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             V::input(
                 "theta_meas",
                 &RADIAN,
-                "Electrical rotor angle of a sensor, read by the sensored estimator",
+                "Electrical rotor angle of a sensor; read only by the estimator Sensored",
                 |m| &mut m.model.inputs.theta_meas,
             ),
-            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor, read by the sensored estimator", |m| {
+            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor; read only by the estimator Sensored", |m| {
                 &mut m.model.inputs.speed_meas
             }),
-            V::input("tau_ref", &NEWTON_METRE, "Torque reference; read with speed_loop.torque_mode only", |m| {
+            V::input("tau_ref", &NEWTON_METRE, "Torque reference; read only with speed_loop.torque_mode", |m| {
                 &mut m.model.inputs.tau_ref
             }),
             V::boolean_input(
                 "enable",
-                "The controller works; false: 0 V, and everything starts again when true",
+                "The controller runs; false: it commands 0 V, and starts anew when set to true",
                 |m| &mut m.model.inputs.enable,
             ),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),

@@ -6,11 +6,11 @@
 //! 4. Along the magnet the iron saturates and the current is greater: the greater peak was on the side of the north pole.
 //!    The estimate stays, or turns by half a turn. Then speed and current control begin.
 //!
-//! With the flux linkage x = V T_s `samples` the peaks are x / L_d + c_2 x^2 and x / L_d - c_2 x^2, nearly.
+//! With the flux linkage x = V T_s `samples` the peaks are x / L_d + s_2 x^2 and x / L_d - s_2 x^2, nearly.
 //! Limits: the rotor stands still; where nothing saturates the noise decides.
 //!
 //! The saliency cannot tell the ends apart (Kim & Sul 2011, eq (36): the angle is in it as 2 theta); the sequence of pulses is derived
-//! here from the saturation of [`saturation`](crate::plant::saturation). V in V, x in Wb, L in H, c_2 in A/Wb2.
+//! here from the saturation of [`saturation`](crate::plant::saturation). V in V, x in Wb, L in H, s_2 in A/Wb2.
 
 use crate::estimator::{Context, Sample};
 use crate::frame::{Axis, DqHat, Estimated};
@@ -22,8 +22,8 @@ use std::f64::consts::PI;
 
 /// Rests in units of L/R.
 const REST: f64 = 4.0;
-/// Least difference of the peaks, by the controller's estimates, in units of x / L_d.
-const LEAST_DIFFERENCE: f64 = 0.02;
+/// Minimum difference of the peaks, by the controller's estimates, in units of x / L_d.
+const MIN_DIFFERENCE: f64 = 0.02;
 
 /// Parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,22 +43,22 @@ impl Default for PolarityParameters {
 }
 
 impl PolarityParameters {
-    /// Whether the pulses tell the ends of the magnet apart, with the estimate `c_2` (A/Wb2) of its saturation, and stay
+    /// Whether the pulses tell the ends of the magnet apart, with the estimate `s_2` (A/Wb2) of its saturation, and stay
     /// within the current `limit` (A).
     ///
     /// # Errors
     /// Says which parameters do not fit.
-    pub fn validate(&self, motor: &Motor, T_s: f64, c_2: f64, limit: f64) -> Result<(), Fault> {
+    pub fn validate(&self, motor: &Motor, T_s: f64, s_2: f64, limit: f64) -> Result<(), Fault> {
         let Self { voltage, samples, .. } = self;
         let x = voltage * T_s * f64::from(*samples);
-        let (linear, saturated) = (x / motor.L_d, c_2 * x * x);
+        let (linear, saturated) = (x / motor.L_d, s_2 * x * x);
         let pulses = format!("polarity.voltage = {voltage} V for polarity.samples = {samples} of T_s = {T_s} s");
-        if 2.0 * saturated.abs() < LEAST_DIFFERENCE * linear {
+        if 2.0 * saturated.abs() < MIN_DIFFERENCE * linear {
             return Err(Fault::new(format!(
-                "saturation.c_2 = {c_2} A/Wb2: {pulses} make peaks of {linear} A that differ by {} A only; the ends of \
+                "saturation.s_2 = {s_2} A/Wb2: {pulses} make peaks of {linear} A that differ by {} A only; the ends of \
                  the magnet differ by saturation alone, and the start by injection needs {} A",
                 2.0 * saturated.abs(),
-                LEAST_DIFFERENCE * linear
+                MIN_DIFFERENCE * linear
             )));
         }
         if linear + saturated.abs() > limit {
@@ -152,15 +152,15 @@ type P = Row<PolarityParameters>;
 pub const POLARITY: &Table<PolarityParameters> = &Table::new(
     const {
         &[
-            P::parameter("t_find", &SECOND, "Time of injection before the pulses, start by injection", |p| {
+            P::parameter("t_find", &SECOND, "Duration of the injection before the pulses, start by injection", |p| {
                 &mut p.t_find
             })
             .above(0.0),
-            P::parameter("voltage", &VOLT, "Voltage of the pulses along the axis found, start by injection", |p| {
+            P::parameter("voltage", &VOLT, "Amplitude of the d-axis voltage pulses, start by injection", |p| {
                 &mut p.voltage
             })
             .above(0.0),
-            P::integer_parameter("samples", "Samples of a pulse, start by injection", |p| &mut p.samples)
+            P::integer_parameter("samples", "Duration of a pulse in samples, start by injection", |p| &mut p.samples)
                 .at_least(1.0)
                 .at_most(1000.0),
         ]
@@ -176,11 +176,11 @@ mod tests {
         let motor = Motor { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 };
         let par = PolarityParameters::default();
         par.validate(&motor, 1e-4, 40.0, 15.0).unwrap();
-        let message = |par: &PolarityParameters, c_2, limit| {
-            par.validate(&motor, 1e-4, c_2, limit).unwrap_err().message().to_owned()
+        let message = |par: &PolarityParameters, s_2, limit| {
+            par.validate(&motor, 1e-4, s_2, limit).unwrap_err().message().to_owned()
         };
         let unknown = message(&par, 0.0, 15.0);
-        for part in ["saturation.c_2 = 0 A/Wb2", "polarity.voltage = 150 V", "polarity.samples = 8", "T_s = 0.0001 s"] {
+        for part in ["saturation.s_2 = 0 A/Wb2", "polarity.voltage = 150 V", "polarity.samples = 8", "T_s = 0.0001 s"] {
             assert!(unknown.contains(part), "{unknown}");
         }
         let weak = message(&PolarityParameters { voltage: 5.0, ..par.clone() }, 40.0, 15.0);

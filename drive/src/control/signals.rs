@@ -79,9 +79,9 @@ impl ControllerOutputs {
 /// The two components of a vector, as variables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DqParts {
-    /// Along the estimated magnet axis.
+    /// Component on the estimated d axis.
     pub d: f64,
-    /// Across it.
+    /// Component on the estimated q axis.
     pub q: f64,
 }
 

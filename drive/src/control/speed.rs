@@ -23,7 +23,7 @@ pub struct SpeedLoop {
     pub t_is: f64,
     /// Weight of the set point on the proportional part, 0..1.
     pub b: f64,
-    /// Greatest change of the reference in rad/s2, mechanical, >= 0; 0: none.
+    /// Maximum rate of change of the reference in rad/s2, mechanical, >= 0; 0: no ramp.
     pub ramp: f64,
     /// The torque reference rules instead of the speed's.
     pub torque_mode: bool,
@@ -39,8 +39,12 @@ impl SpeedLoop {
     /// The reference (rad/s) a sample of `T_s` (s) after it was `last`, on its way to `w_ref` (rad/s).
     #[inline]
     pub fn ramped(&self, last: f64, w_ref: f64, T_s: f64) -> f64 {
-        let most = self.ramp * T_s;
-        if self.ramp > 0.0 && (w_ref - last).abs() > most { last + most.copysign(w_ref - last) } else { w_ref }
+        let max_change = self.ramp * T_s;
+        if self.ramp > 0.0 && (w_ref - last).abs() > max_change {
+            last + max_change.copysign(w_ref - last)
+        } else {
+            w_ref
+        }
     }
 }
 
@@ -104,19 +108,24 @@ pub const SPEED_LOOP: &Table<SpeedLoop> = &Table::new(
             P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the speed loop", |p| &mut p.bandwidth)
                 .above(0.0)
                 .tunable(),
-            P::parameter("t_is", &ONE, "Integral time in units of 1/bandwidth", |p| &mut p.t_is).above(0.0).tunable(),
-            P::parameter("b", &ONE, "Weight of the set point on the proportional part", |p| &mut p.b)
+            P::parameter("t_is", &ONE, "Integral time constant in units of 1/bandwidth", |p| &mut p.t_is)
+                .above(0.0)
+                .tunable(),
+            P::parameter("b", &ONE, "Set-point weight of the proportional part", |p| &mut p.b)
                 .at_least(0.0)
                 .at_most(1.0)
                 .tunable(),
-            P::parameter("ramp", &RAD_PER_S2, "Greatest rate of the speed reference, mechanical; 0: none", |p| {
-                &mut p.ramp
-            })
+            P::parameter(
+                "ramp",
+                &RAD_PER_S2,
+                "Maximum rate of change of the mechanical speed reference; 0: no ramp",
+                |p| &mut p.ramp,
+            )
             .at_least(0.0)
             .tunable(),
             P::boolean_parameter(
                 "torque_mode",
-                "The torque reference tau_ref rules, within the limits, and speed_ref does nothing; false: speed control",
+                "Torque control by tau_ref within the limits, speed_ref ignored; false: speed control",
                 |p| &mut p.torque_mode,
             ),
         ]

@@ -37,14 +37,18 @@ const FILTER: f64 = TAU * 60.0;
 /// The starts; a value never changes.
 pub static STARTS: Enumeration = Enumeration {
     name: "Start",
-    description: "What happens before the estimator is at work",
+    description: "Start sequence before the estimator takes over",
     items: &[
-        Item { value: 1, name: "Direct", description: "Nothing: the estimator starts at once" },
-        Item { value: 2, name: "CurrentFrequency", description: "I-f start: a current leads the rotor to start.speed" },
+        Item { value: 1, name: "Direct", description: "No sequence: the estimator starts at once" },
+        Item {
+            value: 2,
+            name: "CurrentFrequency",
+            description: "I-f start: a rotating current vector takes the rotor to start.speed",
+        },
         Item {
             value: 3,
             name: "Injection",
-            description: "Standstill: injection finds the magnet's axis, voltage pulses its north pole",
+            description: "At standstill: injection finds the d axis, voltage pulses find the north pole",
         },
     ],
 };
@@ -178,20 +182,27 @@ type P = Row<StartParameters>;
 pub const START: &Table<StartParameters> = &Table::new(
     const {
         &[
-            P::enumeration_parameter("mode", &STARTS, "What happens before the estimator is at work", |p| &mut p.mode),
-            P::parameter("i", &AMPERE, "Current that leads the rotor, I-f start", |p| &mut p.i).above(0.0),
+            P::enumeration_parameter("mode", &STARTS, "Start sequence before the estimator takes over", |p| {
+                &mut p.mode
+            }),
+            P::parameter("i", &AMPERE, "Magnitude of the rotating current vector, I-f start", |p| &mut p.i).above(0.0),
             P::parameter("t_align", &SECOND, "Duration of each of the two alignments, I-f start", |p| &mut p.t_align)
                 .above(0.0),
-            P::parameter("acceleration", &RAD_PER_S2, "Mechanical acceleration of the current, I-f start", |p| {
-                &mut p.acceleration
-            })
+            P::parameter(
+                "acceleration",
+                &RAD_PER_S2,
+                "Mechanical acceleration of the current vector, I-f start",
+                |p| &mut p.acceleration,
+            )
             .above(0.0),
-            P::parameter("speed", &SPEED, "Mechanical speed of the hand-over to the estimator, I-f start", |p| {
+            P::parameter("speed", &SPEED, "Mechanical speed at which the estimator takes over, I-f start", |p| {
                 &mut p.speed
             })
             .above(0.0),
-            P::parameter("settle", &SECOND, "Time at that speed before the hand-over, I-f start", |p| &mut p.settle)
-                .at_least(0.0),
+            P::parameter("settle", &SECOND, "Time at start.speed before the estimator takes over, I-f start", |p| {
+                &mut p.settle
+            })
+            .at_least(0.0),
         ]
     },
 );

@@ -19,16 +19,16 @@ use serde::{Deserialize, Serialize};
 /// Limits of the current references.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
-    /// Greatest |i_q| in A, > 0.
+    /// Maximum |i_q| in A, > 0.
     pub i_q: f64,
-    /// Greatest magnitude of the current in A, > 0.
+    /// Maximum phase current (peak) in A, > 0.
     pub i: f64,
-    /// Greatest magnitude of the torque reference in N.m, > 0.
+    /// Maximum magnitude of the torque reference in N.m, > 0.
     pub tau: f64,
 }
 
 impl Limits {
-    /// Greatest |i_q| in A beside `i_d` (A), which has priority.
+    /// Maximum |i_q| in A that `i_d` (A), which has priority, leaves.
     #[inline]
     pub fn i_q_beside(&self, i_d: f64) -> f64 {
         self.i_q.min((self.i * self.i - i_d * i_d).max(0.0).sqrt())
@@ -59,12 +59,14 @@ const COMPENSATION: &Table<Compensation> = &Table::new(
             C::parameter(
                 "u_dead",
                 &VOLT,
-                "Voltage that a leg loses to dead time, added to the command; 0: none",
+                "Dead-time voltage of an inverter leg, added to the command; 0: no compensation",
                 |p| &mut p.u_dead,
             )
             .at_least(0.0),
-            C::parameter("i_zero", &AMPERE, "Current below which proportionally less is added", |p| &mut p.i_zero)
-                .above(0.0),
+            C::parameter("i_zero", &AMPERE, "Current below which the compensation falls linearly to zero", |p| {
+                &mut p.i_zero
+            })
+            .above(0.0),
         ]
     },
 );
@@ -96,14 +98,14 @@ pub struct ControllerParameters {
     pub limit: Limits,
     /// The low-speed law.
     pub zero_speed: ZeroSpeed,
-    /// What says that the rotor is lost.
+    /// Detection of a lost rotor.
     pub lock: LockParameters,
     /// The start.
     pub start: StartParameters,
     /// The start by injection.
     pub polarity: PolarityParameters,
-    /// Estimate of the machine's saturation of second order in A/Wb2, >= 0; 0: not known.
-    pub c_2: f64,
+    /// Estimate of the second-order d-axis saturation coefficient in A/Wb2, >= 0; 0: unknown.
+    pub s_2: f64,
     /// First estimate of the electrical angle in rad.
     pub theta_est: f64,
     /// First estimate of the mechanical speed in rad/s.
@@ -130,7 +132,7 @@ impl Default for ControllerParameters {
             lock: LockParameters::default(),
             start: StartParameters::default(),
             polarity: PolarityParameters::default(),
-            c_2: 0.0,
+            s_2: 0.0,
             theta_est: 0.0,
             speed_est: 0.0,
         }
@@ -166,26 +168,26 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
                 .above(0.0)
                 .tunable(),
-            P::parameter("limit.i_q", &AMPERE, "Greatest magnitude of i_q", |p| &mut p.limit.i_q).above(0.0).tunable(),
-            P::parameter("limit.i", &AMPERE, "Greatest magnitude of the current; i_d has priority over i_q", |p| {
+            P::parameter("limit.i_q", &AMPERE, "Maximum magnitude of the q-axis current", |p| &mut p.limit.i_q)
+                .above(0.0)
+                .tunable(),
+            P::parameter("limit.i", &AMPERE, "Maximum phase current (peak); i_d has priority over i_q", |p| {
                 &mut p.limit.i
             })
             .above(0.0)
             .tunable(),
-            P::parameter("limit.tau", &NEWTON_METRE, "Greatest magnitude of the torque reference", |p| {
-                &mut p.limit.tau
-            })
-            .above(0.0)
-            .tunable(),
+            P::parameter("limit.tau", &NEWTON_METRE, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
+                .above(0.0)
+                .tunable(),
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
             P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
             P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
             P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
             P::parameter(
-                "saturation.c_2",
+                "saturation.s_2",
                 &A_PER_WB2,
-                "Estimate of the saturation of second order along the magnet, start by injection; 0: not known",
-                |p| &mut p.c_2,
+                "Second-order d-axis saturation coefficient (estimate), read by the start by injection; 0: unknown",
+                |p| &mut p.s_2,
             )
             .at_least(0.0),
             P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
@@ -198,20 +200,20 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
 
 type O = Row<ControllerOutputs>;
 
-/// What the output says.
+/// Description of the output `lock_lost`, on the controller and on `PmsmDrive`.
 pub const LOCK_LOST: &str =
-    "Whether the estimate fits the voltage: 0 it is at the rotor, 1 and more it is lost, 10 at most";
+    "Mismatch between the estimate and the applied voltage: 0 locked, 1 or more lost, 10 at most";
 
-/// What the output says.
-pub const ENABLED: &str = "The controller is at work: the voltage references are its own";
+/// Description of the output `enabled`, on the controller and on `PmsmDrive`.
+pub const ENABLED: &str = "The controller is running: the voltage references are its own";
 
-/// What says that a limit is reached: the last outputs of the controller and of the drive.
+/// Outputs that report a reached limit: the last outputs of the controller and of `PmsmDrive`.
 pub const LIMITED: &Table<ControllerOutputs> = &Table::new(
     const {
         &[
             O::boolean_output(
                 "voltage_limited",
-                "The hexagon of u_dc limited the voltage references of the last sample",
+                "The voltage hexagon of u_dc limited the voltage references of the last sample",
                 |o| &mut o.voltage_limited,
             ),
             O::boolean_output(
@@ -236,10 +238,10 @@ pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
                 &mut o.theta_est
             }),
-            O::discrete_output("i_d", &AMPERE, "Stator current along the estimated magnet axis", |o| &mut o.i.d),
-            O::discrete_output("i_q", &AMPERE, "Stator current across the estimated magnet axis", |o| &mut o.i.q),
-            O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d", |o| &mut o.i_ref.d),
-            O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q", |o| &mut o.i_ref.q),
+            O::discrete_output("i_d", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| &mut o.i.d),
+            O::discrete_output("i_q", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| &mut o.i.q),
+            O::discrete_output("i_d_ref", &AMPERE, "d-axis stator current reference", |o| &mut o.i_ref.d),
+            O::discrete_output("i_q_ref", &AMPERE, "q-axis stator current reference", |o| &mut o.i_ref.q),
             O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
             O::boolean_output("enabled", ENABLED, |o| &mut o.enabled),
             O::part("", &Part { table: LIMITED, lens: |o| o }),

@@ -1,4 +1,4 @@
-//! The low-speed law: a current along the estimated magnet axis that the rotor follows where no estimate is possible.
+//! The low-speed law: a d-axis current that the rotor follows at speeds where no estimate is possible.
 //!
 //! Rasmussen (25): i_sd,ref = i_0 exp(-|w_r^| / w_0), with the MECHANICAL speed.
 
@@ -36,14 +36,15 @@ type P = Row<ZeroSpeed>;
 pub const ZERO_SPEED: &Table<ZeroSpeed> = &Table::new(
     const {
         &[
-            P::parameter("i_0", &AMPERE, "Current along the estimated magnet axis at standstill, eq (25)", |p| {
-                &mut p.i_0
-            })
-            .at_least(0.0)
-            .tunable(),
-            P::parameter("w_0", &SPEED, "Mechanical speed at which that current has fallen to 1/e, eq (25)", |p| {
-                &mut p.w_0
-            })
+            P::parameter("i_0", &AMPERE, "d-axis current reference at standstill, eq (25)", |p| &mut p.i_0)
+                .at_least(0.0)
+                .tunable(),
+            P::parameter(
+                "w_0",
+                &SPEED,
+                "Mechanical speed at which the d-axis current reference has fallen to 1/e, eq (25)",
+                |p| &mut p.w_0,
+            )
             .above(0.0)
             .tunable(),
         ]

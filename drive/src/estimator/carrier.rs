@@ -35,10 +35,10 @@ impl Default for CarrierParameters {
     }
 }
 
-/// Fewest samples in a period: with fewer the band-pass is no more one.
-const LEAST_SAMPLES: usize = 6;
-/// Most samples in a period.
-const MOST_SAMPLES: usize = 32;
+/// Minimum samples per period: with fewer the band-pass filter degenerates.
+const MIN_SAMPLES: usize = 6;
+/// Maximum samples per period.
+const MAX_SAMPLES: usize = 32;
 
 /// The carrier at a sample.
 #[derive(Clone, Copy, Debug)]
@@ -64,7 +64,7 @@ impl Carrier {
         let par = &context.par.carrier;
         let phi = par.frequency * context.T_s;
         // A period is a whole number of samples: counted in integers, the phase never drifts.
-        let samples = samples(context).unwrap_or(LEAST_SAMPLES);
+        let samples = samples(context).unwrap_or(MIN_SAMPLES);
         let place = usize::try_from(k % samples as u64).unwrap_or(0);
         let (sin_phi, cos_phi) = sin_cos(phi);
         let (sin, cos) = sin_cos(phi * float(place));
@@ -78,7 +78,7 @@ fn samples(context: &Context) -> Option<usize> {
     let exact = TAU / (context.par.carrier.frequency * context.T_s);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, and is checked")]
     let whole = exact.round() as usize;
-    let fits = (LEAST_SAMPLES..=MOST_SAMPLES).contains(&whole) && (exact - float(whole)).abs() < 1e-6 * exact;
+    let fits = (MIN_SAMPLES..=MAX_SAMPLES).contains(&whole) && (exact - float(whole)).abs() < 1e-6 * exact;
     fits.then_some(whole)
 }
 
@@ -118,7 +118,7 @@ impl<F> BandPass<F> {
 /// The mean over a period of the carrier.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PeriodMean {
-    x: [f64; MOST_SAMPLES],
+    x: [f64; MAX_SAMPLES],
 }
 
 impl PeriodMean {
@@ -142,7 +142,7 @@ pub fn validate(context: &Context) -> Result<(), Fault> {
     let exact = TAU / (w * context.T_s);
     Err(Fault::new(format!(
         "carrier.frequency = {w} rad/s and T_s = {} s: a period of the carrier is {exact} samples; it must be a whole \
-         number from {LEAST_SAMPLES} to {MOST_SAMPLES}",
+         number from {MIN_SAMPLES} to {MAX_SAMPLES}",
         context.T_s
     )))
 }
@@ -153,10 +153,14 @@ type P = Row<CarrierParameters>;
 pub const CARRIER: &Table<CarrierParameters> = &Table::new(
     const {
         &[
-            P::parameter("voltage", &VOLT, "Voltage of the sinusoidal carrier", |p| &mut p.voltage).above(0.0),
+            P::parameter("voltage", &VOLT, "Amplitude of the sinusoidal carrier voltage", |p| &mut p.voltage)
+                .above(0.0),
             P::parameter("frequency", &RAD_PER_S, "Angular frequency of the sinusoidal carrier", |p| &mut p.frequency)
                 .above(0.0),
-            P::parameter("zeta", &ONE, "Damping of the band-pass around the carrier", |p| &mut p.zeta).above(0.0),
+            P::parameter("zeta", &ONE, "Damping ratio of the band-pass filter at the carrier frequency", |p| {
+                &mut p.zeta
+            })
+            .above(0.0),
         ]
     },
 );

@@ -37,7 +37,7 @@ impl Estimating for CurrentModel {
         let r_q = x.v.q() - motor.R_s * x.i.q() - (w * motor.L_d + slip * motor.L_q) * x.i.d() - w * motor.psi_M;
         let di_d = x.i_now.d() - (x.i_last.d() + T_s / motor.L_d * r_d);
         let di_q = x.i_now.q() - (x.i_last.q() + T_s / motor.L_q * r_q);
-        f.w -= (1.0 - pole(par.model.filter, T_s)) * di_q * motor.L_q / (T_s * motor.psi_M);
+        f.w -= (1.0 - pole(par.matsui.filter, T_s)) * di_q * motor.L_q / (T_s * motor.psi_M);
         f.correct(context, -di_d * motor.L_d / T_s);
         Estimate::new(f.theta, f.speed(), sample)
     }

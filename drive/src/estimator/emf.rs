@@ -121,21 +121,19 @@ type P = Row<EmfParameters>;
 pub const EMF: &Table<EmfParameters> = &Table::new(
     const {
         &[
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the EMF: poles of its observer or filter", |p| {
-                &mut p.bandwidth
-            })
-            .above(0.0)
-            .tunable(),
+            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the back-EMF observer or filter", |p| &mut p.bandwidth)
+                .above(0.0)
+                .tunable(),
             P::parameter(
                 "w_sign",
                 &RAD_PER_S,
-                "Electrical speed at which the estimate takes the other direction",
+                "Electrical speed beyond zero at which the estimated direction of rotation changes",
                 |p| &mut p.w_sign,
             )
             .above(0.0),
             P::boolean_parameter(
                 "frame_term",
-                "Keep the speed of the estimated frame beside that of the rotor, which Kim & Sul drop in (18)",
+                "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18)",
                 |p| &mut p.frame_term,
             ),
         ]

@@ -16,7 +16,7 @@ const CLIP: f64 = 0.5;
 
 /// Parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FollowerParameters {
+pub struct MatsuiParameters {
     /// Gain rho of the angle in rad/s, > 0.
     pub bandwidth: f64,
     /// Bandwidth of the speed's low-pass in rad/s, > 0.
@@ -25,7 +25,7 @@ pub struct FollowerParameters {
     pub integral: bool,
 }
 
-impl Default for FollowerParameters {
+impl Default for MatsuiParameters {
     fn default() -> Self {
         Self { bandwidth: TAU * 15.0, filter: TAU * 50.0, integral: true }
     }
@@ -69,7 +69,7 @@ impl Follower {
     /// Corrects by the voltage -w psi_M sin theta~ (V) that the d row shows.
     #[inline]
     pub fn correct(&mut self, context: &Context, e_d: f64) {
-        let par = &context.par.model;
+        let par = &context.par.matsui;
         let s = self.direction.update(self.w, context.par.emf.w_sign);
         let e = -s * e_d / (context.motor.psi_M * self.w.abs().max(context.par.emf.w_sign));
         let e = e.clamp(-CLIP, CLIP);
@@ -80,25 +80,25 @@ impl Follower {
     }
 }
 
-type P = Row<FollowerParameters>;
+type P = Row<MatsuiParameters>;
 
-/// The variables; their owner gives the prefix `model.`.
-pub const FOLLOWER: &Table<FollowerParameters> = &Table::new(
+/// The variables; their owner gives the prefix `matsui.`.
+pub const MATSUI: &Table<MatsuiParameters> = &Table::new(
     const {
         &[
-            P::parameter("bandwidth", &RAD_PER_S, "Gain of the angle error, voltage and current model", |p| {
+            P::parameter("bandwidth", &RAD_PER_S, "Gain of the angle error in voltage and current model", |p| {
                 &mut p.bandwidth
             })
             .above(0.0)
             .tunable(),
-            P::parameter("filter", &RAD_PER_S, "Bandwidth of the calculated speed, voltage and current model", |p| {
+            P::parameter("filter", &RAD_PER_S, "Bandwidth of the speed filter in voltage and current model", |p| {
                 &mut p.filter
             })
             .above(0.0)
             .tunable(),
             P::boolean_parameter(
                 "integral",
-                "Integrate the angle error, so that a bias of the speed turns nothing; false: as printed",
+                "Integrate the angle error, so that a speed bias causes no angle error; false: as printed",
                 |p| &mut p.integral,
             ),
         ]

@@ -105,15 +105,23 @@ type P = Row<HybridParameters>;
 pub const HYBRID: &Table<HybridParameters> = &Table::new(
     const {
         &[
-            P::parameter("w_low", &RAD_PER_S, "Electrical speed up to which only the injection counts", |p| {
-                &mut p.w_low
-            })
+            P::parameter(
+                "w_low",
+                &RAD_PER_S,
+                "Electrical speed up to which the hybrid uses the injection alone",
+                |p| &mut p.w_low,
+            )
             .at_least(0.0),
-            P::parameter("w_high", &RAD_PER_S, "Electrical speed from which only the EMF counts", |p| &mut p.w_high)
-                .above(0.0),
-            P::parameter("bandwidth", &RAD_PER_S, "Pole of the tracker where only the EMF counts", |p| {
-                &mut p.bandwidth
+            P::parameter("w_high", &RAD_PER_S, "Electrical speed from which the hybrid uses the back EMF alone", |p| {
+                &mut p.w_high
             })
+            .above(0.0),
+            P::parameter(
+                "bandwidth",
+                &RAD_PER_S,
+                "Magnitude of the tracker pole where the hybrid uses the back EMF alone",
+                |p| &mut p.bandwidth,
+            )
             .above(0.0)
             .tunable(),
         ]

@@ -17,9 +17,9 @@
 //! the filter takes noise for knowledge, and the angle is off by 0.18 deg at 0.1 of the rated speed with 10 mA of noise,
 //! fifteen times as much as here.
 //!
-//! Noise as spectral densities, so that the filter is the same at every T_s: of the voltage S_d along and S_q across the
-//! magnet, of the acceleration S_a, of the current S_i. The EMF then shows the angle with the density S_d / (w psi_M)^2 and,
-//! across, the speed with S_q / psi_M^2. Where the angle rules (S_q >> S_d) the poles are those of a PLL with
+//! Noise as spectral densities, so that the filter is the same at every T_s: of the voltage S_d on the d axis and S_q on the
+//! q axis, of the acceleration S_a, of the current S_i. The EMF then shows the angle with the density S_d / (w psi_M)^2 and,
+//! on the q axis, the speed with S_q / psi_M^2. Where the angle rules (S_q >> S_d) the poles are those of a PLL with
 //! w_0^2 = |w| psi_M sqrt(S_a / S_d) and the damping 1/sqrt(2): a bandwidth that grows with the root of the speed.
 //!
 //! The rule of [`KalmanParameters::new`]: S_i = sigma^2 T_s of the sensors; S_d = (1 V)^2 1 ms, what a good inverter
@@ -53,18 +53,18 @@ const RAD2_PER_S3: Quantity =
     Quantity::new("AccelerationNoiseDensity", Unit::si("rad2/s3", Exponents::mechanical(0, 0, -3, 0).with_rad(2)));
 
 /// Largest variance of the angle in rad2.
-const MOST: f64 = 1.0;
+const MAX_VARIANCE: f64 = 1.0;
 /// Standard deviation of the angle at the start in rad.
-const THETA: f64 = 0.3;
+const THETA_DEVIATION: f64 = 0.3;
 /// Time in s over which the speed may have wandered at the start.
-const SINCE: f64 = 0.05;
+const WANDERING_TIME: f64 = 0.05;
 
 /// Parameters: spectral densities.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KalmanParameters {
-    /// Of the voltage along the estimated magnet in V2.s, > 0.
+    /// Of the estimated d-axis voltage in V2.s, > 0.
     pub voltage_d: f64,
-    /// Of the voltage across it in V2.s, > 0.
+    /// Of the estimated q-axis voltage in V2.s, > 0.
     pub voltage_q: f64,
     /// Of the electrical acceleration in rad2/s3, > 0.
     pub acceleration: f64,
@@ -139,8 +139,8 @@ impl Kalman {
         let Q = Vector4::new(noise.voltage_d, noise.voltage_q, noise.acceleration, 0.0) * T_s;
         self.P = F * self.P * F.transpose() + Matrix4::from_diagonal(&Q);
         let P = &mut self.P;
-        if P[(3, 3)] > MOST {
-            let scale = (MOST / P[(3, 3)]).sqrt();
+        if P[(3, 3)] > MAX_VARIANCE {
+            let scale = (MAX_VARIANCE / P[(3, 3)]).sqrt();
             for k in 0..4 {
                 P[(3, k)] *= scale;
                 P[(k, 3)] *= scale;
@@ -178,18 +178,18 @@ impl Kalman {
 }
 
 impl Estimating for Kalman {
-    /// Of the flux all is known but what the sensors' noise hides; angle and speed are uncertain.
+    /// The flux is known to within the noise of the current sensors; angle and speed are uncertain.
     fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let Context { motor, par, T_s, .. } = *context;
         let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
         let psi = DqHat::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q());
         // By the angle at the measured current: -j i turned into flux.
-        let v = Vector4::new(motor.L_d * i.q(), -motor.L_q * i.d(), 0.0, 1.0) * THETA;
+        let v = Vector4::new(motor.L_d * i.q(), -motor.L_q * i.d(), 0.0, 1.0) * THETA_DEVIATION;
         let flux = par.kalman.current / T_s;
         let own = Vector4::new(
             motor.L_d * motor.L_d * flux,
             motor.L_q * motor.L_q * flux,
-            SINCE * par.kalman.acceleration,
+            WANDERING_TIME * par.kalman.acceleration,
             0.0,
         );
         (Self { psi, w, theta, P: v * v.transpose() + Matrix4::from_diagonal(&own) }, Estimate::new(theta, w, sample))
@@ -201,8 +201,8 @@ impl Estimating for Kalman {
         let F = self.predict(motor, sample, T_s);
         self.spread(&F, &par.kalman, T_s);
         let r = self.correct(motor, sample.i, par.kalman.current / T_s);
-        let surprise = DqHat::new(motor.L_d * r.d(), motor.L_q * r.q());
-        if surprise.dot(surprise) > motor.psi_M * motor.psi_M {
+        let innovation = DqHat::new(motor.L_d * r.d(), motor.L_q * r.q());
+        if innovation.dot(innovation) > motor.psi_M * motor.psi_M {
             *self = Self::start(context, sample, self.theta, 0.0).0;
         }
         Estimate::new(self.theta, self.w, sample)
@@ -215,22 +215,18 @@ type P = Row<KalmanParameters>;
 pub const KALMAN: &Table<KalmanParameters> = &Table::new(
     const {
         &[
-            P::parameter("voltage_d", &V2_S, "Noise density of the voltage along the estimated magnet axis", |p| {
-                &mut p.voltage_d
-            })
-            .above(0.0)
-            .tunable(),
-            P::parameter("voltage_q", &V2_S, "Noise density of the voltage across the estimated magnet axis", |p| {
-                &mut p.voltage_q
-            })
-            .above(0.0)
-            .tunable(),
+            P::parameter("voltage_d", &V2_S, "Noise density of the estimated d-axis voltage", |p| &mut p.voltage_d)
+                .above(0.0)
+                .tunable(),
+            P::parameter("voltage_q", &V2_S, "Noise density of the estimated q-axis voltage", |p| &mut p.voltage_q)
+                .above(0.0)
+                .tunable(),
             P::parameter("acceleration", &RAD2_PER_S3, "Noise density of the electrical acceleration", |p| {
                 &mut p.acceleration
             })
             .above(0.0)
             .tunable(),
-            P::parameter("current", &A2_S, "Noise density of the measured current: variance times T_s", |p| {
+            P::parameter("current", &A2_S, "Noise density of the measured current: its variance times T_s", |p| {
                 &mut p.current
             })
             .above(0.0)
@@ -389,7 +385,7 @@ mod tests {
                 let scale = filter.P.diagonal().map(|x| 1.0 / x.sqrt());
                 let correlation = Matrix4::from_fn(|r, c| filter.P[(r, c)] * scale[r] * scale[c]);
                 let least = correlation.symmetric_eigenvalues().min();
-                assert!(least > -1e-12 && filter.P[(3, 3)] <= MOST, "{size}, {n}: {least} {filter:?}");
+                assert!(least > -1e-12 && filter.P[(3, 3)] <= MAX_VARIANCE, "{size}, {n}: {least} {filter:?}");
             }
         }
     }

@@ -252,11 +252,11 @@ estimators! {
     6 CurrentModel(current_model::CurrentModel)
         "Current model, Kim & Sul 2011, eq (28) to (30)";
     7 VoltageFeedback(voltage_feedback::VoltageFeedback)
-        "Feedback of the current controller's voltage, Kim & Sul 2011, eq (31) and (32)";
+        "Feedback of the current controller's d-axis voltage, Kim & Sul 2011, eq (31) and (32)";
     8 RotatingInjection(rotating::RotatingInjection)
         "Rotating voltage in stator axes, heterodyne, Kim & Sul 2011, eq (38) to (40)";
     9 PulsatingInjection(pulsating::PulsatingInjection)
-        "Pulsating voltage along the estimated magnet axis, Kim & Sul 2011, eq (42) to (45)";
+        "Pulsating voltage on the estimated d axis, Kim & Sul 2011, eq (42) to (45)";
     10 SquareWaveInjection(square_wave::SquareWaveInjection)
         "Square-wave voltage at half the PWM frequency, Kim & Sul 2011, section III";
     11 NearPwmInjection(near_pwm::NearPwmInjection)

@@ -107,7 +107,7 @@ type P = Row<NearPwmParameters>;
 /// The variables; their owner gives the prefix `near_pwm.`.
 pub const NEAR_PWM: &Table<NearPwmParameters> = &Table::new(
     const {
-        &[P::parameter("voltage", &VOLT, "Voltage of the vector that turns by 120 degrees each sample", |p| {
+        &[P::parameter("voltage", &VOLT, "Injected voltage vector, which turns by 120 degrees each sample", |p| {
             &mut p.voltage
         })
         .above(0.0)]

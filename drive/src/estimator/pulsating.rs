@@ -106,12 +106,9 @@ type P = Row<PulsatingParameters>;
 /// The variables; their owner gives the prefix `pulsating.`.
 pub const PULSATING: &Table<PulsatingParameters> = &Table::new(
     const {
-        &[P::enumeration_parameter(
-            "demodulation",
-            &DEMODULATIONS,
-            "How the angle error is found in the carrier's current",
-            |p| &mut p.demodulation,
-        )]
+        &[P::enumeration_parameter("demodulation", &DEMODULATIONS, "Demodulation of the carrier current", |p| {
+            &mut p.demodulation
+        })]
     },
 );
 

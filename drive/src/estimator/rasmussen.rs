@@ -73,7 +73,7 @@ impl Estimating for Rasmussen {
 
     #[inline]
     fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
-        let Context { motor, T_s, par: EstimatorParameters { observer: par, .. }, .. } = *context;
+        let Context { motor, T_s, par: EstimatorParameters { rasmussen: par, .. }, .. } = *context;
         let half_way = Axis::<Estimated>::at(self.theta + 0.5 * T_s * self.w);
         let resistive = (self.i + sample.i) * (0.5 * motor.R_s);
         self.psi_s += (sample.u - resistive + half_way.to_stator(self.v)) * T_s;
@@ -91,7 +91,7 @@ impl Estimating for Rasmussen {
 
     /// w^ = g_1 psi_rq^ + w_I stays where g_1 changes.
     fn retune(&mut self, old: &Context, new: &Context) {
-        let g_1 = |context: &Context| context.par.observer.g_1(context.motor);
+        let g_1 = |context: &Context| context.par.rasmussen.g_1(context.motor);
         self.w_i += (g_1(old) - g_1(new)) * self.psi_r(new.motor).q();
     }
 }
@@ -105,7 +105,7 @@ impl RasmussenParameters {
 }
 
 impl Rasmussen {
-    /// Flux linkage of the magnet in Wb as the observer has it at the last sample, in the estimated frame.
+    /// Estimated permanent-magnet flux linkage in Wb at the last sample, in the estimated frame.
     #[inline]
     fn psi_r(&self, motor: &Motor) -> DqHat {
         let axis = Axis::<Estimated>::at(self.theta);
@@ -121,18 +121,20 @@ fn inductive(motor: &Motor, i: DqHat) -> DqHat {
 
 type P = Row<RasmussenParameters>;
 
-/// The observer's variables; their owner gives the prefix `observer.`.
-pub const OBSERVER: &Table<RasmussenParameters> = &Table::new(
+/// The observer's variables; their owner gives the prefix `rasmussen.`.
+pub const RASMUSSEN: &Table<RasmussenParameters> = &Table::new(
     const {
         &[
-            P::parameter("c_1", &PER_SECOND, "Feedback of the d flux error, eq (21)", |p| &mut p.c_1)
+            P::parameter("c_1", &PER_SECOND, "Feedback gain of the d-axis flux error, eq (21)", |p| &mut p.c_1)
                 .at_least(0.0)
                 .tunable(),
-            P::parameter("c_2", &PER_SECOND, "Feedback of the q flux, eq (21)", |p| &mut p.c_2).at_least(0.0).tunable(),
-            P::parameter("w_n", &RAD_PER_S, "Natural frequency of the speed adaptation", |p| &mut p.w_n)
+            P::parameter("c_2", &PER_SECOND, "Feedback gain of the q-axis flux, eq (21)", |p| &mut p.c_2)
+                .at_least(0.0)
+                .tunable(),
+            P::parameter("w_n", &RAD_PER_S, "Natural angular frequency of the speed adaptation", |p| &mut p.w_n)
                 .above(0.0)
                 .tunable(),
-            P::parameter("zeta", &ONE, "Damping of the speed adaptation; 0 is the integral form (16)", |p| &mut p.zeta)
+            P::parameter("zeta", &ONE, "Damping ratio of the speed adaptation; 0: integral form (16)", |p| &mut p.zeta)
                 .at_least(0.0)
                 .tunable(),
         ]
@@ -173,7 +175,7 @@ mod tests {
         let rotor = |theta: f64| Axis::<Estimated>::at(theta);
         let current = |theta: f64| rotor(theta).to_stator(i);
         let flux = |theta: f64| rotor(theta).to_stator(DqHat::new(motor.psi_M, 0.0) + inductive(&motor, i));
-        let par = EstimatorParameters { observer: par.clone(), ..EstimatorParameters::default() };
+        let par = EstimatorParameters { rasmussen: par.clone(), ..EstimatorParameters::default() };
         let context = context(&par, hat);
         let first = Sample { i: current(0.0), ..Sample::default() };
         let (mut observer, _) = Rasmussen::start(&context, &first, theta_tilde, w);

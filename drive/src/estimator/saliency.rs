@@ -16,7 +16,7 @@ use fmu_core::Fault;
 pub const CLIP: f64 = 0.5;
 
 /// Least |L_q - L_d| / (L_q + L_d): below it the noise of the current sensors is all there is.
-const LEAST_SALIENCY: f64 = 0.01;
+const MIN_SALIENCY: f64 = 0.01;
 
 /// The high-frequency admittance in 1/H.
 #[derive(Clone, Copy, Debug)]
@@ -55,11 +55,11 @@ pub fn response(motor: &Motor, middle: Axis<Estimated>, sample: &Sample, T_s: f6
 /// The two inductances are too close.
 pub fn validate_saliency(motor: &Motor) -> Result<(), Fault> {
     let Motor { L_d, L_q, .. } = motor;
-    if (L_q - L_d).abs() < LEAST_SALIENCY * (L_q + L_d) {
+    if (L_q - L_d).abs() < MIN_SALIENCY * (L_q + L_d) {
         return Err(Fault::new(format!(
             "motor.L_d = {L_d} H and motor.L_q = {L_q} H: an estimator by injection needs inductances that differ by \
              more than {} % of their sum, since it finds the angle by their difference",
-            100.0 * LEAST_SALIENCY
+            100.0 * MIN_SALIENCY
         )));
     }
     Ok(())

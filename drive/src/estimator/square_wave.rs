@@ -132,11 +132,9 @@ type P = Row<SquareWaveParameters>;
 pub const SQUARE_WAVE: &Table<SquareWaveParameters> = &Table::new(
     const {
         &[
-            P::parameter("voltage", &VOLT, "Voltage injected along the estimated magnet axis, square wave", |p| {
-                &mut p.voltage
-            })
-            .above(0.0),
-            P::integer_parameter("samples", "Samples in a period of the square wave, 2 or 4", |p| &mut p.samples)
+            P::parameter("voltage", &VOLT, "Square-wave voltage injected on the estimated d axis", |p| &mut p.voltage)
+                .above(0.0),
+            P::integer_parameter("samples", "Samples per period of the square wave, 2 or 4", |p| &mut p.samples)
                 .at_least(2.0)
                 .at_most(4.0),
         ]

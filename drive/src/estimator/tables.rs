@@ -2,12 +2,12 @@
 
 use crate::estimator::carrier::{CARRIER, CarrierParameters};
 use crate::estimator::emf::{EMF, EmfParameters};
-use crate::estimator::follower::{FOLLOWER, FollowerParameters};
+use crate::estimator::follower::{MATSUI, MatsuiParameters};
 use crate::estimator::hybrid::{HYBRID, HybridParameters};
 use crate::estimator::kalman::{KALMAN, KalmanParameters};
 use crate::estimator::near_pwm::{NEAR_PWM, NearPwmParameters};
 use crate::estimator::pulsating::{PULSATING, PulsatingParameters};
-use crate::estimator::rasmussen::{OBSERVER, RasmussenParameters};
+use crate::estimator::rasmussen::{RASMUSSEN, RasmussenParameters};
 use crate::estimator::square_wave::{SQUARE_WAVE, SquareWaveParameters};
 use crate::estimator::tracker::{TRACKER, TrackerParameters};
 use fmu_core::{Part, Row, Table};
@@ -17,13 +17,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EstimatorParameters {
     /// The Rasmussen observer.
-    pub observer: RasmussenParameters,
+    pub rasmussen: RasmussenParameters,
     /// The tracker of those that find an angle error.
     pub tracker: TrackerParameters,
     /// Those on the EMF.
     pub emf: EmfParameters,
     /// Voltage model and current model.
-    pub model: FollowerParameters,
+    pub matsui: MatsuiParameters,
     /// The sinusoidal carrier of rotating and pulsating injection.
     pub carrier: CarrierParameters,
     /// Pulsating injection.
@@ -44,10 +44,10 @@ type P = Row<EstimatorParameters>;
 pub const ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = &Table::new(
     const {
         &[
-            P::part("observer.", &Part { table: OBSERVER, lens: |p| &mut p.observer }),
+            P::part("rasmussen.", &Part { table: RASMUSSEN, lens: |p| &mut p.rasmussen }),
             P::part("tracker.", &Part { table: TRACKER, lens: |p| &mut p.tracker }),
             P::part("emf.", &Part { table: EMF, lens: |p| &mut p.emf }),
-            P::part("model.", &Part { table: FOLLOWER, lens: |p| &mut p.model }),
+            P::part("matsui.", &Part { table: MATSUI, lens: |p| &mut p.matsui }),
             P::part("carrier.", &Part { table: CARRIER, lens: |p| &mut p.carrier }),
             P::part("pulsating.", &Part { table: PULSATING, lens: |p| &mut p.pulsating }),
             P::part("square_wave.", &Part { table: SQUARE_WAVE, lens: |p| &mut p.square_wave }),

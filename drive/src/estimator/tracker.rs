@@ -111,7 +111,7 @@ pub const TRACKER: &Table<TrackerParameters> = &Table::new(
             P::enumeration_parameter("kind", &TRACKERS, "Tracker of angle and speed from the angle error", |p| {
                 &mut p.kind
             }),
-            P::parameter("bandwidth", &RAD_PER_S, "Pole of the tracker, of multiplicity two or three", |p| {
+            P::parameter("bandwidth", &RAD_PER_S, "Magnitude of the tracker's double or triple pole", |p| {
                 &mut p.bandwidth
             })
             .above(0.0)

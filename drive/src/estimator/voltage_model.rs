@@ -35,7 +35,7 @@ impl Estimating for VoltageModel {
         let p_i = (x.i_now - x.i_last) * (1.0 / T_s);
         let w_cal = (x.v.q() - motor.R_s * x.i.q() - motor.L_q * p_i.q() - slip * motor.L_q * x.i.d())
             / (motor.psi_M + motor.L_d * x.i.d());
-        f.w += (1.0 - pole(par.model.filter, T_s)) * (w_cal - f.w);
+        f.w += (1.0 - pole(par.matsui.filter, T_s)) * (w_cal - f.w);
         let dv_d = x.v.d() - motor.R_s * x.i.d() - motor.L_d * p_i.d() + (f.w * motor.L_q + slip * motor.L_d) * x.i.q();
         f.correct(context, dv_d);
         Estimate::new(f.theta, f.speed(), sample)

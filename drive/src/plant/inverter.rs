@@ -51,12 +51,12 @@ type P = Row<Inverter>;
 pub const INVERTER: &Table<Inverter> = &Table::new(
     const {
         &[
-            P::parameter("dead_time", &SECOND, "Dead time between the switches of a leg; 0: ideal", |p| {
+            P::parameter("dead_time", &SECOND, "Dead time between the two switches of a leg; 0: ideal inverter", |p| {
                 &mut p.dead_time
             })
             .at_least(0.0),
             P::parameter("T_pwm", &SECOND, "PWM period", |p| &mut p.T_pwm).above(0.0),
-            P::parameter("i_zero", &AMPERE, "Current below which the error of the dead time falls linearly", |p| {
+            P::parameter("i_zero", &AMPERE, "Current below which the dead-time voltage falls linearly to zero", |p| {
                 &mut p.i_zero
             })
             .above(0.0),

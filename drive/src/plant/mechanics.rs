@@ -61,14 +61,14 @@ pub const MECHANICS: &Table<Mechanics> = &Table::new(
     const {
         &[
             P::parameter("J", &KG_M2, "Moment of inertia of rotor and load", |m| &mut m.J).above(0.0),
-            P::parameter("B", &NM_S_PER_RAD, "Viscous friction", |m| &mut m.B).at_least(0.0),
+            P::parameter("B", &NM_S_PER_RAD, "Viscous friction coefficient", |m| &mut m.B).at_least(0.0),
             P::parameter("tau_coulomb", &NEWTON_METRE, "Coulomb friction torque", |m| &mut m.tau_coulomb).at_least(0.0),
             P::parameter("w_coulomb", &SPEED, "Speed over which the Coulomb torque changes sign", |m| &mut m.w_coulomb)
                 .above(0.0),
             P::boolean_parameter(
                 "imposed",
-                "Speed and angle come in as speed_shaft and angle_shaft, tau_shaft goes out, and the inertia belongs to \
-                 the drive train; false: the shaft turns freely under tau_load",
+                "The drive train imposes speed_shaft and angle_shaft and takes tau_shaft; the inertia is its own. false: the \
+                 shaft turns freely under tau_load",
                 |m| &mut m.imposed,
             ),
         ]

@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 /// Longest step of the integration in s. At 4500 rpm of the reference motor a current is off by less than 1e-5 A.
 const LONGEST_SUBSTEP: f64 = 50e-6;
 
-/// Most substeps of one communication step: 500 s of simulated time.
-const MOST_SUBSTEPS: f64 = 1e7;
+/// Maximum number of substeps in one communication step: 500 s of simulated time.
+const MAX_SUBSTEPS: f64 = 1e7;
 
 /// Inputs, held over a communication step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -86,9 +86,9 @@ pub struct PlantOutputs {
     pub theta_e: f64,
     /// Electromagnetic torque in N.m.
     pub tau_e: f64,
-    /// Current along the magnet in A.
+    /// d-axis stator current in A.
     pub i_d: f64,
-    /// Current across the magnet in A.
+    /// q-axis stator current in A.
     pub i_q: f64,
     /// Power between DC link, machine and shaft, mean over the last step.
     pub powers: Powers,
@@ -252,8 +252,8 @@ impl Model for PmsmPlant {
         let legs = self.legs();
         let substep = LONGEST_SUBSTEP.min(0.5 * legs.time(&self.parameters.motor));
         let count = (step.h / substep - 1e-9).ceil().max(1.0);
-        if count > MOST_SUBSTEPS {
-            let longest = MOST_SUBSTEPS * substep;
+        if count > MAX_SUBSTEPS {
+            let longest = MAX_SUBSTEPS * substep;
             return Err(Fault::value("the step size", format!("{} s", step.h), format!("at most {longest} s")));
         }
         let h = step.h / count;
@@ -305,14 +305,14 @@ const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             V::input("tau_load", &NEWTON_METRE, "Load torque at the shaft, positive against positive speed", |m| {
                 &mut m.model.inputs.tau_load
             }),
-            V::input("speed_shaft", &SPEED, "Speed of the shaft; read with mechanics.imposed only", |m| {
+            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft; read only with mechanics.imposed", |m| {
                 &mut m.model.inputs.speed_shaft
             }),
-            V::input("angle_shaft", &RADIAN, "Angle of the shaft, mechanical; read with mechanics.imposed only", |m| {
+            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft; read only with mechanics.imposed", |m| {
                 &mut m.model.inputs.angle_shaft
             })
             .unbounded(),
-            V::boolean_input("enable", "The gates switch; false: off, only the diodes conduct", |m| {
+            V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
                 &mut m.model.inputs.enable
             }),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),

@@ -1,12 +1,12 @@
 //! Magnetic saturation and cross-saturation: the current as a polynomial of the flux linkage.
 //!
-//! With x = psi_d - psi_M: i_d = x / L_d + c_2 x^2 + c_3 x^3 + c_x psi_q^2 / 2, i_q = psi_q / L_q + c_x x psi_q.
-//! Both are derivatives of one energy, so no cycle yields energy: d i_d / d psi_q = d i_q / d psi_d = c_x psi_q.
+//! With x = psi_d - psi_M: i_d = x / L_d + s_2 x^2 + s_3 x^3 + s_dq psi_q^2 / 2, i_q = psi_q / L_q + s_dq x psi_q.
+//! Both are derivatives of one energy, so no cycle yields energy: d i_d / d psi_q = d i_q / d psi_d = s_dq psi_q.
 //!
-//! c_2 > 0 tells the two ends of the magnet apart: current along it (x > 0) meets a smaller inductance than against it.
-//! Limits: a polynomial, good to about the flux at which d i_d / d psi_d = 1 / L_d + 2 c_2 x + 3 c_3 x^2 stays positive.
+//! s_2 > 0 distinguishes the magnet's poles: a positive d-axis current (x > 0) meets a smaller inductance than a negative one.
+//! Limits: a polynomial, good to about the flux at which d i_d / d psi_d = 1 / L_d + 2 s_2 x + 3 s_3 x^2 stays positive.
 //!
-//! Neither paper saturates: a polynomial chosen here that has an energy. Flux linkages in Wb, c_2 and c_x in A/Wb2, c_3 in A/Wb3.
+//! Neither paper saturates: a polynomial chosen here that has an energy. Flux linkages in Wb, s_2 and s_dq in A/Wb2, s_3 in A/Wb3.
 
 use crate::frame::Dq;
 use crate::motor::Motor;
@@ -27,12 +27,12 @@ const fn per_weber(n: i8) -> Exponents {
 /// Parameters; all zero is the linear machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Saturation {
-    /// Of second order along the magnet in A/Wb2.
-    pub c_2: f64,
-    /// Of third order along the magnet in A/Wb3.
-    pub c_3: f64,
-    /// Between the axes in A/Wb2.
-    pub c_x: f64,
+    /// Second-order d-axis coefficient in A/Wb2.
+    pub s_2: f64,
+    /// Third-order d-axis coefficient in A/Wb3.
+    pub s_3: f64,
+    /// Cross-saturation coefficient in A/Wb2.
+    pub s_dq: f64,
 }
 
 impl Saturation {
@@ -40,15 +40,15 @@ impl Saturation {
     #[inline]
     pub fn current(&self, motor: &Motor, psi: Dq) -> Dq {
         let (x, q) = (psi.d() - motor.psi_M, psi.q());
-        Dq::new((self.c_2 + self.c_3 * x) * x * x + 0.5 * self.c_x * q * q, self.c_x * x * q)
+        Dq::new((self.s_2 + self.s_3 * x) * x * x + 0.5 * self.s_dq * q * q, self.s_dq * x * q)
     }
 
     /// The least incremental inductance (H) of the machine at the flux linkage `psi` (Wb) over all directions:
     /// 1 over the greatest eigenvalue of d i / d psi, which is symmetric.
     pub fn least_inductance(&self, motor: &Motor, psi: Dq) -> f64 {
         let (x, q) = (psi.d() - motor.psi_M, psi.q());
-        let by_d = 1.0 / motor.L_d + (2.0 * self.c_2 + 3.0 * self.c_3 * x) * x;
-        let (by_q, cross) = (1.0 / motor.L_q + self.c_x * x, self.c_x * q);
+        let by_d = 1.0 / motor.L_d + (2.0 * self.s_2 + 3.0 * self.s_3 * x) * x;
+        let (by_q, cross) = (1.0 / motor.L_q + self.s_dq * x, self.s_dq * q);
         1.0 / (0.5 * (by_d + by_q) + (0.5 * (by_d - by_q)).hypot(cross))
     }
 
@@ -56,7 +56,7 @@ impl Saturation {
     #[inline]
     pub fn energy(&self, motor: &Motor, psi: Dq) -> f64 {
         let (x, q) = (psi.d() - motor.psi_M, psi.q());
-        1.5 * ((self.c_2 / 3.0 + 0.25 * self.c_3 * x) * x * x * x + 0.5 * self.c_x * x * q * q)
+        1.5 * ((self.s_2 / 3.0 + 0.25 * self.s_3 * x) * x * x * x + 0.5 * self.s_dq * x * q * q)
     }
 }
 
@@ -66,10 +66,12 @@ type P = Row<Saturation>;
 pub const SATURATION: &Table<Saturation> = &Table::new(
     const {
         &[
-            P::parameter("c_2", &A_PER_WB2, "Saturation of second order along the magnet; 0: none", |p| &mut p.c_2),
-            P::parameter("c_3", &A_PER_WB3, "Saturation of third order along the magnet; 0: none", |p| &mut p.c_3)
+            P::parameter("s_2", &A_PER_WB2, "Second-order d-axis saturation coefficient; 0: none", |p| &mut p.s_2),
+            P::parameter("s_3", &A_PER_WB3, "Third-order d-axis saturation coefficient; 0: none", |p| &mut p.s_3)
                 .at_least(0.0),
-            P::parameter("c_x", &A_PER_WB2, "Cross-saturation between the axes; 0: none", |p| &mut p.c_x),
+            P::parameter("s_dq", &A_PER_WB2, "Cross-saturation coefficient between d and q axis; 0: none", |p| {
+                &mut p.s_dq
+            }),
         ]
     },
 );
@@ -80,7 +82,7 @@ mod tests {
 
     #[test]
     fn is_reciprocal_and_tells_north_from_south() {
-        let (motor, s) = (Motor::default(), Saturation { c_2: 40.0, c_3: 40.0, c_x: 7.0 });
+        let (motor, s) = (Motor::default(), Saturation { s_2: 40.0, s_3: 40.0, s_dq: 7.0 });
         let (psi, h) = (Dq::new(0.21, -0.08), 1e-6);
         let linear = |v: Dq| Dq::new(v.d() / motor.L_d, v.q() / motor.L_q);
         let by = |v: Dq| (s.current(&motor, psi + v) - s.current(&motor, psi - v) + linear(v) * 2.0) * (0.5 / h);

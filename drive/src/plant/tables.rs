@@ -45,15 +45,12 @@ pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
             O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
             O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed),
             O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle).unbounded(),
-            O::output(
-                "theta_e",
-                &RADIAN,
-                "Electrical rotor angle from phase a to the magnet axis, in (-pi, pi]",
-                |o| &mut o.theta_e,
-            ),
+            O::output("theta_e", &RADIAN, "Electrical rotor angle from phase a to the d axis, in (-pi, pi]", |o| {
+                &mut o.theta_e
+            }),
             O::output("tau_e", &NEWTON_METRE, "Electromagnetic torque", |o| &mut o.tau_e),
-            O::output("i_d", &AMPERE, "Stator current along the true magnet axis", |o| &mut o.i_d),
-            O::output("i_q", &AMPERE, "Stator current across the true magnet axis", |o| &mut o.i_q),
+            O::output("i_d", &AMPERE, "d-axis stator current", |o| &mut o.i_d),
+            O::output("i_q", &AMPERE, "q-axis stator current", |o| &mut o.i_q),
             O::part("", &Part { table: POWERS, lens: |o| &mut o.powers }),
             O::output(
                 "tau_shaft",

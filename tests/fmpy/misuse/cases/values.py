@@ -131,7 +131,7 @@ def out_of_range(fmu):
             it.free()
 
 
-STRICT = ("motor.R_s", "motor.L_d", "motor.L_q", "motor.psi_M", "mechanics.J", "T_s", "observer.w_n")
+STRICT = ("motor.R_s", "motor.L_d", "motor.L_q", "motor.psi_M", "mechanics.J", "T_s", "rasmussen.w_n")
 STRICT += ("current.bandwidth", "speed_loop.bandwidth", "speed_loop.t_is", "limit.i", "limit.i_q", "zero_speed.w_0")
 
 
