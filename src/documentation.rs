@@ -170,7 +170,8 @@ fn table(variables: &[&Variable]) -> String {
         let (name, text, unit) = (escape(&v.name), escape(&v.description), unit(v));
         put!(out, "<tr><td class=\"name\">{name}{size}</td><td>{text}{kind}</td><td class=\"unit\">{unit}</td>");
         if settable {
-            let allowed = escape(v.allowed.as_deref().unwrap_or_default());
+            let bounded = v.min.is_some() || v.max.is_some();
+            let allowed = if bounded { escape(&v.range().to_string()) } else { String::new() };
             put!(out, "<td class=\"number\">{}</td><td>{allowed}</td>", start(v));
         }
         out += "</tr>\n";

@@ -7,8 +7,9 @@ pub use terminals::{Member, Terminal, TerminalPicture};
 use crate::Fault;
 use crate::model::{Block, Experiment, Model};
 use crate::probe;
+use crate::row::Slot;
 use crate::unit::{Exponents, Quantity};
-use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Slot, Variability};
+use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
 
 /// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
@@ -62,8 +63,10 @@ pub struct Variable {
     pub min: Option<f64>,
     /// Upper bound.
     pub max: Option<f64>,
-    /// What is allowed, in words, where there is a bound.
-    pub allowed: Option<String>,
+    /// The lower bound itself is not allowed.
+    pub above: bool,
+    /// The upper bound itself is not allowed.
+    pub below: bool,
     /// Typical magnitude.
     pub nominal: Option<f64>,
     /// Grows without bound.
@@ -135,8 +138,8 @@ impl Description {
         for (index, dependencies) in dependencies.iter().enumerate() {
             let Some((name, meta, element)) = table.locate(index) else { continue };
             let Some((_, slot)) = table.entry(&mut block, index) else { continue };
-            let start = settable(meta.causality).then(|| value(&slot));
-            if let (Some(start), true) = (start, settable(meta.causality)) {
+            let start = meta.causality.is_settable().then(|| value(&slot));
+            if let (Some(start), true) = (start, meta.causality.is_settable()) {
                 check_start(&name, meta, start)?;
             }
             if element > 0 {
@@ -176,6 +179,14 @@ impl Description {
     }
 }
 
+impl Variable {
+    /// What is allowed.
+    pub fn range(&self) -> Range {
+        let (min, max) = (self.min.unwrap_or(f64::NEG_INFINITY), self.max.unwrap_or(f64::INFINITY));
+        Range { min, max, above: self.above, below: self.below }
+    }
+}
+
 fn variable(
     name: String,
     meta: &Meta,
@@ -183,7 +194,6 @@ fn variable(
     start: Option<Value>,
     initial_dependencies: Option<Vec<u32>>,
 ) -> Variable {
-    let bounded = meta.range.min.is_finite() || meta.range.max.is_finite();
     Variable {
         name,
         description: meta.description.into(),
@@ -193,7 +203,8 @@ fn variable(
         kind: kind(&meta.kind),
         min: meta.range.min.is_finite().then_some(meta.range.min),
         max: meta.range.max.is_finite().then_some(meta.range.max),
-        allowed: bounded.then(|| meta.range.to_string()),
+        above: meta.range.above,
+        below: meta.range.below,
         nominal: meta.nominal,
         unbounded: meta.unbounded,
         dimension: meta.dimension,
@@ -205,11 +216,6 @@ fn variable(
 /// Value reference of the table's variable `index`.
 fn reference(index: usize) -> u32 {
     u32::try_from(index + 1).unwrap_or(u32::MAX)
-}
-
-/// Whether the importer sets variables of this causality.
-pub fn settable(causality: Causality) -> bool {
-    matches!(causality, Causality::Input | Causality::Parameter)
 }
 
 fn value(slot: &Slot<'_>) -> Value {

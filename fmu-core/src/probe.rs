@@ -3,9 +3,9 @@
 //! At several operating points every input and parameter is changed alone, and the outputs and calculated parameters
 //! whose bits change are noted (`InitialUnknowns` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
 
-use crate::description::settable;
 use crate::model::{Block, Model};
-use crate::variable::{Causality, Kind, Meta, Slot};
+use crate::row::Slot;
+use crate::variable::{Causality, Kind, Meta};
 
 /// Operating points tried, the start values among them.
 const POINTS: u32 = 16;
@@ -21,12 +21,12 @@ pub(crate) fn initial_dependencies<M: Model>() -> Vec<Option<Vec<usize>>> {
     for point in 0..POINTS {
         let mut base = Block::<M>::default();
         if point > 0 {
-            for i in (0..table.len()).filter(|&i| settable(causality[i])) {
+            for i in (0..table.len()).filter(|&i| causality[i].is_settable()) {
                 change::<M>(&mut base, i, &mut draw);
             }
         }
         let before = values(&mut base);
-        for known in (0..table.len()).filter(|&i| settable(causality[i])) {
+        for known in (0..table.len()).filter(|&i| causality[i].is_settable()) {
             let mut changed = base.clone();
             change::<M>(&mut changed, known, &mut draw);
             for (unknown, after) in values(&mut changed).into_iter().enumerate() {

@@ -3,8 +3,12 @@
 //! A variable's index is its running offset: a scalar takes one, an array one per element, a part as many as its table.
 //! Everything that does not need a value is checked while compiling: names, ranges, the number of variables.
 
+use crate::fault::Fault;
+use crate::row::{Access, Node, Row, Slot};
 use crate::token::Hash;
-use crate::variable::{Access, Meta, Row, Slot};
+use crate::variable::{Causality, Kind, Meta, Variability};
+use std::fmt::Display;
+use std::ptr;
 
 /// Most variables a table can hold, its parts' included.
 pub const CAPACITY: usize = 512;
@@ -15,13 +19,6 @@ pub struct Part<W: 'static, P: 'static> {
     pub table: &'static Table<P>,
     /// Where the part is.
     pub lens: fn(&mut W) -> &mut P,
-}
-
-/// What a table asks of a part without knowing its type.
-pub(crate) trait Node<W>: Sync {
-    fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
-    fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
-    fn element(&self, index: usize) -> Option<usize>;
 }
 
 impl<W, P> Node<W> for Part<W, P> {
@@ -35,6 +32,14 @@ impl<W, P> Node<W> for Part<W, P> {
 
     fn element(&self, index: usize) -> Option<usize> {
         self.table.element(index)
+    }
+}
+
+impl<W: 'static> Row<W> {
+    /// All variables of a part, under a prefix that ends with a dot (or none).
+    pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
+        let access = Access::Part { len: part.table.len(), hash: part.table.hash(), node: part };
+        Self::new(prefix, "", Causality::Local, Variability::Fixed, Kind::Boolean, access)
     }
 }
 
@@ -136,6 +141,35 @@ impl<W: 'static> Table<W> {
         let mut name = String::new();
         let (meta, element) = self.locate_into(index, &mut name)?;
         Some((name, meta, element))
+    }
+
+    /// A fault of the variable that `get` finds: its name, value and unit in `whole`, and what is `allowed`.
+    pub fn fault<T>(&self, whole: &W, get: impl FnOnce(&mut W) -> &mut T, allowed: impl Display) -> Fault
+    where
+        W: Clone,
+    {
+        Fault::new(format!("{} is not allowed: {allowed}", self.tell(whole, get)))
+    }
+
+    /// Name, value and unit of the variable that `get` finds in `whole`: for messages.
+    pub fn tell<T>(&self, whole: &W, get: impl FnOnce(&mut W) -> &mut T) -> String
+    where
+        W: Clone,
+    {
+        let mut whole = whole.clone();
+        let wanted = ptr::from_mut(get(&mut whole)).addr();
+        let found = (0..self.len).find_map(|index| {
+            let (meta, slot) = self.entry(&mut whole, index)?;
+            let (address, value) = match &slot {
+                Slot::Real(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
+                Slot::Integer(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
+                Slot::Boolean(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
+            };
+            let unit = if let Kind::Real(quantity) = meta.kind { quantity.unit.name } else { "" };
+            let space = if unit.is_empty() { "" } else { " " };
+            (address == wanted).then(|| Some(format!("{} = {value}{space}{unit}", self.locate(index)?.0))).flatten()
+        });
+        found.unwrap_or_else(|| "a value without a variable".into())
     }
 
     fn locate_into(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {

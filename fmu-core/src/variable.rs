@@ -1,10 +1,5 @@
-//! One row of a variable table: name, unit, range, and the closure that finds the value, or a part with its own table.
-//!
-//! Only causality/variability pairs that FMI 2.0.5 (2.2.7) and FMI 3.0.2 (2.4.7.4) allow have a constructor. Start
-//! values are not written here: they come from the model's `Default`.
+//! What a variable is, but for where its value lives: causality, variability, type, range.
 
-use crate::table::{Node, Part};
-use crate::token::Hash;
 use crate::unit::Quantity;
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +17,13 @@ pub enum Causality {
     Output,
     /// Computed by the model, for the curious.
     Local,
+}
+
+impl Causality {
+    /// Whether the importer sets variables of this causality.
+    pub fn is_settable(self) -> bool {
+        matches!(self, Self::Input | Self::Parameter)
+    }
 }
 
 /// When a variable changes.
@@ -132,243 +134,6 @@ pub struct Meta {
     pub unbounded: bool,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,
-}
-
-/// Where the value lives.
-pub(crate) enum Access<W: 'static> {
-    Real(fn(&mut W) -> &mut f64),
-    Reals(fn(&mut W) -> &mut [f64]),
-    Integer(fn(&mut W) -> &mut i32),
-    Boolean(fn(&mut W) -> &mut bool),
-    Part { len: usize, hash: Hash, node: &'static dyn Node<W> },
-}
-
-/// A value found by a table, ready to read or to write.
-#[derive(Debug)]
-pub enum Slot<'a> {
-    /// A real number.
-    Real(&'a mut f64),
-    /// An integer or the value of an enumeration.
-    Integer(&'a mut i32),
-    /// A truth value.
-    Boolean(&'a mut bool),
-}
-
-/// A row of the table of `W`: a variable, or the table of a part of `W`.
-pub struct Row<W: 'static> {
-    pub(crate) meta: Meta,
-    pub(crate) access: Access<W>,
-}
-
-impl<W: 'static> Row<W> {
-    const fn new(
-        name: &'static str,
-        description: &'static str,
-        causality: Causality,
-        variability: Variability,
-        kind: Kind,
-        access: Access<W>,
-    ) -> Self {
-        let meta = Meta {
-            name,
-            description,
-            causality,
-            variability,
-            kind,
-            range: Range::ALL,
-            nominal: None,
-            unbounded: false,
-            dimension: None,
-        };
-        Self { meta, access }
-    }
-
-    const fn real(
-        (causality, variability): (Causality, Variability),
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::new(name, description, causality, variability, Kind::Real(quantity), Access::Real(get))
-    }
-
-    /// All variables of a part, under a prefix that ends with a dot (or none).
-    pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
-        let access = Access::Part { len: part.table.len(), hash: part.table.hash(), node: part };
-        Self::new(prefix, "", Causality::Local, Variability::Fixed, Kind::Boolean, access)
-    }
-
-    /// A continuous real input.
-    pub const fn input(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Input, Variability::Continuous), name, quantity, description, get)
-    }
-
-    /// A real input that changes at sample instants.
-    pub const fn discrete_input(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Input, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A Boolean input.
-    pub const fn boolean_input(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut bool) -> Self {
-        let access = Access::Boolean(get);
-        Self::new(name, description, Causality::Input, Variability::Discrete, Kind::Boolean, access)
-    }
-
-    /// A continuous real output, calculated from the start on.
-    pub const fn output(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Output, Variability::Continuous), name, quantity, description, get)
-    }
-
-    /// A real output that changes at sample instants.
-    pub const fn discrete_output(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Output, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// An integer output.
-    pub const fn integer_output(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut i32) -> Self {
-        let access = Access::Integer(get);
-        Self::new(name, description, Causality::Output, Variability::Discrete, Kind::Integer, access)
-    }
-
-    /// A Boolean output.
-    pub const fn boolean_output(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut bool) -> Self {
-        let access = Access::Boolean(get);
-        Self::new(name, description, Causality::Output, Variability::Discrete, Kind::Boolean, access)
-    }
-
-    /// A real parameter, fixed after initialisation.
-    pub const fn parameter(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Parameter, Variability::Fixed), name, quantity, description, get)
-    }
-
-    /// A fixed array of real parameters; `dimension` elements.
-    pub const fn array_parameter(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        dimension: usize,
-        get: fn(&mut W) -> &mut [f64],
-    ) -> Self {
-        let kind = Kind::Real(quantity);
-        let mut it = Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Reals(get));
-        it.meta.dimension = Some(dimension);
-        it
-    }
-
-    /// An integer parameter.
-    pub const fn integer_parameter(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut i32) -> Self {
-        let access = Access::Integer(get);
-        Self::new(name, description, Causality::Parameter, Variability::Fixed, Kind::Integer, access)
-    }
-
-    /// A Boolean parameter.
-    pub const fn boolean_parameter(
-        name: &'static str,
-        description: &'static str,
-        get: fn(&mut W) -> &mut bool,
-    ) -> Self {
-        let access = Access::Boolean(get);
-        Self::new(name, description, Causality::Parameter, Variability::Fixed, Kind::Boolean, access)
-    }
-
-    /// An enumeration parameter, stored as its integer; a setter only ever writes a value that exists.
-    pub const fn enumeration_parameter(
-        name: &'static str,
-        enumeration: &'static Enumeration,
-        description: &'static str,
-        get: fn(&mut W) -> &mut i32,
-    ) -> Self {
-        let kind = Kind::Enumeration(enumeration);
-        Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Integer(get))
-    }
-
-    /// A parameter computed by the model's `derive`, constant during the simulation.
-    pub const fn calculated(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::CalculatedParameter, Variability::Fixed), name, quantity, description, get)
-    }
-
-    /// A parameter becomes tunable: it may change at communication points.
-    ///
-    /// # Panics
-    /// While compiling, on anything but a parameter.
-    pub const fn tunable(mut self) -> Self {
-        assert!(matches!(self.meta.causality, Causality::Parameter), "only a parameter can be tunable");
-        self.meta.variability = Variability::Tunable;
-        self
-    }
-
-    /// Values greater than `bound` only.
-    pub const fn above(mut self, bound: f64) -> Self {
-        self.meta.range.min = bound;
-        self.meta.range.above = true;
-        self
-    }
-
-    /// Values less than `bound` only.
-    pub const fn below(mut self, bound: f64) -> Self {
-        self.meta.range.max = bound;
-        self.meta.range.below = true;
-        self
-    }
-
-    /// Values of at least `bound`.
-    pub const fn at_least(mut self, bound: f64) -> Self {
-        self.meta.range.min = bound;
-        self
-    }
-
-    /// Values of at most `bound`.
-    pub const fn at_most(mut self, bound: f64) -> Self {
-        self.meta.range.max = bound;
-        self
-    }
-
-    /// The variable grows without bound, like an angle that is not wrapped (FMI 3.0.2, 2.4.7.5 `unbounded`).
-    pub const fn unbounded(mut self) -> Self {
-        self.meta.unbounded = true;
-        self
-    }
-
-    /// Typical magnitude, for solvers' scaling; not 0.
-    ///
-    /// # Panics
-    /// While compiling, on 0.
-    pub const fn nominal(mut self, magnitude: f64) -> Self {
-        assert!(magnitude != 0.0, "a nominal value must not be 0");
-        self.meta.nominal = Some(magnitude);
-        self
-    }
 }
 
 #[cfg(test)]

@@ -205,3 +205,13 @@ mod terminals {
         assert!(why::<OtherIcon>().contains("has another icon dot"));
     }
 }
+
+#[test]
+fn a_fault_names_the_row_it_means() {
+    let small = Small::default();
+    let fault =
+        Small::TABLE.fault(&Block { model: small, out: SmallOutputs::default() }, |m| &mut m.model.load.r, "less");
+    assert_eq!(fault.message(), "load.R = 4 Ohm is not allowed: less");
+    let load = Load { r: 1.0, map: [0.0; 3], mode: 3 };
+    assert_eq!(LOAD.tell(&load, |m| &mut m.mode), "mode = 3");
+}

@@ -5,7 +5,7 @@ use super::rules::{Setting, Value};
 use anyhow::{Result, anyhow, bail};
 use drive::{PmsmPlant, SensorlessController};
 use fmu_core::Description;
-use fmu_core::description::{Variable, VariableKind};
+use fmu_core::description::VariableKind;
 
 /// Checks both lists against the descriptions of the models.
 ///
@@ -41,17 +41,9 @@ fn one(description: &Description, setting: &Setting) -> Result<()> {
         }
         _ => bail!("{name} of {model} has another type than {:?}", setting.value),
     };
-    if !in_range(variable, number) {
-        let allowed = variable.allowed.as_deref().unwrap_or("a finite number");
+    let allowed = variable.range();
+    if !allowed.contains(number) {
         bail!("{name} of {model} = {number} must be {allowed}: correct the value");
     }
     Ok(())
-}
-
-/// Whether a number is finite and within the bounds; `allowed` tells whether a bound itself is.
-fn in_range(variable: &Variable, x: f64) -> bool {
-    let allowed = variable.allowed.as_deref().unwrap_or_default();
-    let low = variable.min.is_none_or(|min| if allowed.contains("greater than") { x > min } else { x >= min });
-    let high = variable.max.is_none_or(|max| if allowed.contains("less than") { x < max } else { x <= max });
-    x.is_finite() && low && high
 }

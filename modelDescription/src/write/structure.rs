@@ -4,7 +4,7 @@
 
 use crate::version::FmiVersion;
 use crate::xml::Element;
-use fmu_core::description::{TIME, Variable, settable};
+use fmu_core::description::{TIME, Variable};
 use fmu_core::{Causality, Description};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -72,7 +72,7 @@ impl<'a> Numbering<'a> {
                 index += 1;
                 let number = if version == FmiVersion::V2 { index } else { v.value_reference };
                 numbers.push(number);
-                if settable(v.causality) {
+                if v.causality.is_settable() {
                     known.insert(reference, number);
                 }
             }
