@@ -9,7 +9,7 @@ use drive::estimator::tracker::MECHANICAL_OBSERVER;
 use drive::math::{sin_cos, wrap};
 use drive::motor::Motor;
 use drive::pair::Pair;
-use fmu_core::{Elapsed, Step};
+use fmu_core::{Elapsed, Fault, Step};
 use std::f64::consts::TAU;
 
 /// Rated mechanical speed in rad/s: 1500 rpm.
@@ -108,23 +108,37 @@ pub fn speed(pair: &Pair) -> f64 {
     pair.plant.out.speed / RATED_SPEED
 }
 
-/// Runs a pair for `duration` (s); `each` sees it before every step with the time, and at the end. Stops where a step
-/// fails: a drive that was lost.
+/// Runs a pair for `duration` (s) in steps of `h` (s); `each` sees it before every step with the time, and at the end. False
+/// where a step fails: a drive that was lost.
 ///
-/// # Panics
-/// When the parameters do not fit together.
-pub fn run(pair: &mut Pair, duration: f64, mut each: impl FnMut(f64, &mut Pair)) {
-    pair.start().expect("parameters that fit together");
-    let h = pair.controller.model.parameters.T_s;
+/// # Errors
+/// The parameters do not fit together.
+pub fn run_in_steps(
+    pair: &mut Pair,
+    h: f64,
+    duration: f64,
+    mut each: impl FnMut(f64, &mut Pair),
+) -> Result<bool, Fault> {
+    pair.start()?;
     let mut k = 0_u32;
     while f64::from(k) * h < duration - 0.5 * h {
         each(f64::from(k) * h, pair);
         if pair.step(h).is_err() {
-            return;
+            return Ok(false);
         }
         k += 1;
     }
     each(f64::from(k) * h, pair);
+    Ok(true)
+}
+
+/// The same in steps of the sample period.
+///
+/// # Panics
+/// When the parameters do not fit together.
+pub fn run(pair: &mut Pair, duration: f64, each: impl FnMut(f64, &mut Pair)) {
+    let h = pair.controller.model.parameters.T_s;
+    run_in_steps(pair, h, duration, each).expect("parameters that fit together");
 }
 
 /// Mean, standard deviation and greatest magnitude of a signal.

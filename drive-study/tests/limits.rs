@@ -41,15 +41,9 @@ fn error(pair: &Pair) -> f64 {
     wrap(pair.controller.out.theta_est - pair.plant.out.theta_e).to_degrees()
 }
 
-/// Runs a pair in steps of `h` (s); `each` sees it before every step with the time.
-fn run(pair: &mut Pair, h: f64, duration: f64, mut each: impl FnMut(f64, &mut Pair)) {
-    pair.start().unwrap();
-    let mut k = 0_u32;
-    while f64::from(k) * h < duration - 0.5 * h {
-        each(f64::from(k) * h, pair);
-        pair.step(h).unwrap();
-        k += 1;
-    }
+/// Runs a pair in steps of `h` (s); `each` sees it before every step with the time, and at the end.
+fn run(pair: &mut Pair, h: f64, duration: f64, each: impl FnMut(f64, &mut Pair)) {
+    assert!(runner::run_in_steps(pair, h, duration, each).unwrap(), "a step failed");
 }
 
 /// The value of an input that comes at `from` (s).

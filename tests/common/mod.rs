@@ -7,6 +7,7 @@ pub mod python;
 
 use drive::Pair;
 use drive_study::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
+use drive_study::runner::run_in_steps;
 use fmu_core::{Block, Model, Slot};
 use std::path::{Path, PathBuf};
 
@@ -30,15 +31,9 @@ pub fn error(pair: &Pair) -> f64 {
 }
 
 /// Runs a pair for `duration` (s) in steps of `h` (s); `each` sees it before every step with the time, and at the end.
-pub fn run(pair: &mut Pair, h: f64, duration: f64, mut each: impl FnMut(f64, &mut Pair)) {
-    pair.start().expect("parameters that fit together");
-    let mut k = 0_u32;
-    while f64::from(k) * h < duration - 0.5 * h {
-        each(f64::from(k) * h, pair);
-        pair.step(h).expect("a step");
-        k += 1;
-    }
-    each(f64::from(k) * h, pair);
+pub fn run(pair: &mut Pair, h: f64, duration: f64, each: impl FnMut(f64, &mut Pair)) {
+    let lasted = run_in_steps(pair, h, duration, each).expect("parameters that fit together");
+    assert!(lasted, "a step failed");
 }
 
 /// A pair with parameters set on both sides.

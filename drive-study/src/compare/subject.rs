@@ -176,20 +176,10 @@ impl Subject {
     ///
     /// # Errors
     /// The parameters do not fit together.
-    pub fn run(&self, duration: f64, mut each: impl FnMut(f64, &mut Pair)) -> Result<bool, Fault> {
+    pub fn run(&self, duration: f64, each: impl FnMut(f64, &mut Pair)) -> Result<bool, Fault> {
         let mut pair = self.pair.clone();
-        pair.start()?;
         let h = pair.controller.model.parameters.T_s;
-        let mut k = 0_u32;
-        while f64::from(k) * h < duration - 0.5 * h {
-            each(f64::from(k) * h, &mut pair);
-            if pair.step(h).is_err() {
-                return Ok(false);
-            }
-            k += 1;
-        }
-        each(f64::from(k) * h, &mut pair);
-        Ok(true)
+        runner::run_in_steps(&mut pair, h, duration, each)
     }
 
     /// Sets speed reference and load, both in pu.
