@@ -83,3 +83,34 @@ def test_controller_without_a_machine(archives, standard, options):
 
 def test_both_standards_agree(archives):
     assert plant(archives, 2).tobytes() == plant(archives, 3).tobytes()
+
+
+@STANDARDS
+@pytest.mark.parametrize("step", [1e-4, 1e-3, 3.7e-5])
+def test_power_and_energy_of_the_drive_are_balanced(archives, standard, step):
+    """To 1000 rpm in 1 s and 2 N.m: the energies balance to 1e-6, the mean powers to 0.1 %, and each is the other's integral."""
+    rpm, out = np.pi / 30.0, ["speed", "i_d", "i_q", "voltage_limited", "current_limited"]
+    powers = ["p_in", "p_mech", "p_loss"]
+    energies = ["energy.in", "energy.mech", "energy.loss"]
+    names = [("time", float), ("speed_ref", float), ("tau_load", float)]
+    table = np.array([(0.0, 0.0, 0.0), (1.0, 1000 * rpm, 0.0), (1.5, 1000 * rpm, 2.0), (2.5, 1000 * rpm, 2.0)], dtype=names)
+    result = simulate_fmu(
+        archives / f"fmi{standard}" / "PmsmDrive.fmu",
+        stop_time=2.5,
+        step_size=step,
+        output_interval=step,
+        input=table,
+        output=out + powers + energies,
+    )
+    stored = 0.75 * 6e-3 * (result["i_d"] ** 2 + result["i_q"] ** 2) + 0.5 * 1.5e-3 * result["speed"] ** 2
+    balance = result["energy.in"] - result["energy.mech"] - result["energy.loss"] - (stored - stored[0])
+    assert result["energy.in"][-1] > 200.0
+    assert np.abs(balance).max() < 1e-6 * result["energy.in"][-1]
+    steady = result["time"] > 2.0
+    p_in, p_mech, p_loss = (result[name][steady].mean() for name in powers)
+    assert abs(p_in - p_mech - p_loss) < 1e-3 * p_in
+    seconds = result["time"][steady][-1] - result["time"][steady][0]
+    for power, energy in zip(powers, energies):
+        passed = result[energy][steady]
+        assert (passed[-1] - passed[0]) / seconds == pytest.approx(result[power][steady].mean(), rel=1e-3)
+    assert not result["voltage_limited"][steady].any() and not result["current_limited"][steady].any()
