@@ -19,6 +19,7 @@ pub mod estimator;
 pub mod frame;
 pub mod integrate;
 pub mod math;
+pub mod modulation;
 pub mod motor;
 pub mod pair;
 pub mod plant;

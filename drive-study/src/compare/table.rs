@@ -186,7 +186,7 @@ pub const MACHINES: &str = "All on the 2.2 kW machine with interior magnets (R 3
 pub fn starts(cells: &[Cell]) -> String {
     let mut ways: Vec<(&str, Vec<&str>)> = Vec::new();
     for cell in cells {
-        let way = match Class::of(cell.entry.kind) {
+        let way = match cell.entry.kind.class() {
             Class::FluxObserver => "by itself, from any angle",
             Class::BackEmf => "I-f start to 0.15 pu",
             Class::Injection | Class::Hybrid => "initial position by injection, polarity by voltage pulses",

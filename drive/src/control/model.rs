@@ -9,10 +9,10 @@ use crate::control::speed::SpeedGains;
 use crate::control::start::{CURRENT_FREQUENCY, INJECTION, Led};
 use crate::control::state::{Command, Gains, InUse, State, context};
 use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
-use crate::estimator::{Estimate, Estimator, Injection, Kind, Sample};
+use crate::estimator::{Class, Estimate, Estimator, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
 use crate::math::wrap;
-use crate::plant::inverter::{dead_time_loss, limit_to_hexagon};
+use crate::modulation::{dead_time_loss, limit_to_hexagon};
 use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
@@ -218,7 +218,7 @@ impl Model for SensorlessController {
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
         let k = motor.torque_constant();
-        let tau = if Kind::of(*estimator) == Some(Kind::Rasmussen) {
+        let tau = if Kind::of(*estimator).is_some_and(|kind| kind.class() == Class::FluxObserver) {
             limit.tau
         } else {
             greatest_torque(motor, limit, current.mtpa)
@@ -248,7 +248,7 @@ impl Model for SensorlessController {
             return Err(Fault::value("start.i", format!("{} A", start.i), allowed));
         }
         if start.mode == INJECTION {
-            if !kind.injects() {
+            if !kind.class().injects() {
                 return Err(Fault::new(format!(
                     "start.mode = {INJECTION} (Injection) and estimator = {estimator} ({}): the start by injection needs an \
                      estimator that injects",

@@ -8,7 +8,7 @@ use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::{SpeedController, SpeedGains};
 use crate::control::start::{CURRENT_FREQUENCY, INJECTION, Lead, Led};
 use crate::control::tables::ControllerParameters;
-use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Kind, Sample};
+use crate::estimator::{Class, Context, Estimate, Estimator, EstimatorParameters, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use crate::math::wrap;
 use crate::motor::Motor;
@@ -190,8 +190,8 @@ impl State {
             };
             (i_q_ref, wanted.abs() > limit)
         };
-        // The low-speed law is Rasmussen's; it would only be a loss where the angle is known.
-        if kind == Kind::Rasmussen {
+        // Only a flux observer needs the low-speed law at standstill; the other methods would pay losses for nothing.
+        if kind.class() == Class::FluxObserver {
             let i_d_ref = par.zero_speed.i_d_ref(speed);
             let (i_q_ref, limited) = torque(par.limit.i_q_beside(i_d_ref).min(gains.i_tau));
             return (DqHat::new(i_d_ref, i_q_ref), limited);
