@@ -33,7 +33,7 @@ pub(super) fn response(subject: &Subject) -> Result<Outcome, Fault> {
     turning.run(0.5, |t, p| {
         turning.set(p, 0.05, 0.0);
         if t > 0.2 {
-            error.add(runner::angle_error(p));
+            error.add(runner::rotor_ahead(p));
         }
         let i = p.plant.out.i.to_stator();
         trace.t.push(t);
