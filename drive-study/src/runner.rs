@@ -1,6 +1,6 @@
 //! The test bench of the Kim & Sul figures: the 2.2 kW machine, a preset per estimator, and what is measured of a run.
 //!
-//! Speeds are in units of the rated speed, torques of the rated torque (pu); angle errors are theta - theta^ in degrees.
+//! Speeds are in units of the rated speed, torques of the rated torque (pu); angle errors are theta - theta^ in degrees, as in Kim & Sul.
 //! A run is the closed loop of plant and controller, stepped at the sample period as an importer steps it.
 
 use drive::estimator::Kind;
@@ -98,8 +98,8 @@ pub fn turning(mut pair: Pair, speed: f64) -> Pair {
     pair
 }
 
-/// Angle error theta - theta^ in deg.
-pub fn angle_error(pair: &Pair) -> f64 {
+/// How far the rotor is ahead of the estimate: theta - theta^ in deg, wrapped.
+pub fn rotor_ahead(pair: &Pair) -> f64 {
     wrap(pair.plant.out.theta_e - pair.controller.out.theta_est).to_degrees()
 }
 
@@ -198,7 +198,7 @@ pub fn steady(pair: Pair, speed: f64, load: f64) -> Steady {
     run(&mut pair, 2.5, |t, p| {
         p.plant.model.inputs.tau_load = ramp(load, t);
         if t > 2.0 {
-            steady.error.add(angle_error(p));
+            steady.error.add(rotor_ahead(p));
             steady.speed.add(self::speed(p) - speed);
         }
     });
@@ -213,7 +213,7 @@ pub fn slowed_down(pair: Pair, speed: f64) -> Steady {
         p.plant.model.inputs.tau_load = ramp(1.0, t);
         p.controller.model.inputs.speed_ref = RATED_SPEED * (0.5 - 0.5 * (t - 1.2)).clamp(speed, 0.5);
         if t > arrival + 1.5 {
-            steady.error.add(angle_error(p));
+            steady.error.add(rotor_ahead(p));
             steady.speed.add(self::speed(p) - speed);
         }
     });
@@ -232,7 +232,7 @@ pub fn load_step(pair: Pair, speed: f64, load: f64) -> (f64, f64) {
         p.plant.model.inputs.tau_load = if t >= 0.5 - 1e-9 { load * RATED_TORQUE } else { 0.0 };
         if t > 0.5 {
             dip = dip.max(speed - self::speed(p));
-            peak = peak.max(angle_error(p).abs());
+            peak = peak.max(rotor_ahead(p).abs());
         }
     });
     (dip, peak)

@@ -219,7 +219,7 @@ fn cross_saturation_turns_all_alike() {
         run(&mut pair, 2.5, |t, p| {
             p.plant.model.inputs.tau_load = RATED_TORQUE * (t / 0.5).min(1.0);
             if t > 2.0 {
-                error.add(angle_error(p));
+                error.add(rotor_ahead(p));
                 i_d.add(p.plant.out.i_d);
                 i_q.add(p.plant.out.i_q);
             }
@@ -253,7 +253,7 @@ fn start_from(pair: &Pair, degrees: f64, s_2: f64, speed: f64) -> f64 {
         }
     });
     assert!(turned < 0.3, "from {degrees} deg: the rotor turned at {turned} rad/s");
-    angle_error(&pair)
+    rotor_ahead(&pair)
 }
 
 #[test]
@@ -295,7 +295,7 @@ fn hybrid_both_ways(mut pair: Pair, ramp: f64, load: f64) -> f64 {
         let speed = 0.95 * (up(legs[0], 1.0) - up(legs[1], 2.0) + up(legs[2], 1.0));
         p.controller.model.inputs.speed_ref = speed * RATED_SPEED;
         p.plant.model.inputs.tau_load = load * RATED_TORQUE * ((t - 0.1) / 0.3).clamp(0.0, 1.0);
-        peak = peak.max(angle_error(p).abs());
+        peak = peak.max(rotor_ahead(p).abs());
     });
     assert!(speed(&pair).abs() < 0.01, "it is back at rest: {}", speed(&pair));
     peak

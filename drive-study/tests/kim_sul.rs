@@ -171,7 +171,7 @@ fn i_f_start_from_every_angle() {
             p.controller.model.inputs.speed_ref = if t > 0.6 { side * 0.5 * RATED_SPEED } else { 0.0 };
             p.plant.model.inputs.tau_load = load * RATED_TORQUE * (p.plant.out.speed / 2.0).tanh();
             if t > 1.3 {
-                peak = peak.max(angle_error(p).abs());
+                peak = peak.max(rotor_ahead(p).abs());
             }
         });
         let speed = speed(&pair);

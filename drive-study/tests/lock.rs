@@ -3,7 +3,7 @@
 
 use drive::estimator::Kind;
 use drive::{Pair, SensorlessController};
-use drive_study::runner::{self, RATED_SPEED, RATED_TORQUE, angle_error, turning, with_dead_time};
+use drive_study::runner::{self, RATED_SPEED, RATED_TORQUE, rotor_ahead, turning, with_dead_time};
 use fmu_core::{Block, Elapsed, Model, Step};
 use std::f64::consts::PI;
 
@@ -23,7 +23,7 @@ fn watch(what: &str, pair: &mut Pair, (duration, from): (f64, f64), mut each: im
         let all = [out.u.a, out.u.b, out.u.c, out.i.d, out.i.q, out.i_ref.d, out.i_ref.q, out.speed_est, out.theta_est];
         assert!(all.iter().all(|x| x.is_finite()), "{what}, {t} s: {out:?}");
         assert!((0.0..=10.0).contains(&out.lock_lost) && out.theta_est.abs() <= PI, "{what}, {t} s: {out:?}");
-        let (error, emf) = (angle_error(p).abs(), f64::from(motor.n_p) * plant.speed.abs() * motor.psi_M);
+        let (error, emf) = (rotor_ahead(p).abs(), f64::from(motor.n_p) * plant.speed.abs() * motor.psi_M);
         right = if error < 20.0 { right + T_S } else { 0.0 };
         wrong = if error > 60.0 && emf > doubt { wrong + T_S } else { 0.0 };
         assert!(right < 0.2 || out.lock_lost < 1.0, "{what}, {t} s: {} at {error} deg", out.lock_lost);

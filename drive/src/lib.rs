@@ -2,7 +2,9 @@
 //!
 //! Conventions, everywhere: SI units; motor sign (currents flow into the machine, torque positive with positive speed);
 //! space vectors are peak-valued (amplitude-invariant Clarke transform), so torque and power carry a factor 3/2; angles
-//! are electrical unless the name says mechanical; the d axis is the magnet's axis; `theta_tilde = theta_hat - theta`.
+//! are electrical unless the name says mechanical; the d axis is the magnet's axis. An angle error states its sign:
+//! `theta~ = theta - theta^` (Kim & Sul: how far the rotor is ahead) in estimators, trackers and the comparison;
+//! `theta^ - theta` (Rasmussen: how far the estimate is ahead) in his observer and in the figures of his paper.
 //! A value with `_hat` belongs to an estimator; the controller never sees the plant's parameters.
 //!
 //! Papers: Rasmussen, *Sensorless speed control including zero speed of non salient PM synchronous drives*, Bull. Polish
@@ -19,6 +21,7 @@ pub mod estimator;
 pub mod frame;
 pub mod integrate;
 pub mod math;
+pub mod modulation;
 pub mod motor;
 pub mod pair;
 pub mod plant;

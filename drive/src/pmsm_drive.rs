@@ -7,7 +7,7 @@
 use crate::control::signals::ControllerOutputs;
 use crate::control::tables::{self, ENABLED, LIMITED, LOCK_LOST};
 use crate::pair::Pair;
-use crate::plant::{model::PlantOutputs, power::Powers, tables as plant};
+use crate::plant::{power::Powers, signals::PlantOutputs, tables as plant};
 use fmu_core::unit::{AMPERE, NEWTON_METRE, ONE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
@@ -121,7 +121,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 3;
+    const STATE_VERSION: u16 = 4;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -320,7 +320,7 @@ mod tests {
         let mut pair = Pair::default();
         pair.plant.model.parameters.mechanics.imposed = true;
         // A sensor: a sensorless drive against a shaft that does not yield can lose it, and then enlarges any rounding.
-        pair.controller.model.parameters.estimator = 13;
+        pair.controller.model.parameters.estimator = crate::estimator::Kind::Sensored as i32;
         let mut drive = Block::<PmsmDrive>::default();
         drive.model.pair = pair.clone();
         drive.initialise();

@@ -1,7 +1,7 @@
 //! A start and a load step for every estimator, run natively and told to fmpy: parameters, inputs and what must come out.
 
 use drive::control::start::{CURRENT_FREQUENCY, INJECTION};
-use drive::estimator::Kind;
+use drive::estimator::{Class, Kind};
 use drive::{Pair, math};
 use drive_study::runner::{self, RATED_SPEED, RATED_TORQUE};
 use fmu_core::{Block, Causality, Model, Slot};
@@ -49,11 +49,18 @@ pub fn at(schedule: &Schedule, t: f64) -> f64 {
     schedule.iter().rev().find(|(from, _)| t >= from - 1e-9).map_or(0.0, |(_, value)| *value)
 }
 
+/// The reference motor with this estimator.
+fn flux_observer(kind: Kind) -> Pair {
+    let mut pair = Pair::default();
+    pair.controller.model.parameters.estimator = kind as i32;
+    pair
+}
+
 fn load_step(kind: Kind) -> Experiment {
-    // Injections run out of voltage above 0.2 pu; the Rasmussen observer is for its own motor.
-    let speed = if (8..=11).contains(&(kind as i32)) { 0.1 } else { 0.5 };
-    let (pair, speed, load) = if kind == Kind::Rasmussen {
-        let mut pair = Pair::default();
+    // Injections run out of voltage above 0.2 pu; a flux observer is for a motor without saliency.
+    let speed = if kind.class() == Class::Injection { 0.1 } else { 0.5 };
+    let (pair, speed, load) = if kind.class() == Class::FluxObserver {
+        let mut pair = flux_observer(kind);
         pair.plant.model.parameters.initial.speed = 100.0;
         pair.controller.model.parameters.speed_est = 100.0;
         (pair, 100.0, 1.0)
@@ -65,15 +72,19 @@ fn load_step(kind: Kind) -> Experiment {
 }
 
 fn start(kind: Kind) -> Experiment {
-    let mut pair = if kind == Kind::Rasmussen { Pair::default() } else { runner::drive(kind) };
+    let mut pair = if kind.class() == Class::FluxObserver { flux_observer(kind) } else { runner::drive(kind) };
     pair.plant.model.parameters.initial.theta_e = 2.0;
-    let (mode, speed) = match kind as i32 {
-        1 => (1, 50.0),
-        8..=11 => (INJECTION, 0.05 * RATED_SPEED),
-        12 => (INJECTION, 0.5 * RATED_SPEED),
-        13 => (1, 0.5 * RATED_SPEED),
-        _ => (CURRENT_FREQUENCY, 0.5 * RATED_SPEED),
+    let mut mode = pair.controller.model.parameters.start.mode;
+    let speed = match kind.class() {
+        Class::FluxObserver => 50.0,
+        Class::Injection => 0.05 * RATED_SPEED,
+        Class::Hybrid | Class::Sensored | Class::BackEmf => 0.5 * RATED_SPEED,
     };
+    if kind.class().injects() {
+        mode = INJECTION;
+    } else if !kind.holds_standstill() {
+        mode = CURRENT_FREQUENCY;
+    }
     pair.controller.model.parameters.start.mode = mode;
     if mode == INJECTION {
         pair = runner::with_saturation(pair);

@@ -63,7 +63,7 @@ pub struct Follow {
 impl Follow {
     /// The state of the drive at the time `t` (s), measured; the speed should be `reference` (pu).
     pub fn add(&mut self, t: f64, reference: f64, pair: &Pair) {
-        let (speed, error) = (runner::speed(pair), runner::angle_error(pair));
+        let (speed, error) = (runner::speed(pair), runner::rotor_ahead(pair));
         let off = speed - reference;
         self.n += 1.0;
         self.squares += off * off;
@@ -81,7 +81,7 @@ impl Follow {
             self.trace.t.push(t);
             self.trace.reference.push(reference);
             self.trace.speed.push(runner::speed(pair));
-            self.trace.error.push(runner::angle_error(pair));
+            self.trace.error.push(runner::rotor_ahead(pair));
         }
     }
 

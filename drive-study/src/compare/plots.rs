@@ -58,7 +58,7 @@ fn together(id: &str, cells: &[&Cell]) -> Result<Plot> {
         let Some(trace) = cell.trace() else { continue };
         let name = cell.entry.label();
         columns.push(column(name.clone(), "speed in pu", full(&trace.speed)));
-        columns.push(column(name, "angle error in deg", full(&trace.error)));
+        columns.push(column(name, "theta - theta^ in deg", full(&trace.error)));
     }
     recording.columns = columns;
     let title = format!("{id}: {}", cells[0].scenario.title);

@@ -55,7 +55,7 @@ pub(super) fn start(subject: &Subject, effort: Effort) -> Result<Outcome, Fault>
 
 /// From standstill to rated speed, measured from 0.15 pu on.
 pub(super) fn ramp(subject: &Subject, _effort: Effort) -> Result<Outcome, Fault> {
-    if let Some(why) = subject.class.no_speed(1.0) {
+    if let Some(why) = subject.no_speed(1.0) {
         return Ok(Outcome::NotApplicable(why));
     }
     let (subject, mut follow) = (subject.starting(), Follow::default());
@@ -106,8 +106,8 @@ fn both_ways(subject: &Subject) -> Result<Outcome, Fault> {
 
 /// A load step at a constant speed.
 pub(super) fn load_step(subject: &Subject, speed: f64, load: f64) -> Result<Outcome, Fault> {
-    let none = if speed == 0.0 { subject.class.no_standstill() } else { None };
-    if let Some(why) = none.or(subject.class.no_speed(speed)) {
+    let none = if speed == 0.0 { subject.no_standstill() } else { None };
+    if let Some(why) = none.or(subject.no_speed(speed)) {
         return Ok(Outcome::NotApplicable(why));
     }
     let (turning, mut follow) = (subject.turning(speed), Follow::default());
@@ -137,8 +137,8 @@ fn dynamic(follow: Follow, survived: bool, from: f64, with_dip: bool) -> Outcome
 
 /// Rated load at a constant speed, the last half second of it.
 pub(super) fn rated(subject: &Subject, speed: f64) -> Result<Outcome, Fault> {
-    let none = if speed == 0.0 { subject.class.no_standstill() } else { None };
-    if let Some(why) = none.or(subject.class.no_speed(speed.abs())) {
+    let none = if speed == 0.0 { subject.no_standstill() } else { None };
+    if let Some(why) = none.or(subject.no_speed(speed.abs())) {
         return Ok(Outcome::NotApplicable(why));
     }
     let follow = slowed_down(subject, speed)?;
@@ -216,7 +216,7 @@ fn lowest_by(subject: &Subject, effort: Effort, approach: Approach) -> Result<Ou
     } else {
         &[0.2, 0.1, 0.05, 0.03, 0.02, 0.0]
     };
-    let low = if subject.class.no_standstill().is_some() { 1e-9 } else { 0.0 };
+    let low = if subject.no_standstill().is_some() { 1e-9 } else { 0.0 };
     lowest_of(subject, approach, all.iter().copied().filter(|&speed| speed >= low))
 }
 

@@ -2,14 +2,14 @@
 
 use super::Outcome;
 use super::measure::{Measure, Trace};
-use super::subject::{Class, Subject};
+use super::subject::Subject;
 use crate::runner;
 use fmu_core::Fault;
 
 const NOTHING: Outcome = Outcome::NotApplicable("injects nothing");
 
 fn injects(subject: &Subject) -> bool {
-    matches!(subject.class, Class::Injection | Class::Hybrid)
+    subject.class.injects()
 }
 
 /// RMS of the carrier's current (magnitude of its space vector) and its copper loss, 1.5 R i^2.
@@ -33,7 +33,7 @@ pub(super) fn response(subject: &Subject) -> Result<Outcome, Fault> {
     turning.run(0.5, |t, p| {
         turning.set(p, 0.05, 0.0);
         if t > 0.2 {
-            error.add(runner::angle_error(p));
+            error.add(runner::rotor_ahead(p));
         }
         let i = p.plant.out.i.to_stator();
         trace.t.push(t);

@@ -10,50 +10,12 @@ use crate::runner::RATED_SPEED;
 use drive::Pair;
 use drive::control::start::{CURRENT_FREQUENCY, INJECTION};
 use drive::control::tables::ControllerParameters;
+pub use drive::estimator::Class;
 use drive::estimator::Kind;
 use drive::estimator::pulsating::MEASUREMENT_AXES;
 use drive::math::tanh;
 use fmu_core::Fault;
 use std::f64::consts::TAU;
-
-/// What an estimator lives on, as far as it decides which scenarios it can take part in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Class {
-    /// Rasmussen's flux observer: starts by itself and holds standstill by a current along the estimated magnet axis.
-    FluxObserver,
-    /// The EMF of the magnet: nothing at standstill, so an I-f start leads the rotor to 0.15 pu.
-    BackEmf,
-    /// The saliency, by an injected voltage: standstill and low speed, no more voltage above 0.2 pu.
-    Injection,
-    /// Injection below, the EMF above.
-    Hybrid,
-    /// A sensor: the yardstick.
-    Sensored,
-}
-
-impl Class {
-    /// The class of an estimator; one that this list does not know lives on the EMF.
-    pub fn of(kind: Kind) -> Self {
-        match kind.name() {
-            "Rasmussen" => Self::FluxObserver,
-            "Sensored" => Self::Sensored,
-            "Hybrid" => Self::Hybrid,
-            name if name.ends_with("Injection") => Self::Injection,
-            _ => Self::BackEmf,
-        }
-    }
-
-    /// Why nothing can be said at standstill.
-    pub fn no_standstill(self) -> Option<&'static str> {
-        (self == Self::BackEmf).then_some("no EMF at standstill")
-    }
-
-    /// Why nothing can be said at `speed` (pu).
-    pub fn no_speed(self, speed: f64) -> Option<&'static str> {
-        (self == Self::Injection && speed > 0.2)
-            .then_some("injection above 0.2 pu is limited by the voltage: Hybrid goes on from there")
-    }
-}
 
 /// A row of the grid: an estimator, or a variant of one that the review has figures for.
 #[derive(Clone, Copy, Debug)]
@@ -84,7 +46,7 @@ const VARIANTS: &[Entry] = &[
 impl Entry {
     /// The machine that it runs on, and what 1 pu of torque is there.
     pub fn machine(&self) -> &'static str {
-        match Class::of(self.kind) {
+        match self.kind.class() {
             Class::FluxObserver => "reference motor, 2 N.m",
             _ => "2.2 kW machine, 14 N.m",
         }
@@ -92,7 +54,7 @@ impl Entry {
 
     /// Its name in a table, with the machine where it is not that of the others.
     pub fn label(&self) -> String {
-        match Class::of(self.kind) {
+        match self.kind.class() {
             Class::FluxObserver => format!("{} ({})", self.name, self.machine()),
             _ => self.name.into(),
         }
@@ -114,7 +76,7 @@ impl Entry {
 pub struct Subject {
     /// The row.
     pub entry: Entry,
-    /// What it lives on.
+    /// The signal that it finds the rotor by.
     pub class: Class,
     /// The drive at rest.
     pub pair: Pair,
@@ -125,13 +87,25 @@ pub struct Subject {
 impl Subject {
     /// The subject of a row.
     pub fn new(entry: Entry) -> Self {
-        let class = Class::of(entry.kind);
+        let class = entry.kind.class();
         let (mut pair, torque) = match class {
             Class::FluxObserver => (Pair::default(), 2.0),
             _ => (runner::drive(entry.kind), runner::RATED_TORQUE),
         };
+        pair.controller.model.parameters.estimator = entry.kind as i32;
         (entry.set)(&mut pair.controller.model.parameters);
         Self { entry, class, pair, torque }
+    }
+
+    /// Why nothing can be said at standstill.
+    pub fn no_standstill(&self) -> Option<&'static str> {
+        (!self.entry.kind.holds_standstill()).then_some("no EMF at standstill")
+    }
+
+    /// Why nothing can be said at `speed` (pu).
+    pub fn no_speed(&self, speed: f64) -> Option<&'static str> {
+        (self.class == Class::Injection && speed > 0.2)
+            .then_some("injection above 0.2 pu is limited by the voltage: Hybrid goes on from there")
     }
 
     /// The same with other parameters.

@@ -180,13 +180,13 @@ pub fn verdict(cells: &[Cell]) -> String {
 pub const MACHINES: &str = "All on the 2.2 kW machine with interior magnets (R 3.6 ohm, L_d 36 mH, L_q 51 mH, psi 0.545 Wb, \
      1 pu = 1500 rpm and 14 N.m), 10 kHz, 10 mA of current noise, 12 bit; Rasmussen, which is for machines without saliency, \
      on its own reference motor (assumed; 1 pu = 1500 rpm and 2 N.m) with R^ = 0.9 R and without noise. \
-     Angle errors are theta - theta^.";
+     Angle errors are theta - theta^: positive where the rotor is ahead of the estimate.";
 
 /// How the estimators of the cells start, in words.
 pub fn starts(cells: &[Cell]) -> String {
     let mut ways: Vec<(&str, Vec<&str>)> = Vec::new();
     for cell in cells {
-        let way = match Class::of(cell.entry.kind) {
+        let way = match cell.entry.kind.class() {
             Class::FluxObserver => "by itself, from any angle",
             Class::BackEmf => "I-f start to 0.15 pu",
             Class::Injection | Class::Hybrid => "initial position by injection, polarity by voltage pulses",

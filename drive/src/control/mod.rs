@@ -1,6 +1,7 @@
 //! The control: current and speed loops, the low-speed law, and the model `SensorlessController` made of them.
 
 pub mod current;
+mod cycle;
 pub mod lock;
 pub mod model;
 pub mod polarity;

@@ -1,18 +1,15 @@
-//! The model `SensorlessController`: one digital controller on its own sample grid.
+//! The model `SensorlessController`: one digital controller on its own sample grid. [`cycle`](super::cycle) has what one
+//! sample does.
 
 use crate::control::current::CurrentGains;
 use crate::control::lock::{LOST, Lock, LockGains};
-use crate::control::polarity::Searching;
 use crate::control::reference::greatest_torque;
 use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
-use crate::control::start::{CURRENT_FREQUENCY, INJECTION, Led};
-use crate::control::state::{Command, Gains, InUse, State, context};
+use crate::control::start::{CURRENT_FREQUENCY, INJECTION};
+use crate::control::state::{Gains, InUse, State, context};
 use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
-use crate::estimator::{Estimate, Estimator, Injection, Kind, Sample};
-use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
-use crate::math::wrap;
-use crate::plant::inverter::{dead_time_loss, limit_to_hexagon};
+use crate::estimator::{Class, Estimator, Kind, Sample};
 use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
@@ -30,13 +27,13 @@ pub struct SensorlessController {
     pub inputs: ControllerInputs,
     /// Parameters.
     pub parameters: ControllerParameters,
-    gains: Gains,
+    pub(super) gains: Gains,
     /// Those of the last sample.
-    last_gains: Gains,
+    pub(super) last_gains: Gains,
     /// A parameter was set since the last sample.
-    tuned: bool,
-    in_use: InUse,
-    state: State,
+    pub(super) tuned: bool,
+    pub(super) in_use: InUse,
+    pub(super) state: State,
 }
 
 impl SensorlessController {
@@ -52,7 +49,7 @@ impl SensorlessController {
         if sane && out.is_finite() { out } else { self.start_again() }
     }
 
-    /// Not enabled: all but the grid and what is shown stands as before the first sample.
+    /// Not enabled: resets everything except the sample grid and the displayed outputs.
     #[cold]
     fn rest(&mut self) -> ControllerOutputs {
         let Self { parameters: par, state, .. } = self;
@@ -67,7 +64,7 @@ impl SensorlessController {
     fn start_again(&mut self) -> ControllerOutputs {
         let Self { parameters: par, state, .. } = self;
         let theta = state.computed.theta_est;
-        let kind = Kind::of(par.estimator).unwrap_or(Kind::Rasmussen);
+        let kind = par.kind();
         let nothing = Sample { k: state.k, ..Sample::default() };
         let (estimator, _) = Estimator::start(kind, &context(par, &par.estimators, &par.motor), &nothing, theta, 0.0);
         *state = State {
@@ -81,119 +78,6 @@ impl SensorlessController {
         };
         ControllerOutputs { theta_est: theta, lock_lost: LOST, enabled: true, ..ControllerOutputs::default() }
     }
-
-    fn control(&mut self) -> ControllerOutputs {
-        let Self { inputs, parameters: par, gains, last_gains, tuned, in_use, state } = self;
-        let (motor, T_s) = (&par.motor, par.T_s);
-        let n_p = f64::from(motor.n_p);
-        let i = par.sensor.measure(inputs.i, state.samples).to_stator();
-        let first = state.k == 0;
-        let tuned = std::mem::take(tuned) && !first;
-        if first {
-            in_use.take_up(par);
-        }
-        // The command that acted since the last sample: the newest one without a delay.
-        let acted = match (par.delay, state.commands) {
-            (0, [newest, ..]) => newest,
-            (1, [_, older, _]) => older,
-            (_, [.., oldest]) => oldest,
-        };
-        let sample = Sample {
-            k: state.k,
-            i,
-            i_last: if first { i } else { state.i_last },
-            u: acted.u,
-            u_injected: acted.injected,
-            u_pi: state.u_pi,
-            i_ref: state.i_ref,
-            tau_ref: state.tau_ref,
-            theta_meas: inputs.theta_meas,
-            w_meas: n_p * inputs.speed_meas,
-            u_dc: inputs.u_dc,
-        };
-        let kind = Kind::of(par.estimator).unwrap_or(Kind::Rasmussen);
-        let begins = state.lead.is_some() || state.search.is_some();
-        let (estimate, led, searching) = state.estimate(kind, gains, par, in_use, inputs, &sample);
-        if tuned {
-            let new = context(par, &par.estimators, motor);
-            state.estimator.retune(&context(par, &in_use.estimators, &in_use.motor), &new);
-            in_use.take_up(par);
-        }
-        let Estimate { theta, w, i: controlled, injection } = estimate;
-        let speed = w / n_p;
-
-        let axis = Axis::<Estimated>::at(theta);
-        let i_hat = axis.from_stator(controlled);
-        let (i_ref, current_limited) = if let Some(Led::Frame(.., i_ref)) = led {
-            (i_ref, false)
-        } else if state.search.is_some() {
-            (DqHat::ZERO, false)
-        } else {
-            let old = (tuned && !begins).then_some(&last_gains.speed);
-            state.references(kind, gains, old, par, inputs, speed)
-        };
-        if tuned && !matches!(searching, Some(Searching::Found(_))) {
-            state.current.retune(&last_gains.current, &gains.current, i_ref, i_hat);
-        }
-
-        let wanted = if let Some(Searching::Voltage(_, u)) = searching {
-            u
-        } else {
-            state.current.command(&gains.current, motor, i_ref, i_hat, w)
-        };
-        // The command acts from `delay` to `delay + 1` samples from now: turned to the middle of that interval.
-        let acting = Axis::<Estimated>::at(theta + (f64::from(par.delay) + 0.5) * T_s * w);
-        let injected = match injection {
-            Injection::None => AlphaBeta::ZERO,
-            Injection::Stator(u) => u,
-            Injection::Estimated(u) => acting.to_stator(u),
-        };
-        let whole = acting.to_stator(wanted) + injected;
-        let (command, mut voltage_limited) = within_hexagon(whole, inputs.u_dc);
-        let cut = acting.from_stator(command - injected) - wanted;
-        state.current.integrate(&gains.current, i_ref - i_hat, cut, T_s);
-        let share = if whole.magnitude() > 0.0 { command.magnitude() / whole.magnitude() } else { 1.0 };
-        let [newest, older, _] = state.commands;
-        state.commands = [Command { u: command, injected: injected * share }, newest, older];
-        let compensated = if par.compensation.u_dead > 0.0 {
-            let legs = Phases::from_stator(acting.to_stator(i_ref));
-            let loss = dead_time_loss(par.compensation.u_dead, par.compensation.i_zero, legs);
-            let (compensated, limited) = within_hexagon(command + loss, inputs.u_dc);
-            voltage_limited |= limited;
-            compensated
-        } else {
-            command
-        };
-        // A current that leads is no estimate, and an axis that is still searched none either.
-        let lock_lost = if matches!(led, Some(Led::Frame(..))) || searching.is_some() {
-            state.lock = Lock::default();
-            0.0
-        } else {
-            state.lock.update(&gains.lock, motor, &sample, axis, w)
-        };
-        state.i_last = i;
-        state.i_ref = i_ref;
-        state.tau_ref = motor.torque(i_ref.d(), i_ref.q());
-        state.u_pi = state.current.output(&gains.current, i_ref - i_hat);
-
-        ControllerOutputs {
-            u: Phases::from_stator(compensated),
-            speed_est: speed,
-            theta_est: wrap(theta + T_s * w),
-            i: i_hat.into(),
-            i_ref: i_ref.into(),
-            lock_lost,
-            enabled: true,
-            voltage_limited,
-            current_limited,
-        }
-    }
-}
-
-/// The voltage `u` (V) within the hexagon of `u_dc` (V), and whether it was outside.
-fn within_hexagon(u: AlphaBeta, u_dc: f64) -> (AlphaBeta, bool) {
-    let phases = Phases::from_stator(u);
-    (limit_to_hexagon(phases, u_dc), phases.span() > u_dc)
 }
 
 impl Model for SensorlessController {
@@ -213,12 +97,12 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 5;
+    const STATE_VERSION: u16 = 6;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
         let k = motor.torque_constant();
-        let tau = if Kind::of(*estimator) == Some(Kind::Rasmussen) {
+        let tau = if Kind::of(*estimator).is_some_and(|kind| kind.class() == Class::FluxObserver) {
             limit.tau
         } else {
             greatest_torque(motor, limit, current.mtpa)
@@ -248,7 +132,7 @@ impl Model for SensorlessController {
             return Err(Fault::value("start.i", format!("{} A", start.i), allowed));
         }
         if start.mode == INJECTION {
-            if !kind.injects() {
+            if !kind.class().injects() {
                 return Err(Fault::new(format!(
                     "start.mode = {INJECTION} (Injection) and estimator = {estimator} ({}): the start by injection needs an \
                      estimator that injects",

@@ -78,9 +78,9 @@ enum Stage {
     Mirrored,
 }
 
-/// State of the search.
+/// State of the search for the north pole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Search {
+pub struct PolaritySearch {
     stage: Stage,
     /// Samples in this stage.
     n: f64,
@@ -90,18 +90,23 @@ pub struct Search {
     peaks: [f64; 2],
 }
 
-/// What the search asks for at a sample.
+/// What the search requests at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Searching {
-    /// The estimator works; no current.
-    Estimate,
-    /// This voltage (V) in the frame at this angle (rad), in place of the current controller's.
-    Voltage(f64, DqHat),
-    /// The magnet points to this angle (rad).
+pub enum SearchStep {
+    /// The estimator injects; the current stays at zero.
+    Inject,
+    /// Apply the voltage `u` (V) in the frame at `theta` (rad) instead of the current controller's.
+    Pulse {
+        /// Angle of the frame.
+        theta: f64,
+        /// Voltage in the frame.
+        u: DqHat,
+    },
+    /// The north pole is at this electrical angle (rad).
     Found(f64),
 }
 
-impl Search {
+impl PolaritySearch {
     /// The estimator's angle (rad) at this sample.
     #[inline]
     pub fn sees(&mut self, theta: f64) {
@@ -109,7 +114,7 @@ impl Search {
     }
 
     /// One sample.
-    pub fn update(&mut self, par: &PolarityParameters, context: &Context, sample: &Sample) -> Searching {
+    pub fn update(&mut self, par: &PolarityParameters, context: &Context, sample: &Sample) -> SearchStep {
         let Context { motor, T_s, .. } = *context;
         let (n, pulse) = (self.n, f64::from(par.samples));
         let rest = (REST * motor.L_d.max(motor.L_q) / motor.R_s / T_s).ceil();
@@ -118,7 +123,7 @@ impl Search {
         let (voltage, duration) = match self.stage {
             Stage::Find => {
                 if n * T_s < par.t_find {
-                    return Searching::Estimate;
+                    return SearchStep::Inject;
                 }
                 (0.0, n)
             }
@@ -138,11 +143,11 @@ impl Search {
                 Stage::Forward => Stage::Mirrored,
                 Stage::Mirrored => {
                     let [along, against] = self.peaks;
-                    return Searching::Found(if along >= against { self.theta } else { self.theta + PI });
+                    return SearchStep::Found(if along >= against { self.theta } else { self.theta + PI });
                 }
             };
         }
-        Searching::Voltage(self.theta, DqHat::new(voltage, 0.0))
+        SearchStep::Pulse { theta: self.theta, u: DqHat::new(voltage, 0.0) }
     }
 }
 

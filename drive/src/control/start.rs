@@ -91,9 +91,9 @@ enum Stage {
     Hold,
 }
 
-/// State: a frame that leads.
+/// State: the frame of the rotating current vector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Lead {
+pub struct CurrentFrequencyStart {
     stage: Stage,
     /// Samples in this stage.
     n: f64,
@@ -105,19 +105,32 @@ pub struct Lead {
     e: DqHat,
 }
 
-/// What the lead asks for at a sample.
+/// What the start requests at a sample; angles in rad and speeds in rad/s, electrical.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Led {
-    /// Control this current (A) in the frame at the electrical angle (rad) that turns at the speed (rad/s).
-    Frame(f64, f64, DqHat),
-    /// The rotor is at this electrical angle (rad) and speed (rad/s): the estimator's turn. The frame was at the last
-    /// angle (rad).
-    HandOver(f64, f64, f64),
+pub enum StartStep {
+    /// Control the current `i_ref` (A) in the frame at `theta`, which turns at `w`.
+    Current {
+        /// Angle of the frame.
+        theta: f64,
+        /// Speed of the frame.
+        w: f64,
+        /// Current reference in the frame.
+        i_ref: DqHat,
+    },
+    /// The rotor is at `theta` and turns at `w`: the estimator takes over.
+    HandOver {
+        /// Angle of the rotor.
+        theta: f64,
+        /// Speed of the rotor.
+        w: f64,
+        /// Last angle of the frame.
+        theta_frame: f64,
+    },
 }
 
-impl Lead {
-    /// One sample; `theta_est` (rad) is where the second alignment brings the rotor, `reference` what says to which side to
-    /// turn.
+impl CurrentFrequencyStart {
+    /// One sample. The second alignment brings the rotor to `theta_est` (rad); the sign of `reference` decides the direction
+    /// of rotation.
     pub fn update(
         &mut self,
         par: &StartParameters,
@@ -125,7 +138,7 @@ impl Lead {
         theta_est: f64,
         reference: f64,
         sample: &Sample,
-    ) -> Led {
+    ) -> StartStep {
         let Context { motor, T_s, J, .. } = *context;
         let n_p = f64::from(motor.n_p);
         let theta_last = self.theta;
@@ -159,7 +172,7 @@ impl Lead {
             Stage::Hold if t >= par.settle => {
                 let s = self.w.signum();
                 let theta = self.theta + atan2(-s * self.e.d(), s * self.e.q());
-                return Led::HandOver(theta, self.w, self.theta);
+                return StartStep::HandOver { theta, w: self.w, theta_frame: self.theta };
             }
             _ => {}
         }
@@ -168,7 +181,7 @@ impl Lead {
         let w_0 = (n_p * K * par.i / J).sqrt();
         let gain = 2.0 * ZETA * w_0 * J / (n_p * K);
         let i_q = (-gain * (self.e.q() / motor.psi_M - self.w)).clamp(-par.i, par.i);
-        Led::Frame(self.theta, self.w, DqHat::new(par.i * grown, i_q * grown))
+        StartStep::Current { theta: self.theta, w: self.w, i_ref: DqHat::new(par.i * grown, i_q * grown) }
     }
 
     fn enter(&mut self, stage: Stage) {

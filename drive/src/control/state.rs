@@ -1,14 +1,14 @@
-//! What the controller keeps from one sample to the next, and who leads: the start, or the estimator.
+//! What the controller keeps from one sample to the next, and who leads: a start sequence or the estimator.
 
 use crate::control::current::{CurrentController, CurrentGains};
 use crate::control::lock::{Lock, LockGains};
-use crate::control::polarity::{Search, Searching};
+use crate::control::polarity::{PolaritySearch, SearchStep};
 use crate::control::reference::max_torque_per_ampere;
 use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::{SpeedController, SpeedGains};
-use crate::control::start::{CURRENT_FREQUENCY, INJECTION, Lead, Led};
+use crate::control::start::{CURRENT_FREQUENCY, CurrentFrequencyStart, INJECTION, StartStep};
 use crate::control::tables::ControllerParameters;
-use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Kind, Sample};
+use crate::estimator::{Class, Context, Estimate, Estimator, EstimatorParameters, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use crate::math::wrap;
 use crate::motor::Motor;
@@ -50,6 +50,44 @@ impl InUse {
     }
 }
 
+/// Who determines the angle of the frame in which the current is controlled.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) enum Leader {
+    /// The estimator.
+    #[default]
+    Estimator,
+    /// The I-f start: the rotor follows its current vector.
+    Start(CurrentFrequencyStart),
+    /// The search for the north pole at standstill.
+    Search(PolaritySearch),
+}
+
+impl Leader {
+    /// The first one with `start.mode` = `mode`.
+    fn of(mode: i32) -> Self {
+        match mode {
+            CURRENT_FREQUENCY => Self::Start(CurrentFrequencyStart::default()),
+            INJECTION => Self::Search(PolaritySearch::default()),
+            _ => Self::Estimator,
+        }
+    }
+}
+
+/// What the loops do in a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Mode {
+    /// A start sequence is at work: control this current (A), no speed.
+    Current(DqHat),
+    /// A start sequence is at work: apply this voltage (V), no current control.
+    Voltage(DqHat),
+    /// The first sample of speed and current control after the I-f start.
+    AfterStart,
+    /// The first sample of speed and current control after the search.
+    AfterSearch,
+    /// Speed and current control.
+    ClosedLoop,
+}
+
 /// What a sample hands on to the next.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
@@ -60,10 +98,7 @@ pub(super) struct State {
     #[serde(with = "fixed_size")]
     pub(super) k: u64,
     pub(super) estimator: Estimator,
-    /// What leads the rotor before the estimator is at work.
-    pub(super) lead: Option<Lead>,
-    /// What finds the magnet at standstill before speed is controlled.
-    pub(super) search: Option<Search>,
+    pub(super) leader: Leader,
     pub(super) speed: SpeedController,
     pub(super) current: CurrentController,
     /// Commands of the last samples, the newest first: the one at `timing.delay` acted since the last sample.
@@ -90,8 +125,7 @@ impl State {
     pub(super) fn new(par: &ControllerParameters, enabled: bool) -> Self {
         let shown = ControllerOutputs { theta_est: wrap(par.theta_est), enabled, ..ControllerOutputs::default() };
         Self {
-            lead: (par.start.mode == CURRENT_FREQUENCY).then(Lead::default),
-            search: (par.start.mode == INJECTION).then(Search::default),
+            leader: Leader::of(par.start.mode),
             w_ref: par.speed_est,
             computed: shown.clone(),
             shown,
@@ -99,28 +133,28 @@ impl State {
         }
     }
 
-    /// From the frame of the lead at the angle `frame` (rad) to the estimated one at `theta` (rad), turning at `w`
-    /// (rad/s): the same voltage, the same torque.
+    /// From the I-f start's frame at `theta_frame` (rad) to the estimated one at `theta` (rad), turning at `w` (rad/s): the
+    /// same voltage, the same torque.
     pub(super) fn take_over(
         &mut self,
         gains: &Gains,
         par: &ControllerParameters,
         speed_ref: f64,
         sample: &Sample,
-        (theta, w, frame): (f64, f64, f64),
+        (theta, w, theta_frame): (f64, f64, f64),
     ) {
         let motor = &par.motor;
         let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
         let i_q = motor.torque(i.d(), i.q()) / gains.k;
-        self.current = self.current.in_frame_behind(frame - theta);
+        self.current = self.current.in_frame_behind(theta_frame - theta);
         // A ramp begins at the rotor's speed.
         self.w_ref = w / f64::from(motor.n_p);
         let w_ref = par.speed_loop.ramped(self.w_ref, speed_ref, par.T_s);
         self.speed = SpeedController::take_over(&gains.speed, w_ref, w / f64::from(motor.n_p), i_q);
-        self.lead = None;
+        self.leader = Leader::Estimator;
     }
 
-    /// The estimate at a sample, whoever gives it: what leads, what searches, or the estimator.
+    /// The estimate at a sample, from whoever leads, and what the loops do with it.
     pub(super) fn estimate(
         &mut self,
         kind: Kind,
@@ -129,43 +163,43 @@ impl State {
         in_use: &InUse,
         inputs: &ControllerInputs,
         sample: &Sample,
-    ) -> (Estimate, Option<Led>, Option<Searching>) {
+    ) -> (Estimate, Mode) {
         let context = context(par, &in_use.estimators, &in_use.motor);
-        let reference = if par.speed_loop.torque_mode { inputs.tau_ref } else { inputs.speed_ref };
-        let led = self.lead.as_mut().map(|lead| lead.update(&par.start, &context, par.theta_est, reference, sample));
-        let searching = self.search.as_mut().map(|search| search.update(&par.polarity, &context, sample));
-        let estimate = if sample.k == 0 {
+        let first = (sample.k == 0).then(|| {
             let w = f64::from(par.motor.n_p) * par.speed_est;
             let (estimator, estimate) = Estimator::start(kind, &context, sample, par.theta_est, w);
             self.estimator = estimator;
             estimate
-        } else if let Some(Led::HandOver(theta, w, frame)) = led {
-            self.estimator.place(&context, sample, theta, w);
-            self.take_over(gains, par, inputs.speed_ref, sample, (theta, w, frame));
-            Estimate::new(theta, w, sample)
-        } else if led.is_some() {
-            Estimate::default()
-        } else if let Some(Searching::Voltage(theta, _)) = searching {
-            Estimate::new(theta, 0.0, sample)
-        } else if let Some(Searching::Found(theta)) = searching {
-            self.estimator.place(&context, sample, theta, 0.0);
-            self.found();
-            Estimate::new(theta, 0.0, sample)
-        } else {
-            self.estimator.update(&context, sample)
-        };
-        if let (Some(search), Some(Searching::Estimate)) = (&mut self.search, searching) {
-            search.sees(estimate.theta);
+        });
+        let reference = if par.speed_loop.torque_mode { inputs.tau_ref } else { inputs.speed_ref };
+        match &mut self.leader {
+            Leader::Start(start) => match start.update(&par.start, &context, par.theta_est, reference, sample) {
+                StartStep::Current { theta, w, i_ref } => (Estimate::new(theta, w, sample), Mode::Current(i_ref)),
+                StartStep::HandOver { theta, w, theta_frame } => {
+                    self.estimator.place(&context, sample, theta, w);
+                    self.take_over(gains, par, inputs.speed_ref, sample, (theta, w, theta_frame));
+                    (Estimate::new(theta, w, sample), Mode::AfterStart)
+                }
+            },
+            Leader::Search(search) => match search.update(&par.polarity, &context, sample) {
+                SearchStep::Inject => {
+                    let estimate = first.unwrap_or_else(|| self.estimator.update(&context, sample));
+                    search.sees(estimate.theta);
+                    (estimate, Mode::Current(DqHat::ZERO))
+                }
+                SearchStep::Pulse { theta, u } => (Estimate::new(theta, 0.0, sample), Mode::Voltage(u)),
+                SearchStep::Found(theta) => {
+                    self.estimator.place(&context, sample, theta, 0.0);
+                    self.begin_at_rest();
+                    (Estimate::new(theta, 0.0, sample), Mode::AfterSearch)
+                }
+            },
+            Leader::Estimator => (first.unwrap_or_else(|| self.estimator.update(&context, sample)), Mode::ClosedLoop),
         }
-        let estimate = match led {
-            Some(Led::Frame(theta, w, _)) => Estimate::new(theta, w, sample),
-            _ => estimate,
-        };
-        (estimate, led, searching)
     }
 
-    /// The current references (A) at the estimated mechanical `speed` (rad/s), and whether a limit cut them; `old` gains of
-    /// a speed loop tuned now.
+    /// The current references (A) at the estimated mechanical `speed` (rad/s), and whether a limit reduced them; `old` are
+    /// the gains of a speed loop that is retuned at this sample.
     #[inline]
     pub(super) fn references(
         &mut self,
@@ -181,22 +215,22 @@ impl State {
         if let Some(old) = old {
             self.speed.retune(old, &gains.speed, w_ref, speed);
         }
-        let mut torque = |limit: f64| {
-            let (i_q_ref, wanted) = if par.speed_loop.torque_mode {
-                let wanted = inputs.tau_ref / gains.k;
-                (wanted.clamp(-limit, limit), wanted)
+        let mut i_q_ref = |limit: f64| {
+            let (limited, requested) = if par.speed_loop.torque_mode {
+                let requested = inputs.tau_ref / gains.k;
+                (requested.clamp(-limit, limit), requested)
             } else {
                 self.speed.update(&gains.speed, w_ref, speed, limit, par.T_s)
             };
-            (i_q_ref, wanted.abs() > limit)
+            (limited, requested.abs() > limit)
         };
-        // The low-speed law is Rasmussen's; it would only be a loss where the angle is known.
-        if kind == Kind::Rasmussen {
+        // Only a flux observer needs the low-speed law at standstill; the other methods would pay losses for nothing.
+        if kind.class() == Class::FluxObserver {
             let i_d_ref = par.zero_speed.i_d_ref(speed);
-            let (i_q_ref, limited) = torque(par.limit.i_q_beside(i_d_ref).min(gains.i_tau));
+            let (i_q_ref, limited) = i_q_ref(par.limit.i_q_beside(i_d_ref).min(gains.i_tau));
             return (DqHat::new(i_d_ref, i_q_ref), limited);
         }
-        let (i_q_ref, limited) = torque(gains.i_tau);
+        let (i_q_ref, limited) = i_q_ref(gains.i_tau);
         let i_ref = if par.current.mtpa {
             max_torque_per_ampere(&par.motor, gains.k * i_q_ref)
         } else {
@@ -205,9 +239,10 @@ impl State {
         (i_ref, limited)
     }
 
-    /// The magnet is found: the loops begin at rest.
-    pub(super) fn found(&mut self) {
-        (self.current, self.speed, self.search) = (CurrentController::default(), SpeedController::default(), None);
+    /// The north pole is found: the estimator leads, and both loops begin at rest.
+    fn begin_at_rest(&mut self) {
+        (self.current, self.speed) = (CurrentController::default(), SpeedController::default());
+        self.leader = Leader::Estimator;
     }
 }
 

@@ -8,8 +8,8 @@ use crate::control::signals::ControllerOutputs;
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
 use crate::control::start::{START, StartParameters};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
-use crate::estimator::ESTIMATORS;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
+use crate::estimator::{ESTIMATORS, Kind};
 use crate::motor::{MOTOR, Motor};
 use crate::plant::saturation::A_PER_WB2;
 use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METRE, ONE, RADIAN, SECOND, SPEED, VOLT};
@@ -110,6 +110,13 @@ pub struct ControllerParameters {
     pub theta_est: f64,
     /// First estimate of the mechanical speed in rad/s.
     pub speed_est: f64,
+}
+
+impl ControllerParameters {
+    /// The estimator; the table lets no other value in.
+    pub(super) fn kind(&self) -> Kind {
+        Kind::of(self.estimator).unwrap_or(Kind::Rasmussen)
+    }
 }
 
 impl Default for ControllerParameters {

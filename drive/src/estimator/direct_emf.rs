@@ -13,7 +13,6 @@ use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
 use crate::frame::DqHat;
-use crate::math::atan2;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
@@ -46,9 +45,9 @@ impl Estimating for DirectEmf {
         );
         self.e += (e - self.e) * (1.0 - pole(par.emf.bandwidth, T_s));
         let s = self.direction.update(w, par.emf.w_sign);
-        self.tracker.correct(context, par.tracker.bandwidth, atan2(-s * self.e.d(), s * self.e.q()), sample.tau_ref);
-        Estimate::new(self.tracker.theta, self.tracker.w, sample)
+        self.tracker.follow(context, emf::angle_error(s, self.e.d(), self.e.q()), sample)
     }
+
     fn validate(context: &Context) -> Result<(), Fault> {
         emf::validate(context)
     }

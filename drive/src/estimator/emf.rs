@@ -14,7 +14,7 @@
 
 use crate::estimator::Context;
 use crate::estimator::interval::Interval;
-use crate::math::exp;
+use crate::math::{atan2, exp};
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
@@ -69,6 +69,12 @@ impl Direction {
         }
         self.0
     }
+}
+
+/// The angle error theta - theta^ in rad that the EMF (`e_d`, `e_q`) (V) shows in a direction of rotation with the sign `s`.
+#[inline]
+pub fn angle_error(s: f64, e_d: f64, e_q: f64) -> f64 {
+    atan2(-s * e_d, s * e_q)
 }
 
 /// Observer of current and EMF of one axis.

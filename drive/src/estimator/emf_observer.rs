@@ -11,7 +11,6 @@ use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
-use crate::math::atan2;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
@@ -49,9 +48,9 @@ impl Estimating for EmfObserver {
         let e_d = self.d.update(z, motor.L_d, T_s, r_d, x.i_now.d());
         let e_q = self.q.update(z, motor.L_q, T_s, r_q, x.i_now.q());
         let s = self.direction.update(w, par.emf.w_sign);
-        self.tracker.correct(context, par.tracker.bandwidth, atan2(-s * e_d, s * e_q), sample.tau_ref);
-        Estimate::new(self.tracker.theta, self.tracker.w, sample)
+        self.tracker.follow(context, emf::angle_error(s, e_d, e_q), sample)
     }
+
     fn validate(context: &Context) -> Result<(), Fault> {
         emf::validate(context)
     }

@@ -13,7 +13,6 @@ use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
-use crate::math::atan2;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
@@ -47,7 +46,7 @@ impl ExtendedEmfObserver {
         let e_d = self.d.update(z, motor.L_d, T_s, r.d(), x.i_now.d());
         let e_q = self.q.update(z, motor.L_d, T_s, r.q(), x.i_now.q());
         let s = self.direction.update(w, par.emf.w_sign);
-        atan2(-s * e_d, s * e_q)
+        emf::angle_error(s, e_d, e_q)
     }
 }
 
@@ -72,9 +71,9 @@ impl Estimating for ExtendedEmf {
         tracker.advance(context.T_s);
         let x = Interval::new(tracker.theta_last, tracker.theta, sample, context.T_s);
         let e = observer.angle_error(context, &x, tracker.w);
-        tracker.correct(context, context.par.tracker.bandwidth, e, sample.tau_ref);
-        Estimate::new(tracker.theta, tracker.w, sample)
+        tracker.follow(context, e, sample)
     }
+
     fn validate(context: &Context) -> Result<(), Fault> {
         emf::validate(context)
     }

@@ -6,7 +6,8 @@
 //! parameters) comes in a [`Context`].
 //!
 //! A new estimator implements [`Estimating`], has a row in the list at the end of this file and, for parameters of its
-//! own, a row in [`tables`]. It then appears in the enumeration, the FMUs and their documentation.
+//! own, a row in [`tables`]. The row says what the method is ([`Class`]) and whether it holds standstill. The estimator then
+//! appears in the enumeration, the FMUs, their documentation and every scenario of the comparison.
 
 pub mod carrier;
 pub mod current_model;
@@ -149,9 +150,31 @@ pub trait Estimating: Sized {
     }
 }
 
-/// The list: value, name, state and description make the enumeration and the one place of dispatch.
+/// The signal that a method finds the rotor by; it decides how a drive starts and which scenarios it can run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// The stator flux. Starts by itself and holds standstill with the d-axis current of `zero_speed`.
+    FluxObserver,
+    /// The back EMF, which vanishes at standstill: an I-f start takes the rotor to a speed that shows it.
+    BackEmf,
+    /// The saliency, by an injected voltage: standstill and low speed, as far as the voltage suffices.
+    Injection,
+    /// Injection at low speed, the back EMF above.
+    Hybrid,
+    /// A sensor: the reference for all others.
+    Sensored,
+}
+
+impl Class {
+    /// Whether the method injects a voltage that finds the d axis at standstill.
+    pub fn injects(self) -> bool {
+        matches!(self, Self::Injection | Self::Hybrid)
+    }
+}
+
+/// The list: value, name, state, class, standstill and description make the enumeration and the one place of dispatch.
 macro_rules! estimators {
-    ($($value:literal $name:ident($state:ty) $description:literal;)*) => {
+    ($($value:literal $name:ident($state:ty): $class:ident, standstill $standstill:literal, $description:literal;)*) => {
         /// The estimators, in the order of the interface: a value never changes, new ones are appended.
         pub static ESTIMATORS: Enumeration = Enumeration {
             name: "Estimator",
@@ -181,6 +204,20 @@ macro_rules! estimators {
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => stringify!($name),)*
+                }
+            }
+
+            /// The signal that it finds the rotor by.
+            pub fn class(self) -> Class {
+                match self {
+                    $(Self::$name => Class::$class,)*
+                }
+            }
+
+            /// Whether it holds a loaded rotor at standstill.
+            pub fn holds_standstill(self) -> bool {
+                match self {
+                    $(Self::$name => $standstill,)*
                 }
             }
 
@@ -239,48 +276,34 @@ macro_rules! estimators {
 }
 
 estimators! {
-    1 Rasmussen(rasmussen::Rasmussen)
+    1 Rasmussen(rasmussen::Rasmussen): FluxObserver, standstill true,
         "Full-order flux observer with PI speed adaptation, Rasmussen 2006, eq (16) and (21)";
-    2 DirectEmf(direct_emf::DirectEmf)
+    2 DirectEmf(direct_emf::DirectEmf): BackEmf, standstill false,
         "Back EMF calculated from the voltage equation, Kim & Sul 2011, eq (11) to (13)";
-    3 EmfObserver(emf_observer::EmfObserver)
+    3 EmfObserver(emf_observer::EmfObserver): BackEmf, standstill false,
         "State observer of the back EMF, Kim & Sul 2011, eq (14) and (15)";
-    4 ExtendedEmf(extended_emf::ExtendedEmf)
+    4 ExtendedEmf(extended_emf::ExtendedEmf): BackEmf, standstill false,
         "State observer of the extended EMF, Kim & Sul 2011, eq (16) to (23)";
-    5 VoltageModel(voltage_model::VoltageModel)
+    5 VoltageModel(voltage_model::VoltageModel): BackEmf, standstill false,
         "Voltage model, Kim & Sul 2011, eq (24) to (27)";
-    6 CurrentModel(current_model::CurrentModel)
+    6 CurrentModel(current_model::CurrentModel): BackEmf, standstill false,
         "Current model, Kim & Sul 2011, eq (28) to (30)";
-    7 VoltageFeedback(voltage_feedback::VoltageFeedback)
+    7 VoltageFeedback(voltage_feedback::VoltageFeedback): BackEmf, standstill false,
         "Feedback of the current controller's d-axis voltage, Kim & Sul 2011, eq (31) and (32)";
-    8 RotatingInjection(rotating::RotatingInjection)
+    8 RotatingInjection(rotating::RotatingInjection): Injection, standstill true,
         "Rotating voltage in stator axes, heterodyne, Kim & Sul 2011, eq (38) to (40)";
-    9 PulsatingInjection(pulsating::PulsatingInjection)
+    9 PulsatingInjection(pulsating::PulsatingInjection): Injection, standstill true,
         "Pulsating voltage on the estimated d axis, Kim & Sul 2011, eq (42) to (45)";
-    10 SquareWaveInjection(square_wave::SquareWaveInjection)
+    10 SquareWaveInjection(square_wave::SquareWaveInjection): Injection, standstill true,
         "Square-wave voltage at half the PWM frequency, Kim & Sul 2011, section III";
-    11 NearPwmInjection(near_pwm::NearPwmInjection)
+    11 NearPwmInjection(near_pwm::NearPwmInjection): Injection, standstill true,
         "Voltage with a period of three samples, Kim & Sul 2011, section III";
-    12 Hybrid(hybrid::Hybrid)
+    12 Hybrid(hybrid::Hybrid): Hybrid, standstill true,
         "Square-wave injection at low speed, extended EMF above, Kim & Sul 2011, section IV";
-    13 Sensored(sensored::Sensored)
+    13 Sensored(sensored::Sensored): Sensored, standstill true,
         "Angle and speed of a sensor, theta_meas and speed_meas, Kim & Sul 2011, Fig. 1a";
-    14 KalmanFilter(kalman::Kalman)
+    14 KalmanFilter(kalman::Kalman): BackEmf, standstill false,
         "Extended Kalman filter on stator flux, speed and angle, Kim & Sul 2011, section II.A";
-}
-
-impl Kind {
-    /// Whether it finds the magnet's axis at standstill, by injection.
-    pub fn injects(self) -> bool {
-        matches!(
-            self,
-            Self::RotatingInjection
-                | Self::PulsatingInjection
-                | Self::SquareWaveInjection
-                | Self::NearPwmInjection
-                | Self::Hybrid
-        )
-    }
 }
 
 impl Default for Estimator {

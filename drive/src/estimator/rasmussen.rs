@@ -2,7 +2,8 @@
 //!
 //! In the estimated rotor frame: psi_r^ = psi_s^ - L i, d psi_s^/dt = u - R i + v - j w^ psi_s^,
 //! v = -c_1 (psi_rd^ - psi_M) - j c_2 psi_rq^, w^ = g_1 psi_rq^ + g_2 int psi_rq^ dt, d theta^/dt = w^.
-//! The j on c_2 is missing in the text before (7) of the paper; (7), (16) and (21) have it.
+//! The j on c_2 is missing in the text before (7) of the paper; (7), (16) and (21) have it. In this file theta~ = theta^ - theta,
+//! Rasmussen's sign.
 //!
 //! Gains by the poles of the speed adaptation: g_2 = w_n^2 / psi_M, g_1 = 2 zeta w_n / psi_M.
 //!

@@ -8,7 +8,7 @@
 //! each torque of its own, so its speed has no lag.
 //! Limits: behind a filter or observer of bandwidth w_o, rho <= w_o / 3; below 2 pi 15 rad/s a 50 % load step loses it.
 
-use crate::estimator::Context;
+use crate::estimator::{Context, Estimate, Sample};
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Enumeration, Fault, Item, Row, Table};
 use serde::{Deserialize, Serialize};
@@ -100,6 +100,16 @@ pub fn validate(context: &Context) -> Result<(), Fault> {
         )));
     }
     Ok(())
+}
+
+impl Tracker {
+    /// The common end of the methods that find an angle error: the tracker follows `e` (rad), and its angle and speed are
+    /// the estimate.
+    #[inline]
+    pub fn follow(&mut self, context: &Context, e: f64, sample: &Sample) -> Estimate {
+        self.correct(context, context.par.tracker.bandwidth, e, sample.tau_ref);
+        Estimate::new(self.theta, self.w, sample)
+    }
 }
 
 type P = Row<TrackerParameters>;

@@ -45,9 +45,9 @@ impl Estimating for VoltageFeedback {
         self.frame += smoothing * (par.emf.slip(&x, w) * motor.L_d * x.i.q() - self.frame);
         let v_dfb = sample.u_pi.d() + self.frame;
         let e = (-s * v_dfb / (motor.psi_M * w.abs().max(par.emf.w_sign))).clamp(-CLIP, CLIP);
-        self.tracker.correct(context, par.tracker.bandwidth, e, sample.tau_ref);
-        Estimate::new(self.tracker.theta, self.tracker.w, sample)
+        self.tracker.follow(context, e, sample)
     }
+
     fn validate(context: &Context) -> Result<(), Fault> {
         let current = context.current;
         if !current.reference_feed_forward || current.active_resistance {

@@ -11,8 +11,9 @@
 //! Derived here from the ideal diode bridge; `drive/tests/gates_off.rs` compares it with such a bridge in stator axes. u in V, i in A.
 
 use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
+use crate::modulation::dead_time_loss;
 use crate::motor::Motor;
-use crate::plant::inverter::{Inverter, dead_time_loss};
+use crate::plant::inverter::Inverter;
 
 /// Shortest substep in s that the diodes ask for.
 const SHORTEST_SUBSTEP: f64 = 1e-6;

@@ -7,4 +7,5 @@ pub mod mechanics;
 pub mod model;
 pub mod power;
 pub mod saturation;
+pub mod signals;
 pub mod tables;

@@ -3,10 +3,11 @@
 use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
 use crate::integrate::rk4;
 use crate::math::wrap;
-use crate::plant::inverter::limit_to_hexagon;
+use crate::modulation::limit_to_hexagon;
 use crate::plant::legs::Legs;
 use crate::plant::machine;
 use crate::plant::power::{Energy, Powers};
+use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::{OUTPUTS, PARAMETERS, PlantParameters};
 use fmu_core::unit::{NEWTON_METRE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, Table, Terminal};
@@ -18,30 +19,6 @@ const LONGEST_SUBSTEP: f64 = 50e-6;
 
 /// Maximum number of substeps in one communication step: 500 s of simulated time.
 const MAX_SUBSTEPS: f64 = 1e7;
-
-/// Inputs, held over a communication step.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PlantInputs {
-    /// Stator voltage references in V, averages over a PWM period.
-    pub u: Phases,
-    /// DC-link voltage in V, >= 0.
-    pub u_dc: f64,
-    /// Load torque in N.m, positive against positive speed; not read with an imposed speed.
-    pub tau_load: f64,
-    /// Imposed mechanical speed of the shaft in rad/s.
-    pub speed_shaft: f64,
-    /// Imposed mechanical angle of the shaft in rad, at the beginning of the step.
-    pub angle_shaft: f64,
-    /// The gates switch; false: only the diodes conduct.
-    pub enable: bool,
-}
-
-impl Default for PlantInputs {
-    fn default() -> Self {
-        let u = Phases::default();
-        Self { u, u_dc: 325.0, tau_load: 0.0, speed_shaft: 0.0, angle_shaft: 0.0, enable: true }
-    }
-}
 
 /// What the integration advances: the state, and the energies of the step beside it.
 type Vector = SVector<f64, 7>;
@@ -71,31 +48,6 @@ impl State {
     fn is_finite(self) -> bool {
         self.psi.is_finite() && self.speed.is_finite() && self.angle.is_finite()
     }
-}
-
-/// Outputs.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PlantOutputs {
-    /// Stator currents in A, positive into the machine.
-    pub i: Phases,
-    /// Mechanical speed in rad/s.
-    pub speed: f64,
-    /// Mechanical angle in rad, not wrapped.
-    pub angle: f64,
-    /// Electrical angle in rad, in (-pi, pi].
-    pub theta_e: f64,
-    /// Electromagnetic torque in N.m.
-    pub tau_e: f64,
-    /// d-axis stator current in A.
-    pub i_d: f64,
-    /// q-axis stator current in A.
-    pub i_q: f64,
-    /// Power between DC link, machine and shaft, mean over the last step.
-    pub powers: Powers,
-    /// Torque of the shaft on the load in N.m.
-    pub tau_shaft: f64,
-    /// Energy since the start.
-    pub energy: Energy,
 }
 
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.

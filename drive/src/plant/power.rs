@@ -24,7 +24,7 @@
 
 use crate::frame::Phases;
 use crate::plant::legs::Legs;
-use crate::plant::model::PlantInputs;
+use crate::plant::signals::PlantInputs;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};

@@ -3,9 +3,9 @@
 use crate::motor::{MOTOR, Motor};
 use crate::plant::inverter::{INVERTER, Inverter};
 use crate::plant::mechanics::{MECHANICS, Mechanics};
-use crate::plant::model::PlantOutputs;
 use crate::plant::power::{ENERGY, POWERS};
 use crate::plant::saturation::{SATURATION, Saturation};
+use crate::plant::signals::PlantOutputs;
 use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED};
 use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};

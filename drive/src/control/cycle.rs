@@ -1,0 +1,177 @@
+//! One sample of the controller, in the order of Rasmussen 2006, Fig. 2: measure, estimate, reference, modulate.
+
+use crate::control::lock::Lock;
+use crate::control::model::SensorlessController;
+use crate::control::signals::ControllerOutputs;
+use crate::control::state::{Command, Mode, context};
+use crate::estimator::{Estimate, Injection, Sample};
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
+use crate::math::wrap;
+use crate::modulation::{dead_time_loss, limit_to_hexagon};
+
+/// The estimated rotor frame at a sample, and what is controlled in it.
+struct Frame {
+    axis: Axis<Estimated>,
+    /// Electrical angle in rad.
+    theta: f64,
+    /// Electrical speed in rad/s.
+    w: f64,
+    /// Stator current to control in A, without a carrier.
+    i: DqHat,
+    /// Injected voltage in V.
+    injection: Injection,
+}
+
+impl SensorlessController {
+    /// One sample: currents in, voltage references out.
+    pub(super) fn control(&mut self) -> ControllerOutputs {
+        let first = self.state.k == 0;
+        let tuned = std::mem::take(&mut self.tuned) && !first;
+        if first {
+            self.in_use.take_up(&self.parameters);
+        }
+        let sample = self.measure();
+        let (frame, mode) = self.estimate(&sample, tuned);
+        let speed = frame.w / f64::from(self.parameters.motor.n_p);
+        let (i_ref, current_limited) = self.reference(mode, speed, tuned);
+        let (u, voltage_limited) = self.modulate(mode, &frame, i_ref, tuned);
+        let lock_lost = self.lock(mode, &frame, &sample);
+        self.keep(&sample, i_ref, frame.i);
+
+        ControllerOutputs {
+            u,
+            speed_est: speed,
+            theta_est: wrap(frame.theta + self.parameters.T_s * frame.w),
+            i: frame.i.into(),
+            i_ref: i_ref.into(),
+            lock_lost,
+            enabled: true,
+            voltage_limited,
+            current_limited,
+        }
+    }
+
+    /// What the sensors and the last samples tell.
+    #[inline]
+    fn measure(&self) -> Sample {
+        let Self { inputs, parameters: par, state, .. } = self;
+        let i = par.sensor.measure(inputs.i, state.samples).to_stator();
+        // The command that acted since the last sample: the newest one without a delay.
+        let acted = match (par.delay, state.commands) {
+            (0, [newest, ..]) => newest,
+            (1, [_, older, _]) => older,
+            (_, [.., oldest]) => oldest,
+        };
+        Sample {
+            k: state.k,
+            i,
+            i_last: if state.k == 0 { i } else { state.i_last },
+            u: acted.u,
+            u_injected: acted.injected,
+            u_pi: state.u_pi,
+            i_ref: state.i_ref,
+            tau_ref: state.tau_ref,
+            theta_meas: inputs.theta_meas,
+            w_meas: f64::from(par.motor.n_p) * inputs.speed_meas,
+            u_dc: inputs.u_dc,
+        }
+    }
+
+    /// The estimated frame, and what the loops do in it. Parameters that were `tuned` act on the estimator from here on.
+    #[inline]
+    fn estimate(&mut self, sample: &Sample, tuned: bool) -> (Frame, Mode) {
+        let Self { inputs, parameters: par, gains, in_use, state, .. } = self;
+        let (estimate, mode) = state.estimate(par.kind(), gains, par, in_use, inputs, sample);
+        if tuned {
+            let new = context(par, &par.estimators, &par.motor);
+            state.estimator.retune(&context(par, &in_use.estimators, &in_use.motor), &new);
+            in_use.take_up(par);
+        }
+        let Estimate { theta, w, i, injection } = estimate;
+        let axis = Axis::<Estimated>::at(theta);
+        (Frame { axis, theta, w, i: axis.from_stator(i), injection }, mode)
+    }
+
+    /// Current references in A at the estimated mechanical `speed` (rad/s), and whether a limit reduced them.
+    #[inline]
+    fn reference(&mut self, mode: Mode, speed: f64, tuned: bool) -> (DqHat, bool) {
+        let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
+        match mode {
+            Mode::Current(i_ref) => (i_ref, false),
+            Mode::Voltage(_) => (DqHat::ZERO, false),
+            Mode::AfterStart | Mode::AfterSearch | Mode::ClosedLoop => {
+                let old = (tuned && mode == Mode::ClosedLoop).then_some(&last_gains.speed);
+                state.references(par.kind(), gains, old, par, inputs, speed)
+            }
+        }
+    }
+
+    /// Current control, injection, the hexagon and dead-time compensation: the voltage references in V, and whether the
+    /// hexagon limited them.
+    #[inline]
+    fn modulate(&mut self, mode: Mode, frame: &Frame, i_ref: DqHat, tuned: bool) -> (Phases, bool) {
+        let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
+        let (motor, T_s) = (&par.motor, par.T_s);
+        if tuned && mode != Mode::AfterSearch {
+            state.current.retune(&last_gains.current, &gains.current, i_ref, frame.i);
+        }
+        let requested = if let Mode::Voltage(u) = mode {
+            u
+        } else {
+            state.current.command(&gains.current, motor, i_ref, frame.i, frame.w)
+        };
+        // The command acts from `delay` to `delay + 1` samples from now: turned to the middle of that interval.
+        let acting = Axis::<Estimated>::at(frame.theta + (f64::from(par.delay) + 0.5) * T_s * frame.w);
+        let injected = match frame.injection {
+            Injection::None => AlphaBeta::ZERO,
+            Injection::Stator(u) => u,
+            Injection::Estimated(u) => acting.to_stator(u),
+        };
+        let whole = acting.to_stator(requested) + injected;
+        let (command, limited) = within_hexagon(whole, inputs.u_dc);
+        let limitation = acting.from_stator(command - injected) - requested;
+        state.current.integrate(&gains.current, i_ref - frame.i, limitation, T_s);
+        let share = if whole.magnitude() > 0.0 { command.magnitude() / whole.magnitude() } else { 1.0 };
+        let [newest, older, _] = state.commands;
+        state.commands = [Command { u: command, injected: injected * share }, newest, older];
+        if par.compensation.u_dead > 0.0 {
+            let legs = Phases::from_stator(acting.to_stator(i_ref));
+            let loss = dead_time_loss(par.compensation.u_dead, par.compensation.i_zero, legs);
+            let (compensated, beyond) = within_hexagon(command + loss, inputs.u_dc);
+            (Phases::from_stator(compensated), limited || beyond)
+        } else {
+            (Phases::from_stator(command), limited)
+        }
+    }
+
+    /// The output `lock_lost`; 0 during a start sequence, whose angle is no estimate.
+    #[inline]
+    fn lock(&mut self, mode: Mode, frame: &Frame, sample: &Sample) -> f64 {
+        let Self { parameters: par, gains, state, .. } = self;
+        match mode {
+            Mode::Current(_) | Mode::Voltage(_) | Mode::AfterSearch => {
+                state.lock = Lock::default();
+                0.0
+            }
+            Mode::AfterStart | Mode::ClosedLoop => {
+                state.lock.update(&gains.lock, &par.motor, sample, frame.axis, frame.w)
+            }
+        }
+    }
+
+    /// Keeps what the next sample needs: the references and the current `i` (A) of this one.
+    #[inline]
+    fn keep(&mut self, sample: &Sample, i_ref: DqHat, i: DqHat) {
+        let Self { parameters: par, gains, state, .. } = self;
+        state.i_last = sample.i;
+        state.i_ref = i_ref;
+        state.tau_ref = par.motor.torque(i_ref.d(), i_ref.q());
+        state.u_pi = state.current.output(&gains.current, i_ref - i);
+    }
+}
+
+/// The voltage `u` (V) within the hexagon of `u_dc` (V), and whether it was outside.
+fn within_hexagon(u: AlphaBeta, u_dc: f64) -> (AlphaBeta, bool) {
+    let phases = Phases::from_stator(u);
+    (limit_to_hexagon(phases, u_dc), phases.span() > u_dc)
+}

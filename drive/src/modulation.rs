@@ -1,0 +1,61 @@
+//! What three inverter legs make of a voltage command on average over a PWM period: the hexagon of the DC link, and the
+//! dead-time voltage. Plant and controller use the same functions: the one is the inverter, the other knows it.
+//!
+//! The hexagon follows from three legs between the rails, here. Dead time: a leg loses u_dead sign(i), below i_zero the
+//! linear part of it, u_dead i / i_zero; the field's usual mean-value model, in neither paper. u in V, i in A.
+
+use crate::frame::{AlphaBeta, Phases};
+
+/// The stator voltage (V) that an inverter on `u_dc` (V, >= 0) applies for the references `u` (V).
+///
+/// Only differences of the references matter; the inverter chooses the zero sequence. It reproduces each vector inside
+/// the hexagon (no line-to-line voltage above `u_dc`) and scales the others back radially to its edge.
+#[inline]
+pub fn limit_to_hexagon(u: Phases, u_dc: f64) -> AlphaBeta {
+    let span = u.span();
+    let v = u.to_stator();
+    if span > u_dc { v * (u_dc.max(0.0) / span) } else { v }
+}
+
+/// The stator voltage (V) lost to dead time at the phase currents `i` (A): up to `u_dead` (V) per leg, linear within
+/// +-`i_zero` (A).
+#[inline]
+pub fn dead_time_loss(u_dead: f64, i_zero: f64, i: Phases) -> AlphaBeta {
+    let leg = |i: f64| u_dead * (i / i_zero).clamp(-1.0, 1.0);
+    Phases { a: leg(i.a), b: leg(i.b), c: leg(i.c) }.to_stator()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_is_a_hexagon() {
+        // Corners reach 2/3 u_dc, the middle of an edge u_dc / sqrt(3).
+        for i in 0..360 {
+            let theta = f64::from(i).to_radians();
+            let wanted = AlphaBeta::new(1000.0 * theta.cos(), 1000.0 * theta.sin());
+            let got = limit_to_hexagon(Phases::from_stator(wanted), 300.0);
+            let from_corner = f64::from(i % 60).to_radians();
+            let edge = 200.0 * 0.75_f64.sqrt() / (std::f64::consts::FRAC_PI_6 - from_corner).cos();
+            assert!((got.magnitude() - edge).abs() < 1e-9, "{i} deg: {} V, not {edge} V", got.magnitude());
+            assert!(got.cross(wanted).abs() < 1e-6, "the direction stays");
+        }
+    }
+
+    #[test]
+    fn a_leg_loses_the_dead_time() {
+        let u_dead = 10.8;
+        // Currents (+, -, -): legs lose (u, -u, -u), a vector of 4/3 u along phase a.
+        let loss = dead_time_loss(u_dead, 0.1, Phases { a: 2.0, b: -1.0, c: -1.0 });
+        assert!((loss.alpha() - 4.0 / 3.0 * u_dead).abs() < 1e-12 && loss.beta().abs() < 1e-12);
+        let loss = dead_time_loss(u_dead, 0.1, Phases { a: 0.02, b: -0.01, c: -0.01 });
+        assert!((loss.alpha() - 0.2 * u_dead).abs() < 1e-12, "inside the zone it is a resistance");
+    }
+
+    #[test]
+    fn inside_nothing_changes_and_the_common_part_is_free() {
+        let u = Phases { a: 500.0, b: 400.0, c: 300.0 };
+        assert_eq!(limit_to_hexagon(u, 200.0), u.to_stator());
+    }
+}

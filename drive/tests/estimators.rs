@@ -1,0 +1,67 @@
+//! One row in the list makes an estimator: name, class, start, update, retuning and placing all derive from it.
+
+use drive::control::current::CurrentLoop;
+use drive::control::start::{CURRENT_FREQUENCY, INJECTION};
+use drive::estimator::{Class, Context, ESTIMATORS, Estimator, EstimatorParameters, Injection, Kind, Sample};
+use drive::frame::AlphaBeta;
+use drive::motor::Motor;
+use drive::{SensorlessController, math::wrap};
+use fmu_core::Model;
+
+/// The 2.2 kW machine: its saliency suits every method.
+fn salient() -> Motor {
+    Motor { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 }
+}
+
+#[test]
+fn the_row_is_an_item_of_the_enumeration() {
+    assert_eq!(ESTIMATORS.items.len(), Kind::ALL.len());
+    for (place, (&kind, item)) in Kind::ALL.iter().zip(ESTIMATORS.items).enumerate() {
+        assert_eq!(usize::try_from(item.value), Ok(place + 1), "{}: the values are the places in the list", item.name);
+        assert_eq!((Kind::of(item.value), item.name), (Some(kind), kind.name()));
+        assert!(!item.description.is_empty(), "{}", item.name);
+    }
+    let past_the_end = ESTIMATORS.items.iter().map(|item| item.value + 1).max().unwrap();
+    assert_eq!((Kind::of(0), Kind::of(past_the_end)), (None, None));
+}
+
+#[test]
+fn the_row_dispatches_every_call() {
+    let (par, motor) = (EstimatorParameters::default(), salient());
+    let current = CurrentLoop { reference_feed_forward: true, ..CurrentLoop::default() };
+    let context = Context { par: &par, motor: &motor, current: &current, J: 15e-3, T_s: 1e-4, delay: 1.0 };
+    let at = |k, theta_meas| Sample { k, i: AlphaBeta::ZERO, theta_meas, ..Sample::default() };
+    for &kind in Kind::ALL {
+        let name = kind.name();
+        kind.validate(&context).unwrap_or_else(|fault| panic!("{name}: {fault}"));
+        let (mut estimator, estimate) = Estimator::start(kind, &context, &at(0, 0.3), 0.3, 0.0);
+        assert!(format!("{estimator:?}").starts_with(name), "{name}: {estimator:?}");
+        assert!((estimate.theta - 0.3).abs() < 1e-12, "{name} starts where it is told: {}", estimate.theta);
+        let injects = estimate.injection != Injection::None;
+        assert_eq!(injects, kind.class().injects(), "{name} injects at standstill: {injects}");
+        let before = estimator.clone();
+        estimator.retune(&context, &context);
+        assert_eq!(estimator, before, "{name}: the same parameters change nothing");
+        estimator.place(&context, &at(1, 2.0), 2.0, 0.0);
+        let estimate = estimator.update(&context, &at(2, 2.0));
+        assert!(wrap(estimate.theta - 2.0).abs() < 0.01, "{name} goes on where it is placed: {}", estimate.theta);
+    }
+}
+
+#[test]
+fn the_class_decides_how_a_drive_starts() {
+    for &kind in Kind::ALL {
+        let mut controller = SensorlessController::default();
+        let par = &mut controller.parameters;
+        (par.estimator, par.motor, par.s_2) = (kind as i32, salient(), 40.0);
+        (par.limit.i, par.limit.i_q) = (15.0, 15.0);
+        par.current.reference_feed_forward = true;
+        for (mode, allowed) in [(1, true), (CURRENT_FREQUENCY, true), (INJECTION, kind.class().injects())] {
+            controller.parameters.start.mode = mode;
+            let judged = controller.validate();
+            assert_eq!(judged.is_ok(), allowed, "{}, start.mode = {mode}: {judged:?}", kind.name());
+        }
+        let loses_standstill = !kind.holds_standstill();
+        assert!(!loses_standstill || kind.class() == Class::BackEmf, "{}: only the EMF vanishes", kind.name());
+    }
+}
