@@ -122,14 +122,14 @@ fn the_limits_of_the_estimators_are_those_of_the_grid() {
     assert!(page.contains(&format!("under 0.8 of the load: error {both_ways}")), "{both_ways}");
 }
 
-/// The README shows what the command prints.
+/// The results page shows what the command prints.
 #[test]
-fn the_readme_shows_what_is_printed() {
+fn the_results_page_shows_what_is_printed() {
     let estimators = ["Rasmussen", "ExtendedEmf", "VoltageModel", "SquareWaveInjection", "Sensored"];
     let text = table::text(&of(grid(), &estimators, &["load-0", "load-0.1", "load-0.5", "load-1"]));
     let (printed, _) = text.split_once("\n  load-0: ").unwrap();
-    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
-    assert!(readme.contains(printed), "README.md shows another table than\n{printed}");
+    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results.md")).unwrap();
+    assert!(page.contains(printed), "docs/results.md shows another table than\n{printed}");
 }
 
 #[test]

@@ -85,7 +85,7 @@ fn fmi_sim() {
         let native = importers::drive_speed(&experiment, 0.0);
         let speed = run_fmi_sim(&program, &fmi3_without_units, &experiment).unwrap();
         assert_same(&speed, &native, "FMI 3.0", &experiment);
-        // When this fails the copy above has become needless: run the archive as it is, and correct README.
+        // If this fails, the copy above is no longer needed: run the archive as it is, and correct docs/import.md.
         let refused = run_fmi_sim(&program, &fmi3, &experiment).expect_err("units of FMI 3.0 are read now");
         assert!(refused.contains("unknown field"), "{refused}");
     }
