@@ -80,6 +80,12 @@ impl SensorlessController {
     }
 }
 
+/// The fault of a current that exceeds the limit.
+fn above_limit(par: &ControllerParameters, get: impl FnOnce(&mut ControllerParameters) -> &mut f64) -> Fault {
+    let limit = PARAMETERS.tell(par, |p| &mut p.limit.i);
+    PARAMETERS.fault(par, get, format!("at most {limit}"))
+}
+
 impl Model for SensorlessController {
     type Outputs = ControllerOutputs;
 
@@ -122,30 +128,28 @@ impl Model for SensorlessController {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        let ControllerParameters { limit, zero_speed, estimator, start, polarity, motor, T_s, s_2, .. } =
-            &self.parameters;
+        let par = &self.parameters;
+        let ControllerParameters { limit, zero_speed, estimator, start, polarity, motor, T_s, s_2, .. } = par;
         let Some(kind) = Kind::of(*estimator) else {
-            return Err(Fault::value("estimator", estimator, "one of the enumeration's values"));
+            return Err(PARAMETERS.fault(par, |p| &mut p.estimator, "one of the enumeration's values"));
         };
         if start.mode == CURRENT_FREQUENCY && start.i > limit.i {
-            let allowed = format!("at most limit.i = {} A", limit.i);
-            return Err(Fault::value("start.i", format!("{} A", start.i), allowed));
+            return Err(above_limit(par, |p| &mut p.start.i));
         }
         if start.mode == INJECTION {
             if !kind.class().injects() {
                 return Err(Fault::new(format!(
-                    "start.mode = {INJECTION} (Injection) and estimator = {estimator} ({}): the start by injection needs an \
-                     estimator that injects",
+                    "{} (Injection) and {} ({}): the start by injection needs an estimator that injects",
+                    PARAMETERS.tell(par, |p| &mut p.start.mode),
+                    PARAMETERS.tell(par, |p| &mut p.estimator),
                     kind.name()
                 )));
             }
             polarity.validate(motor, *T_s, *s_2, limit.i)?;
         }
-        let par = &self.parameters;
         kind.validate(&context(par, &par.estimators, &par.motor))?;
         if zero_speed.i_0 > limit.i {
-            let allowed = format!("at most limit.i = {} A", limit.i);
-            return Err(Fault::value("zero_speed.i_0", format!("{} A", zero_speed.i_0), allowed));
+            return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
         }
         Ok(())
     }

@@ -138,10 +138,10 @@ pub fn validate(context: &Context) -> Result<(), Fault> {
     if samples(context).is_some() {
         return Ok(());
     }
-    let w = context.par.carrier.frequency;
+    let (w, frequency) = (context.par.carrier.frequency, context.tell(|p| &mut p.carrier.frequency));
     let exact = TAU / (w * context.T_s);
     Err(Fault::new(format!(
-        "carrier.frequency = {w} rad/s and T_s = {} s: a period of the carrier is {exact} samples; it must be a whole \
+        "{frequency} and T_s = {} s: a period of the carrier is {exact} samples; it must be a whole \
          number from {MIN_SAMPLES} to {MAX_SAMPLES}",
         context.T_s
     )))

@@ -109,8 +109,9 @@ impl AxisObserver {
 pub fn validate(context: &Context) -> Result<(), Fault> {
     let (rho, w_o) = (context.par.tracker.bandwidth, context.par.emf.bandwidth);
     if rho > w_o / 3.0 * (1.0 + 1e-9) {
-        let allowed = format!("at most a third of emf.bandwidth = {w_o} rad/s, or the tracker rings on the EMF's lag");
-        return Err(Fault::value("tracker.bandwidth", format!("{rho} rad/s"), allowed));
+        let observer = context.tell(|p| &mut p.emf.bandwidth);
+        let allowed = format!("at most a third of {observer}, or the tracker rings on the EMF's lag");
+        return Err(context.fault(|p| &mut p.tracker.bandwidth, allowed));
     }
     Ok(())
 }

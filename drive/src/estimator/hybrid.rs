@@ -92,8 +92,8 @@ impl Estimating for Hybrid {
     fn validate(context: &Context) -> Result<(), Fault> {
         let HybridParameters { w_low, w_high, .. } = context.par.hybrid;
         if w_low >= w_high {
-            let allowed = format!("above hybrid.w_low = {w_low} rad/s");
-            return Err(Fault::value("hybrid.w_high", format!("{w_high} rad/s"), allowed));
+            let allowed = format!("above {}", context.tell(|p| &mut p.hybrid.w_low));
+            return Err(context.fault(|p| &mut p.hybrid.w_high, allowed));
         }
         SquareWaveInjection::validate(context)
     }

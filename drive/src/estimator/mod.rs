@@ -38,6 +38,8 @@ use crate::frame::{AlphaBeta, DqHat};
 use crate::motor::Motor;
 use fmu_core::{Enumeration, Fault, Item};
 use serde::{Deserialize, Serialize};
+use std::fmt::Display;
+use tables::ESTIMATOR_PARAMETERS;
 pub use tables::EstimatorParameters;
 
 /// What a controller knows at sample k.
@@ -85,6 +87,18 @@ pub struct Context<'a> {
     /// Samples from taking the currents to the voltage acting: the command of sample k acts in
     /// [k + delay, k + delay + 1).
     pub delay: f64,
+}
+
+impl Context<'_> {
+    /// Name, value and unit of one of the estimators' parameters, for messages.
+    pub fn tell<T>(&self, get: impl FnOnce(&mut EstimatorParameters) -> &mut T) -> String {
+        ESTIMATOR_PARAMETERS.tell(self.par, get)
+    }
+
+    /// The fault that one of the estimators' parameters is not what is `allowed`.
+    pub fn fault<T>(&self, get: impl FnOnce(&mut EstimatorParameters) -> &mut T, allowed: impl Display) -> Fault {
+        ESTIMATOR_PARAMETERS.fault(self.par, get, allowed)
+    }
 }
 
 /// A voltage to be added to the command of this sample, in V.

@@ -120,7 +120,7 @@ impl Estimating for SquareWaveInjection {
     fn validate(context: &Context) -> Result<(), Fault> {
         let samples = context.par.square_wave.samples;
         if samples != 2 && samples != 4 {
-            return Err(Fault::value("square_wave.samples", samples, "2 or 4"));
+            return Err(context.fault(|p| &mut p.square_wave.samples, "2 or 4"));
         }
         validate_saliency(context.motor)
     }

@@ -94,9 +94,9 @@ impl Tracker {
 pub fn validate(context: &Context) -> Result<(), Fault> {
     if context.par.tracker.kind == MECHANICAL_OBSERVER && context.J.partial_cmp(&0.0) != Some(Ordering::Greater) {
         return Err(Fault::new(format!(
-            "mechanics.J = {} kg.m2 and tracker.kind = {MECHANICAL_OBSERVER} (MechanicalObserver): that observer divides \
-             torque by inertia, which must be above 0",
-            context.J
+            "mechanics.J = {} kg.m2 and {} (MechanicalObserver): that observer divides torque by inertia, which must be above 0",
+            context.J,
+            context.tell(|p| &mut p.tracker.kind)
         )));
     }
     Ok(())
