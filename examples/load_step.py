@@ -1,4 +1,4 @@
-"""Load step of 2 N.m at standstill (Rasmussen 2006, Fig. 5a/c/e): plant and controller FMU, stepped by fmpy.
+"""Load step of 2 N.m at standstill (Rasmussen 2006, Fig. 5a/c/e): plant and controller FMU, stepped with FMPy.
 
     cargo run --release -- build
     pip install fmpy matplotlib
@@ -11,11 +11,11 @@ from math import degrees, pi, remainder
 import matplotlib.pyplot as plt
 from fmpy import extract, instantiate_fmu, read_model_description
 
-T_S, STOP = 1e-4, 3.0  # s: the controller's sample period, and the end
+T_S, STOP = 1e-4, 3.0  # s: the controller's sample period, the end of the run
 
 
 def start(folder, name):
-    """An initialised instance, its getter and its setter by variable name."""
+    """Return an initialized instance, its getter and its setter by variable name."""
     archive = f"{folder}/{name}.fmu"
     description = read_model_description(archive)
     reference = {v.name: v.valueReference for v in description.modelVariables}

@@ -1,12 +1,12 @@
-"""Load step of 2 N.m at standstill in OMSimulator (not in the tests: its package downloads the program while it is installed).
+"""Load step of 2 N.m at standstill in OMSimulator (not in the tests: installing its package downloads the program).
 
     cargo run --release -- build --fmi 2
     pip install OMSimulator
     python examples/omsimulator.py target/fmu/fmi2
 
-With OMSimulator 3's `SSP` class; before it: `OMSimulator()`, `newModel`, `addSystem(..., system_wc)`, `addSubModel`,
-`addConnection`, `setFixedStepSize`, `setReal`, `simulate`, of the same meaning. Its fixed-step master `oms_ma` steps all
-FMUs and then carries all outputs over, so `timing.delay` stays 1.
+This script uses the `SSP` class of OMSimulator 3. Older versions have `OMSimulator()`, `newModel`,
+`addSystem(..., system_wc)`, `addSubModel`, `addConnection`, `setFixedStepSize`, `setReal` and `simulate` for the same
+steps. The fixed-step master `oms_ma` steps all FMUs and then exchanges all values, so `timing.delay` stays 1.
 """
 
 import sys
@@ -37,6 +37,6 @@ run.stepUntil(0.5)
 run.setValue(CRef("default", "plant", "tau_load"), 2.0)
 run.stepUntil(3.0)
 speed, i_d = (run.getValue(CRef("default", *name)) for name in (("plant", "speed"), ("controller", "i_d")))
-print(f"at the end {speed * 9.5493:.2f} rpm, i_sd {i_d:.3f} A; right are 0.00 rpm and 5.000 A")
+print(f"at the end {speed * 9.5493:.2f} rpm, i_sd {i_d:.3f} A; expected: 0.00 rpm and 5.000 A")
 run.terminate()
 run.delete()

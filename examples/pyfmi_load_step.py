@@ -4,7 +4,8 @@
     conda install -c conda-forge pyfmi
     python examples/pyfmi_load_step.py target/fmu/fmi2
 
-PyFMI imports co-simulation FMUs of FMI 2.0 only. Its master steps both and then exchanges, so `timing.delay` stays 1.
+PyFMI imports co-simulation FMUs of FMI 2.0 only. Its master steps both FMUs and then exchanges all values, so
+`timing.delay` stays 1.
 """
 
 import sys
@@ -26,7 +27,7 @@ options["step_size"] = 1e-4  # s: the controller's sample period; the default of
 
 
 def load(time):
-    """Load torque in N.m."""
+    """Return the load torque in N.m."""
     return 2.0 if time >= 0.5 - 1e-9 else 0.0
 
 
@@ -34,4 +35,4 @@ results = master.simulate(final_time=3.0, input=([(plant, "tau_load")], load), o
 motor, control = results[plant], results[controller]
 error = degrees(remainder(control["theta_est"][-1] - motor["theta_e"][-1], 2 * pi))
 print(f"at the end {motor['speed'][-1] * 30 / pi:.2f} rpm, i_sd {control['i_d'][-1]:.3f} A, angle error {error:.2f} deg")
-print("right are 0.00 rpm, 5.000 A, 36.34 deg")
+print("expected: 0.00 rpm, 5.000 A, 36.34 deg")
