@@ -9,7 +9,7 @@
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;
-use drive::estimator::Kind;
+use drive::estimator::{Class, Kind};
 use drive::math::wrap;
 use drive_study::runner;
 use fmu_core::Step;
@@ -169,7 +169,7 @@ fn every_estimator_knows_two_samples() {
         for speed in if kind.class().injects() { [0.0, 0.05] } else { [0.3, 0.8] } {
             let (one, two) = (loaded(kind, speed, false, 1), loaded(kind, speed, true, 2));
             assert!(one.abs().max(two.abs()) < 0.3, "{kind:?} at {speed}: {one} deg with one sample, {two} with two");
-            if !kind.class().injects() && kind != Kind::Sensored {
+            if !kind.class().injects() && kind.class() != Class::Sensored {
                 let wrong = loaded(kind, speed, true, 1);
                 let turn = (3.0 * speed * runner::RATED_SPEED * T_S).to_degrees();
                 assert!((wrong / turn + 1.0).abs() < 0.15, "{kind:?} at {speed}: {wrong} deg, not {}", -turn);
