@@ -28,7 +28,7 @@ enum Command {
     Tune(tune::Tune),
     Ssp(ssp::Ssp),
     #[command(hide = true)]
-    Probe(probe::Probe),
+    Probe(probe::ProbeArguments),
 }
 
 fn main() -> ExitCode {

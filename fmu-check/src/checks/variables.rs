@@ -1,8 +1,10 @@
 //! Variables, types and units (FMI 2.0.5, 2.2.2, 2.2.3, 2.2.7; FMI 3.0.2, 2.4.3, 2.4.4, 2.4.7).
 
 use super::clocked::alias_units;
+use super::units;
 use super::xml::with_description;
-use super::{Check, Level, Levels, Run, Subject, Verdict, units};
+use crate::check::{Check, Level, Levels, Run, Verdict};
+use crate::fmu_file::FmuFile;
 use model_description::{
     BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, ModelVariable, Variability, parse_number,
 };
@@ -12,38 +14,38 @@ const TABLE: &str = "2.0.5, 2.2.7; 3.0.2, 2.4.7.4 and 2.4.7.5";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "V01a", requirement: "Names of variables, aliases included, are unique, not empty, and without line breaks and tabs.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(names) },
-    Check { id: "V01b", requirement: "With the naming convention structured every name keeps to its grammar.", clause: "2.0.5, 2.2.9; 3.0.2, 2.4.7.5.1", levels: Levels::MUST, run: Run::File(structured) },
+    Check { id: "V01a", requirement: "Names of variables and aliases are unique, not empty, and free of line breaks and tabs.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(names) },
+    Check { id: "V01b", requirement: "With the naming convention \"structured\", every name follows the grammar.", clause: "2.0.5, 2.2.9; 3.0.2, 2.4.7.5.1", levels: Levels::MUST, run: Run::File(structured) },
     Check { id: "V02a", requirement: "Value references are unique.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(references) },
-    Check { id: "V02b", requirement: "Variables with one value reference are true aliases: one can be set at most, constants only with equal constants, one start value, one unit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(aliases) },
-    Check { id: "V03", requirement: "The independent variable is a continuous number without start and initial; FMI 3.0 has exactly one, FMI 2.0 at most one.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::File(independent) },
+    Check { id: "V02b", requirement: "Variables that share a value reference are true aliases: at most one can be set, constants alias only equal constants, and there is one start value and one unit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(aliases) },
+    Check { id: "V03", requirement: "The independent variable is a continuous number without start and initial; FMI 3.0 requires exactly one, FMI 2.0 allows at most one.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::File(independent) },
     Check { id: "V04a", requirement: "Causality and variability are a legal pair.", clause: TABLE, levels: Levels::MUST, run: Run::File(pairs) },
-    Check { id: "V04b", requirement: "initial is one of those that causality and variability allow.", clause: TABLE, levels: Levels::MUST, run: Run::File(initials) },
-    Check { id: "V04c", requirement: "A start value is there where it is required, and not where it is forbidden.", clause: TABLE, levels: Levels::MUST, run: Run::File(starts) },
+    Check { id: "V04b", requirement: "The attribute initial has a value that causality and variability allow.", clause: TABLE, levels: Levels::MUST, run: Run::File(initials) },
+    Check { id: "V04c", requirement: "A start value is present where it is required and absent where it is forbidden.", clause: TABLE, levels: Levels::MUST, run: Run::File(starts) },
     Check { id: "V05", requirement: "Only floating-point variables are continuous.", clause: TABLE, levels: Levels::MUST, run: Run::File(continuous) },
     Check { id: "V06a", requirement: "min <= start <= max, and nominal is not 0.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(ranges) },
-    Check { id: "V08a", requirement: "declaredType names a type definition of the same base type, and an enumeration has one.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(types) },
-    Check { id: "V08b", requirement: "Type definitions have unique names, and enumerations items of unique names and values.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(definitions) },
-    Check { id: "V09a", requirement: "A unit is one of UnitDefinitions, and a display unit one of its display units.", clause: "2.0.5, 2.2.2 and 2.2.7; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unit_names) },
-    Check { id: "V09b", requirement: "Units, and the display units of each, have unique names.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unique_units) },
-    Check { id: "V09c", requirement: "The base units of a common unit have the exponents and the factor that its name means.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(bases) },
-    Check { id: "V09d", requirement: "A common display unit has the factor that its name means (display = factor * value + offset).", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(displays) },
-    Check { id: "V10", requirement: "Only aliases of floating-point variables have a display unit, one of the variable's unit.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(alias_units) },
-    Check { id: "V11", requirement: "Only continuous variables have intermediateUpdate, and only inputs canHandleMultipleSetPerTimeInstant.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(flags) },
-    Check { id: "V13", requirement: "A dimension is a positive number or refers to a structural parameter or constant of type UInt64, and start values are one or as many as elements.", clause: "3.0.2, 2.4.7.2 and 2.4.7.5", levels: Levels(None, Some(Level::Must)), run: Run::File(arrays) },
-    Check { id: "V14", requirement: "Start values are of the variable's type, within its range.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(forms) },
+    Check { id: "V08a", requirement: "declaredType names a type definition of the same base type; every enumeration has one.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(types) },
+    Check { id: "V08b", requirement: "Type definitions have unique names; enumeration items have unique names and values.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(definitions) },
+    Check { id: "V09a", requirement: "Every unit is defined in UnitDefinitions, and every display unit belongs to its unit.", clause: "2.0.5, 2.2.2 and 2.2.7; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unit_names) },
+    Check { id: "V09b", requirement: "Unit names are unique, and display unit names are unique within their unit.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unique_units) },
+    Check { id: "V09c", requirement: "The base unit of a common unit has the exponents and factor that the name implies.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(bases) },
+    Check { id: "V09d", requirement: "A common display unit has the factor that its name implies (display = factor * value + offset).", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(displays) },
+    Check { id: "V10", requirement: "Only aliases of floating-point variables have a display unit, and it belongs to the unit of the variable.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(alias_units) },
+    Check { id: "V11", requirement: "Only continuous variables use intermediateUpdate, and only inputs use canHandleMultipleSetPerTimeInstant.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(flags) },
+    Check { id: "V13", requirement: "A dimension is a positive number or refers to a structural parameter or constant of type UInt64, and an array has one start value or as many as elements.", clause: "3.0.2, 2.4.7.2 and 2.4.7.5", levels: Levels(None, Some(Level::Must)), run: Run::File(arrays) },
+    Check { id: "V14", requirement: "Start values have the type of the variable and lie within the range of that type.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(start_value_types) },
 ];
 
 /// A finding for each variable that the rule refuses.
-fn each(subject: &Subject, rule: impl Fn(&ModelDescription, &ModelVariable) -> Option<String>) -> Verdict {
-    with_description(subject, |d| {
+fn each(fmu: &FmuFile, rule: impl Fn(&ModelDescription, &ModelVariable) -> Option<String>) -> Verdict {
+    with_description(fmu, |d| {
         let say = |v| rule(d, v).map(|why| format!("line {}: variable {}: {why}", v.line, v.name));
         d.variables.iter().filter_map(say).collect()
     })
 }
 
-fn names(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn names(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let mut seen: HashMap<&str, usize> = HashMap::new();
         let mut findings = Vec::new();
         for v in &d.variables {
@@ -52,7 +54,7 @@ fn names(subject: &Subject) -> Verdict {
                     findings.push(format!("line {}: the name {name:?} is empty or has control characters", v.line));
                 }
                 if let Some(first) = seen.insert(name, v.line) {
-                    findings.push(format!("line {}: the name {name:?} is already that of line {first}", v.line));
+                    findings.push(format!("line {}: the name {name:?} is already used in line {first}", v.line));
                 }
             }
         }
@@ -60,11 +62,11 @@ fn names(subject: &Subject) -> Verdict {
     })
 }
 
-fn structured(subject: &Subject) -> Verdict {
-    if subject.description.as_ref().is_ok_and(|d| !d.structured_names) {
+fn structured(fmu: &FmuFile) -> Verdict {
+    if fmu.description.as_ref().is_ok_and(|d| !d.structured_names) {
         return Verdict::NotApplicable("the naming convention is flat".into());
     }
-    each(subject, |_, v| {
+    each(fmu, |_, v| {
         let mut all = std::iter::once(&v.name).chain(v.aliases.iter().map(|a| &a.name));
         all.find_map(|n| grammar(n).err().map(|why| format!("{n:?}: {why}")))
     })
@@ -87,7 +89,7 @@ fn grammar(name: &str) -> Result<(), String> {
         match rest.strip_prefix('.') {
             Some(next) => rest = next,
             None if rest.is_empty() => return Ok(()),
-            None => return Err(format!("{rest:?} is not expected")),
+            None => return Err(format!("{rest:?} is unexpected")),
         }
     }
 }
@@ -105,7 +107,7 @@ fn part(text: &str) -> Result<&str, String> {
         let letter = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let end = text.find(|c| !letter(c)).unwrap_or(text.len());
         if end == 0 || text.starts_with(|c: char| c.is_ascii_digit()) {
-            return Err("a part does not begin with a letter or an underscore".into());
+            return Err("a part does not start with a letter or an underscore".into());
         }
         &text[end..]
     };
@@ -113,30 +115,32 @@ fn part(text: &str) -> Result<&str, String> {
         let (inside, after) = indices.split_once(']').ok_or("a bracket is not closed")?;
         let number = |i: &str| !i.trim().is_empty() && i.trim().bytes().all(|b| b.is_ascii_digit());
         if !inside.split(',').all(number) {
-            return Err(format!("[{inside}] is no list of indices"));
+            return Err(format!("[{inside}] is not a list of indices"));
         }
         rest = after;
     }
     Ok(rest)
 }
 
-fn references(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn references(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let mut seen: HashMap<u32, &ModelVariable> = HashMap::new();
         let mut findings = Vec::new();
         for v in &d.variables {
             if let Some(first) = seen.insert(v.value_reference, v) {
                 let (reference, name) = (v.value_reference, &first.name);
-                findings
-                    .push(format!("line {}: variable {}: has value reference {reference} of {name}", v.line, v.name));
+                findings.push(format!(
+                    "line {}: variable {}: has the value reference {reference} of {name}",
+                    v.line, v.name
+                ));
             }
         }
         findings
     })
 }
 
-fn aliases(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn aliases(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let mut sets: HashMap<(BaseType, u32), Vec<&ModelVariable>> = HashMap::new();
         for v in &d.variables {
             // Enumerations are got and set as integers.
@@ -159,7 +163,7 @@ fn aliases(subject: &Subject) -> Verdict {
                 wrong("more than one of them has a start value");
             }
             if constants > 0 && set.iter().any(|v| v.start != set[0].start) {
-                wrong("they are constants of different values");
+                wrong("they are constants with different values");
             }
             if set.iter().any(|v| v.unit != set[0].unit) {
                 wrong("they have different units");
@@ -170,8 +174,8 @@ fn aliases(subject: &Subject) -> Verdict {
     })
 }
 
-fn independent(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn independent(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let all: Vec<_> = d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
         let mut findings = Vec::new();
         if all.len() > 1 || (all.is_empty() && d.version == FmiVersion::V3) {
@@ -191,27 +195,27 @@ fn independent(subject: &Subject) -> Verdict {
 
 /// Whether the file leaves the variability to the default. FMI 2.0's is continuous whatever the type; for what is no
 /// Real that would never be legal, and everybody reads it as discrete.
-fn by_default(subject: &Subject, v: &ModelVariable) -> bool {
-    let element = subject
+fn by_default(fmu: &FmuFile, v: &ModelVariable) -> bool {
+    let element = fmu
         .root()
         .and_then(|r| r.child("ModelVariables"))
         .and_then(|list| list.children.iter().find(|e| e.line == v.line && e.get("name") == Some(&v.name)));
     element.is_some_and(|e| e.get("variability").is_none())
 }
 
-fn variability(subject: &Subject, v: &ModelVariable) -> Variability {
-    if subject.version == FmiVersion::V2 && !v.base.is_float() && by_default(subject, v) {
+fn variability(fmu: &FmuFile, v: &ModelVariable) -> Variability {
+    if fmu.version == FmiVersion::V2 && !v.base.is_float() && by_default(fmu, v) {
         Variability::Discrete
     } else {
         v.variability
     }
 }
 
-fn pairs(subject: &Subject) -> Verdict {
+fn pairs(fmu: &FmuFile) -> Verdict {
     use Causality as C;
     use Variability as V;
-    each(subject, |_, v| {
-        let variability = variability(subject, v);
+    each(fmu, |_, v| {
+        let variability = variability(fmu, v);
         let legal = match v.causality {
             C::StructuralParameter | C::Parameter | C::CalculatedParameter => {
                 matches!(variability, V::Fixed | V::Tunable)
@@ -241,10 +245,10 @@ fn allowed(version: FmiVersion, causality: Causality, variability: Variability) 
     }
 }
 
-fn initials(subject: &Subject) -> Verdict {
-    each(subject, |d, v| {
+fn initials(fmu: &FmuFile) -> Verdict {
+    each(fmu, |d, v| {
         let initial = v.initial?;
-        match allowed(d.version, v.causality, variability(subject, v)) {
+        match allowed(d.version, v.causality, variability(fmu, v)) {
             None => Some(format!("initial={initial} with causality {}", v.causality)),
             Some(set) if set.contains(&initial) => None,
             Some(_) => {
@@ -254,8 +258,8 @@ fn initials(subject: &Subject) -> Verdict {
     })
 }
 
-fn starts(subject: &Subject) -> Verdict {
-    each(subject, |d, v| {
+fn starts(fmu: &FmuFile) -> Verdict {
+    each(fmu, |d, v| {
         if v.base == BaseType::Clock || v.causality == Causality::Independent {
             return None;
         }
@@ -275,15 +279,15 @@ fn starts(subject: &Subject) -> Verdict {
     })
 }
 
-fn continuous(subject: &Subject) -> Verdict {
-    each(subject, |_, v| {
-        let bad = variability(subject, v) == Variability::Continuous && !v.base.is_float();
+fn continuous(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, v| {
+        let bad = variability(fmu, v) == Variability::Continuous && !v.base.is_float();
         bad.then(|| format!("is a continuous {}", v.base))
     })
 }
 
-fn ranges(subject: &Subject) -> Verdict {
-    each(subject, |_, v| {
+fn ranges(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, v| {
         if v.min.zip(v.max).is_some_and(|(min, max)| min > max) {
             return Some(format!("min = {} is greater than max = {}", v.min?, v.max?));
         }
@@ -295,23 +299,23 @@ fn ranges(subject: &Subject) -> Verdict {
         }
         let numbers = v.start.as_deref()?.split_whitespace().filter_map(parse_number);
         let outside = |x: &f64| v.min.is_some_and(|min| *x < min) || v.max.is_some_and(|max| *x > max);
-        numbers.into_iter().find(outside).map(|x| format!("start = {x} is outside of min and max"))
+        numbers.into_iter().find(outside).map(|x| format!("start = {x} is outside min and max"))
     })
 }
 
-fn types(subject: &Subject) -> Verdict {
-    each(subject, |d, v| match &v.declared_type {
+fn types(fmu: &FmuFile) -> Verdict {
+    each(fmu, |d, v| match &v.declared_type {
         None => (v.base == BaseType::Enumeration).then(|| "is an enumeration without declaredType".into()),
         Some(name) => match d.type_definition(name) {
             None => Some(format!("there is no type {name:?}")),
-            Some(t) if t.base != v.base => Some(format!("is a {}, and its type {name:?} a {}", v.base, t.base)),
+            Some(t) if t.base != v.base => Some(format!("is a {} but its type {name:?} is a {}", v.base, t.base)),
             Some(_) => None,
         },
     })
 }
 
-fn definitions(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn definitions(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let mut findings = Vec::new();
         for (i, t) in d.types.iter().enumerate() {
             if d.types[..i].iter().any(|other| other.name == t.name) {
@@ -323,7 +327,7 @@ fn definitions(subject: &Subject) -> Verdict {
             for (j, item) in t.items.iter().enumerate() {
                 if t.items[..j].iter().any(|other| other.name == item.name || other.value == item.value) {
                     findings.push(format!(
-                        "line {}: type {:?}: {} = {} is there twice",
+                        "line {}: type {:?}: {} = {} occurs twice",
                         t.line, t.name, item.name, item.value
                     ));
                 }
@@ -333,7 +337,7 @@ fn definitions(subject: &Subject) -> Verdict {
     })
 }
 
-fn unit_names(subject: &Subject) -> Verdict {
+fn unit_names(fmu: &FmuFile) -> Verdict {
     let wrong = |d: &ModelDescription, unit: Option<&str>, display: Option<&str>| match (unit, display) {
         (None, Some(display)) => Some(format!("the display unit {display:?} comes without a unit")),
         (Some(unit), display) => match (d.unit(unit), display) {
@@ -345,7 +349,7 @@ fn unit_names(subject: &Subject) -> Verdict {
         },
         _ => None,
     };
-    with_description(subject, |d| {
+    with_description(fmu, |d| {
         let of_types = d.types.iter().filter_map(|t| {
             let why = wrong(d, t.unit.as_deref(), t.display_unit.as_deref())?;
             Some(format!("line {}: type {}: {why}", t.line, t.name))
@@ -358,16 +362,16 @@ fn unit_names(subject: &Subject) -> Verdict {
     })
 }
 
-fn unique_units(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn unique_units(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let mut findings = Vec::new();
         for (i, unit) in d.units.iter().enumerate() {
             if d.units[..i].iter().any(|u| u.name == unit.name) {
-                findings.push(format!("line {}: the unit {:?} is there twice", unit.line, unit.name));
+                findings.push(format!("line {}: the unit {:?} occurs twice", unit.line, unit.name));
             }
             for (j, display) in unit.display_units.iter().enumerate() {
                 if unit.display_units[..j].iter().any(|u| u.name == display.name) {
-                    findings.push(format!("line {}: the display unit {:?} is there twice", unit.line, display.name));
+                    findings.push(format!("line {}: the display unit {:?} occurs twice", unit.line, display.name));
                 }
             }
         }
@@ -375,19 +379,19 @@ fn unique_units(subject: &Subject) -> Verdict {
     })
 }
 
-fn bases(subject: &Subject) -> Verdict {
-    with_description(subject, units::wrong_bases)
+fn bases(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, units::wrong_bases)
 }
 
-fn displays(subject: &Subject) -> Verdict {
-    with_description(subject, units::wrong_displays)
+fn displays(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, units::wrong_displays)
 }
 
-fn flags(subject: &Subject) -> Verdict {
-    let Some(list) = subject.root().and_then(|r| r.child("ModelVariables")) else {
+fn flags(fmu: &FmuFile) -> Verdict {
+    let Some(list) = fmu.root().and_then(|r| r.child("ModelVariables")) else {
         return Verdict::NotDetermined("the XML cannot be read".into());
     };
-    with_description(subject, |d| {
+    with_description(fmu, |d| {
         let mut findings = Vec::new();
         for element in &list.children {
             let on = |a: &str| element.get(a).is_some_and(|v| matches!(v.trim(), "true" | "1"));
@@ -397,12 +401,14 @@ fn flags(subject: &Subject) -> Verdict {
                 continue;
             };
             if on("intermediateUpdate") && (v.variability != Variability::Continuous || v.base == BaseType::Clock) {
-                findings
-                    .push(format!("line {}: variable {}: intermediateUpdate, but {}", v.line, v.name, v.variability));
+                findings.push(format!(
+                    "line {}: variable {}: has intermediateUpdate but is {}",
+                    v.line, v.name, v.variability
+                ));
             }
             if on("canHandleMultipleSetPerTimeInstant") && v.causality != Causality::Input {
                 findings.push(format!(
-                    "line {}: variable {}: canHandleMultipleSetPerTimeInstant, but no input",
+                    "line {}: variable {}: has canHandleMultipleSetPerTimeInstant but is not an input",
                     v.line, v.name
                 ));
             }
@@ -411,8 +417,8 @@ fn flags(subject: &Subject) -> Verdict {
     })
 }
 
-fn arrays(subject: &Subject) -> Verdict {
-    each(subject, |d, v| {
+fn arrays(fmu: &FmuFile) -> Verdict {
+    each(fmu, |d, v| {
         if v.dimensions.is_empty() {
             let many = v.start.as_deref().is_some_and(|s| s.split_whitespace().count() > 1);
             let text = matches!(v.base, BaseType::String | BaseType::Binary);
@@ -431,7 +437,7 @@ fn arrays(subject: &Subject) -> Verdict {
                         size.causality == Causality::StructuralParameter || size.variability == Variability::Constant;
                     if !fits || size.base != BaseType::UInt64 {
                         return Some(format!(
-                            "its dimension {} is no structural parameter or constant of type UInt64",
+                            "its dimension {} is not a structural parameter or constant of type UInt64",
                             size.name
                         ));
                     }
@@ -446,8 +452,8 @@ fn arrays(subject: &Subject) -> Verdict {
     })
 }
 
-fn forms(subject: &Subject) -> Verdict {
-    each(subject, |_, v| {
+fn start_value_types(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, v| {
         let start = v.start.as_deref()?;
         let (low, high): (i128, i128) = match v.base {
             BaseType::Int8 => (i8::MIN.into(), i8::MAX.into()),
@@ -469,7 +475,10 @@ fn forms(subject: &Subject) -> Verdict {
         if v.base == BaseType::String {
             return None;
         }
-        start.split_whitespace().find(|w| !good(w)).map(|w| format!("start={w:?} is no value of the type {}", v.base))
+        start
+            .split_whitespace()
+            .find(|w| !good(w))
+            .map(|w| format!("start={w:?} is not a value of the type {}", v.base))
     })
 }
 

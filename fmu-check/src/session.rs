@@ -3,9 +3,10 @@
 //! Everything that is found is written down at once, and every call before it is made, so that nothing is lost when the
 //! FMU takes the process down. `Err(Blocked)` ends a probe that cannot find out what it wants.
 
-use super::it::It;
+use crate::encoding::bits;
+use clap::Args;
 use fmu_import::file_uri;
-use fmu_import::raw::{Arguments, Interface, Raw, width};
+use fmu_import::raw::{Arguments, Interface, Raw};
 use model_description::{
     BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, ModelVariable, Variability,
 };
@@ -39,10 +40,33 @@ pub(super) enum Line {
     Done,
 }
 
+/// Runs one probe. Only the checker calls it.
+#[derive(Debug, Args)]
+pub struct ProbeArguments {
+    /// Id of the check.
+    #[arg(long)]
+    pub id: String,
+    /// Folder that the FMU was unpacked to.
+    #[arg(long)]
+    pub dir: PathBuf,
+    /// The binary.
+    #[arg(long)]
+    pub binary: PathBuf,
+    /// File that the findings go to.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Number of the first case.
+    #[arg(long, default_value_t = 0)]
+    pub from: usize,
+    /// Time that it may take, in seconds.
+    #[arg(long, default_value_t = 10.0)]
+    pub seconds: f64,
+}
+
 /// A probe's FMU.
-pub(super) struct Bench {
+pub(super) struct Session {
     pub(super) raw: Raw,
-    pub(super) md: ModelDescription,
+    pub(super) description: ModelDescription,
     /// Path of the binary.
     pub(super) binary: PathBuf,
     /// Folder that the FMU was unpacked to.
@@ -53,29 +77,30 @@ pub(super) struct Bench {
     pub(super) silent: Cell<bool>,
     from: usize,
     next: Cell<usize>,
-    found: Cell<usize>,
-    born: Cell<usize>,
+    violations: Cell<usize>,
+    instances_made: Cell<usize>,
     began: Instant,
-    patience: Duration,
+    timeout: Duration,
 }
 
 /// Most violations that one probe tells.
-const MOST: usize = 25;
+const MAX_VIOLATIONS: usize = 25;
 
-impl Bench {
+impl Session {
     /// Loads the FMU.
-    pub(super) fn open(args: &super::probe::Probe) -> Result<Self, Blocked> {
+    pub(super) fn open(args: &ProbeArguments) -> Result<Self, Blocked> {
         let blocked = |e: &dyn std::fmt::Display| Blocked(e.to_string());
         let xml = std::fs::read(args.dir.join("modelDescription.xml")).map_err(|e| blocked(&e))?;
-        let md = model_description::read(&xml).map_err(|e| blocked(&e))?;
+        let description = model_description::read(&xml).map_err(|e| blocked(&e))?;
         let create = |path: &Path| File::options().create(true).append(true).open(path).map_err(|e| blocked(&e));
         let lines = create(&args.out)?;
         let mut journal = File::create(args.out.with_extension("call")).map_err(|e| blocked(&e))?;
         let _ = journal.write_all(b"P loading the binary");
-        let raw = Raw::open(&args.binary, md.version).map_err(|e| Blocked(format!("the binary does not load: {e}")))?;
+        let raw = Raw::open(&args.binary, description.version)
+            .map_err(|e| Blocked(format!("the binary does not load: {e}")))?;
         Ok(Self {
             raw,
-            md,
+            description,
             binary: args.binary.clone(),
             dir: args.dir.clone(),
             lines: RefCell::new(lines),
@@ -84,30 +109,30 @@ impl Bench {
             silent: Cell::new(false),
             from: args.from,
             next: Cell::new(0),
-            found: Cell::new(0),
-            born: Cell::new(0),
+            violations: Cell::new(0),
+            instances_made: Cell::new(0),
             began: Instant::now(),
-            patience: Duration::from_secs_f64(args.seconds),
+            timeout: Duration::from_secs_f64(args.seconds),
         })
     }
 
     /// The same FMU once more, for another thread.
-    pub(super) fn twin(&self, number: usize) -> Result<Self, Blocked> {
-        let raw = Raw::open(&self.binary, self.md.version).map_err(Blocked)?;
-        self.twin_of(raw, number)
+    pub(super) fn duplicate(&self, number: usize) -> Result<Self, Blocked> {
+        let raw = Raw::open(&self.binary, self.description.version).map_err(Blocked)?;
+        self.duplicate_with(raw, number)
     }
 
     /// The same FMU with another loaded binary; what it finds and calls goes to files that nobody reads.
-    pub(super) fn twin_of(&self, raw: Raw, number: usize) -> Result<Self, Blocked> {
-        self.twin_at(&self.dir, raw, number)
+    pub(super) fn duplicate_with(&self, raw: Raw, number: usize) -> Result<Self, Blocked> {
+        self.duplicate_at(&self.dir, raw, number)
     }
 
     /// The same, unpacked to another folder.
-    pub(super) fn twin_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, Blocked> {
+    pub(super) fn duplicate_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, Blocked> {
         let scratch = || tempfile::tempfile().map_err(|e| Blocked(e.to_string()));
         Ok(Self {
             raw,
-            md: self.md.clone(),
+            description: self.description.clone(),
             binary: self.binary.clone(),
             dir: dir.into(),
             lines: RefCell::new(scratch()?),
@@ -116,15 +141,15 @@ impl Bench {
             silent: Cell::new(true),
             from: 0,
             next: Cell::new(0),
-            found: Cell::new(0),
-            born: Cell::new(1000 * (number + 1)),
+            violations: Cell::new(0),
+            instances_made: Cell::new(1000 * (number + 1)),
             began: self.began,
-            patience: self.patience,
+            timeout: self.timeout,
         })
     }
 
     /// Tells instances from now on that the FMU was unpacked to another folder.
-    pub(super) fn live_in(&mut self, dir: &Path) {
+    pub(super) fn move_to(&mut self, dir: &Path) {
         dir.clone_into(&mut self.dir);
     }
 
@@ -142,8 +167,8 @@ impl Bench {
 
     /// Tells a violation.
     pub(super) fn violated(&self, text: impl Into<String>) {
-        self.found.set(self.found.get() + 1);
-        if self.found.get() <= MOST {
+        self.violations.set(self.violations.get() + 1);
+        if self.violations.get() <= MAX_VIOLATIONS {
             self.write(&Line::Violated(text.into()));
         }
     }
@@ -160,7 +185,8 @@ impl Bench {
         self.write(&Line::Note(text.into()));
     }
 
-    /// The requirement is not about this FMU.
+    /// Reports that the requirement does not apply to this FMU, as the result of the probe.
+    #[expect(clippy::unnecessary_wraps, reason = "probes return it")]
     pub(super) fn not_applicable(&self, reason: impl Into<String>) -> Result<(), Blocked> {
         self.write(&Line::NotApplicable(reason.into()));
         Ok(())
@@ -180,8 +206,8 @@ impl Bench {
     }
 
     /// Whether half of the time is used up; loops end then.
-    pub(super) fn late(&self) -> bool {
-        self.began.elapsed() > self.patience / 2
+    pub(super) fn half_time_used(&self) -> bool {
+        self.began.elapsed() > self.timeout / 2
     }
 
     /// Notes the call that comes next.
@@ -206,7 +232,7 @@ impl Bench {
         result
     }
 
-    fn prepare<T>(&self, work: impl FnOnce() -> Result<T, Blocked>) -> Result<T, Blocked> {
+    pub(super) fn prepare<T>(&self, work: impl FnOnce() -> Result<T, Blocked>) -> Result<T, Blocked> {
         let before = self.preparing.replace(true);
         let result = work();
         self.preparing.set(before);
@@ -218,15 +244,15 @@ impl Bench {
     pub(super) fn arguments(&self, name: &str) -> Arguments {
         let text = |text: &str| CString::new(text).unwrap_or_default();
         let resources = self.resources();
-        let resources = match self.md.version {
+        let resources = match self.description.version {
             FmiVersion::V2 => file_uri(&resources),
             FmiVersion::V3 => format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR),
         };
-        self.born.set(self.born.get() + 1);
-        let clocks = self.md.variables.iter().any(|v| v.base == BaseType::Clock);
+        self.instances_made.set(self.instances_made.get() + 1);
+        let clocks = self.description.variables.iter().any(|v| v.base == BaseType::Clock);
         Arguments {
             name: Some(text(name)),
-            token: Some(text(&self.md.token)),
+            token: Some(text(&self.description.token)),
             resources: Some(text(&resources)),
             interface: Interface::CoSimulation,
             logger: true,
@@ -235,57 +261,23 @@ impl Bench {
             lasting: true,
             logging: false,
             event_mode: clocks,
-            environment: 0x5000 + 0x10 * self.born.get(),
+            environment: 0x5000 + 0x10 * self.instances_made.get(),
         }
-    }
-
-    /// Instantiates; `None` for NULL.
-    pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<It<'_>>, Blocked> {
-        self.calling(&format!("{}({:?})", self.instantiation(), arguments.name.as_deref().unwrap_or_default()));
-        let handle = self.raw.instantiate(arguments).map_err(Blocked)?;
-        Ok(handle.map(|handle| It::new(self, handle, arguments.event_mode)))
-    }
-
-    /// Name of the function that makes instances for co-simulation.
-    pub(super) fn instantiation(&self) -> &'static str {
-        match self.md.version {
-            FmiVersion::V2 => "fmi2Instantiate",
-            FmiVersion::V3 => "fmi3InstantiateCoSimulation",
-        }
-    }
-
-    /// A new instance that works.
-    pub(super) fn fresh(&self) -> Result<It<'_>, Blocked> {
-        self.prepare(|| {
-            let made = self.instantiate(&self.arguments("probe"))?;
-            made.ok_or_else(|| Blocked(format!("{} returned NULL", self.instantiation())))
-        })
-    }
-
-    /// A new instance in initialisation mode.
-    pub(super) fn initialising(&self) -> Result<It<'_>, Blocked> {
-        let it = self.fresh()?;
-        self.prepare(|| it.enter())?;
-        Ok(it)
-    }
-
-    /// A new instance that is ready to step.
-    pub(super) fn stepping(&self) -> Result<It<'_>, Blocked> {
-        let it = self.initialising()?;
-        self.prepare(|| it.exit())?;
-        Ok(it)
     }
 
     /// Start time of the default experiment.
     pub(super) fn start(&self) -> f64 {
-        self.md.default_experiment.start.filter(|t| t.is_finite()).unwrap_or(0.0)
+        self.description.default_experiment.start.filter(|t| t.is_finite()).unwrap_or(0.0)
     }
 
     /// A communication step that should suit.
     pub(super) fn h(&self) -> f64 {
-        let x = self.md.default_experiment;
-        let fixed =
-            self.md.co_simulation.as_ref().and_then(|c| c.attribute("fixedInternalStepSize")?.trim().parse().ok());
+        let x = self.description.default_experiment;
+        let fixed = self
+            .description
+            .co_simulation
+            .as_ref()
+            .and_then(|c| c.attribute("fixedInternalStepSize")?.trim().parse().ok());
         let good = |h: &f64| h.is_finite() && *h > 0.0;
         let span = x.stop.map(|stop| (stop - self.start()) / 100.0);
         x.step.filter(good).or(fixed.filter(good)).or(span.filter(good)).unwrap_or(0.01)
@@ -298,12 +290,15 @@ impl Bench {
 
     /// A capability.
     pub(super) fn flag(&self, name: &str) -> bool {
-        self.md.co_simulation.as_ref().is_some_and(|c| c.flag(name))
+        self.description.co_simulation.as_ref().is_some_and(|c| c.flag(name))
     }
 
     /// Variables whose values are numbers, which all probes can compare.
     pub(super) fn numeric(&self) -> impl Iterator<Item = &ModelVariable> {
-        self.md.variables.iter().filter(|v| !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock))
+        self.description
+            .variables
+            .iter()
+            .filter(|v| !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock))
     }
 
     /// The numeric outputs, or all numeric variables where there are none.
@@ -316,7 +311,7 @@ impl Bench {
     /// Inputs that are floating-point numbers.
     pub(super) fn float_inputs(&self) -> Vec<&ModelVariable> {
         let fits = |v: &&ModelVariable| v.causality == Causality::Input && v.base.is_float() && v.clocks.is_empty();
-        self.md.variables.iter().filter(fits).collect()
+        self.description.variables.iter().filter(fits).collect()
     }
 
     /// Number of elements of a variable.
@@ -324,7 +319,7 @@ impl Bench {
         let extent = |d: &Dimension| match d {
             Dimension::Fixed(n) => usize::try_from(*n).unwrap_or(1),
             Dimension::Variable(r) => {
-                let size = self.md.variables.iter().find(|s| s.value_reference == *r);
+                let size = self.description.variables.iter().find(|s| s.value_reference == *r);
                 size.and_then(|s| s.start.as_deref()?.trim().parse().ok()).unwrap_or(1)
             }
         };
@@ -332,7 +327,7 @@ impl Bench {
     }
 
     /// A value near the start value, within the range, that differs from it.
-    pub(super) fn other_value(&self, v: &ModelVariable, scale: f64) -> Option<Vec<u64>> {
+    pub(super) fn different_value(&self, v: &ModelVariable, scale: f64) -> Option<Vec<u64>> {
         let n = self.elements(v);
         if v.base == BaseType::Boolean {
             let on = v.start.as_deref().is_some_and(|s| matches!(s.trim(), "true" | "1"));
@@ -349,7 +344,7 @@ impl Bench {
             return Some(vec![bits(v.base, value); n]);
         }
         if v.base == BaseType::Enumeration {
-            let items = &self.md.type_definition(v.declared_type.as_deref()?)?.items;
+            let items = &self.description.type_definition(v.declared_type.as_deref()?)?.items;
             let other = items.iter().map(|i| i.value).find(|i| first != Some(i.to_string().as_str()))?;
             return Some(vec![other.cast_unsigned(); n]);
         }
@@ -358,32 +353,7 @@ impl Bench {
     }
 }
 
-/// The bits of a number as a value of a type; integers are truncated.
-pub(super) fn bits(base: BaseType, x: f64) -> u64 {
-    match base {
-        BaseType::Float64 => x.to_bits(),
-        #[expect(clippy::cast_possible_truncation, reason = "single precision is what crosses the interface")]
-        BaseType::Float32 => u64::from((x as f32).to_bits()),
-        #[expect(clippy::cast_possible_truncation, reason = "saturates; small numbers")]
-        _ => (x as i64).cast_unsigned(),
-    }
-}
-
-/// Bits as a number, for evidence.
-pub(super) fn show(v: &ModelVariable, version: FmiVersion, bits: &[u64]) -> String {
-    let one = |x: u64| match v.base {
-        BaseType::Float64 => format!("{:?}", f64::from_bits(x)),
-        BaseType::Float32 => format!("{:?}", f32::from_bits(u32::try_from(x & 0xffff_ffff).unwrap_or(0))),
-        BaseType::UInt8 | BaseType::UInt16 | BaseType::UInt32 | BaseType::UInt64 | BaseType::Boolean => x.to_string(),
-        _ => {
-            let shift = 64 - 8 * width(v.base, version);
-            ((x << shift).cast_signed() >> shift).to_string()
-        }
-    };
-    bits.iter().map(|x| one(*x)).collect::<Vec<_>>().join(" ")
-}
-
-/// Whether a variable can be set before initialisation mode ends.
+/// Whether a variable can be set before initialization mode ends.
 pub(super) fn settable(v: &ModelVariable) -> bool {
     v.variability != Variability::Constant
         && v.causality != Causality::Independent
@@ -393,9 +363,4 @@ pub(super) fn settable(v: &ModelVariable) -> bool {
             Causality::StructuralParameter | Causality::CalculatedParameter => false,
             _ => v.initial_or_default() == Some(Initial::Exact),
         }
-}
-
-/// A status that is OK or a warning.
-pub(super) fn fine(status: fmu_import::Status) -> bool {
-    matches!(status, fmu_import::Status::OK | fmu_import::Status::WARNING)
 }

@@ -1,9 +1,11 @@
 //! Terminals and icons (FMI 3.0.2, 2.4.9; FMI 2.0.5, 2.3 takes the folder of FMI 3.0).
 
-use super::bench::{Bench, Blocked};
-use super::instances::life;
-use super::lifecycle::difference;
-use super::{Check, Levels, Run, Subject, Verdict, schema, zip};
+use super::schema;
+use crate::check::{Check, Levels, Run, Verdict};
+use crate::fmu_file::FmuFile;
+use crate::session::{Blocked, Session};
+use crate::trajectory::{difference, trajectory};
+use crate::zip_headers;
 use fmu_import::raw::Raw;
 use model_description::{Causality, Element, FmiVersion, Terminal, TerminalsAndIcons, read_terminals};
 use std::path::Path;
@@ -17,23 +19,23 @@ const LIMIT: u64 = 64 << 20;
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "I01", requirement: "terminalsAndIcons.xml has the standard's elements and version, and names variables that exist.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(elements) },
-    Check { id: "I01n", requirement: "Names of terminals, and of members where they are matched by name, are there and unique.", clause: "3.0.2, 2.4.9.2", levels: Levels::MUST, run: Run::File(names) },
-    Check { id: "I01k", requirement: "Members are inputs, outputs and parameters; inflows and outflows are scalar, and kinds and rules of others have reverse domain names.", clause: "3.0.2, 2.4.9.2.3", levels: Levels::MUST, run: Run::File(kinds) },
-    Check { id: "I01p", requirement: "Pictures are there as PNG; corners and colours are what the standard says.", clause: "3.0.2, 2.4.9.1", levels: Levels::MUST, run: Run::File(pictures) },
-    Check { id: "I02", requirement: "Without terminalsAndIcons/ and extra/ the FMU does the same, bit for bit.", clause: "3.0.2, 2.4.9 and 2.5.1.6", levels: Levels::MUST, run: Run::Probe(stripped) },
+    Check { id: "I01", requirement: "terminalsAndIcons.xml has the elements and version of the standard and names variables that exist.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(elements) },
+    Check { id: "I01n", requirement: "Terminal names are present and unique, and so are member names wherever members are matched by name.", clause: "3.0.2, 2.4.9.2", levels: Levels::MUST, run: Run::File(names) },
+    Check { id: "I01k", requirement: "Members are inputs, outputs or parameters; inflows and outflows are scalar; vendor-specific matching rules have reverse domain names.", clause: "3.0.2, 2.4.9.2.3", levels: Levels::MUST, run: Run::File(kinds) },
+    Check { id: "I01p", requirement: "Pictures are available as PNG, and the corners of the coordinate system are in order.", clause: "3.0.2, 2.4.9.1", levels: Levels::MUST, run: Run::File(pictures) },
+    Check { id: "I02", requirement: "Without terminalsAndIcons/ and extra/ the FMU gives the same results, bit for bit.", clause: "3.0.2, 2.4.9 and 2.5.1.6", levels: Levels::MUST, run: Run::Probe(stripped) },
 ];
 
 /// The file's text; `None` where there is none.
-fn text(subject: &Subject) -> Option<Result<String, String>> {
-    let bytes = zip::contents(&subject.bytes, subject.zip.find(FILE)?, LIMIT);
+fn text(fmu: &FmuFile) -> Option<Result<String, String>> {
+    let bytes = zip_headers::contents(&fmu.bytes, fmu.zip.find(FILE)?, LIMIT);
     Some(bytes.and_then(|bytes| String::from_utf8(bytes).map_err(|_| "is not UTF-8".to_owned())))
 }
 
 /// What is wrong, from the file as an importer reads it; a file that cannot be read is the matter of I01.
-fn read(subject: &Subject, findings: impl FnOnce(&TerminalsAndIcons) -> Vec<String>) -> Verdict {
-    match text(subject) {
-        None => Verdict::NotApplicable("there is no terminalsAndIcons.xml".into()),
+fn read(fmu: &FmuFile, findings: impl FnOnce(&TerminalsAndIcons) -> Vec<String>) -> Verdict {
+    match text(fmu) {
+        None => Verdict::NotApplicable("the archive has no terminalsAndIcons.xml".into()),
         Some(text) => match text.and_then(|t| read_terminals(t).map_err(|e| e.to_string())) {
             Ok(file) => {
                 Verdict::of(findings(&file).into_iter().map(|f| format!("terminalsAndIcons.xml: {f}")).collect())
@@ -48,9 +50,9 @@ fn all(terminals: &[Terminal]) -> Vec<&Terminal> {
     terminals.iter().flat_map(|t| std::iter::once(t).chain(all(&t.terminals))).collect()
 }
 
-fn elements(subject: &Subject) -> Verdict {
-    let Some(text) = text(subject) else {
-        return Verdict::NotApplicable("there is no terminalsAndIcons.xml".into());
+fn elements(fmu: &FmuFile) -> Verdict {
+    let Some(text) = text(fmu) else {
+        return Verdict::NotApplicable("the archive has no terminalsAndIcons.xml".into());
     };
     let tree = match text.and_then(|t| Element::parse(&t).map_err(|e| e.to_string())) {
         Ok(tree) => tree,
@@ -58,17 +60,17 @@ fn elements(subject: &Subject) -> Verdict {
     };
     let mut findings = schema::deviations_of_terminals(&tree);
     let version = tree.get("fmiVersion").unwrap_or_default();
-    let own = subject.root().and_then(|root| root.get("fmiVersion")).unwrap_or_default();
-    match subject.version {
+    let own = fmu.root().and_then(|root| root.get("fmiVersion")).unwrap_or_default();
+    match fmu.version {
         FmiVersion::V2 if !version.starts_with("3.") => findings.push(format!(
-            "fmiVersion={version:?}, which defines no such file: in an FMU of FMI 2.0 it is that of FMI 3.0"
+            "fmiVersion={version:?}, which does not define this file: in an FMU of FMI 2.0 the version is that of FMI 3.0"
         )),
         FmiVersion::V3 if version != own => {
-            findings.push(format!("fmiVersion={version:?}, and the model description has {own:?}"));
+            findings.push(format!("fmiVersion={version:?}, but the model description has {own:?}"));
         }
         _ => {}
     }
-    if let Ok(description) = &subject.description {
+    if let Ok(description) = &fmu.description {
         let mut open = vec![&tree];
         while let Some(element) = open.pop() {
             open.extend(&element.children);
@@ -82,13 +84,13 @@ fn elements(subject: &Subject) -> Verdict {
     Verdict::of(findings.into_iter().map(|f| format!("terminalsAndIcons.xml: {f}")).collect())
 }
 
-fn names(subject: &Subject) -> Verdict {
-    read(subject, |file| {
+fn names(fmu: &FmuFile) -> Verdict {
+    read(fmu, |file| {
         let mut findings = Vec::new();
         let mut level = |terminals: &[Terminal]| {
             for (k, t) in terminals.iter().enumerate() {
                 if terminals[..k].iter().any(|before| before.name == t.name) {
-                    findings.push(format!("line {}: the terminal {} is there twice", t.line, t.name));
+                    findings.push(format!("line {}: the terminal {} occurs twice", t.line, t.name));
                 }
             }
         };
@@ -103,12 +105,12 @@ fn names(subject: &Subject) -> Verdict {
                 match &m.name {
                     None => {
                         findings.push(format!(
-                            "line {}: a member of the {} {} without memberName",
+                            "line {}: a member of the {} {} has no memberName",
                             m.line, t.matching_rule, t.name
                         ));
                     }
                     Some(name) if seen.contains(&name.as_str()) => {
-                        findings.push(format!("line {}: the member {name} of {} is there twice", m.line, t.name));
+                        findings.push(format!("line {}: the member {name} of {} occurs twice", m.line, t.name));
                     }
                     Some(name) => seen.push(name),
                 }
@@ -118,18 +120,18 @@ fn names(subject: &Subject) -> Verdict {
     })
 }
 
-fn kinds(subject: &Subject) -> Verdict {
-    let Ok(description) = &subject.description else {
+fn kinds(fmu: &FmuFile) -> Verdict {
+    let Ok(description) = &fmu.description else {
         return Verdict::NotDetermined("the description cannot be read".into());
     };
-    read(subject, |file| {
+    read(fmu, |file| {
         let mut findings = Vec::new();
         let legal = [Causality::Input, Causality::Output, Causality::Parameter, Causality::CalculatedParameter];
         for t in all(&file.terminals) {
             let rule = t.matching_rule.as_str();
             if !["plug", "bus", "sequence", "none"].contains(&rule) && !rule.contains('.') {
                 findings.push(format!(
-                    "line {}: matchingRule={rule:?} is neither the standard's nor a reverse domain name",
+                    "line {}: matchingRule={rule:?} is neither a rule of the standard nor a reverse domain name",
                     t.line
                 ));
             }
@@ -142,41 +144,44 @@ fn kinds(subject: &Subject) -> Verdict {
                 }
                 if let Some(v) = variable.filter(|v| !legal.contains(&v.causality)) {
                     findings.push(format!(
-                        "line {}: {} is {} and has the causality {}",
+                        "line {}: {} is an {} but has the causality {}",
                         m.line, v.name, m.kind, v.causality
                     ));
                 }
                 if let Some(v) = variable.filter(|v| flow && v.is_array()) {
-                    findings.push(format!("line {}: {} is {} and an array", m.line, v.name, m.kind));
+                    findings.push(format!("line {}: {} is an {} but an array", m.line, v.name, m.kind));
                 }
             }
             let flows = t.members.iter().filter(|m| m.kind == "inflow" || m.kind == "outflow").count();
             if !t.streams.is_empty() && flows > 1 {
-                findings.push(format!("line {}: {} has stream members and {flows} flows, at most one", t.line, t.name));
+                findings.push(format!(
+                    "line {}: {} has stream members and {flows} flows; at most one is allowed",
+                    t.line, t.name
+                ));
             }
         }
         findings
     })
 }
 
-fn pictures(subject: &Subject) -> Verdict {
+fn pictures(fmu: &FmuFile) -> Verdict {
     const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
     let png = |base: &str| -> Option<String> {
         let path = format!("{FOLDER}/{base}.png");
-        let Some(entry) = subject.zip.find(&path) else { return Some(format!("there is no {path}")) };
-        let bytes = zip::contents(&subject.bytes, entry, LIMIT).unwrap_or_default();
-        (!bytes.starts_with(SIGNATURE)).then(|| format!("{path} is no PNG"))
+        let Some(entry) = fmu.zip.find(&path) else { return Some(format!("{path} is missing")) };
+        let bytes = zip_headers::contents(&fmu.bytes, entry, LIMIT).unwrap_or_default();
+        (!bytes.starts_with(SIGNATURE)).then(|| format!("{path} is not a PNG"))
     };
-    read(subject, |file| {
+    read(fmu, |file| {
         let mut findings = Vec::new();
         let area = file.coordinates.area;
         if !(area.x1 < area.x2 && area.y1 < area.y2) {
             findings.push(format!(
-                "the coordinate system goes from ({}, {}) to ({}, {}): not from the lower left to the upper right",
+                "the coordinate system goes from ({}, {}) to ({}, {}): expected from the lower left to the upper right",
                 area.x1, area.y1, area.x2, area.y2
             ));
         }
-        let icons = subject.zip.find(&format!("{FOLDER}/icon.png")).is_some();
+        let icons = fmu.zip.find(&format!("{FOLDER}/icon.png")).is_some();
         findings.extend(file.icon.filter(|_| icons).and_then(|_| png("icon")));
         for t in all(&file.terminals) {
             let Some(picture) = &t.picture else { continue };
@@ -186,24 +191,24 @@ fn pictures(subject: &Subject) -> Verdict {
     })
 }
 
-fn stripped(bench: &Bench) -> Result<(), Blocked> {
+fn stripped(session: &Session) -> Result<(), Blocked> {
     const EXTRAS: [&str; 2] = [FOLDER, "extra"];
-    if !EXTRAS.iter().any(|folder| bench.dir.join(folder).is_dir()) {
-        return bench.not_applicable("the FMU has neither terminalsAndIcons/ nor extra/");
+    if !EXTRAS.iter().any(|folder| session.dir.join(folder).is_dir()) {
+        return session.not_applicable("the FMU has neither terminalsAndIcons/ nor extra/");
     }
-    let whole = life(&bench.stepping()?, 20)?;
+    let whole = trajectory(&session.stepping()?, 20)?;
     let failed = |e: std::io::Error| Blocked(e.to_string());
     // Below the working directory of the probe, which is thrown away.
     let target = std::env::current_dir().map_err(failed)?.join("stripped");
-    copy(&bench.dir, &target, &EXTRAS).map_err(failed)?;
-    let inside = bench.binary.strip_prefix(&bench.dir).map_err(|e| Blocked(e.to_string()))?;
-    let raw = Raw::open(&target.join(inside), bench.md.version).map_err(Blocked)?;
-    let twin = bench.twin_at(&target, raw, 30)?;
-    match twin.stepping().and_then(|it| life(&it, 20)) {
-        Err(Blocked(why)) => bench.violated(format!("without {}: {why}", EXTRAS.join("/ and "))),
+    copy(&session.dir, &target, &EXTRAS).map_err(failed)?;
+    let inside = session.binary.strip_prefix(&session.dir).map_err(|e| Blocked(e.to_string()))?;
+    let raw = Raw::open(&target.join(inside), session.description.version).map_err(Blocked)?;
+    let duplicate = session.duplicate_at(&target, raw, 30)?;
+    match duplicate.stepping().and_then(|instance| trajectory(&instance, 20)) {
+        Err(Blocked(why)) => session.violated(format!("without {}: {why}", EXTRAS.join("/ and "))),
         Ok(rows) => {
             if let Some((step, i)) = difference(&whole, &rows) {
-                bench.violated(format!("{} differs after {} steps", bench.watched()[i].name, step + 1));
+                session.violated(format!("{} differs after {} steps", session.watched()[i].name, step + 1));
             }
         }
     }

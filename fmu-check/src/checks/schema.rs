@@ -1,6 +1,6 @@
 //! Walks the elements of modelDescription.xml and terminalsAndIcons.xml along the rules of the standard.
 
-use super::rules::{Rule, TERMINALS, V2, V3, expand};
+use super::schema_rules::{Rule, TERMINALS, V2, V3, expand};
 use model_description::{Element, FmiVersion, parse_number};
 
 /// Every deviation, with its line.
@@ -102,7 +102,7 @@ fn say(form: &str) -> &'static str {
         "u" => "an unsigned integer",
         "d" => "a number",
         "l" => "a list of unsigned integers",
-        "c" => "a colour, three numbers from 0 to 255",
+        "c" => "a color, three numbers from 0 to 255",
         "w" => "a list of dependent, constant, fixed, tunable, discrete",
         _ => "of the right form",
     }

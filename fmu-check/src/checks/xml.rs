@@ -1,33 +1,35 @@
 //! modelDescription.xml: syntax, header, interface (FMI 2.0.5, 2.2.1, 2.2.5, 4.3.1; FMI 3.0.2, 2.4.1, 2.4.5, 4.3).
 
-use super::{Check, Level, Levels, Run, Subject, Verdict, schema};
+use super::schema;
+use crate::check::{Check, Level, Levels, Run, Verdict};
+use crate::fmu_file::FmuFile;
 use model_description::{Element, FmiVersion, ModelDescription};
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "X01a", requirement: "modelDescription.xml is well-formed XML in UTF-8 and says so in its first line.", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(well_formed) },
-    Check { id: "X01b", requirement: "Elements and attributes are those of the standard, in its order, with values of its types; capability flags are spelt as in it.", clause: "2.0.5, 2.2 and 4.3.1; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(valid) },
-    Check { id: "X02a", requirement: "fmiVersion names no patch release: 2.0 or 3.0.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::MUST, run: Run::File(version) },
+    Check { id: "X01a", requirement: "modelDescription.xml is well-formed XML in UTF-8 and declares UTF-8 in its first line.", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(well_formed) },
+    Check { id: "X01b", requirement: "Elements and attributes are those of the standard, in its order and with values of its types; capability flags are spelled as in the standard.", clause: "2.0.5, 2.2 and 4.3.1; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(valid) },
+    Check { id: "X02a", requirement: "fmiVersion is 2.0 or 3.0, without a patch release.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::MUST, run: Run::File(version) },
     Check { id: "X05", requirement: "generationDateAndTime has the form YYYY-MM-DDThh:mm:ssZ.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::SHOULD, run: Run::File(date) },
-    Check { id: "X06", requirement: "Description, author, version, copyright, license and generationTool are given.", clause: "fmi-guides, 3", levels: Levels::SHOULD, run: Run::File(metadata) },
-    Check { id: "X08", requirement: "Capability flags that imply others come with them.", clause: "2.0.5, 4.3.1; 3.0.2, 2.4.5 and 4.3", levels: Levels::MUST, run: Run::File(flags) },
-    Check { id: "X10", requirement: "In the default experiment stop follows start, the step is positive and shorter, and the tolerance is not negative.", clause: "2.0.5, 2.2.5; 3.0.2, 2.4.6", levels: Levels::SHOULD, run: Run::File(experiment) },
-    Check { id: "X11", requirement: "An FMU without model exchange has no attribute reinit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(reinit) },
-    Check { id: "X12", requirement: "Numbers are finite and spelt as xs:double.", clause: "2.0.5, 2.1.3", levels: Levels(Some(Level::Must), None), run: Run::File(numbers) },
+    Check { id: "X06", requirement: "The attributes description, author, version, copyright, license and generationTool are given.", clause: "fmi-guides, 3", levels: Levels::SHOULD, run: Run::File(metadata) },
+    Check { id: "X08", requirement: "Every capability flag that requires another flag is accompanied by it.", clause: "2.0.5, 4.3.1; 3.0.2, 2.4.5 and 4.3", levels: Levels::MUST, run: Run::File(flags) },
+    Check { id: "X10", requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, and the tolerance is not negative.", clause: "2.0.5, 2.2.5; 3.0.2, 2.4.6", levels: Levels::SHOULD, run: Run::File(experiment) },
+    Check { id: "X11", requirement: "An FMU without model exchange does not use the attribute reinit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(reinit) },
+    Check { id: "X12", requirement: "Numbers are finite and spelled as xs:double.", clause: "2.0.5, 2.1.3", levels: Levels(Some(Level::Must), None), run: Run::File(numbers) },
     Check { id: "G-L1a", requirement: "Log categories have unique names.", clause: "2.0.5, 2.2.4; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(categories) },
 ];
 
 /// A check of the elements.
-fn with_root(subject: &Subject, check: impl Fn(&Element) -> Vec<String>) -> Verdict {
-    match &subject.tree {
+fn with_root(fmu: &FmuFile, check: impl Fn(&Element) -> Vec<String>) -> Verdict {
+    match &fmu.tree {
         Ok(root) => Verdict::of(check(root)),
         Err(cause) => Verdict::NotDetermined(cause.clone()),
     }
 }
 
 /// A check of the description.
-pub(super) fn with_description(subject: &Subject, check: impl Fn(&ModelDescription) -> Vec<String>) -> Verdict {
-    match &subject.description {
+pub(super) fn with_description(fmu: &FmuFile, check: impl Fn(&ModelDescription) -> Vec<String>) -> Verdict {
+    match &fmu.description {
         Ok(description) => Verdict::of(check(description)),
         Err(cause) => Verdict::NotDetermined(cause.clone()),
     }
@@ -43,27 +45,27 @@ pub(super) fn all(root: &Element) -> Vec<&Element> {
     found
 }
 
-fn well_formed(subject: &Subject) -> Verdict {
-    let mut findings: Vec<_> = subject.tree.as_ref().err().cloned().into_iter().collect();
-    if subject.xml.starts_with(b"\xef\xbb\xbf") {
-        findings.push("line 1: begins with a byte order mark".into());
+fn well_formed(fmu: &FmuFile) -> Verdict {
+    let mut findings: Vec<_> = fmu.tree.as_ref().err().cloned().into_iter().collect();
+    if fmu.xml.starts_with(b"\xef\xbb\xbf") {
+        findings.push("line 1: starts with a byte order mark".into());
     }
-    let text = String::from_utf8_lossy(&subject.xml);
+    let text = String::from_utf8_lossy(&fmu.xml);
     let first = text.lines().next().unwrap_or_default().trim_start_matches('\u{feff}');
     let declaration = first.split("?>").next().unwrap_or_default();
     if !declaration.starts_with("<?xml ") {
         findings.push("line 1: there is no XML declaration".into());
     } else if !declaration.to_ascii_lowercase().contains("utf-8") {
-        findings.push(format!("line 1: {declaration}?> does not say encoding=\"UTF-8\""));
+        findings.push(format!("line 1: {declaration}?> does not declare encoding=\"UTF-8\""));
     }
     Verdict::of(findings)
 }
 
-fn valid(subject: &Subject) -> Verdict {
-    with_root(subject, |root| {
-        let mut findings = schema::deviations(root, subject.version);
+fn valid(fmu: &FmuFile) -> Verdict {
+    with_root(fmu, |root| {
+        let mut findings = schema::deviations(root, fmu.version);
         // What an importer cannot read at all, and the rules do not know of.
-        if let (true, Err(cause)) = (findings.is_empty(), &subject.description) {
+        if let (true, Err(cause)) = (findings.is_empty(), &fmu.description) {
             // Another version is what X02a is about.
             findings.extend((!cause.contains("fmiVersion")).then(|| cause.clone()));
         }
@@ -71,16 +73,16 @@ fn valid(subject: &Subject) -> Verdict {
     })
 }
 
-fn version(subject: &Subject) -> Verdict {
-    with_root(subject, |root| {
+fn version(fmu: &FmuFile) -> Verdict {
+    with_root(fmu, |root| {
         let found = root.get("fmiVersion").unwrap_or_default();
-        let good = found == subject.version.to_string();
+        let good = found == fmu.version.to_string();
         if good { Vec::new() } else { vec![format!("line {}: fmiVersion={found:?}", root.line)] }
     })
 }
 
-fn date(subject: &Subject) -> Verdict {
-    with_root(subject, |root| {
+fn date(fmu: &FmuFile) -> Verdict {
+    with_root(fmu, |root| {
         let Some(found) = root.get("generationDateAndTime") else {
             return vec![format!("line {}: there is no generationDateAndTime", root.line)];
         };
@@ -91,17 +93,17 @@ fn date(subject: &Subject) -> Verdict {
     })
 }
 
-fn metadata(subject: &Subject) -> Verdict {
-    with_root(subject, |root| {
+fn metadata(fmu: &FmuFile) -> Verdict {
+    with_root(fmu, |root| {
         let missing = |a: &&&str| root.get(a).is_none_or(|v| v.trim().is_empty());
         let names = ["description", "author", "version", "copyright", "license", "generationTool"];
         names.iter().filter(missing).map(|a| format!("line {}: there is no {a}", root.line)).collect()
     })
 }
 
-fn flags(subject: &Subject) -> Verdict {
-    with_description(subject, |description| {
-        let Some(i) = &description.co_simulation else { return vec!["there is no co-simulation interface".into()] };
+fn flags(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |description| {
+        let Some(i) = &description.co_simulation else { return vec!["the FMU has no co-simulation interface".into()] };
         let mut findings = Vec::new();
         let mut implies = |holds: bool, what: &str| {
             if !holds {
@@ -109,7 +111,7 @@ fn flags(subject: &Subject) -> Verdict {
             }
         };
         let state = i.can_get_and_set_state() || !i.can_serialize_state();
-        implies(state, "the state can be serialised, but not got and set");
+        implies(state, "canSerializeFMUState requires canGetAndSetFMUState");
         if description.version == FmiVersion::V3 {
             let early = !i.flag("canReturnEarlyAfterIntermediateUpdate") || i.flag("providesIntermediateUpdate");
             implies(early, "canReturnEarlyAfterIntermediateUpdate without providesIntermediateUpdate");
@@ -120,12 +122,12 @@ fn flags(subject: &Subject) -> Verdict {
     })
 }
 
-fn experiment(subject: &Subject) -> Verdict {
-    let Some(root) = subject.root() else { return Verdict::NotDetermined("the XML cannot be read".into()) };
+fn experiment(fmu: &FmuFile) -> Verdict {
+    let Some(root) = fmu.root() else { return Verdict::NotDetermined("the XML cannot be read".into()) };
     let Some(element) = root.child("DefaultExperiment") else {
         return Verdict::NotApplicable("there is no default experiment".into());
     };
-    with_description(subject, |description| {
+    with_description(fmu, |description| {
         let x = description.default_experiment;
         let (start, mut findings) = (x.start.unwrap_or(0.0), Vec::new());
         let mut wrong = |bad: bool, text: String| {
@@ -145,20 +147,20 @@ fn experiment(subject: &Subject) -> Verdict {
     })
 }
 
-fn reinit(subject: &Subject) -> Verdict {
-    if subject.root().is_some_and(|r| r.child("ModelExchange").is_some()) {
+fn reinit(fmu: &FmuFile) -> Verdict {
+    if fmu.root().is_some_and(|r| r.child("ModelExchange").is_some()) {
         return Verdict::NotApplicable("there is a model exchange interface".into());
     }
-    with_root(subject, |root| {
+    with_root(fmu, |root| {
         let found = all(root).into_iter().filter(|e| e.get("reinit").is_some());
         found.map(|e| format!("line {}: <{}> has an attribute reinit", e.line, e.name)).collect()
     })
 }
 
-fn numbers(subject: &Subject) -> Verdict {
+fn numbers(fmu: &FmuFile) -> Verdict {
     let names =
         ["start", "min", "max", "nominal", "factor", "offset", "startTime", "stopTime", "stepSize", "tolerance"];
-    with_root(subject, |root| {
+    with_root(fmu, |root| {
         let numeric = |e: &&Element| e.name != "String";
         let bad = |e: &Element, a: &str| {
             let value = e.get(a)?.trim().to_ascii_lowercase();
@@ -169,13 +171,13 @@ fn numbers(subject: &Subject) -> Verdict {
     })
 }
 
-fn categories(subject: &Subject) -> Verdict {
-    with_description(subject, |description| {
+fn categories(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |description| {
         let names: Vec<&str> = description.log_categories.iter().map(|c| c.name.as_str()).collect();
         let mut findings = Vec::new();
         for (i, name) in names.iter().enumerate() {
             if names[..i].contains(name) {
-                findings.push(format!("the log category {name} is there twice"));
+                findings.push(format!("the log category {name} occurs twice"));
             }
         }
         findings

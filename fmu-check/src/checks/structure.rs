@@ -3,7 +3,8 @@
 use super::clocked::clocked_states;
 use super::dependencies::dependencies_hold;
 use super::xml::with_description;
-use super::{Check, Level, Levels, Run, Subject, Verdict};
+use crate::check::{Check, Level, Levels, Run, Verdict};
+use crate::fmu_file::FmuFile;
 use model_description::{
     BaseType, Causality, FmiVersion, Initial, ModelDescription, ModelVariable, Unknown, Variability,
 };
@@ -13,14 +14,14 @@ const CLAUSE: &str = "2.0.5, 2.2.8; 3.0.2, 2.4.8";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "S01", requirement: "Outputs are exactly the variables with causality output, each once.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(outputs) },
-    Check { id: "S02a", requirement: "InitialUnknowns are exactly the outputs, calculated parameters, states and state derivatives that are calculated or approximate at the start.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(initial_unknowns) },
+    Check { id: "S01", requirement: "Outputs lists every variable with causality output exactly once, and nothing else.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(outputs) },
+    Check { id: "S02a", requirement: "InitialUnknowns lists exactly the outputs, calculated parameters, states and state derivatives whose initial is calculated or approx.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(initial_unknowns) },
     Check { id: "S02b", requirement: "InitialUnknowns are sorted by index.", clause: "2.0.5, 2.2.8", levels: Levels(Some(Level::Must), None), run: Run::File(sorted) },
     Check { id: "S03a", requirement: "Every dependency exists and is a known of its list.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(knowns) },
-    Check { id: "S03b", requirement: "dependenciesKind has one word for each dependency, and of the initial unknowns only dependent and constant.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(kinds) },
-    Check { id: "S04", requirement: "What an initial unknown does not depend on does not change it.", clause: CLAUSE, levels: Levels::MUST, run: Run::Probe(dependencies_hold) },
-    Check { id: "S05", requirement: "A state derivative refers to its state by its attribute derivative.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(derivatives) },
-    Check { id: "S06", requirement: "A clocked state is a discrete variable on a clock, refers by its attribute previous to its previous value, and two do not share one.", clause: "3.0.2, 2.4.8 and 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(clocked_states) },
+    Check { id: "S03b", requirement: "dependenciesKind has one word for each dependency; initial unknowns use only dependent and constant.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(kinds) },
+    Check { id: "S04", requirement: "A variable that is not a dependency of an initial unknown does not change it.", clause: CLAUSE, levels: Levels::MUST, run: Run::Probe(dependencies_hold) },
+    Check { id: "S05", requirement: "A state derivative refers to its state with the attribute derivative.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(derivatives) },
+    Check { id: "S06", requirement: "A clocked state is a discrete variable on a clock and refers to its previous value with the attribute previous; no two share one.", clause: "3.0.2, 2.4.8 and 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(clocked_states) },
 ];
 
 fn name(d: &ModelDescription, reference: u32) -> String {
@@ -34,19 +35,19 @@ fn list(d: &ModelDescription, unknowns: &[Unknown]) -> BTreeSet<String> {
 fn twice(d: &ModelDescription, unknowns: &[Unknown]) -> Vec<String> {
     let again = |(i, u): (usize, &Unknown)| {
         let bad = unknowns[..i].iter().any(|o| o.reference == u.reference);
-        bad.then(|| format!("line {}: {} is there twice", u.line, name(d, u.reference)))
+        bad.then(|| format!("line {}: {} occurs twice", u.line, name(d, u.reference)))
     };
     unknowns.iter().enumerate().filter_map(again).collect()
 }
 
-fn outputs(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn outputs(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let mut findings = twice(d, &d.outputs);
         let listed = list(d, &d.outputs);
         let all: BTreeSet<_> =
             d.variables.iter().filter(|v| v.causality == Causality::Output).map(|v| v.name.clone()).collect();
-        findings.extend(all.difference(&listed).map(|n| format!("the output {n} is not in the list")));
-        findings.extend(listed.difference(&all).map(|n| format!("{n} is in the list and no output")));
+        findings.extend(all.difference(&listed).map(|n| format!("the output {n} is missing in the list")));
+        findings.extend(listed.difference(&all).map(|n| format!("{n} is in the list but is not an output")));
         findings
     })
 }
@@ -57,8 +58,8 @@ fn states_and_derivatives(d: &ModelDescription) -> Vec<&ModelVariable> {
     derivatives.flat_map(|v| [Some(v), v.derivative.and_then(|s| d.referenced(s))]).flatten().collect()
 }
 
-fn initial_unknowns(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn initial_unknowns(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let mut findings = twice(d, &d.initial_unknowns);
         let open = |v: &&ModelVariable| matches!(v.initial_or_default(), Some(Initial::Approx | Initial::Calculated));
         let clocked = |v: &&ModelVariable| !v.clocks.is_empty() || v.base == BaseType::Clock;
@@ -75,15 +76,15 @@ fn initial_unknowns(subject: &Subject) -> Verdict {
         let listed = list(d, &d.initial_unknowns);
         findings.extend(needed.difference(&listed).map(|n| format!("{n} is missing in the list")));
         let more = listed.difference(&needed).filter(|n| !optional.contains(*n));
-        findings.extend(more.map(|n| format!("{n} is in the list and no initial unknown")));
+        findings.extend(more.map(|n| format!("{n} is in the list but is not an initial unknown")));
         findings
     })
 }
 
-fn sorted(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
-        let late = d.initial_unknowns.windows(2).filter(|w| w[0].reference > w[1].reference);
-        late.map(|w| format!("line {}: index {} after {}", w[1].line, w[1].reference, w[0].reference)).collect()
+fn sorted(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let unsorted = d.initial_unknowns.windows(2).filter(|w| w[0].reference > w[1].reference);
+        unsorted.map(|w| format!("line {}: index {} after {}", w[1].line, w[1].reference, w[0].reference)).collect()
     })
 }
 
@@ -91,8 +92,8 @@ fn lists(d: &ModelDescription) -> [(&'static str, &[Unknown]); 3] {
     [("output", &d.outputs), ("derivative", &d.derivatives), ("initial unknown", &d.initial_unknowns)]
 }
 
-fn knowns(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn knowns(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let states: Vec<&str> = states_and_derivatives(d).iter().map(|v| v.name.as_str()).collect();
         let mut findings = Vec::new();
         for (kind, unknowns) in lists(d) {
@@ -102,15 +103,15 @@ fn knowns(subject: &Subject) -> Verdict {
                 for (i, &reference) in unknown.dependencies.iter().flatten().enumerate() {
                     let deps = unknown.dependencies.as_deref().unwrap_or_default();
                     if deps[..i].contains(&reference) {
-                        findings.push(format!("{at}: the dependency {reference} is there twice"));
+                        findings.push(format!("{at}: the dependency {reference} occurs twice"));
                     }
                     let Some(v) = d.referenced(reference) else {
-                        findings.push(format!("{at}: there is no variable {reference} to depend on"));
+                        findings.push(format!("{at}: the dependency {reference} does not exist"));
                         continue;
                     };
                     if !is_known(d, v, initial, &states) {
                         findings
-                            .push(format!("{at}: {} is no known here ({}, {})", v.name, v.causality, v.variability));
+                            .push(format!("{at}: {} is not a known here ({}, {})", v.name, v.causality, v.variability));
                     }
                 }
             }
@@ -129,8 +130,8 @@ fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &[&s
     }
 }
 
-fn kinds(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+fn kinds(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let mut findings = Vec::new();
         for (kind, unknowns) in lists(d) {
             for unknown in unknowns {
@@ -152,16 +153,17 @@ fn kinds(subject: &Subject) -> Verdict {
     })
 }
 
-fn derivatives(subject: &Subject) -> Verdict {
-    if subject.description.as_ref().is_ok_and(|d| d.derivatives.is_empty()) {
-        return Verdict::NotApplicable("no state derivatives are listed".into());
+fn derivatives(fmu: &FmuFile) -> Verdict {
+    if fmu.description.as_ref().is_ok_and(|d| d.derivatives.is_empty()) {
+        return Verdict::NotApplicable("the list of state derivatives is empty".into());
     }
-    with_description(subject, |d| {
+    with_description(fmu, |d| {
         let bad = |u: &Unknown| {
             let state = d.referenced(u.reference)?.derivative.and_then(|s| d.referenced(s));
             let good = state.is_some_and(|s| matches!(s.causality, Causality::Local | Causality::Output));
-            (!good)
-                .then(|| format!("line {}: {} names no state that is local or an output", u.line, name(d, u.reference)))
+            (!good).then(|| {
+                format!("line {}: {} refers to no state that is local or an output", u.line, name(d, u.reference))
+            })
         };
         d.derivatives.iter().filter_map(bad).collect()
     })

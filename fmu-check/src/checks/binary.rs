@@ -1,8 +1,8 @@
 //! The binary as a file: its format, what it exports and what it needs (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
 
-use super::bench::{Bench, Blocked, fine};
-use super::subject::Binary;
-use super::{Check, Level, Levels, Run, Subject, Verdict};
+use crate::check::{Check, Level, Levels, Run, Verdict};
+use crate::fmu_file::{Binary, FmuFile};
+use crate::session::{Blocked, Session};
 use fmu_import::elf::{FLOOR, NEEDED, dynamic, is_system, newest_glibc, strings};
 use fmu_import::raw::{Simple, Text};
 use model_description::FmiVersion;
@@ -12,19 +12,19 @@ use object::{Architecture, BinaryFormat, Object, ObjectSection, ObjectSymbol};
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "B00", requirement: "There is a binary for this machine, and it loads.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::Probe(loads) },
+    Check { id: "B00", requirement: "The archive contains a binary for this platform, and it loads.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::Probe(loads) },
     Check { id: "B10", requirement: "Every binary is a shared library for the platform of its folder.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(format) },
-    Check { id: "B01", requirement: "Every binary exports all functions of the standard: in FMI 2.0 those of its interface types.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(exports) },
+    Check { id: "B01", requirement: "Every binary exports all functions of the standard; in FMI 2.0, those of its interface types.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(exports) },
     Check { id: "B02a", requirement: "No other exported symbol begins with fmi3.", clause: "3.0.2, 2.5", levels: Levels(None, Some(Level::Must)), run: Run::File(reserved) },
-    Check { id: "B02b", requirement: "Nothing is exported but functions of the standards and one or two of the tool's own.", clause: "hardening", levels: Levels::HARD, run: Run::File(others) },
-    Check { id: "B02c", requirement: "The binary can be unloaded: it has no unique symbols and no flag against it.", clause: "hardening", levels: Levels::HARD, run: Run::File(unloadable) },
-    Check { id: "B03", requirement: "Only libraries of the C library are needed from the system, others are in the archive.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(needed) },
-    Check { id: "B03r", requirement: "A search path for libraries is $ORIGIN or below.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(rpath) },
-    Check { id: "B04", requirement: "Linux binaries need no newer C library than 2.17 (2014), so that they load on old systems.", clause: "hardening", levels: Levels::HARD, run: Run::File(floor) },
-    Check { id: "B05", requirement: "Linux binaries have neither relocations in their text nor an executable stack.", clause: "hardening", levels: Levels::HARD, run: Run::File(hardened) },
-    Check { id: "B11", requirement: "A binary for x86_64 Linux does not ask for a newer processor than the first of its kind (its note of needed instruction sets).", clause: "hardening", levels: Levels::HARD, run: Run::File(processor) },
-    Check { id: "X02b", requirement: "GetVersion tells 2.0 or 3.0, and GetTypesPlatform default.", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels::MUST, run: Run::Probe(versions) },
-    Check { id: "B08", requirement: "A whole life writes nothing to the console and makes no file where it runs.", clause: "hardening", levels: Levels::HARD, run: Run::Silent(life) },
+    Check { id: "B02b", requirement: "A binary exports only functions of the standards and at most two symbols of the tool.", clause: "hardening", levels: Levels::HARD, run: Run::File(only_standard_functions) },
+    Check { id: "B02c", requirement: "The binary can be unloaded: it has no unique symbols and no NODELETE flag.", clause: "hardening", levels: Levels::HARD, run: Run::File(unloadable) },
+    Check { id: "B03", requirement: "A binary needs only C system libraries; the archive contains all others.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(needed) },
+    Check { id: "B03r", requirement: "Every library search path is $ORIGIN or below.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(rpath) },
+    Check { id: "B04", requirement: "Linux binaries need at most version 2.17 (2012) of the GNU C library, so that they load on old systems.", clause: "hardening", levels: Levels::HARD, run: Run::File(c_library) },
+    Check { id: "B05", requirement: "Linux binaries have no text relocations and no executable stack.", clause: "hardening", levels: Levels::HARD, run: Run::File(no_dangerous_flags) },
+    Check { id: "B11", requirement: "A binary for x86_64 Linux requires no instruction set beyond x86-64-v1 (according to its note).", clause: "hardening", levels: Levels::HARD, run: Run::File(processor) },
+    Check { id: "X02b", requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels::MUST, run: Run::Probe(versions) },
+    Check { id: "B08", requirement: "A complete run writes nothing to the console and creates no file in the working directory.", clause: "hardening", levels: Levels::HARD, run: Run::Silent(complete_run) },
 ];
 
 const COMMON2: &str = "GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment EnterInitializationMode ExitInitializationMode Terminate Reset GetReal GetInteger GetBoolean GetString SetReal SetInteger SetBoolean SetString GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate GetDirectionalDerivative";
@@ -49,21 +49,21 @@ pub(super) fn functions(version: FmiVersion) -> Vec<&'static str> {
 }
 
 /// The libraries that carry the FMU: the others in their folders are helpers.
-fn carriers(subject: &Subject) -> Vec<&Binary> {
-    let description = subject.description.as_ref().ok();
+fn carriers(fmu: &FmuFile) -> Vec<&Binary> {
+    let description = fmu.description.as_ref().ok();
     let names: Vec<&str> = description.map_or_else(Vec::new, |d| {
-        let others = [&d.model_exchange, &d.scheduled_execution].into_iter().filter_map(|i| i.as_deref());
-        d.co_simulation.iter().map(|c| c.model_identifier.as_str()).chain(others).collect()
+        let identifiers = [&d.model_exchange, &d.scheduled_execution].into_iter().filter_map(|i| i.as_deref());
+        d.co_simulation.iter().map(|c| c.model_identifier.as_str()).chain(identifiers).collect()
     });
     let base = |b: &Binary| b.name.rsplit('/').next().and_then(|f| f.rsplit_once('.')).map(|(base, _)| base.to_owned());
-    subject.binaries.iter().filter(|b| base(b).is_some_and(|base| names.contains(&base.as_str()))).collect()
+    fmu.binaries.iter().filter(|b| base(b).is_some_and(|base| names.contains(&base.as_str()))).collect()
 }
 
 /// Findings about each carrier that can be read.
-fn each(subject: &Subject, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>) -> Verdict {
-    let carriers = carriers(subject);
+fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>) -> Verdict {
+    let carriers = carriers(fmu);
     if carriers.is_empty() {
-        return Verdict::NotApplicable("there is no shared library of the description's name".into());
+        return Verdict::NotApplicable("no shared library is named after modelIdentifier".into());
     }
     let mut findings = Vec::new();
     for binary in carriers {
@@ -76,22 +76,26 @@ fn each(subject: &Subject, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<Stri
 }
 
 /// Findings about each carrier that is a 64-bit ELF file.
-fn elf(subject: &Subject, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<String>, object::Error>) -> Verdict {
-    let (mut findings, mut any) = (Vec::new(), false);
-    for binary in carriers(subject) {
+fn elf(fmu: &FmuFile, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<String>, object::Error>) -> Verdict {
+    let (mut findings, mut found_elf) = (Vec::new(), false);
+    for binary in carriers(fmu) {
         let Ok(file) = ElfFile64::parse(&*binary.bytes) else { continue };
-        any = true;
+        found_elf = true;
         match rule(binary, &file) {
             Ok(found) => findings.extend(found.into_iter().map(|f| format!("{}: {f}", binary.name))),
             Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
         }
     }
-    if any { Verdict::of(findings) } else { Verdict::NotApplicable("there is no 64-bit ELF binary".into()) }
+    if found_elf {
+        Verdict::of(findings)
+    } else {
+        Verdict::NotApplicable("the archive has no 64-bit ELF binary".into())
+    }
 }
 
-fn format(subject: &Subject) -> Verdict {
+fn format(fmu: &FmuFile) -> Verdict {
     let mut findings = Vec::new();
-    for binary in carriers(subject) {
+    for binary in carriers(fmu) {
         let expected = match binary.folder.as_str() {
             "linux64" => Some((BinaryFormat::Elf, Architecture::X86_64)),
             "win64" => Some((BinaryFormat::Pe, Architecture::X86_64)),
@@ -118,13 +122,13 @@ fn format(subject: &Subject) -> Verdict {
         };
         let Some((format, architecture)) = expected else { continue };
         match object::File::parse(&*binary.bytes) {
-            Err(e) => findings.push(format!("{}: is no binary: {e}", binary.name)),
+            Err(e) => findings.push(format!("{}: is not a binary: {e}", binary.name)),
             Ok(file) => {
                 if (file.format(), file.architecture()) != (format, architecture) {
                     findings.push(format!("{}: is {:?} for {:?}", binary.name, file.format(), file.architecture()));
                 }
                 if !matches!(file.kind(), object::ObjectKind::Dynamic) {
-                    findings.push(format!("{}: is no shared library but {:?}", binary.name, file.kind()));
+                    findings.push(format!("{}: is not a shared library but {:?}", binary.name, file.kind()));
                 }
             }
         }
@@ -150,46 +154,46 @@ fn exported(file: &object::File<'_>) -> Vec<String> {
     names
 }
 
-fn exports(subject: &Subject) -> Verdict {
-    let needed: Vec<String> = match subject.version {
+fn exports(fmu: &FmuFile) -> Verdict {
+    let needed: Vec<String> = match fmu.version {
         FmiVersion::V2 => {
-            let exchange = subject.description.as_ref().is_ok_and(|d| d.model_exchange.is_some());
+            let exchange = fmu.description.as_ref().is_ok_and(|d| d.model_exchange.is_some());
             let lists = [COMMON2, COSIMULATION2, if exchange { EXCHANGE2 } else { "" }];
             lists.iter().flat_map(|l| l.split_whitespace()).map(|n| format!("fmi2{n}")).collect()
         }
         FmiVersion::V3 => ALL3.split_whitespace().map(|n| format!("fmi3{n}")).collect(),
     };
-    each(subject, |_, file| {
-        let there = exported(file);
-        needed.iter().filter(|n| !there.contains(n)).map(|n| format!("does not export {n}")).collect()
+    each(fmu, |_, file| {
+        let exported_names = exported(file);
+        needed.iter().filter(|n| !exported_names.contains(n)).map(|n| format!("does not export {n}")).collect()
     })
 }
 
-fn reserved(subject: &Subject) -> Verdict {
-    each(subject, |_, file| {
+fn reserved(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, file| {
         let known = |n: &str| ALL3.split_whitespace().any(|f| f == n);
         let bad = |n: &String| n.strip_prefix("fmi3").is_some_and(|rest| !known(rest));
         exported(file).into_iter().filter(bad).map(|n| format!("exports {n}")).collect()
     })
 }
 
-fn others(subject: &Subject) -> Verdict {
-    each(subject, |_, file| {
+fn only_standard_functions(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, file| {
         let functions = |n: &String| n.starts_with("fmi2") || n.starts_with("fmi3");
         let linker = ["_init", "_fini", "_edata", "_end", "__bss_start", "DllMain"];
-        let more: Vec<_> =
+        let other_symbols: Vec<_> =
             exported(file).into_iter().filter(|n| !functions(n) && !linker.contains(&n.as_str())).collect();
-        let shown = more.iter().take(5).cloned().collect::<Vec<_>>().join(", ");
-        if more.len() > 2 {
-            vec![format!("exports {} symbols besides, for example {shown}", more.len())]
+        let shown = other_symbols.iter().take(5).cloned().collect::<Vec<_>>().join(", ");
+        if other_symbols.len() > 2 {
+            vec![format!("exports {} other symbols, for example {shown}", other_symbols.len())]
         } else {
             Vec::new()
         }
     })
 }
 
-fn unloadable(subject: &Subject) -> Verdict {
-    elf(subject, |_, file| {
+fn unloadable(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |_, file| {
         let mut findings = Vec::new();
         for (tag, value) in dynamic(file)? {
             if tag == 0x6fff_fffb && value & 8 != 0 {
@@ -212,16 +216,16 @@ fn unloadable(subject: &Subject) -> Verdict {
 const RPATH: i64 = 15;
 const RUNPATH: i64 = 29;
 
-fn needed(subject: &Subject) -> Verdict {
-    elf(subject, |binary, file| {
-        let shipped = |name: &str| subject.zip.find(&format!("binaries/{}/{name}", binary.folder)).is_some();
+fn needed(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |binary, file| {
+        let shipped = |name: &str| fmu.zip.find(&format!("binaries/{}/{name}", binary.folder)).is_some();
         let foreign = |n: &String| !is_system(n) && !shipped(n);
         Ok(strings(file, NEEDED)?.into_iter().filter(foreign).map(|n| format!("needs {n}")).collect())
     })
 }
 
-fn rpath(subject: &Subject) -> Verdict {
-    elf(subject, |_, file| {
+fn rpath(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |_, file| {
         let mut findings = Vec::new();
         for path in strings(file, RPATH)?.into_iter().chain(strings(file, RUNPATH)?) {
             findings.extend(path.split(':').filter(|p| !p.starts_with("$ORIGIN")).map(|p| format!("searches {p:?}")));
@@ -230,26 +234,26 @@ fn rpath(subject: &Subject) -> Verdict {
     })
 }
 
-fn floor(subject: &Subject) -> Verdict {
-    elf(subject, |_, file| {
+fn c_library(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |_, file| {
         let newest = newest_glibc(file)?.filter(|newest| *newest > FLOOR);
         Ok(newest.map(|newest| format!("needs {newest}")).into_iter().collect())
     })
 }
 
-fn hardened(subject: &Subject) -> Verdict {
-    elf(subject, |_, file| {
+fn no_dangerous_flags(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |_, file| {
         let mut findings = Vec::new();
         for (tag, value) in dynamic(file)? {
             if tag == 22 || (tag == 30 && value & 4 != 0) {
-                findings.push("has relocations in its text".into());
+                findings.push("has text relocations".into());
             }
         }
         for segment in file.elf_program_headers() {
             if segment.p_type(file.endian()) == elf::PT_GNU_STACK
                 && segment.p_flags(file.endian()) & elf::PF_X != elf::ProgramFlags(0)
             {
-                findings.push("wants an executable stack".into());
+                findings.push("requires an executable stack".into());
             }
         }
         Ok(findings)
@@ -257,9 +261,9 @@ fn hardened(subject: &Subject) -> Verdict {
 }
 
 /// `GNU_PROPERTY_X86_ISA_1_NEEDED` of the note `.note.gnu.property`: bit 0 is the baseline, the others are x86-64-v2 to v4.
-fn processor(subject: &Subject) -> Verdict {
+fn processor(fmu: &FmuFile) -> Verdict {
     const NEEDED: u32 = 0xc000_8002;
-    elf(subject, |_, file| {
+    elf(fmu, |_, file| {
         let mut findings = Vec::new();
         let Some(section) = file.section_by_name(".note.gnu.property") else { return Ok(findings) };
         let data = section.data()?;
@@ -269,7 +273,7 @@ fn processor(subject: &Subject) -> Verdict {
         while let (Some(kind), Some(size)) = (word(at), word(at + 4)) {
             if kind == NEEDED && word(at + 8).is_some_and(|bits| bits & !1 != 0) {
                 findings.push(format!(
-                    "its note asks for instruction sets above x86-64-v1 ({:#x})",
+                    "its note requires instruction sets beyond x86-64-v1 ({:#x})",
                     word(at + 8).unwrap_or(0)
                 ));
             }
@@ -279,38 +283,38 @@ fn processor(subject: &Subject) -> Verdict {
     })
 }
 
-/// The bench has loaded it already.
-fn loads(_: &Bench) -> Result<(), Blocked> {
+/// The session has loaded it already.
+fn loads(_: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn versions(bench: &Bench) -> Result<(), Blocked> {
-    let mut texts = vec![(Text::GetVersion, bench.md.version.to_string())];
-    if bench.md.version == FmiVersion::V2 {
+fn versions(session: &Session) -> Result<(), Blocked> {
+    let mut texts = vec![(Text::GetVersion, session.description.version.to_string())];
+    if session.description.version == FmiVersion::V2 {
         texts.push((Text::GetTypesPlatform, "default".into()));
     }
     for (name, expected) in texts {
-        bench.calling(&bench.raw.name(name.as_str()));
-        let told = bench.raw.text(name);
-        bench.require(told.as_ref() == Some(&expected), || {
-            format!("{} returned {told:?}, expected {expected:?}", bench.raw.name(name.as_str()))
+        session.calling(&session.raw.name(name.as_str()));
+        let version = session.raw.text(name);
+        session.require(version.as_ref() == Some(&expected), || {
+            format!("{} returned {version:?}, expected {expected:?}", session.raw.name(name.as_str()))
         });
     }
     Ok(())
 }
 
 /// A life as every importer leads it.
-fn life(bench: &Bench) -> Result<(), Blocked> {
-    let it = bench.stepping()?;
+fn complete_run(session: &Session) -> Result<(), Blocked> {
+    let instance = session.stepping()?;
     for k in 0..20 {
-        it.excite(k)?;
-        let _ = it.step(bench.h())?;
-        let _ = it.snapshot(&bench.watched())?;
+        instance.change_inputs(k)?;
+        let _ = instance.step(session.h())?;
+        let _ = instance.snapshot(&session.watched())?;
     }
-    let status = it.simple(Simple::Terminate)?;
-    bench.note(format!("Terminate returned {status}"));
-    if fine(status) {
-        it.free()?;
+    let status = instance.simple(Simple::Terminate)?;
+    session.note(format!("Terminate returned {status}"));
+    if status.is_ok() {
+        instance.free()?;
     }
     Ok(())
 }

@@ -1,11 +1,12 @@
 //! What only FMI 3.0 has: aliases with display units, clocked states.
 
 use super::xml::with_description;
-use super::{Subject, Verdict};
+use crate::check::Verdict;
+use crate::fmu_file::FmuFile;
 
 /// From the elements: what only clocked FMUs have is no part of the description that is read.
-pub(super) fn clocked_states(subject: &Subject) -> Verdict {
-    let Some(root) = subject.root() else { return Verdict::NotDetermined("the description is no XML".into()) };
+pub(super) fn clocked_states(fmu: &FmuFile) -> Verdict {
+    let Some(root) = fmu.root() else { return Verdict::NotDetermined("the description is not well-formed XML".into()) };
     let variables = || root.child("ModelVariables").map_or(&[][..], |list| &list.children).iter();
     let find = |reference: &str| variables().find(|v| v.get("valueReference") == Some(reference));
     let states: Vec<_> = root.child("ModelStructure").into_iter().flat_map(|s| s.all("ClockedState")).collect();
@@ -22,7 +23,7 @@ pub(super) fn clocked_states(subject: &Subject) -> Verdict {
         let name = v.get("name").unwrap_or_default();
         if v.name == "Clock" || v.get("variability").is_some_and(|word| word != "discrete") || v.get("clocks").is_none()
         {
-            say(&format!("{name} is no discrete variable with clocks"));
+            say(&format!("{name} is not a discrete variable with clocks"));
         }
         match v.get("previous") {
             None => say(&format!("{name} has no attribute previous")),
@@ -33,7 +34,7 @@ pub(super) fn clocked_states(subject: &Subject) -> Verdict {
                     say(&format!("previous of {name} is itself, an input, or does not exist"));
                 }
                 if taken.contains(&previous) {
-                    say(&format!("previous of {name} is that of another one"));
+                    say(&format!("another clocked state has the same previous as {name}"));
                 }
                 taken.push(previous);
             }
@@ -42,19 +43,21 @@ pub(super) fn clocked_states(subject: &Subject) -> Verdict {
     Verdict::of(findings)
 }
 
-pub(super) fn alias_units(subject: &Subject) -> Verdict {
-    with_description(subject, |d| {
+pub(super) fn alias_units(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
         let mut findings = Vec::new();
         for v in &d.variables {
             for alias in &v.aliases {
                 let Some(display) = &alias.display_unit else { continue };
                 let unit = v.unit.as_deref().and_then(|unit| d.unit(unit));
                 if !v.base.is_float() {
-                    findings
-                        .push(format!("line {}: the alias {} of a {} has a display unit", v.line, alias.name, v.base));
+                    findings.push(format!(
+                        "line {}: the alias {} of a {} variable has a display unit",
+                        v.line, alias.name, v.base
+                    ));
                 } else if !unit.is_some_and(|unit| unit.display_units.iter().any(|u| u.name == *display)) {
                     findings.push(format!(
-                        "line {}: the alias {} has the display unit {display}, which {} has not",
+                        "line {}: the alias {} has the display unit {display}, which {} does not define",
                         v.line,
                         alias.name,
                         v.unit.as_deref().unwrap_or("a variable without unit")

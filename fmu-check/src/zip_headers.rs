@@ -3,8 +3,8 @@
 use flate2::bufread::DeflateDecoder;
 use std::io::Read;
 
-/// Most entries that are looked at.
-const MOST: usize = 100_000;
+/// Most entries that are read.
+const MAX_ENTRIES: usize = 100_000;
 
 /// One header, local or central.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -66,16 +66,16 @@ fn slice(bytes: &[u8], at: usize, len: usize) -> Option<Vec<u8>> {
 impl Archive {
     /// Reads the directory of an archive.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
-        let end = end_record(bytes).ok_or("not a ZIP archive: it has no end record; or it is cut short")?;
-        let cut = || "the end record is cut short".to_owned();
-        let field = |at| u16_at(bytes, end + at).ok_or_else(cut);
+        let end = end_record(bytes).ok_or("not a ZIP archive, or truncated: it has no end record")?;
+        let truncated = || "the end record is truncated".to_owned();
+        let field = |at| u16_at(bytes, end + at).ok_or_else(truncated);
         let split = [4, 6].iter().try_fold(false, |any, at| Ok::<_, String>(any || field(*at)? != 0))?;
         let count = usize::from(field(10)?);
-        let offset = u32_at(bytes, end + 16).ok_or_else(cut)?;
+        let offset = u32_at(bytes, end + 16).ok_or_else(truncated)?;
         let zip64 = (end >= 20 && u32_at(bytes, end - 20) == Some(0x0706_4b50)) || count == 0xffff;
         let mut at = usize::try_from(offset).map_err(|e| e.to_string())?;
         let mut entries = Vec::new();
-        while entries.len() < count && entries.len() < MOST {
+        while entries.len() < count && entries.len() < MAX_ENTRIES {
             let entry = entry(bytes, &mut at)
                 .ok_or_else(|| format!("entry {} of {count} in the directory cannot be read", entries.len() + 1))?;
             entries.push(entry);
@@ -155,7 +155,7 @@ pub(super) fn contents(bytes: &[u8], entry: &Entry, limit: u64) -> Result<Vec<u8
     }
     let packed = usize::try_from(entry.central.packed).map_err(|e| e.to_string())?;
     let end = entry.start.checked_add(packed).filter(|&end| end <= bytes.len());
-    let data = end.map(|end| &bytes[entry.start..end]).ok_or_else(|| format!("{name}: its data are cut short"))?;
+    let data = end.map(|end| &bytes[entry.start..end]).ok_or_else(|| format!("{name}: its data are truncated"))?;
     let mut out = Vec::new();
     match entry.central.method {
         0 => out.extend_from_slice(&data[..data.len().min(usize::try_from(limit).unwrap_or(usize::MAX))]),
@@ -163,7 +163,7 @@ pub(super) fn contents(bytes: &[u8], entry: &Entry, limit: u64) -> Result<Vec<u8
             let mut inflated = DeflateDecoder::new(data).take(limit);
             inflated.read_to_end(&mut out).map_err(|e| format!("{name}: {e}"))?;
         }
-        other => return Err(format!("{name}: the compression method {other} is not known")),
+        other => return Err(format!("{name}: the compression method {other} is not supported")),
     }
     if out.len() as u64 >= limit {
         return Err(format!("{name}: unpacks to {limit} bytes or more"));
@@ -181,6 +181,6 @@ pub(super) fn contents(bytes: &[u8], entry: &Entry, limit: u64) -> Result<Vec<u8
 }
 
 /// Whether a name stays below the folder that it is joined to, on every system.
-pub(super) fn inside(name: &str) -> bool {
+pub(super) fn is_inside(name: &str) -> bool {
     !name.contains(['\\', ':', '\0']) && !name.starts_with('/') && name.split('/').all(|part| part != "..")
 }

@@ -1,21 +1,23 @@
 //! Manifests of layered standards (FMI 3.0.2, 2.5.1.6).
 
-use super::{Subject, Verdict};
+use crate::check::Verdict;
+use crate::fmu_file::FmuFile;
+use crate::zip_headers::contents;
 use model_description::Element;
 
 /// Namespace of the attributes of a manifest.
 const NAMESPACE: &str = "http://fmi-standard.org/fmi-ls-manifest";
 const ATTRIBUTES: [&str; 3] = ["fmi-ls-name", "fmi-ls-version", "fmi-ls-description"];
 
-pub(super) fn manifests(subject: &Subject) -> Verdict {
+pub(super) fn manifests(fmu: &FmuFile) -> Verdict {
     let (mut findings, mut any) = (Vec::new(), false);
-    for entry in &subject.zip.entries {
+    for entry in &fmu.zip.entries {
         let name = entry.name();
         if !name.starts_with("extra/") || !name.ends_with("/fmi-ls-manifest.xml") {
             continue;
         }
         any = true;
-        let text = super::zip::contents(&subject.bytes, entry, 16 << 20);
+        let text = contents(&fmu.bytes, entry, 16 << 20);
         let text = text.and_then(|t| String::from_utf8(t).map_err(|_| "is not UTF-8".to_owned()));
         match text.and_then(|t| Element::parse(&t).map_err(|e| e.to_string())) {
             Err(cause) => findings.push(format!("{name}: {cause}")),
