@@ -1,19 +1,53 @@
 //! FMI 3.0 for co-simulation, called without event mode and early return (FMI 3.0.2, chapters 2.2 and 4.2).
 
-mod functions;
-
-pub(super) use functions::Functions;
-
-use crate::abi::Loaded;
-use crate::abi::log::{Log, Status, copy_text};
+use super::Loaded;
+use super::library::symbols;
+use super::log::{Log, Status, copy_text};
+use super::shared::{SharedInstance, missing};
+use super::signatures::v3::{DoStep, EnterInitializationMode, Get, InstantiateCoSimulation, Set, SetDebugLogging};
 use crate::standard::{Experiment, Outcome, Refusal, Standard, judge, misfit, narrow};
 use crate::value::Values;
-use functions::{Component, Get, Set, Simple};
 use model_description::BaseType;
 use std::ffi::{CString, c_char, c_void};
 use std::ops::ControlFlow;
 use std::ptr;
 use std::sync::Arc;
+
+symbols! {
+    /// The functions of FMI 3.0 that this importer calls and FMI 2.0 does not have with the same type.
+    Functions {
+        instantiate: "fmi3InstantiateCoSimulation" = InstantiateCoSimulation,
+        enter: "fmi3EnterInitializationMode" = EnterInitializationMode,
+        get_float64: "fmi3GetFloat64" = Get<f64>,
+        set_float64: "fmi3SetFloat64" = Set<f64>,
+        do_step: "fmi3DoStep" = DoStep,
+        ;
+        // The standard requires all of these; a call reports one that an FMU omits.
+        get_float32: "fmi3GetFloat32" = Get<f32>,
+        set_float32: "fmi3SetFloat32" = Set<f32>,
+        get_int8: "fmi3GetInt8" = Get<i8>,
+        set_int8: "fmi3SetInt8" = Set<i8>,
+        get_uint8: "fmi3GetUInt8" = Get<u8>,
+        set_uint8: "fmi3SetUInt8" = Set<u8>,
+        get_int16: "fmi3GetInt16" = Get<i16>,
+        set_int16: "fmi3SetInt16" = Set<i16>,
+        get_uint16: "fmi3GetUInt16" = Get<u16>,
+        set_uint16: "fmi3SetUInt16" = Set<u16>,
+        get_int32: "fmi3GetInt32" = Get<i32>,
+        set_int32: "fmi3SetInt32" = Set<i32>,
+        get_uint32: "fmi3GetUInt32" = Get<u32>,
+        set_uint32: "fmi3SetUInt32" = Set<u32>,
+        get_int64: "fmi3GetInt64" = Get<i64>,
+        set_int64: "fmi3SetInt64" = Set<i64>,
+        get_uint64: "fmi3GetUInt64" = Get<u64>,
+        set_uint64: "fmi3SetUInt64" = Set<u64>,
+        get_boolean: "fmi3GetBoolean" = Get<u8>,
+        set_boolean: "fmi3SetBoolean" = Set<u8>,
+        get_string: "fmi3GetString" = Get<*const c_char>,
+        set_string: "fmi3SetString" = Set<*const c_char>,
+        set_debug_logging: "fmi3SetDebugLogging" = SetDebugLogging,
+    }
+}
 
 unsafe extern "C" fn log_message(
     environment: *mut c_void,
@@ -27,16 +61,17 @@ unsafe extern "C" fn log_message(
 
 /// An instance.
 pub(super) struct Instance {
+    // First, so that the instance is freed while the library is still there.
+    shared: SharedInstance,
     functions: Arc<Loaded<Functions>>,
-    component: Component,
-    /// FMI 3.0 hears of the times on entering initialisation mode.
+    /// FMI 3.0 receives the times on entering initialization mode.
     experiment: Experiment,
 }
 
 /// Borrows a function that may be missing.
 macro_rules! function {
     ($self:ident.$field:ident, $name:literal) => {
-        $self.functions.api.$field.ok_or_else(|| Refusal::Impossible(format!("the function {} is missing", $name)))?
+        $self.functions.api.$field.ok_or_else(|| missing($name))?
     };
 }
 
@@ -62,30 +97,27 @@ impl Instance {
                 ptr::null(),
                 0,
                 log.environment(),
-                log_message,
+                Some(log_message),
                 ptr::null(),
             )
         };
         if component.is_null() {
             return Err(Refusal::Null("fmi3InstantiateCoSimulation"));
         }
-        Ok(Self { functions, component, experiment: Experiment { start: 0.0, stop: None, tolerance: None } })
-    }
-
-    fn simple(&self, name: &'static str, function: Simple) -> Outcome {
-        // SAFETY: the component is alive.
-        judge(name, unsafe { function(self.component) })
+        // SAFETY: the instance is of this library, which `functions` keeps loaded.
+        let shared = unsafe { SharedInstance::new(&functions.shared, component) };
+        Ok(Self { shared, functions, experiment: Experiment { start: 0.0, stop: None, tolerance: None } })
     }
 
     fn get_all<T: Clone>(&self, name: &'static str, f: Get<T>, reference: u32, mut values: Vec<T>) -> Outcome<Vec<T>> {
-        // SAFETY: the component is alive; one reference, and room for as many values as said.
-        let status = unsafe { f(self.component, &raw const reference, 1, values.as_mut_ptr(), values.len()) };
+        // SAFETY: the instance is alive; one reference, and room for as many values as said.
+        let status = unsafe { f(self.shared.pointer, &raw const reference, 1, values.as_mut_ptr(), values.len()) };
         judge(name, status).map(|()| values)
     }
 
     fn set_all<T>(&self, name: &'static str, f: Set<T>, reference: u32, values: &[T]) -> Outcome {
-        // SAFETY: the component is alive; one reference, as many values as said.
-        judge(name, unsafe { f(self.component, &raw const reference, 1, values.as_ptr(), values.len()) })
+        // SAFETY: the instance is alive; one reference, as many values as said.
+        judge(name, unsafe { f(self.shared.pointer, &raw const reference, 1, values.as_ptr(), values.len()) })
     }
 }
 
@@ -103,7 +135,7 @@ macro_rules! by_integer_type {
             $(BaseType::$variant => {
                 let $name = concat!("fmi3", $direction, $suffix);
                 let $function = $self.functions.api.$field
-                    .ok_or_else(|| Refusal::Impossible(format!("the function {} is missing", $name)))?;
+                    .ok_or_else(|| missing($name))?;
                 $body
             })*
             _ => $other,
@@ -116,17 +148,21 @@ fn wide<T: Into<i128>>(values: Vec<T>) -> Values {
 }
 
 impl Standard for Instance {
+    fn shared(&mut self) -> &mut SharedInstance {
+        &mut self.shared
+    }
+
     fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         let (n, api) = (references.len().min(values.len()), &self.functions.api);
-        // SAFETY: the component is alive; both slices have at least n elements.
-        let status = unsafe { (api.get_float64)(self.component, references.as_ptr(), n, values.as_mut_ptr(), n) };
+        // SAFETY: the instance is alive; both slices have at least n elements.
+        let status = unsafe { (api.get_float64)(self.shared.pointer, references.as_ptr(), n, values.as_mut_ptr(), n) };
         judge("fmi3GetFloat64", status)
     }
 
     fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
         let (n, api) = (references.len().min(values.len()), &self.functions.api);
         // SAFETY: as above.
-        let status = unsafe { (api.set_float64)(self.component, references.as_ptr(), n, values.as_ptr(), n) };
+        let status = unsafe { (api.set_float64)(self.shared.pointer, references.as_ptr(), n, values.as_ptr(), n) };
         judge("fmi3SetFloat64", status)
     }
 
@@ -191,8 +227,8 @@ impl Standard for Instance {
 
     fn set_debug_logging(&mut self, on: bool) -> Outcome {
         let function = function!(self.set_debug_logging, "fmi3SetDebugLogging");
-        // SAFETY: the component is alive; no categories, so no array.
-        judge("fmi3SetDebugLogging", unsafe { function(self.component, on, 0, ptr::null()) })
+        // SAFETY: the instance is alive; no categories, so no array.
+        judge("fmi3SetDebugLogging", unsafe { function(self.shared.pointer, on, 0, ptr::null()) })
     }
 
     fn setup(&mut self, experiment: Experiment) -> Outcome {
@@ -203,23 +239,19 @@ impl Standard for Instance {
     fn enter_initialization(&mut self) -> Outcome {
         let (x, enter) = (self.experiment, self.functions.api.enter);
         let (tolerance, stop) = (x.tolerance.unwrap_or(0.0), x.stop.unwrap_or(0.0));
-        // SAFETY: the component is alive.
+        // SAFETY: the instance is alive.
         let status =
-            unsafe { enter(self.component, x.tolerance.is_some(), tolerance, x.start, x.stop.is_some(), stop) };
+            unsafe { enter(self.shared.pointer, x.tolerance.is_some(), tolerance, x.start, x.stop.is_some(), stop) };
         judge("fmi3EnterInitializationMode", status)
-    }
-
-    fn exit_initialization(&mut self) -> Outcome {
-        self.simple("fmi3ExitInitializationMode", self.functions.api.exit)
     }
 
     fn do_step(&mut self, t: f64, h: f64) -> Outcome<ControlFlow<()>> {
         let (mut event, mut terminate, mut early, mut last) = (0, 0, 0, t);
-        // SAFETY: the component is alive, there is room for each result. "No set state before this point" is false: a
+        // SAFETY: the instance is alive, there is room for each result. "No set state before this point" is false: a
         // state may be set at any time.
         let status = unsafe {
             (self.functions.api.do_step)(
-                self.component,
+                self.shared.pointer,
                 t,
                 h,
                 false,
@@ -231,63 +263,5 @@ impl Standard for Instance {
         };
         judge("fmi3DoStep", status)?;
         Ok(if terminate == 0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) })
-    }
-
-    fn terminate(&mut self) -> Outcome {
-        self.simple("fmi3Terminate", self.functions.api.terminate)
-    }
-
-    fn reset(&mut self) -> Outcome {
-        self.simple("fmi3Reset", self.functions.api.reset)
-    }
-
-    fn get_state(&mut self) -> Outcome<*mut c_void> {
-        let (function, mut state) = (function!(self.get_state, "fmi3GetFMUState"), ptr::null_mut());
-        // SAFETY: the component is alive; a null state asks for a new one.
-        judge("fmi3GetFMUState", unsafe { function(self.component, &raw mut state) }).map(|()| state)
-    }
-
-    fn set_state(&mut self, state: *mut c_void) -> Outcome {
-        let function = function!(self.set_state, "fmi3SetFMUState");
-        // SAFETY: the component is alive; the facade only passes states that it got and has not freed.
-        judge("fmi3SetFMUState", unsafe { function(self.component, state) })
-    }
-
-    fn free_state(&mut self, mut state: *mut c_void) -> Outcome {
-        let function = function!(self.free_state, "fmi3FreeFMUState");
-        // SAFETY: as above; the facade forgets the state.
-        judge("fmi3FreeFMUState", unsafe { function(self.component, &raw mut state) })
-    }
-
-    fn serialize(&mut self, state: *mut c_void) -> Outcome<Vec<u8>> {
-        let size_of = function!(self.state_size, "fmi3SerializedFMUStateSize");
-        let function = function!(self.serialize, "fmi3SerializeFMUState");
-        let mut size = 0;
-        // SAFETY: the component and the state are alive, there is room for the size.
-        judge("fmi3SerializedFMUStateSize", unsafe { size_of(self.component, state, &raw mut size) })?;
-        let mut bytes = vec![0_u8; size];
-        // SAFETY: as above; the buffer has the size that the FMU asked for.
-        let status = unsafe { function(self.component, state, bytes.as_mut_ptr(), size) };
-        judge("fmi3SerializeFMUState", status).map(|()| bytes)
-    }
-
-    fn deserialize(&mut self, bytes: &[u8]) -> Outcome<*mut c_void> {
-        let (function, mut state) = (function!(self.deserialize, "fmi3DeserializeFMUState"), ptr::null_mut());
-        // SAFETY: the component is alive, the bytes are as many as said.
-        let status = unsafe { function(self.component, bytes.as_ptr(), bytes.len(), &raw mut state) };
-        judge("fmi3DeserializeFMUState", status).map(|()| state)
-    }
-
-    fn abandon(&mut self) {
-        self.component = ptr::null_mut();
-    }
-}
-
-impl Drop for Instance {
-    fn drop(&mut self) {
-        if !self.component.is_null() {
-            // SAFETY: the component is alive, and nobody uses it after this.
-            unsafe { (self.functions.api.free)(self.component) };
-        }
     }
 }
