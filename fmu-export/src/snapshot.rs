@@ -1,4 +1,4 @@
-//! All that changes in an instance, as one plain value: what an FMU state saves.
+//! Everything that changes in an instance, as one plain value that an FMU state saves.
 
 use crate::lifecycle::{Life, State};
 use crate::message;
@@ -16,10 +16,10 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// Judges the times.
+    /// Checks the times.
     ///
     /// # Errors
-    /// Says which time is not finite, or that the stop is not after the start.
+    /// A time is not finite, or the stop time is not after the start time.
     pub fn new(start: f64, stop: Option<f64>) -> Result<Self, Fault> {
         if !start.is_finite() {
             return Err(Fault::value("startTime", start, "any finite number"));
@@ -36,7 +36,7 @@ impl Experiment {
 /// Model, outputs, time and state of the lifecycle.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
-pub struct Saved<M: Model> {
+pub struct Snapshot<M: Model> {
     /// State of the lifecycle.
     pub life: Life,
     /// Set by `SetupExperiment` or `EnterInitializationMode`.
@@ -45,13 +45,13 @@ pub struct Saved<M: Model> {
     pub elapsed: Elapsed,
     /// End of the last step as the importer computes it, `t + h`; before the first step the start time.
     pub end: f64,
-    /// Something was set that the model has not seen yet: before the start everything, afterwards tunable parameters.
+    /// The model has not processed a set call yet: before the start of any variable, afterwards of a tunable parameter.
     pub dirty: bool,
     /// The model and its outputs.
     pub block: Block<M>,
 }
 
-impl<M: Model> Default for Saved<M> {
+impl<M: Model> Default for Snapshot<M> {
     fn default() -> Self {
         Self {
             life: Life::default(),
@@ -64,7 +64,7 @@ impl<M: Model> Default for Saved<M> {
     }
 }
 
-impl<M: Model> Clone for Saved<M> {
+impl<M: Model> Clone for Snapshot<M> {
     fn clone(&self) -> Self {
         Self { block: self.block.clone(), ..*self }
     }
@@ -79,7 +79,7 @@ impl<M: Model> Clone for Saved<M> {
     }
 }
 
-impl<M: Model> Saved<M> {
+impl<M: Model> Snapshot<M> {
     /// Every value that the importer sets is one that it could have set, and no other is NaN.
     ///
     /// # Errors
@@ -114,11 +114,11 @@ impl<M: Model> Saved<M> {
         Ok(model)
     }
 
-    /// Time is what a simulation can have reached: the sum of the steps fits the importer's own time, which rounding can
-    /// at most double where a step is as short as the last digit of the time.
+    /// Checks that a simulation can reach this time: the sum of the steps matches the importer's own time, which rounding can at
+    /// most double if a step is as short as the last digit of the time.
     ///
     /// # Errors
-    /// Says what does not fit.
+    /// Names the time and the state of the lifecycle that contradict each other.
     pub fn check_time(&self) -> Result<(), Fault> {
         let start = self.experiment.map_or(M::INFO.experiment.start, |e| e.start);
         let (elapsed, since) = (self.elapsed.seconds(), self.end - start);
