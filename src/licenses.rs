@@ -1,4 +1,4 @@
-//! The licences of an FMU and of the crates linked into it.
+//! The licenses of an FMU and of the crates linked into it.
 
 use crate::workspace::{Package, Workspace};
 use fmu_core::Description;
@@ -9,8 +9,8 @@ use std::path::Path;
 
 /// Licences to pack with an FMU.
 #[derive(Clone, Debug, Default)]
-pub struct Licences {
-    /// Texts of the workspace's own licence.
+pub struct Licenses {
+    /// Texts of the workspace's own license.
     own: Vec<String>,
     /// What is linked into the binary; `None` when that is not known.
     crates: Option<Vec<Crate>>,
@@ -20,12 +20,12 @@ pub struct Licences {
 struct Crate {
     name: String,
     version: String,
-    licence: String,
+    license: String,
     source: String,
     texts: Vec<String>,
 }
 
-impl Licences {
+impl Licenses {
     /// Of what is linked into the library of a package.
     pub fn of_package(workspace: &Workspace, package: &str) -> Self {
         let linked = workspace.linked(package);
@@ -45,7 +45,7 @@ impl Licences {
         let Some(crates) = &self.crates else { return out };
         let _ = writeln!(out, "{RULE}\nThe binary contains these Rust crates and parts of Rust's standard library.\n");
         for c in crates {
-            let _ = writeln!(out, "{} {}: {}  {}", c.name, c.version, c.licence, c.source);
+            let _ = writeln!(out, "{} {}: {}  {}", c.name, c.version, c.license, c.source);
         }
         let _ = writeln!(out, "std (Rust's standard library): MIT OR Apache-2.0  https://github.com/rust-lang/rust");
         // Many crates share one text.
@@ -70,12 +70,12 @@ impl Licences {
              DocumentNamespace: https://spdx.org/spdxdocs/{name}-{version}-{id}\nCreator: Tool: {}\nCreated: {date}\n\n",
             crate::pack::TOOL.replace(' ', "-"),
         );
-        let mut package = |id: &str, name: &str, version: &str, licence: &str, source: &str, copyright: &str| {
+        let mut package = |id: &str, name: &str, version: &str, license: &str, source: &str, copyright: &str| {
             // Writing to a String does not fail.
             let _ = write!(
                 out,
                 "PackageName: {name}\nSPDXID: SPDXRef-{id}\nPackageVersion: {version}\nPackageDownloadLocation: {source}\n\
-                 FilesAnalyzed: false\nPackageLicenseConcluded: {licence}\nPackageLicenseDeclared: {licence}\n\
+                 FilesAnalyzed: false\nPackageLicenseConcluded: {license}\nPackageLicenseDeclared: {license}\n\
                  PackageCopyrightText: {copyright}\n",
             );
             let relation = if id == "FMU" { "SPDXRef-DOCUMENT DESCRIBES" } else { "SPDXRef-FMU CONTAINS" };
@@ -84,11 +84,11 @@ impl Licences {
         package("FMU", name, version, license, "NOASSERTION", &format!("<text>{copyright}</text>"));
         for c in self.crates.iter().flatten() {
             // "MIT/Apache-2.0" is an old spelling of Cargo's.
-            let licence = c.licence.replace('/', " OR ");
+            let license = c.license.replace('/', " OR ");
             let source = if c.source.is_empty() { "NOASSERTION" } else { &c.source };
             let id =
                 format!("{}-{}", c.name, c.version).replace(|x: char| !(x.is_ascii_alphanumeric() || x == '.'), "-");
-            package(&id, &c.name, &c.version, &licence, source, "NOASSERTION");
+            package(&id, &c.name, &c.version, &license, source, "NOASSERTION");
         }
         out
     }
@@ -98,15 +98,15 @@ const RULE: &str = "------------------------------------------------------------
 
 impl Crate {
     fn of(package: &Package, own: bool) -> Self {
-        let licence = package.license.clone().unwrap_or_else(|| "see its text".into());
-        let texts = if own { Vec::new() } else { texts_in(package.folder(), &licence) };
+        let license = package.license.clone().unwrap_or_else(|| "see its text".into());
+        let texts = if own { Vec::new() } else { texts_in(package.folder(), &license) };
         let source = package.repository.clone().unwrap_or_default();
-        Self { name: package.name.clone(), version: package.version.clone(), licence, source, texts }
+        Self { name: package.name.clone(), version: package.version.clone(), license, source, texts }
     }
 }
 
-/// The texts of licences and notices in a folder; where MIT is one of the choices and has a file, that one only.
-fn texts_in(folder: &Path, licence: &str) -> Vec<String> {
+/// The texts of licenses and notices in a folder; where MIT is one of the choices and has a file, that one only.
+fn texts_in(folder: &Path, license: &str) -> Vec<String> {
     let is_text =
         |name: &str| ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"].iter().any(|n| name.starts_with(n));
     let mut files: Vec<(String, String)> = fs::read_dir(folder)
@@ -119,7 +119,7 @@ fn texts_in(folder: &Path, licence: &str) -> Vec<String> {
         .filter_map(|(name, path)| Some((name, fs::read_to_string(path).ok()?.replace("\r\n", "\n"))))
         .collect();
     files.sort();
-    let by_mit = licence.contains(" OR ") || licence.contains('/');
+    let by_mit = license.contains(" OR ") || license.contains('/');
     if by_mit && files.iter().any(|(name, _)| name.contains("MIT")) {
         files.retain(|(name, _)| name.contains("MIT") || name.starts_with("NOTICE"));
     }
