@@ -8,7 +8,7 @@ mod timing;
 use drive::SensorlessController;
 use fmu_core::Model;
 use fmu_export::abi::types::{Fmi2Boolean, FmuState, Instance, c_int};
-use fmu_export::saved::Saved;
+use fmu_export::snapshot::Snapshot;
 use std::ffi::CString;
 use std::hint::black_box;
 use std::ptr::{null, null_mut};
@@ -39,7 +39,7 @@ fn main() {
         let restored = time(|| restore(it, black_box(state)));
         assert_eq!(fmi::fmi2FreeFMUstate(it, &raw mut state), 0);
         fmi::fmi2FreeInstance(it);
-        let size = size_of::<Saved<SensorlessController>>();
+        let size = size_of::<Snapshot<SensorlessController>>();
         println!(
             "a state of {size} bytes: saved in {saved:.0} ns, restored in {restored:.0} ns; a step of the controller takes \
              {step:.0} ns, {:.2} times as long as both; goal: 200 ns each",

@@ -28,7 +28,7 @@ struct ArtifactTarget {
     crate_types: Vec<String>,
 }
 
-/// Compiles the cdylibs of these packages, optimised, in a target folder of its own (a `cargo` that waits for this program
+/// Compiles the cdylibs of these packages, optimized, in a target folder of its own (a `cargo` that waits for this program
 /// holds the usual one). Paths of this machine stay out of the binaries, so that builds at two places agree byte for byte.
 ///
 /// # Errors
@@ -79,7 +79,7 @@ fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target
     build.env("CARGO_ENCODED_RUSTFLAGS", flags(&workspace.root, target));
     // A panic becomes a status at the C interface, whatever the workspace asks for its programs.
     build.env("CARGO_PROFILE_RELEASE_PANIC", "unwind");
-    // The whole library optimised as one, and no names in it beside those exported: unless the caller says otherwise.
+    // The whole library optimized as one, and no names in it beside those exported: unless the caller says otherwise.
     for (setting, value) in [("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "symbols")] {
         let name = format!("CARGO_PROFILE_RELEASE_{setting}");
         if env::var_os(&name).is_none() {

@@ -66,7 +66,7 @@ mod tests {
     use fmu_core::Model;
 
     #[test]
-    fn a_picture_has_the_size_and_the_colours_of_its_svg() {
+    fn a_picture_has_the_size_and_the_colors_of_its_svg() {
         let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" width="3" height="2"><path fill="#ff0007" d="M1 0h1v2h-1z"/></svg>"##;
         let map = Pixmap::decode_png(&png(svg).unwrap()).unwrap();
         let pixels: Vec<_> = map.pixels().iter().map(|p| [p.red(), p.green(), p.blue(), p.alpha()]).collect();

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 /// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.
 ///
-/// Exit status: 0 when all is well, 1 when a simulation, a compiler or a check failed, 2 for bad usage or a bad file.
+/// Exit status: 0 on success, 1 if a simulation, a compiler or a check fails, 2 for wrong usage or an unusable file.
 #[derive(Debug, Parser)]
 #[command(name = "fmu", version)]
 struct Cli {
@@ -28,7 +28,7 @@ enum Command {
     Tune(tune::Tune),
     Ssp(ssp::Ssp),
     #[command(hide = true)]
-    Probe(probe::Probe),
+    Probe(probe::ProbeArguments),
 }
 
 fn main() -> ExitCode {

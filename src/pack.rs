@@ -1,7 +1,7 @@
 //! The archive of an FMU: what is in it, and writing it so that the same contents give the same bytes.
 
 use crate::documentation;
-use crate::licences::Licences;
+use crate::licenses::Licenses;
 use anyhow::{Context, Result};
 use fmu_core::Description;
 use fmu_import::platform::Platform;
@@ -86,7 +86,7 @@ impl Moment {
 pub fn contents(
     description: &Description,
     binaries: &[(Platform, Vec<u8>)],
-    licences: &Licences,
+    licenses: &Licenses,
     version: FmiVersion,
     moment: Moment,
 ) -> BTreeMap<String, Entry> {
@@ -94,10 +94,10 @@ pub fn contents(
     let mut files = BTreeMap::from([
         ("modelDescription.xml".into(), Entry::text(model_description::write(description, version, &generation))),
         ("documentation/index.html".into(), Entry::text(documentation::page(description, version))),
-        ("documentation/licenses/license.txt".into(), Entry::text(licences.text(description))),
+        ("documentation/licenses/license.txt".into(), Entry::text(licenses.text(description))),
     ]);
     if version == FmiVersion::V3 {
-        let spdx = licences.spdx(description, &generation.date_and_time);
+        let spdx = licenses.spdx(description, &generation.date_and_time);
         files.insert("documentation/licenses/license.spdx".into(), Entry::text(spdx));
     }
     for (platform, bytes) in binaries {

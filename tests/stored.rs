@@ -10,7 +10,7 @@ use fmu_core::{Block, Model};
 use fmu_export::instance::Instance;
 use fmu_export::lifecycle::{Standard, State};
 use fmu_export::log::{Log, Sink, Status};
-use fmu_export::saved::Saved;
+use fmu_export::snapshot::Snapshot;
 use fmu_export::{blob, registry};
 use std::cell::Cell;
 use std::mem::MaybeUninit;
@@ -63,13 +63,13 @@ fn watch(name: &'static str) -> Arc<AtomicU64> {
     let trial = Arc::new(AtomicU64::new(0));
     let seen = Arc::downgrade(&trial);
     std::thread::spawn(move || {
-        let (mut last, mut since) = (0, Instant::now());
-        while let Some(now) = seen.upgrade().map(|trial| trial.load(Relaxed)) {
-            if now != last {
-                (last, since) = (now, Instant::now());
+        let (mut last, mut since) = (0, Instant::current());
+        while let Some(current) = seen.upgrade().map(|trial| trial.load(Relaxed)) {
+            if current != last {
+                (last, since) = (current, Instant::current());
             }
             if since.elapsed() > PATIENCE {
-                eprintln!("{name}: trial {now} hangs");
+                eprintln!("{name}: trial {current} hangs");
                 std::process::abort();
             }
             std::thread::sleep(Duration::from_millis(100));
@@ -78,46 +78,46 @@ fn watch(name: &'static str) -> Arc<AtomicU64> {
     trial
 }
 
-fn instance<M: Model>(now: Saved<M>) -> Instance<M> {
-    Instance::new(Standard::Fmi3, "stored".into(), Log::new(Box::new(Silent), false), now)
+fn instance<M: Model>(current: Snapshot<M>) -> Instance<M> {
+    Instance::new(Standard::Fmi3, "stored".into(), Log::new(Box::new(Silent), false), current)
 }
 
 /// Sets the variable `name`, if the model has it.
-fn put<M: Model>(now: &mut Saved<M>, name: &str, value: f64) {
+fn put<M: Model>(current: &mut Snapshot<M>, name: &str, value: f64) {
     let index = (0..M::TABLE.len()).find(|&i| M::TABLE.locate(i).is_some_and(|(n, ..)| n == name));
-    if let Some((_, fmu_core::Slot::Real(x))) = index.and_then(|i| M::TABLE.entry(&mut now.block, i)) {
+    if let Some((_, fmu_core::Slot::Real(x))) = index.and_then(|i| M::TABLE.entry(&mut current.block, i)) {
         *x = value;
     }
 }
 
 /// Ends initialisation as the gate would.
-fn exit<M: Model>(it: &mut Instance<M>) -> bool {
-    let done = it.exit_initialisation().is_ok();
-    it.now.life.after(done, Some(State::Step));
+fn exit<M: Model>(instance: &mut Instance<M>) -> bool {
+    let done = instance.exit_initialization().is_ok();
+    instance.current.life.after(done, Some(State::Step));
     done
 }
 
 /// Bytes of a block in every state of its life.
 fn seeds<M: Model>(block: Block<M>) -> Vec<Vec<u8>> {
-    let mut it = instance(Saved { block, ..Saved::default() });
-    let mut seeds = vec![blob::write(&it.now).unwrap()];
-    it.set_up(0.5, Some(1e3)).unwrap();
-    it.now.life.after(true, Some(State::Initialization));
-    seeds.push(blob::write(&it.now).unwrap());
-    assert!(exit(&mut it));
+    let mut instance = instance(Snapshot { block, ..Snapshot::default() });
+    let mut seeds = vec![blob::write(&instance.current).unwrap()];
+    instance.set_up(0.5, Some(1e3)).unwrap();
+    instance.current.life.after(true, Some(State::Initialization));
+    seeds.push(blob::write(&instance.current).unwrap());
+    assert!(exit(&mut instance));
     for k in 0..400 {
         if [0, 1, 30].contains(&k) {
-            seeds.push(blob::write(&it.now).unwrap());
+            seeds.push(blob::write(&instance.current).unwrap());
         }
         for (name, value) in [("u_a", 20.0), ("u_b", -5.0), ("i_a", 1.0), ("i_b", -2.0), ("u_dc", 540.0)] {
-            put(&mut it.now, name, value);
+            put(&mut instance.current, name, value);
         }
-        put(&mut it.now, "speed_ref", 50.0);
-        it.do_step(it.now.end, H).unwrap();
+        put(&mut instance.current, "speed_ref", 50.0);
+        instance.do_step(instance.current.end, H).unwrap();
     }
-    seeds.push(blob::write(&it.now).unwrap());
-    it.now.life.after(true, Some(State::Terminated));
-    seeds.push(blob::write(&it.now).unwrap());
+    seeds.push(blob::write(&instance.current).unwrap());
+    instance.current.life.after(true, Some(State::Terminated));
+    seeds.push(blob::write(&instance.current).unwrap());
     seeds
 }
 
@@ -173,15 +173,15 @@ fn damaged(seeds: &[Vec<u8>], dice: &mut Dice) -> Vec<u8> {
 
 /// Gives the bytes back; whether they were taken, and for how long the longest step ran then.
 fn trial<M: Model>(bytes: &[u8]) -> Option<Duration> {
-    let mut it = instance::<M>(Saved::default());
-    let before = blob::write(&it.now).unwrap();
-    let handle = it.deserialise(bytes);
-    assert!(blob::write(&it.now).unwrap() == before, "the instance changed");
+    let mut instance = instance::<M>(Snapshot::default());
+    let before = blob::write(&instance.current).unwrap();
+    let handle = instance.deserialize(bytes);
+    assert!(blob::write(&instance.current).unwrap() == before, "the instance changed");
     let handle = handle.ok()?;
-    it.restore(handle).unwrap();
+    instance.restore(handle).unwrap();
     registry::free::<M>(handle).unwrap();
     assert!(
-        blob::read::<M>(&blob::write(&it.now).unwrap()).is_ok(),
+        blob::read::<M>(&blob::write(&instance.current).unwrap()).is_ok(),
         "a state that was taken is one that can be stored"
     );
     let references: Vec<u32> = (1..=u32::try_from(M::TABLE.len()).unwrap())
@@ -194,20 +194,20 @@ fn trial<M: Model>(bytes: &[u8]) -> Option<Duration> {
     // As at the gate: a panic is an error, after which no step is made.
     QUIET.set(true);
     let _ = catch_unwind(AssertUnwindSafe(|| {
-        if it.now.life.state() == State::Instantiated && it.set_up(0.0, None).is_ok() {
-            it.now.life.after(true, Some(State::Initialization));
+        if instance.current.life.state() == State::Instantiated && instance.set_up(0.0, None).is_ok() {
+            instance.current.life.after(true, Some(State::Initialization));
         }
-        if it.now.life.state() == State::Initialization && !exit(&mut it) {
+        if instance.current.life.state() == State::Initialization && !exit(&mut instance) {
             return;
         }
         for _ in 0..3 {
             let mut values = vec![MaybeUninit::uninit(); references.len()];
-            let _ = it.get::<f64>(&references, &mut values);
-            if it.now.life.state() != State::Step {
+            let _ = instance.get::<f64>(&references, &mut values);
+            if instance.current.life.state() != State::Step {
                 return;
             }
-            let began = Instant::now();
-            let done = it.do_step(it.now.end, H);
+            let began = Instant::current();
+            let done = instance.do_step(instance.current.end, H);
             longest = longest.max(began.elapsed());
             if done.is_err() {
                 return;

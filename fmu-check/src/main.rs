@@ -18,7 +18,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Hidden {
     #[command(hide = true)]
-    Probe(probe::Probe),
+    Probe(probe::ProbeArguments),
 }
 
 fn main() -> ExitCode {

@@ -1,6 +1,8 @@
 //! What `fmu check` tells: as text, JSON and HTML.
 
-use super::{Finding, GROUPS, Level, Subject, Verdict};
+use crate::check::{Finding, Level, Verdict};
+use crate::checks::GROUPS;
+use crate::fmu_file::FmuFile;
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -33,11 +35,11 @@ pub struct Counts {
 }
 
 impl Report {
-    pub(super) fn new(subject: &Subject, findings: Vec<Finding>) -> Self {
-        let description = subject.description.as_ref().ok();
+    pub(super) fn new(fmu: &FmuFile, findings: Vec<Finding>) -> Self {
+        let description = fmu.description.as_ref().ok();
         Self {
-            file: subject.path.display().to_string(),
-            fmi_version: subject.version.to_string(),
+            file: fmu.path.display().to_string(),
+            fmi_version: fmu.version.to_string(),
             model: description.map(|d| d.model_name.clone()),
             generation_tool: description.and_then(|d| d.generation_tool.clone()),
             findings,
@@ -109,7 +111,7 @@ impl Report {
             let passed = findings.iter().filter(|f| matches!(f.verdict, Verdict::Pass(_))).count();
             let _ = writeln!(out, "\n{title} ({passed} of {} passed)", findings.len());
             // What hinders a whole group is told once.
-            let mut told: Vec<&str> = Vec::new();
+            let mut shown_reasons: Vec<&str> = Vec::new();
             for f in &findings {
                 match &f.verdict {
                     Verdict::Pass(_) | Verdict::NotApplicable(_) if !verbose => {}
@@ -118,8 +120,8 @@ impl Report {
                         let ids: Vec<_> = findings.iter().filter(same).map(|f| f.id).collect();
                         if ids.len() == 1 {
                             line(&mut out, f);
-                        } else if !told.contains(&reason.as_str()) {
-                            told.push(reason);
+                        } else if !shown_reasons.contains(&reason.as_str()) {
+                            shown_reasons.push(reason);
                             let _ = writeln!(out, "  not determined: {}\n         - {reason}", ids.join(", "));
                         }
                     }
@@ -129,7 +131,7 @@ impl Report {
         }
         let _ = writeln!(out, "\n{}", self.summary());
         let end = match (self.conforms(), self.violated().count()) {
-            (true, 0) => "Nothing is violated.",
+            (true, 0) => "All requirements hold.",
             (true, _) => "No requirement of the standard (must) is violated.",
             (false, _) => "Requirements of the standard (must) are violated.",
         };
@@ -167,7 +169,7 @@ impl Report {
         for (title, findings) in self.groups() {
             let _ = writeln!(out, "<h2>{}</h2>\n<table>", escape(title));
             for f in findings {
-                let (word, evidence) = words(f);
+                let (word, evidence) = verdict_text(f);
                 let class = match &f.verdict {
                     Verdict::Violated(_) => format!("violated {}", level(f.level)),
                     Verdict::Pass(_) => "pass".into(),
@@ -201,7 +203,7 @@ pub(super) fn level(level: Level) -> &'static str {
 }
 
 /// The word for a verdict, and its evidence.
-fn words(finding: &Finding) -> (&'static str, Vec<&str>) {
+fn verdict_text(finding: &Finding) -> (&'static str, Vec<&str>) {
     match &finding.verdict {
         Verdict::Pass(evidence) => ("pass", evidence.iter().map(String::as_str).collect()),
         Verdict::Violated(evidence) => ("VIOLATED", evidence.iter().map(String::as_str).collect()),
@@ -211,21 +213,21 @@ fn words(finding: &Finding) -> (&'static str, Vec<&str>) {
 }
 
 /// Pieces of evidence in the text.
-const SHOWN: usize = 8;
+const MAX_EVIDENCE: usize = 8;
 
 fn line(out: &mut String, finding: &Finding) {
-    let (word, evidence) = words(finding);
+    let (word, evidence) = verdict_text(finding);
     let _ = writeln!(out, "  {:<6} {word} ({}): {}", finding.id, level(finding.level), finding.requirement);
     if matches!(finding.verdict, Verdict::Violated(_)) {
         let clause = finding.clause;
         let _ =
             writeln!(out, "         see {}{clause}", if clause.starts_with(char::is_numeric) { "FMI " } else { "" });
     }
-    for text in evidence.iter().take(SHOWN) {
+    for text in evidence.iter().take(MAX_EVIDENCE) {
         let _ = writeln!(out, "         - {}", text.lines().collect::<Vec<_>>().join(" "));
     }
-    if evidence.len() > SHOWN {
-        let _ = writeln!(out, "         - and {} more; --format json has them", evidence.len() - SHOWN);
+    if evidence.len() > MAX_EVIDENCE {
+        let _ = writeln!(out, "         - and {} more; --format json shows them", evidence.len() - MAX_EVIDENCE);
     }
 }
 

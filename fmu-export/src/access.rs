@@ -8,7 +8,7 @@ use fmu_core::description::TIME;
 use fmu_core::{Causality, Fault, Meta, Model, Slot, Variability};
 use std::mem::MaybeUninit;
 
-/// Values that a set remembers to take them back.
+/// Number of previous values that a set call keeps to undo a partial set.
 const SHORT: usize = 8;
 
 /// The table's index of a value reference; [`TIME`] becomes an index past every table.
@@ -27,7 +27,7 @@ fn open(meta: &Meta, state: State) -> bool {
     }
 }
 
-/// The variable that was found, if it can be set, now, to this value.
+/// The variable, if it can be set to this value in the current state.
 #[inline]
 fn settable<'a, T: Value>(
     found: Option<(&'static Meta, Slot<'a>)>,
@@ -38,7 +38,7 @@ fn settable<'a, T: Value>(
 }
 
 impl<M: Model> Instance<M> {
-    /// The variables' values, one after the other. In initialisation they fit what was set; later they are those of the
+    /// The variables' values, one after the other. In initialization they fit what was set; later they are those of the
     /// last step, inputs and tunable parameters as set.
     ///
     /// # Errors
@@ -61,7 +61,7 @@ impl<M: Model> Instance<M> {
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, place) in (0..count).zip(&mut places) {
                 let index = first.wrapping_add(offset);
-                match M::TABLE.entry(&mut self.now.block, index).and_then(|(meta, slot)| T::read(meta, &slot)) {
+                match M::TABLE.entry(&mut self.current.block, index).and_then(|(meta, slot)| T::read(meta, &slot)) {
                     Some(value) => place.write(value),
                     None => place.write(self.read_other(reference, index)?),
                 };
@@ -70,12 +70,12 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// What no variable of this type is: time, or a mistake.
+    /// The value of `time`, or an error: no variable of this type has the reference.
     #[cold]
     fn read_other<T: Value>(&mut self, reference: u32, index: usize) -> Result<T, Fault> {
-        match M::TABLE.entry(&mut self.now.block, index) {
+        match M::TABLE.entry(&mut self.current.block, index) {
             Some((meta, _)) => Err(message::type_of::<M>(index, meta, T::CARRIES)),
-            None if reference == TIME => T::time(self.now.end).ok_or_else(|| message::time(T::CARRIES)),
+            None if reference == TIME => T::time(self.current.end).ok_or_else(|| message::time(T::CARRIES)),
             None => Err(message::unknown::<M>(reference)),
         }
     }
@@ -95,7 +95,7 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    /// A short vector is written at once and taken back on an error; a long one is judged before.
+    /// Writes a short vector at once and undoes it on an error; checks a long one before writing.
     fn set_each<T: Value, const ARRAYS: bool>(
         &mut self,
         references: &[u32],
@@ -105,7 +105,7 @@ impl<M: Model> Instance<M> {
         if values.len() > SHORT {
             self.judge_each::<T, ARRAYS>(references, values)?;
         }
-        let state = self.now.life.state();
+        let state = self.current.life.state();
         let (mut done, mut old, mut dirty) = (0, [(0, any); SHORT], false);
         let mut next = values.iter();
         for &reference in references {
@@ -113,7 +113,7 @@ impl<M: Model> Instance<M> {
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, &value) in (0..count).zip(&mut next) {
                 let index = first.wrapping_add(offset);
-                let Some((meta, slot)) = settable(M::TABLE.entry(&mut self.now.block, index), state, value) else {
+                let Some((meta, slot)) = settable(M::TABLE.entry(&mut self.current.block, index), state, value) else {
                     self.take_back(&old[..done]);
                     return Err(self.refusal(reference, index, value));
                 };
@@ -126,18 +126,18 @@ impl<M: Model> Instance<M> {
                 dirty |= meta.causality == Causality::Parameter;
             }
         }
-        self.now.dirty |= dirty || state != State::Step;
+        self.current.dirty |= dirty || state != State::Step;
         Ok(())
     }
 
     fn judge_each<T: Value, const ARRAYS: bool>(&mut self, references: &[u32], values: &[T]) -> Result<(), Fault> {
-        let state = self.now.life.state();
+        let state = self.current.life.state();
         let mut next = values.iter();
         for &reference in references {
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, &value) in (0..count).zip(&mut next) {
                 let index = index(reference).wrapping_add(offset);
-                if settable(M::TABLE.entry(&mut self.now.block, index), state, value).is_none() {
+                if settable(M::TABLE.entry(&mut self.current.block, index), state, value).is_none() {
                     return Err(self.refusal(reference, index, value));
                 }
             }
@@ -148,7 +148,7 @@ impl<M: Model> Instance<M> {
     #[cold]
     fn take_back<T: Value>(&mut self, old: &[(usize, T)]) {
         for &(index, before) in old.iter().rev() {
-            if let Some((_, slot)) = M::TABLE.entry(&mut self.now.block, index) {
+            if let Some((_, slot)) = M::TABLE.entry(&mut self.current.block, index) {
                 before.write(slot);
             }
         }
@@ -157,11 +157,11 @@ impl<M: Model> Instance<M> {
     /// Why a value cannot be set.
     #[cold]
     fn refusal<T: Value>(&mut self, reference: u32, index: usize, value: T) -> Fault {
-        match M::TABLE.entry(&mut self.now.block, index) {
+        match M::TABLE.entry(&mut self.current.block, index) {
             Some((meta, _)) => match value.judge(meta) {
                 None => message::type_of::<M>(index, meta, T::CARRIES),
-                Some(_) if !open(meta, self.now.life.state()) => {
-                    message::fixed::<M>(index, meta, self.now.life.state())
+                Some(_) if !open(meta, self.current.life.state()) => {
+                    message::fixed::<M>(index, meta, self.current.life.state())
                 }
                 Some(_) => message::range::<M>(index, meta, value),
             },
@@ -173,10 +173,10 @@ impl<M: Model> Instance<M> {
     /// Refuses a getter or setter of a type that no variable has.
     ///
     /// # Errors
-    /// There is a reference at all.
+    /// The list of references is not empty.
     pub fn refuse(&mut self, references: &[u32], carries: &str) -> Result<(), Fault> {
         let Some(&reference) = references.first() else { return Ok(()) };
-        match M::TABLE.entry(&mut self.now.block, index(reference)) {
+        match M::TABLE.entry(&mut self.current.block, index(reference)) {
             Some((meta, _)) => Err(message::type_of::<M>(index(reference), meta, carries)),
             None if reference == TIME => Err(message::time(carries)),
             None => Err(message::unknown::<M>(reference)),
@@ -201,7 +201,7 @@ impl<M: Model> Instance<M> {
         let index = index(reference);
         match M::TABLE.element(index) {
             Some(element) if element > 0 => Err(message::element::<M>(reference, index, element)),
-            _ => Ok(M::TABLE.entry(&mut self.now.block, index).and_then(|(meta, _)| meta.dimension).unwrap_or(1)),
+            _ => Ok(M::TABLE.entry(&mut self.current.block, index).and_then(|(meta, _)| meta.dimension).unwrap_or(1)),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! A saved state as bytes: header, payload, checksum. No pointer, no address, no host order: the same on every platform.
+//! A saved state as bytes: header, payload, checksum. The bytes contain no address and no host byte order: they are the same on
+//! every platform.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -11,7 +12,7 @@
 //! | 4 | CRC-32 of all before |
 
 use crate::lifecycle::State;
-use crate::saved::Saved;
+use crate::snapshot::Snapshot;
 use fmu_core::{Fault, Model};
 
 const MAGIC: &[u8; 8] = b"FMUstate";
@@ -24,16 +25,16 @@ const CHECKSUM: usize = 4;
 /// for every state of a model, unless it holds lists that grow.
 ///
 /// # Errors
-/// The model cannot be serialised.
-pub fn size<M: Model>(state: &Saved<M>) -> Result<usize, Fault> {
+/// The model cannot be serialized.
+pub fn size<M: Model>(state: &Snapshot<M>) -> Result<usize, Fault> {
     padded::<M>(payload_size(state)?)
 }
 
 /// A state as bytes, [`size`] of them.
 ///
 /// # Errors
-/// The model cannot be serialised.
-pub fn write<M: Model>(state: &Saved<M>) -> Result<Vec<u8>, Fault> {
+/// The model cannot be serialized.
+pub fn write<M: Model>(state: &Snapshot<M>) -> Result<Vec<u8>, Fault> {
     let payload = payload_size(state)?;
     let length = u32::try_from(payload).map_err(|_| Fault::new("the state is larger than 4 GB"))?;
     let mut bytes = vec![0; padded::<M>(payload)?];
@@ -45,11 +46,11 @@ pub fn write<M: Model>(state: &Saved<M>) -> Result<Vec<u8>, Fault> {
     Ok(bytes)
 }
 
-/// Reads a state, trusting nothing.
+/// Reads a state and validates every part of it.
 ///
 /// # Errors
-/// Says what is wrong with the bytes: length, kind, version, checksum, content.
-pub fn read<M: Model>(bytes: &[u8]) -> Result<Saved<M>, Fault> {
+/// Names the invalid part of the bytes: length, kind, version, checksum or content.
+pub fn read<M: Model>(bytes: &[u8]) -> Result<Snapshot<M>, Fault> {
     let refuse = |why: String| Fault::new(format!("these {} bytes are no state of this FMU: {why}", bytes.len()));
     let Some((body, checksum)) = bytes.split_last_chunk::<CHECKSUM>() else { return Err(refuse("too short".into())) };
     let Some((header, room)) = body.split_first_chunk::<HEADER>() else { return Err(refuse("too short".into())) };
@@ -71,7 +72,7 @@ pub fn read<M: Model>(bytes: &[u8]) -> Result<Saved<M>, Fault> {
     if crc32(body).to_le_bytes() != *checksum {
         return Err(refuse("the checksum differs".into()));
     }
-    let (mut state, rest): (Saved<M>, &[u8]) =
+    let (mut state, rest): (Snapshot<M>, &[u8]) =
         postcard::take_from_bytes(&room[..length]).map_err(|e| refuse(format!("content: {e}")))?;
     if !rest.is_empty() {
         return Err(refuse("content".into()));
@@ -94,17 +95,17 @@ fn header<M: Model>(length: u32) -> [u8; HEADER] {
     header
 }
 
-fn payload_size<M: Model>(state: &Saved<M>) -> Result<usize, Fault> {
+fn payload_size<M: Model>(state: &Snapshot<M>) -> Result<usize, Fault> {
     postcard::experimental::serialized_size(state).map_err(|e| unable(&e))
 }
 
 fn unable(error: &postcard::Error) -> Fault {
-    Fault::new(format!("the state cannot be serialised: {error}"))
+    Fault::new(format!("the state cannot be serialized: {error}"))
 }
 
-/// Room for a payload: twice what a fresh model needs, and some, for integers that grow from one byte to ten.
+/// Size of a payload: twice that of a new model and a reserve for integers that grow from one byte to ten.
 fn unit<M: Model>() -> Result<usize, Fault> {
-    Ok((2 * payload_size(&Saved::<M>::default())?).next_multiple_of(64) + 64)
+    Ok((2 * payload_size(&Snapshot::<M>::default())?).next_multiple_of(64) + 64)
 }
 
 fn padded<M: Model>(payload: usize) -> Result<usize, Fault> {

@@ -2,7 +2,7 @@
 
 use crate::lifecycle::{Standard, State};
 use crate::log::Log;
-use crate::saved::{Experiment, Saved};
+use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
 use fmu_core::{Fault, Model, Step};
 
@@ -12,63 +12,63 @@ pub struct Instance<M: Model> {
     pub standard: Standard,
     /// Name given by the importer.
     pub name: String,
-    /// Where messages go.
+    /// The logger.
     pub log: Log,
     /// Everything that a step, a set or a reset changes.
-    pub now: Saved<M>,
+    pub current: Snapshot<M>,
     /// A reference can stand for several values: only in FMI 3.0, and only if the model has an array.
     pub(crate) arrays: bool,
 }
 
 impl<M: Model> Instance<M> {
-    /// A fresh instance of the model `now`.
-    pub fn new(standard: Standard, name: String, log: Log, now: Saved<M>) -> Self {
+    /// A fresh instance of the model `current`.
+    pub fn new(standard: Standard, name: String, log: Log, current: Snapshot<M>) -> Self {
         let table = M::TABLE;
         let arrays = standard == Standard::Fmi3
             && (0..table.len()).any(|i| table.locate(i).is_some_and(|(_, meta, _)| meta.dimension.is_some()));
         log.event(|| format!("{name}: instance of {} {}", M::INFO.name, M::INFO.version));
-        Self { standard, name, log, now, arrays }
+        Self { standard, name, log, current, arrays }
     }
 
-    /// Keeps start and stop time.
+    /// Stores start and stop time.
     ///
     /// # Errors
     /// As [`Experiment::new`].
     pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
-        self.now.experiment = Some(Experiment::new(start, stop)?);
-        self.now.end = start;
+        self.current.experiment = Some(Experiment::new(start, stop)?);
+        self.current.end = start;
         Ok(())
     }
 
-    /// Enters initialisation.
+    /// Enters initialization.
     ///
     /// # Errors
     /// No experiment was set up (FMI 2.0.5, 4.2.4: `fmi2SetupExperiment` comes first).
-    pub fn enter_initialisation(&mut self) -> Result<(), Fault> {
-        self.now.experiment.map(|_| ()).ok_or_else(|| Fault::new("fmi2SetupExperiment must be called before it"))
+    pub fn enter_initialization(&mut self) -> Result<(), Fault> {
+        self.current.experiment.map(|_| ()).ok_or_else(|| Fault::new("fmi2SetupExperiment must be called before it"))
     }
 
-    /// Ends initialisation: parameters are judged together, state and outputs computed.
+    /// Ends initialization: parameters are judged together, state and outputs computed.
     ///
     /// # Errors
-    /// As [`Saved::check`] and [`Model::validate`].
-    pub fn exit_initialisation(&mut self) -> Result<(), Fault> {
-        self.now.check()?;
-        self.now.judged()?;
-        self.now.block.initialise();
-        self.now.dirty = false;
-        self.log.event(|| message::start(&self.name, &mut self.now));
+    /// As [`Snapshot::check`] and [`Model::validate`].
+    pub fn exit_initialization(&mut self) -> Result<(), Fault> {
+        self.current.check()?;
+        self.current.judged()?;
+        self.current.block.initialise();
+        self.current.dirty = false;
+        self.log.event(|| message::start(&self.name, &mut self.current));
         Ok(())
     }
 
     /// Ends the simulation.
     pub fn terminate(&mut self) {
-        self.log.event(|| format!("{}: terminated at {} s", self.name, self.now.end));
+        self.log.event(|| format!("{}: terminated at {} s", self.name, self.current.end));
     }
 
-    /// Back to the fresh instance; name and logger stay.
+    /// Restores the state after instantiation; name and logger stay.
     pub fn reset(&mut self) {
-        self.now = Saved::default();
+        self.current = Snapshot::default();
         self.log.event(|| format!("{}: reset", self.name));
     }
 
@@ -79,48 +79,48 @@ impl<M: Model> Instance<M> {
     /// Or what the model reports.
     #[inline]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<(), Fault> {
-        let now = &mut self.now;
-        let next = now.elapsed.plus(h);
-        now.check_step(t, h, next)?;
-        if now.dirty {
-            now.block.model = now.judged()?;
-            now.dirty = false;
+        let current = &mut self.current;
+        let next = current.elapsed.plus(h);
+        current.check_step(t, h, next)?;
+        if current.dirty {
+            current.block.model = current.judged()?;
+            current.dirty = false;
         }
-        now.block.step(&Step { start: now.elapsed, h })?;
-        now.elapsed = next;
-        now.end = t + h;
+        current.block.step(&Step { start: current.elapsed, h })?;
+        current.elapsed = next;
+        current.end = t + h;
         Ok(())
     }
 
-    /// Before the start the model computes what was set since the last look; later a get shows the last step.
+    /// Before the first step, recomputes the outputs if variables were set; afterwards a get returns the values of the last step.
     pub(crate) fn refresh(&mut self) {
-        if self.now.dirty && matches!(self.now.life.state(), State::Instantiated | State::Initialization) {
-            self.now.block.initialise();
-            self.now.dirty = false;
+        if self.current.dirty && matches!(self.current.life.state(), State::Instantiated | State::Initialization) {
+            self.current.block.initialise();
+            self.current.dirty = false;
         }
     }
 
     /// Saves the state under `handle`, or under a new handle if it is 0; returns the handle.
     ///
     /// # Errors
-    /// The handle is none of ours.
+    /// The handle is unknown.
     pub fn save(&self, handle: usize) -> Result<usize, Fault> {
         if handle == 0 {
-            return Ok(registry::keep(self.now.clone()));
+            return Ok(registry::keep(self.current.clone()));
         }
         registry::with(handle, |state| {
-            state.clone_from(&self.now);
+            state.clone_from(&self.current);
             Ok(handle)
         })
     }
 
-    /// Goes back, or forth, to a saved state, of this or another instance of the model.
+    /// Restores a saved state of this or another instance of the model.
     ///
     /// # Errors
-    /// The handle is none of ours.
+    /// The handle is unknown.
     pub fn restore(&mut self, handle: usize) -> Result<(), Fault> {
         registry::with(handle, |state| {
-            self.now.clone_from(state);
+            self.current.clone_from(state);
             Ok(())
         })
     }
@@ -129,7 +129,7 @@ impl<M: Model> Instance<M> {
     ///
     /// # Errors
     /// As [`blob::read`].
-    pub fn deserialise(&self, bytes: &[u8]) -> Result<usize, Fault> {
+    pub fn deserialize(&self, bytes: &[u8]) -> Result<usize, Fault> {
         blob::read::<M>(bytes).map(registry::keep)
     }
 }

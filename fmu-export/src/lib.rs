@@ -1,8 +1,8 @@
 //! The C interfaces of FMI 2.0 and FMI 3.0 co-simulation for any [`fmu_core::Model`], from one line: [`export!`].
 //!
-//! Layers, from below: [`lifecycle`] (which call in which state), [`value`] (C types and base types), [`saved`] (all
-//! that changes), [`blob`] and [`registry`] (states as bytes and as handles), [`log`], [`instance`] (what the calls
-//! mean), and [`abi`] (pointers). No motor, no XML; `unsafe` in [`abi`] only.
+//! Layers, from the bottom: [`lifecycle`] (which call is allowed in which state), [`value`] (C types and base types), [`snapshot`]
+//! (everything that changes), [`blob`] and [`registry`] (states as bytes and as handles), [`log`], [`instance`] (the calls without
+//! C), and [`abi`] (pointers). The crate knows neither motors nor XML; only [`abi`] contains `unsafe`.
 
 #![deny(unsafe_code)]
 
@@ -15,6 +15,6 @@ pub mod lifecycle;
 pub mod log;
 mod message;
 pub mod registry;
-pub mod saved;
+pub mod snapshot;
 mod step;
 pub mod value;

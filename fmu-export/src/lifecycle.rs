@@ -107,13 +107,13 @@ pub enum Call {
     DoStep,
     /// `GetFMUState`.
     SaveState,
-    /// `SetFMUState`: the state comes from what was saved.
+    /// `SetFMUState`: the restored snapshot brings the next state.
     RestoreState,
-    /// Free, size, serialise and deserialise a saved state.
+    /// Free, size, serialize and deserialize a saved state.
     UseState,
     /// `fmi2Get...Status`.
     Status,
-    /// What this FMU does not offer: refused everywhere, with the reason rather than the state.
+    /// A capability that this FMU does not have: refused in every state, with that reason.
     Unsupported,
 }
 
@@ -144,7 +144,7 @@ impl Call {
             Self::ExitInitialization => both(&[Initialization], Some(Step)),
             Self::Terminate => both(&[Step], Some(Terminated)),
             Self::Reset => both(&State::ALL, Some(Instantiated)),
-            // FMI 3.0.2, 2.3.3 lets start values be read before initialisation; FMI 2.0.5, 4.2.4 does not.
+            // FMI 3.0.2, 2.3.3 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
             // In Error: for debugging (2.0.5, table in 4.2.4).
             Self::Get => each(&[Initialization, Step, Terminated, Error], &State::ALL),
             Self::Set => both(&[Instantiated, Initialization, Step], None),
@@ -179,7 +179,7 @@ impl Life {
         self.0
     }
 
-    /// Takes note that a call succeeded, with the [next](Call::next) state, or failed.
+    /// Records that a call succeeded, with the [next](Call::next) state, or failed.
     #[inline]
     pub const fn after(&mut self, succeeded: bool, next: Option<State>) {
         if !succeeded {

@@ -1,4 +1,4 @@
-//! What an instance says, and to whom. Errors are always said; the rest only when the importer asked for its category.
+//! Logging of an instance. Errors are always logged; other messages only if the importer enabled their category.
 
 use crate::lifecycle::Standard;
 use fmu_core::Fault;
@@ -8,11 +8,11 @@ use fmu_core::log::{ALL, CATEGORIES, DISCARD, ERROR, EVENTS};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 pub enum Status {
-    /// All well.
+    /// The call succeeded.
     Ok = 0,
     /// Not used by this library.
     Warning = 1,
-    /// The call could not be fulfilled; nothing changed and nothing is wrong.
+    /// The call could not be fulfilled; nothing changed and the instance remains usable.
     Discard = 2,
     /// The call failed; see [`State::Error`](crate::lifecycle::State::Error).
     Error = 3,
@@ -20,11 +20,11 @@ pub enum Status {
 
 /// The importer's logger.
 pub trait Sink {
-    /// Passes one message on.
+    /// Passes one message to the importer.
     fn write(&self, status: Status, category: &str, message: &str);
 }
 
-/// The logger and what it is to be told.
+/// The logger and the enabled categories.
 pub struct Log {
     sink: Box<dyn Sink>,
     /// One flag per category of [`CATEGORIES`].
@@ -37,13 +37,13 @@ impl Log {
         Self { sink, enabled: [on; CATEGORIES.len()] }
     }
 
-    /// Says why a call failed; heard even with logging off, since the status alone helps nobody.
+    /// Logs why a call failed, even with logging off: the status alone does not help.
     #[cold]
     pub fn error(&self, message: &str) {
         self.sink.write(Status::Error, ERROR, message);
     }
 
-    /// Says why a call was discarded.
+    /// Logs why a call was discarded.
     #[cold]
     pub fn discard(&self, message: &str) {
         if self.is_on(DISCARD) {
@@ -51,7 +51,7 @@ impl Log {
         }
     }
 
-    /// Says what happened; the message is only made when somebody listens.
+    /// Logs an event; the message is built only if its category is enabled.
     pub fn event(&self, message: impl FnOnce() -> String) {
         if self.is_on(EVENTS) {
             self.sink.write(Status::Ok, EVENTS, &message());

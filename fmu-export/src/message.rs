@@ -1,7 +1,7 @@
-//! Words for messages. Names are looked up here, when something went wrong or somebody listens, and nowhere else.
+//! Texts of messages. Variable names are looked up only here, when a call fails or logging is on.
 
 use crate::lifecycle::State;
-use crate::saved::Saved;
+use crate::snapshot::Snapshot;
 use fmu_core::description::TIME;
 use fmu_core::{Causality, Fault, Kind, Meta, Model, Slot, Variability};
 use std::fmt::Display;
@@ -89,12 +89,12 @@ pub(crate) fn count(given: usize, needed: usize) -> Fault {
 }
 
 /// How an instance starts: what differs from the start values.
-pub(crate) fn start<M: Model>(instance: &str, now: &mut Saved<M>) -> String {
-    let mut fresh = Saved::<M>::default();
+pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>) -> String {
+    let mut fresh = Snapshot::<M>::default();
     let mut changes = Vec::new();
     for index in 0..M::TABLE.len() {
         let (Some((meta, new)), Some((_, old))) =
-            (M::TABLE.entry(&mut now.block, index), M::TABLE.entry(&mut fresh.block, index))
+            (M::TABLE.entry(&mut current.block, index), M::TABLE.entry(&mut fresh.block, index))
         else {
             continue;
         };
@@ -103,7 +103,7 @@ pub(crate) fn start<M: Model>(instance: &str, now: &mut Saved<M>) -> String {
         }
     }
     let changes = if changes.is_empty() { "all start values as they were".into() } else { changes.join(", ") };
-    format!("{instance}: initialised at {} s with {changes}", now.end)
+    format!("{instance}: initialized at {} s with {changes}", current.end)
 }
 
 /// Value reference 0.

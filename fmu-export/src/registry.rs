@@ -1,16 +1,15 @@
 //! The saved FMU states, and the handles that stand for them in C.
 //!
-//! A handle is a number, never an address: it is looked up, not followed, and none is given twice. So a foreign, freed
-//! or garbage `FMUState` is an error with a message and never a crash. This is the only global of a binary; a step
-//! does not touch it.
+//! A handle is a unique number, not an address: it is looked up and never dereferenced. A foreign, freed or garbage `FMUState`
+//! therefore gives an error with a message and never a crash. This is the only global of a binary; a step does not touch it.
 
-use crate::saved::Saved;
+use crate::snapshot::Snapshot;
 use fmu_core::{Fault, Model};
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Handles differ by this much, so that they look like the aligned pointers that some importers expect.
+/// Distance of two handles: they look like the aligned pointers that some importers expect.
 const STRIDE: usize = 16;
 
 struct Registry {
@@ -24,8 +23,8 @@ fn registry() -> MutexGuard<'static, Registry> {
     REGISTRY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps a state and gives its handle, never 0.
-pub fn keep<M: Model>(state: Saved<M>) -> usize {
+/// Stores a state and returns its handle, never 0.
+pub fn keep<M: Model>(state: Snapshot<M>) -> usize {
     let mut registry = registry();
     registry.last += STRIDE;
     let handle = registry.last;
@@ -36,15 +35,15 @@ pub fn keep<M: Model>(state: Saved<M>) -> usize {
 /// Works with the state behind a handle.
 ///
 /// # Errors
-/// The handle is none of ours, was freed, or belongs to another model; or what `work` reports.
-pub fn with<M: Model, T>(handle: usize, work: impl FnOnce(&mut Saved<M>) -> Result<T, Fault>) -> Result<T, Fault> {
+/// The handle is unknown, was freed or belongs to another model; or the error of `work`.
+pub fn with<M: Model, T>(handle: usize, work: impl FnOnce(&mut Snapshot<M>) -> Result<T, Fault>) -> Result<T, Fault> {
     match registry().states.get_mut(&handle).and_then(|state| state.downcast_mut()) {
         Some(state) => work(state),
         None => Err(unknown(handle)),
     }
 }
 
-/// Frees the state behind a handle; 0 is fine.
+/// Frees the state behind a handle; ignores 0.
 ///
 /// # Errors
 /// As [`with`].
@@ -53,7 +52,7 @@ pub fn free<M: Model>(handle: usize) -> Result<(), Fault> {
         return Ok(());
     }
     let mut registry = registry();
-    if !registry.states.get(&handle).is_some_and(|state| state.is::<Saved<M>>()) {
+    if !registry.states.get(&handle).is_some_and(|state| state.is::<Snapshot<M>>()) {
         return Err(unknown(handle));
     }
     registry.states.remove(&handle);

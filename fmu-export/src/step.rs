@@ -1,13 +1,13 @@
 //! Whether a communication step continues the simulation (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1.1).
 
-use crate::saved::Saved;
+use crate::snapshot::Snapshot;
 use fmu_core::{Elapsed, Fault, Model};
 
-impl<M: Model> Saved<M> {
-    /// Judges a step from `t` by `h`, which reaches `next` after the start.
+impl<M: Model> Snapshot<M> {
+    /// Checks a step from `t` by `h`, which reaches `next` after the start.
     ///
     /// # Errors
-    /// Says which of the two is wrong, and what was expected.
+    /// Names the invalid argument and the expected value.
     #[inline]
     pub(crate) fn check_step(&self, t: f64, h: f64, next: Elapsed) -> Result<(), Fault> {
         // NaN is not contained; a subnormal h is below the resolution of any time but 0.
@@ -30,7 +30,7 @@ impl<M: Model> Saved<M> {
     }
 }
 
-/// What two additions may lose at this magnitude.
+/// Largest rounding error of two additions at this magnitude.
 fn rounding(t: f64) -> f64 {
     2.0 * f64::EPSILON * t.abs()
 }

@@ -6,7 +6,7 @@ use std::fmt::{self, Display};
 
 /// A C type of one of the standards, in the layout of C.
 pub trait Value: Copy + Display {
-    /// What it carries, in words.
+    /// Name of the type in messages.
     const CARRIES: &'static str;
 
     /// The value in `slot`, `None` if the variable has another base type.
@@ -34,7 +34,7 @@ pub struct Fmi2Integer(pub c_int);
 #[repr(transparent)]
 pub struct Fmi2Boolean(pub c_int);
 
-/// `fmi3Boolean`, a C `bool`: received as a byte, since an importer may pass any.
+/// `fmi3Boolean`, a C `bool`: received as a byte, because an importer may pass any value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct Fmi3Boolean(pub u8);

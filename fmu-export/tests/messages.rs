@@ -40,7 +40,7 @@ fn the_events_of_a_life() {
         let texts: Vec<&str> = messages.iter().map(|m| m.text.as_str()).collect();
         let expected = [
             "drive 1: instance of Probe 1.0",
-            "drive 1: initialised at 2 s with motor.R = 3.5",
+            "drive 1: initialized at 2 s with motor.R = 3.5",
             "drive 1: terminated at 2.5 s",
             "drive 1: reset",
         ];

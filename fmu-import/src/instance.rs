@@ -138,7 +138,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses, for example parameters that do not fit together.
     pub fn exit_initialization(&mut self) -> Result<(), Error> {
-        self.call(|s| s.exit_initialization())
+        self.call(|s| s.shared().exit_initialization())
     }
 
     /// Steps from `t` to `t + h`; breaks when the FMU asks to end the simulation.
@@ -155,7 +155,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn terminate(&mut self) -> Result<(), Error> {
-        self.call(|s| s.terminate())
+        self.call(|s| s.shared().terminate())
     }
 
     /// Back to what it was when it was made.
@@ -163,7 +163,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn reset(&mut self) -> Result<(), Error> {
-        self.call(|s| s.reset())
+        self.call(|s| s.shared().reset())
     }
 
     /// Saves the state.
@@ -171,7 +171,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses, or cannot.
     pub fn get_state(&mut self) -> Result<State, Error> {
-        let state = self.call(|s| s.get_state())?;
+        let state = self.call(|s| s.shared().get_state())?;
         self.states.push(Some(state));
         Ok(State(self.states.len() - 1))
     }
@@ -182,7 +182,7 @@ impl Instance {
     /// The FMU refuses, or the state was freed.
     pub fn set_state(&mut self, state: State) -> Result<(), Error> {
         let state = self.state(state)?;
-        self.call(|s| s.set_state(state))
+        self.call(|s| s.shared().set_state(state))
     }
 
     /// Frees a saved state. Those that remain are freed with the instance.
@@ -192,7 +192,7 @@ impl Instance {
     pub fn free_state(&mut self, state: State) -> Result<(), Error> {
         let raw = self.state(state)?;
         self.states[state.0] = None;
-        self.call(|s| s.free_state(raw))
+        self.call(|s| s.shared().free_state(raw))
     }
 
     /// A saved state as bytes.
@@ -201,7 +201,7 @@ impl Instance {
     /// The FMU refuses, or cannot, or the state was freed.
     pub fn serialize_state(&mut self, state: State) -> Result<Vec<u8>, Error> {
         let state = self.state(state)?;
-        self.call(|s| s.serialize(state))
+        self.call(|s| s.shared().serialize(state))
     }
 
     /// A saved state from bytes; it is not yet set.
@@ -209,7 +209,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses, or cannot.
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<State, Error> {
-        let state = self.call(|s| s.deserialize(bytes))?;
+        let state = self.call(|s| s.shared().deserialize(bytes))?;
         self.states.push(Some(state));
         Ok(State(self.states.len() - 1))
     }
@@ -246,7 +246,7 @@ impl Instance {
         }
         call(&mut *self.standard).map_err(|refusal| {
             if matches!(refusal, Refusal::Status(_, Status::FATAL)) {
-                self.standard.abandon();
+                self.standard.shared().abandon();
                 self.dead = true;
             }
             explain(&self.name, refusal, self.log.reason())
@@ -258,7 +258,7 @@ impl Drop for Instance {
     fn drop(&mut self) {
         for state in std::mem::take(&mut self.states).into_iter().flatten() {
             // Nobody is left to hear of a refusal.
-            let _ = self.call(|s| s.free_state(state));
+            let _ = self.call(|s| s.shared().free_state(state));
         }
     }
 }

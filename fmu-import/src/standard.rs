@@ -2,8 +2,8 @@
 
 use super::value::Values;
 use crate::abi::log::Status;
+use crate::abi::shared::SharedInstance;
 use model_description::BaseType;
-use std::ffi::c_void;
 use std::ops::ControlFlow;
 
 /// A call that did not succeed.
@@ -21,7 +21,7 @@ pub(super) type Outcome<T = ()> = Result<T, Refusal>;
 
 /// Judges a status: a warning is a success.
 pub(super) fn judge(function: &'static str, status: Status) -> Outcome {
-    if matches!(status, Status::OK | Status::WARNING) { Ok(()) } else { Err(Refusal::Status(function, status)) }
+    if status.is_ok() { Ok(()) } else { Err(Refusal::Status(function, status)) }
 }
 
 /// The times of an experiment.
@@ -34,6 +34,8 @@ pub(super) struct Experiment {
 
 /// One instance, seen through either standard. Dropping it frees the instance.
 pub(super) trait Standard {
+    /// The calls that both standards share: end of initialization, terminate, reset, saved states.
+    fn shared(&mut self) -> &mut SharedInstance;
     fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome;
     fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome;
     fn get(&mut self, base: BaseType, reference: u32, count: usize) -> Outcome<Values>;
@@ -41,18 +43,8 @@ pub(super) trait Standard {
     fn set_debug_logging(&mut self, on: bool) -> Outcome;
     fn setup(&mut self, experiment: Experiment) -> Outcome;
     fn enter_initialization(&mut self) -> Outcome;
-    fn exit_initialization(&mut self) -> Outcome;
     /// Breaks when the FMU asks to end the simulation.
     fn do_step(&mut self, t: f64, h: f64) -> Outcome<ControlFlow<()>>;
-    fn terminate(&mut self) -> Outcome;
-    fn reset(&mut self) -> Outcome;
-    fn get_state(&mut self) -> Outcome<*mut c_void>;
-    fn set_state(&mut self, state: *mut c_void) -> Outcome;
-    fn free_state(&mut self, state: *mut c_void) -> Outcome;
-    fn serialize(&mut self, state: *mut c_void) -> Outcome<Vec<u8>>;
-    fn deserialize(&mut self, bytes: &[u8]) -> Outcome<*mut c_void>;
-    /// After a fatal error the standard forbids every further call, freeing included.
-    fn abandon(&mut self);
 }
 
 /// A value that does not fit the type that crosses the interface.

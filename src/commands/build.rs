@@ -2,7 +2,7 @@
 
 use crate::compile::{Library, compile};
 use crate::icons;
-use crate::licences::Licences;
+use crate::licenses::Licenses;
 use crate::pack::{self, Moment};
 use crate::target::{Target, Tools, ZIG};
 use crate::workspace::{Package, Workspace};
@@ -19,43 +19,43 @@ use std::path::{Path, PathBuf};
 
 /// Compiles FMUs and packs them for both standards.
 ///
-/// Without names, every FMU of the workspace: the packages in its folder fmus/. A name is that of the package
+/// Without names, builds every FMU of the workspace: the packages in its folder fmus/. Select an FMU by the name of its package
 /// (pmsm-plant) or of the FMU (PmsmPlant).
 ///
-/// An FMU of your own is any cdylib with one line `fmu_export::export!(MyModel);`:
+/// Your own FMU is any cdylib with the line `fmu_export::export!(MyModel);`:
 ///   a package of the workspace     fmu build --package own-fmu
-///   a library that is already built, or several of one model for several platforms
+///   a library that is already built, or several libraries of one model for several platforms
 ///                                  fmu build --library target/release/libmy_fmu.so
 ///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
 ///
-/// For other platforms, by Rust's names of them; the FMUs then hold a binary for each of these, and only these:
+/// For other platforms, name the Rust targets; the FMUs then contain a binary for each of them and no others:
 ///   fmu build --target x86_64-unknown-linux-gnu,aarch64-unknown-linux-gnu,x86_64-pc-windows-gnu
-/// It needs Rust's standard library for each (rustup target add TRIPLE), mingw for Windows, cargo-zigbuild with ziglang for
-/// Linux and macOS. A build for this machine is made all the same, if it is not asked for: it describes the model.
+/// This needs Rust's standard library for each target (rustup target add TRIPLE), mingw for Windows, and cargo-zigbuild with
+/// ziglang for Linux and macOS. The command always builds for this computer too, because that library describes the model.
 ///
-/// Linux binaries need glibc 2.17 (2012) where cargo-zigbuild is in PATH; otherwise what this machine's linker makes them
-/// need, which is told. CARGO_TARGET_TRIPLE_LINKER, in Cargo's spelling, names another linker.
+/// With cargo-zigbuild in PATH, Linux binaries need glibc 2.17 (2012). Otherwise this computer's linker decides, and the command
+/// prints what they need. CARGO_TARGET_TRIPLE_LINKER, in Cargo's spelling, selects another linker.
 ///
-/// With SOURCE_DATE_EPOCH set, the same sources give the same bytes.
+/// With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Build {
     /// FMUs to build, by package or FMU name
     #[arg(value_name = "FMU", conflicts_with_all = ["package", "library"])]
     pub fmus: Vec<String>,
-    /// The standard: 2 or 3; both without this option
+    /// FMI version: 2 or 3 [default: both]
     #[arg(long, value_name = "VERSION", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
     pub fmi: Option<String>,
-    /// Where fmi2/NAME.fmu and fmi3/NAME.fmu go [default: fmu in Cargo's target folder]
+    /// Folder for fmi2/NAME.fmu and fmi3/NAME.fmu [default: fmu in Cargo's target folder]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// A package with a cdylib, of this workspace
+    /// Package of this workspace with a cdylib
     #[arg(long, value_name = "NAME", conflicts_with = "library")]
     pub package: Option<String>,
-    /// A library that is already built; PLATFORM= if it is not for this machine
+    /// Library that is already built; with PLATFORM= if it is for another platform
     #[arg(long, value_name = "[PLATFORM=]FILE")]
     pub library: Vec<String>,
-    /// What to build for, instead of this machine; several with commas, or by repeating it
+    /// Target to build for instead of this computer; separate several with commas or repeat the option
     #[arg(long, value_name = "TRIPLE", value_delimiter = ',', conflicts_with = "library")]
     pub target: Vec<String>,
 }
@@ -64,13 +64,13 @@ pub struct Build {
 struct Model {
     description: Description,
     binaries: Vec<(Platform, Vec<u8>)>,
-    licences: Licences,
+    licenses: Licenses,
 }
 
 /// Runs the command; returns the files that were written.
 ///
 /// # Errors
-/// A name that is no FMU, a compiler that fails, a library that is none of ours, a folder that cannot be written.
+/// A name is not an FMU, the compiler fails, a library was not made by `export!`, or a folder cannot be written.
 pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     let moment = Moment::of_environment()?;
     let versions = match args.fmi.as_deref() {
@@ -93,7 +93,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
         for &version in &versions {
             let folder = if version == FmiVersion::V2 { "fmi2" } else { "fmi3" };
             let path = out.join(folder).join(format!("{}.fmu", model.description.name));
-            let mut files = pack::contents(&model.description, &model.binaries, &model.licences, version, moment);
+            let mut files = pack::contents(&model.description, &model.binaries, &model.licenses, version, moment);
             files.extend(icons::files(&model.description, version)?);
             pack::write(&path, &pack::archive(&files, moment)?)?;
             written.push(path);
@@ -136,7 +136,7 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
         bail!("nothing that was compiled is a cdylib: set crate-type = [\"cdylib\"]");
     }
     let model = |(package, own): &Library| {
-        load(own, built.get(package).map_or(&[], Vec::as_slice), Licences::of_package(workspace, package))
+        load(own, built.get(package).map_or(&[], Vec::as_slice), Licenses::of_package(workspace, package))
     };
     describing.iter().map(model).collect()
 }
@@ -155,7 +155,7 @@ fn targets(tools: &Tools, triples: &[String]) -> Result<Vec<Target>> {
     Ok(targets)
 }
 
-/// What the Linux binaries need of the importing machine beyond what each has: a line for all that need the same.
+/// What the Linux binaries need of the importing system beyond glibc 2.17: one line for all binaries with the same needs.
 fn notes(models: &[Model]) -> Vec<String> {
     let mut by_needs: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for Model { description, binaries, .. } in models {
@@ -172,7 +172,7 @@ fn notes(models: &[Model]) -> Vec<String> {
     by_needs.into_iter().map(note).collect()
 }
 
-/// The packages that are meant: by their names, or by those of their FMUs, which only differ in how words are joined.
+/// The selected packages, by package name or by FMU name; the two differ only in how words are joined.
 fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>> {
     let letters = |name: &str| name.to_lowercase().replace(['-', '_'], "");
     if all.is_empty() {
@@ -189,7 +189,7 @@ fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>>
     names.iter().map(one).collect()
 }
 
-/// Libraries of one model, built before.
+/// Libraries of one model that are already built.
 fn given(libraries: &[String]) -> Result<Model> {
     let parse = |text: &String| match text.split_once('=') {
         Some((platform, file)) => Ok((platform.parse().map_err(|e: String| anyhow!(e))?, PathBuf::from(file))),
@@ -200,14 +200,14 @@ fn given(libraries: &[String]) -> Result<Model> {
     let (_, own) = own.ok_or_else(|| {
         anyhow!("one library must be for this machine ({}): it describes the model", Platform::host())
     })?;
-    load(own, &libraries, Licences::default())
+    load(own, &libraries, Licenses::default())
 }
 
-/// A model of these libraries, described by one for this machine.
-fn load(own: &Path, libraries: &[(Platform, PathBuf)], licences: Licences) -> Result<Model> {
+/// The model of these libraries, described by the one for this computer.
+fn load(own: &Path, libraries: &[(Platform, PathBuf)], licenses: Licenses) -> Result<Model> {
     let description = describe(own)?;
     let read = |(platform, path): &(Platform, PathBuf)| Ok((*platform, read(path)?));
-    Ok(Model { description, binaries: libraries.iter().map(read).collect::<Result<_>>()?, licences })
+    Ok(Model { description, binaries: libraries.iter().map(read).collect::<Result<_>>()?, licenses })
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {

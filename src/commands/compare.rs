@@ -12,25 +12,25 @@ use std::path::PathBuf;
 
 /// Runs every estimator through start-up, load steps, wrong parameters and more, and compares the figures.
 ///
-/// Runs natively, on all cores. Writes compare.html, compare.md, compare.txt, compare.csv and plots to `compare` in Cargo's
-/// target folder. Exit status 1 when a number is outside the tolerance of the figure there is for it.
+/// Runs natively on all cores. Writes compare.html, compare.md, compare.txt, compare.csv and plots to `compare` in Cargo's
+/// target folder. Exits with status 1 if a figure is outside its tolerance.
 #[derive(Debug, Default, Args)]
 pub struct Compare {
-    /// Some estimators only
+    /// Run only these estimators
     #[arg(long, value_name = "ESTIMATOR,...", value_delimiter = ',')]
     pub only: Vec<String>,
-    /// Some scenarios only
+    /// Run only these scenarios
     #[arg(long, value_name = "SCENARIO,...", value_delimiter = ',')]
     pub scenario: Vec<String>,
-    /// List estimators and scenarios and end
+    /// List estimators and scenarios and exit
     #[arg(long)]
     pub list: bool,
-    /// Where the results go [default: compare in Cargo's target folder]
+    /// Output folder [default: compare in Cargo's target folder]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
 
-/// Runs the command; returns whether every figure is as expected.
+/// Runs the command; returns whether every figure is within its tolerance.
 ///
 /// # Errors
 /// A name is unknown, or a file cannot be written.
@@ -67,11 +67,11 @@ fn selection(args: &Compare) -> Result<Selection> {
     let estimator = |name: &String| {
         let found = Entry::all().into_iter().find(|e| e.name.eq_ignore_ascii_case(name));
         let known = || names(Entry::all().iter().map(|e| e.name));
-        found.ok_or_else(|| anyhow!("--only {name}: is no estimator; there are {}", known()))
+        found.ok_or_else(|| anyhow!("--only {name}: is not an estimator; there are {}", known()))
     };
     let scenario = |id: &String| {
         let known = || names(SCENARIOS.iter().map(|s| s.id));
-        scenario::find(id).ok_or_else(|| anyhow!("--scenario {id}: is no scenario; there are {}", known()))
+        scenario::find(id).ok_or_else(|| anyhow!("--scenario {id}: is not a scenario; there are {}", known()))
     };
     if !args.only.is_empty() {
         selection.entries = args.only.iter().map(estimator).collect::<Result<_>>()?;

@@ -12,26 +12,26 @@ use std::path::PathBuf;
 const DESCRIPTION: &str = "modelDescription.xml";
 const BINARIES: &str = "binaries/";
 
-/// Makes one FMU out of several of the same FMU, built for different platforms at different places.
+/// Merges builds of one FMU for different platforms into a single FMU.
 ///
-/// They must be of one standard and have the same token (GUID) and the same files, but for binaries/ and for the date of
-/// their making; the latest date is kept. Otherwise nothing is written. The same FMUs give the same bytes, in any order.
+/// The FMUs must have the same FMI version, token (GUID) and files, except for binaries/ and the generation date; the latest date
+/// is kept. Otherwise the command writes nothing. The same FMUs give the same bytes in any order.
 ///
 ///   fmu merge linux/PmsmPlant.fmu windows/PmsmPlant.fmu --out PmsmPlant.fmu
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Merge {
-    /// The FMUs
+    /// FMUs to merge
     #[arg(value_name = "FILE.fmu", num_args = 2.., required = true)]
     pub files: Vec<PathBuf>,
-    /// The file to write
+    /// File to write
     #[arg(long, value_name = "FILE.fmu")]
     pub out: PathBuf,
 }
 
-/// An FMU that goes into the merged one.
+/// An FMU to merge.
 struct Part {
-    /// Its file, for messages.
+    /// File name, for messages.
     name: String,
     description: ModelDescription,
     files: BTreeMap<String, Vec<u8>>,
@@ -40,7 +40,7 @@ struct Part {
 /// Runs the command.
 ///
 /// # Errors
-/// A file is no FMU, or two of them do not fit together.
+/// A file is not an FMU, or two FMUs differ in more than binaries and date.
 pub fn run(args: &Merge) -> Result<()> {
     let moment = Moment::of_environment()?;
     let open = |path: &PathBuf| {
@@ -97,7 +97,7 @@ fn same_fmu(a: &Part, b: &Part) -> Result<()> {
     Ok(())
 }
 
-/// Everything but the binaries must be the same, but for when it was made.
+/// Requires that everything except the binaries and the generation date is equal.
 fn same_files(a: &Part, b: &Part) -> Result<()> {
     let shared = |part: &Part| part.files.keys().filter(|n| !n.starts_with(BINARIES)).cloned().collect::<Vec<_>>();
     for (one, other) in [(a, b), (b, a)] {
@@ -114,14 +114,14 @@ fn same_files(a: &Part, b: &Part) -> Result<()> {
         if of_a != of_b {
             let alike = of_a.iter().zip(&of_b).take_while(|(x, y)| x == y).count();
             let line = of_b[..alike].split(|byte| *byte == b'\n').count();
-            let told = "build both from the same sources with the same fmu";
-            bail!("{}: {name}, line {line}: differs from that of {}; {told}", b.name, a.name);
+            let remedy = "build both from the same sources with the same fmu";
+            bail!("{}: {name}, line {line}: differs from that of {}; {remedy}", b.name, a.name);
         }
     }
     Ok(())
 }
 
-/// A file, with the moment at which its archive was made put aside.
+/// A file without the date of generation.
 fn dateless(bytes: &[u8], date: &str) -> Vec<u8> {
     match std::str::from_utf8(bytes) {
         Ok(text) if !date.is_empty() => text.replace(date, "").into_bytes(),
@@ -129,7 +129,7 @@ fn dateless(bytes: &[u8], date: &str) -> Vec<u8> {
     }
 }
 
-/// A platform that both have must be the same in both.
+/// Requires that the binaries of a platform that both FMUs have are equal.
 fn other_platforms(a: &Part, b: &Part) -> Result<()> {
     let version = a.description.version;
     let folder = |name: &str| Some(name.strip_prefix(BINARIES)?.split_once('/')?.0.to_owned());

@@ -8,15 +8,16 @@ use std::path::PathBuf;
 
 /// Builds the FMUs, runs the paper's experiments through them in both standards and compares the figures.
 ///
-/// Writes CSV, plots and report.html to `reproduce` in Cargo's target folder. Exit status 1 when a figure is off.
+/// Writes CSV, plots and report.html to `reproduce` in Cargo's target folder. Exits with status 1 if a figure
+/// is outside its tolerance.
 #[derive(Debug, Args)]
 pub struct Reproduce {
-    /// Where the results go [default: reproduce in Cargo's target folder]
+    /// Output folder [default: reproduce in Cargo's target folder]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
 
-/// Runs the command; returns whether every figure is as expected.
+/// Runs the command; returns whether every figure is within its tolerance.
 ///
 /// # Errors
 /// The FMUs cannot be built or run, or a file cannot be written.

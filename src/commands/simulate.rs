@@ -16,76 +16,76 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Co-simulates FMUs of FMI 2.0 and FMI 3.0, of this project or of any other.
+/// Co-simulates FMUs of FMI 2.0 and FMI 3.0, from this project or any other tool.
 ///
-/// An instance has the name of its file; NAME=FILE gives another. Variables are written INSTANCE.VARIABLE.
+/// An instance is named after its file; NAME=FILE gives another name. Write variables as INSTANCE.VARIABLE.
 ///
-/// At every communication point all outputs are read and all inputs set, then all FMUs step: what one FMU sends reaches
-/// the other one step later. With --sequential the FMUs step in the order given, each with what those before it have just
-/// computed.
+/// At every communication point the command reads all outputs, sets all inputs, then steps all FMUs: an output reaches other
+/// FMUs one step later. With --sequential, the FMUs step in the order given, and each receives the new outputs of those before
+/// it.
 ///
-/// After the run a line on standard error warns of inputs that kept their start values, for nothing feeds or sets them, and of
-/// a step longer than an FMU's DefaultExperiment has.
+/// After the run, warnings on standard error list inputs that kept their start values because nothing feeds or sets them, and a
+/// step that is longer than the DefaultExperiment of an FMU.
 ///
 /// Start the motor and turn it at 1000 rpm (104.7 rad/s):
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
 ///     --input SensorlessController.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
-/// The same from an SSP file of `fmu ssp`, or of any other tool; names without a dot are those of the system's connectors:
+/// The same from an SSP file of `fmu ssp` or any other tool; names without a dot refer to connectors of the system:
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
 /// The same, connected by terminals:
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --terminal p.phases=c.phases --terminal p.sensor=c.sensor \
 ///     --input c.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
-/// The same, connected by hand, with another resistance, some variables only, as CSV:
+/// The same, connected by hand, with another resistance, recording selected variables as CSV:
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --connect c.u_a=p.u_a --connect c.u_b=p.u_b \
 ///     --connect c.u_c=p.u_c --connect p.i_a=c.i_a --connect p.i_b=c.i_b --connect p.i_c=c.i_c \
 ///     --set p.motor.R_s=3.3 --input c.speed_ref=0:0,0.1:104.7 --stop 1 --record p.speed,c.speed_est --csv -
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Simulate {
-    /// FMUs, each with a name of your choice or that of the file; or one SSP file
+    /// FMUs, each optionally with a name; or one SSP file
     #[arg(value_name = "[NAME=]FILE", required = true)]
     pub fmus: Vec<String>,
     /// Connect an output to an input (repeatable)
     #[arg(long, value_name = "OUTPUT=INPUT")]
     pub connect: Vec<String>,
-    /// Connect two terminals, each an instance's group of variables that belong together (repeatable)
+    /// Connect two terminals, which group the variables of an instance (repeatable)
     #[arg(long, value_name = "TERMINAL=TERMINAL")]
     pub terminal: Vec<String>,
-    /// Connect every input that nothing feeds to the output of the same name of another FMU
+    /// Connect every unconnected input to the output of the same name of another FMU
     #[arg(long)]
     pub auto_connect: bool,
-    /// Set what a parameter file says, SSV of SSP 1.0, before --set (repeatable)
+    /// Set the values of a parameter file (SSV of SSP 1.0) before --set (repeatable)
     #[arg(long, value_name = "INSTANCE=FILE.ssv")]
     pub parameters: Vec<String>,
-    /// Set a parameter, or an input that nothing feeds (repeatable)
+    /// Set a parameter or an unconnected input (repeatable)
     #[arg(long, value_name = "VARIABLE=VALUE")]
     pub set: Vec<String>,
     /// Feed an input over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE for straight lines, or
-    /// a CSV file with time in the first column and INSTANCE.VARIABLE above the others
+    /// a CSV file with time in the first column and INSTANCE.VARIABLE as heading of the others
     #[arg(long, value_name = "VARIABLE=POINTS|FILE.csv")]
     pub input: Vec<String>,
-    /// Start time in s [default: that of the FMUs, or 0]
+    /// Start time in s [default: from the FMUs, else 0]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub start: Option<f64>,
-    /// Stop time in s [default: the latest of the FMUs, or 1]
+    /// Stop time in s [default: the latest of the FMUs, else 1]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub stop: Option<f64>,
-    /// Communication step in s [default: the shortest of the FMUs, or a thousandth of the time]
+    /// Communication step in s [default: the shortest of the FMUs, else a thousandth of the duration]
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
     /// Variables to record [default: all outputs]
     #[arg(long, value_name = "VARIABLE,...", value_delimiter = ',')]
     pub record: Vec<String>,
-    /// Write what was recorded as CSV; - for standard output
+    /// Write the recording as CSV; - for standard output
     #[arg(long, value_name = "FILE|-")]
     pub csv: Option<PathBuf>,
-    /// Plot what was recorded
+    /// Plot the recording
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
-    /// Step the FMUs one after the other, each with what those before it have just computed
+    /// Step the FMUs one after another; each receives the new outputs of those before it
     #[arg(long)]
     pub sequential: bool,
-    /// Show all that the FMUs log
+    /// Show all messages that the FMUs log
     #[arg(long)]
     pub logging: bool,
 }
@@ -93,7 +93,7 @@ pub struct Simulate {
 /// Runs the command.
 ///
 /// # Errors
-/// A file is no FMU that runs here, a name is wrong, or an FMU fails.
+/// A file is not an FMU that runs here, a name is wrong, or an FMU fails.
 pub fn run(args: &Simulate) -> Result<()> {
     let mut loaded = open(args)?;
     let settings = prepare(&mut loaded, args)?;
@@ -118,7 +118,7 @@ pub fn run(args: &Simulate) -> Result<()> {
     written
 }
 
-/// What may make a result wrong that no FMU refuses: inputs that keep their start values, a step that is too long.
+/// Warnings about inputs that keep their start values and a step that is too long, which no FMU refuses.
 fn warnings(system: &System, settings: &Settings) -> Vec<String> {
     let mut found = Vec::new();
     for (index, instance) in system.instances().iter().enumerate() {
@@ -216,7 +216,7 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
     Ok(settings(args, &loaded.experiments))
 }
 
-/// What is not said is taken from the FMUs.
+/// Takes times that are not given from the FMUs.
 fn settings(args: &Simulate, experiments: &[Experiment]) -> Settings {
     let start = args.start.or_else(|| experiments.iter().find_map(|x| x.start)).unwrap_or(0.0);
     let latest = experiments.iter().filter_map(|x| x.stop).reduce(f64::max);

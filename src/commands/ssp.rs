@@ -9,40 +9,39 @@ use clap::Args;
 use drive_study::tune;
 use std::path::PathBuf;
 
-/// Packs plant and controller, connected and with the values of a machine, as one SSP file (SSP 1.0).
+/// Packs plant and controller, connected and with the values of a motor, into one SSP file (SSP 1.0).
 ///
-/// The system has the inputs (speed_ref, tau_load, u_dc and more) and the outputs that PmsmDrive has. Values come from a
-/// machine's file, as with `fmu tune`, or from SSV files for the components controller and plant; without either the FMUs keep
-/// their start values.
+/// The system has the inputs (speed_ref, tau_load, u_dc and more) and outputs of PmsmDrive. Values come from a motor file, as with
+/// `fmu tune`, or from SSV files for the components controller and plant; without either, the FMUs keep their start values.
 ///
 ///   fmu ssp --motor motors/ipmsm-2.2kw.toml --out drive.ssp
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg
 ///
-/// SSP 1.0 is older than FMI 3.0: many importers of SSP take FMUs of FMI 2.0 only. OMSimulator's command line runs the file as
-/// it is, with --integers if a machine is given. With SOURCE_DATE_EPOCH set, the same sources give the same bytes.
+/// SSP 1.0 is older than FMI 3.0, and many SSP importers accept only FMUs of FMI 2.0. OMSimulator's command line runs the file
+/// unchanged; add --integers if a motor is given. With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Ssp {
-    /// The standard of the FMUs: 2 or 3
+    /// FMI version of the FMUs: 2 or 3
     #[arg(long, value_name = "VERSION", default_value = "2", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
     pub fmi: String,
-    /// File of the machine, as `fmu tune` reads it
+    /// Motor file, as for `fmu tune`
     #[arg(long, value_name = "MOTOR.toml", conflicts_with = "parameters")]
     pub motor: Option<PathBuf>,
-    /// Values for controller or plant, SSV of SSP 1.0 (repeatable)
+    /// Values for controller or plant as SSV of SSP 1.0 (repeatable)
     #[arg(long, value_name = "COMPONENT=FILE.ssv")]
     pub parameters: Vec<String>,
-    /// Writes the machine's enumerations as integers, for importers that read no names (OMSimulator)
+    /// Write the motor's enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long, requires = "motor")]
     pub integers: bool,
-    /// Connects `enabled` of the controller to `enable` of the plant, for a drive that is switched off; some importers have no
-    /// Boolean connections
+    /// Connect `enabled` of the controller to `enable` of the plant, for a drive that can be switched off; some importers do
+    /// not support Boolean connections
     #[arg(long)]
     pub gates: bool,
-    /// Writes the size of the diagram, SystemGeometry, which some importers refuse (OMSimulator)
+    /// Write the size of the diagram (SystemGeometry), which some importers refuse (OMSimulator)
     #[arg(long)]
     pub geometry: bool,
-    /// Where the SSP goes
+    /// File to write
     #[arg(long, value_name = "FILE.ssp")]
     pub out: PathBuf,
 }

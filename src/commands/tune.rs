@@ -1,4 +1,4 @@
-//! `fmu tune`: parameter values of the FMUs for a machine.
+//! The command `fmu tune`: parameter values of the FMUs for a motor.
 
 use crate::workspace::Workspace;
 use crate::{pack, ssv};
@@ -8,10 +8,10 @@ use drive_study::tune::rules::{Setting, Value};
 use drive_study::tune::{self, rules::Tuned};
 use std::path::{Path, PathBuf};
 
-/// Turns a machine and bandwidths into parameter values of PmsmPlant and SensorlessController.
+/// Computes parameter values of PmsmPlant and SensorlessController from motor data and bandwidths.
 ///
-/// MOTOR.toml holds machine, mechanics, ratings, DC link and the bandwidths of current loop, speed loop and observer; the
-/// folder motors/ has examples. Writes NAME.PmsmPlant.ssv and NAME.SensorlessController.ssv (SSP 1.0) with the values that
+/// MOTOR.toml contains motor, mechanics, ratings, DC link and the bandwidths of current loop, speed loop and observer; see the
+/// examples in motors/. The command writes NAME.PmsmPlant.ssv and NAME.SensorlessController.ssv (SSP 1.0) with the values that
 /// differ from the start values of the FMUs, for importers:
 ///
 ///   fmu tune motors/ipmsm-2.2kw.toml --out target/tune
@@ -22,13 +22,13 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Tune {
-    /// File of the machine
+    /// Motor file
     #[arg(value_name = "MOTOR.toml")]
     pub motor: PathBuf,
-    /// Where the files go [default: tune in Cargo's target folder]
+    /// Output folder [default: tune in Cargo's target folder]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Writes enumerations as integers, for importers that read no names (OMSimulator)
+    /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
 }
@@ -36,7 +36,7 @@ pub struct Tune {
 /// Runs the command.
 ///
 /// # Errors
-/// The machine's file is wrong, or a file cannot be written.
+/// The motor file is invalid, or a file cannot be written.
 pub fn run(args: &Tune) -> Result<()> {
     let tuned = tune::tune(&args.motor)?;
     let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("tune")), Ok)?;

@@ -25,7 +25,7 @@ pub fn check(path: &Path, only: &[&str]) -> Report {
 pub fn check_within(path: &Path, only: &[&str], seconds: u64) -> Report {
     let options = Options {
         only: only.iter().map(ToString::to_string).collect(),
-        patience: Some(Duration::from_secs(seconds)),
+        timeout: Some(Duration::from_secs(seconds)),
         program: Some(env!("CARGO_BIN_EXE_fmu").into()),
     };
     fmu_check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))

@@ -87,9 +87,9 @@ impl<M: Model> Abi<M> {
         }
     }
 
-    pub unsafe fn exit_initialisation(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn exit_initialization(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |it| Ok(it.exit_initialisation()?)) }
+        unsafe { enter::<M>(entry, instance, |it| Ok(it.exit_initialization()?)) }
     }
 
     pub unsafe fn terminate(entry: Entry, instance: Instance) -> c_int {
@@ -114,7 +114,7 @@ impl<M: Model> Abi<M> {
 
     /// `state` leads to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.6.4).
     pub unsafe fn save_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
-        // SAFETY: the importer's variable, which it has initialised as the standard says.
+        // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
             enter::<M>(entry, instance, |it| {
                 let state = place(state, "FMUState")?.assume_init_mut();
@@ -129,9 +129,9 @@ impl<M: Model> Abi<M> {
         unsafe { enter::<M>(entry, instance, |it| Ok(it.restore(state.addr())?)) }
     }
 
-    /// NULL, and a variable that holds NULL, are fine.
+    /// Ignores NULL and a variable that holds NULL.
     pub unsafe fn free_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
-        // SAFETY: the importer's variable, which it has initialised as the standard says.
+        // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
             enter::<M>(entry, instance, |_| {
                 if state.is_null() {
@@ -145,7 +145,7 @@ impl<M: Model> Abi<M> {
         }
     }
 
-    pub unsafe fn serialised_size(entry: Entry, instance: Instance, state: FmuState, size: *mut usize) -> c_int {
+    pub unsafe fn serialized_size(entry: Entry, instance: Instance, state: FmuState, size: *mut usize) -> c_int {
         // SAFETY: the importer's variable; the state is a number to us.
         unsafe {
             enter::<M>(entry, instance, |_| {
@@ -156,7 +156,7 @@ impl<M: Model> Abi<M> {
         }
     }
 
-    pub unsafe fn serialise(entry: Entry, instance: Instance, state: FmuState, bytes: *mut u8, size: usize) -> c_int {
+    pub unsafe fn serialize(entry: Entry, instance: Instance, state: FmuState, bytes: *mut u8, size: usize) -> c_int {
         // SAFETY: the importer's array of this size; the state is a number to us.
         unsafe {
             enter::<M>(entry, instance, |_| {
@@ -173,8 +173,8 @@ impl<M: Model> Abi<M> {
         }
     }
 
-    /// Always makes a new state: what the variable held before is not looked at.
-    pub unsafe fn deserialise(
+    /// Always creates a new state and ignores the previous value of the variable.
+    pub unsafe fn deserialize(
         entry: Entry,
         instance: Instance,
         bytes: *const u8,
@@ -185,13 +185,13 @@ impl<M: Model> Abi<M> {
         unsafe {
             enter::<M>(entry, instance, |it| {
                 let state = place(state, "FMUState")?;
-                state.write(handle(it.deserialise(array(bytes, size, "serializedState")?)?));
+                state.write(handle(it.deserialize(array(bytes, size, "serializedState")?)?));
                 Ok(())
             })
         }
     }
 
-    /// What this FMU does not offer.
+    /// A function of a capability that this FMU does not have.
     pub unsafe fn unsupported(entry: Entry, instance: Instance, why: &str) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<M>(entry, instance, |_| Err(Fault::new(format!("not supported: {why}")).into())) }

@@ -54,9 +54,9 @@ impl<M: Model> Abi<M> {
         unsafe { enter::<M>(entry, instance, |it| Ok(it.set_up(start, (stop_defined.0 != 0).then_some(stop))?)) }
     }
 
-    pub unsafe fn fmi2_enter_initialisation(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn fmi2_enter_initialization(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |it| Ok(it.enter_initialisation()?)) }
+        unsafe { enter::<M>(entry, instance, |it| Ok(it.enter_initialization()?)) }
     }
 
     pub unsafe fn fmi2_do_step(entry: Entry, instance: Instance, t: f64, h: f64) -> c_int {
@@ -73,7 +73,7 @@ impl<M: Model> Abi<M> {
                 if kind != LAST_SUCCESSFUL_TIME {
                     return no_status(kind);
                 }
-                value.write(it.now.end);
+                value.write(it.current.end);
                 Ok(())
             })
         }
@@ -152,8 +152,8 @@ macro_rules! export_fmi2 {
                 => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
             fmi2SetupExperiment(_tolerance_defined: Fmi2Boolean, _tolerance: f64, start: f64, stop_defined: Fmi2Boolean, stop: f64)
                 => SetupExperiment: fmi2_setup_experiment(start, stop_defined, stop);
-            fmi2EnterInitializationMode() => EnterInitialization: fmi2_enter_initialisation();
-            fmi2ExitInitializationMode() => ExitInitialization: exit_initialisation();
+            fmi2EnterInitializationMode() => EnterInitialization: fmi2_enter_initialization();
+            fmi2ExitInitializationMode() => ExitInitialization: exit_initialization();
             fmi2Terminate() => Terminate: terminate();
             fmi2Reset() => Reset: reset();
 
@@ -169,10 +169,10 @@ macro_rules! export_fmi2 {
             fmi2GetFMUstate(state: *mut FmuState) => SaveState: save_state(state);
             fmi2SetFMUstate(state: FmuState) => RestoreState: restore_state(state);
             fmi2FreeFMUstate(state: *mut FmuState) => UseState: free_state(state);
-            fmi2SerializedFMUstateSize(state: FmuState, size: *mut usize) => UseState: serialised_size(state, size);
-            fmi2SerializeFMUstate(state: FmuState, bytes: *mut u8, size: usize) => UseState: serialise(state, bytes, size);
+            fmi2SerializedFMUstateSize(state: FmuState, size: *mut usize) => UseState: serialized_size(state, size);
+            fmi2SerializeFMUstate(state: FmuState, bytes: *mut u8, size: usize) => UseState: serialize(state, bytes, size);
             fmi2DeSerializeFMUstate(bytes: *const u8, size: usize, state: *mut FmuState)
-                => UseState: deserialise(bytes, size, state);
+                => UseState: deserialize(bytes, size, state);
 
             fmi2DoStep(t: f64, h: f64, _no_set_state_prior: Fmi2Boolean) => DoStep: fmi2_do_step(t, h);
             fmi2CancelStep() => Unsupported: unsupported("no step is ever in progress");

@@ -30,7 +30,7 @@ impl<M: Model> Abi<M> {
         open::<M>(entry, Log::new(Box::new(Fmi3Sink { logger, environment }), logging_on.0 != 0), judged)
     }
 
-    pub unsafe fn fmi3_enter_initialisation(
+    pub unsafe fn fmi3_enter_initialization(
         entry: Entry,
         instance: Instance,
         start: f64,
@@ -60,9 +60,9 @@ impl<M: Model> Abi<M> {
                 place(event_handling_needed, "eventHandlingNeeded")?.write(Fmi3Boolean(0));
                 place(terminate_simulation, "terminateSimulation")?.write(Fmi3Boolean(0));
                 place(early_return, "earlyReturn")?.write(Fmi3Boolean(0));
-                time.write(it.now.end);
+                time.write(it.current.end);
                 it.do_step(t, h)?;
-                time.write(it.now.end);
+                time.write(it.current.end);
                 Ok(())
             })
         }
@@ -164,8 +164,8 @@ macro_rules! export_fmi3 {
             fmi3SetDebugLogging(on: Fmi3Boolean, n: usize, categories: *const Text)
                 => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
             fmi3EnterInitializationMode(_tolerance_defined: Fmi3Boolean, _tolerance: f64, start: f64, stop_defined: Fmi3Boolean, stop: f64)
-                => EnterInitialization: fmi3_enter_initialisation(start, stop_defined, stop);
-            fmi3ExitInitializationMode() => ExitInitialization: exit_initialisation();
+                => EnterInitialization: fmi3_enter_initialization(start, stop_defined, stop);
+            fmi3ExitInitializationMode() => ExitInitialization: exit_initialization();
             fmi3Terminate() => Terminate: terminate();
             fmi3Reset() => Reset: reset();
 
@@ -204,10 +204,10 @@ macro_rules! export_fmi3 {
             fmi3GetFMUState(state: *mut FmuState) => SaveState: save_state(state);
             fmi3SetFMUState(state: FmuState) => RestoreState: restore_state(state);
             fmi3FreeFMUState(state: *mut FmuState) => UseState: free_state(state);
-            fmi3SerializedFMUStateSize(state: FmuState, size: *mut usize) => UseState: serialised_size(state, size);
-            fmi3SerializeFMUState(state: FmuState, bytes: *mut u8, size: usize) => UseState: serialise(state, bytes, size);
+            fmi3SerializedFMUStateSize(state: FmuState, size: *mut usize) => UseState: serialized_size(state, size);
+            fmi3SerializeFMUState(state: FmuState, bytes: *mut u8, size: usize) => UseState: serialize(state, bytes, size);
             fmi3DeserializeFMUState(bytes: *const u8, size: usize, state: *mut FmuState)
-                => UseState: deserialise(bytes, size, state);
+                => UseState: deserialize(bytes, size, state);
 
             fmi3DoStep(
                 t: f64, h: f64, _no_set_state_prior: Fmi3Boolean, event_handling_needed: *mut Fmi3Boolean,

@@ -4,7 +4,7 @@
 use crate::instance::Instance;
 use crate::lifecycle::{Call, Standard, State, States};
 use crate::log::{Log, Status};
-use crate::saved::Saved;
+use crate::snapshot::Snapshot;
 use fmu_core::{Fault, Model};
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
@@ -27,7 +27,7 @@ impl Entry {
     }
 }
 
-/// Why a call was not done.
+/// Why a call failed.
 pub(crate) enum Refusal {
     /// Status Error: the instance goes to the Error state.
     Error(Fault),
@@ -41,7 +41,7 @@ impl From<Fault> for Refusal {
     }
 }
 
-/// What the importer's pointer leads to. `busy` while a call is under way: a logger that calls back finds it closed.
+/// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused.
 struct Handle<M: Model> {
     busy: Cell<bool>,
     instance: UnsafeCell<Instance<M>>,
@@ -78,13 +78,13 @@ fn pass<M: Model>(
     instance: &mut Instance<M>,
     body: impl FnOnce(&mut Instance<M>) -> Result<(), Refusal>,
 ) -> Status {
-    if instance.standard != entry.standard || !entry.states.contains(instance.now.life.state()) {
+    if instance.standard != entry.standard || !entry.states.contains(instance.current.life.state()) {
         return fail(entry, instance, Refusal::Error(misplaced(entry, instance)));
     }
     // A panic can leave a half-done step; the instance then only leads to Reset, SetFMUState and Free.
     match catch_unwind(AssertUnwindSafe(|| body(instance))) {
         Ok(Ok(())) => {
-            instance.now.life.after(true, entry.next);
+            instance.current.life.after(true, entry.next);
             Status::Ok
         }
         Ok(Err(refusal)) => fail(entry, instance, refusal),
@@ -96,7 +96,7 @@ fn pass<M: Model>(
 fn fail<M: Model>(entry: Entry, instance: &mut Instance<M>, refusal: Refusal) -> Status {
     match refusal {
         Refusal::Error(fault) => {
-            instance.now.life.after(false, None);
+            instance.current.life.after(false, None);
             instance.log.error(&format!("{}: {fault}", entry.name));
             Status::Error
         }
@@ -112,7 +112,7 @@ fn misplaced<M: Model>(entry: Entry, instance: &Instance<M>) -> Fault {
     if instance.standard != entry.standard {
         return Fault::new("the instance was made by the other standard's function");
     }
-    let state = instance.now.life.state();
+    let state = instance.current.life.state();
     Fault::new(format!("not allowed in the state {state}; allowed in: {}", entry.states))
 }
 
@@ -124,10 +124,10 @@ fn panicked(payload: &(dyn Any + Send)) -> Fault {
 
 /// A new instance for the importer, or NULL and a message.
 pub(crate) fn open<M: Model>(entry: Entry, log: Log, name: Result<String, Fault>) -> *mut c_void {
-    let model = || catch_unwind(Saved::<M>::default).map_err(|payload| panicked(payload.as_ref()));
+    let model = || catch_unwind(Snapshot::<M>::default).map_err(|payload| panicked(payload.as_ref()));
     match name.and_then(|name| Ok((name, model()?))) {
-        Ok((name, now)) => {
-            let instance = UnsafeCell::new(Instance::new(entry.standard, name, log, now));
+        Ok((name, current)) => {
+            let instance = UnsafeCell::new(Instance::new(entry.standard, name, log, current));
             Box::into_raw(Box::new(Handle { busy: Cell::new(false), instance })).cast()
         }
         Err(fault) => {
@@ -137,7 +137,7 @@ pub(crate) fn open<M: Model>(entry: Entry, log: Log, name: Result<String, Fault>
     }
 }
 
-/// Frees an instance; NULL is fine, and a logger that frees the instance it logs for is ignored.
+/// Frees an instance; ignores NULL and a logger that frees the instance it logs for.
 ///
 /// # Safety
 /// As [`enter`]; the pointer is not used again.

@@ -21,7 +21,7 @@ pub(crate) unsafe fn array<'a, T>(pointer: *const T, n: usize, name: &str) -> Re
     Ok(unsafe { slice::from_raw_parts(pointer, n) })
 }
 
-/// Room for `n` elements that the importer need not have initialised. NULL is room for none.
+/// Room for `n` elements that the importer need not have initialized. NULL is room for none.
 ///
 /// # Safety
 /// A non-NULL aligned `pointer` is writable for `n` elements, and nobody else uses it during `'a`.
@@ -33,7 +33,7 @@ pub(crate) unsafe fn room<'a, T>(pointer: *mut T, n: usize, name: &str) -> Resul
     if !fits(pointer, n) {
         return Err(refuse(pointer.is_null(), n, name));
     }
-    // SAFETY: not NULL, aligned, no larger than an allocation can be; ours by the caller's promise; uninitialised is fine.
+    // SAFETY: not NULL, aligned, no larger than an allocation can be; ours by the caller's promise; uninitialized is fine.
     Ok(unsafe { slice::from_raw_parts_mut(pointer.cast(), n) })
 }
 
@@ -46,7 +46,7 @@ pub(crate) unsafe fn place<'a, T>(pointer: *mut T, name: &str) -> Result<&'a mut
     if !fits(pointer, 1) {
         return Err(refuse(pointer.is_null(), 1, name));
     }
-    // SAFETY: not NULL, aligned; ours by the caller's promise; uninitialised is fine.
+    // SAFETY: not NULL, aligned; ours by the caller's promise; uninitialized is fine.
     Ok(unsafe { &mut *pointer.cast() })
 }
 

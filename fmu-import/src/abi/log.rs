@@ -35,6 +35,11 @@ impl Status {
     pub const ERROR: Self = Self(3);
     /// Every instance of this FMU is done for.
     pub const FATAL: Self = Self(4);
+
+    /// Whether the call succeeded: OK or Warning.
+    pub fn is_ok(self) -> bool {
+        matches!(self, Self::OK | Self::WARNING)
+    }
 }
 
 impl fmt::Display for Status {

@@ -5,19 +5,23 @@ pub(crate) mod fmi3;
 pub(crate) mod library;
 pub(crate) mod log;
 pub mod raw;
+pub(crate) mod shared;
+mod signatures;
 
 use crate::Error;
 use crate::standard::{Outcome, Standard};
 use log::Log;
 use model_description::FmiVersion;
+use shared::SharedFunctions;
 use std::ffi::CString;
 use std::path::Path;
 use std::sync::Arc;
 use tempfile::TempDir;
 
-/// The functions of a library, the library, and the folder that it lies in; dropped in this order.
+/// The functions of a library, the library, and the folder that contains it; dropped in this order.
 pub(crate) struct Loaded<F> {
     api: F,
+    shared: Arc<SharedFunctions>,
     _library: libloading::Library,
     _dir: Arc<TempDir>,
 }
@@ -32,20 +36,24 @@ impl Functions {
     /// Loads the binary, which lies in `dir`.
     pub(crate) fn load(binary: &Path, version: FmiVersion, dir: &Arc<TempDir>) -> Result<Self, Error> {
         let library = library::load(binary)?;
-        let functions = match version {
-            FmiVersion::V2 => {
-                // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that
-                // they go to keeps the library.
-                unsafe { fmi2::Functions::load(&library) }
-                    .map(|api| Self::V2(Arc::new(Loaded { api, _library: library, _dir: dir.clone() })))
-            }
-            FmiVersion::V3 => {
-                // SAFETY: as above.
-                unsafe { fmi3::Functions::load(&library) }
-                    .map(|api| Self::V3(Arc::new(Loaded { api, _library: library, _dir: dir.clone() })))
-            }
+        let load = || {
+            // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that they go
+            // to keeps the library.
+            let shared = Arc::new(unsafe { SharedFunctions::load(&library, version) }?);
+            Ok(match version {
+                FmiVersion::V2 => {
+                    // SAFETY: as above.
+                    let api = unsafe { fmi2::Functions::load(&library) }?;
+                    Self::V2(Arc::new(Loaded { api, shared, _library: library, _dir: dir.clone() }))
+                }
+                FmiVersion::V3 => {
+                    // SAFETY: as above.
+                    let api = unsafe { fmi3::Functions::load(&library) }?;
+                    Self::V3(Arc::new(Loaded { api, shared, _library: library, _dir: dir.clone() }))
+                }
+            })
         };
-        functions.map_err(|cause| Error::file(binary, cause))
+        load().map_err(|cause: String| Error::file(binary, cause))
     }
 
     /// An instance for co-simulation; `resources` is a URI in FMI 2.0 and a path in FMI 3.0.

@@ -1,6 +1,7 @@
 //! The callbacks that the FMU gets, and what comes through them.
 
 use super::super::log::{Status, copy_text};
+use super::super::signatures::v2::{calloc, free};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -52,7 +53,7 @@ pub(super) unsafe fn optional(text: *const c_char) -> Option<String> {
     unsafe { CStr::from_ptr(text) }.to_str().ok().map(str::to_owned)
 }
 
-/// See `fmi2::logger`: a variadic function, received as far as its arguments are in registers.
+/// See [`v2::Logger`](super::super::signatures::v2::Logger): a variadic function, received as far as its arguments are in registers.
 pub(super) unsafe extern "C" fn logger2<const LATE: bool>(
     environment: *mut c_void,
     instance: *const c_char,
@@ -81,11 +82,6 @@ pub(super) unsafe extern "C" fn logger3(
     push(Event { environment: environment.addr(), instance: None, status: status.0, category, text, late: false });
 }
 
-unsafe extern "C" {
-    fn calloc(count: usize, size: usize) -> *mut c_void;
-    fn free(memory: *mut c_void);
-}
-
 pub(super) unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
     ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
     // SAFETY: the C library's.
@@ -96,17 +92,4 @@ pub(super) unsafe extern "C" fn release(memory: *mut c_void) {
     ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
     // SAFETY: the FMU passes what `allocate` gave, or NULL.
     unsafe { free(memory) }
-}
-
-pub(super) type Logger2 =
-    unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, *const c_char);
-
-/// `fmi2CallbackFunctions`.
-#[repr(C)]
-pub(super) struct Callbacks {
-    pub(super) logger: Option<Logger2>,
-    pub(super) allocate: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
-    pub(super) free: Option<unsafe extern "C" fn(*mut c_void)>,
-    pub(super) step_finished: *const c_void,
-    pub(super) environment: *mut c_void,
 }

@@ -1,7 +1,7 @@
 //! Instantiation, with every argument in the checker's hands.
 
-use super::super::log::Status;
-use super::callbacks::{Callbacks, allocate, logger2, logger3, release};
+use super::super::signatures::{v2, v3};
+use super::callbacks::{allocate, logger2, logger3, release};
 use super::{Handle, Raw};
 use model_description::FmiVersion;
 use std::ffi::{CString, c_char, c_int, c_void};
@@ -72,22 +72,13 @@ impl Raw {
         texts: [*const c_char; 3],
         environment: *mut c_void,
     ) -> Result<*mut c_void, String> {
-        type Instantiate = unsafe extern "C" fn(
-            *const c_char,
-            c_int,
-            *const c_char,
-            *const c_char,
-            *const Callbacks,
-            c_int,
-            c_int,
-        ) -> *mut c_void;
-        let f: Instantiate = self.function("Instantiate").ok_or("the function fmi2Instantiate is missing")?;
+        let f: v2::Instantiate = self.function("Instantiate").ok_or("the function fmi2Instantiate is missing")?;
         // Kept for ever: an FMU made before FMI 2.0.5 may keep the pointer.
-        let callbacks = Box::leak(Box::new(Callbacks {
+        let callbacks = Box::leak(Box::new(v2::Callbacks {
             logger: b.logger.then_some(logger2::<false>),
             allocate: b.memory.then_some(allocate),
             free: b.memory.then_some(release),
-            step_finished: ptr::null(),
+            step_finished: None,
             environment,
         }));
         let kind = c_int::from(b.interface == Interface::CoSimulation);
@@ -108,43 +99,7 @@ impl Raw {
         texts: [*const c_char; 3],
         environment: *mut c_void,
     ) -> Result<*mut c_void, String> {
-        type Logger = Option<unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char)>;
-        type Common = unsafe extern "C" fn(
-            *const c_char,
-            *const c_char,
-            *const c_char,
-            bool,
-            bool,
-            *mut c_void,
-            Logger,
-        ) -> *mut c_void;
-        type CoSimulation = unsafe extern "C" fn(
-            *const c_char,
-            *const c_char,
-            *const c_char,
-            bool,
-            bool,
-            bool,
-            bool,
-            *const u32,
-            usize,
-            *mut c_void,
-            Logger,
-            *const c_void,
-        ) -> *mut c_void;
-        type Scheduled = unsafe extern "C" fn(
-            *const c_char,
-            *const c_char,
-            *const c_char,
-            bool,
-            bool,
-            *mut c_void,
-            Logger,
-            *const c_void,
-            *const c_void,
-            *const c_void,
-        ) -> *mut c_void;
-        let logger: Logger = if b.logger { Some(logger3) } else { None };
+        let logger: Option<v3::LogMessage> = if b.logger { Some(logger3) } else { None };
         let [name, token, resources] = texts;
         let missing = |name: &str| format!("the function fmi3{name} is missing");
         // SAFETY: of all three: the standard's types; texts are NULL or C strings that outlive the call.
@@ -152,7 +107,7 @@ impl Raw {
             match b.interface {
                 Interface::CoSimulation => {
                     let name_of = "InstantiateCoSimulation";
-                    let f: CoSimulation = self.function(name_of).ok_or_else(|| missing(name_of))?;
+                    let f: v3::InstantiateCoSimulation = self.function(name_of).ok_or_else(|| missing(name_of))?;
                     Ok(f(
                         name,
                         token,
@@ -170,12 +125,13 @@ impl Raw {
                 }
                 Interface::ModelExchange => {
                     let name_of = "InstantiateModelExchange";
-                    let f: Common = self.function(name_of).ok_or_else(|| missing(name_of))?;
+                    let f: v3::InstantiateModelExchange = self.function(name_of).ok_or_else(|| missing(name_of))?;
                     Ok(f(name, token, resources, false, b.logging, environment, logger))
                 }
                 Interface::ScheduledExecution => {
                     let name_of = "InstantiateScheduledExecution";
-                    let f: Scheduled = self.function(name_of).ok_or_else(|| missing(name_of))?;
+                    let f: v3::InstantiateScheduledExecution =
+                        self.function(name_of).ok_or_else(|| missing(name_of))?;
                     let none = ptr::null();
                     Ok(f(name, token, resources, false, b.logging, environment, logger, none, none, none))
                 }

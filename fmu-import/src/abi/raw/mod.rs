@@ -20,6 +20,7 @@ pub use names::{Optional, Simple, StepStatus, Text};
 pub use processor::float_control;
 
 use super::log::Status;
+use super::signatures::{FreeInstance, OfInstance, Text as TextFunction, v2, v3};
 use buffer::CANARY;
 use callbacks::optional;
 use libloading::Library;
@@ -54,10 +55,10 @@ impl SavedState {
     }
 }
 
-/// Which of the results of `fmi3DoStep` are to be told; the others get NULL.
-pub type Places = [bool; 4];
+/// Which results of `fmi3DoStep` get a pointer; the others get NULL.
+pub type ResultPointers = [bool; 4];
 
-/// What `fmi3DoStep` told.
+/// The results of `fmi3DoStep`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stepped {
     /// `eventHandlingNeeded`, as a byte.
@@ -76,10 +77,6 @@ pub struct Raw {
     library: Library,
     version: FmiVersion,
 }
-
-type OfInstance = unsafe extern "C" fn(*mut c_void) -> Status;
-type Get2 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void) -> Status;
-type Get3 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void, usize) -> Status;
 
 impl Raw {
     /// Loads a binary.
@@ -136,46 +133,50 @@ impl Raw {
 
     /// What the FMU says of itself.
     pub fn text(&self, name: Text) -> Option<String> {
-        let function: unsafe extern "C" fn() -> *const c_char = self.function(name.as_str())?;
+        let function: TextFunction = self.function(name.as_str())?;
         // SAFETY: the standard's type; the text is a constant of the FMU.
         unsafe { optional(function()) }
     }
 
     /// `FreeInstance`; `None` if it is missing.
-    pub fn free(&self, it: Handle) -> Option<()> {
-        let f: unsafe extern "C" fn(*mut c_void) = self.function("FreeInstance")?;
+    pub fn free(&self, instance: Handle) -> Option<()> {
+        let f: FreeInstance = self.function("FreeInstance")?;
         // SAFETY: an instance of this FMU, freed once, or NULL.
-        unsafe { f(it.pointer()) };
+        unsafe { f(instance.pointer()) };
         Some(())
     }
 
     /// A function with nothing but the instance. `fmi3EnterInitializationMode` is none of them: see
     /// [`experiment`](Self::experiment).
-    pub fn simple(&self, name: Simple, it: Handle) -> Option<Status> {
+    pub fn simple(&self, name: Simple, instance: Handle) -> Option<Status> {
         if name == Simple::EnterInitializationMode && self.version == FmiVersion::V3 {
             return None;
         }
         let f: OfInstance = self.function(name.as_str())?;
         // SAFETY: all functions that `Simple` names have this type.
-        Some(unsafe { f(it.pointer()) })
+        Some(unsafe { f(instance.pointer()) })
     }
 
     /// `fmi2SetupExperiment` or `fmi3EnterInitializationMode`.
-    pub fn experiment(&self, it: Handle, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Option<Status> {
+    pub fn experiment(
+        &self,
+        instance: Handle,
+        tolerance: Option<f64>,
+        start: f64,
+        stop: Option<f64>,
+    ) -> Option<Status> {
         let (has_tolerance, has_stop) = (tolerance.is_some(), stop.is_some());
         let (tolerance, stop) = (tolerance.unwrap_or(0.0), stop.unwrap_or(0.0));
         // SAFETY: the standards' types.
         Some(unsafe {
             match self.version {
                 FmiVersion::V2 => {
-                    type F = unsafe extern "C" fn(*mut c_void, c_int, f64, f64, c_int, f64) -> Status;
-                    let f: F = self.function("SetupExperiment")?;
-                    f(it.pointer(), c_int::from(has_tolerance), tolerance, start, c_int::from(has_stop), stop)
+                    let f: v2::SetupExperiment = self.function("SetupExperiment")?;
+                    f(instance.pointer(), c_int::from(has_tolerance), tolerance, start, c_int::from(has_stop), stop)
                 }
                 FmiVersion::V3 => {
-                    type F = unsafe extern "C" fn(*mut c_void, bool, f64, f64, bool, f64) -> Status;
-                    let f: F = self.function("EnterInitializationMode")?;
-                    f(it.pointer(), has_tolerance, tolerance, start, has_stop, stop)
+                    let f: v3::EnterInitializationMode = self.function("EnterInitializationMode")?;
+                    f(instance.pointer(), has_tolerance, tolerance, start, has_stop, stop)
                 }
             }
         })
@@ -185,7 +186,7 @@ impl Raw {
     /// there is room. `n_values` is FMI 3.0's.
     pub fn get(
         &self,
-        it: Handle,
+        instance: Handle,
         base: BaseType,
         references: Option<&[u32]>,
         n: usize,
@@ -193,13 +194,13 @@ impl Raw {
         n_values: usize,
     ) -> Option<Status> {
         let (references, values) = checked(references, n, values, n_values.max(n));
-        self.transfer(&format!("Get{}", type_name(base, self.version)), it, references, n, values, n_values)
+        self.transfer(&format!("Get{}", type_name(base, self.version)), instance, references, n, values, n_values)
     }
 
     /// A setter, as [`get`](Self::get).
     pub fn set(
         &self,
-        it: Handle,
+        instance: Handle,
         base: BaseType,
         references: Option<&[u32]>,
         n: usize,
@@ -207,13 +208,13 @@ impl Raw {
         n_values: usize,
     ) -> Option<Status> {
         let (references, values) = checked(references, n, values, n_values.max(n));
-        self.transfer(&format!("Set{}", type_name(base, self.version)), it, references, n, values, n_values)
+        self.transfer(&format!("Set{}", type_name(base, self.version)), instance, references, n, values, n_values)
     }
 
     fn transfer(
         &self,
         name: &str,
-        it: Handle,
+        instance: Handle,
         references: *const u32,
         n: usize,
         values: *mut c_void,
@@ -222,20 +223,28 @@ impl Raw {
         // SAFETY: the standards' types, whatever the values are: they only differ in what the pointer leads to.
         Some(unsafe {
             match self.version {
-                FmiVersion::V2 => self.function::<Get2>(name)?(it.pointer(), references, n, values),
-                FmiVersion::V3 => self.function::<Get3>(name)?(it.pointer(), references, n, values, n_values),
+                FmiVersion::V2 => self.function::<v2::Get<c_void>>(name)?(instance.pointer(), references, n, values),
+                FmiVersion::V3 => {
+                    self.function::<v3::Get<c_void>>(name)?(instance.pointer(), references, n, values, n_values)
+                }
             }
         })
     }
 
     /// Texts; NULL pointers come back as `None`.
-    pub fn get_strings(&self, it: Handle, references: &[u32], count: usize) -> Option<(Status, Vec<Option<String>>)> {
+    pub fn get_strings(
+        &self,
+        instance: Handle,
+        references: &[u32],
+        count: usize,
+    ) -> Option<(Status, Vec<Option<String>>)> {
         let mut buffer = Buffer::room(BaseType::String, self.version, count);
         for word in &mut buffer.words[..count] {
             *word = 0;
         }
-        let status = self.get(it, BaseType::String, Some(references), references.len(), Some(&mut buffer), count)?;
-        if !matches!(status, Status::OK | Status::WARNING) {
+        let status =
+            self.get(instance, BaseType::String, Some(references), references.len(), Some(&mut buffer), count)?;
+        if !status.is_ok() {
             return Some((status, Vec::new()));
         }
         let pointer = |word: u64| ptr::with_exposed_provenance::<c_char>(usize::try_from(word).unwrap_or(0));
@@ -244,13 +253,14 @@ impl Raw {
     }
 
     /// Sets texts; `None` for NULL. The buffer is overwritten afterwards.
-    pub fn set_strings(&self, it: Handle, references: &[u32], texts: &[Option<&CStr>]) -> Option<Status> {
+    pub fn set_strings(&self, instance: Handle, references: &[u32], texts: &[Option<&CStr>]) -> Option<Status> {
         let mut copies: Vec<Option<Vec<u8>>> =
             texts.iter().map(|t| t.map(|t| t.to_bytes_with_nul().to_vec())).collect();
         let address = |copy: &Option<Vec<u8>>| copy.as_ref().map_or(0, |c| c.as_ptr().expose_provenance() as u64);
         let bits: Vec<u64> = copies.iter().map(address).collect();
         let mut buffer = Buffer::of(BaseType::String, self.version, &bits);
-        let status = self.set(it, BaseType::String, Some(references), references.len(), Some(&mut buffer), texts.len());
+        let status =
+            self.set(instance, BaseType::String, Some(references), references.len(), Some(&mut buffer), texts.len());
         for copy in copies.iter_mut().flatten() {
             let end = copy.len().saturating_sub(1);
             copy[..end].fill(b'#');
@@ -258,43 +268,40 @@ impl Raw {
         status
     }
 
-    /// `DoStep`; `places` are FMI 3.0's.
-    pub fn do_step(&self, it: Handle, t: f64, h: f64, no_prior: bool, places: Places) -> Option<(Status, Stepped)> {
-        let mut told = Stepped { event: 0xc5, terminate: 0xc5, early: 0xc5, last: f64::NAN };
+    /// `DoStep`; `pointers` are FMI 3.0's.
+    pub fn do_step(
+        &self,
+        instance: Handle,
+        t: f64,
+        h: f64,
+        no_prior: bool,
+        pointers: ResultPointers,
+    ) -> Option<(Status, Stepped)> {
+        let mut results = Stepped { event: 0xc5, terminate: 0xc5, early: 0xc5, last: f64::NAN };
         // SAFETY: the standards' types; the places are ours or NULL.
         let status = unsafe {
             match self.version {
                 FmiVersion::V2 => {
-                    let f: unsafe extern "C" fn(*mut c_void, f64, f64, c_int) -> Status = self.function("DoStep")?;
-                    f(it.pointer(), t, h, c_int::from(no_prior))
+                    let f: v2::DoStep = self.function("DoStep")?;
+                    f(instance.pointer(), t, h, c_int::from(no_prior))
                 }
                 FmiVersion::V3 => {
-                    type F = unsafe extern "C" fn(
-                        *mut c_void,
-                        f64,
-                        f64,
-                        bool,
-                        *mut u8,
-                        *mut u8,
-                        *mut u8,
-                        *mut f64,
-                    ) -> Status;
-                    let f: F = self.function("DoStep")?;
+                    let f: v3::DoStep = self.function("DoStep")?;
                     let null = ptr::null_mut;
                     f(
-                        it.pointer(),
+                        instance.pointer(),
                         t,
                         h,
                         no_prior,
-                        if places[0] { &raw mut told.event } else { null() },
-                        if places[1] { &raw mut told.terminate } else { null() },
-                        if places[2] { &raw mut told.early } else { null() },
-                        if places[3] { &raw mut told.last } else { ptr::null_mut() },
+                        if pointers[0] { &raw mut results.event } else { null() },
+                        if pointers[1] { &raw mut results.terminate } else { null() },
+                        if pointers[2] { &raw mut results.early } else { null() },
+                        if pointers[3] { &raw mut results.last } else { ptr::null_mut() },
                     )
                 }
             }
         };
-        Some((status, told))
+        Some((status, results))
     }
 
     /// `SetDebugLogging`; `categories` may be NULL, and an element of it.
@@ -303,7 +310,7 @@ impl Raw {
     /// The categories are fewer than said.
     pub fn debug_logging(
         &self,
-        it: Handle,
+        instance: Handle,
         on: bool,
         categories: Option<&[Option<&CStr>]>,
         n: usize,
@@ -315,33 +322,34 @@ impl Raw {
         // SAFETY: the standards' types; as many strings as said, or NULL.
         Some(unsafe {
             match self.version {
-                FmiVersion::V2 => {
-                    type F = unsafe extern "C" fn(*mut c_void, c_int, usize, *const *const c_char) -> Status;
-                    self.function::<F>("SetDebugLogging")?(it.pointer(), c_int::from(on), n, pointer)
-                }
+                FmiVersion::V2 => self.function::<v2::SetDebugLogging>("SetDebugLogging")?(
+                    instance.pointer(),
+                    c_int::from(on),
+                    n,
+                    pointer,
+                ),
                 FmiVersion::V3 => {
-                    type F = unsafe extern "C" fn(*mut c_void, bool, usize, *const *const c_char) -> Status;
-                    self.function::<F>("SetDebugLogging")?(it.pointer(), on, n, pointer)
+                    self.function::<v3::SetDebugLogging>("SetDebugLogging")?(instance.pointer(), on, n, pointer)
                 }
             }
         })
     }
 
     /// `fmi2Get...Status` with a place for any of its results; returns the first eight bytes of it.
-    pub fn step_status(&self, name: StepStatus, it: Handle, kind: c_int) -> Option<(Status, u64)> {
-        let f: unsafe extern "C" fn(*mut c_void, c_int, *mut u64) -> Status = self.function(name.as_str())?;
+    pub fn step_status(&self, name: StepStatus, instance: Handle, kind: c_int) -> Option<(Status, u64)> {
+        let f: v2::GetStatus<u64> = self.function(name.as_str())?;
         let mut value = CANARY;
         // SAFETY: FMI 2.0's type but for the place, which has room for each of its values.
-        Some((unsafe { f(it.pointer(), kind, &raw mut value) }, value))
+        Some((unsafe { f(instance.pointer(), kind, &raw mut value) }, value))
     }
 
     /// `fmi3UpdateDiscreteStates`: whether another iteration is needed, and whether the simulation is to end.
-    pub fn update_discrete_states(&self, it: Handle) -> Option<(Status, bool, bool)> {
-        type F = unsafe extern "C" fn(*mut c_void, *mut u8, *mut u8, *mut u8, *mut u8, *mut u8, *mut f64) -> Status;
-        let (f, mut flags, mut next): (F, _, _) = (self.function("UpdateDiscreteStates")?, [0_u8; 5], 0.0);
+    pub fn update_discrete_states(&self, instance: Handle) -> Option<(Status, bool, bool)> {
+        let (f, mut flags, mut next): (v3::UpdateDiscreteStates, _, _) =
+            (self.function("UpdateDiscreteStates")?, [0_u8; 5], 0.0);
         let [a, b, c, d, e] = &mut flags;
         // SAFETY: FMI 3.0's type; the places are ours.
-        let status = unsafe { f(it.pointer(), a, b, c, d, e, &raw mut next) };
+        let status = unsafe { f(instance.pointer(), a, b, c, d, e, &raw mut next) };
         Some((status, flags[0] != 0, flags[1] != 0))
     }
 }

@@ -1,23 +1,26 @@
 //! Functions of optional capabilities, which the checker calls to see them refused where an FMU has no such capability.
 
 use super::super::log::Status;
-use super::{Get2, Handle, Optional, Raw};
+use super::super::signatures::{v2, v3};
+use super::{Handle, Optional, Raw};
 use model_description::FmiVersion;
 use std::ffi::{c_int, c_void};
 
 impl Raw {
     /// The derivatives of variables of double precision with respect to time.
-    pub fn output_derivatives(&self, it: Handle, references: &[u32], order: c_int) -> Option<(Status, Vec<f64>)> {
-        type Get2 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const c_int, *mut f64) -> Status;
-        type Get3 = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const c_int, *mut f64, usize) -> Status;
+    pub fn output_derivatives(&self, instance: Handle, references: &[u32], order: c_int) -> Option<(Status, Vec<f64>)> {
         let n = references.len();
         let (orders, mut values) = (vec![order; n], vec![f64::NAN; n]);
-        let (i, vr, orders, out) = (it.pointer(), references.as_ptr(), orders.as_ptr(), values.as_mut_ptr());
+        let (i, vr, orders, out) = (instance.pointer(), references.as_ptr(), orders.as_ptr(), values.as_mut_ptr());
         // SAFETY: the standards' types; all arrays have this length.
         let status = unsafe {
             match self.version {
-                FmiVersion::V2 => self.function::<Get2>("GetRealOutputDerivatives")?(i, vr, n, orders, out),
-                FmiVersion::V3 => self.function::<Get3>("GetOutputDerivatives")?(i, vr, n, orders, out, n),
+                FmiVersion::V2 => {
+                    self.function::<v2::OutputDerivatives>("GetRealOutputDerivatives")?(i, vr, n, orders, out)
+                }
+                FmiVersion::V3 => {
+                    self.function::<v3::OutputDerivatives>("GetOutputDerivatives")?(i, vr, n, orders, out, n)
+                }
             }
         };
         Some((status, values))
@@ -25,7 +28,7 @@ impl Raw {
 
     /// A function of an optional capability, with arguments that are good as far as the instance allows: one variable, numbers
     /// of 0, room for results.
-    pub fn optional(&self, function: Optional, it: Handle, reference: u32) -> Option<Status> {
+    pub fn optional(&self, function: Optional, instance: Handle, reference: u32) -> Option<Status> {
         use Optional as O;
         type Ref = *const u32;
         type Any = *mut c_void;
@@ -36,7 +39,7 @@ impl Raw {
         }
         let (a, b): (Any, Any) = (room.as_mut_ptr().cast(), more.as_mut_ptr().cast());
         let (c, d): (Any, Any) = (third.as_mut_ptr().cast(), fourth.as_mut_ptr().cast());
-        let (vr, i, name) = (&raw const reference, it.pointer(), function.as_str());
+        let (vr, i, name) = (&raw const reference, instance.pointer(), function.as_str());
         // SAFETY: every type is that of the standard, up to what a pointer to data leads to; each place has 512 bytes,
         // more than one value or 64 states need.
         Some(unsafe {
@@ -53,12 +56,11 @@ impl Raw {
                 | O::GetShiftFraction
                 | O::SetShiftFraction
                 | O::SetIntervalFraction
-                | O::SetRealInputDerivatives
-                | O::GetRealOutputDerivatives => {
+                | O::SetRealInputDerivatives => {
                     self.function::<unsafe extern "C" fn(Any, Ref, usize, Any, Any) -> Status>(name)?(i, vr, 1, a, b)
                 }
                 O::GetClock | O::SetClock | O::GetShiftDecimal | O::SetShiftDecimal | O::SetIntervalDecimal => {
-                    self.function::<Get2>(name)?(i, vr, 1, a)
+                    self.function::<v2::Get<c_void>>(name)?(i, vr, 1, a)
                 }
                 O::GetNumberOfVariableDependencies => {
                     self.function::<unsafe extern "C" fn(Any, u32, Any) -> Status>(name)?(i, reference, a)
@@ -77,14 +79,15 @@ impl Raw {
                         self.function::<F>(name)?(i, vr, 1, vr, 1, a, 1, b, 1)
                     }
                 },
-                O::GetOutputDerivatives => self
-                    .function::<unsafe extern "C" fn(Any, Ref, usize, Any, Any, usize) -> Status>(name)?(
-                    i, vr, 1, a, b, 1,
-                ),
+                O::GetRealOutputDerivatives => {
+                    self.function::<v2::OutputDerivatives>(name)?(i, vr, 1, a.cast(), b.cast())
+                }
+                O::GetOutputDerivatives => {
+                    self.function::<v3::OutputDerivatives>(name)?(i, vr, 1, a.cast(), b.cast(), 1)
+                }
                 O::UpdateDiscreteStates => {
-                    type F = unsafe extern "C" fn(Any, Any, Any, Any, Any, Any, Any) -> Status;
-                    let at = |n: usize| a.wrapping_byte_add(n);
-                    self.function::<F>(name)?(i, a, at(8), at(16), at(24), at(32), b)
+                    let at = |n: usize| a.wrapping_byte_add(n).cast();
+                    self.function::<v3::UpdateDiscreteStates>(name)?(i, at(0), at(8), at(16), at(24), at(32), b.cast())
                 }
                 O::CompletedIntegratorStep => match self.version {
                     FmiVersion::V2 => {

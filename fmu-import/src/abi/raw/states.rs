@@ -1,9 +1,9 @@
 //! Saved states, with every argument in the checker's hands.
 
 use super::super::log::Status;
+use super::super::signatures::{Deserialize, Serialize, SetState, StatePlace, StatePointer, StateSize};
 use super::{Handle, Raw, SavedState};
 use model_description::FmiVersion;
-use std::ffi::c_void;
 use std::ptr;
 
 impl Raw {
@@ -19,24 +19,24 @@ impl Raw {
     }
 
     /// `GetFMUState`; `None` for the place passes NULL.
-    pub fn get_state(&self, it: Handle, place: Option<&mut SavedState>) -> Option<Status> {
-        self.with_place("Get", it, place)
+    pub fn get_state(&self, instance: Handle, place: Option<&mut SavedState>) -> Option<Status> {
+        self.with_place("Get", instance, place)
     }
 
     /// `FreeFMUState`, as [`get_state`](Self::get_state).
-    pub fn free_state(&self, it: Handle, place: Option<&mut SavedState>) -> Option<Status> {
-        self.with_place("Free", it, place)
+    pub fn free_state(&self, instance: Handle, place: Option<&mut SavedState>) -> Option<Status> {
+        self.with_place("Free", instance, place)
     }
 
-    fn with_place(&self, name: &str, it: Handle, place: Option<&mut SavedState>) -> Option<Status> {
-        let f: unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> Status = self.function(&self.state_name(name))?;
+    fn with_place(&self, name: &str, instance: Handle, place: Option<&mut SavedState>) -> Option<Status> {
+        let f: StatePlace = self.function(&self.state_name(name))?;
         match place {
             // SAFETY: the standards' type; NULL is what the checker wants to pass.
-            None => Some(unsafe { f(it.pointer(), ptr::null_mut()) }),
+            None => Some(unsafe { f(instance.pointer(), ptr::null_mut()) }),
             Some(place) => {
                 let mut pointer = place.pointer();
                 // SAFETY: the standards' type; the place is ours.
-                let status = unsafe { f(it.pointer(), &raw mut pointer) };
+                let status = unsafe { f(instance.pointer(), &raw mut pointer) };
                 *place = SavedState(pointer.expose_provenance());
                 Some(status)
             }
@@ -44,27 +44,25 @@ impl Raw {
     }
 
     /// `SetFMUState`.
-    pub fn set_state(&self, it: Handle, state: SavedState) -> Option<Status> {
-        let f: unsafe extern "C" fn(*mut c_void, *mut c_void) -> Status = self.function(&self.state_name("Set"))?;
+    pub fn set_state(&self, instance: Handle, state: SavedState) -> Option<Status> {
+        let f: SetState = self.function(&self.state_name("Set"))?;
         // SAFETY: the standards' type; a foreign state is what the checker wants to pass.
-        Some(unsafe { f(it.pointer(), state.pointer()) })
+        Some(unsafe { f(instance.pointer(), state.pointer()) })
     }
 
     /// `SerializedFMUStateSize`.
-    pub fn state_size(&self, it: Handle, state: SavedState) -> Option<(Status, usize)> {
-        type F = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut usize) -> Status;
-        let (f, mut size): (F, _) = (self.function(&self.state_name("Size"))?, 0);
+    pub fn state_size(&self, instance: Handle, state: SavedState) -> Option<(Status, usize)> {
+        let (f, mut size): (StateSize, _) = (self.function(&self.state_name("Size"))?, 0);
         // SAFETY: the standards' type; the place is ours.
-        Some((unsafe { f(it.pointer(), state.pointer(), &raw mut size) }, size))
+        Some((unsafe { f(instance.pointer(), state.pointer(), &raw mut size) }, size))
     }
 
     /// `SerializeFMUState` into a buffer of this many bytes; the bytes behind it must stay as they are.
-    pub fn serialize(&self, it: Handle, state: SavedState, size: usize) -> Option<(Status, Vec<u8>, bool)> {
-        type F = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut u8, usize) -> Status;
-        let f: F = self.function(&self.state_name("Serialize"))?;
+    pub fn serialize(&self, instance: Handle, state: SavedState, size: usize) -> Option<(Status, Vec<u8>, bool)> {
+        let f: Serialize = self.function(&self.state_name("Serialize"))?;
         let mut bytes = vec![0xc5_u8; size + 256];
         // SAFETY: the standards' type; the buffer is longer than said.
-        let status = unsafe { f(it.pointer(), state.pointer(), bytes.as_mut_ptr(), size) };
+        let status = unsafe { f(instance.pointer(), state.pointer(), bytes.as_mut_ptr(), size) };
         let intact = bytes[size..].iter().all(|b| *b == 0xc5);
         bytes.truncate(size);
         Some((status, bytes, intact))
@@ -74,13 +72,13 @@ impl Raw {
     ///
     /// # Panics
     /// The bytes are fewer than said.
-    pub fn deserialize(&self, it: Handle, bytes: Option<&[u8]>, size: usize) -> Option<(Status, SavedState)> {
-        type F = unsafe extern "C" fn(*mut c_void, *const u8, usize, *mut *mut c_void) -> Status;
-        let (f, mut state): (F, *mut c_void) = (self.function(&self.state_name("Deserialize"))?, ptr::null_mut());
+    pub fn deserialize(&self, instance: Handle, bytes: Option<&[u8]>, size: usize) -> Option<(Status, SavedState)> {
+        let (f, mut state): (Deserialize, StatePointer) =
+            (self.function(&self.state_name("Deserialize"))?, ptr::null_mut());
         assert!(bytes.is_none_or(|b| size <= b.len()), "the bytes are fewer than said");
         let pointer = bytes.map_or(ptr::null(), <[u8]>::as_ptr);
         // SAFETY: the standards' type; as many bytes as said, or NULL.
-        let status = unsafe { f(it.pointer(), pointer, size, &raw mut state) };
+        let status = unsafe { f(instance.pointer(), pointer, size, &raw mut state) };
         Some((status, SavedState(state.expose_provenance())))
     }
 }

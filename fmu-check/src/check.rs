@@ -1,0 +1,128 @@
+//! The vocabulary of the checker: levels, checks, groups, verdicts and options.
+
+use super::fmu_file::FmuFile;
+use super::session::{Blocked, Session};
+use model_description::FmiVersion;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// How binding a requirement is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// The standard requires it.
+    Must,
+    /// The standard or its guides recommend it.
+    Should,
+    /// The standard leaves it open, but a robust FMU does it.
+    Hard,
+}
+
+/// The levels in FMI 2.0 and in FMI 3.0; `None` if the standard has no such requirement.
+#[derive(Clone, Copy, Debug)]
+pub struct Levels(pub(super) Option<Level>, pub(super) Option<Level>);
+
+impl Levels {
+    pub(super) const MUST: Self = Self::both(Level::Must);
+    pub(super) const SHOULD: Self = Self::both(Level::Should);
+    pub(super) const HARD: Self = Self::both(Level::Hard);
+
+    const fn both(level: Level) -> Self {
+        Self(Some(level), Some(level))
+    }
+
+    /// The level in one standard.
+    pub const fn of(self, version: FmiVersion) -> Option<Level> {
+        match version {
+            FmiVersion::V2 => self.0,
+            FmiVersion::V3 => self.1,
+        }
+    }
+}
+
+/// One requirement.
+pub struct Check {
+    /// Short name, for example `V04`.
+    pub id: &'static str,
+    /// What is required, in one sentence.
+    pub requirement: &'static str,
+    /// Where the standards say so.
+    pub clause: &'static str,
+    /// How binding it is.
+    pub levels: Levels,
+    pub(super) run: Run,
+}
+
+/// How a check runs.
+#[derive(Clone, Copy)]
+pub(super) enum Run {
+    /// Examines the file.
+    File(fn(&FmuFile) -> Verdict),
+    /// Calls the binary in its own process.
+    Probe(fn(&Session) -> Result<(), Blocked>),
+    /// As `Probe`; any output to the console or the working directory is a violation.
+    Silent(fn(&Session) -> Result<(), Blocked>),
+    /// As `Probe`, in two processes that must report the same.
+    Twice(fn(&Session) -> Result<(), Blocked>),
+}
+
+/// Checks that belong together.
+pub struct Group {
+    /// Name for `--only`.
+    pub name: &'static str,
+    /// Title in reports.
+    pub title: &'static str,
+    /// The checks, in the order of the report.
+    pub checks: &'static [Check],
+}
+
+/// The result of a check, with evidence.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(tag = "verdict", content = "evidence", rename_all = "snake_case")]
+pub enum Verdict {
+    /// The requirement holds as far as it was tested.
+    Pass(Vec<String>),
+    /// The requirement is violated.
+    Violated(Vec<String>),
+    /// The requirement does not apply to this FMU, for this reason.
+    NotApplicable(String),
+    /// The check could not decide, for this reason.
+    NotDetermined(String),
+}
+
+impl Verdict {
+    /// A pass if there are no findings, otherwise a violation.
+    pub(super) fn of(findings: Vec<String>) -> Self {
+        if findings.is_empty() { Self::Pass(Vec::new()) } else { Self::Violated(findings) }
+    }
+}
+
+/// A check and its verdict.
+#[derive(Clone, Debug, Serialize)]
+pub struct Finding {
+    /// Id of the check.
+    pub id: &'static str,
+    /// Name of its group.
+    pub group: &'static str,
+    /// What is required.
+    pub requirement: &'static str,
+    /// Where the standards say so.
+    pub clause: &'static str,
+    /// Level for the standard of this FMU.
+    pub level: Level,
+    /// Result.
+    #[serde(flatten)]
+    pub verdict: Verdict,
+}
+
+/// Options of a check run.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Ids of checks or names of groups; empty for all.
+    pub only: Vec<String>,
+    /// Time limit for one probe of the binary; `None` for 10 s.
+    pub timeout: Option<Duration>,
+    /// Program with the hidden command `probe`; `None` for the running one.
+    pub program: Option<PathBuf>,
+}

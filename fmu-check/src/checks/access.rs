@@ -1,0 +1,334 @@
+//! Getting and setting (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.6): what is refused, and what is there to begin with.
+
+use super::values::{booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, tunable};
+use crate::check::{Check, Level, Levels, Run};
+use crate::encoding::{bits, same, show};
+use crate::session::{Blocked, Session};
+use fmu_import::Status;
+use fmu_import::raw::Buffer;
+use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability, parse_number};
+
+const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.6.2";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "V07", requirement: "A start value in the description equals the value in the binary.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::Probe(start_values) },
+    Check { id: "V06b", requirement: "Integer and enumeration outputs always lie between min and max.", clause: "3.0.2, 2.2.6.3", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(ranges) },
+    Check { id: "G01a", requirement: "Getting and setting zero variables succeeds, even with NULL pointers.", clause: GET, levels: Levels::HARD, run: Run::Probe(zero_variables) },
+    Check { id: "G01b", requirement: "A NULL array gives Error.", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(null_arrays) },
+    Check { id: "G01c", requirement: "A wrong number of values gives Error, and the FMU writes nothing past the values.", clause: GET, levels: Levels(None, Some(Level::Must)), run: Run::Probe(wrong_counts) },
+    Check { id: "G02", requirement: "A value reference that does not exist gives Error.", clause: "3.0.2, 2.2.3", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(unknown_reference) },
+    Check { id: "V12", requirement: "A getter or setter for another type than that of the variable gives Error.", clause: "3.0.2, 2.2.6.2", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(wrong_type) },
+    Check { id: "G03a", requirement: "Setting a constant gives Error.", clause: "2.0.5, 2.1.3; 3.0.2, 2.2.3", levels: Levels::MUST, run: Run::Probe(constants) },
+    Check { id: "G03b", requirement: "Setting a variable that cannot be set (output, time, fixed parameter after initialization) gives Error and changes nothing.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(not_settable) },
+    Check { id: "G03c", requirement: "A set call for several variables that fails changes none of them.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(all_or_nothing) },
+    Check { id: "G04", requirement: "A value that is set before the end of initialization reads back bit for bit.", clause: GET, levels: Levels::MUST, run: Run::Probe(round_trip) },
+    Check { id: "G05", requirement: "The FMU copies strings that are set: the importer may overwrite its own.", clause: GET, levels: Levels::MUST, run: Run::Probe(strings) },
+    Check { id: "G06", requirement: "A tunable parameter can be set between steps and keeps its value.", clause: "2.0.5, 2.2.7 and 4.2.4; 3.0.2, 2.4.7.4 and 4.2.1", levels: Levels::MUST, run: Run::Probe(tunable) },
+    Check { id: "L11", requirement: "Initialization can be iterated: values set and read in between leave no trace.", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.4", levels: Levels::MUST, run: Run::Probe(iterated_initialization) },
+    Check { id: "G07a", requirement: "NaN, infinities and huge numbers in an input cause no hang, no crash and no disturbance of another instance.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(not_a_number) },
+    Check { id: "G07b", requirement: "A parameter outside min and max is refused, at the latest at the end of initialization.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(out_of_range) },
+    Check { id: "G08", requirement: "A Boolean other than 0 and 1 does no harm.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(booleans) },
+];
+
+/// The start values of a variable as bits; `None` for a form that is none of the type.
+fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
+    let one = |word: &str| match v.base {
+        BaseType::Boolean => Some(u64::from(matches!(word, "true" | "1"))),
+        base if base.is_float() => parse_number(word).map(|x| bits(base, x)),
+        BaseType::UInt64 => word.parse().ok(),
+        _ => word.parse::<i64>().ok().map(i64::cast_unsigned),
+    };
+    let values: Vec<u64> = v.start.as_deref()?.split_whitespace().map(one).collect::<Option<_>>()?;
+    match values.len() {
+        1 => Some(vec![values[0]; n]),
+        len if len == n => Some(values),
+        _ => None,
+    }
+}
+
+fn start_values(session: &Session) -> Result<(), Blocked> {
+    let v2 = session.description.version == FmiVersion::V2;
+    let instance = if v2 { session.initializing()? } else { session.fresh()? };
+    let mut compared = 0;
+    for v in session.numeric().filter(|v| v.start.is_some() && v.clocks.is_empty()) {
+        let fixed = !v2 || v.causality == Causality::Input || v.initial_or_default() == Some(Initial::Exact);
+        let Some(expected) = expected(v, session.elements(v)).filter(|_| fixed) else { continue };
+        let (status, found) = instance.get(v)?;
+        compared += 1;
+        session.require(status.is_ok(), || format!("line {}: Get({}) returned {status}", v.line, v.name));
+        session.require(!status.is_ok() || same(v, session.description.version, &expected, &found), || {
+            format!(
+                "line {}: {}: start={:?}, but the binary has {}",
+                v.line,
+                v.name,
+                v.start.as_deref().unwrap_or_default(),
+                show(v, session.description.version, &found)
+            )
+        });
+    }
+    let fits = |v: &&ModelVariable| v.base == BaseType::String && !v.is_array() && v.start.is_some();
+    for v in session.description.variables.iter().filter(fits) {
+        session.calling(&format!("GetString({})", v.name));
+        let Some((status, found)) = session.raw.get_strings(instance.handle, &[v.value_reference], 1) else { continue };
+        compared += 1;
+        let good = status.is_ok() && found.first().is_some_and(|f| f.as_deref() == v.start.as_deref());
+        session.require(good, || {
+            format!("line {}: {}: start={:?}, but the binary returned {status}, {found:?}", v.line, v.name, v.start)
+        });
+    }
+    session.note(format!("compared {compared} start values"));
+    Ok(())
+}
+
+fn ranges(session: &Session) -> Result<(), Blocked> {
+    let discrete = |v: &&ModelVariable| {
+        matches!(v.causality, Causality::Output | Causality::Local)
+            && !v.base.is_float()
+            && v.base != BaseType::Boolean
+            && v.clocks.is_empty()
+    };
+    let limited: Vec<_> = session.numeric().filter(discrete).filter(|v| v.min.is_some() || v.max.is_some()).collect();
+    if limited.is_empty() {
+        return session.not_applicable("there is no integer output with min or max");
+    }
+    let instance = session.stepping()?;
+    for k in 0..50 {
+        for v in &limited {
+            let (_, found) = instance.get(v)?;
+            let text = show(v, session.description.version, &found);
+            let outside = |x: f64| v.min.is_some_and(|min| x < min) || v.max.is_some_and(|max| x > max);
+            if text.split(' ').filter_map(|t| t.parse().ok()).any(outside) {
+                session.violated(format!("line {}: {} is {text} after {k} steps", v.line, v.name));
+                return Ok(());
+            }
+        }
+        instance.change_inputs(k)?;
+        instance.steps(1, session.h())?;
+    }
+    Ok(())
+}
+
+/// The types that the standard has getters and setters for, with values that are numbers.
+fn plain_types(version: FmiVersion) -> Vec<BaseType> {
+    let v2 = [BaseType::Float64, BaseType::Int32, BaseType::Boolean];
+    let excluded = [BaseType::String, BaseType::Binary, BaseType::Clock, BaseType::Enumeration];
+    let all = || BaseType::ALL.iter().copied().filter(|b| !excluded.contains(b)).collect();
+    if version == FmiVersion::V2 { v2.to_vec() } else { all() }
+}
+
+fn zero_variables(session: &Session) -> Result<(), Blocked> {
+    for base in plain_types(session.description.version) {
+        session.case(|| {
+            let instance = session.stepping()?;
+            for set in [false, true] {
+                let (kind, none) = (if set { "Set" } else { "Get" }, Option::<&mut Buffer>::None);
+                let status = instance.call(&format!("{kind}({base}, NULL, 0, NULL, 0)"), |raw| {
+                    if set {
+                        raw.set(instance.handle, base, None, 0, none, 0)
+                    } else {
+                        raw.get(instance.handle, base, None, 0, none, 0)
+                    }
+                })?;
+                session.require(status.is_ok(), || format!("{kind}{base} of zero variables returned {status}"));
+            }
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn null_arrays(session: &Session) -> Result<(), Blocked> {
+    for (references, values) in [(false, true), (true, false)] {
+        for set in [false, true] {
+            session.case(|| {
+                let instance = session.stepping()?;
+                let wanted = if set { Causality::Input } else { Causality::Output };
+                let Some(v) = session.numeric().find(|v| v.causality == wanted && v.base.is_float() && !v.is_array())
+                else {
+                    return Ok(());
+                };
+                let mut buffer = Buffer::of(v.base, session.description.version, &[bits(v.base, 0.0)]);
+                let list = [v.value_reference];
+                let (list, place) = (references.then_some(&list[..]), values.then_some(&mut buffer));
+                let call = format!(
+                    "{}({}, {}, 1, {}, 1)",
+                    if set { "Set" } else { "Get" },
+                    v.base,
+                    if references { "vr" } else { "NULL" },
+                    if values { "values" } else { "NULL" }
+                );
+                let status = instance.call(&call, |raw| {
+                    if set {
+                        raw.set(instance.handle, v.base, list, 1, place, 1)
+                    } else {
+                        raw.get(instance.handle, v.base, list, 1, place, 1)
+                    }
+                })?;
+                session.require(status == Status::ERROR, || format!("{call} returned {status}"));
+                Ok(())
+            });
+        }
+    }
+    Ok(())
+}
+
+fn wrong_counts(session: &Session) -> Result<(), Blocked> {
+    for (n, set) in [(0, false), (2, false), (0, true), (2, true)] {
+        session.case(|| {
+            let instance = session.stepping()?;
+            let wanted = if set { Causality::Input } else { Causality::Output };
+            let Some(v) = session
+                .numeric()
+                .find(|v| v.causality == wanted && v.base.is_float() && !v.is_array() && v.clocks.is_empty())
+            else {
+                return Ok(());
+            };
+            let mut buffer = Buffer::of(v.base, session.description.version, &vec![bits(v.base, 0.0); n]);
+            let list = [v.value_reference];
+            let call = format!("{}({}, nValueReferences=1, nValues={n})", if set { "Set" } else { "Get" }, v.name);
+            let status = instance.call(&call, |raw| {
+                let place = Some(&mut buffer);
+                if set {
+                    raw.set(instance.handle, v.base, Some(&list), 1, place, n)
+                } else {
+                    raw.get(instance.handle, v.base, Some(&list), 1, place, n)
+                }
+            })?;
+            session.require(status == Status::ERROR, || format!("{call} returned {status}"));
+            session.require(buffer.intact(), || format!("{call} wrote past the {n} values"));
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+/// A reference that no variable has.
+fn free_reference(session: &Session) -> u32 {
+    let used: Vec<u32> = session.description.variables.iter().map(|v| v.value_reference).collect();
+    // Elements of arrays may count as references inside; so far behind all of them.
+    (0..1_000_000).map(|k| 0x0fff_fff0_u32 - k).find(|r| !used.contains(r)).unwrap_or(u32::MAX)
+}
+
+fn unknown_reference(session: &Session) -> Result<(), Blocked> {
+    for reference in [free_reference(session), u32::MAX] {
+        if session.description.variables.iter().any(|v| v.value_reference == reference) {
+            continue;
+        }
+        for base in plain_types(session.description.version) {
+            for set in [false, true] {
+                session.case(|| must_be_refused(session, base, reference, set, "a reference that does not exist"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A getter or setter that must return Error.
+fn must_be_refused(session: &Session, base: BaseType, reference: u32, set: bool, what: &str) -> Result<(), Blocked> {
+    let instance = session.stepping()?;
+    let mut buffer = Buffer::of(base, session.description.version, &[bits(base, 0.0)]);
+    let call = format!("{}({base}, reference={reference})", if set { "Set" } else { "Get" });
+    let status = instance.call(&call, |raw| {
+        let place = Some(&mut buffer);
+        if set {
+            raw.set(instance.handle, base, Some(&[reference]), 1, place, 1)
+        } else {
+            raw.get(instance.handle, base, Some(&[reference]), 1, place, 1)
+        }
+    })?;
+    session.require(status == Status::ERROR, || format!("{call}, {what}, returned {status}"));
+    Ok(())
+}
+
+fn wrong_type(session: &Session) -> Result<(), Blocked> {
+    let carries = |base| fmu_import::raw::type_name(base, session.description.version);
+    for base in plain_types(session.description.version) {
+        // FMI 2.0 numbers each type for itself, so the reference must be none of this type.
+        let taken = |r: u32| {
+            session.description.variables.iter().any(|v| v.value_reference == r && carries(v.base) == carries(base))
+        };
+        let other = session
+            .description
+            .variables
+            .iter()
+            .find(|v| carries(v.base) != carries(base) && !v.is_array() && !taken(v.value_reference));
+        let Some(v) = other else { continue };
+        for set in [false, true] {
+            session.case(|| {
+                must_be_refused(session, base, v.value_reference, set, &format!("{} of the type {}", v.name, v.base))
+            });
+        }
+    }
+    Ok(())
+}
+
+fn constants(session: &Session) -> Result<(), Blocked> {
+    let constant = |v: &&ModelVariable| v.variability == Variability::Constant && !v.is_array();
+    let Some(v) = session.numeric().find(constant) else { return session.not_applicable("there are no constants") };
+    let instance = session.fresh()?;
+    let values = session.different_value(v, 1.0).unwrap_or_else(|| vec![0]);
+    let status = instance.set(v, &values)?;
+    session.require(status == Status::ERROR, || format!("Set({}) of a constant returned {status}", v.name));
+    Ok(())
+}
+
+fn not_settable(session: &Session) -> Result<(), Blocked> {
+    let fits = |v: &&ModelVariable| {
+        !v.is_array()
+            && v.clocks.is_empty()
+            && match v.causality {
+                Causality::Output | Causality::CalculatedParameter | Causality::Independent => {
+                    v.variability != Variability::Constant
+                }
+                Causality::Parameter => v.variability == Variability::Fixed,
+                _ => false,
+            }
+    };
+    let mut seen = Vec::new();
+    for v in session.numeric().filter(fits) {
+        // One of each kind.
+        if seen.contains(&(v.causality, v.base)) {
+            continue;
+        }
+        seen.push((v.causality, v.base));
+        session.case(|| {
+            let instance = session.stepping()?;
+            instance.steps(2, session.h())?;
+            let (before, Some(values)) = (instance.get(v)?.1, session.different_value(v, 7.0)) else { return Ok(()) };
+            let status = instance.set(v, &values)?;
+            session.require(status == Status::ERROR, || {
+                format!("Set({}), {} {}, in step mode returned {status}", v.name, v.variability, v.causality)
+            });
+            let (status, after) = instance.get(v)?;
+            session.require(!status.is_ok() || before == after, || {
+                format!("Set({}) in step mode changed the value", v.name)
+            });
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn all_or_nothing(session: &Session) -> Result<(), Blocked> {
+    let inputs = session.float_inputs();
+    let Some(v) = inputs.iter().find(|v| !v.is_array() && v.base == BaseType::Float64) else {
+        return session.not_applicable("there is no scalar Float64 input");
+    };
+    let Some(values) = session.different_value(v, 3.0) else { return Ok(()) };
+    let instance = session.stepping()?;
+    let before = instance.get(v)?.1;
+    let mut buffer = Buffer::of(v.base, session.description.version, &[values[0], 0]);
+    let list = [v.value_reference, free_reference(session)];
+    let status = instance.call(&format!("Set({}, and a reference that does not exist)", v.name), |raw| {
+        raw.set(instance.handle, v.base, Some(&list), 2, Some(&mut buffer), 2)
+    })?;
+    if status.is_ok() {
+        return Err(Blocked("the FMU does not refuse a reference that does not exist".into()));
+    }
+    let (status, after) = instance.get(v)?;
+    session.require(!status.is_ok() || before == after, || {
+        format!("{} was changed by a set call that returned Error", v.name)
+    });
+    Ok(())
+}

@@ -1,0 +1,312 @@
+//! The archive, by its raw headers (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
+
+use super::layered::manifests;
+use crate::check::{Check, Level, Levels, Run, Verdict};
+use crate::fmu_file::FmuFile;
+use crate::zip_headers::{Entry, Header, is_inside};
+use model_description::FmiVersion;
+
+const ZIP: &str = "2.0.5, 2.3; 3.0.2, 2.5.1";
+const STRUCTURE: &str = "2.0.5, 2.3; 3.0.2, 2.5.1.4";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "Z01a", requirement: "The file extension is .fmu.", clause: ZIP, levels: Levels::MUST, run: Run::File(extension) },
+    Check { id: "Z01b", requirement: "Entries have relative names with forward slashes and stay inside the archive.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1; APPNOTE 4.4.17", levels: Levels::MUST, run: Run::File(names) },
+    Check { id: "Z01c", requirement: "Entry names are ASCII.", clause: ZIP, levels: Levels::SHOULD, run: Run::File(ascii) },
+    Check { id: "Z01d", requirement: "Entries are stored or deflated (method 0 or 8).", clause: ZIP, levels: Levels::MUST, run: Run::File(methods) },
+    Check { id: "Z01e", requirement: "A data descriptor (general purpose bit 3) occurs only with deflate.", clause: ZIP, levels: Levels::MUST, run: Run::File(descriptors) },
+    Check { id: "Z01f", requirement: "The version needed to extract is at most 2.0, so ZIP64 is not used.", clause: ZIP, levels: Levels::MUST, run: Run::File(needed) },
+    Check { id: "Z01g", requirement: "No entry is encrypted.", clause: ZIP, levels: Levels::MUST, run: Run::File(encryption) },
+    Check { id: "Z01h", requirement: "The archive is neither split nor spanned.", clause: ZIP, levels: Levels::MUST, run: Run::File(split) },
+    Check { id: "Z01i", requirement: "The archive contains no symbolic links.", clause: ZIP, levels: Levels::MUST, run: Run::File(links) },
+    Check { id: "Z01j", requirement: "Every entry unpacks and matches its checksum.", clause: "APPNOTE 4.4.7", levels: Levels::MUST, run: Run::File(contents) },
+    Check { id: "Z01k", requirement: "Entry names are unique, and local and central headers agree.", clause: "APPNOTE 4.3", levels: Levels::HARD, run: Run::File(headers) },
+    Check { id: "Z02a", requirement: "The archive contains at least one implementation: binaries or sources.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(implementation) },
+    Check { id: "Z02b", requirement: "The root contains only the entries of the standard.", clause: STRUCTURE, levels: Levels::SHOULD, run: Run::File(root) },
+    Check { id: "Z03", requirement: "Folders below binaries/ have the platform names of the standard.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(platforms) },
+    Check { id: "X03", requirement: "Every platform folder contains a library named after modelIdentifier.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(base_names) },
+    Check { id: "Z04a", requirement: "The archive contains documentation/index.html.", clause: STRUCTURE, levels: Levels::SHOULD, run: Run::File(documentation) },
+    Check { id: "Z04b", requirement: "documentation/licenses contains license.txt or license.html (in FMI 3.0 also license.spdx) as its entry point.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(licenses) },
+    Check { id: "Z04c", requirement: "An FMU that needs an execution tool describes it in documentation/externalDependencies.txt or .html.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(dependencies) },
+    Check { id: "Z05", requirement: "Every SVG icon or diagram is accompanied by a PNG.", clause: "3.0.2, 2.5.1", levels: Levels(None, Some(Level::Must)), run: Run::File(pictures) },
+    Check { id: "Z06", requirement: "Folders below extra/ have reverse domain names.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.6", levels: Levels::SHOULD, run: Run::File(extra) },
+    Check { id: "Z07", requirement: "Sources include sources/buildDescription.xml and exclude the headers of the standard.", clause: "3.0.2, 2.5.1.2", levels: Levels(Some(Level::Should), Some(Level::Should)), run: Run::File(sources) },
+    Check { id: "I03", requirement: "A manifest of a layered standard (extra/*/fmi-ls-manifest.xml) is well-formed and gives name, version and description in its namespace.", clause: "3.0.2, 2.5.1.6; fmi3LayeredStandardManifest.xsd", levels: Levels::MUST, run: Run::File(manifests) },
+];
+
+/// A finding for each entry that the rule refuses.
+fn each_entry(fmu: &FmuFile, rule: impl Fn(&Entry) -> Option<String>) -> Verdict {
+    let say = |entry| rule(entry).map(|why| format!("entry {:?}: {why}", entry.name()));
+    Verdict::of(fmu.zip.entries.iter().filter_map(say).collect())
+}
+
+/// Both headers of an entry, with what they are called.
+fn headers_of(entry: &Entry) -> impl Iterator<Item = (&'static str, &Header)> {
+    [("central", Some(&entry.central)), ("local", entry.local.as_ref())].into_iter().filter_map(|(n, h)| Some((n, h?)))
+}
+
+fn extension(fmu: &FmuFile) -> Verdict {
+    let found = fmu.path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    Verdict::of(if found == "fmu" { Vec::new() } else { vec![format!("the extension is {found:?}, expected fmu")] })
+}
+
+fn names(fmu: &FmuFile) -> Verdict {
+    each_entry(fmu, |entry| {
+        let name = entry.name();
+        let bad = !is_inside(&name) || name.starts_with("./") || name.contains("/./") || name.is_empty();
+        bad.then(|| "is not a plain relative path with forward slashes".into())
+    })
+}
+
+fn ascii(fmu: &FmuFile) -> Verdict {
+    each_entry(fmu, |entry| (!entry.central.name.is_ascii()).then(|| "is not ASCII".into()))
+}
+
+fn methods(fmu: &FmuFile) -> Verdict {
+    each_entry(fmu, |entry| {
+        headers_of(entry)
+            .find(|(_, h)| ![0, 8].contains(&h.method))
+            .map(|(n, h)| format!("{n} header: method {}", h.method))
+    })
+}
+
+fn descriptors(fmu: &FmuFile) -> Verdict {
+    each_entry(fmu, |entry| {
+        let bad = headers_of(entry).find(|(_, h)| h.flags & 8 != 0 && h.method != 8);
+        bad.map(|(n, h)| format!("{n} header: bit 3 with method {}", h.method))
+    })
+}
+
+fn needed(fmu: &FmuFile) -> Verdict {
+    let mut findings = Vec::new();
+    if fmu.zip.zip64 {
+        findings.push("the archive has a ZIP64 end record".into());
+    }
+    for entry in &fmu.zip.entries {
+        if let Some((n, h)) = headers_of(entry).find(|(_, h)| h.needed & 0xff > 20) {
+            let (major, minor) = ((h.needed & 0xff) / 10, h.needed % 10);
+            findings.push(format!("entry {:?}: {n} header: version needed {major}.{minor}", entry.name()));
+        }
+    }
+    Verdict::of(findings)
+}
+
+fn encryption(fmu: &FmuFile) -> Verdict {
+    each_entry(fmu, |entry| {
+        headers_of(entry).find(|(_, h)| h.flags & 0x41 != 0).map(|(n, _)| format!("{n} header: encrypted"))
+    })
+}
+
+fn split(fmu: &FmuFile) -> Verdict {
+    let other = |e: &Entry| (e.disk != 0).then(|| format!("entry {:?}: on disk {}", e.name(), e.disk));
+    let mut findings: Vec<_> = fmu.zip.entries.iter().filter_map(other).collect();
+    if fmu.zip.split {
+        findings.push("the end record counts disks".into());
+    }
+    Verdict::of(findings)
+}
+
+fn links(fmu: &FmuFile) -> Verdict {
+    each_entry(fmu, |entry| entry.is_link().then(|| "is a symbolic link".into()))
+}
+
+fn contents(fmu: &FmuFile) -> Verdict {
+    Verdict::of(fmu.unpack_errors.clone())
+}
+
+fn headers(fmu: &FmuFile) -> Verdict {
+    let entries = &fmu.zip.entries;
+    let mut names: Vec<_> = entries.iter().map(|e| e.central.name.to_ascii_lowercase()).collect();
+    names.sort();
+    let twice = names.windows(2).filter(|w| w[0] == w[1]);
+    let mut findings: Vec<_> =
+        twice.map(|w| format!("entry {:?}: occurs twice (ignoring case)", String::from_utf8_lossy(&w[0]))).collect();
+    for entry in entries {
+        let c = &entry.central;
+        match &entry.local {
+            None => findings.push(format!("entry {:?}: has no local header", entry.name())),
+            Some(l) if l.name != c.name => findings.push(format!(
+                "entry {:?}: is {:?} in its local header",
+                entry.name(),
+                String::from_utf8_lossy(&l.name)
+            )),
+            // With a data descriptor the local header may be silent about sizes.
+            Some(l) => {
+                let sizes = l.flags & 8 != 0 || (l.crc, l.packed, l.size) == (c.crc, c.packed, c.size);
+                if !sizes || l.method != c.method || l.flags != c.flags {
+                    findings.push(format!("entry {:?}: local and central header differ", entry.name()));
+                }
+            }
+        }
+    }
+    Verdict::of(findings)
+}
+
+fn implementation(fmu: &FmuFile) -> Verdict {
+    let sources = fmu.zip.names().iter().any(|n| n.starts_with("sources/") && !n.ends_with('/'));
+    let binaries = fmu.zip.names().iter().any(|n| n.starts_with("binaries/") && !n.ends_with('/'));
+    let present = sources || binaries;
+    Verdict::of(if present { Vec::new() } else { vec!["the archive contains neither binaries/ nor sources/".into()] })
+}
+
+fn root(fmu: &FmuFile) -> Verdict {
+    let folders = ["binaries", "documentation", "extra", "resources", "sources", "terminalsAndIcons"];
+    each_entry(fmu, |entry| {
+        let name = entry.name();
+        let known = match name.split_once('/') {
+            Some((folder, _)) => folders.contains(&folder),
+            None => name == "modelDescription.xml" || (fmu.version == FmiVersion::V2 && name == "model.png"),
+        };
+        (!known).then(|| "is not part of the standard's structure; move it to extra/".into())
+    })
+}
+
+fn platforms(fmu: &FmuFile) -> Verdict {
+    let old = ["win32", "win64", "linux32", "linux64", "darwin32", "darwin64"];
+    let tuple = |folder: &str| {
+        let parts: Vec<_> = folder.split('-').collect();
+        let arch = ["aarch32", "aarch64", "riscv32", "riscv64", "x86", "x86_64", "ppc32", "ppc64"];
+        let plain =
+            |p: &&str| !p.is_empty() && p.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_');
+        (2..=3).contains(&parts.len()) && (arch.contains(&parts[0]) || plain(&parts[0])) && parts[1..].iter().all(plain)
+    };
+    let mut folders: Vec<_> = fmu
+        .zip
+        .names()
+        .iter()
+        .filter_map(|n| Some(n.strip_prefix("binaries/")?.split_once('/')?.0.to_owned()))
+        .collect();
+    folders.sort();
+    folders.dedup();
+    let known = |f: &&String| match fmu.version {
+        FmiVersion::V2 => old.contains(&f.as_str()) || tuple(f),
+        FmiVersion::V3 => tuple(f),
+    };
+    Verdict::of(folders.iter().filter(|f| !known(f)).map(|f| format!("binaries/{f} is not a platform tuple")).collect())
+}
+
+fn base_names(fmu: &FmuFile) -> Verdict {
+    let description = match &fmu.description {
+        Ok(description) => description,
+        Err(cause) => return Verdict::NotDetermined(cause.clone()),
+    };
+    let identifiers: Vec<&str> = [&description.model_exchange, &description.scheduled_execution]
+        .into_iter()
+        .filter_map(|i| i.as_deref())
+        .chain(description.co_simulation.as_ref().map(|c| c.model_identifier.as_str()))
+        .collect();
+    if fmu.binaries.is_empty() {
+        return Verdict::NotApplicable("there are no shared libraries".into());
+    }
+    let mut findings = Vec::new();
+    for identifier in &identifiers {
+        let c_name = identifier.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+            && identifier.bytes().next().is_some_and(|b| !b.is_ascii_digit());
+        if !c_name {
+            findings.push(format!("modelIdentifier={identifier:?} is not a C identifier"));
+        }
+    }
+    let mut folders: Vec<_> = fmu.binaries.iter().map(|b| b.folder.as_str()).collect();
+    folders.sort_unstable();
+    folders.dedup();
+    for folder in folders {
+        let extension = if folder.contains("win") && !folder.contains("darwin") {
+            "dll"
+        } else if folder.contains("darwin") {
+            "dylib"
+        } else {
+            "so"
+        };
+        for identifier in &identifiers {
+            let name = format!("binaries/{folder}/{identifier}.{extension}");
+            if !fmu.binaries.iter().any(|b| b.name == name) {
+                let present: Vec<_> =
+                    fmu.binaries.iter().filter(|b| b.folder == folder).map(|b| b.name.as_str()).collect();
+                findings.push(format!("{name} is missing; the folder contains {}", present.join(", ")));
+            }
+        }
+    }
+    Verdict::of(findings)
+}
+
+fn documentation(fmu: &FmuFile) -> Verdict {
+    let present = fmu.zip.find("documentation/index.html").is_some();
+    Verdict::of(if present { Vec::new() } else { vec!["documentation/index.html is missing".into()] })
+}
+
+fn licenses(fmu: &FmuFile) -> Verdict {
+    let names = fmu.zip.names();
+    if !names.iter().any(|n| n.starts_with("documentation/licenses/")) {
+        return Verdict::NotApplicable("there is no documentation/licenses".into());
+    }
+    let entries = match fmu.version {
+        FmiVersion::V2 => &["license.txt", "license.html"][..],
+        FmiVersion::V3 => &["license.txt", "license.html", "license.spdx"][..],
+    };
+    let present = entries.iter().any(|e| names.contains(&format!("documentation/licenses/{e}")));
+    Verdict::of(if present {
+        Vec::new()
+    } else {
+        vec![format!("documentation/licenses has none of {}", entries.join(", "))]
+    })
+}
+
+fn dependencies(fmu: &FmuFile) -> Verdict {
+    match fmu.interface() {
+        None => Verdict::NotDetermined("the description cannot be read".into()),
+        Some(i) if !i.needs_execution_tool() => Verdict::NotApplicable("needsExecutionTool is false".into()),
+        Some(i) => {
+            let present = ["txt", "html"]
+                .iter()
+                .any(|e| fmu.zip.find(&format!("documentation/externalDependencies.{e}")).is_some());
+            let missing = format!(
+                "line {}: needsExecutionTool is true, but documentation/externalDependencies is missing",
+                i.line
+            );
+            Verdict::of(if present { Vec::new() } else { vec![missing] })
+        }
+    }
+}
+
+fn pictures(fmu: &FmuFile) -> Verdict {
+    each_entry(fmu, |entry| {
+        let png = entry
+            .name()
+            .strip_suffix(".svg")
+            .filter(|n| !n.starts_with("extra/") && !n.starts_with("resources/"))
+            .map(|n| format!("{n}.png"))?;
+        let known = png.starts_with("terminalsAndIcons/") || png == "documentation/diagram.png";
+        (known && fmu.zip.find(&png).is_none()).then(|| format!("{png} is missing"))
+    })
+}
+
+fn extra(fmu: &FmuFile) -> Verdict {
+    if !fmu.zip.names().iter().any(|n| n.starts_with("extra/") && n != "extra/") {
+        return Verdict::NotApplicable("there is no extra/".into());
+    }
+    each_entry(fmu, |entry| {
+        let name = entry.name();
+        let first = name.strip_prefix("extra/").filter(|r| !r.is_empty())?.split('/').next().unwrap_or_default();
+        (!first.contains('.')).then(|| "is not below a reverse domain name".into())
+    })
+}
+
+fn sources(fmu: &FmuFile) -> Verdict {
+    let names = fmu.zip.names();
+    if !names.iter().any(|n| n.starts_with("sources/") && !n.ends_with('/')) {
+        return Verdict::NotApplicable("there are no sources".into());
+    }
+    let mut findings = Vec::new();
+    if fmu.version == FmiVersion::V3 && fmu.zip.find("sources/buildDescription.xml").is_none() {
+        findings.push("sources/buildDescription.xml is missing".into());
+    }
+    let header = |n: &&String| {
+        let file = n.rsplit('/').next().unwrap_or_default();
+        ["Functions.h", "FunctionTypes.h", "TypesPlatform.h", "PlatformTypes.h"]
+            .iter()
+            .any(|h| file == format!("fmi2{h}") || file == format!("fmi3{h}"))
+    };
+    findings.extend(names.iter().filter(header).map(|n| format!("entry {n:?}: is a header file of the standard")));
+    Verdict::of(findings)
+}

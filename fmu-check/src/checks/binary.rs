@@ -1,0 +1,320 @@
+//! The binary as a file: its format, what it exports and what it needs (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
+
+use crate::check::{Check, Level, Levels, Run, Verdict};
+use crate::fmu_file::{Binary, FmuFile};
+use crate::session::{Blocked, Session};
+use fmu_import::elf::{FLOOR, NEEDED, dynamic, is_system, newest_glibc, strings};
+use fmu_import::raw::{Simple, Text};
+use model_description::FmiVersion;
+use object::elf;
+use object::read::elf::{ElfFile64, ProgramHeader};
+use object::{Architecture, BinaryFormat, Object, ObjectSection, ObjectSymbol};
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "B00", requirement: "The archive contains a binary for this platform, and it loads.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::Probe(loads) },
+    Check { id: "B10", requirement: "Every binary is a shared library for the platform of its folder.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(format) },
+    Check { id: "B01", requirement: "Every binary exports all functions of the standard; in FMI 2.0, those of its interface types.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(exports) },
+    Check { id: "B02a", requirement: "No other exported symbol begins with fmi3.", clause: "3.0.2, 2.5", levels: Levels(None, Some(Level::Must)), run: Run::File(reserved) },
+    Check { id: "B02b", requirement: "A binary exports only functions of the standards and at most two symbols of the tool.", clause: "hardening", levels: Levels::HARD, run: Run::File(only_standard_functions) },
+    Check { id: "B02c", requirement: "The binary can be unloaded: it has no unique symbols and no NODELETE flag.", clause: "hardening", levels: Levels::HARD, run: Run::File(unloadable) },
+    Check { id: "B03", requirement: "A binary needs only C system libraries; the archive contains all others.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(needed) },
+    Check { id: "B03r", requirement: "Every library search path is $ORIGIN or below.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(rpath) },
+    Check { id: "B04", requirement: "Linux binaries need at most version 2.17 (2012) of the GNU C library, so that they load on old systems.", clause: "hardening", levels: Levels::HARD, run: Run::File(c_library) },
+    Check { id: "B05", requirement: "Linux binaries have no text relocations and no executable stack.", clause: "hardening", levels: Levels::HARD, run: Run::File(no_dangerous_flags) },
+    Check { id: "B11", requirement: "A binary for x86_64 Linux requires no instruction set beyond x86-64-v1 (according to its note).", clause: "hardening", levels: Levels::HARD, run: Run::File(processor) },
+    Check { id: "X02b", requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels::MUST, run: Run::Probe(versions) },
+    Check { id: "B08", requirement: "A complete run writes nothing to the console and creates no file in the working directory.", clause: "hardening", levels: Levels::HARD, run: Run::Silent(complete_run) },
+];
+
+const COMMON2: &str = "GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment EnterInitializationMode ExitInitializationMode Terminate Reset GetReal GetInteger GetBoolean GetString SetReal SetInteger SetBoolean SetString GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate GetDirectionalDerivative";
+const COSIMULATION2: &str = "SetRealInputDerivatives GetRealOutputDerivatives DoStep CancelStep GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus GetStringStatus";
+const EXCHANGE2: &str = "EnterEventMode NewDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime SetContinuousStates GetDerivatives GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates";
+const ALL3: &str = "GetVersion SetDebugLogging InstantiateModelExchange InstantiateCoSimulation InstantiateScheduledExecution FreeInstance EnterInitializationMode ExitInitializationMode EnterEventMode Terminate Reset GetFloat32 GetFloat64 GetInt8 GetUInt8 GetInt16 GetUInt16 GetInt32 GetUInt32 GetInt64 GetUInt64 GetBoolean GetString GetBinary GetClock SetFloat32 SetFloat64 SetInt8 SetUInt8 SetInt16 SetUInt16 SetInt32 SetUInt32 SetInt64 SetUInt64 SetBoolean SetString SetBinary SetClock GetNumberOfVariableDependencies GetVariableDependencies GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize SerializeFMUState DeserializeFMUState GetDirectionalDerivative GetAdjointDerivative EnterConfigurationMode ExitConfigurationMode GetIntervalDecimal GetIntervalFraction GetShiftDecimal GetShiftFraction SetIntervalDecimal SetIntervalFraction SetShiftDecimal SetShiftFraction EvaluateDiscreteStates UpdateDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime SetContinuousStates GetContinuousStateDerivatives GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates GetNumberOfEventIndicators GetNumberOfContinuousStates EnterStepMode GetOutputDerivatives DoStep ActivateModelPartition";
+
+/// Every function of a standard, without prefix.
+pub(super) fn functions(version: FmiVersion) -> Vec<&'static str> {
+    let lists = match version {
+        FmiVersion::V2 => [COMMON2, COSIMULATION2, EXCHANGE2].join(" "),
+        FmiVersion::V3 => ALL3.into(),
+    };
+    let all = [COMMON2, COSIMULATION2, EXCHANGE2, ALL3].into_iter().flat_map(str::split_whitespace);
+    let mut found: Vec<&'static str> = Vec::new();
+    for name in all {
+        if lists.split_whitespace().any(|n| n == name) && !found.contains(&name) {
+            found.push(name);
+        }
+    }
+    found
+}
+
+/// The libraries that carry the FMU: the others in their folders are helpers.
+fn carriers(fmu: &FmuFile) -> Vec<&Binary> {
+    let description = fmu.description.as_ref().ok();
+    let names: Vec<&str> = description.map_or_else(Vec::new, |d| {
+        let identifiers = [&d.model_exchange, &d.scheduled_execution].into_iter().filter_map(|i| i.as_deref());
+        d.co_simulation.iter().map(|c| c.model_identifier.as_str()).chain(identifiers).collect()
+    });
+    let base = |b: &Binary| b.name.rsplit('/').next().and_then(|f| f.rsplit_once('.')).map(|(base, _)| base.to_owned());
+    fmu.binaries.iter().filter(|b| base(b).is_some_and(|base| names.contains(&base.as_str()))).collect()
+}
+
+/// Findings about each carrier that can be read.
+fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>) -> Verdict {
+    let carriers = carriers(fmu);
+    if carriers.is_empty() {
+        return Verdict::NotApplicable("no shared library is named after modelIdentifier".into());
+    }
+    let mut findings = Vec::new();
+    for binary in carriers {
+        match object::File::parse(&*binary.bytes) {
+            Ok(file) => findings.extend(rule(binary, &file).into_iter().map(|f| format!("{}: {f}", binary.name))),
+            Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
+        }
+    }
+    Verdict::of(findings)
+}
+
+/// Findings about each carrier that is a 64-bit ELF file.
+fn elf(fmu: &FmuFile, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<String>, object::Error>) -> Verdict {
+    let (mut findings, mut found_elf) = (Vec::new(), false);
+    for binary in carriers(fmu) {
+        let Ok(file) = ElfFile64::parse(&*binary.bytes) else { continue };
+        found_elf = true;
+        match rule(binary, &file) {
+            Ok(found) => findings.extend(found.into_iter().map(|f| format!("{}: {f}", binary.name))),
+            Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
+        }
+    }
+    if found_elf {
+        Verdict::of(findings)
+    } else {
+        Verdict::NotApplicable("the archive has no 64-bit ELF binary".into())
+    }
+}
+
+fn format(fmu: &FmuFile) -> Verdict {
+    let mut findings = Vec::new();
+    for binary in carriers(fmu) {
+        let expected = match binary.folder.as_str() {
+            "linux64" => Some((BinaryFormat::Elf, Architecture::X86_64)),
+            "win64" => Some((BinaryFormat::Pe, Architecture::X86_64)),
+            "linux32" => Some((BinaryFormat::Elf, Architecture::I386)),
+            "win32" => Some((BinaryFormat::Pe, Architecture::I386)),
+            // May be a universal binary.
+            "darwin64" => None,
+            other => {
+                let mut parts = other.split('-');
+                let architecture = match parts.next() {
+                    Some("x86_64") => Some(Architecture::X86_64),
+                    Some("aarch64") => Some(Architecture::Aarch64),
+                    Some("x86") => Some(Architecture::I386),
+                    _ => None,
+                };
+                let format = match parts.next() {
+                    Some("linux") => Some(BinaryFormat::Elf),
+                    Some("windows") => Some(BinaryFormat::Pe),
+                    Some("darwin") => Some(BinaryFormat::MachO),
+                    _ => None,
+                };
+                format.zip(architecture)
+            }
+        };
+        let Some((format, architecture)) = expected else { continue };
+        match object::File::parse(&*binary.bytes) {
+            Err(e) => findings.push(format!("{}: is not a binary: {e}", binary.name)),
+            Ok(file) => {
+                if (file.format(), file.architecture()) != (format, architecture) {
+                    findings.push(format!("{}: is {:?} for {:?}", binary.name, file.format(), file.architecture()));
+                }
+                if !matches!(file.kind(), object::ObjectKind::Dynamic) {
+                    findings.push(format!("{}: is not a shared library but {:?}", binary.name, file.kind()));
+                }
+            }
+        }
+    }
+    Verdict::of(findings)
+}
+
+/// Names of exported symbols; macOS puts an underscore before.
+fn exported(file: &object::File<'_>) -> Vec<String> {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let mut names: Vec<String> = match file.format() {
+        BinaryFormat::Elf => file
+            .dynamic_symbols()
+            .filter(ObjectSymbol::is_definition)
+            .filter_map(|s| s.name().ok().map(str::to_owned))
+            .collect(),
+        _ => file.exports().into_iter().flatten().flatten().filter_map(|e| e.name().name().map(text)).collect(),
+    };
+    if file.format() == BinaryFormat::MachO {
+        names = names.into_iter().map(|n| n.strip_prefix('_').map_or(n.clone(), str::to_owned)).collect();
+    }
+    names.retain(|n| !n.is_empty());
+    names
+}
+
+fn exports(fmu: &FmuFile) -> Verdict {
+    let needed: Vec<String> = match fmu.version {
+        FmiVersion::V2 => {
+            let exchange = fmu.description.as_ref().is_ok_and(|d| d.model_exchange.is_some());
+            let lists = [COMMON2, COSIMULATION2, if exchange { EXCHANGE2 } else { "" }];
+            lists.iter().flat_map(|l| l.split_whitespace()).map(|n| format!("fmi2{n}")).collect()
+        }
+        FmiVersion::V3 => ALL3.split_whitespace().map(|n| format!("fmi3{n}")).collect(),
+    };
+    each(fmu, |_, file| {
+        let exported_names = exported(file);
+        needed.iter().filter(|n| !exported_names.contains(n)).map(|n| format!("does not export {n}")).collect()
+    })
+}
+
+fn reserved(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, file| {
+        let known = |n: &str| ALL3.split_whitespace().any(|f| f == n);
+        let bad = |n: &String| n.strip_prefix("fmi3").is_some_and(|rest| !known(rest));
+        exported(file).into_iter().filter(bad).map(|n| format!("exports {n}")).collect()
+    })
+}
+
+fn only_standard_functions(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, file| {
+        let functions = |n: &String| n.starts_with("fmi2") || n.starts_with("fmi3");
+        let linker = ["_init", "_fini", "_edata", "_end", "__bss_start", "DllMain"];
+        let other_symbols: Vec<_> =
+            exported(file).into_iter().filter(|n| !functions(n) && !linker.contains(&n.as_str())).collect();
+        let shown = other_symbols.iter().take(5).cloned().collect::<Vec<_>>().join(", ");
+        if other_symbols.len() > 2 {
+            vec![format!("exports {} other symbols, for example {shown}", other_symbols.len())]
+        } else {
+            Vec::new()
+        }
+    })
+}
+
+fn unloadable(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |_, file| {
+        let mut findings = Vec::new();
+        for (tag, value) in dynamic(file)? {
+            if tag == 0x6fff_fffb && value & 8 != 0 {
+                findings.push("has the flag NODELETE".into());
+            }
+        }
+        let unique = |s: &object::read::elf::ElfSymbol64<'_, '_>| {
+            let flags = s.flags();
+            matches!(flags, object::SymbolFlags::Elf { st_info, .. } if st_info.0 >> 4 == 10)
+        };
+        let names: Vec<_> =
+            file.dynamic_symbols().filter(unique).filter_map(|s| s.name().ok().map(str::to_owned)).collect();
+        if let Some(first) = names.first() {
+            findings.push(format!("has {} unique symbols, for example {first}", names.len()));
+        }
+        Ok(findings)
+    })
+}
+
+const RPATH: i64 = 15;
+const RUNPATH: i64 = 29;
+
+fn needed(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |binary, file| {
+        let shipped = |name: &str| fmu.zip.find(&format!("binaries/{}/{name}", binary.folder)).is_some();
+        let foreign = |n: &String| !is_system(n) && !shipped(n);
+        Ok(strings(file, NEEDED)?.into_iter().filter(foreign).map(|n| format!("needs {n}")).collect())
+    })
+}
+
+fn rpath(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |_, file| {
+        let mut findings = Vec::new();
+        for path in strings(file, RPATH)?.into_iter().chain(strings(file, RUNPATH)?) {
+            findings.extend(path.split(':').filter(|p| !p.starts_with("$ORIGIN")).map(|p| format!("searches {p:?}")));
+        }
+        Ok(findings)
+    })
+}
+
+fn c_library(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |_, file| {
+        let newest = newest_glibc(file)?.filter(|newest| *newest > FLOOR);
+        Ok(newest.map(|newest| format!("needs {newest}")).into_iter().collect())
+    })
+}
+
+fn no_dangerous_flags(fmu: &FmuFile) -> Verdict {
+    elf(fmu, |_, file| {
+        let mut findings = Vec::new();
+        for (tag, value) in dynamic(file)? {
+            if tag == 22 || (tag == 30 && value & 4 != 0) {
+                findings.push("has text relocations".into());
+            }
+        }
+        for segment in file.elf_program_headers() {
+            if segment.p_type(file.endian()) == elf::PT_GNU_STACK
+                && segment.p_flags(file.endian()) & elf::PF_X != elf::ProgramFlags(0)
+            {
+                findings.push("requires an executable stack".into());
+            }
+        }
+        Ok(findings)
+    })
+}
+
+/// `GNU_PROPERTY_X86_ISA_1_NEEDED` of the note `.note.gnu.property`: bit 0 is the baseline, the others are x86-64-v2 to v4.
+fn processor(fmu: &FmuFile) -> Verdict {
+    const NEEDED: u32 = 0xc000_8002;
+    elf(fmu, |_, file| {
+        let mut findings = Vec::new();
+        let Some(section) = file.section_by_name(".note.gnu.property") else { return Ok(findings) };
+        let data = section.data()?;
+        let word = |at: usize| data.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        // Name size, description size, type, "GNU", then properties: type, size, data padded to 8 bytes.
+        let mut at = 16;
+        while let (Some(kind), Some(size)) = (word(at), word(at + 4)) {
+            if kind == NEEDED && word(at + 8).is_some_and(|bits| bits & !1 != 0) {
+                findings.push(format!(
+                    "its note requires instruction sets beyond x86-64-v1 ({:#x})",
+                    word(at + 8).unwrap_or(0)
+                ));
+            }
+            at += 8 + usize::try_from(size).unwrap_or(usize::MAX / 2).next_multiple_of(8);
+        }
+        Ok(findings)
+    })
+}
+
+/// The session has loaded it already.
+fn loads(_: &Session) -> Result<(), Blocked> {
+    Ok(())
+}
+
+fn versions(session: &Session) -> Result<(), Blocked> {
+    let mut texts = vec![(Text::GetVersion, session.description.version.to_string())];
+    if session.description.version == FmiVersion::V2 {
+        texts.push((Text::GetTypesPlatform, "default".into()));
+    }
+    for (name, expected) in texts {
+        session.calling(&session.raw.name(name.as_str()));
+        let version = session.raw.text(name);
+        session.require(version.as_ref() == Some(&expected), || {
+            format!("{} returned {version:?}, expected {expected:?}", session.raw.name(name.as_str()))
+        });
+    }
+    Ok(())
+}
+
+/// A life as every importer leads it.
+fn complete_run(session: &Session) -> Result<(), Blocked> {
+    let instance = session.stepping()?;
+    for k in 0..20 {
+        instance.change_inputs(k)?;
+        let _ = instance.step(session.h())?;
+        let _ = instance.snapshot(&session.watched())?;
+    }
+    let status = instance.simple(Simple::Terminate)?;
+    session.note(format!("Terminate returned {status}"));
+    if status.is_ok() {
+        instance.free()?;
+    }
+    Ok(())
+}

@@ -1,0 +1,230 @@
+//! Several instances, threads, copies, loading and unloading.
+
+use crate::check::{Check, Levels, Run};
+use crate::instance::Instance;
+use crate::session::{Blocked, Session};
+use crate::trajectory::{difference, trajectory};
+use fmu_import::raw::Raw;
+
+const ONCE: &str = "2.0.5, 2.1.1 and 4.3.1; 3.0.2, 2.2.1 and 2.4.5";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "L04a", requirement: "Interleaved instances give the same results as each alone, bit for bit.", clause: ONCE, levels: Levels::MUST, run: Run::Probe(interleaved) },
+    Check { id: "L04b", requirement: "Instances in several threads give the same results as each alone, bit for bit.", clause: ONCE, levels: Levels::MUST, run: Run::Probe(threads) },
+    Check { id: "L04c", requirement: "An instance can be created in one thread, used in another and freed in a third.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(moving_between_threads) },
+    Check { id: "B05d", requirement: "Two copies of the binary, loaded with their symbols visible to each other, do not interfere.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(copies) },
+    Check { id: "B07a", requirement: "Creating and freeing instances leaks no memory.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(leaks) },
+    Check { id: "B07b", requirement: "The binary can be loaded and unloaded repeatedly and does not stay loaded.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(reloads) },
+];
+
+fn only_once(session: &Session) -> bool {
+    session.flag("canBeInstantiatedOnlyOncePerProcess")
+}
+
+const ONLY_ONCE: &str = "canBeInstantiatedOnlyOncePerProcess is true";
+
+fn interleaved(session: &Session) -> Result<(), Blocked> {
+    if only_once(session) {
+        return session.not_applicable(ONLY_ONCE);
+    }
+    let alone = trajectory(&session.stepping()?, 20)?;
+    // That they can be made at all is what is asked here.
+    let mut all = Vec::new();
+    for k in 0..8 {
+        let Some(instance) = session.instantiate(&session.arguments(&format!("probe {k}")))? else {
+            session.violated(format!("instance {} could not be created beside {k} others", k + 2));
+            return Ok(());
+        };
+        instance.enter()?;
+        instance.exit()?;
+        all.push((instance, Vec::new()));
+    }
+    for k in 0..20 {
+        for (instance, rows) in &mut all {
+            instance.change_inputs(k)?;
+            instance.steps(1, session.h())?;
+            rows.push(instance.snapshot(&session.watched())?);
+        }
+    }
+    for (k, (instance, rows)) in all.into_iter().enumerate() {
+        if let Some((step, i)) = difference(&alone, &rows) {
+            session.violated(format!("instance {k}: {} differs after {} steps", session.watched()[i].name, step + 1));
+        }
+        instance.free()?;
+    }
+    Ok(())
+}
+
+/// A bench has files that only one thread may write; each thread gets a loaded binary and a silent journal of its own.
+fn threads(session: &Session) -> Result<(), Blocked> {
+    if only_once(session) {
+        return session.not_applicable(ONLY_ONCE);
+    }
+    let alone = trajectory(&session.stepping()?, 40)?;
+    session.calling("4 threads, each with an instance, 40 steps");
+    let results: Vec<Result<Vec<Vec<Vec<u64>>>, String>> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..4)
+            .map(|k| {
+                let duplicate = session.duplicate(k);
+                scope.spawn(move || {
+                    duplicate.and_then(|duplicate| trajectory(&duplicate.stepping()?, 40)).map_err(|Blocked(why)| why)
+                })
+            })
+            .collect();
+        workers.into_iter().map(|w| w.join().unwrap_or_else(|_| Err("the thread panicked".into()))).collect()
+    });
+    for (k, rows) in results.into_iter().enumerate() {
+        match rows {
+            Err(why) => session.violated(format!("thread {k}: {why}")),
+            Ok(rows) => {
+                if let Some((step, i)) = difference(&alone, &rows) {
+                    session.violated(format!(
+                        "thread {k}: {} differs after {} steps",
+                        session.watched()[i].name,
+                        step + 1
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn moving_between_threads(session: &Session) -> Result<(), Blocked> {
+    let handle = session.stepping()?.handle;
+    let (start, h, raw) = (session.start(), session.h(), &session.raw);
+    session.calling("DoStep in another thread");
+    let stepped = std::thread::scope(|scope| {
+        scope.spawn(move || raw.do_step(handle, start, h, false, [true; 4]).map(|(s, _)| s)).join()
+    });
+    let status = stepped.ok().flatten();
+    session.require(status.is_some_and(fmu_import::Status::is_ok), || {
+        format!("DoStep in another thread returned {status:?}")
+    });
+    session.calling("FreeInstance in a third thread");
+    let _ = std::thread::scope(|scope| scope.spawn(move || raw.free(handle)).join());
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn copies(session: &Session) -> Result<(), Blocked> {
+    session.not_applicable("libraries do not share symbols on this system")
+}
+
+#[cfg(unix)]
+fn copies(session: &Session) -> Result<(), Blocked> {
+    if only_once(session) {
+        return session.not_applicable(ONLY_ONCE);
+    }
+    let alone = trajectory(&session.stepping()?, 20)?;
+    let folder = session.binary.parent().ok_or_else(|| Blocked("the binary has no folder".into()))?;
+    let failed = |e: std::io::Error| Blocked(e.to_string());
+    let mut duplicates = Vec::new();
+    for k in 0..2 {
+        // Below the working directory of the probe, which is thrown away.
+        let target = std::env::current_dir().map_err(failed)?.join(format!("copy {k} %23 \u{e4}"));
+        std::fs::create_dir_all(&target).map_err(failed)?;
+        for file in std::fs::read_dir(folder).map_err(failed)?.flatten() {
+            if file.path().is_file() {
+                std::fs::copy(file.path(), target.join(file.file_name())).map_err(failed)?;
+            }
+        }
+        let binary = target.join(session.binary.file_name().unwrap_or_default());
+        session.calling("dlopen(RTLD_NOW | RTLD_GLOBAL)");
+        let raw = Raw::open_global(&binary, session.description.version).map_err(Blocked)?;
+        duplicates.push(session.duplicate_with(raw, 10 + k)?);
+    }
+    let instances: Vec<Instance<'_>> = duplicates.iter().map(Session::stepping).collect::<Result<_, _>>()?;
+    let mut rows = vec![Vec::new(); instances.len()];
+    for k in 0..20 {
+        for (instance, rows) in instances.iter().zip(&mut rows) {
+            instance.change_inputs(k)?;
+            instance.steps(1, session.h())?;
+            rows.push(instance.snapshot(&session.watched())?);
+        }
+    }
+    for rows in rows {
+        if let Some((step, i)) = difference(&alone, &rows) {
+            session.violated(format!("a copy: {} differs after {} steps", session.watched()[i].name, step + 1));
+        }
+    }
+    drop(instances);
+    // Two copies stay loaded until the process ends.
+    duplicates.into_iter().for_each(std::mem::forget);
+    Ok(())
+}
+
+/// Resident memory of this process, in bytes.
+fn resident() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmRSS:"))?;
+    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
+}
+
+fn leaks(session: &Session) -> Result<(), Blocked> {
+    if resident().is_none() {
+        return Err(Blocked("this system does not report the memory of a process".into()));
+    }
+    let cycle = |n: usize| {
+        session.many(&format!("{n} instances: created, stepped and freed"), || {
+            for _ in 0..n {
+                let Some(instance) = session.instantiate(&session.arguments("probe"))? else {
+                    return Err(Blocked("no instance".into()));
+                };
+                instance.enter()?;
+                instance.exit()?;
+                instance.steps(2, session.h())?;
+                instance.free()?;
+                if session.half_time_used() {
+                    break;
+                }
+            }
+            Ok(())
+        })
+    };
+    cycle(50)?;
+    let before = resident().unwrap_or(0);
+    cycle(300)?;
+    let after = resident().unwrap_or(0);
+    let growth = after.saturating_sub(before);
+    // One page an instance would be 1.2 MB; the struct of callbacks that we keep for FMI 2.0 is 40 bytes.
+    session.require(growth < 1_000_000, || format!("300 instances leaked {} kB", growth / 1000));
+    session.note(format!("{} kB more after 300 instances", growth / 1000));
+    Ok(())
+}
+
+fn reloads(session: &Session) -> Result<(), Blocked> {
+    let name = session.binary.file_name().unwrap_or_default();
+    // Another path, so that what the bench has loaded does not keep it.
+    let working_directory = std::env::current_dir().map_err(|e| Blocked(e.to_string()))?;
+    let target = working_directory.join("reloaded");
+    let folder = session.binary.parent().unwrap_or(&working_directory);
+    std::fs::create_dir_all(&target).map_err(|e| Blocked(e.to_string()))?;
+    for file in std::fs::read_dir(folder).into_iter().flatten().flatten().filter(|f| f.path().is_file()) {
+        std::fs::copy(file.path(), target.join(file.file_name())).map_err(|e| Blocked(e.to_string()))?;
+    }
+    let binary = target.join(name);
+    for k in 0..20 {
+        session.calling(&format!("loading the binary, round {}", k + 1));
+        let raw = Raw::open(&binary, session.description.version).map_err(Blocked)?;
+        let duplicate = session.duplicate_with(raw, 20 + k)?;
+        {
+            let instance = duplicate.stepping()?;
+            instance.steps(3, session.h())?;
+            instance.free()?;
+        }
+        session.calling(&format!("unloading the binary, round {}", k + 1));
+        duplicate.raw.close().map_err(Blocked)?;
+        if session.half_time_used() {
+            break;
+        }
+    }
+    if let Ok(maps) = std::fs::read_to_string("/proc/self/maps") {
+        let text = binary.to_string_lossy();
+        session.require(!maps.lines().any(|l| l.ends_with(&*text)), || {
+            "the binary is still loaded after unloading".into()
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,291 @@
+//! The life cycle: what is allowed goes through, what is not is refused, and nothing takes the process down
+//! (FMI 2.0.5, 2.1.5 and 4.2.4; FMI 3.0.2, 2.2.3, 2.3 and 4.2).
+
+use super::lifecycle_states::State::{Error, Initialization, Instantiated, Step, Terminated};
+use super::lifecycle_states::in_state;
+use super::state_table::{allowed, configuration, null_instance, refused, unsupported};
+use crate::check::{Check, Level, Levels, Run};
+use crate::instance::Instance;
+use crate::session::{Blocked, Session};
+use crate::trajectory::difference;
+use fmu_import::raw::{Handle, Interface, Simple};
+use model_description::{Causality, FmiVersion};
+use std::ffi::CString;
+
+const STATES: &str = "2.0.5, 4.2.4; 3.0.2, 2.3 and 4.2";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "L00", requirement: "A minimal run succeeds: instantiation, initialization, steps, termination.", clause: STATES, levels: Levels::MUST, run: Run::Probe(minimal_run) },
+    Check { id: "X04", requirement: "Instantiation with a wrong token (GUID) returns NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(token) },
+    Check { id: "L01a", requirement: "Instantiation returns NULL if the instance name is NULL or empty or the token is NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(null_arguments) },
+    Check { id: "L01b", requirement: "An instance works without a log callback.", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(without_logger) },
+    Check { id: "L01c", requirement: "An FMU without resources works without a resource path.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(without_resources) },
+    Check { id: "L02", requirement: "The FMU does not read the struct of callbacks after fmi2Instantiate has returned.", clause: "2.0.5, 2.1.5", levels: Levels(Some(Level::Should), None), run: Run::Probe(callbacks) },
+    Check { id: "L03", requirement: "Instantiation returns NULL for an interface that the FMU does not have and for event mode without hasEventMode.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(interfaces) },
+    Check { id: "L05", requirement: "FreeInstance is allowed in every state and ignores NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(free) },
+    Check { id: "L06", requirement: "Reset, in any state, restores a new instance: a second run equals the first bit for bit.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(reset) },
+    Check { id: "L07", requirement: "Every call that the state allows succeeds.", clause: STATES, levels: Levels::MUST, run: Run::Probe(allowed) },
+    Check { id: "L08", requirement: "Every call that the state does not allow returns Error.", clause: "3.0.2, 2.2.3", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(refused) },
+    Check { id: "L08u", requirement: "A function of a capability that the FMU does not have returns Error in every state.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::HARD, run: Run::Probe(unsupported) },
+    Check { id: "C03", requirement: "Without structural parameters, configuration mode is refused.", clause: "3.0.2, 2.3.2", levels: Levels(None, Some(Level::Should)), run: Run::Probe(configuration) },
+    Check { id: "L08n", requirement: "Every call without an instance (NULL) returns Error.", clause: "3.0.2, 2.2.1", levels: Levels::HARD, run: Run::Probe(null_instance) },
+    Check { id: "L09a", requirement: "After an Error, the next step is refused.", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(after_error) },
+    Check { id: "L09b", requirement: "After an Error, Reset restores a working instance.", clause: "2.0.5, 4.2.4; 3.0.2, 2.2.3", levels: Levels::MUST, run: Run::Probe(recovery) },
+    Check { id: "L10", requirement: "After Terminate, the last values can be read.", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.7", levels: Levels::MUST, run: Run::Probe(terminated) },
+    Check { id: "L12", requirement: "A step beyond the stop time returns Error.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Probe(past_stop_time) },
+];
+
+fn minimal_run(session: &Session) -> Result<(), Blocked> {
+    let instance = session.stepping()?;
+    instance.steps(10, session.h())?;
+    let _ = instance.snapshot(&session.watched())?;
+    let status = instance.simple(Simple::Terminate)?;
+    session.require(status.is_ok(), || format!("{} returned {status}", session.raw.name("Terminate")));
+    Ok(())
+}
+
+fn token(session: &Session) -> Result<(), Blocked> {
+    let mut arguments = session.arguments("probe");
+    arguments.token = CString::new("{00000000-wrong-token}").ok();
+    let created = session.instantiate(&arguments)?;
+    session
+        .require(created.is_none(), || format!("{} with a wrong token created an instance", session.instantiation()));
+    Ok(())
+}
+
+fn null_arguments(session: &Session) -> Result<(), Blocked> {
+    let empty = Some(CString::default());
+    let cases =
+        [("instanceName = NULL", None, true), ("instanceName = \"\"", empty, true), ("token = NULL", None, false)];
+    for (what, value, name) in cases {
+        session.case(|| {
+            let mut arguments = session.arguments("probe");
+            if name {
+                arguments.name = value;
+            } else {
+                arguments.token = value;
+            }
+            let created = session.instantiate(&arguments)?;
+            session
+                .require(created.is_none(), || format!("{} with {what} created an instance", session.instantiation()));
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+/// From a arguments to a few steps and an error.
+fn short_run(session: &Session, arguments: &fmu_import::raw::Arguments, what: &str) -> Result<(), Blocked> {
+    let Some(instance) = session.instantiate(arguments)? else {
+        session.violated(format!("{} with {what} returned NULL", session.instantiation()));
+        return Ok(());
+    };
+    instance.enter()?;
+    instance.exit()?;
+    instance.steps(2, session.h())?;
+    let _ = instance.call("DoStep(h=-1)", |raw| {
+        raw.do_step(instance.handle, instance.time.get(), -1.0, false, [true; 4]).map(|(s, _)| s)
+    })?;
+    instance.free()
+}
+
+fn without_logger(session: &Session) -> Result<(), Blocked> {
+    let v2 = session.description.version == FmiVersion::V2;
+    session.case(|| {
+        let mut arguments = session.arguments("probe");
+        (arguments.logger, arguments.logging) = (false, true);
+        short_run(session, &arguments, "a NULL log callback")
+    });
+    if v2 {
+        session.case(|| {
+            let mut arguments = session.arguments("probe");
+            (arguments.callbacks, arguments.logging) = (false, true);
+            // NULL is not allowed here, so NULL is a good answer.
+            if let Some(instance) = session.instantiate(&arguments)? {
+                instance.free()?;
+            }
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn without_resources(session: &Session) -> Result<(), Blocked> {
+    if session.has_resources() {
+        return session.not_applicable("the archive has resources");
+    }
+    let v2 = session.description.version == FmiVersion::V2;
+    let odd = if v2 { "file:/no%20such/pl%C3%A4ce#1" } else { "/no such/pl\u{e4}ce #1/" };
+    for (what, path) in [("a NULL resource path", None), ("a resource path that does not exist", Some(odd))] {
+        session.case(|| {
+            let mut arguments = session.arguments("probe");
+            arguments.resources = path.and_then(|p| CString::new(p).ok());
+            short_run(session, &arguments, what)
+        });
+    }
+    Ok(())
+}
+
+fn callbacks(session: &Session) -> Result<(), Blocked> {
+    let mut arguments = session.arguments("probe");
+    (arguments.lasting, arguments.logging) = (false, true);
+    short_run(session, &arguments, "valid arguments")?;
+    let late = fmu_import::raw::take_events().iter().filter(|e| e.late).count();
+    session.require(late == 0, || format!("{late} messages used the struct after fmi2Instantiate had returned"));
+    Ok(())
+}
+
+fn interfaces(session: &Session) -> Result<(), Blocked> {
+    let v3 = session.description.version == FmiVersion::V3;
+    let mut cases = Vec::new();
+    if session.description.model_exchange.is_none() {
+        cases.push(("model exchange", Interface::ModelExchange, false));
+    }
+    if v3 && session.description.scheduled_execution.is_none() {
+        cases.push(("scheduled execution", Interface::ScheduledExecution, false));
+    }
+    if v3 && !session.flag("hasEventMode") {
+        cases.push(("eventModeUsed = true", Interface::CoSimulation, true));
+    }
+    for (what, interface, event_mode) in cases {
+        session.case(|| {
+            let mut arguments = session.arguments("probe");
+            (arguments.interface, arguments.event_mode) = (interface, event_mode);
+            let created = session.instantiate(&arguments)?;
+            session.require(created.is_none(), || format!("an instantiation for {what} created an instance"));
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn free(session: &Session) -> Result<(), Blocked> {
+    session.case(|| {
+        session.calling(&format!("{}(NULL)", session.raw.name("FreeInstance")));
+        session.raw.free(Handle::NULL).ok_or_else(|| Blocked("FreeInstance is missing".into()))
+    });
+    for state in [Instantiated, Initialization, Step, Terminated, Error] {
+        session.case(|| match in_state(session, state) {
+            Ok(instance) => instance.free(),
+            // Some FMUs return no Error; that is told elsewhere.
+            Err(Blocked(why)) => {
+                session.note(format!("{state:?}: {why}"));
+                Ok(())
+            }
+        });
+    }
+    Ok(())
+}
+
+fn reset(session: &Session) -> Result<(), Blocked> {
+    let run = |instance: &Instance<'_>| {
+        instance.enter()?;
+        instance.exit()?;
+        instance.run(20, session.h())
+    };
+    let first = run(&session.fresh()?)?;
+    let names: Vec<_> = session.watched().iter().map(|v| v.name.clone()).collect();
+    for state in [Instantiated, Initialization, Step, Terminated, Error] {
+        session.case(|| {
+            let Ok(instance) = in_state(session, state) else { return Ok(()) };
+            // What was set must be forgotten.
+            if matches!(state, Step) {
+                instance.change_inputs(1)?;
+                instance.steps(3, session.h())?;
+            }
+            let status = instance.simple(Simple::Reset)?;
+            if !status.is_ok() {
+                session.violated(format!("Reset after {state:?} returned {status}"));
+                return Ok(());
+            }
+            instance.experiment(session.start(), None);
+            let second = run(&instance)?;
+            if let Some((k, i)) = difference(&first, &second) {
+                session.violated(format!(
+                    "Reset after {state:?}: {} differs from a new instance after {} steps",
+                    names[i],
+                    k + 1
+                ));
+            }
+            Ok(())
+        });
+    }
+    session.case(|| {
+        let instance = session.fresh()?;
+        for v in
+            session.description.variables.iter().filter(|v| v.causality == Causality::Parameter && v.base.is_float())
+        {
+            if let Some(values) = session.different_value(v, 1.0) {
+                let _ = instance.set(v, &values)?;
+            }
+        }
+        let _ = instance.simple(Simple::Reset)?;
+        instance.experiment(session.start(), None);
+        let second = run(&instance)?;
+        if let Some((k, i)) = difference(&first, &second) {
+            session.violated(format!("Reset after setting parameters: {} differs after {} steps", names[i], k + 1));
+        }
+        Ok(())
+    });
+    Ok(())
+}
+
+fn after_error(session: &Session) -> Result<(), Blocked> {
+    let instance = in_state(session, Step)?;
+    let how = instance.provoke()?;
+    let status = instance.step_at(instance.time.get(), session.h())?;
+    session.require(!status.is_ok(), || format!("after {how} had returned Error, DoStep returned {status}"));
+    Ok(())
+}
+
+fn recovery(session: &Session) -> Result<(), Blocked> {
+    let instance = in_state(session, Step)?;
+    let how = instance.provoke()?;
+    let status = instance.simple(Simple::Reset)?;
+    if !status.is_ok() {
+        session.violated(format!("after {how} had returned Error, Reset returned {status}"));
+        return Ok(());
+    }
+    instance.experiment(session.start(), None);
+    if let Err(Blocked(why)) =
+        instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(5, session.h()))
+    {
+        session.violated(format!("after {how} had returned Error and Reset had succeeded: {why}"));
+    }
+    Ok(())
+}
+
+fn terminated(session: &Session) -> Result<(), Blocked> {
+    let instance = in_state(session, Step)?;
+    let watched = session.watched();
+    let before = instance.snapshot(&watched)?;
+    let status = instance.simple(Simple::Terminate)?;
+    if !status.is_ok() {
+        return Err(Blocked(format!("Terminate returned {status}")));
+    }
+    for (v, old) in watched.iter().zip(before) {
+        let (status, now) = instance.get(v)?;
+        session.require(status.is_ok(), || format!("Get({}) after Terminate returned {status}", v.name));
+        session.require(!status.is_ok() || now == old, || format!("Terminate changed {}", v.name));
+    }
+    Ok(())
+}
+
+fn past_stop_time(session: &Session) -> Result<(), Blocked> {
+    let (h, start) = (session.h(), session.start());
+    let instance = session.fresh()?;
+    instance.experiment(start, Some(start + 4.0 * h));
+    instance.enter()?;
+    instance.exit()?;
+    instance.steps(3, h)?;
+    // The last step may be a hair late, by rounding.
+    let t = instance.time.get();
+    let last = instance.step_at(t, start + 4.0 * h - t)?;
+    session.require(last.is_ok(), || format!("the step that ends at the stop time returned {last}"));
+    let status = instance.step_at(start + 4.0 * h, h)?;
+    session.require(!status.is_ok(), || {
+        format!("stopTime={}: DoStep(t={}, h={h}) returned {status}", start + 4.0 * h, start + 4.0 * h)
+    });
+    Ok(())
+}

@@ -1,0 +1,164 @@
+//! Logging and memory (FMI 2.0.5, 2.1.5; FMI 3.0.2, 2.3.1).
+
+use crate::check::{Check, Level, Levels, Run};
+use crate::session::{Blocked, Session};
+use fmu_import::Status;
+use fmu_import::raw::{Event, allocations, take_events};
+use model_description::FmiVersion;
+use std::ffi::CString;
+
+const LOG: &str = "2.0.5, 2.1.5; 3.0.2, 2.3.1";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "G-L1b", requirement: "Every message has a category from LogCategories, or NULL if there are none.", clause: LOG, levels: Levels::MUST, run: Run::Probe(categories) },
+    Check { id: "G-L2a", requirement: "SetDebugLogging accepts an empty list, meaning all categories, and each category of LogCategories.", clause: LOG, levels: Levels::MUST, run: Run::Probe(switch) },
+    Check { id: "G-L2b", requirement: "A category that does not exist or is NULL gives Error and does no harm.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(unknown) },
+    Check { id: "G-L3a", requirement: "With logging on, every Error is accompanied by a message of that status.", clause: "3.0.2, 2.2.3", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(errors) },
+    Check { id: "G-L3b", requirement: "Messages are UTF-8, not empty, and have no trailing line break.", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(texts) },
+    Check { id: "G-L4", requirement: "Messages carry the environment, and in FMI 2.0 the name, that were passed on instantiation.", clause: LOG, levels: Levels::MUST, run: Run::Probe(identity) },
+    Check { id: "G-L5", requirement: "With logging off, the FMU logs only errors.", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(silence) },
+    Check { id: "M01", requirement: "With canNotUseMemoryManagementFunctions, the FMU does not call the memory functions of the importer, and they may be NULL.", clause: "2.0.5, 2.1.5 and 4.3.1", levels: Levels(Some(Level::Must), None), run: Run::Probe(memory) },
+];
+
+/// A life with mistakes in it, and what was logged; the environment and the name that it was made with.
+fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<Event>, usize, String), Blocked> {
+    let _ = take_events();
+    let mut arguments = session.arguments("a probe's name");
+    arguments.logging = logging;
+    let environment = arguments.environment;
+    let instance = session.instantiate(&arguments)?.ok_or_else(|| Blocked("no instance".into()))?;
+    // The FMU keeps its own copy of the name.
+    drop(arguments);
+    instance.enter()?;
+    instance.exit()?;
+    instance.steps(5, session.h())?;
+    if let Err(Blocked(why)) = instance.provoke() {
+        session.note(why);
+    }
+    instance.free()?;
+    Ok((take_events(), environment, "a probe's name".into()))
+}
+
+fn show(event: &Event) -> String {
+    let category = event.category.as_deref().unwrap_or("NULL");
+    format!("{} [{category}] {:?}", Status(event.status), event.text.as_deref().unwrap_or("(none, or not UTF-8)"))
+}
+
+fn categories(session: &Session) -> Result<(), Blocked> {
+    let known: Vec<&str> = session.description.log_categories.iter().map(|c| c.name.as_str()).collect();
+    let (events, ..) = log_of_a_run(session, true)?;
+    for event in &events {
+        let good = event.category.as_deref().map_or(known.is_empty(), |c| known.contains(&c));
+        session.require(good, || format!("{}; the categories are: {}", show(event), known.join(", ")));
+    }
+    session.note(format!("{} messages", events.len()));
+    Ok(())
+}
+
+fn switch(session: &Session) -> Result<(), Blocked> {
+    let instance = session.fresh()?;
+    for on in [true, false] {
+        let status = instance
+            .call(&format!("SetDebugLogging({on}, 0, NULL)"), |raw| raw.debug_logging(instance.handle, on, None, 0))?;
+        session.require(status.is_ok(), || format!("SetDebugLogging({on}, 0, NULL) returned {status}"));
+        for category in &session.description.log_categories {
+            let name = CString::new(category.name.as_str()).unwrap_or_default();
+            let call = format!("SetDebugLogging({on}, 1, {})", category.name);
+            let status = instance.call(&call, |raw| raw.debug_logging(instance.handle, on, Some(&[Some(&name)]), 1))?;
+            session.require(status.is_ok(), || format!("{call} returned {status}"));
+        }
+    }
+    Ok(())
+}
+
+fn unknown(session: &Session) -> Result<(), Blocked> {
+    for (what, name) in [("no such category", CString::new("no such category").ok()), ("NULL", None)] {
+        session.case(|| {
+            let instance = session.fresh()?;
+            let call = format!("SetDebugLogging(true, 1, {what})");
+            let status =
+                instance.call(&call, |raw| raw.debug_logging(instance.handle, true, Some(&[name.as_deref()]), 1))?;
+            session.require(!status.is_ok(), || format!("{call} returned {status}"));
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn errors(session: &Session) -> Result<(), Blocked> {
+    let _ = take_events();
+    let mut arguments = session.arguments("probe");
+    arguments.logging = true;
+    let instance = session.instantiate(&arguments)?.ok_or_else(|| Blocked("no instance".into()))?;
+    instance.enter()?;
+    instance.exit()?;
+    instance.steps(2, session.h())?;
+    let _ = take_events();
+    let how = instance.provoke()?;
+    let events = take_events();
+    let reported = events.iter().any(|e| e.status == Status::ERROR.0);
+    session.require(reported, || {
+        format!("{how} returned Error, but none of the {} messages has that status", events.len())
+    });
+    Ok(())
+}
+
+fn texts(session: &Session) -> Result<(), Blocked> {
+    let (events, ..) = log_of_a_run(session, true)?;
+    for event in &events {
+        let good = event.text.as_deref().is_some_and(|t| !t.trim().is_empty() && !t.ends_with(['\n', '\r']));
+        session.require(good, || show(event));
+    }
+    session.note(format!("{} messages", events.len()));
+    Ok(())
+}
+
+fn identity(session: &Session) -> Result<(), Blocked> {
+    let (events, environment, name) = log_of_a_run(session, true)?;
+    for event in &events {
+        session.require(event.environment == environment, || format!("{} has another environment", show(event)));
+        if session.description.version == FmiVersion::V2 {
+            let logged_name = event.instance.as_deref();
+            session.require(logged_name == Some(&name), || {
+                format!("{} has the instance name {logged_name:?}, expected {name:?}", show(event))
+            });
+        }
+    }
+    if events.is_empty() {
+        return Err(Blocked("the FMU logged no message".into()));
+    }
+    Ok(())
+}
+
+fn silence(session: &Session) -> Result<(), Blocked> {
+    let (events, ..) = log_of_a_run(session, false)?;
+    for event in events.iter().filter(|e| e.status < Status::ERROR.0) {
+        session.violated(format!("with loggingOn = false: {}", show(event)));
+    }
+    Ok(())
+}
+
+fn memory(session: &Session) -> Result<(), Blocked> {
+    if !session.flag("canNotUseMemoryManagementFunctions") {
+        return session.not_applicable("canNotUseMemoryManagementFunctions is false");
+    }
+    for given in [true, false] {
+        session.case(|| {
+            let mut arguments = session.arguments("probe");
+            arguments.memory = given;
+            let Some(instance) = session.instantiate(&arguments)? else {
+                session.violated("fmi2Instantiate with NULL memory functions returned NULL");
+                return Ok(());
+            };
+            instance.enter()?;
+            instance.exit()?;
+            instance.steps(5, session.h())?;
+            instance.free()?;
+            let used = allocations();
+            session.require(used == 0, || format!("the FMU called the memory functions {used} times"));
+            Ok(())
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,46 @@
+//! The checks: one file for each group, with a table of its checks at the top, and files that a group shares.
+
+#![allow(clippy::unnecessary_wraps, reason = "all probes have one signature")]
+
+mod access;
+mod archive;
+mod binary;
+mod clocked;
+mod dependencies;
+mod derivatives;
+mod host;
+mod instances;
+mod layered;
+mod lifecycle;
+mod lifecycle_states;
+mod logging;
+mod schema;
+mod schema_rules;
+mod state;
+mod state_table;
+mod structure;
+mod terminals;
+mod time;
+mod units;
+mod values;
+mod variables;
+mod xml;
+
+use crate::check::Group;
+
+/// Every check.
+pub const GROUPS: &[Group] = &[
+    Group { name: "archive", title: "The archive", checks: archive::CHECKS },
+    Group { name: "xml", title: "modelDescription.xml", checks: xml::CHECKS },
+    Group { name: "variables", title: "Variables, types and units", checks: variables::CHECKS },
+    Group { name: "structure", title: "Model structure", checks: structure::CHECKS },
+    Group { name: "terminals", title: "Terminals and icons", checks: terminals::CHECKS },
+    Group { name: "binary", title: "The binary", checks: binary::CHECKS },
+    Group { name: "lifecycle", title: "Life cycle", checks: lifecycle::CHECKS },
+    Group { name: "access", title: "Getting and setting", checks: access::CHECKS },
+    Group { name: "time", title: "Steps and time", checks: time::CHECKS },
+    Group { name: "state", title: "FMU state", checks: state::CHECKS },
+    Group { name: "logging", title: "Logging", checks: logging::CHECKS },
+    Group { name: "instances", title: "Instances, threads, loading", checks: instances::CHECKS },
+    Group { name: "host", title: "A guest in the importer's process", checks: host::CHECKS },
+];

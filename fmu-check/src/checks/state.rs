@@ -1,0 +1,324 @@
+//! Saved states (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.6.4).
+
+use super::lifecycle_states::{State, in_state};
+use crate::check::{Check, Levels, Run};
+use crate::instance::Instance;
+use crate::session::{Blocked, Session};
+use crate::trajectory::difference;
+use fmu_import::Status;
+use fmu_import::raw::SavedState;
+use model_description::{CoSimulation, ModelVariable};
+
+const STATE: &str = "2.0.5, 2.1.8; 3.0.2, 2.2.6.4";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "F01a", requirement: "A state can be read, set repeatedly and freed in every state of the life cycle; freeing it returns NULL.", clause: STATE, levels: Levels::MUST, run: Run::Probe(in_every_state) },
+    Check { id: "F01b", requirement: "Reading a state into an existing one overwrites it, and freeing NULL is ignored.", clause: STATE, levels: Levels::MUST, run: Run::Probe(overwrite) },
+    Check { id: "F02a", requirement: "A run from a restored state equals the run from the time of saving, bit for bit.", clause: STATE, levels: Levels::MUST, run: Run::Probe(rerun_from_state) },
+    Check { id: "F02b", requirement: "A restored state restores all variables: parameters, inputs and outputs.", clause: STATE, levels: Levels::MUST, run: Run::Probe(variables) },
+    Check { id: "F02c", requirement: "After an Error, a state saved earlier restores a working instance.", clause: "2.0.5, 4.2.4; 3.0.2, 2.2.3", levels: Levels::MUST, run: Run::Probe(after_error) },
+    Check { id: "F03a", requirement: "A state can be set into another instance of the FMU.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(other_instance) },
+    Check { id: "F03b", requirement: "A NULL state and a NULL pointer to a state give Error.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(null_states) },
+    Check { id: "F04a", requirement: "A serialized state can be restored in another instance: the run from it is equal bit for bit.", clause: STATE, levels: Levels::MUST, run: Run::Probe(serialized) },
+    Check { id: "F04b", requirement: "Equal states give equal bytes: no addresses and no uninitialized memory.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(equal_bytes) },
+    Check { id: "F04c", requirement: "Bytes that are not a state (empty, truncated, altered) give Error and never crash the process.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(corrupted) },
+    Check { id: "F04d", requirement: "A buffer of the wrong size gives Error, and the FMU writes nothing past it.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(wrong_size) },
+];
+
+fn can(session: &Session, flag: fn(&CoSimulation) -> bool) -> bool {
+    session.description.co_simulation.as_ref().is_some_and(flag)
+}
+
+/// Ends a probe of states where there are none.
+macro_rules! needs {
+    ($session:ident, $flag:ident) => {
+        if !can($session, CoSimulation::$flag) {
+            return $session.not_applicable(concat!(stringify!($flag), " is false"));
+        }
+    };
+}
+
+fn in_every_state(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_get_and_set_state);
+    for state in [State::Instantiated, State::Initialization, State::Step, State::Terminated] {
+        session.case(|| {
+            let instance = in_state(session, state)?;
+            let mut saved = SavedState::NULL;
+            let got = instance.call("GetFMUState", |raw| raw.get_state(instance.handle, Some(&mut saved)))?;
+            session.require(got.is_ok() && saved != SavedState::NULL, || {
+                format!("GetFMUState in {state:?} returned {got}")
+            });
+            if !got.is_ok() {
+                return Ok(());
+            }
+            for _ in 0..2 {
+                let status = instance.call("SetFMUState", |raw| raw.set_state(instance.handle, saved))?;
+                session.require(status.is_ok(), || format!("SetFMUState in {state:?} returned {status}"));
+            }
+            let status = instance.call("FreeFMUState", |raw| raw.free_state(instance.handle, Some(&mut saved)))?;
+            session.require(status.is_ok(), || format!("FreeFMUState in {state:?} returned {status}"));
+            session.require(saved == SavedState::NULL, || {
+                format!("FreeFMUState in {state:?} did not set the pointer to NULL")
+            });
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn overwrite(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_get_and_set_state);
+    session.case(|| {
+        let (instance, h) = (session.stepping()?, session.h());
+        let mut state = instance.save()?;
+        instance.steps(5, h)?;
+        let status = instance
+            .call("GetFMUState(a state read before)", |raw| raw.get_state(instance.handle, Some(&mut state)))?;
+        session.require(status.is_ok(), || format!("GetFMUState into a state read before returned {status}"));
+        let time = instance.time.get();
+        let first = instance.run(10, h)?;
+        instance.restore(state, time)?;
+        rerun(&instance, &first, "restored from a state that was overwritten");
+        Ok(())
+    });
+    session.case(|| {
+        let instance = session.stepping()?;
+        let mut state = SavedState::NULL;
+        let status = instance.call("FreeFMUState(&NULL)", |raw| raw.free_state(instance.handle, Some(&mut state)))?;
+        session.require(status.is_ok(), || format!("FreeFMUState of NULL returned {status}"));
+        Ok(())
+    });
+    Ok(())
+}
+
+/// An instance under way, with inputs moved.
+fn running_instance(session: &Session) -> Result<Instance<'_>, Blocked> {
+    let instance = session.stepping()?;
+    for k in 0..12 {
+        instance.change_inputs(k)?;
+        instance.steps(1, session.h())?;
+    }
+    Ok(instance)
+}
+
+/// Runs again from where a state was restored; a step that fails now, and did not before, is a difference.
+fn rerun(instance: &Instance<'_>, first: &[Vec<Vec<u64>>], what: &str) {
+    match instance.run(first.len(), instance.session.h()) {
+        Ok(second) => report_difference(instance.session, first, &second, what),
+        Err(Blocked(why)) => instance.session.violated(format!("{what}: {why}")),
+    }
+}
+
+fn report_difference(session: &Session, first: &[Vec<Vec<u64>>], second: &[Vec<Vec<u64>>], what: &str) {
+    if let Some((k, i)) = difference(first, second) {
+        let name = session.watched().get(i).map_or("an output", |v| v.name.as_str()).to_owned();
+        session.violated(format!("{what}: {name} differs after {} steps", k + 1));
+    }
+}
+
+fn rerun_from_state(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_get_and_set_state);
+    let (instance, h) = (running_instance(session)?, session.h());
+    let (state, time) = (instance.save()?, instance.time.get());
+    let first = instance.run(50, h)?;
+    for again in 1..=2 {
+        instance.restore(state, time)?;
+        rerun(&instance, &first, &format!("restored {again} times"));
+        // A state must also undo what a longer run and other inputs did.
+        instance.change_inputs(4)?;
+        instance.steps(7, h)?;
+    }
+    Ok(())
+}
+
+fn variables(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_get_and_set_state);
+    let (instance, h) = (running_instance(session)?, session.h());
+    let all: Vec<&ModelVariable> = session.numeric().filter(|v| v.clocks.is_empty()).collect();
+    let (state, time) = (instance.save()?, instance.time.get());
+    let before = instance.snapshot(&all)?;
+    instance.change_inputs(1)?;
+    for v in all.iter().filter(|v| v.variability == model_description::Variability::Tunable && v.base.is_float()) {
+        if let Some(values) = session.different_value(v, 1.0) {
+            let _ = instance.set(v, &values)?;
+        }
+    }
+    instance.steps(5, h)?;
+    instance.restore(state, time)?;
+    for (v, (old, new)) in all.iter().zip(before.iter().zip(instance.snapshot(&all)?)) {
+        session.require(*old == new, || format!("{} differs from its value at the time of saving", v.name));
+    }
+    Ok(())
+}
+
+fn after_error(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_get_and_set_state);
+    let (instance, h) = (running_instance(session)?, session.h());
+    let (state, time) = (instance.save()?, instance.time.get());
+    let first = instance.run(10, h)?;
+    let how = instance.provoke()?;
+    let status = instance.call("SetFMUState", |raw| raw.set_state(instance.handle, state))?;
+    if !status.is_ok() {
+        session.violated(format!("after {how} had returned Error, SetFMUState returned {status}"));
+        return Ok(());
+    }
+    instance.time.set(time);
+    rerun(&instance, &first, "restored after an Error");
+    Ok(())
+}
+
+fn other_instance(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_get_and_set_state);
+    let (instance, h) = (running_instance(session)?, session.h());
+    let (state, time) = (instance.save()?, instance.time.get());
+    let first = instance.run(20, h)?;
+    let other = session.stepping()?;
+    let status = other.call("SetFMUState(of another instance)", |raw| raw.set_state(other.handle, state))?;
+    if !status.is_ok() {
+        session.violated(format!("SetFMUState with the state of another instance returned {status}"));
+        return Ok(());
+    }
+    other.time.set(time);
+    rerun(&other, &first, "set into another instance");
+    Ok(())
+}
+
+/// A call that ought to be refused.
+type Call = fn(&Instance<'_>) -> Result<Status, Blocked>;
+
+fn null_states(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_get_and_set_state);
+    let cases: [(&str, Call); 2] = [
+        ("SetFMUState(NULL)", |instance| {
+            instance.call("SetFMUState(NULL)", |raw| raw.set_state(instance.handle, SavedState::NULL))
+        }),
+        ("GetFMUState(NULL)", |instance| {
+            instance.call("GetFMUState(NULL)", |raw| raw.get_state(instance.handle, None))
+        }),
+    ];
+    for (what, call) in cases {
+        session.case(|| {
+            let status = call(&session.stepping()?)?;
+            session.require(status == Status::ERROR, || format!("{what} returned {status}"));
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn serialized(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_serialize_state);
+    let (instance, h) = (running_instance(session)?, session.h());
+    let (state, time) = (instance.save()?, instance.time.get());
+    let bytes = instance.serialize(state)?;
+    let first = instance.run(30, h)?;
+    let other = session.stepping()?;
+    let mut back = SavedState::NULL;
+    let status = other.call("DeserializeFMUState", |raw| {
+        let (status, state) = raw.deserialize(other.handle, Some(&bytes), bytes.len())?;
+        back = state;
+        Some(status)
+    })?;
+    if !status.is_ok() {
+        session.violated(format!("DeserializeFMUState of {} bytes just serialized returned {status}", bytes.len()));
+        return Ok(());
+    }
+    other.restore(back, time)?;
+    rerun(&other, &first, "deserialized in another instance");
+    session.note(format!("{} bytes", bytes.len()));
+    Ok(())
+}
+
+fn equal_bytes(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_serialize_state);
+    let make = || {
+        let instance = running_instance(session)?;
+        let state = instance.save()?;
+        instance.serialize(state)
+    };
+    let (one, two) = (make()?, make()?);
+    session.require(one.len() == two.len(), || format!("{} and {} bytes", one.len(), two.len()));
+    let places: Vec<_> = one.iter().zip(&two).enumerate().filter(|(_, (a, b))| a != b).map(|(i, _)| i).collect();
+    if let Some(first) = places.first() {
+        session.violated(format!(
+            "two instances after the same run differ in {} of {} bytes, first in byte {first}",
+            places.len(),
+            one.len()
+        ));
+    }
+    Ok(())
+}
+
+fn corrupted(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_serialize_state);
+    let instance = running_instance(session)?;
+    let state = instance.save()?;
+    let good = instance.serialize(state)?;
+    let n = good.len();
+    let mut cases: Vec<(String, Option<Vec<u8>>)> = vec![("NULL".into(), None), ("no bytes".into(), Some(Vec::new()))];
+    cases.extend(
+        [1, n / 2, n.saturating_sub(1)]
+            .iter()
+            .map(|&k| (format!("the first {k} of {n} bytes"), Some(good[..k.min(n)].to_vec()))),
+    );
+    cases.push(("zeros".into(), Some(vec![0; n])));
+    cases.push(("0xff".into(), Some(vec![0xff; n])));
+    let mut random = 0x9e37_79b9_u32;
+    for _ in 0..60 {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let (byte, bit) = (random as usize / 64 % n.max(1), random % 8);
+        let mut changed = good.clone();
+        if let Some(b) = changed.get_mut(byte) {
+            *b ^= 1 << bit;
+        }
+        cases.push((format!("bit {bit} of byte {byte} of {n} flipped"), Some(changed)));
+    }
+    for (what, bytes) in cases {
+        session.case(|| {
+            let instance = session.stepping()?;
+            let mut back = SavedState::NULL;
+            let size = bytes.as_ref().map_or(n, Vec::len);
+            let status = instance.call(&format!("DeserializeFMUState({what})"), |raw| {
+                let (status, state) = raw.deserialize(instance.handle, bytes.as_deref(), size)?;
+                back = state;
+                Some(status)
+            })?;
+            session.require(!status.is_ok(), || format!("DeserializeFMUState of {what} returned {status}"));
+            if status.is_ok() && back != SavedState::NULL {
+                // What the FMU takes, it must be able to live with.
+                let status =
+                    instance.call(&format!("SetFMUState({what})"), |raw| raw.set_state(instance.handle, back))?;
+                if status.is_ok() {
+                    let _ = instance.step(session.h())?;
+                }
+            }
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn wrong_size(session: &Session) -> Result<(), Blocked> {
+    needs!(session, can_serialize_state);
+    let instance = running_instance(session)?;
+    let state = instance.save()?;
+    let n = instance.serialize(state)?.len();
+    for size in [0, n / 2, n.saturating_sub(1)] {
+        session.case(|| {
+            let instance = running_instance(session)?;
+            let state = instance.save()?;
+            let mut intact = true;
+            let status = instance.call(&format!("SerializeFMUState(size={size} of {n})"), |raw| {
+                let (status, _, whole) = raw.serialize(instance.handle, state, size)?;
+                intact = whole;
+                Some(status)
+            })?;
+            session.require(intact, || format!("SerializeFMUState into {size} of {n} bytes wrote past them"));
+            session
+                .require(!status.is_ok(), || format!("SerializeFMUState into {size} of {n} bytes returned {status}"));
+            Ok(())
+        });
+    }
+    Ok(())
+}

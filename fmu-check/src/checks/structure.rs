@@ -1,0 +1,170 @@
+//! ModelStructure (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). What the file says; that it is true is in `dependencies`.
+
+use super::clocked::clocked_states;
+use super::dependencies::dependencies_hold;
+use super::xml::with_description;
+use crate::check::{Check, Level, Levels, Run, Verdict};
+use crate::fmu_file::FmuFile;
+use model_description::{
+    BaseType, Causality, FmiVersion, Initial, ModelDescription, ModelVariable, Unknown, Variability,
+};
+use std::collections::BTreeSet;
+
+const CLAUSE: &str = "2.0.5, 2.2.8; 3.0.2, 2.4.8";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "S01", requirement: "Outputs lists every variable with causality output exactly once, and nothing else.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(outputs) },
+    Check { id: "S02a", requirement: "InitialUnknowns lists exactly the outputs, calculated parameters, states and state derivatives whose initial is calculated or approx.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(initial_unknowns) },
+    Check { id: "S02b", requirement: "InitialUnknowns are sorted by index.", clause: "2.0.5, 2.2.8", levels: Levels(Some(Level::Must), None), run: Run::File(sorted) },
+    Check { id: "S03a", requirement: "Every dependency exists and is a known of its list.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(knowns) },
+    Check { id: "S03b", requirement: "dependenciesKind has one word for each dependency; initial unknowns use only dependent and constant.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(kinds) },
+    Check { id: "S04", requirement: "A variable that is not a dependency of an initial unknown does not change it.", clause: CLAUSE, levels: Levels::MUST, run: Run::Probe(dependencies_hold) },
+    Check { id: "S05", requirement: "A state derivative refers to its state with the attribute derivative.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(derivatives) },
+    Check { id: "S06", requirement: "A clocked state is a discrete variable on a clock and refers to its previous value with the attribute previous; no two share one.", clause: "3.0.2, 2.4.8 and 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(clocked_states) },
+];
+
+fn name(d: &ModelDescription, reference: u32) -> String {
+    d.referenced(reference).map_or_else(|| format!("{reference} (does not exist)"), |v| v.name.clone())
+}
+
+fn list(d: &ModelDescription, unknowns: &[Unknown]) -> BTreeSet<String> {
+    unknowns.iter().map(|u| name(d, u.reference)).collect()
+}
+
+fn twice(d: &ModelDescription, unknowns: &[Unknown]) -> Vec<String> {
+    let again = |(i, u): (usize, &Unknown)| {
+        let bad = unknowns[..i].iter().any(|o| o.reference == u.reference);
+        bad.then(|| format!("line {}: {} occurs twice", u.line, name(d, u.reference)))
+    };
+    unknowns.iter().enumerate().filter_map(again).collect()
+}
+
+fn outputs(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let mut findings = twice(d, &d.outputs);
+        let listed = list(d, &d.outputs);
+        let all: BTreeSet<_> =
+            d.variables.iter().filter(|v| v.causality == Causality::Output).map(|v| v.name.clone()).collect();
+        findings.extend(all.difference(&listed).map(|n| format!("the output {n} is missing in the list")));
+        findings.extend(listed.difference(&all).map(|n| format!("{n} is in the list but is not an output")));
+        findings
+    })
+}
+
+/// States are what derivatives refer to.
+fn states_and_derivatives(d: &ModelDescription) -> Vec<&ModelVariable> {
+    let derivatives = d.derivatives.iter().filter_map(|u| d.referenced(u.reference));
+    derivatives.flat_map(|v| [Some(v), v.derivative.and_then(|s| d.referenced(s))]).flatten().collect()
+}
+
+fn initial_unknowns(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let mut findings = twice(d, &d.initial_unknowns);
+        let open = |v: &&ModelVariable| matches!(v.initial_or_default(), Some(Initial::Approx | Initial::Calculated));
+        let clocked = |v: &&ModelVariable| !v.clocks.is_empty() || v.base == BaseType::Clock;
+        let output = |v: &&ModelVariable| v.causality == Causality::Output;
+        let calculated = |v: &&ModelVariable| v.causality == Causality::CalculatedParameter;
+        let variables = || d.variables.iter().filter(open);
+        let needed: BTreeSet<String> = variables()
+            .filter(|v| output(v) && !clocked(v) || calculated(v))
+            .chain(states_and_derivatives(d).into_iter().filter(open))
+            .map(|v| v.name.clone())
+            .collect();
+        // FMI 3.0 leaves clocked variables to the exporter.
+        let optional: BTreeSet<String> = variables().filter(clocked).map(|v| v.name.clone()).collect();
+        let listed = list(d, &d.initial_unknowns);
+        findings.extend(needed.difference(&listed).map(|n| format!("{n} is missing in the list")));
+        let more = listed.difference(&needed).filter(|n| !optional.contains(*n));
+        findings.extend(more.map(|n| format!("{n} is in the list but is not an initial unknown")));
+        findings
+    })
+}
+
+fn sorted(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let unsorted = d.initial_unknowns.windows(2).filter(|w| w[0].reference > w[1].reference);
+        unsorted.map(|w| format!("line {}: index {} after {}", w[1].line, w[1].reference, w[0].reference)).collect()
+    })
+}
+
+fn lists(d: &ModelDescription) -> [(&'static str, &[Unknown]); 3] {
+    [("output", &d.outputs), ("derivative", &d.derivatives), ("initial unknown", &d.initial_unknowns)]
+}
+
+fn knowns(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let states: Vec<&str> = states_and_derivatives(d).iter().map(|v| v.name.as_str()).collect();
+        let mut findings = Vec::new();
+        for (kind, unknowns) in lists(d) {
+            let initial = kind == "initial unknown";
+            for unknown in unknowns {
+                let at = format!("line {}: {kind} {}", unknown.line, name(d, unknown.reference));
+                for (i, &reference) in unknown.dependencies.iter().flatten().enumerate() {
+                    let deps = unknown.dependencies.as_deref().unwrap_or_default();
+                    if deps[..i].contains(&reference) {
+                        findings.push(format!("{at}: the dependency {reference} occurs twice"));
+                    }
+                    let Some(v) = d.referenced(reference) else {
+                        findings.push(format!("{at}: the dependency {reference} does not exist"));
+                        continue;
+                    };
+                    if !is_known(d, v, initial, &states) {
+                        findings
+                            .push(format!("{at}: {} is not a known here ({}, {})", v.name, v.causality, v.variability));
+                    }
+                }
+            }
+        }
+        findings
+    })
+}
+
+fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &[&str]) -> bool {
+    let exact = v.initial_or_default() == Some(Initial::Exact) && v.variability != Variability::Constant;
+    match v.causality {
+        Causality::Input | Causality::Independent => true,
+        _ if initial => exact || (v.base == BaseType::Clock),
+        Causality::Parameter | Causality::StructuralParameter => d.version == FmiVersion::V3,
+        _ => states.contains(&v.name.as_str()) || !v.clocks.is_empty() || v.base == BaseType::Clock,
+    }
+}
+
+fn kinds(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let mut findings = Vec::new();
+        for (kind, unknowns) in lists(d) {
+            for unknown in unknowns {
+                let at = format!("line {}: {kind} {}", unknown.line, name(d, unknown.reference));
+                let Some(words) = &unknown.kinds else { continue };
+                let count = unknown.dependencies.as_ref().map_or(0, Vec::len);
+                if words.len() != count {
+                    findings.push(format!("{at}: {} kinds for {count} dependencies", words.len()));
+                }
+                let bad = words
+                    .iter()
+                    .find(|w| kind == "initial unknown" && !["dependent", "constant"].contains(&w.as_str()));
+                if let Some(word) = bad {
+                    findings.push(format!("{at}: the kind {word}"));
+                }
+            }
+        }
+        findings
+    })
+}
+
+fn derivatives(fmu: &FmuFile) -> Verdict {
+    if fmu.description.as_ref().is_ok_and(|d| d.derivatives.is_empty()) {
+        return Verdict::NotApplicable("the list of state derivatives is empty".into());
+    }
+    with_description(fmu, |d| {
+        let bad = |u: &Unknown| {
+            let state = d.referenced(u.reference)?.derivative.and_then(|s| d.referenced(s));
+            let good = state.is_some_and(|s| matches!(s.causality, Causality::Local | Causality::Output));
+            (!good).then(|| {
+                format!("line {}: {} refers to no state that is local or an output", u.line, name(d, u.reference))
+            })
+        };
+        d.derivatives.iter().filter_map(bad).collect()
+    })
+}

@@ -1,0 +1,230 @@
+//! Terminals and icons (FMI 3.0.2, 2.4.9; FMI 2.0.5, 2.3 takes the folder of FMI 3.0).
+
+use super::schema;
+use crate::check::{Check, Levels, Run, Verdict};
+use crate::fmu_file::FmuFile;
+use crate::session::{Blocked, Session};
+use crate::trajectory::{difference, trajectory};
+use crate::zip_headers;
+use fmu_import::raw::Raw;
+use model_description::{Causality, Element, FmiVersion, Terminal, TerminalsAndIcons, read_terminals};
+use std::path::Path;
+
+const CLAUSE: &str = "2.0.5, 2.3; 3.0.2, 2.4.9";
+const FOLDER: &str = "terminalsAndIcons";
+const FILE: &str = "terminalsAndIcons/terminalsAndIcons.xml";
+
+/// Most bytes of the XML.
+const LIMIT: u64 = 64 << 20;
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "I01", requirement: "terminalsAndIcons.xml has the elements and version of the standard and names variables that exist.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(elements) },
+    Check { id: "I01n", requirement: "Terminal names are present and unique, and so are member names wherever members are matched by name.", clause: "3.0.2, 2.4.9.2", levels: Levels::MUST, run: Run::File(names) },
+    Check { id: "I01k", requirement: "Members are inputs, outputs or parameters; inflows and outflows are scalar; vendor-specific matching rules have reverse domain names.", clause: "3.0.2, 2.4.9.2.3", levels: Levels::MUST, run: Run::File(kinds) },
+    Check { id: "I01p", requirement: "Pictures are available as PNG, and the corners of the coordinate system are in order.", clause: "3.0.2, 2.4.9.1", levels: Levels::MUST, run: Run::File(pictures) },
+    Check { id: "I02", requirement: "Without terminalsAndIcons/ and extra/ the FMU gives the same results, bit for bit.", clause: "3.0.2, 2.4.9 and 2.5.1.6", levels: Levels::MUST, run: Run::Probe(stripped) },
+];
+
+/// The file's text; `None` where there is none.
+fn text(fmu: &FmuFile) -> Option<Result<String, String>> {
+    let bytes = zip_headers::contents(&fmu.bytes, fmu.zip.find(FILE)?, LIMIT);
+    Some(bytes.and_then(|bytes| String::from_utf8(bytes).map_err(|_| "is not UTF-8".to_owned())))
+}
+
+/// What is wrong, from the file as an importer reads it; a file that cannot be read is the matter of I01.
+fn read(fmu: &FmuFile, findings: impl FnOnce(&TerminalsAndIcons) -> Vec<String>) -> Verdict {
+    match text(fmu) {
+        None => Verdict::NotApplicable("the archive has no terminalsAndIcons.xml".into()),
+        Some(text) => match text.and_then(|t| read_terminals(t).map_err(|e| e.to_string())) {
+            Ok(file) => {
+                Verdict::of(findings(&file).into_iter().map(|f| format!("terminalsAndIcons.xml: {f}")).collect())
+            }
+            Err(cause) => Verdict::NotDetermined(format!("terminalsAndIcons.xml: {cause}")),
+        },
+    }
+}
+
+/// All terminals, those inside others too.
+fn all(terminals: &[Terminal]) -> Vec<&Terminal> {
+    terminals.iter().flat_map(|t| std::iter::once(t).chain(all(&t.terminals))).collect()
+}
+
+fn elements(fmu: &FmuFile) -> Verdict {
+    let Some(text) = text(fmu) else {
+        return Verdict::NotApplicable("the archive has no terminalsAndIcons.xml".into());
+    };
+    let tree = match text.and_then(|t| Element::parse(&t).map_err(|e| e.to_string())) {
+        Ok(tree) => tree,
+        Err(cause) => return Verdict::Violated(vec![format!("terminalsAndIcons.xml: {cause}")]),
+    };
+    let mut findings = schema::deviations_of_terminals(&tree);
+    let version = tree.get("fmiVersion").unwrap_or_default();
+    let own = fmu.root().and_then(|root| root.get("fmiVersion")).unwrap_or_default();
+    match fmu.version {
+        FmiVersion::V2 if !version.starts_with("3.") => findings.push(format!(
+            "fmiVersion={version:?}, which does not define this file: in an FMU of FMI 2.0 the version is that of FMI 3.0"
+        )),
+        FmiVersion::V3 if version != own => {
+            findings.push(format!("fmiVersion={version:?}, but the model description has {own:?}"));
+        }
+        _ => {}
+    }
+    if let Ok(description) = &fmu.description {
+        let mut open = vec![&tree];
+        while let Some(element) = open.pop() {
+            open.extend(&element.children);
+            for attribute in ["variableName", "inStreamVariableName", "outStreamVariableName"] {
+                if let Some(name) = element.get(attribute).filter(|name| description.variable(name).is_none()) {
+                    findings.push(format!("line {}: there is no variable {name:?}", element.line));
+                }
+            }
+        }
+    }
+    Verdict::of(findings.into_iter().map(|f| format!("terminalsAndIcons.xml: {f}")).collect())
+}
+
+fn names(fmu: &FmuFile) -> Verdict {
+    read(fmu, |file| {
+        let mut findings = Vec::new();
+        let mut level = |terminals: &[Terminal]| {
+            for (k, t) in terminals.iter().enumerate() {
+                if terminals[..k].iter().any(|before| before.name == t.name) {
+                    findings.push(format!("line {}: the terminal {} occurs twice", t.line, t.name));
+                }
+            }
+        };
+        level(&file.terminals);
+        let terminals = all(&file.terminals);
+        for t in &terminals {
+            level(&t.terminals);
+        }
+        for t in terminals.iter().filter(|t| ["plug", "bus"].contains(&&*t.matching_rule)) {
+            let mut seen: Vec<&str> = Vec::new();
+            for m in &t.members {
+                match &m.name {
+                    None => {
+                        findings.push(format!(
+                            "line {}: a member of the {} {} has no memberName",
+                            m.line, t.matching_rule, t.name
+                        ));
+                    }
+                    Some(name) if seen.contains(&name.as_str()) => {
+                        findings.push(format!("line {}: the member {name} of {} occurs twice", m.line, t.name));
+                    }
+                    Some(name) => seen.push(name),
+                }
+            }
+        }
+        findings
+    })
+}
+
+fn kinds(fmu: &FmuFile) -> Verdict {
+    let Ok(description) = &fmu.description else {
+        return Verdict::NotDetermined("the description cannot be read".into());
+    };
+    read(fmu, |file| {
+        let mut findings = Vec::new();
+        let legal = [Causality::Input, Causality::Output, Causality::Parameter, Causality::CalculatedParameter];
+        for t in all(&file.terminals) {
+            let rule = t.matching_rule.as_str();
+            if !["plug", "bus", "sequence", "none"].contains(&rule) && !rule.contains('.') {
+                findings.push(format!(
+                    "line {}: matchingRule={rule:?} is neither a rule of the standard nor a reverse domain name",
+                    t.line
+                ));
+            }
+            for m in &t.members {
+                let variable = description.variable(&m.variable);
+                let flow = ["inflow", "outflow"].contains(&&*m.kind);
+                // That a kind of others is a reverse domain name is only recommended.
+                if !flow && m.kind != "signal" {
+                    continue;
+                }
+                if let Some(v) = variable.filter(|v| !legal.contains(&v.causality)) {
+                    findings.push(format!(
+                        "line {}: {} is an {} but has the causality {}",
+                        m.line, v.name, m.kind, v.causality
+                    ));
+                }
+                if let Some(v) = variable.filter(|v| flow && v.is_array()) {
+                    findings.push(format!("line {}: {} is an {} but an array", m.line, v.name, m.kind));
+                }
+            }
+            let flows = t.members.iter().filter(|m| m.kind == "inflow" || m.kind == "outflow").count();
+            if !t.streams.is_empty() && flows > 1 {
+                findings.push(format!(
+                    "line {}: {} has stream members and {flows} flows; at most one is allowed",
+                    t.line, t.name
+                ));
+            }
+        }
+        findings
+    })
+}
+
+fn pictures(fmu: &FmuFile) -> Verdict {
+    const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+    let png = |base: &str| -> Option<String> {
+        let path = format!("{FOLDER}/{base}.png");
+        let Some(entry) = fmu.zip.find(&path) else { return Some(format!("{path} is missing")) };
+        let bytes = zip_headers::contents(&fmu.bytes, entry, LIMIT).unwrap_or_default();
+        (!bytes.starts_with(SIGNATURE)).then(|| format!("{path} is not a PNG"))
+    };
+    read(fmu, |file| {
+        let mut findings = Vec::new();
+        let area = file.coordinates.area;
+        if !(area.x1 < area.x2 && area.y1 < area.y2) {
+            findings.push(format!(
+                "the coordinate system goes from ({}, {}) to ({}, {}): expected from the lower left to the upper right",
+                area.x1, area.y1, area.x2, area.y2
+            ));
+        }
+        let icons = fmu.zip.find(&format!("{FOLDER}/icon.png")).is_some();
+        findings.extend(file.icon.filter(|_| icons).and_then(|_| png("icon")));
+        for t in all(&file.terminals) {
+            let Some(picture) = &t.picture else { continue };
+            findings.extend(png(&picture.icon).map(|what| format!("line {}: {what}", picture.line)));
+        }
+        findings
+    })
+}
+
+fn stripped(session: &Session) -> Result<(), Blocked> {
+    const EXTRAS: [&str; 2] = [FOLDER, "extra"];
+    if !EXTRAS.iter().any(|folder| session.dir.join(folder).is_dir()) {
+        return session.not_applicable("the FMU has neither terminalsAndIcons/ nor extra/");
+    }
+    let whole = trajectory(&session.stepping()?, 20)?;
+    let failed = |e: std::io::Error| Blocked(e.to_string());
+    // Below the working directory of the probe, which is thrown away.
+    let target = std::env::current_dir().map_err(failed)?.join("stripped");
+    copy(&session.dir, &target, &EXTRAS).map_err(failed)?;
+    let inside = session.binary.strip_prefix(&session.dir).map_err(|e| Blocked(e.to_string()))?;
+    let raw = Raw::open(&target.join(inside), session.description.version).map_err(Blocked)?;
+    let duplicate = session.duplicate_at(&target, raw, 30)?;
+    match duplicate.stepping().and_then(|instance| trajectory(&instance, 20)) {
+        Err(Blocked(why)) => session.violated(format!("without {}: {why}", EXTRAS.join("/ and "))),
+        Ok(rows) => {
+            if let Some((step, i)) = difference(&whole, &rows) {
+                session.violated(format!("{} differs after {} steps", session.watched()[i].name, step + 1));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Copies a folder, but not the folders of these names in it.
+fn copy(from: &Path, to: &Path, but: &[&str]) -> std::io::Result<()> {
+    std::fs::create_dir_all(to)?;
+    for file in std::fs::read_dir(from)? {
+        let (name, path) = file.map(|f| (f.file_name(), f.path()))?;
+        if path.is_dir() && !but.iter().any(|b| name == *b) {
+            copy(&path, &to.join(name), &[])?;
+        } else if path.is_file() {
+            std::fs::copy(&path, to.join(name))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,351 @@
+//! Steps and time (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1).
+
+use super::derivatives::output_derivatives;
+use crate::check::{Check, Level, Levels, Run};
+use crate::instance::Instance;
+use crate::session::{Blocked, Session};
+use crate::trajectory::difference;
+use fmu_import::Status;
+use fmu_import::raw::StepStatus;
+use model_description::{BaseType, Causality, CoSimulation};
+
+const STEP: &str = "2.0.5, 4.2.2; 3.0.2, 4.2.1.1";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "T01a", requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6.", clause: STEP, levels: Levels::SHOULD, run: Run::Probe(start_times) },
+    Check { id: "T01b", requirement: "A communication point other than the end of the last step gives Error.", clause: STEP, levels: Levels::HARD, run: Run::Probe(gap) },
+    Check { id: "T01c", requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps.", clause: STEP, levels: Levels::MUST, run: Run::Probe(accumulated) },
+    Check { id: "T02a", requirement: "A step size of 0 or less gives Error.", clause: STEP, levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(non_positive_step) },
+    Check { id: "T02b", requirement: "A step size or time that is NaN or infinite gives Error and returns promptly.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(non_finite_step) },
+    Check { id: "T03", requirement: "Halving the communication step gives approximately the same results with inputs held.", clause: STEP, levels: Levels::HARD, run: Run::Probe(halves) },
+    Check { id: "T04", requirement: "With canHandleVariableCommunicationStepSize, steps of any size succeed.", clause: "2.0.5, 4.3.1; 3.0.2, 4.3", levels: Levels::MUST, run: Run::Probe(variable) },
+    Check { id: "T05", requirement: "noSetFMUStatePriorToCurrentPoint changes no result, and the state at the current point can still be saved and set.", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1.1", levels: Levels::MUST, run: Run::Probe(no_set_state_before) },
+    Check { id: "T06a", requirement: "After OK, lastSuccessfulTime is t + h unless the step returned early, which must be allowed; Booleans are 0 or 1.", clause: "3.0.2, 4.2.1.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results) },
+    Check { id: "T06b", requirement: "The independent variable equals the time of the last communication point.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent) },
+    Check { id: "T06c", requirement: "NULL pointers for results do no harm.", clause: "3.0.2, 2.2.1", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(null_results) },
+    Check { id: "T07", requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), run: Run::Probe(statuses) },
+    Check { id: "T09", requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read and match their slopes; order 0 and orders above the maximum give Error.", clause: "2.0.5, 4.2.1; 3.0.2, 4.2.1.1", levels: Levels::MUST, run: Run::Probe(output_derivatives) },
+    Check { id: "T10", requirement: "Two consecutive runs with the same inputs are equal bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(determinism) },
+    Check { id: "T10p", requirement: "Two processes with different addresses give the same results bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes) },
+];
+
+fn start_times(session: &Session) -> Result<(), Blocked> {
+    for start in [0.0, -1.0, 1000.0, 1e6] {
+        session.case(|| {
+            let instance = session.fresh()?;
+            instance.experiment(start, None);
+            let life = instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(20, session.h()));
+            if let Err(Blocked(why)) = life {
+                session.violated(format!("startTime={start}: {why}"));
+            }
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn gap(session: &Session) -> Result<(), Blocked> {
+    for shift in [0.5, -0.5, 2.0] {
+        session.case(|| {
+            let (instance, h) = (session.stepping()?, session.h());
+            instance.steps(3, h)?;
+            let t = instance.time.get();
+            let status = instance.step_at(t + shift * h, h)?;
+            session.require(!status.is_ok(), || {
+                format!("the last step ended at {t}, and DoStep(t={}, h={h}) returned {status}", t + shift * h)
+            });
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn accumulated(session: &Session) -> Result<(), Blocked> {
+    let (instance, h) = (session.stepping()?, session.h());
+    // Beyond its default experiment an FMU may have no data; what happens there is no finding.
+    let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
+    session.many(&format!("up to 100000 steps of {h}, t = t + h"), || {
+        for k in 0..100_000 {
+            let inside = instance.time.get() + h <= stop;
+            let status = instance.step(h)?;
+            if !status.is_ok() && inside {
+                session.violated(format!("step {k}, DoStep(t={:?}, h={h:?}), returned {status}", instance.time.get()));
+                return Ok(());
+            }
+            if !status.is_ok() || (k % 100 == 0 && session.half_time_used()) {
+                session.note(format!("{k} steps"));
+                return Ok(());
+            }
+        }
+        session.note("100000 steps");
+        Ok(())
+    })
+}
+
+fn non_positive_step(session: &Session) -> Result<(), Blocked> {
+    for h in [0.0, -session.h()] {
+        session.case(|| {
+            let instance = session.stepping()?;
+            instance.steps(2, session.h())?;
+            let status = instance.step_at(instance.time.get(), h)?;
+            session.require(status == Status::ERROR, || {
+                format!("DoStep(t={}, h={h}) returned {status}", instance.time.get())
+            });
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn non_finite_step(session: &Session) -> Result<(), Blocked> {
+    let h = session.h();
+    for (t, h) in
+        [(None, f64::NAN), (None, f64::INFINITY), (Some(f64::NAN), h), (Some(f64::INFINITY), h), (None, 1e300)]
+    {
+        session.case(|| {
+            let instance = session.stepping()?;
+            instance.steps(2, session.h())?;
+            let t = t.unwrap_or(instance.time.get());
+            let status = instance.step_at(t, h)?;
+            // A step of 1e300 is a number after all; only a hang counts.
+            session.require(!status.is_ok() || (1e300..f64::INFINITY).contains(&h), || {
+                format!("DoStep(t={t}, h={h}) returned {status}")
+            });
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn halves(session: &Session) -> Result<(), Blocked> {
+    if !session.flag("canHandleVariableCommunicationStepSize") {
+        return session.not_applicable("the communication step may not change");
+    }
+    let (h, n) = (session.h(), 40);
+    let fits = |v: &&&model_description::ModelVariable| v.base == BaseType::Float64 && !v.is_array();
+    let all = session.watched();
+    let watched: Vec<_> = all.iter().filter(fits).copied().collect();
+    let run = |parts: u32| {
+        let instance = session.stepping()?;
+        instance.change_inputs(3)?;
+        (0..n)
+            .map(|_| {
+                instance.steps(usize::try_from(parts).unwrap_or(1), h / f64::from(parts))?;
+                instance.snapshot(&watched)
+            })
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let (whole, half) = (run(1)?, run(2)?);
+    let number = |bits: &[u64]| bits.first().map_or(0.0, |b| f64::from_bits(*b));
+    for (i, v) in watched.iter().enumerate() {
+        let scale = whole.iter().map(|row| number(&row[i]).abs()).fold(v.nominal.unwrap_or(0.0).abs(), f64::max);
+        let largest_difference =
+            whole.iter().zip(&half).map(|(a, b)| (number(&a[i]) - number(&b[i])).abs()).fold(0.0, f64::max);
+        session.require(largest_difference <= 0.1 * scale + 1e-9, || {
+            format!(
+                "{} ({}): results with steps of {h} and {} differ by {largest_difference}; the scale is {scale}",
+                v.name,
+                v.variability,
+                h / 2.0
+            )
+        });
+    }
+    Ok(())
+}
+
+fn variable(session: &Session) -> Result<(), Blocked> {
+    if !session.flag("canHandleVariableCommunicationStepSize") {
+        return session.not_applicable("canHandleVariableCommunicationStepSize is false");
+    }
+    let (instance, h) = (session.stepping()?, session.h());
+    let mut random = 0x2545_f491_u32;
+    for _ in 0..200 {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let part = h * (0.05 + 3.0 * f64::from(random >> 8) / f64::from(1 << 24));
+        let t = instance.time.get();
+        let status = instance.step(part)?;
+        if !status.is_ok() {
+            session.violated(format!("DoStep(t={t:?}, h={part:?}) returned {status}"));
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn step_results(session: &Session) -> Result<(), Blocked> {
+    let (instance, h) = (session.stepping()?, session.h());
+    if session.flag("hasEventMode") && session.description.variables.iter().any(|v| v.base == BaseType::Clock) {
+        return session.not_applicable("the FMU has clocks and needs event mode");
+    }
+    for _ in 0..20 {
+        let t = instance.time.get();
+        let mut result = None;
+        let status = instance.call(&format!("DoStep(t={t}, h={h})"), |raw| {
+            let (status, step_results) = raw.do_step(instance.handle, t, h, false, [true; 4])?;
+            result = Some(step_results);
+            Some(status)
+        })?;
+        let Some(step_results) = result.filter(|_| status.is_ok()) else {
+            return Err(Blocked(format!("DoStep returned {status}")));
+        };
+        session
+            .require([step_results.event, step_results.terminate, step_results.early].iter().all(|b| *b <= 1), || {
+                format!("DoStep(t={t}, h={h}) gave {step_results:?}: a Boolean is not 0 or 1, or was not written")
+            });
+        session.require(step_results.early == 0, || {
+            format!("DoStep(t={t}, h={h}) returned early although that was not allowed")
+        });
+        let is_close = (step_results.last - (t + h)).abs() <= 1e-9 * h + 4.0 * f64::EPSILON * t.abs();
+        session.require(is_close, || format!("DoStep(t={t}, h={h}) gave lastSuccessfulTime={}", step_results.last));
+        if step_results.terminate == 1 {
+            break;
+        }
+        instance.time.set(t + h);
+    }
+    Ok(())
+}
+
+fn independent(session: &Session) -> Result<(), Blocked> {
+    let time = session
+        .description
+        .variables
+        .iter()
+        .find(|v| v.causality == Causality::Independent && v.base == BaseType::Float64);
+    let Some(time) = time else {
+        return session.not_applicable("there is no independent variable of type Float64");
+    };
+    let (instance, h) = (session.stepping()?, session.h());
+    for _ in 0..5 {
+        instance.steps(1, h)?;
+        let (status, bits) = instance.get(time)?;
+        let (t, step_results) = (instance.time.get(), bits.first().map_or(f64::NAN, |b| f64::from_bits(*b)));
+        let is_close = status.is_ok() && (step_results - t).abs() <= 1e-6 * h + 4.0 * f64::EPSILON * t.abs();
+        session.require(is_close, || {
+            format!("after the step to {t}, Get({}) returned {status}, {step_results}", time.name)
+        });
+    }
+    Ok(())
+}
+
+fn null_results(session: &Session) -> Result<(), Blocked> {
+    for missing in 0..4 {
+        session.case(|| {
+            let instance = session.stepping()?;
+            let mut given = [true; 4];
+            given[missing] = false;
+            let name = ["eventHandlingNeeded", "terminateSimulation", "earlyReturn", "lastSuccessfulTime"][missing];
+            let status = instance.call(&format!("DoStep({name}=NULL)"), |raw| {
+                raw.do_step(instance.handle, instance.time.get(), session.h(), false, given).map(|(s, _)| s)
+            })?;
+            session.note(format!("{name}=NULL: {status}"));
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn statuses(session: &Session) -> Result<(), Blocked> {
+    use StepStatus::{GetBooleanStatus, GetIntegerStatus, GetRealStatus, GetStatus, GetStringStatus};
+    for name in [GetStatus, GetRealStatus, GetIntegerStatus, GetBooleanStatus, GetStringStatus] {
+        for kind in [0, 1, 2, 3, 99] {
+            session.case(|| {
+                let instance = session.stepping()?;
+                instance.steps(1, session.h())?;
+                let status = instance.call(&format!("{name:?}(kind={kind})"), |raw| {
+                    raw.step_status(name, instance.handle, kind).map(|(s, _)| s)
+                })?;
+                let known = [Status::OK, Status::WARNING, Status::DISCARD].contains(&status) || kind == 99;
+                // A number of a status that this function does not tell at all may be an error.
+                let fits = matches!(
+                    (name, kind),
+                    (GetStatus, 0) | (GetRealStatus, 2) | (GetBooleanStatus, 3) | (GetStringStatus, 1)
+                );
+                session.require(known || !fits, || format!("fmi2{name:?}({kind}) returned {status}"));
+                Ok(())
+            });
+        }
+    }
+    Ok(())
+}
+
+fn determinism(session: &Session) -> Result<(), Blocked> {
+    let run = || {
+        let instance = session.stepping()?;
+        (0..30)
+            .map(|k| {
+                instance.change_inputs(k)?;
+                instance.steps(1, session.h())?;
+                instance.snapshot(&session.watched())
+            })
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let (first, second) = (run()?, run()?);
+    if let Some((k, i)) = difference(&first, &second) {
+        session.violated(format!("{} differs after {} steps", session.watched()[i].name, k + 1));
+    }
+    Ok(())
+}
+
+/// What comes out is told as a number, which the parent compares.
+fn two_processes(session: &Session) -> Result<(), Blocked> {
+    let instance = session.stepping()?;
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for k in 0..30 {
+        instance.change_inputs(k)?;
+        instance.steps(1, session.h())?;
+        for bits in instance.snapshot(&session.watched())?.into_iter().flatten() {
+            hash = bits.to_le_bytes().iter().fold(hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3));
+        }
+    }
+    session.note(format!("30 steps, all outputs hashed: {hash:016x}"));
+    Ok(())
+}
+
+fn no_set_state_before(session: &Session) -> Result<(), Blocked> {
+    let saves = session.description.co_simulation.as_ref().is_some_and(CoSimulation::can_get_and_set_state);
+    let run = |instance: &Instance<'_>, from: u32, no_prior: bool| {
+        let mut rows = Vec::new();
+        for k in from..from + 10 {
+            instance.change_inputs(k)?;
+            let (t, h) = (instance.time.get(), session.h());
+            let status = instance
+                .call(&format!("DoStep(t={t}, h={h}, noSetFMUStatePriorToCurrentPoint={no_prior})"), |raw| {
+                    raw.do_step(instance.handle, t, h, no_prior, [true; 4]).map(|(s, _)| s)
+                })?;
+            session.require(status.is_ok(), || {
+                format!("with noSetFMUStatePriorToCurrentPoint={no_prior} DoStep(t={t}) returned {status}")
+            });
+            instance.time.set(t + h);
+            rows.push(instance.snapshot(&session.watched())?);
+        }
+        Ok::<_, Blocked>(rows)
+    };
+    if session.description.variables.iter().any(|v| v.base == BaseType::Clock) {
+        return session.not_applicable("the FMU has clocks and needs event mode");
+    }
+    let (unrestricted, restricted) = (session.stepping()?, session.stepping()?);
+    let (a, b) = (run(&unrestricted, 0, false)?, run(&restricted, 0, true)?);
+    if let Some((step, i)) = difference(&a, &b) {
+        session.violated(format!(
+            "{} differs after {} steps with noSetFMUStatePriorToCurrentPoint",
+            session.watched()[i].name,
+            step + 1
+        ));
+    }
+    if !saves {
+        session.note("the FMU does not save states");
+        return Ok(());
+    }
+    let (here, time) = (restricted.save()?, restricted.time.get());
+    let first = run(&restricted, 10, false)?;
+    if let Err(Blocked(why)) = restricted.restore(here, time) {
+        session
+            .violated(format!("restoring the current point after a step with noSetFMUStatePriorToCurrentPoint: {why}"));
+        return Ok(());
+    }
+    if let Some((step, i)) = difference(&first, &run(&restricted, 10, true)?) {
+        session.violated(format!("{} differs {} steps after the state was set", session.watched()[i].name, step + 1));
+    }
+    Ok(())
+}

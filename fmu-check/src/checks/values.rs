@@ -1,0 +1,223 @@
+//! Values that are set: that they come back, take effect, and do no harm when they make no sense.
+
+use crate::encoding::{bits, same, show};
+use crate::session::{Blocked, Session, settable};
+use crate::trajectory::difference;
+use fmu_import::Status;
+use fmu_import::raw::Simple;
+use model_description::{BaseType, Causality, ModelVariable, Variability};
+use std::ffi::CString;
+
+pub(super) fn round_trip(session: &Session) -> Result<(), Blocked> {
+    let instance = session.initializing()?;
+    for v in session.numeric().filter(|v| settable(v)) {
+        let Some(values) = session.different_value(v, 1.0) else { continue };
+        let status = instance.set(v, &values)?;
+        if !status.is_ok() {
+            // A value that the model does not like is its good right; what is said of it is a check of its own.
+            if status == Status::ERROR {
+                return Err(Blocked(format!(
+                    "Set({} = {}) returned {status}",
+                    v.name,
+                    show(v, session.description.version, &values)
+                )));
+            }
+            continue;
+        }
+        let (_, back) = instance.get(v)?;
+        session.require(same(v, session.description.version, &values, &back), || {
+            format!(
+                "{}: set to {}, got {}",
+                v.name,
+                show(v, session.description.version, &values),
+                show(v, session.description.version, &back)
+            )
+        });
+    }
+    Ok(())
+}
+
+pub(super) fn strings(session: &Session) -> Result<(), Blocked> {
+    let fits = |v: &&ModelVariable| v.base == BaseType::String && settable(v) && !v.is_array();
+    let Some(v) = session.description.variables.iter().find(fits) else {
+        return session.not_applicable("no string can be set");
+    };
+    for text in ["", "probe \u{e4}\u{1f50b}", &"x".repeat(1 << 20)] {
+        session.case(|| {
+            let instance = session.initializing()?;
+            let c_text = CString::new(text).unwrap_or_default();
+            let status = instance.call(&format!("SetString({})", v.name), |raw| {
+                raw.set_strings(instance.handle, &[v.value_reference], &[Some(&c_text)])
+            })?;
+            if !status.is_ok() {
+                return Err(Blocked(format!("SetString({}) returned {status}", v.name)));
+            }
+            session.calling(&format!("GetString({})", v.name));
+            let (_, back) = session
+                .raw
+                .get_strings(instance.handle, &[v.value_reference], 1)
+                .ok_or_else(|| Blocked("GetString is missing".into()))?;
+            session.require(back.first().is_some_and(|b| b.as_deref() == Some(text)), || {
+                format!("{}: a string of {} bytes did not read back", v.name, text.len())
+            });
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+pub(super) fn not_a_number(session: &Session) -> Result<(), Blocked> {
+    let inputs = session.float_inputs();
+    if inputs.is_empty() {
+        return session.not_applicable("there is no floating-point input");
+    }
+    let alone = session.stepping()?.run(5, session.h())?;
+    for v in &inputs {
+        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, -1e308, 5e-324, -0.0] {
+            if session.half_time_used() {
+                session.note("time ran out before all inputs were tried");
+                return Ok(());
+            }
+            session.case(|| {
+                let (instance, other) = (session.stepping()?, session.stepping()?);
+                let _ = instance.set(v, &vec![bits(v.base, x); session.elements(v)])?;
+                for _ in 0..3 {
+                    let _ = instance.call(&format!("DoStep with {} = {x}", v.name), |raw| {
+                        raw.do_step(instance.handle, instance.time.get(), session.h(), false, [true; 4]).map(|(s, _)| s)
+                    })?;
+                    instance.time.set(instance.time.get() + session.h());
+                }
+                let undisturbed = other.run(5, session.h())?;
+                session.require(undisturbed == alone, || {
+                    format!("{} = {x} in one instance changed the results of another", v.name)
+                });
+                Ok(())
+            });
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn out_of_range(session: &Session) -> Result<(), Blocked> {
+    let fits = |v: &&ModelVariable| {
+        v.causality == Causality::Parameter && settable(v) && v.base.is_float() && (v.min.is_some() || v.max.is_some())
+    };
+    let limited: Vec<_> = session.description.variables.iter().filter(fits).take(40).collect();
+    if limited.is_empty() {
+        return session.not_applicable("there is no floating-point parameter with min or max");
+    }
+    for v in limited {
+        let below = v.min.map(|x| x - x.abs().max(1.0));
+        let above = v.max.map(|x| x + x.abs().max(1.0));
+        for x in below.into_iter().chain(above).filter(|x| x.is_finite()) {
+            session.case(|| {
+                let instance = session.initializing()?;
+                let status = instance.set(v, &vec![bits(v.base, x); session.elements(v)])?;
+                let end = if status.is_ok() { instance.simple(Simple::ExitInitializationMode)? } else { status };
+                session.require(!end.is_ok(), || format!("line {}: {} = {x} was accepted", v.line, v.name));
+                Ok(())
+            });
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn booleans(session: &Session) -> Result<(), Blocked> {
+    let fits = |v: &&ModelVariable| v.base == BaseType::Boolean && settable(v) && !v.is_array();
+    let Some(v) = session.description.variables.iter().find(fits) else {
+        return session.not_applicable("no Boolean can be set");
+    };
+    let width = 8 * fmu_import::raw::width(v.base, session.description.version);
+    for value in [2, 0xff, u64::MAX >> (64 - width)] {
+        session.case(|| {
+            let instance = session.initializing()?;
+            let status = instance.set(v, &[value])?;
+            if status.is_ok() {
+                let (_, back) = instance.get(v)?;
+                session.require(back[0] <= 1, || format!("{}: set to {value}, got {}", v.name, back[0]));
+                let _ = instance.simple(Simple::ExitInitializationMode)?;
+                let _ = instance.step(session.h())?;
+            }
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+pub(super) fn tunable(session: &Session) -> Result<(), Blocked> {
+    let fits = |v: &&ModelVariable| {
+        v.causality == Causality::Parameter && v.variability == Variability::Tunable && v.clocks.is_empty()
+    };
+    let tunable: Vec<_> = session.numeric().filter(fits).take(40).collect();
+    if tunable.is_empty() {
+        return session.not_applicable("there is no tunable parameter");
+    }
+    for v in tunable {
+        session.case(|| {
+            let instance = session.stepping()?;
+            instance.steps(2, session.h())?;
+            let Some(values) = session.different_value(v, 1.0) else { return Ok(()) };
+            let status = instance.set(v, &values)?;
+            session.require(status.is_ok(), || {
+                format!("line {}: Set({}) between steps returned {status}", v.line, v.name)
+            });
+            if !status.is_ok() {
+                return Ok(());
+            }
+            if let Err(Blocked(why)) = instance.steps(2, session.h()) {
+                // The model may have rules that the description cannot tell.
+                session.note(format!("{} = {}: {why}", v.name, show(v, session.description.version, &values)));
+                return Ok(());
+            }
+            let (_, back) = instance.get(v)?;
+            session.require(same(v, session.description.version, &values, &back), || {
+                let (set, got) =
+                    (show(v, session.description.version, &values), show(v, session.description.version, &back));
+                format!("line {}: {}: set to {set}, but two steps later it is {got}", v.line, v.name)
+            });
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+/// One instance gets its values at once, another gets others first, is looked at, and gets them then.
+pub(super) fn iterated_initialization(session: &Session) -> Result<(), Blocked> {
+    let watched = session.watched();
+    let settable: Vec<_> = session.numeric().filter(|v| settable(v) && v.base.is_float()).collect();
+    let (plain, iterated) = (session.initializing()?, session.initializing()?);
+    for v in settable.iter().take_while(|_| !session.half_time_used()) {
+        let (Some(first), Some(last)) = (session.different_value(v, 3.0), session.different_value(v, 1.0)) else {
+            continue;
+        };
+        // What one of them refuses is not what is asked here.
+        if iterated.set(v, &first)?.is_ok() && iterated.set(v, &last)?.is_ok() {
+            let _ = iterated.snapshot(&watched)?;
+            let _ = plain.set(v, &last)?;
+        } else {
+            return Err(Blocked(format!("{} cannot be set", v.name)));
+        }
+    }
+    let alike = plain.snapshot(&watched)? == iterated.snapshot(&watched)?;
+    session.require(alike, || "in initialization mode the outputs depend on values set and read earlier".into());
+    match (plain.exit(), iterated.exit()) {
+        (Ok(()), Ok(())) => {}
+        (Err(Blocked(why)), Err(_)) => {
+            session.note(format!("these values are inconsistent: {why}"));
+            return Ok(());
+        }
+        (Err(Blocked(why)), _) | (_, Err(Blocked(why))) => {
+            session.violated(format!("only one of two instances with the same values fails: {why}"));
+            return Ok(());
+        }
+    }
+    let (a, b) = (plain.run(5, session.h())?, iterated.run(5, session.h())?);
+    if let Some((step, i)) = difference(&a, &b) {
+        session.violated(format!(
+            "{} differs {} steps after an initialization that set values twice",
+            watched[i].name,
+            step + 1
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,498 @@
+//! Variables, types and units (FMI 2.0.5, 2.2.2, 2.2.3, 2.2.7; FMI 3.0.2, 2.4.3, 2.4.4, 2.4.7).
+
+use super::clocked::alias_units;
+use super::units;
+use super::xml::with_description;
+use crate::check::{Check, Level, Levels, Run, Verdict};
+use crate::fmu_file::FmuFile;
+use model_description::{
+    BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, ModelVariable, Variability, parse_number,
+};
+use std::collections::HashMap;
+
+const TABLE: &str = "2.0.5, 2.2.7; 3.0.2, 2.4.7.4 and 2.4.7.5";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "V01a", requirement: "Names of variables and aliases are unique, not empty, and free of line breaks and tabs.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(names) },
+    Check { id: "V01b", requirement: "With the naming convention \"structured\", every name follows the grammar.", clause: "2.0.5, 2.2.9; 3.0.2, 2.4.7.5.1", levels: Levels::MUST, run: Run::File(structured) },
+    Check { id: "V02a", requirement: "Value references are unique.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(references) },
+    Check { id: "V02b", requirement: "Variables that share a value reference are true aliases: at most one can be set, constants alias only equal constants, and there is one start value and one unit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(aliases) },
+    Check { id: "V03", requirement: "The independent variable is a continuous number without start and initial; FMI 3.0 requires exactly one, FMI 2.0 allows at most one.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::File(independent) },
+    Check { id: "V04a", requirement: "Causality and variability are a legal pair.", clause: TABLE, levels: Levels::MUST, run: Run::File(pairs) },
+    Check { id: "V04b", requirement: "The attribute initial has a value that causality and variability allow.", clause: TABLE, levels: Levels::MUST, run: Run::File(initials) },
+    Check { id: "V04c", requirement: "A start value is present where it is required and absent where it is forbidden.", clause: TABLE, levels: Levels::MUST, run: Run::File(starts) },
+    Check { id: "V05", requirement: "Only floating-point variables are continuous.", clause: TABLE, levels: Levels::MUST, run: Run::File(continuous) },
+    Check { id: "V06a", requirement: "min <= start <= max, and nominal is not 0.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(ranges) },
+    Check { id: "V08a", requirement: "declaredType names a type definition of the same base type; every enumeration has one.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(types) },
+    Check { id: "V08b", requirement: "Type definitions have unique names; enumeration items have unique names and values.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(definitions) },
+    Check { id: "V09a", requirement: "Every unit is defined in UnitDefinitions, and every display unit belongs to its unit.", clause: "2.0.5, 2.2.2 and 2.2.7; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unit_names) },
+    Check { id: "V09b", requirement: "Unit names are unique, and display unit names are unique within their unit.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unique_units) },
+    Check { id: "V09c", requirement: "The base unit of a common unit has the exponents and factor that the name implies.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(bases) },
+    Check { id: "V09d", requirement: "A common display unit has the factor that its name implies (display = factor * value + offset).", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(displays) },
+    Check { id: "V10", requirement: "Only aliases of floating-point variables have a display unit, and it belongs to the unit of the variable.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(alias_units) },
+    Check { id: "V11", requirement: "Only continuous variables use intermediateUpdate, and only inputs use canHandleMultipleSetPerTimeInstant.", clause: "3.0.2, 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(flags) },
+    Check { id: "V13", requirement: "A dimension is a positive number or refers to a structural parameter or constant of type UInt64, and an array has one start value or as many as elements.", clause: "3.0.2, 2.4.7.2 and 2.4.7.5", levels: Levels(None, Some(Level::Must)), run: Run::File(arrays) },
+    Check { id: "V14", requirement: "Start values have the type of the variable and lie within the range of that type.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(start_value_types) },
+];
+
+/// A finding for each variable that the rule refuses.
+fn each(fmu: &FmuFile, rule: impl Fn(&ModelDescription, &ModelVariable) -> Option<String>) -> Verdict {
+    with_description(fmu, |d| {
+        let say = |v| rule(d, v).map(|why| format!("line {}: variable {}: {why}", v.line, v.name));
+        d.variables.iter().filter_map(say).collect()
+    })
+}
+
+fn names(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let mut seen: HashMap<&str, usize> = HashMap::new();
+        let mut findings = Vec::new();
+        for v in &d.variables {
+            for name in std::iter::once(v.name.as_str()).chain(v.aliases.iter().map(|a| a.name.as_str())) {
+                if name.trim().is_empty() || name.contains(['\n', '\r', '\t']) {
+                    findings.push(format!("line {}: the name {name:?} is empty or has control characters", v.line));
+                }
+                if let Some(first) = seen.insert(name, v.line) {
+                    findings.push(format!("line {}: the name {name:?} is already used in line {first}", v.line));
+                }
+            }
+        }
+        findings
+    })
+}
+
+fn structured(fmu: &FmuFile) -> Verdict {
+    if fmu.description.as_ref().is_ok_and(|d| !d.structured_names) {
+        return Verdict::NotApplicable("the naming convention is flat".into());
+    }
+    each(fmu, |_, v| {
+        let mut all = std::iter::once(&v.name).chain(v.aliases.iter().map(|a| &a.name));
+        all.find_map(|n| grammar(n).err().map(|why| format!("{n:?}: {why}")))
+    })
+}
+
+/// `name = identifier | "der(" identifier ["," order] ")"`, identifiers joined by dots, each with indices; FMI 2.0.5,
+/// 2.2.9. A part in single quotes may have anything, with backslash escapes.
+fn grammar(name: &str) -> Result<(), String> {
+    let inner = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
+    let body = match inner {
+        Some(inner) => match inner.rsplit_once(',') {
+            Some((body, order)) if order.trim().bytes().all(|b| b.is_ascii_digit()) => body,
+            _ => inner,
+        },
+        None => name,
+    };
+    let mut rest = body;
+    loop {
+        rest = part(rest)?;
+        match rest.strip_prefix('.') {
+            Some(next) => rest = next,
+            None if rest.is_empty() => return Ok(()),
+            None => return Err(format!("{rest:?} is unexpected")),
+        }
+    }
+}
+
+fn part(text: &str) -> Result<&str, String> {
+    let mut rest = if let Some(quoted) = text.strip_prefix('\'') {
+        let mut escaped = false;
+        let end = quoted.char_indices().find(|&(_, c)| {
+            let closes = c == '\'' && !escaped;
+            escaped = c == '\\' && !escaped;
+            closes
+        });
+        &quoted[end.ok_or("a quote is not closed")?.0 + 1..]
+    } else {
+        let letter = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let end = text.find(|c| !letter(c)).unwrap_or(text.len());
+        if end == 0 || text.starts_with(|c: char| c.is_ascii_digit()) {
+            return Err("a part does not start with a letter or an underscore".into());
+        }
+        &text[end..]
+    };
+    if let Some(indices) = rest.strip_prefix('[') {
+        let (inside, after) = indices.split_once(']').ok_or("a bracket is not closed")?;
+        let number = |i: &str| !i.trim().is_empty() && i.trim().bytes().all(|b| b.is_ascii_digit());
+        if !inside.split(',').all(number) {
+            return Err(format!("[{inside}] is not a list of indices"));
+        }
+        rest = after;
+    }
+    Ok(rest)
+}
+
+fn references(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let mut seen: HashMap<u32, &ModelVariable> = HashMap::new();
+        let mut findings = Vec::new();
+        for v in &d.variables {
+            if let Some(first) = seen.insert(v.value_reference, v) {
+                let (reference, name) = (v.value_reference, &first.name);
+                findings.push(format!(
+                    "line {}: variable {}: has the value reference {reference} of {name}",
+                    v.line, v.name
+                ));
+            }
+        }
+        findings
+    })
+}
+
+fn aliases(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let mut sets: HashMap<(BaseType, u32), Vec<&ModelVariable>> = HashMap::new();
+        for v in &d.variables {
+            // Enumerations are got and set as integers.
+            let base = if v.base == BaseType::Enumeration { BaseType::Int32 } else { v.base };
+            sets.entry((base, v.value_reference)).or_default().push(v);
+        }
+        let mut findings = Vec::new();
+        for set in sets.values().filter(|set| set.len() > 1) {
+            let list = set.iter().map(|v| v.name.as_str()).collect::<Vec<_>>().join(", ");
+            let mut wrong = |why: &str| findings.push(format!("line {}: the aliases {list}: {why}", set[0].line));
+            let settable = |v: &&&ModelVariable| matches!(v.causality, Causality::Input | Causality::Parameter);
+            if set.iter().filter(settable).count() > 1 {
+                wrong("more than one of them can be set");
+            }
+            let constants = set.iter().filter(|v| v.variability == Variability::Constant).count();
+            if constants != 0 && constants != set.len() {
+                wrong("some are constants and some are not");
+            }
+            if constants == 0 && set.iter().filter(|v| v.start.is_some()).count() > 1 {
+                wrong("more than one of them has a start value");
+            }
+            if constants > 0 && set.iter().any(|v| v.start != set[0].start) {
+                wrong("they are constants with different values");
+            }
+            if set.iter().any(|v| v.unit != set[0].unit) {
+                wrong("they have different units");
+            }
+        }
+        findings.sort();
+        findings
+    })
+}
+
+fn independent(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let all: Vec<_> = d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
+        let mut findings = Vec::new();
+        if all.len() > 1 || (all.is_empty() && d.version == FmiVersion::V3) {
+            findings.push(format!("there are {} independent variables", all.len()));
+        }
+        for v in all {
+            if !v.base.is_float() || v.variability != Variability::Continuous {
+                findings.push(format!("line {}: variable {}: is a {} {}", v.line, v.name, v.variability, v.base));
+            }
+            if v.start.is_some() || v.initial.is_some() {
+                findings.push(format!("line {}: variable {}: has a start value or initial", v.line, v.name));
+            }
+        }
+        findings
+    })
+}
+
+/// Whether the file leaves the variability to the default. FMI 2.0's is continuous whatever the type; for what is no
+/// Real that would never be legal, and everybody reads it as discrete.
+fn by_default(fmu: &FmuFile, v: &ModelVariable) -> bool {
+    let element = fmu
+        .root()
+        .and_then(|r| r.child("ModelVariables"))
+        .and_then(|list| list.children.iter().find(|e| e.line == v.line && e.get("name") == Some(&v.name)));
+    element.is_some_and(|e| e.get("variability").is_none())
+}
+
+fn variability(fmu: &FmuFile, v: &ModelVariable) -> Variability {
+    if fmu.version == FmiVersion::V2 && !v.base.is_float() && by_default(fmu, v) {
+        Variability::Discrete
+    } else {
+        v.variability
+    }
+}
+
+fn pairs(fmu: &FmuFile) -> Verdict {
+    use Causality as C;
+    use Variability as V;
+    each(fmu, |_, v| {
+        let variability = variability(fmu, v);
+        let legal = match v.causality {
+            C::StructuralParameter | C::Parameter | C::CalculatedParameter => {
+                matches!(variability, V::Fixed | V::Tunable)
+            }
+            C::Input => matches!(variability, V::Discrete | V::Continuous),
+            C::Output => matches!(variability, V::Constant | V::Discrete | V::Continuous),
+            C::Local => true,
+            C::Independent => variability == V::Continuous,
+        };
+        (!legal).then(|| format!("causality {} with variability {variability}", v.causality))
+    })
+}
+
+/// The values of `initial` that a pair allows; `None` where the attribute must be absent.
+fn allowed(version: FmiVersion, causality: Causality, variability: Variability) -> Option<&'static [Initial]> {
+    use Initial::{Approx, Calculated, Exact};
+    match (causality, variability) {
+        (Causality::Independent, _) => None,
+        (Causality::Input, _) if version == FmiVersion::V2 => None,
+        (Causality::Input | Causality::Parameter | Causality::StructuralParameter, _) | (_, Variability::Constant) => {
+            Some(&[Exact])
+        }
+        (Causality::CalculatedParameter, _) | (_, Variability::Fixed | Variability::Tunable) => {
+            Some(&[Calculated, Approx])
+        }
+        _ => Some(&[Calculated, Exact, Approx]),
+    }
+}
+
+fn initials(fmu: &FmuFile) -> Verdict {
+    each(fmu, |d, v| {
+        let initial = v.initial?;
+        match allowed(d.version, v.causality, variability(fmu, v)) {
+            None => Some(format!("initial={initial} with causality {}", v.causality)),
+            Some(set) if set.contains(&initial) => None,
+            Some(_) => {
+                Some(format!("initial={initial} with causality {} and variability {}", v.causality, v.variability))
+            }
+        }
+    })
+}
+
+fn starts(fmu: &FmuFile) -> Verdict {
+    each(fmu, |d, v| {
+        if v.base == BaseType::Clock || v.causality == Causality::Independent {
+            return None;
+        }
+        let input = v.causality == Causality::Input && d.version == FmiVersion::V2;
+        let initial = if input { Some(Initial::Exact) } else { v.initial_or_default() };
+        match (initial, v.start.is_some()) {
+            (Some(Initial::Exact | Initial::Approx), false) => Some(format!(
+                "there is no start value, required with causality {} and initial {}",
+                v.causality,
+                initial.map_or("none", Initial::as_str)
+            )),
+            (Some(Initial::Calculated), true) => {
+                Some("there is a start value, forbidden with initial calculated".into())
+            }
+            _ => None,
+        }
+    })
+}
+
+fn continuous(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, v| {
+        let bad = variability(fmu, v) == Variability::Continuous && !v.base.is_float();
+        bad.then(|| format!("is a continuous {}", v.base))
+    })
+}
+
+fn ranges(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, v| {
+        if v.min.zip(v.max).is_some_and(|(min, max)| min > max) {
+            return Some(format!("min = {} is greater than max = {}", v.min?, v.max?));
+        }
+        if v.nominal == Some(0.0) {
+            return Some("nominal is 0".into());
+        }
+        if matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Boolean | BaseType::Clock) {
+            return None;
+        }
+        let numbers = v.start.as_deref()?.split_whitespace().filter_map(parse_number);
+        let outside = |x: &f64| v.min.is_some_and(|min| *x < min) || v.max.is_some_and(|max| *x > max);
+        numbers.into_iter().find(outside).map(|x| format!("start = {x} is outside min and max"))
+    })
+}
+
+fn types(fmu: &FmuFile) -> Verdict {
+    each(fmu, |d, v| match &v.declared_type {
+        None => (v.base == BaseType::Enumeration).then(|| "is an enumeration without declaredType".into()),
+        Some(name) => match d.type_definition(name) {
+            None => Some(format!("there is no type {name:?}")),
+            Some(t) if t.base != v.base => Some(format!("is a {} but its type {name:?} is a {}", v.base, t.base)),
+            Some(_) => None,
+        },
+    })
+}
+
+fn definitions(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let mut findings = Vec::new();
+        for (i, t) in d.types.iter().enumerate() {
+            if d.types[..i].iter().any(|other| other.name == t.name) {
+                findings.push(format!("line {}: there is another type {:?}", t.line, t.name));
+            }
+            if d.version == FmiVersion::V2 && d.variables.iter().any(|v| v.name == t.name) {
+                findings.push(format!("line {}: type {:?} has the name of a variable", t.line, t.name));
+            }
+            for (j, item) in t.items.iter().enumerate() {
+                if t.items[..j].iter().any(|other| other.name == item.name || other.value == item.value) {
+                    findings.push(format!(
+                        "line {}: type {:?}: {} = {} occurs twice",
+                        t.line, t.name, item.name, item.value
+                    ));
+                }
+            }
+        }
+        findings
+    })
+}
+
+fn unit_names(fmu: &FmuFile) -> Verdict {
+    let wrong = |d: &ModelDescription, unit: Option<&str>, display: Option<&str>| match (unit, display) {
+        (None, Some(display)) => Some(format!("the display unit {display:?} comes without a unit")),
+        (Some(unit), display) => match (d.unit(unit), display) {
+            (None, _) => Some(format!("the unit {unit:?} is not defined")),
+            (Some(u), Some(display)) if u.display_unit(display).is_none() && display != unit => {
+                Some(format!("the unit {unit:?} has no display unit {display:?}"))
+            }
+            _ => None,
+        },
+        _ => None,
+    };
+    with_description(fmu, |d| {
+        let of_types = d.types.iter().filter_map(|t| {
+            let why = wrong(d, t.unit.as_deref(), t.display_unit.as_deref())?;
+            Some(format!("line {}: type {}: {why}", t.line, t.name))
+        });
+        let of_variables = d.variables.iter().filter_map(|v| {
+            let why = wrong(d, v.unit.as_deref(), v.display_unit.as_deref())?;
+            Some(format!("line {}: variable {}: {why}", v.line, v.name))
+        });
+        of_types.chain(of_variables).collect()
+    })
+}
+
+fn unique_units(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let mut findings = Vec::new();
+        for (i, unit) in d.units.iter().enumerate() {
+            if d.units[..i].iter().any(|u| u.name == unit.name) {
+                findings.push(format!("line {}: the unit {:?} occurs twice", unit.line, unit.name));
+            }
+            for (j, display) in unit.display_units.iter().enumerate() {
+                if unit.display_units[..j].iter().any(|u| u.name == display.name) {
+                    findings.push(format!("line {}: the display unit {:?} occurs twice", unit.line, display.name));
+                }
+            }
+        }
+        findings
+    })
+}
+
+fn bases(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, units::wrong_bases)
+}
+
+fn displays(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, units::wrong_displays)
+}
+
+fn flags(fmu: &FmuFile) -> Verdict {
+    let Some(list) = fmu.root().and_then(|r| r.child("ModelVariables")) else {
+        return Verdict::NotDetermined("the XML cannot be read".into());
+    };
+    with_description(fmu, |d| {
+        let mut findings = Vec::new();
+        for element in &list.children {
+            let on = |a: &str| element.get(a).is_some_and(|v| matches!(v.trim(), "true" | "1"));
+            let Some(v) =
+                d.variables.iter().find(|v| v.line == element.line && Some(v.name.as_str()) == element.get("name"))
+            else {
+                continue;
+            };
+            if on("intermediateUpdate") && (v.variability != Variability::Continuous || v.base == BaseType::Clock) {
+                findings.push(format!(
+                    "line {}: variable {}: has intermediateUpdate but is {}",
+                    v.line, v.name, v.variability
+                ));
+            }
+            if on("canHandleMultipleSetPerTimeInstant") && v.causality != Causality::Input {
+                findings.push(format!(
+                    "line {}: variable {}: has canHandleMultipleSetPerTimeInstant but is not an input",
+                    v.line, v.name
+                ));
+            }
+        }
+        findings
+    })
+}
+
+fn arrays(fmu: &FmuFile) -> Verdict {
+    each(fmu, |d, v| {
+        if v.dimensions.is_empty() {
+            let many = v.start.as_deref().is_some_and(|s| s.split_whitespace().count() > 1);
+            let text = matches!(v.base, BaseType::String | BaseType::Binary);
+            return (many && !text).then(|| "is a scalar with several start values".into());
+        }
+        let mut elements = 1_u64;
+        for dimension in &v.dimensions {
+            let extent = match dimension {
+                Dimension::Fixed(0) => return Some("has a dimension of 0".into()),
+                Dimension::Fixed(n) => *n,
+                Dimension::Variable(reference) => {
+                    let Some(size) = d.variables.iter().find(|s| s.value_reference == *reference) else {
+                        return Some(format!("its dimension refers to {reference}, which does not exist"));
+                    };
+                    let fits =
+                        size.causality == Causality::StructuralParameter || size.variability == Variability::Constant;
+                    if !fits || size.base != BaseType::UInt64 {
+                        return Some(format!(
+                            "its dimension {} is not a structural parameter or constant of type UInt64",
+                            size.name
+                        ));
+                    }
+                    size.start.as_deref().and_then(|s| s.trim().parse().ok()).unwrap_or(1)
+                }
+            };
+            elements = elements.saturating_mul(extent);
+        }
+        let text = matches!(v.base, BaseType::String | BaseType::Binary);
+        let given = if text { v.start_texts.len() } else { v.start.as_deref()?.split_whitespace().count() } as u64;
+        (given > 1 && given != elements).then(|| format!("has {given} start values for {elements} elements"))
+    })
+}
+
+fn start_value_types(fmu: &FmuFile) -> Verdict {
+    each(fmu, |_, v| {
+        let start = v.start.as_deref()?;
+        let (low, high): (i128, i128) = match v.base {
+            BaseType::Int8 => (i8::MIN.into(), i8::MAX.into()),
+            BaseType::UInt8 => (0, u8::MAX.into()),
+            BaseType::Int16 => (i16::MIN.into(), i16::MAX.into()),
+            BaseType::UInt16 => (0, u16::MAX.into()),
+            BaseType::Int32 => (i32::MIN.into(), i32::MAX.into()),
+            BaseType::UInt32 => (0, u32::MAX.into()),
+            BaseType::UInt64 => (0, u64::MAX.into()),
+            _ => (i64::MIN.into(), i64::MAX.into()),
+        };
+        let good = |word: &str| match v.base {
+            BaseType::Float32 | BaseType::Float64 => parse_number(word).is_some(),
+            BaseType::Boolean => ["true", "false", "0", "1"].contains(&word),
+            BaseType::String | BaseType::Clock => true,
+            BaseType::Binary => word.len().is_multiple_of(2) && word.bytes().all(|b| b.is_ascii_hexdigit()),
+            _ => word.parse::<i128>().is_ok_and(|x| (low..=high).contains(&x)),
+        };
+        if v.base == BaseType::String {
+            return None;
+        }
+        start
+            .split_whitespace()
+            .find(|w| !good(w))
+            .map(|w| format!("start={w:?} is not a value of the type {}", v.base))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_the_grammar() {
+        for good in ["a", "_x1", "a.b.c", "a[1].b[2,3]", "der(a.b)", "der(a,2)", "'any thing.'", "a.'it\\'s'.c"] {
+            assert_eq!(grammar(good), Ok(()), "{good}");
+        }
+        for bad in ["", "1a", "a b", "a.", ".a", "a[", "a[]", "a[x]", "a-b", "'open", "der(a"] {
+            assert!(grammar(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! modelDescription.xml: syntax, header, interface (FMI 2.0.5, 2.2.1, 2.2.5, 4.3.1; FMI 3.0.2, 2.4.1, 2.4.5, 4.3).
+
+use super::schema;
+use crate::check::{Check, Level, Levels, Run, Verdict};
+use crate::fmu_file::FmuFile;
+use model_description::{Element, FmiVersion, ModelDescription};
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "X01a", requirement: "modelDescription.xml is well-formed XML in UTF-8 and declares UTF-8 in its first line.", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(well_formed) },
+    Check { id: "X01b", requirement: "Elements and attributes are those of the standard, in its order and with values of its types; capability flags are spelled as in the standard.", clause: "2.0.5, 2.2 and 4.3.1; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(valid) },
+    Check { id: "X02a", requirement: "fmiVersion is 2.0 or 3.0, without a patch release.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::MUST, run: Run::File(version) },
+    Check { id: "X05", requirement: "generationDateAndTime has the form YYYY-MM-DDThh:mm:ssZ.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::SHOULD, run: Run::File(date) },
+    Check { id: "X06", requirement: "The attributes description, author, version, copyright, license and generationTool are given.", clause: "fmi-guides, 3", levels: Levels::SHOULD, run: Run::File(metadata) },
+    Check { id: "X08", requirement: "Every capability flag that requires another flag is accompanied by it.", clause: "2.0.5, 4.3.1; 3.0.2, 2.4.5 and 4.3", levels: Levels::MUST, run: Run::File(flags) },
+    Check { id: "X10", requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, and the tolerance is not negative.", clause: "2.0.5, 2.2.5; 3.0.2, 2.4.6", levels: Levels::SHOULD, run: Run::File(experiment) },
+    Check { id: "X11", requirement: "An FMU without model exchange does not use the attribute reinit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(reinit) },
+    Check { id: "X12", requirement: "Numbers are finite and spelled as xs:double.", clause: "2.0.5, 2.1.3", levels: Levels(Some(Level::Must), None), run: Run::File(numbers) },
+    Check { id: "G-L1a", requirement: "Log categories have unique names.", clause: "2.0.5, 2.2.4; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(categories) },
+];
+
+/// A check of the elements.
+fn with_root(fmu: &FmuFile, check: impl Fn(&Element) -> Vec<String>) -> Verdict {
+    match &fmu.tree {
+        Ok(root) => Verdict::of(check(root)),
+        Err(cause) => Verdict::NotDetermined(cause.clone()),
+    }
+}
+
+/// A check of the description.
+pub(super) fn with_description(fmu: &FmuFile, check: impl Fn(&ModelDescription) -> Vec<String>) -> Verdict {
+    match &fmu.description {
+        Ok(description) => Verdict::of(check(description)),
+        Err(cause) => Verdict::NotDetermined(cause.clone()),
+    }
+}
+
+/// Every element below one, and itself.
+pub(super) fn all(root: &Element) -> Vec<&Element> {
+    let (mut found, mut open) = (Vec::new(), vec![root]);
+    while let Some(element) = open.pop() {
+        found.push(element);
+        open.extend(element.children.iter().rev());
+    }
+    found
+}
+
+fn well_formed(fmu: &FmuFile) -> Verdict {
+    let mut findings: Vec<_> = fmu.tree.as_ref().err().cloned().into_iter().collect();
+    if fmu.xml.starts_with(b"\xef\xbb\xbf") {
+        findings.push("line 1: starts with a byte order mark".into());
+    }
+    let text = String::from_utf8_lossy(&fmu.xml);
+    let first = text.lines().next().unwrap_or_default().trim_start_matches('\u{feff}');
+    let declaration = first.split("?>").next().unwrap_or_default();
+    if !declaration.starts_with("<?xml ") {
+        findings.push("line 1: there is no XML declaration".into());
+    } else if !declaration.to_ascii_lowercase().contains("utf-8") {
+        findings.push(format!("line 1: {declaration}?> does not declare encoding=\"UTF-8\""));
+    }
+    Verdict::of(findings)
+}
+
+fn valid(fmu: &FmuFile) -> Verdict {
+    with_root(fmu, |root| {
+        let mut findings = schema::deviations(root, fmu.version);
+        // What an importer cannot read at all, and the rules do not know of.
+        if let (true, Err(cause)) = (findings.is_empty(), &fmu.description) {
+            // Another version is what X02a is about.
+            findings.extend((!cause.contains("fmiVersion")).then(|| cause.clone()));
+        }
+        findings
+    })
+}
+
+fn version(fmu: &FmuFile) -> Verdict {
+    with_root(fmu, |root| {
+        let found = root.get("fmiVersion").unwrap_or_default();
+        let good = found == fmu.version.to_string();
+        if good { Vec::new() } else { vec![format!("line {}: fmiVersion={found:?}", root.line)] }
+    })
+}
+
+fn date(fmu: &FmuFile) -> Verdict {
+    with_root(fmu, |root| {
+        let Some(found) = root.get("generationDateAndTime") else {
+            return vec![format!("line {}: there is no generationDateAndTime", root.line)];
+        };
+        let form = "dddd-dd-ddTdd:dd:ddZ";
+        let same = |(f, c): (char, char)| if f == 'd' { c.is_ascii_digit() } else { f == c };
+        let good = found.len() == form.len() && form.chars().zip(found.chars()).all(same);
+        if good { Vec::new() } else { vec![format!("line {}: generationDateAndTime={found:?}", root.line)] }
+    })
+}
+
+fn metadata(fmu: &FmuFile) -> Verdict {
+    with_root(fmu, |root| {
+        let missing = |a: &&&str| root.get(a).is_none_or(|v| v.trim().is_empty());
+        let names = ["description", "author", "version", "copyright", "license", "generationTool"];
+        names.iter().filter(missing).map(|a| format!("line {}: there is no {a}", root.line)).collect()
+    })
+}
+
+fn flags(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |description| {
+        let Some(i) = &description.co_simulation else { return vec!["the FMU has no co-simulation interface".into()] };
+        let mut findings = Vec::new();
+        let mut implies = |holds: bool, what: &str| {
+            if !holds {
+                findings.push(format!("line {}: {what}", i.line));
+            }
+        };
+        let state = i.can_get_and_set_state() || !i.can_serialize_state();
+        implies(state, "canSerializeFMUState requires canGetAndSetFMUState");
+        if description.version == FmiVersion::V3 {
+            let early = !i.flag("canReturnEarlyAfterIntermediateUpdate") || i.flag("providesIntermediateUpdate");
+            implies(early, "canReturnEarlyAfterIntermediateUpdate without providesIntermediateUpdate");
+            let clocked = description.variables.iter().any(|v| v.base == model_description::BaseType::Clock);
+            implies(!clocked || i.has_event_mode(), "there are clocks, but hasEventMode is false");
+        }
+        findings
+    })
+}
+
+fn experiment(fmu: &FmuFile) -> Verdict {
+    let Some(root) = fmu.root() else { return Verdict::NotDetermined("the XML cannot be read".into()) };
+    let Some(element) = root.child("DefaultExperiment") else {
+        return Verdict::NotApplicable("there is no default experiment".into());
+    };
+    with_description(fmu, |description| {
+        let x = description.default_experiment;
+        let (start, mut findings) = (x.start.unwrap_or(0.0), Vec::new());
+        let mut wrong = |bad: bool, text: String| {
+            if bad {
+                findings.push(format!("line {}: {text}", element.line));
+            }
+        };
+        if let Some(stop) = x.stop {
+            wrong(stop <= start, format!("stopTime = {stop} does not follow startTime = {start}"));
+            if let Some(step) = x.step {
+                wrong(step > stop - start && stop > start, format!("stepSize = {step} is longer than the experiment"));
+            }
+        }
+        wrong(x.step.is_some_and(|h| h <= 0.0), "stepSize is not positive".into());
+        wrong(x.tolerance.is_some_and(|t| t < 0.0), "tolerance is negative".into());
+        findings
+    })
+}
+
+fn reinit(fmu: &FmuFile) -> Verdict {
+    if fmu.root().is_some_and(|r| r.child("ModelExchange").is_some()) {
+        return Verdict::NotApplicable("there is a model exchange interface".into());
+    }
+    with_root(fmu, |root| {
+        let found = all(root).into_iter().filter(|e| e.get("reinit").is_some());
+        found.map(|e| format!("line {}: <{}> has an attribute reinit", e.line, e.name)).collect()
+    })
+}
+
+fn numbers(fmu: &FmuFile) -> Verdict {
+    let names =
+        ["start", "min", "max", "nominal", "factor", "offset", "startTime", "stopTime", "stepSize", "tolerance"];
+    with_root(fmu, |root| {
+        let numeric = |e: &&Element| e.name != "String";
+        let bad = |e: &Element, a: &str| {
+            let value = e.get(a)?.trim().to_ascii_lowercase();
+            (value.contains("inf") || value.contains("nan"))
+                .then(|| format!("line {}: {a}={:?}", e.line, e.get(a).unwrap_or_default()))
+        };
+        all(root).into_iter().filter(numeric).flat_map(|e| names.iter().filter_map(move |a| bad(e, a))).collect()
+    })
+}
+
+fn categories(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |description| {
+        let names: Vec<&str> = description.log_categories.iter().map(|c| c.name.as_str()).collect();
+        let mut findings = Vec::new();
+        for (i, name) in names.iter().enumerate() {
+            if names[..i].contains(name) {
+                findings.push(format!("the log category {name} occurs twice"));
+            }
+        }
+        findings
+    })
+}

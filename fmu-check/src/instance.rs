@@ -1,0 +1,260 @@
+//! An instance under test.
+
+use crate::encoding::show;
+use crate::session::{Blocked, Session};
+use fmu_import::Status;
+use fmu_import::raw::{Arguments, Buffer, Handle, Raw, SavedState, Simple};
+use model_description::{FmiVersion, ModelVariable};
+use std::cell::Cell;
+
+/// An instance. It is not freed by itself: that the FMU frees it well is a probe of its own.
+pub(super) struct Instance<'b> {
+    pub(super) session: &'b Session,
+    pub(super) handle: Handle,
+    event_mode: bool,
+    start: Cell<f64>,
+    stop: Cell<Option<f64>>,
+    /// Where the next step begins.
+    pub(super) time: Cell<f64>,
+}
+
+impl Session {
+    /// Instantiates; `None` for NULL.
+    pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<Instance<'_>>, Blocked> {
+        self.calling(&format!("{}({:?})", self.instantiation(), arguments.name.as_deref().unwrap_or_default()));
+        let handle = self.raw.instantiate(arguments).map_err(Blocked)?;
+        Ok(handle.map(|handle| Instance::new(self, handle, arguments.event_mode)))
+    }
+
+    /// Name of the function that makes instances for co-simulation.
+    pub(super) fn instantiation(&self) -> &'static str {
+        match self.description.version {
+            FmiVersion::V2 => "fmi2Instantiate",
+            FmiVersion::V3 => "fmi3InstantiateCoSimulation",
+        }
+    }
+
+    /// A new instance that works.
+    pub(super) fn fresh(&self) -> Result<Instance<'_>, Blocked> {
+        self.prepare(|| {
+            let made = self.instantiate(&self.arguments("probe"))?;
+            made.ok_or_else(|| Blocked(format!("{} returned NULL", self.instantiation())))
+        })
+    }
+
+    /// A new instance in initialization mode.
+    pub(super) fn initializing(&self) -> Result<Instance<'_>, Blocked> {
+        let instance = self.fresh()?;
+        self.prepare(|| instance.enter())?;
+        Ok(instance)
+    }
+
+    /// A new instance that is ready to step.
+    pub(super) fn stepping(&self) -> Result<Instance<'_>, Blocked> {
+        let instance = self.initializing()?;
+        self.prepare(|| instance.exit())?;
+        Ok(instance)
+    }
+}
+
+impl<'b> Instance<'b> {
+    fn new(session: &'b Session, handle: Handle, event_mode: bool) -> Self {
+        let (start, stop, time) = (Cell::new(session.start()), Cell::new(None), Cell::new(session.start()));
+        Self { session, handle, event_mode, start, stop, time }
+    }
+}
+
+impl Instance<'_> {
+    /// Calls a function that the FMU must have; notes it before.
+    pub(super) fn call(&self, call: &str, function: impl FnOnce(&Raw) -> Option<Status>) -> Result<Status, Blocked> {
+        let name = self.session.raw.name(call);
+        self.session.calling(&name);
+        let missing = || Blocked(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
+        function(&self.session.raw).ok_or_else(missing)
+    }
+
+    /// A function without arguments.
+    pub(super) fn simple(&self, name: Simple) -> Result<Status, Blocked> {
+        self.call(name.as_str(), |raw| raw.simple(name, self.handle))
+    }
+
+    fn must(&self, name: &str, status: Status) -> Result<(), Blocked> {
+        if status.is_ok() { Ok(()) } else { Err(Blocked(format!("{} returned {status}", self.session.raw.name(name)))) }
+    }
+
+    /// Sets the experiment's times, before [`enter`](Self::enter).
+    pub(super) fn experiment(&self, start: f64, stop: Option<f64>) {
+        self.start.set(start);
+        self.time.set(start);
+        self.stop.set(stop);
+    }
+
+    /// To initialization mode.
+    pub(super) fn enter(&self) -> Result<(), Blocked> {
+        let (start, stop) = (self.start.get(), self.stop.get());
+        let name = if self.session.description.version == FmiVersion::V2 {
+            "SetupExperiment"
+        } else {
+            "EnterInitializationMode"
+        };
+        let status = self.call(&format!("{name}(startTime={start}, stopTime={stop:?})"), |raw| {
+            raw.experiment(self.handle, None, start, stop)
+        })?;
+        self.must(name, status)?;
+        if self.session.description.version == FmiVersion::V2 {
+            self.must("EnterInitializationMode", self.simple(Simple::EnterInitializationMode)?)?;
+        }
+        Ok(())
+    }
+
+    /// From initialization mode to where steps are made.
+    pub(super) fn exit(&self) -> Result<(), Blocked> {
+        self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
+        if self.event_mode { self.events() } else { Ok(()) }
+    }
+
+    /// Through event mode, to step mode.
+    fn events(&self) -> Result<(), Blocked> {
+        for _ in 0..100 {
+            let mut again = false;
+            let status = self.call("UpdateDiscreteStates", |raw| {
+                let (status, more, _) = raw.update_discrete_states(self.handle)?;
+                again = more;
+                Some(status)
+            })?;
+            self.must("UpdateDiscreteStates", status)?;
+            if !again {
+                break;
+            }
+        }
+        self.must("EnterStepMode", self.simple(Simple::EnterStepMode)?)
+    }
+
+    /// A step, from where the last one ended.
+    pub(super) fn step(&self, h: f64) -> Result<Status, Blocked> {
+        let t = self.time.get();
+        let status = self.step_at(t, h)?;
+        if status.is_ok() {
+            self.time.set(t + h);
+        }
+        Ok(status)
+    }
+
+    /// A step from any time.
+    pub(super) fn step_at(&self, t: f64, h: f64) -> Result<Status, Blocked> {
+        let call = if self.session.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?})") };
+        let status = self.call(&call, |raw| raw.do_step(self.handle, t, h, false, [true; 4]).map(|(s, _)| s))?;
+        if self.event_mode && status.is_ok() {
+            self.must("EnterEventMode", self.simple(Simple::EnterEventMode)?)?;
+            self.events()?;
+        }
+        Ok(status)
+    }
+
+    /// Steps that must succeed.
+    pub(super) fn steps(&self, n: usize, h: f64) -> Result<(), Blocked> {
+        for _ in 0..n {
+            self.must("DoStep", self.step(h)?)?;
+        }
+        Ok(())
+    }
+
+    /// A variable's values.
+    pub(super) fn get(&self, v: &ModelVariable) -> Result<(Status, Vec<u64>), Blocked> {
+        let n = self.session.elements(v);
+        let mut buffer = Buffer::room(v.base, self.session.description.version, n);
+        let status = self.call(&format!("Get({})", v.name), |raw| {
+            raw.get(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), n)
+        })?;
+        if !buffer.intact() {
+            return Err(Blocked(format!("getting {} wrote past its {n} values", v.name)));
+        }
+        Ok((status, buffer.bits()))
+    }
+
+    /// Sets a variable's values.
+    pub(super) fn set(&self, v: &ModelVariable, values: &[u64]) -> Result<Status, Blocked> {
+        let mut buffer = Buffer::of(v.base, self.session.description.version, values);
+        let call = format!("Set({} = {})", v.name, show(v, self.session.description.version, values));
+        self.call(&call, |raw| {
+            raw.set(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), values.len())
+        })
+    }
+
+    /// The values of several variables; those that cannot be read are left out.
+    pub(super) fn snapshot(&self, variables: &[&ModelVariable]) -> Result<Vec<Vec<u64>>, Blocked> {
+        let read =
+            |v: &&ModelVariable| self.get(v).map(|(status, bits)| if status.is_ok() { bits } else { Vec::new() });
+        variables.iter().map(read).collect()
+    }
+
+    /// Steps `n` times and tells all watched variables after each: the trajectory.
+    pub(super) fn run(&self, n: usize, h: f64) -> Result<Vec<Vec<Vec<u64>>>, Blocked> {
+        let watched = self.session.watched();
+        self.session.many(
+            &format!("{n} steps of {h} from {}, each followed by getting all outputs", self.time.get()),
+            || {
+                (0..n)
+                    .map(|_| {
+                        self.steps(1, h)?;
+                        self.snapshot(&watched)
+                    })
+                    .collect()
+            },
+        )
+    }
+
+    /// Moves every input that is a number, a bit; the standard allows it between steps.
+    pub(super) fn change_inputs(&self, k: u32) -> Result<(), Blocked> {
+        for v in self.session.float_inputs() {
+            if let Some(values) = self.session.different_value(v, f64::from(k % 5)) {
+                let _ = self.set(v, &values)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Saves the state.
+    pub(super) fn save(&self) -> Result<SavedState, Blocked> {
+        let mut state = SavedState::NULL;
+        let status = self.call("GetFMUState", |raw| raw.get_state(self.handle, Some(&mut state)))?;
+        self.must("GetFMUState", status)?;
+        Ok(state)
+    }
+
+    /// Goes back to a saved state, which was saved at this time.
+    pub(super) fn restore(&self, state: SavedState, time: f64) -> Result<(), Blocked> {
+        let status = self.call("SetFMUState", |raw| raw.set_state(self.handle, state))?;
+        self.must("SetFMUState", status)?;
+        self.time.set(time);
+        Ok(())
+    }
+
+    /// A saved state as bytes.
+    pub(super) fn serialize(&self, state: SavedState) -> Result<Vec<u8>, Blocked> {
+        let mut size = 0;
+        let status = self.call("SerializedFMUStateSize", |raw| {
+            let (status, n) = raw.state_size(self.handle, state)?;
+            size = n;
+            Some(status)
+        })?;
+        self.must("SerializedFMUStateSize", status)?;
+        let mut out = (Vec::new(), true);
+        let status = self.call(&format!("SerializeFMUState(size={size})"), |raw| {
+            let (status, bytes, intact) = raw.serialize(self.handle, state, size)?;
+            out = (bytes, intact);
+            Some(status)
+        })?;
+        self.must("SerializeFMUState", status)?;
+        if !out.1 {
+            return Err(Blocked(format!("SerializeFMUState wrote past its {size} bytes")));
+        }
+        Ok(out.0)
+    }
+
+    /// Frees the instance.
+    pub(super) fn free(self) -> Result<(), Blocked> {
+        self.session.calling(&self.session.raw.name("FreeInstance"));
+        self.session.raw.free(self.handle).ok_or_else(|| Blocked("the function FreeInstance is missing".into()))
+    }
+}

@@ -1,0 +1,258 @@
+//! Runs the probes: each check of the binary in a process of its own with a timeout, all cores at work.
+//!
+//! The parent starts the same program with the hidden command `probe`. The child appends its findings to a file, line by line,
+//! and writes the call that it is about to make to another file. When the child dies, the parent knows what was found and which
+//! call ended it. A probe with several cases is restarted after the case that ended it.
+
+use crate::check::{Check, Options, Run, Verdict};
+use crate::checks::GROUPS;
+use crate::fmu_file::FmuFile;
+use crate::session::Line;
+use std::collections::VecDeque;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Time that a probe may take.
+const TIMEOUT: Duration = Duration::from_secs(10);
+/// Checks that say what is wrong when not even a plain life goes through.
+const WITHOUT_MINIMAL_RUN: [&str; 3] = ["B00", "L00", "X02b"];
+/// Most restarts of a probe whose cases kill it.
+const MAX_RESTARTS: usize = 12;
+
+/// The verdicts of checks, in their order.
+pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Vec<Verdict> {
+    let verdicts: Vec<Mutex<Option<Verdict>>> = checks.iter().map(|_| Mutex::new(None)).collect();
+    let mut queue = VecDeque::new();
+    for (check, verdict) in checks.iter().zip(&verdicts) {
+        match check.run {
+            Run::File(check_file) => store(verdict, check_file(fmu)),
+            Run::Probe(_) | Run::Silent(_) | Run::Twice(_) => queue.push_back((*check, verdict)),
+        }
+    }
+    let runner = Runner::new(fmu, options);
+    let why_no_run_succeeds = if queue.is_empty() { None } else { why_no_run_succeeds(&runner) };
+    let queue = Mutex::new(queue);
+    let workers = std::thread::available_parallelism().map_or(2, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                while let Some((check, verdict)) = take(&queue) {
+                    let found = match (&runner, &why_no_run_succeeds) {
+                        (Err(cause), _) => Verdict::NotDetermined(cause.clone()),
+                        (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => {
+                            Verdict::NotDetermined(cause.clone())
+                        }
+                        (Ok(runner), _) => runner.run(check),
+                    };
+                    store(verdict, found);
+                }
+            });
+        }
+    });
+    let lost = || Verdict::NotDetermined("the probe did not report a result".into());
+    verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect()
+}
+
+/// Why all other probes are in vain: not even a plain life goes through.
+fn why_no_run_succeeds(runner: &Result<Runner, String>) -> Option<String> {
+    let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == "L00")?;
+    match runner.as_ref().ok()?.run(check) {
+        Verdict::Violated(found) => {
+            Some(format!("a minimal run fails (L00): {}", found.first().map_or("", String::as_str)))
+        }
+        Verdict::NotDetermined(why) => Some(why),
+        _ => None,
+    }
+}
+
+fn take<T>(queue: &Mutex<VecDeque<T>>) -> Option<T> {
+    queue.lock().ok()?.pop_front()
+}
+
+fn store(place: &Mutex<Option<Verdict>>, verdict: Verdict) {
+    if let Ok(mut place) = place.lock() {
+        *place = Some(verdict);
+    }
+}
+
+/// What is the same for all probes of a subject.
+struct Runner {
+    program: PathBuf,
+    dir: PathBuf,
+    binary: PathBuf,
+    timeout: Duration,
+}
+
+/// How a child ended.
+enum Outcome {
+    Exit(ExitStatus),
+    TimedOut,
+}
+
+impl Runner {
+    fn new(fmu: &FmuFile, options: &Options) -> Result<Self, String> {
+        let binary = fmu.host_binary()?;
+        let program = options.program.clone().map_or_else(std::env::current_exe, Ok).map_err(|e| e.to_string())?;
+        Ok(Self {
+            program,
+            dir: fmu.dir().to_owned(),
+            binary: fmu.dir().join(&binary.name),
+            timeout: options.timeout.unwrap_or(TIMEOUT),
+        })
+    }
+
+    fn run(&self, check: &Check) -> Verdict {
+        let run = || {
+            self.attempt(check)
+                .unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be started: {e}")))
+        };
+        let verdict = run();
+        if !matches!((check.run, &verdict), (Run::Twice(_), Verdict::Pass(_))) {
+            return verdict;
+        }
+        match (verdict, run()) {
+            (Verdict::Pass(first), Verdict::Pass(second)) if first != second => Verdict::Violated(vec![
+                format!("first process: {}", first.join(", ")),
+                format!("second process: {}", second.join(", ")),
+            ]),
+            (_, second) => second,
+        }
+    }
+
+    fn attempt(&self, check: &Check) -> std::io::Result<Verdict> {
+        let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
+        let (out, working_directory) = (folder.path().join("out"), folder.path().join("home"));
+        fs::create_dir(&working_directory)?;
+        let mut crashes = Vec::new();
+        let mut from = 0;
+        let began = Instant::now();
+        loop {
+            let end = self.child(check, folder.path(), from)?;
+            let lines = read(&out);
+            if lines.iter().any(|l| matches!(l, Line::Done)) {
+                break;
+            }
+            let last_call = fs::read_to_string(out.with_extension("call")).unwrap_or_default();
+            crashes.push((end.describe(self.timeout), last_call.trim().to_owned()));
+            let last = lines.iter().rev().find_map(|l| if let Line::Case(n) = l { Some(*n) } else { None });
+            match last {
+                // Not twice at the same place, not for ever.
+                Some(n) if crashes.len() <= MAX_RESTARTS && began.elapsed() < 2 * self.timeout => from = n + 1,
+                _ => break,
+            }
+        }
+        let mut verdict = verdict_of(check.id, read(&out), crashes);
+        if matches!(check.run, Run::Silent(_)) && matches!(verdict, Verdict::Pass(_)) {
+            let side_effects = side_effects(folder.path(), &working_directory);
+            if !side_effects.is_empty() {
+                verdict = Verdict::Violated(side_effects);
+            }
+        }
+        Ok(verdict)
+    }
+
+    fn child(&self, check: &Check, folder: &Path, from: usize) -> std::io::Result<Outcome> {
+        let console = File::options().create(true).append(true).open(folder.join("console"))?;
+        let mut child = Command::new(&self.program)
+            .args(["probe", "--id", check.id, "--from", &from.to_string()])
+            .args(["--seconds", &self.timeout.as_secs_f64().to_string()])
+            .arg("--dir")
+            .arg(&self.dir)
+            .arg("--binary")
+            .arg(&self.binary)
+            .arg("--out")
+            .arg(folder.join("out"))
+            .current_dir(folder.join("home"))
+            .stdin(Stdio::null())
+            .stdout(console.try_clone()?)
+            .stderr(console)
+            .spawn()?;
+        let began = Instant::now();
+        loop {
+            if let Some(status) = child.try_wait()? {
+                return Ok(Outcome::Exit(status));
+            }
+            if began.elapsed() > self.timeout {
+                child.kill()?;
+                child.wait()?;
+                return Ok(Outcome::TimedOut);
+            }
+            let pause = if began.elapsed() < Duration::from_millis(50) { 1 } else { 5 };
+            std::thread::sleep(Duration::from_millis(pause));
+        }
+    }
+}
+
+impl Outcome {
+    fn describe(&self, timeout: Duration) -> String {
+        match self {
+            Self::TimedOut => format!("did not return within {} s", timeout.as_secs_f64()),
+            Self::Exit(status) => {
+                #[cfg(unix)]
+                if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(status) {
+                    let name = match signal {
+                        4 => " (illegal instruction)",
+                        6 => " (abort)",
+                        7 | 11 => " (invalid memory access)",
+                        8 => " (arithmetic exception)",
+                        _ => "",
+                    };
+                    return format!("ended the process with signal {signal}{name}");
+                }
+                format!("ended the process ({status})")
+            }
+        }
+    }
+}
+
+fn read(out: &Path) -> Vec<Line> {
+    let text = fs::read_to_string(out).unwrap_or_default();
+    text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+}
+
+/// What the process said or left, although nobody asked it to.
+fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
+    let console = fs::read(folder.join("console")).unwrap_or_default();
+    let console = String::from_utf8_lossy(&console);
+    let mut findings: Vec<_> = console.lines().take(5).map(|l| format!("wrote to the console: {l}")).collect();
+    let files = fs::read_dir(working_directory).into_iter().flatten().flatten().take(5);
+    findings
+        .extend(files.map(|f| format!("created a file in the working directory: {}", f.file_name().to_string_lossy())));
+    findings
+}
+
+/// A verdict of what was written and of how often the process died.
+fn verdict_of(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>) -> Verdict {
+    let (mut violated, mut notes, mut blocked, mut not_applicable) = (Vec::new(), Vec::new(), None, None);
+    for line in lines {
+        match line {
+            Line::Violated(text) => violated.push(text),
+            Line::Note(text) => notes.push(text),
+            Line::Blocked(why) => blocked = blocked.or(Some(why)),
+            Line::NotApplicable(why) => not_applicable = not_applicable.or(Some(why)),
+            Line::Case(_) | Line::Done => {}
+        }
+    }
+    for (how, call) in crashes {
+        if let Some(call) = call.strip_prefix("C ") {
+            violated.push(format!("{call} {how}"));
+            continue;
+        }
+        // Before the probe proper: another check tells of it.
+        let call = call.strip_prefix("P ").unwrap_or("the start");
+        if id == "B00" || (id == "L00" && !call.starts_with("loading")) {
+            violated.push(format!("{call} {how}"));
+        } else {
+            blocked = blocked.or(Some(format!("{call} {how}, before the probe began")));
+        }
+    }
+    match (violated.is_empty(), blocked, not_applicable) {
+        (false, ..) => Verdict::Violated(violated),
+        (_, Some(why), _) => Verdict::NotDetermined(why),
+        (_, _, Some(why)) => Verdict::NotApplicable(why),
+        _ => Verdict::Pass(notes),
+    }
+}

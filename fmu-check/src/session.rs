@@ -1,0 +1,366 @@
+//! The probe's side: one FMU, loaded into a process of its own, and what is found out about it.
+//!
+//! Everything that is found is written down at once, and every call before it is made, so that nothing is lost when the
+//! FMU takes the process down. `Err(Blocked)` ends a probe that cannot find out what it wants.
+
+use crate::encoding::bits;
+use clap::Args;
+use fmu_import::file_uri;
+use fmu_import::raw::{Arguments, Interface, Raw};
+use model_description::{
+    BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, ModelVariable, Variability,
+};
+use serde::{Deserialize, Serialize};
+use std::cell::{Cell, RefCell};
+use std::ffi::CString;
+use std::fs::File;
+use std::io::{Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Why something cannot be found out.
+#[derive(Debug)]
+pub(super) struct Blocked(pub(super) String);
+
+/// One line of what a probe writes down.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Line {
+    /// A case begins, by number.
+    Case(usize),
+    /// A violation.
+    Violated(String),
+    /// Something worth telling of a pass.
+    Note(String),
+    /// The requirement is not about this FMU.
+    NotApplicable(String),
+    /// It could not be found out.
+    Blocked(String),
+    /// The probe came to its end.
+    Done,
+}
+
+/// Runs one probe. Only the checker calls it.
+#[derive(Debug, Args)]
+pub struct ProbeArguments {
+    /// Id of the check.
+    #[arg(long)]
+    pub id: String,
+    /// Folder that the FMU was unpacked to.
+    #[arg(long)]
+    pub dir: PathBuf,
+    /// The binary.
+    #[arg(long)]
+    pub binary: PathBuf,
+    /// File that the findings go to.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Number of the first case.
+    #[arg(long, default_value_t = 0)]
+    pub from: usize,
+    /// Time that it may take, in seconds.
+    #[arg(long, default_value_t = 10.0)]
+    pub seconds: f64,
+}
+
+/// A probe's FMU.
+pub(super) struct Session {
+    pub(super) raw: Raw,
+    pub(super) description: ModelDescription,
+    /// Path of the binary.
+    pub(super) binary: PathBuf,
+    /// Folder that the FMU was unpacked to.
+    pub(super) dir: PathBuf,
+    lines: RefCell<File>,
+    journal: RefCell<File>,
+    preparing: Cell<bool>,
+    pub(super) silent: Cell<bool>,
+    from: usize,
+    next: Cell<usize>,
+    violations: Cell<usize>,
+    instances_made: Cell<usize>,
+    began: Instant,
+    timeout: Duration,
+}
+
+/// Most violations that one probe tells.
+const MAX_VIOLATIONS: usize = 25;
+
+impl Session {
+    /// Loads the FMU.
+    pub(super) fn open(args: &ProbeArguments) -> Result<Self, Blocked> {
+        let blocked = |e: &dyn std::fmt::Display| Blocked(e.to_string());
+        let xml = std::fs::read(args.dir.join("modelDescription.xml")).map_err(|e| blocked(&e))?;
+        let description = model_description::read(&xml).map_err(|e| blocked(&e))?;
+        let create = |path: &Path| File::options().create(true).append(true).open(path).map_err(|e| blocked(&e));
+        let lines = create(&args.out)?;
+        let mut journal = File::create(args.out.with_extension("call")).map_err(|e| blocked(&e))?;
+        let _ = journal.write_all(b"P loading the binary");
+        let raw = Raw::open(&args.binary, description.version)
+            .map_err(|e| Blocked(format!("the binary does not load: {e}")))?;
+        Ok(Self {
+            raw,
+            description,
+            binary: args.binary.clone(),
+            dir: args.dir.clone(),
+            lines: RefCell::new(lines),
+            journal: RefCell::new(journal),
+            preparing: Cell::new(false),
+            silent: Cell::new(false),
+            from: args.from,
+            next: Cell::new(0),
+            violations: Cell::new(0),
+            instances_made: Cell::new(0),
+            began: Instant::now(),
+            timeout: Duration::from_secs_f64(args.seconds),
+        })
+    }
+
+    /// The same FMU once more, for another thread.
+    pub(super) fn duplicate(&self, number: usize) -> Result<Self, Blocked> {
+        let raw = Raw::open(&self.binary, self.description.version).map_err(Blocked)?;
+        self.duplicate_with(raw, number)
+    }
+
+    /// The same FMU with another loaded binary; what it finds and calls goes to files that nobody reads.
+    pub(super) fn duplicate_with(&self, raw: Raw, number: usize) -> Result<Self, Blocked> {
+        self.duplicate_at(&self.dir, raw, number)
+    }
+
+    /// The same, unpacked to another folder.
+    pub(super) fn duplicate_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, Blocked> {
+        let scratch = || tempfile::tempfile().map_err(|e| Blocked(e.to_string()));
+        Ok(Self {
+            raw,
+            description: self.description.clone(),
+            binary: self.binary.clone(),
+            dir: dir.into(),
+            lines: RefCell::new(scratch()?),
+            journal: RefCell::new(scratch()?),
+            preparing: Cell::new(false),
+            silent: Cell::new(true),
+            from: 0,
+            next: Cell::new(0),
+            violations: Cell::new(0),
+            instances_made: Cell::new(1000 * (number + 1)),
+            began: self.began,
+            timeout: self.timeout,
+        })
+    }
+
+    /// Tells instances from now on that the FMU was unpacked to another folder.
+    pub(super) fn move_to(&mut self, dir: &Path) {
+        dir.clone_into(&mut self.dir);
+    }
+
+    /// Where the FMU's resources are, if it has any.
+    pub(super) fn resources(&self) -> PathBuf {
+        self.dir.join("resources")
+    }
+
+    /// Writes a line down.
+    pub(super) fn write(&self, line: &Line) {
+        if let Ok(text) = serde_json::to_string(line) {
+            let _ = writeln!(self.lines.borrow_mut(), "{text}");
+        }
+    }
+
+    /// Tells a violation.
+    pub(super) fn violated(&self, text: impl Into<String>) {
+        self.violations.set(self.violations.get() + 1);
+        if self.violations.get() <= MAX_VIOLATIONS {
+            self.write(&Line::Violated(text.into()));
+        }
+    }
+
+    /// Tells a violation unless it holds.
+    pub(super) fn require(&self, holds: bool, text: impl FnOnce() -> String) {
+        if !holds {
+            self.violated(text());
+        }
+    }
+
+    /// Tells something worth knowing.
+    pub(super) fn note(&self, text: impl Into<String>) {
+        self.write(&Line::Note(text.into()));
+    }
+
+    /// Reports that the requirement does not apply to this FMU, as the result of the probe.
+    #[expect(clippy::unnecessary_wraps, reason = "probes return it")]
+    pub(super) fn not_applicable(&self, reason: impl Into<String>) -> Result<(), Blocked> {
+        self.write(&Line::NotApplicable(reason.into()));
+        Ok(())
+    }
+
+    /// A part of a probe that stands alone: after a crash the probe goes on with the next.
+    pub(super) fn case(&self, case: impl FnOnce() -> Result<(), Blocked>) {
+        let number = self.next.get();
+        self.next.set(number + 1);
+        if number < self.from {
+            return;
+        }
+        self.write(&Line::Case(number));
+        if let Err(Blocked(why)) = case() {
+            self.write(&Line::Blocked(why));
+        }
+    }
+
+    /// Whether half of the time is used up; loops end then.
+    pub(super) fn half_time_used(&self) -> bool {
+        self.began.elapsed() > self.timeout / 2
+    }
+
+    /// Notes the call that comes next.
+    pub(super) fn calling(&self, call: &str) {
+        if self.silent.get() {
+            return;
+        }
+        let mut journal = self.journal.borrow_mut();
+        let mark = if self.preparing.get() { "P" } else { "C" };
+        let _ = journal.seek(SeekFrom::Start(0));
+        let _ = journal.write_all(format!("{mark} {call}\n").as_bytes());
+        let end = journal.stream_position().unwrap_or(0);
+        let _ = journal.set_len(end);
+    }
+
+    /// Makes calls without noting each; the journal tells this instead.
+    pub(super) fn many<T>(&self, what: &str, work: impl FnOnce() -> T) -> T {
+        self.calling(what);
+        let before = self.silent.replace(true);
+        let result = work();
+        self.silent.set(before);
+        result
+    }
+
+    pub(super) fn prepare<T>(&self, work: impl FnOnce() -> Result<T, Blocked>) -> Result<T, Blocked> {
+        let before = self.preparing.replace(true);
+        let result = work();
+        self.preparing.set(before);
+        self.calling("(between two calls)");
+        result
+    }
+
+    /// Good arguments for an instantiation.
+    pub(super) fn arguments(&self, name: &str) -> Arguments {
+        let text = |text: &str| CString::new(text).unwrap_or_default();
+        let resources = self.resources();
+        let resources = match self.description.version {
+            FmiVersion::V2 => file_uri(&resources),
+            FmiVersion::V3 => format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR),
+        };
+        self.instances_made.set(self.instances_made.get() + 1);
+        let clocks = self.description.variables.iter().any(|v| v.base == BaseType::Clock);
+        Arguments {
+            name: Some(text(name)),
+            token: Some(text(&self.description.token)),
+            resources: Some(text(&resources)),
+            interface: Interface::CoSimulation,
+            logger: true,
+            callbacks: true,
+            memory: true,
+            lasting: true,
+            logging: false,
+            event_mode: clocks,
+            environment: 0x5000 + 0x10 * self.instances_made.get(),
+        }
+    }
+
+    /// Start time of the default experiment.
+    pub(super) fn start(&self) -> f64 {
+        self.description.default_experiment.start.filter(|t| t.is_finite()).unwrap_or(0.0)
+    }
+
+    /// A communication step that should suit.
+    pub(super) fn h(&self) -> f64 {
+        let x = self.description.default_experiment;
+        let fixed = self
+            .description
+            .co_simulation
+            .as_ref()
+            .and_then(|c| c.attribute("fixedInternalStepSize")?.trim().parse().ok());
+        let good = |h: &f64| h.is_finite() && *h > 0.0;
+        let span = x.stop.map(|stop| (stop - self.start()) / 100.0);
+        x.step.filter(good).or(fixed.filter(good)).or(span.filter(good)).unwrap_or(0.01)
+    }
+
+    /// Whether the archive has resources.
+    pub(super) fn has_resources(&self) -> bool {
+        std::fs::read_dir(self.resources()).is_ok_and(|mut files| files.next().is_some())
+    }
+
+    /// A capability.
+    pub(super) fn flag(&self, name: &str) -> bool {
+        self.description.co_simulation.as_ref().is_some_and(|c| c.flag(name))
+    }
+
+    /// Variables whose values are numbers, which all probes can compare.
+    pub(super) fn numeric(&self) -> impl Iterator<Item = &ModelVariable> {
+        self.description
+            .variables
+            .iter()
+            .filter(|v| !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock))
+    }
+
+    /// The numeric outputs, or all numeric variables where there are none.
+    pub(super) fn watched(&self) -> Vec<&ModelVariable> {
+        let outputs: Vec<_> =
+            self.numeric().filter(|v| v.causality == Causality::Output && v.clocks.is_empty()).collect();
+        if outputs.is_empty() { self.numeric().filter(|v| v.clocks.is_empty()).collect() } else { outputs }
+    }
+
+    /// Inputs that are floating-point numbers.
+    pub(super) fn float_inputs(&self) -> Vec<&ModelVariable> {
+        let fits = |v: &&ModelVariable| v.causality == Causality::Input && v.base.is_float() && v.clocks.is_empty();
+        self.description.variables.iter().filter(fits).collect()
+    }
+
+    /// Number of elements of a variable.
+    pub(super) fn elements(&self, v: &ModelVariable) -> usize {
+        let extent = |d: &Dimension| match d {
+            Dimension::Fixed(n) => usize::try_from(*n).unwrap_or(1),
+            Dimension::Variable(r) => {
+                let size = self.description.variables.iter().find(|s| s.value_reference == *r);
+                size.and_then(|s| s.start.as_deref()?.trim().parse().ok()).unwrap_or(1)
+            }
+        };
+        v.dimensions.iter().map(extent).product()
+    }
+
+    /// A value near the start value, within the range, that differs from it.
+    pub(super) fn different_value(&self, v: &ModelVariable, scale: f64) -> Option<Vec<u64>> {
+        let n = self.elements(v);
+        if v.base == BaseType::Boolean {
+            let on = v.start.as_deref().is_some_and(|s| matches!(s.trim(), "true" | "1"));
+            return Some(vec![u64::from(!on); n]);
+        }
+        let first = v.start.as_deref().and_then(|s| s.split_whitespace().next());
+        let start: f64 = first.and_then(model_description::parse_number).unwrap_or(0.0);
+        let (min, max) = (v.min.unwrap_or(f64::NEG_INFINITY), v.max.unwrap_or(f64::INFINITY));
+        let nominal = v.nominal.unwrap_or(1.0).abs();
+        if v.base.is_float() {
+            let step = if start == 0.0 { 0.01 * nominal } else { 0.01 * start.abs() } * scale;
+            let value =
+                [start + step, start - step].into_iter().find(|x| (min..=max).contains(x) && *x > min && *x < max)?;
+            return Some(vec![bits(v.base, value); n]);
+        }
+        if v.base == BaseType::Enumeration {
+            let items = &self.description.type_definition(v.declared_type.as_deref()?)?.items;
+            let other = items.iter().map(|i| i.value).find(|i| first != Some(i.to_string().as_str()))?;
+            return Some(vec![other.cast_unsigned(); n]);
+        }
+        let value = [start + 1.0, start - 1.0].into_iter().find(|x| (min..=max).contains(x) && *x >= 0.0)?;
+        Some(vec![bits(v.base, value); n])
+    }
+}
+
+/// Whether a variable can be set before initialization mode ends.
+pub(super) fn settable(v: &ModelVariable) -> bool {
+    v.variability != Variability::Constant
+        && v.causality != Causality::Independent
+        && v.clocks.is_empty()
+        && match v.causality {
+            Causality::Input | Causality::Parameter => true,
+            Causality::StructuralParameter | Causality::CalculatedParameter => false,
+            _ => v.initial_or_default() == Some(Initial::Exact),
+        }
+}

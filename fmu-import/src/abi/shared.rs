@@ -1,0 +1,163 @@
+//! What both standards share: functions with one C type, and an instance that calls them.
+
+use super::signatures::{
+    Deserialize, FreeInstance, InstancePointer, OfInstance, Serialize, SetState, StatePlace, StatePointer, StateSize,
+};
+use crate::standard::{Outcome, Refusal, judge};
+use libloading::Library;
+use model_description::FmiVersion;
+use std::ptr;
+use std::sync::Arc;
+
+/// A function with its full name; `None` if the library does not have it.
+struct Function<T> {
+    name: &'static str,
+    pointer: Option<T>,
+}
+
+impl<T: Copy> Function<T> {
+    fn get(&self) -> Outcome<T> {
+        self.pointer.ok_or_else(|| missing(self.name))
+    }
+
+    fn required(self) -> Result<Self, String> {
+        if self.pointer.is_some() { Ok(self) } else { Err(format!("the function {} is missing", self.name)) }
+    }
+}
+
+/// The refusal of a call whose function the library does not have.
+pub(super) fn missing(name: &str) -> Refusal {
+    Refusal::Impossible(format!("the function {name} is missing"))
+}
+
+/// Functions that have one C type in both standards. An FMU may omit those of saved states.
+pub(super) struct SharedFunctions {
+    free: Function<FreeInstance>,
+    exit_initialization: Function<OfInstance>,
+    terminate: Function<OfInstance>,
+    reset: Function<OfInstance>,
+    get_state: Function<StatePlace>,
+    set_state: Function<SetState>,
+    free_state: Function<StatePlace>,
+    state_size: Function<StateSize>,
+    serialize: Function<Serialize>,
+    deserialize: Function<Deserialize>,
+}
+
+impl SharedFunctions {
+    /// Finds the functions; names the first missing one that no FMU may omit.
+    ///
+    /// # Safety
+    /// Where the library has these symbols, they are functions of the standard's types. The struct is not used after the
+    /// library is closed.
+    pub(super) unsafe fn load(library: &Library, version: FmiVersion) -> Result<Self, String> {
+        /// # Safety
+        /// As for `load`.
+        unsafe fn find<T: Copy>(library: &Library, version: FmiVersion, names: [&'static str; 2]) -> Function<T> {
+            let name = names[usize::from(version == FmiVersion::V3)];
+            // SAFETY: the caller promises the type.
+            Function { name, pointer: unsafe { library.get::<T>(name) }.ok().map(|symbol| *symbol) }
+        }
+        // SAFETY: each name comes with the type that both standards give it.
+        unsafe {
+            let (l, v) = (library, version);
+            Ok(Self {
+                free: find(l, v, ["fmi2FreeInstance", "fmi3FreeInstance"]).required()?,
+                exit_initialization: find(l, v, ["fmi2ExitInitializationMode", "fmi3ExitInitializationMode"])
+                    .required()?,
+                terminate: find(l, v, ["fmi2Terminate", "fmi3Terminate"]).required()?,
+                reset: find(l, v, ["fmi2Reset", "fmi3Reset"]).required()?,
+                get_state: find(l, v, ["fmi2GetFMUstate", "fmi3GetFMUState"]),
+                set_state: find(l, v, ["fmi2SetFMUstate", "fmi3SetFMUState"]),
+                free_state: find(l, v, ["fmi2FreeFMUstate", "fmi3FreeFMUState"]),
+                state_size: find(l, v, ["fmi2SerializedFMUstateSize", "fmi3SerializedFMUStateSize"]),
+                serialize: find(l, v, ["fmi2SerializeFMUstate", "fmi3SerializeFMUState"]),
+                deserialize: find(l, v, ["fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState"]),
+            })
+        }
+    }
+}
+
+/// An instance with the functions that both standards share. Dropping it frees the instance.
+pub(crate) struct SharedInstance {
+    functions: Arc<SharedFunctions>,
+    /// Alive until this is dropped; null after [`abandon`](Self::abandon).
+    pub(super) pointer: InstancePointer,
+}
+
+impl SharedInstance {
+    /// # Safety
+    /// `pointer` is an instance of the library of these functions. The library stays loaded as long as this lives.
+    pub(super) unsafe fn new(functions: &Arc<SharedFunctions>, pointer: InstancePointer) -> Self {
+        Self { functions: functions.clone(), pointer }
+    }
+
+    /// Calls a function that takes only the instance.
+    pub(super) fn call(&self, name: &'static str, function: OfInstance) -> Outcome {
+        // SAFETY: the instance is alive.
+        judge(name, unsafe { function(self.pointer) })
+    }
+
+    pub(crate) fn exit_initialization(&self) -> Outcome {
+        let function = &self.functions.exit_initialization;
+        self.call(function.name, function.get()?)
+    }
+
+    pub(crate) fn terminate(&self) -> Outcome {
+        self.call(self.functions.terminate.name, self.functions.terminate.get()?)
+    }
+
+    pub(crate) fn reset(&self) -> Outcome {
+        self.call(self.functions.reset.name, self.functions.reset.get()?)
+    }
+
+    pub(crate) fn get_state(&self) -> Outcome<StatePointer> {
+        let (function, mut state) = (self.functions.get_state.get()?, ptr::null_mut());
+        // SAFETY: the instance is alive; a null state asks for a new one.
+        judge(self.functions.get_state.name, unsafe { function(self.pointer, &raw mut state) }).map(|()| state)
+    }
+
+    pub(crate) fn set_state(&self, state: StatePointer) -> Outcome {
+        let function = self.functions.set_state.get()?;
+        // SAFETY: the instance is alive; the facade passes only states that it got and has not freed.
+        judge(self.functions.set_state.name, unsafe { function(self.pointer, state) })
+    }
+
+    pub(crate) fn free_state(&self, mut state: StatePointer) -> Outcome {
+        let function = self.functions.free_state.get()?;
+        // SAFETY: as above; the facade forgets the state.
+        judge(self.functions.free_state.name, unsafe { function(self.pointer, &raw mut state) })
+    }
+
+    pub(crate) fn serialize(&self, state: StatePointer) -> Outcome<Vec<u8>> {
+        let (size_of, serialize) = (self.functions.state_size.get()?, self.functions.serialize.get()?);
+        let mut size = 0;
+        // SAFETY: the instance and the state are alive; there is room for the size.
+        judge(self.functions.state_size.name, unsafe { size_of(self.pointer, state, &raw mut size) })?;
+        let mut bytes = vec![0_u8; size];
+        // SAFETY: as above; the buffer has the size that the FMU asked for.
+        let status = unsafe { serialize(self.pointer, state, bytes.as_mut_ptr(), size) };
+        judge(self.functions.serialize.name, status).map(|()| bytes)
+    }
+
+    pub(crate) fn deserialize(&self, bytes: &[u8]) -> Outcome<StatePointer> {
+        let (function, mut state) = (self.functions.deserialize.get()?, ptr::null_mut());
+        // SAFETY: the instance is alive; the pointer and the length are those of one slice.
+        let status = unsafe { function(self.pointer, bytes.as_ptr(), bytes.len(), &raw mut state) };
+        judge(self.functions.deserialize.name, status).map(|()| state)
+    }
+
+    /// Forgets the instance without freeing it: after a fatal error the standard forbids every further call.
+    pub(crate) fn abandon(&mut self) {
+        self.pointer = ptr::null_mut();
+    }
+}
+
+impl Drop for SharedInstance {
+    fn drop(&mut self) {
+        if let (false, Some(free)) = (self.pointer.is_null(), self.functions.free.pointer) {
+            // SAFETY: the instance is alive, and nothing uses it after this.
+            unsafe { free(self.pointer) };
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! The C types of the functions of FMI 2.0 (fmi2FunctionTypes.h) and FMI 3.0 (fmi3FunctionTypes.h), each declared once.
+//!
+//! A function without prefix has the same type in both standards. `fmi3Boolean` is C's `bool`; results are received as bytes,
+//! because an FMU may write other values than 0 and 1.
+
+use super::log::Status;
+use std::ffi::{c_char, c_int, c_void};
+
+/// `fmi2Component`, `fmi3Instance`: the FMU's pointer to an instance.
+pub(super) type InstancePointer = *mut c_void;
+/// `fmi2FMUstate`, `fmi3FMUState`: the FMU's pointer to a saved state.
+pub(super) type StatePointer = *mut c_void;
+
+pub(super) type OfInstance = unsafe extern "C" fn(InstancePointer) -> Status;
+pub(super) type FreeInstance = unsafe extern "C" fn(InstancePointer);
+/// `GetVersion`, `GetTypesPlatform`.
+pub(super) type Text = unsafe extern "C" fn() -> *const c_char;
+/// `GetFMUState`, `FreeFMUState`.
+pub(super) type StatePlace = unsafe extern "C" fn(InstancePointer, *mut StatePointer) -> Status;
+pub(super) type SetState = unsafe extern "C" fn(InstancePointer, StatePointer) -> Status;
+pub(super) type StateSize = unsafe extern "C" fn(InstancePointer, StatePointer, *mut usize) -> Status;
+pub(super) type Serialize = unsafe extern "C" fn(InstancePointer, StatePointer, *mut u8, usize) -> Status;
+pub(super) type Deserialize = unsafe extern "C" fn(InstancePointer, *const u8, usize, *mut StatePointer) -> Status;
+
+/// FMI 2.0.
+pub(super) mod v2 {
+    use super::{InstancePointer, Status, c_char, c_int, c_void};
+
+    pub(in crate::abi) type Instantiate = unsafe extern "C" fn(
+        *const c_char,
+        c_int,
+        *const c_char,
+        *const c_char,
+        *const Callbacks,
+        c_int,
+        c_int,
+    ) -> InstancePointer;
+    pub(in crate::abi) type SetupExperiment =
+        unsafe extern "C" fn(InstancePointer, c_int, f64, f64, c_int, f64) -> Status;
+    pub(in crate::abi) type Get<T> = unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut T) -> Status;
+    pub(in crate::abi) type Set<T> = unsafe extern "C" fn(InstancePointer, *const u32, usize, *const T) -> Status;
+    pub(in crate::abi) type DoStep = unsafe extern "C" fn(InstancePointer, f64, f64, c_int) -> Status;
+    pub(in crate::abi) type SetDebugLogging =
+        unsafe extern "C" fn(InstancePointer, c_int, usize, *const *const c_char) -> Status;
+    /// `fmi2GetStatus` and its variants for each type.
+    pub(in crate::abi) type GetStatus<T> = unsafe extern "C" fn(InstancePointer, c_int, *mut T) -> Status;
+    pub(in crate::abi) type OutputDerivatives =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *const c_int, *mut f64) -> Status;
+    /// `fmi2CallbackLogger`. In C it is variadic, which a Rust function cannot be. On x86_64 and 64-bit ARM, Linux and Windows,
+    /// a variadic call passes its arguments where any call passes them and the caller cleans up, so the first six can be
+    /// received as fixed ones; nothing beyond them is read. (Apple's ARM passes variadic arguments elsewhere: there only five
+    /// are.)
+    pub(in crate::abi) type Logger =
+        unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, *const c_char);
+
+    /// `fmi2CallbackFunctions`.
+    #[repr(C)]
+    pub(in crate::abi) struct Callbacks {
+        pub(in crate::abi) logger: Option<Logger>,
+        pub(in crate::abi) allocate: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
+        pub(in crate::abi) free: Option<unsafe extern "C" fn(*mut c_void)>,
+        pub(in crate::abi) step_finished: Option<unsafe extern "C" fn(*mut c_void, Status)>,
+        pub(in crate::abi) environment: *mut c_void,
+    }
+
+    // The C library's, which `Callbacks` passes on.
+    unsafe extern "C" {
+        pub(in crate::abi) fn calloc(count: usize, size: usize) -> *mut c_void;
+        pub(in crate::abi) fn free(memory: *mut c_void);
+    }
+}
+
+/// FMI 3.0.
+pub(super) mod v3 {
+    use super::{InstancePointer, Status, c_char, c_int, c_void};
+
+    pub(in crate::abi) type LogMessage = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
+    pub(in crate::abi) type InstantiateCoSimulation = unsafe extern "C" fn(
+        *const c_char,
+        *const c_char,
+        *const c_char,
+        bool,
+        bool,
+        bool,
+        bool,
+        *const u32,
+        usize,
+        *mut c_void,
+        Option<LogMessage>,
+        *const c_void,
+    ) -> InstancePointer;
+    pub(in crate::abi) type InstantiateModelExchange = unsafe extern "C" fn(
+        *const c_char,
+        *const c_char,
+        *const c_char,
+        bool,
+        bool,
+        *mut c_void,
+        Option<LogMessage>,
+    ) -> InstancePointer;
+    pub(in crate::abi) type InstantiateScheduledExecution = unsafe extern "C" fn(
+        *const c_char,
+        *const c_char,
+        *const c_char,
+        bool,
+        bool,
+        *mut c_void,
+        Option<LogMessage>,
+        *const c_void,
+        *const c_void,
+        *const c_void,
+    ) -> InstancePointer;
+    pub(in crate::abi) type EnterInitializationMode =
+        unsafe extern "C" fn(InstancePointer, bool, f64, f64, bool, f64) -> Status;
+    pub(in crate::abi) type Get<T> = unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut T, usize) -> Status;
+    pub(in crate::abi) type Set<T> =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *const T, usize) -> Status;
+    pub(in crate::abi) type DoStep =
+        unsafe extern "C" fn(InstancePointer, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64) -> Status;
+    pub(in crate::abi) type SetDebugLogging =
+        unsafe extern "C" fn(InstancePointer, bool, usize, *const *const c_char) -> Status;
+    pub(in crate::abi) type OutputDerivatives =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *const c_int, *mut f64, usize) -> Status;
+    pub(in crate::abi) type UpdateDiscreteStates =
+        unsafe extern "C" fn(InstancePointer, *mut u8, *mut u8, *mut u8, *mut u8, *mut u8, *mut f64) -> Status;
+}
