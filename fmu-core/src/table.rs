@@ -122,6 +122,7 @@ impl<W: 'static> Table<W> {
             Access::Reals(get) => Slot::Real(get(whole).get_mut(usize::from(place.inner))?),
             Access::Integer(get) => Slot::Integer(get(whole)),
             Access::Boolean(get) => Slot::Boolean(get(whole)),
+            Access::Enumeration(field) => Slot::Enumeration(field.find(whole)),
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
         };
         Some((&row.meta, slot))
@@ -164,6 +165,7 @@ impl<W: 'static> Table<W> {
                 Slot::Real(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
                 Slot::Integer(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
                 Slot::Boolean(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
+                Slot::Enumeration(x) => (ptr::from_ref(&**x).addr(), x.get().to_string()),
             };
             let unit = if let Kind::Real(quantity) = meta.kind { quantity.unit.name } else { "" };
             let space = if unit.is_empty() { "" } else { " " };
