@@ -13,12 +13,12 @@ use fmu_export::instance::Instance;
 use fmu_export::lifecycle::Standard;
 use fmu_export::log::{Log, Sink, Status};
 use fmu_export::registry;
-use fmu_export::saved::Saved;
+use fmu_export::snapshot::Snapshot;
 
 /// Saves and restores a block's state.
 fn again_and_again<M: Model>(block: Block<M>, what: &str) {
     let log = Log::new(Box::new(Silent), false);
-    let mut it = Instance::new(Standard::Fmi3, what.into(), log, Saved { block, ..Saved::default() });
+    let mut it = Instance::new(Standard::Fmi3, what.into(), log, Snapshot { block, ..Snapshot::default() });
     let handle = it.save(0).unwrap();
     let before = calls();
     for _ in 0..100 {

@@ -5,7 +5,7 @@
 
 use drive::estimator::Kind;
 use drive::estimator::kalman::KalmanParameters;
-use drive::estimator::tracker::MECHANICAL_OBSERVER;
+use drive::estimator::tracker::TrackerKind;
 use drive::math::{sin_cos, wrap};
 use drive::motor::Motor;
 use drive::pair::Pair;
@@ -36,7 +36,7 @@ pub fn drive(kind: Kind) -> Pair {
     let controller = &mut pair.controller.model;
     controller.inputs.u_dc = 540.0;
     let par = &mut controller.parameters;
-    par.estimator = kind as i32;
+    par.estimator = kind;
     (par.motor, par.J) = (machine(), 15e-3);
     par.current.bandwidth = TAU * 200.0;
     par.current.active_resistance = true;
@@ -70,7 +70,7 @@ pub fn drive(kind: Kind) -> Pair {
 /// (rad/s).
 pub fn with_mechanical_observer(mut pair: Pair, bandwidth: f64) -> Pair {
     let par = &mut pair.controller.model.parameters;
-    (par.estimators.tracker.kind, par.estimators.tracker.bandwidth) = (MECHANICAL_OBSERVER, TAU * 25.0);
+    (par.estimators.tracker.kind, par.estimators.tracker.bandwidth) = (TrackerKind::MechanicalObserver, TAU * 25.0);
     par.speed_loop.bandwidth = bandwidth;
     pair
 }

@@ -6,7 +6,7 @@
 mod common;
 
 use common::{Bench, T_S};
-use drive::control::start::CURRENT_FREQUENCY;
+use drive::control::start::StartMode;
 use drive::estimator::Kind;
 use drive::frame::{AlphaBeta, Phases};
 use drive::plant::tables::PlantParameters;
@@ -156,7 +156,7 @@ fn enabled_at(kind: Kind, from: u32, samples: u32) -> Vec<(Vec<u64>, bool)> {
     let par = &mut pair.controller.model.parameters;
     par.sensor.noise = 0.0;
     if !kind.holds_standstill() {
-        par.start.mode = CURRENT_FREQUENCY;
+        par.start.mode = StartMode::CurrentFrequency;
         (par.start.t_align, par.start.settle) = (0.05, 0.05);
     }
     pair.plant.model.parameters.initial.theta_e = 0.4;

@@ -2,11 +2,11 @@
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;
-use drive::control::start::INJECTION;
+use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
-use drive::estimator::pulsating::MEASUREMENT_AXES;
-use drive::estimator::tracker::MECHANICAL_OBSERVER;
+use drive::estimator::pulsating::Demodulation;
+use drive::estimator::tracker::TrackerKind;
 use drive_study::runner::{drive as preset, *};
 use fmu_core::Model;
 use std::f64::consts::TAU;
@@ -56,7 +56,7 @@ const METHODS: [Method; 6] = [
     Method {
         name: "pulsating, 45-degree axes",
         kind: Kind::PulsatingInjection,
-        set: |p| p.estimators.pulsating.demodulation = MEASUREMENT_AXES,
+        set: |p| p.estimators.pulsating.demodulation = Demodulation::MeasurementAxes,
         mean: 0.4,
         std: 2.1,
         std_theory: 0.93,
@@ -240,7 +240,7 @@ fn cross_saturation_turns_all_alike() {
 fn start_from(pair: &Pair, degrees: f64, s_2: f64, speed: f64) -> f64 {
     let mut pair = pair.clone();
     let par = &mut pair.controller.model.parameters;
-    (par.start.mode, par.s_2) = (INJECTION, 40.0);
+    (par.start.mode, par.s_2) = (StartMode::Injection, 40.0);
     let plant = &mut pair.plant.model.parameters;
     (plant.saturation.s_2, plant.saturation.s_3) = (s_2, s_2);
     plant.initial.theta_e = degrees.to_radians();
@@ -382,7 +382,7 @@ fn what_cannot_work_is_refused_with_names_and_reasons() {
     let message = refused(Kind::SquareWaveInjection, |p| p.estimators.square_wave.samples = 3);
     assert!(message.contains("square_wave.samples") && message.contains("2 or 4"), "{message}");
     let message = refused(Kind::SquareWaveInjection, |p| {
-        p.estimators.tracker.kind = MECHANICAL_OBSERVER;
+        p.estimators.tracker.kind = TrackerKind::MechanicalObserver;
         p.J = 0.0;
     });
     for part in ["mechanics.J = 0 kg.m2", "tracker.kind", "MechanicalObserver"] {
@@ -392,11 +392,11 @@ fn what_cannot_work_is_refused_with_names_and_reasons() {
 
 #[test]
 fn a_start_that_cannot_work_is_refused() {
-    let message = refused(Kind::ExtendedEmf, |p| p.start.mode = INJECTION);
+    let message = refused(Kind::ExtendedEmf, |p| p.start.mode = StartMode::Injection);
     for part in ["start.mode = 3", "estimator = 4 (ExtendedEmf)"] {
         assert!(message.contains(part), "{message}");
     }
-    let message = refused(Kind::SquareWaveInjection, |p| p.start.mode = INJECTION);
+    let message = refused(Kind::SquareWaveInjection, |p| p.start.mode = StartMode::Injection);
     assert!(message.contains("saturation.s_2 = 0 A/Wb2"), "{message}");
 }
 

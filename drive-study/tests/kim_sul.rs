@@ -2,7 +2,7 @@
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;
-use drive::control::start::CURRENT_FREQUENCY;
+use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 use drive_study::runner::{drive as preset, *};
@@ -98,7 +98,8 @@ fn speed_bandwidths() {
     }
     let observed = with(Kind::ExtendedEmf, |p| {
         p.speed_loop.bandwidth = TAU * 60.0;
-        (p.estimators.tracker.kind, p.estimators.tracker.bandwidth) = (2, TAU * 15.0);
+        (p.estimators.tracker.kind, p.estimators.tracker.bandwidth) =
+            (drive::estimator::tracker::TrackerKind::MechanicalObserver, TAU * 15.0);
     });
     near("with the mechanical observer", Kind::ExtendedEmf, speed_bandwidth(&observed, 0.5), 67.0, 6.7);
 }
@@ -164,7 +165,7 @@ fn i_f_start_from_every_angle() {
     for (kind, k) in starts {
         let load = if k % 2 == 0 { 0.0 } else { 0.3 };
         let side = if k % 4 < 2 { 1.0 } else { -1.0 };
-        let mut pair = with_dead_time(with(kind, |p| p.start.mode = CURRENT_FREQUENCY), true);
+        let mut pair = with_dead_time(with(kind, |p| p.start.mode = StartMode::CurrentFrequency), true);
         pair.plant.model.parameters.initial.theta_e = (15.0 * f64::from(k)).to_radians();
         let mut peak = 0.0_f64;
         run(&mut pair, 2.0, |t, p| {

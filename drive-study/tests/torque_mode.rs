@@ -69,7 +69,7 @@ fn beside_the_low_speed_current() {
 fn the_i_f_start_waits_for_a_torque() {
     let mut pair = runner::drive(Kind::ExtendedEmf);
     let par = &mut pair.controller.model.parameters;
-    (par.speed_loop.torque_mode, par.start.mode) = (true, 2);
+    (par.speed_loop.torque_mode, par.start.mode) = (true, drive::control::start::StartMode::CurrentFrequency);
     pair.start().unwrap();
     let mut run = |tau: f64, samples: u32| {
         pair.controller.model.inputs.tau_ref = tau;

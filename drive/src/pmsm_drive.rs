@@ -320,7 +320,7 @@ mod tests {
         let mut pair = Pair::default();
         pair.plant.model.parameters.mechanics.imposed = true;
         // A sensor: a sensorless drive against a shaft that does not yield can lose it, and then enlarges any rounding.
-        pair.controller.model.parameters.estimator = crate::estimator::Kind::Sensored as i32;
+        pair.controller.model.parameters.estimator = crate::estimator::Kind::Sensored;
         let mut drive = Block::<PmsmDrive>::default();
         drive.model.pair = pair.clone();
         drive.initialise();

@@ -16,7 +16,7 @@ fn the_first_command_is_turned_to_where_it_acts() {
         for sign in [1.0, -1.0] {
             let mut controller = Block::<SensorlessController>::default();
             let par = &mut controller.model.parameters;
-            par.estimator = Kind::Sensored as i32;
+            par.estimator = Kind::Sensored;
             (par.delay, par.speed_loop.b) = (delay, 1.0);
             let (n_p, psi_M, k_p) = (f64::from(par.motor.n_p), par.motor.psi_M, par.current.bandwidth * par.motor.L_q);
             let inputs = &mut controller.model.inputs;

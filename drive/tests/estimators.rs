@@ -1,12 +1,12 @@
 //! One row in the list makes an estimator: name, class, start, update, retuning and placing all derive from it.
 
 use drive::control::current::CurrentLoop;
-use drive::control::start::{CURRENT_FREQUENCY, INJECTION};
-use drive::estimator::{Class, Context, ESTIMATORS, Estimator, EstimatorParameters, Injection, Kind, Sample};
+use drive::control::start::StartMode;
+use drive::estimator::{Class, Context, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use drive::frame::AlphaBeta;
 use drive::motor::Motor;
 use drive::{SensorlessController, math::wrap};
-use fmu_core::Model;
+use fmu_core::{Enumerated, Model};
 
 /// The 2.2 kW machine: its saliency suits every method.
 fn salient() -> Motor {
@@ -15,13 +15,13 @@ fn salient() -> Motor {
 
 #[test]
 fn the_row_is_an_item_of_the_enumeration() {
-    assert_eq!(ESTIMATORS.items.len(), Kind::ALL.len());
-    for (place, (&kind, item)) in Kind::ALL.iter().zip(ESTIMATORS.items).enumerate() {
+    assert_eq!(Kind::ENUMERATION.items.len(), Kind::ALL.len());
+    for (place, (&kind, item)) in Kind::ALL.iter().zip(Kind::ENUMERATION.items).enumerate() {
         assert_eq!(usize::try_from(item.value), Ok(place + 1), "{}: the values are the places in the list", item.name);
         assert_eq!((Kind::of(item.value), item.name), (Some(kind), kind.name()));
         assert!(!item.description.is_empty(), "{}", item.name);
     }
-    let past_the_end = ESTIMATORS.items.iter().map(|item| item.value + 1).max().unwrap();
+    let past_the_end = Kind::ENUMERATION.items.iter().map(|item| item.value + 1).max().unwrap();
     assert_eq!((Kind::of(0), Kind::of(past_the_end)), (None, None));
 }
 
@@ -53,13 +53,17 @@ fn the_class_decides_how_a_drive_starts() {
     for &kind in Kind::ALL {
         let mut controller = SensorlessController::default();
         let par = &mut controller.parameters;
-        (par.estimator, par.motor, par.s_2) = (kind as i32, salient(), 40.0);
+        (par.estimator, par.motor, par.s_2) = (kind, salient(), 40.0);
         (par.limit.i, par.limit.i_q) = (15.0, 15.0);
         par.current.reference_feed_forward = true;
-        for (mode, allowed) in [(1, true), (CURRENT_FREQUENCY, true), (INJECTION, kind.class().injects())] {
+        for (mode, allowed) in [
+            (StartMode::Direct, true),
+            (StartMode::CurrentFrequency, true),
+            (StartMode::Injection, kind.class().injects()),
+        ] {
             controller.parameters.start.mode = mode;
             let judged = controller.validate();
-            assert_eq!(judged.is_ok(), allowed, "{}, start.mode = {mode}: {judged:?}", kind.name());
+            assert_eq!(judged.is_ok(), allowed, "{}, start.mode = {mode:?}: {judged:?}", kind.name());
         }
         let loses_standstill = !kind.holds_standstill();
         assert!(!loses_standstill || kind.class() == Class::BackEmf, "{}: only the EMF vanishes", kind.name());

@@ -223,6 +223,7 @@ fn value(slot: &Slot<'_>) -> Value {
         Slot::Real(x) => Value::Real(**x),
         Slot::Integer(x) => Value::Integer(**x),
         Slot::Boolean(x) => Value::Boolean(**x),
+        Slot::Enumeration(x) => Value::Integer(x.get()),
     }
 }
 
@@ -247,11 +248,10 @@ fn kind(kind: &Kind) -> VariableKind {
 
 /// The same judgement that a set gets.
 fn check_start(name: &str, meta: &Meta, start: Value) -> Result<(), Fault> {
-    let allowed = match (start, &meta.kind) {
-        (Value::Real(x), _) => meta.range.contains(x),
-        (Value::Integer(x), Kind::Enumeration(enumeration)) => enumeration.items.iter().any(|item| item.value == x),
-        (Value::Integer(x), _) => meta.range.contains(f64::from(x)),
-        (Value::Boolean(_), _) => true,
+    let allowed = match start {
+        Value::Real(x) => meta.range.contains(x),
+        Value::Integer(x) => meta.range.contains(f64::from(x)),
+        Value::Boolean(_) => true,
     };
     if allowed {
         Ok(())

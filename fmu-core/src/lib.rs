@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod description;
+pub mod enumeration;
 pub mod fault;
 pub mod log;
 pub mod model;
@@ -19,6 +20,7 @@ pub mod unit;
 pub mod variable;
 
 pub use description::Description;
+pub use enumeration::{Choice, Enumerated, Field};
 pub use fault::Fault;
 pub use model::{Block, Experiment, Info, Model};
 pub use row::{Row, Slot};

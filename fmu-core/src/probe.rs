@@ -47,6 +47,7 @@ fn values<M: Model>(block: &mut Block<M>) -> Vec<u64> {
             Some((_, Slot::Real(x))) => x.to_bits(),
             Some((_, Slot::Integer(x))) => u64::from(x.cast_unsigned()),
             Some((_, Slot::Boolean(x))) => u64::from(*x),
+            Some((_, Slot::Enumeration(x))) => u64::from(x.get().cast_unsigned()),
             None => 0,
         })
         .collect()
@@ -73,6 +74,11 @@ fn change<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
             }
         }
         Slot::Boolean(x) => *x = !*x,
+        Slot::Enumeration(x) => {
+            if let Some(&other) = other_integers(meta, x.get()).get(draw.below(2)) {
+                x.set(other);
+            }
+        }
     }
 }
 

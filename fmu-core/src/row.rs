@@ -3,9 +3,10 @@
 //! Only causality/variability pairs that FMI 2.0.5 (2.2.7) and FMI 3.0.2 (2.4.7.4) allow have a constructor. Start
 //! values are not written here: they come from the model's `Default`.
 
+use crate::enumeration::{Choice, Enumerated, Field, Place};
 use crate::token::Hash;
 use crate::unit::Quantity;
-use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
+use crate::variable::{Causality, Kind, Meta, Range, Variability};
 
 /// What a table asks of a part without knowing its type.
 pub(crate) trait Node<W>: Sync {
@@ -20,6 +21,7 @@ pub(crate) enum Access<W: 'static> {
     Reals(fn(&mut W) -> &mut [f64]),
     Integer(fn(&mut W) -> &mut i32),
     Boolean(fn(&mut W) -> &mut bool),
+    Enumeration(&'static dyn Place<W>),
     Part { len: usize, hash: Hash, node: &'static dyn Node<W> },
 }
 
@@ -28,10 +30,12 @@ pub(crate) enum Access<W: 'static> {
 pub enum Slot<'a> {
     /// A real number.
     Real(&'a mut f64),
-    /// An integer or the value of an enumeration.
+    /// An integer.
     Integer(&'a mut i32),
     /// A truth value.
     Boolean(&'a mut bool),
+    /// An item of an enumeration.
+    Enumeration(&'a mut dyn Choice),
 }
 
 /// A row of the table of `W`: a variable, or the table of a part of `W`.
@@ -171,15 +175,14 @@ impl<W: 'static> Row<W> {
         Self::new(name, description, Causality::Parameter, Variability::Fixed, Kind::Boolean, access)
     }
 
-    /// An enumeration parameter, stored as its integer; a setter only ever writes a value that exists.
-    pub const fn enumeration_parameter(
+    /// An enumeration parameter; `field` says where the model holds the enum.
+    pub const fn enumeration_parameter<E: Enumerated>(
         name: &'static str,
-        enumeration: &'static Enumeration,
         description: &'static str,
-        get: fn(&mut W) -> &mut i32,
+        field: &'static Field<W, E>,
     ) -> Self {
-        let kind = Kind::Enumeration(enumeration);
-        Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Integer(get))
+        let kind = Kind::Enumeration(E::ENUMERATION);
+        Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Enumeration(field))
     }
 
     /// A parameter computed by the model's `derive`, constant during the simulation.

@@ -43,6 +43,13 @@ impl<W: 'static> Row<W> {
     }
 }
 
+/// A value of an enumeration with the name of its item.
+fn item(meta: &Meta, value: i32) -> String {
+    let Kind::Enumeration(enumeration) = meta.kind else { return value.to_string() };
+    let name = enumeration.items.iter().find(|item| item.value == value).map_or("?", |item| item.name);
+    format!("{value} ({name})")
+}
+
 /// Where an index leads: a row, and the index inside it.
 #[derive(Clone, Copy)]
 struct Place {
@@ -122,6 +129,7 @@ impl<W: 'static> Table<W> {
             Access::Reals(get) => Slot::Real(get(whole).get_mut(usize::from(place.inner))?),
             Access::Integer(get) => Slot::Integer(get(whole)),
             Access::Boolean(get) => Slot::Boolean(get(whole)),
+            Access::Enumeration(field) => Slot::Enumeration(field.find(whole)),
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
         };
         Some((&row.meta, slot))
@@ -164,6 +172,7 @@ impl<W: 'static> Table<W> {
                 Slot::Real(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
                 Slot::Integer(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
                 Slot::Boolean(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
+                Slot::Enumeration(x) => (ptr::from_ref(&**x).addr(), item(meta, x.get())),
             };
             let unit = if let Kind::Real(quantity) = meta.kind { quantity.unit.name } else { "" };
             let space = if unit.is_empty() { "" } else { " " };

@@ -2,7 +2,6 @@
 #![allow(missing_docs, clippy::float_cmp)]
 
 use fmu_core::unit::{AMPERE, OHM, SPEED, VOLT};
-use fmu_core::variable::Enumeration;
 use fmu_core::*;
 use serde::{Deserialize, Serialize};
 
@@ -10,14 +9,16 @@ use serde::{Deserialize, Serialize};
 struct Load {
     r: f64,
     map: [f64; 3],
-    mode: i32,
+    mode: Mode,
 }
 
-static MODE: Enumeration = Enumeration {
-    name: "Mode",
-    description: "How the load behaves",
-    items: &[Item { value: 1, name: "Plain", description: "" }, Item { value: 3, name: "Odd", description: "" }],
-};
+fmu_core::enumeration! {
+    #[derive(Serialize, Deserialize)]
+    enum Mode("Mode", "How the load behaves") {
+        1 Plain "";
+        3 Odd "";
+    }
+}
 
 type P = Row<Load>;
 const LOAD: &Table<Load> = &Table::new(
@@ -25,7 +26,7 @@ const LOAD: &Table<Load> = &Table::new(
         &[
             P::parameter("R", &OHM, "Resistance", |m| &mut m.r).above(0.0),
             P::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.map),
-            P::enumeration_parameter("mode", &MODE, "Mode", |m| &mut m.mode),
+            P::enumeration_parameter("mode", "Mode", &Field(|m| &mut m.mode)),
         ]
     },
 );
@@ -42,7 +43,14 @@ struct Small {
 
 impl Default for Small {
     fn default() -> Self {
-        Self { u: 2.0, load: Load { r: 4.0, map: [0.0, 1.0, 2.0], mode: 1 }, on: true, n: 1, gain: 0.0, i: 0.0 }
+        Self {
+            u: 2.0,
+            load: Load { r: 4.0, map: [0.0, 1.0, 2.0], mode: Mode::Plain },
+            on: true,
+            n: 1,
+            gain: 0.0,
+            i: 0.0,
+        }
     }
 }
 
@@ -212,6 +220,15 @@ fn a_fault_names_the_row_it_means() {
     let fault =
         Small::TABLE.fault(&Block { model: small, out: SmallOutputs::default() }, |m| &mut m.model.load.r, "less");
     assert_eq!(fault.message(), "load.R = 4 Ohm is not allowed: less");
-    let load = Load { r: 1.0, map: [0.0; 3], mode: 3 };
-    assert_eq!(LOAD.tell(&load, |m| &mut m.mode), "mode = 3");
+    let load = Load { r: 1.0, map: [0.0; 3], mode: Mode::Odd };
+    assert_eq!(LOAD.tell(&load, |m| &mut m.mode), "mode = 3 (Odd)");
+}
+
+#[test]
+fn an_enum_takes_no_value_that_does_not_exist() {
+    let mut block = Block::<Small>::default();
+    let Some((_, Slot::Enumeration(mode))) = Small::TABLE.entry(&mut block, 6) else { panic!("an enumeration") };
+    assert!(mode.set(3) && mode.get() == 3);
+    assert!(!mode.set(2) && mode.get() == 3, "a refused value changes nothing");
+    assert_eq!(block.model.load.mode, Mode::Odd);
 }

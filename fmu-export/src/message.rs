@@ -21,6 +21,7 @@ pub(crate) fn value(slot: &Slot<'_>) -> String {
         Slot::Real(x) => x.to_string(),
         Slot::Integer(x) => x.to_string(),
         Slot::Boolean(x) => x.to_string(),
+        Slot::Enumeration(x) => x.get().to_string(),
     }
 }
 

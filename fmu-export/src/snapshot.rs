@@ -3,7 +3,7 @@
 use crate::lifecycle::{Life, State};
 use crate::message;
 use crate::value::Value;
-use fmu_core::{Block, Causality, Elapsed, Fault, Kind, Model, Slot};
+use fmu_core::{Block, Causality, Elapsed, Fault, Model, Slot};
 use serde::{Deserialize, Serialize};
 
 /// Start and stop time of the importer's experiment in s.
@@ -88,11 +88,10 @@ impl<M: Model> Snapshot<M> {
         for index in 0..M::TABLE.len() {
             let Some((meta, slot)) = M::TABLE.entry(&mut self.block, index) else { continue };
             let set = matches!(meta.causality, Causality::Input | Causality::Parameter);
-            let refused = match (&slot, meta.kind) {
-                (Slot::Real(x), _) if set => (**x).judge(meta) != Some(true),
-                (Slot::Integer(x), Kind::Enumeration(_)) if set => i64::from(**x).judge(meta) != Some(true),
-                (Slot::Integer(x), _) if set => (**x).judge(meta) != Some(true),
-                (Slot::Real(x), _) => x.is_nan(),
+            let refused = match &slot {
+                Slot::Real(x) if set => (**x).judge(meta) != Some(true),
+                Slot::Integer(x) if set => (**x).judge(meta) != Some(true),
+                Slot::Real(x) => x.is_nan(),
                 _ => false,
             };
             if refused {

@@ -86,8 +86,8 @@ impl Value for f64 {
 impl Value for i32 {
     const CARRIES: &'static str = "a 32-bit integer";
 
-    fn read(meta: &Meta, slot: &Slot<'_>) -> Option<Self> {
-        if let (Slot::Integer(x), Kind::Integer) = (slot, meta.kind) { Some(**x) } else { None }
+    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
+        if let Slot::Integer(x) = slot { Some(**x) } else { None }
     }
 
     fn write(self, slot: Slot<'_>) {
@@ -105,13 +105,13 @@ impl Value for i32 {
 impl Value for i64 {
     const CARRIES: &'static str = "an enumeration";
 
-    fn read(meta: &Meta, slot: &Slot<'_>) -> Option<Self> {
-        if let (Slot::Integer(x), Kind::Enumeration(_)) = (slot, meta.kind) { Some(Self::from(**x)) } else { None }
+    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
+        if let Slot::Enumeration(x) = slot { Some(Self::from(x.get())) } else { None }
     }
 
     fn write(self, slot: Slot<'_>) {
-        if let (Slot::Integer(x), Ok(value)) = (slot, i32::try_from(self)) {
-            *x = value;
+        if let (Slot::Enumeration(x), Ok(value)) = (slot, i32::try_from(self)) {
+            x.set(value);
         }
     }
 
@@ -125,11 +125,18 @@ impl Value for Fmi2Integer {
     const CARRIES: &'static str = "an integer or an enumeration";
 
     fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
-        if let Slot::Integer(x) = slot { Some(Self(**x)) } else { None }
+        match slot {
+            Slot::Integer(x) => Some(Self(**x)),
+            Slot::Enumeration(x) => Some(Self(x.get())),
+            _ => None,
+        }
     }
 
     fn write(self, slot: Slot<'_>) {
-        self.0.write(slot);
+        match slot {
+            Slot::Enumeration(_) => i64::from(self.0).write(slot),
+            _ => self.0.write(slot),
+        }
     }
 
     fn judge(self, meta: &Meta) -> Option<bool> {

@@ -1,6 +1,6 @@
 //! A start and a load step for every estimator, run natively and told to fmpy: parameters, inputs and what must come out.
 
-use drive::control::start::{CURRENT_FREQUENCY, INJECTION};
+use drive::control::start::StartMode;
 use drive::estimator::{Class, Kind};
 use drive::{Pair, math};
 use drive_study::runner::{self, RATED_SPEED, RATED_TORQUE};
@@ -35,6 +35,7 @@ fn parameters<M: Model>(block: &Block<M>) -> Map<String, Value> {
             Some((_, Slot::Real(x))) => json!(*x),
             Some((_, Slot::Integer(x))) => json!(*x),
             Some((_, Slot::Boolean(x))) => json!(*x),
+            Some((_, Slot::Enumeration(x))) => json!(x.get()),
             None => Value::Null,
         };
         let set = value(&mut block);
@@ -52,7 +53,7 @@ pub fn at(schedule: &Schedule, t: f64) -> f64 {
 /// The reference motor with this estimator.
 fn flux_observer(kind: Kind) -> Pair {
     let mut pair = Pair::default();
-    pair.controller.model.parameters.estimator = kind as i32;
+    pair.controller.model.parameters.estimator = kind;
     pair
 }
 
@@ -81,12 +82,12 @@ fn start(kind: Kind) -> Experiment {
         Class::Hybrid | Class::Sensored | Class::BackEmf => 0.5 * RATED_SPEED,
     };
     if kind.class().injects() {
-        mode = INJECTION;
+        mode = StartMode::Injection;
     } else if !kind.holds_standstill() {
-        mode = CURRENT_FREQUENCY;
+        mode = StartMode::CurrentFrequency;
     }
     pair.controller.model.parameters.start.mode = mode;
-    if mode == INJECTION {
+    if mode == StartMode::Injection {
         pair = runner::with_saturation(pair);
         pair.controller.model.parameters.s_2 = 40.0;
     }

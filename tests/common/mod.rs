@@ -21,6 +21,8 @@ pub fn set<M: Model>(block: &mut Block<M>, name: &str, value: f64) {
         #[expect(clippy::cast_possible_truncation, reason = "small integers in tests")]
         Some((_, Slot::Integer(x))) => *x = value as i32,
         Some((_, Slot::Boolean(x))) => *x = value != 0.0,
+        #[expect(clippy::cast_possible_truncation, reason = "small integers in tests")]
+        Some((_, Slot::Enumeration(x))) => assert!(x.set(value as i32), "{name} = {value}"),
         None => unreachable!(),
     }
 }

@@ -5,7 +5,7 @@ use super::measure::{Follow, Measure};
 use super::scenario::Effort;
 use super::subject::{Class, Subject};
 use crate::runner;
-use drive::estimator::tracker::MECHANICAL_OBSERVER;
+use drive::estimator::tracker::TrackerKind;
 use fmu_core::Fault;
 use std::f64::consts::TAU;
 
@@ -256,7 +256,8 @@ pub(super) fn bandwidth_fast(subject: &Subject, effort: Effort) -> Result<Outcom
         let par = &mut p.controller.model.parameters;
         par.speed_loop.bandwidth = TAU * loop_hz;
         if let Some(hz) = observer_hz {
-            (par.estimators.tracker.kind, par.estimators.tracker.bandwidth) = (MECHANICAL_OBSERVER, TAU * hz);
+            (par.estimators.tracker.kind, par.estimators.tracker.bandwidth) =
+                (TrackerKind::MechanicalObserver, TAU * hz);
         }
     });
     bandwidth(&fast, effort)

@@ -8,11 +8,11 @@
 use crate::runner;
 use crate::runner::RATED_SPEED;
 use drive::Pair;
-use drive::control::start::{CURRENT_FREQUENCY, INJECTION};
+use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters;
 pub use drive::estimator::Class;
 use drive::estimator::Kind;
-use drive::estimator::pulsating::MEASUREMENT_AXES;
+use drive::estimator::pulsating::Demodulation;
 use drive::math::tanh;
 use fmu_core::Fault;
 use std::f64::consts::TAU;
@@ -31,7 +31,7 @@ const VARIANTS: &[Entry] = &[
     Entry {
         kind: Kind::PulsatingInjection,
         name: "PulsatingInjection-45deg",
-        set: |p| p.estimators.pulsating.demodulation = MEASUREMENT_AXES,
+        set: |p| p.estimators.pulsating.demodulation = Demodulation::MeasurementAxes,
     },
     Entry {
         kind: Kind::SquareWaveInjection,
@@ -92,7 +92,7 @@ impl Subject {
             Class::FluxObserver => (Pair::default(), 2.0),
             _ => (runner::drive(entry.kind), runner::RATED_TORQUE),
         };
-        pair.controller.model.parameters.estimator = entry.kind as i32;
+        pair.controller.model.parameters.estimator = entry.kind;
         (entry.set)(&mut pair.controller.model.parameters);
         Self { entry, class, pair, torque }
     }
@@ -135,9 +135,9 @@ impl Subject {
             let mode = &mut p.controller.model.parameters.start.mode;
             match self.class {
                 Class::FluxObserver | Class::Sensored => {}
-                Class::BackEmf => *mode = CURRENT_FREQUENCY,
+                Class::BackEmf => *mode = StartMode::CurrentFrequency,
                 Class::Injection | Class::Hybrid => {
-                    *mode = INJECTION;
+                    *mode = StartMode::Injection;
                     *p = runner::with_saturation(p.clone());
                     p.controller.model.parameters.s_2 = p.plant.model.parameters.saturation.s_2;
                 }

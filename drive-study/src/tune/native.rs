@@ -24,8 +24,8 @@ fn set<M: Model>(block: &mut Block<M>, setting: &Setting) {
         (Slot::Real(x), Value::Real(value), _) => *x = *value,
         (Slot::Integer(x), Value::Integer(value), _) => *x = *value,
         (Slot::Boolean(x), Value::Boolean(value), _) => *x = *value,
-        (Slot::Integer(x), Value::Item(name), Kind::Enumeration(e)) => {
-            *x = e.items.iter().find(|item| item.name == name).expect("an item of the enumeration").value;
+        (Slot::Enumeration(x), Value::Item(name), Kind::Enumeration(e)) => {
+            x.set(e.items.iter().find(|item| item.name == name).expect("an item of the enumeration").value);
         }
         _ => unreachable!("{} has another type", setting.name),
     }

@@ -81,7 +81,7 @@ impl SensorlessController {
     #[inline]
     fn estimate(&mut self, sample: &Sample, tuned: bool) -> (Frame, Mode) {
         let Self { inputs, parameters: par, gains, in_use, state, .. } = self;
-        let (estimate, mode) = state.estimate(par.kind(), gains, par, in_use, inputs, sample);
+        let (estimate, mode) = state.estimate(par.estimator, gains, par, in_use, inputs, sample);
         if tuned {
             let new = context(par, &par.estimators, &par.motor);
             state.estimator.retune(&context(par, &in_use.estimators, &in_use.motor), &new);
@@ -101,7 +101,7 @@ impl SensorlessController {
             Mode::Voltage(_) => (DqHat::ZERO, false),
             Mode::AfterStart | Mode::AfterSearch | Mode::ClosedLoop => {
                 let old = (tuned && mode == Mode::ClosedLoop).then_some(&last_gains.speed);
-                state.references(par.kind(), gains, old, par, inputs, speed)
+                state.references(par.estimator, gains, old, par, inputs, speed)
             }
         }
     }

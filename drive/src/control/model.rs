@@ -6,10 +6,10 @@ use crate::control::lock::{LOST, Lock, LockGains};
 use crate::control::reference::greatest_torque;
 use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
-use crate::control::start::{CURRENT_FREQUENCY, INJECTION};
+use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
 use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
-use crate::estimator::{Class, Estimator, Kind, Sample};
+use crate::estimator::{Class, Estimator, Sample};
 use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
@@ -64,7 +64,7 @@ impl SensorlessController {
     fn start_again(&mut self) -> ControllerOutputs {
         let Self { parameters: par, state, .. } = self;
         let theta = state.computed.theta_est;
-        let kind = par.kind();
+        let kind = par.estimator;
         let nothing = Sample { k: state.k, ..Sample::default() };
         let (estimator, _) = Estimator::start(kind, &context(par, &par.estimators, &par.motor), &nothing, theta, 0.0);
         *state = State {
@@ -108,7 +108,7 @@ impl Model for SensorlessController {
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
         let k = motor.torque_constant();
-        let tau = if Kind::of(*estimator).is_some_and(|kind| kind.class() == Class::FluxObserver) {
+        let tau = if estimator.class() == Class::FluxObserver {
             limit.tau
         } else {
             greatest_torque(motor, limit, current.mtpa)
@@ -130,24 +130,20 @@ impl Model for SensorlessController {
     fn validate(&self) -> Result<(), Fault> {
         let par = &self.parameters;
         let ControllerParameters { limit, zero_speed, estimator, start, polarity, motor, T_s, s_2, .. } = par;
-        let Some(kind) = Kind::of(*estimator) else {
-            return Err(PARAMETERS.fault(par, |p| &mut p.estimator, "one of the enumeration's values"));
-        };
-        if start.mode == CURRENT_FREQUENCY && start.i > limit.i {
+        if start.mode == StartMode::CurrentFrequency && start.i > limit.i {
             return Err(above_limit(par, |p| &mut p.start.i));
         }
-        if start.mode == INJECTION {
-            if !kind.class().injects() {
+        if start.mode == StartMode::Injection {
+            if !estimator.class().injects() {
                 return Err(Fault::new(format!(
-                    "{} (Injection) and {} ({}): the start by injection needs an estimator that injects",
+                    "{} and {}: the start by injection needs an estimator that injects",
                     PARAMETERS.tell(par, |p| &mut p.start.mode),
-                    PARAMETERS.tell(par, |p| &mut p.estimator),
-                    kind.name()
+                    PARAMETERS.tell(par, |p| &mut p.estimator)
                 )));
             }
             polarity.validate(motor, *T_s, *s_2, limit.i)?;
         }
-        kind.validate(&context(par, &par.estimators, &par.motor))?;
+        estimator.validate(&context(par, &par.estimators, &par.motor))?;
         if zero_speed.i_0 > limit.i {
             return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
         }

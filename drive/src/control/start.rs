@@ -21,7 +21,7 @@ use crate::estimator::{Context, Sample};
 use crate::frame::DqHat;
 use crate::math::{atan2, exp};
 use fmu_core::unit::{AMPERE, Exponents, Quantity, SECOND, SPEED, Unit};
-use fmu_core::{Enumeration, Item, Row, Table};
+use fmu_core::{Field, Row, Table, enumeration};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -34,36 +34,21 @@ const ZETA: f64 = 0.5;
 /// Bandwidth of the EMF in rad/s.
 const FILTER: f64 = TAU * 60.0;
 
-/// The starts; a value never changes.
-pub static STARTS: Enumeration = Enumeration {
-    name: "Start",
-    description: "Start sequence before the estimator takes over",
-    items: &[
-        Item { value: 1, name: "Direct", description: "No sequence: the estimator starts at once" },
-        Item {
-            value: 2,
-            name: "CurrentFrequency",
-            description: "I-f start: a rotating current vector takes the rotor to start.speed",
-        },
-        Item {
-            value: 3,
-            name: "Injection",
-            description: "At standstill: injection finds the d axis, voltage pulses find the north pole",
-        },
-    ],
-};
-
-/// Value of the I-f start in [`STARTS`].
-pub const CURRENT_FREQUENCY: i32 = 2;
-
-/// Value of the start by injection in [`STARTS`].
-pub const INJECTION: i32 = 3;
+enumeration! {
+    /// The start sequences; a value never changes.
+    #[derive(Serialize, Deserialize)]
+    pub enum StartMode("Start", "Start sequence before the estimator takes over") {
+        1 Direct "No sequence: the estimator starts at once";
+        2 CurrentFrequency "I-f start: a rotating current vector takes the rotor to start.speed";
+        3 Injection "At standstill: injection finds the d axis, voltage pulses find the north pole";
+    }
+}
 
 /// Parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StartParameters {
-    /// Value in [`STARTS`].
-    pub mode: i32,
+    /// Which start sequence.
+    pub mode: StartMode,
     /// Current I in A, > 0.
     pub i: f64,
     /// Duration of each of the two alignments in s, > 0.
@@ -78,7 +63,7 @@ pub struct StartParameters {
 
 impl Default for StartParameters {
     fn default() -> Self {
-        Self { mode: 1, i: 5.0, t_align: 0.25, acceleration: 100.0, speed: 24.0, settle: 0.2 }
+        Self { mode: StartMode::Direct, i: 5.0, t_align: 0.25, acceleration: 100.0, speed: 24.0, settle: 0.2 }
     }
 }
 
@@ -195,9 +180,7 @@ type P = Row<StartParameters>;
 pub const START: &Table<StartParameters> = &Table::new(
     const {
         &[
-            P::enumeration_parameter("mode", &STARTS, "Start sequence before the estimator takes over", |p| {
-                &mut p.mode
-            }),
+            P::enumeration_parameter("mode", "Start sequence before the estimator takes over", &Field(|p| &mut p.mode)),
             P::parameter("i", &AMPERE, "Magnitude of the rotating current vector, I-f start", |p| &mut p.i).above(0.0),
             P::parameter("t_align", &SECOND, "Duration of each of the two alignments, I-f start", |p| &mut p.t_align)
                 .above(0.0),

@@ -6,7 +6,7 @@ use crate::control::polarity::{PolaritySearch, SearchStep};
 use crate::control::reference::max_torque_per_ampere;
 use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::{SpeedController, SpeedGains};
-use crate::control::start::{CURRENT_FREQUENCY, CurrentFrequencyStart, INJECTION, StartStep};
+use crate::control::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::control::tables::ControllerParameters;
 use crate::estimator::{Class, Context, Estimate, Estimator, EstimatorParameters, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
@@ -64,11 +64,11 @@ pub(super) enum Leader {
 
 impl Leader {
     /// The first one with `start.mode` = `mode`.
-    fn of(mode: i32) -> Self {
+    fn of(mode: StartMode) -> Self {
         match mode {
-            CURRENT_FREQUENCY => Self::Start(CurrentFrequencyStart::default()),
-            INJECTION => Self::Search(PolaritySearch::default()),
-            _ => Self::Estimator,
+            StartMode::CurrentFrequency => Self::Start(CurrentFrequencyStart::default()),
+            StartMode::Injection => Self::Search(PolaritySearch::default()),
+            StartMode::Direct => Self::Estimator,
         }
     }
 }

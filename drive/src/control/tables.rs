@@ -8,12 +8,12 @@ use crate::control::signals::ControllerOutputs;
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
 use crate::control::start::{START, StartParameters};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
+use crate::estimator::Kind;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
-use crate::estimator::{ESTIMATORS, Kind};
 use crate::motor::{MOTOR, Motor};
 use crate::plant::saturation::A_PER_WB2;
 use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METRE, ONE, RADIAN, SECOND, SPEED, VOLT};
-use fmu_core::{Part, Row, Table};
+use fmu_core::{Field, Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
 /// Limits of the current references.
@@ -78,8 +78,8 @@ pub struct ControllerParameters {
     pub T_s: f64,
     /// Samples from taking the currents to the voltage acting: 0, 1 (Jacobi exchange) or 2.
     pub delay: i32,
-    /// Value of the estimator in [`ESTIMATORS`].
-    pub estimator: i32,
+    /// The estimator of angle and speed.
+    pub estimator: Kind,
     /// Estimates of the machine.
     pub motor: Motor,
     /// Parameters of the estimators.
@@ -112,13 +112,6 @@ pub struct ControllerParameters {
     pub speed_est: f64,
 }
 
-impl ControllerParameters {
-    /// The estimator; the table lets no other value in.
-    pub(super) fn kind(&self) -> Kind {
-        Kind::of(self.estimator).unwrap_or(Kind::Rasmussen)
-    }
-}
-
 impl Default for ControllerParameters {
     /// Tuned for the reference motor, with R^ = 0.9 R on purpose: the safe side at standstill.
     fn default() -> Self {
@@ -126,7 +119,7 @@ impl Default for ControllerParameters {
         Self {
             T_s: 1e-4,
             delay: 1,
-            estimator: 1,
+            estimator: Kind::Rasmussen,
             motor: Motor { R_s: 0.9 * motor.R_s, ..motor },
             estimators: EstimatorParameters::default(),
             sensor: Sensor::default(),
@@ -163,9 +156,7 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             )
             .at_least(0.0)
             .at_most(2.0),
-            P::enumeration_parameter("estimator", &ESTIMATORS, "Estimator of rotor angle and speed", |p| {
-                &mut p.estimator
-            }),
+            P::enumeration_parameter("estimator", "Estimator of rotor angle and speed", &Field(|p| &mut p.estimator)),
             P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
             P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
             P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),

@@ -36,7 +36,7 @@ pub mod voltage_model;
 use crate::control::current::CurrentLoop;
 use crate::frame::{AlphaBeta, DqHat};
 use crate::motor::Motor;
-use fmu_core::{Enumeration, Fault, Item};
+use fmu_core::{Fault, enumeration};
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
 use tables::ESTIMATOR_PARAMETERS;
@@ -189,38 +189,15 @@ impl Class {
 /// The list: value, name, state, class, standstill and description make the enumeration and the one place of dispatch.
 macro_rules! estimators {
     ($($value:literal $name:ident($state:ty): $class:ident, standstill $standstill:literal, $description:literal;)*) => {
-        /// The estimators, in the order of the interface: a value never changes, new ones are appended.
-        pub static ESTIMATORS: Enumeration = Enumeration {
-            name: "Estimator",
-            description: "Estimator of rotor angle and speed",
-            items: &[$(Item { value: $value, name: stringify!($name), description: $description }),*],
-        };
-
-        /// An estimator by its name.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Kind {
-            $(#[doc = $description] $name = $value,)*
+        enumeration! {
+            /// The estimators, in the order of the interface: a value never changes, new ones are appended.
+            #[derive(Serialize, Deserialize)]
+            pub enum Kind("Estimator", "Estimator of rotor angle and speed") {
+                $($value $name $description;)*
+            }
         }
 
         impl Kind {
-            /// All of them.
-            pub const ALL: &'static [Self] = &[$(Self::$name),*];
-
-            /// The one with this value in [`ESTIMATORS`].
-            pub fn of(value: i32) -> Option<Self> {
-                match value {
-                    $($value => Some(Self::$name),)*
-                    _ => None,
-                }
-            }
-
-            /// Its name in [`ESTIMATORS`].
-            pub fn name(self) -> &'static str {
-                match self {
-                    $(Self::$name => stringify!($name),)*
-                }
-            }
-
             /// The signal that it finds the rotor by.
             pub fn class(self) -> Class {
                 match self {

@@ -14,32 +14,28 @@ use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
-use fmu_core::{Enumeration, Fault, Item, Row, Table};
+use fmu_core::{Fault, Field, Row, Table, enumeration};
 use serde::{Deserialize, Serialize};
 
-/// The demodulations; a value never changes.
-pub static DEMODULATIONS: Enumeration = Enumeration {
-    name: "Demodulation",
-    description: "Demodulation of pulsating injection",
-    items: &[
-        Item { value: 1, name: "Heterodyne", description: "Product with the carrier, Kim & Sul 2011, Fig. 9" },
-        Item { value: 2, name: "MeasurementAxes", description: "Magnitudes in axes at 45 degrees, Fig. 10" },
-    ],
-};
-
-/// Value of the 45-degree measurement axes in [`DEMODULATIONS`].
-pub const MEASUREMENT_AXES: i32 = 2;
+enumeration! {
+    /// The demodulations; a value never changes.
+    #[derive(Serialize, Deserialize)]
+    pub enum Demodulation("Demodulation", "Demodulation of pulsating injection") {
+        1 Heterodyne "Product with the carrier, Kim & Sul 2011, Fig. 9";
+        2 MeasurementAxes "Magnitudes in axes at 45 degrees, Fig. 10";
+    }
+}
 
 /// Parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PulsatingParameters {
-    /// Value in [`DEMODULATIONS`].
-    pub demodulation: i32,
+    /// How the angle error is demodulated from the carrier current.
+    pub demodulation: Demodulation,
 }
 
 impl Default for PulsatingParameters {
     fn default() -> Self {
-        Self { demodulation: 1 }
+        Self { demodulation: Demodulation::Heterodyne }
     }
 }
 
@@ -78,7 +74,7 @@ impl Estimating for PulsatingInjection {
         let carrier = Carrier::at(context, sample.k);
         let middle = Axis::<Estimated>::at(0.5 * (tracker.theta_last + tracker.theta));
         let x = band_pass.update(&carrier, response(motor, middle, sample, T_s));
-        let demodulated = if par.pulsating.demodulation == MEASUREMENT_AXES {
+        let demodulated = if par.pulsating.demodulation == Demodulation::MeasurementAxes {
             let magnitudes = ((x.d() + x.q()).abs() - (x.d() - x.q()).abs()) * FRAC_1_SQRT_2;
             magnitudes * (0.5 * FRAC_PI_2 * SQRT_2) * par.carrier.voltage
         } else {
@@ -106,9 +102,11 @@ type P = Row<PulsatingParameters>;
 /// The variables; their owner gives the prefix `pulsating.`.
 pub const PULSATING: &Table<PulsatingParameters> = &Table::new(
     const {
-        &[P::enumeration_parameter("demodulation", &DEMODULATIONS, "Demodulation of the carrier current", |p| {
-            &mut p.demodulation
-        })]
+        &[P::enumeration_parameter(
+            "demodulation",
+            "Demodulation of the carrier current",
+            &Field(|p| &mut p.demodulation),
+        )]
     },
 );
 
@@ -121,7 +119,7 @@ mod tests {
     #[test]
     fn finds_the_rotor_with_both_demodulations_and_every_delay() {
         let mut par = EstimatorParameters::default();
-        for demodulation in [1, MEASUREMENT_AXES] {
+        for &demodulation in Demodulation::ALL {
             par.pulsating.demodulation = demodulation;
             finds_the_rotor::<PulsatingInjection>(&par, 0.1);
         }

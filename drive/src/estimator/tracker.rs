@@ -10,35 +10,31 @@
 
 use crate::estimator::{Context, Estimate, Sample};
 use fmu_core::unit::RAD_PER_S;
-use fmu_core::{Enumeration, Fault, Item, Row, Table};
+use fmu_core::{Fault, Field, Row, Table, enumeration};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
-/// The trackers; a value never changes.
-pub static TRACKERS: Enumeration = Enumeration {
-    name: "Tracker",
-    description: "Tracker of angle and speed from an angle error",
-    items: &[
-        Item { value: 1, name: "Pll", description: "Phase-locked loop of second order" },
-        Item { value: 2, name: "MechanicalObserver", description: "Observer of speed and load torque, of third order" },
-    ],
-};
-
-/// Value of the mechanical observer in [`TRACKERS`].
-pub const MECHANICAL_OBSERVER: i32 = 2;
+enumeration! {
+    /// The trackers; a value never changes.
+    #[derive(Serialize, Deserialize)]
+    pub enum TrackerKind("Tracker", "Tracker of angle and speed from an angle error") {
+        1 Pll "Phase-locked loop of second order";
+        2 MechanicalObserver "Observer of speed and load torque, of third order";
+    }
+}
 
 /// Parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrackerParameters {
-    /// Value in [`TRACKERS`].
-    pub kind: i32,
+    /// Which tracker.
+    pub kind: TrackerKind,
     /// Pole rho in rad/s, > 0, of multiplicity two or three.
     pub bandwidth: f64,
 }
 
 impl Default for TrackerParameters {
     fn default() -> Self {
-        Self { kind: 1, bandwidth: 2.0 * std::f64::consts::PI * 20.0 }
+        Self { kind: TrackerKind::Pll, bandwidth: 2.0 * std::f64::consts::PI * 20.0 }
     }
 }
 
@@ -75,7 +71,7 @@ impl Tracker {
     #[inline]
     pub fn correct(&mut self, context: &Context, rho: f64, e: f64, tau_ref: f64) {
         let T_s = context.T_s;
-        if context.par.tracker.kind == MECHANICAL_OBSERVER {
+        if context.par.tracker.kind == TrackerKind::MechanicalObserver {
             let inertia = context.J / f64::from(context.motor.n_p);
             self.w_frame = self.w + 3.0 * rho * e;
             self.w += T_s * ((tau_ref - self.tau_load) / inertia + 3.0 * rho * rho * e);
@@ -92,9 +88,11 @@ impl Tracker {
 /// # Errors
 /// The mechanical observer has no inertia.
 pub fn validate(context: &Context) -> Result<(), Fault> {
-    if context.par.tracker.kind == MECHANICAL_OBSERVER && context.J.partial_cmp(&0.0) != Some(Ordering::Greater) {
+    if context.par.tracker.kind == TrackerKind::MechanicalObserver
+        && context.J.partial_cmp(&0.0) != Some(Ordering::Greater)
+    {
         return Err(Fault::new(format!(
-            "mechanics.J = {} kg.m2 and {} (MechanicalObserver): that observer divides torque by inertia, which must be above 0",
+            "mechanics.J = {} kg.m2 and {}: that observer divides torque by inertia, which must be above 0",
             context.J,
             context.tell(|p| &mut p.tracker.kind)
         )));
@@ -118,9 +116,11 @@ type P = Row<TrackerParameters>;
 pub const TRACKER: &Table<TrackerParameters> = &Table::new(
     const {
         &[
-            P::enumeration_parameter("kind", &TRACKERS, "Tracker of angle and speed from the angle error", |p| {
-                &mut p.kind
-            }),
+            P::enumeration_parameter(
+                "kind",
+                "Tracker of angle and speed from the angle error",
+                &Field(|p| &mut p.kind),
+            ),
             P::parameter("bandwidth", &RAD_PER_S, "Magnitude of the tracker's double or triple pole", |p| {
                 &mut p.bandwidth
             })
@@ -138,7 +138,7 @@ mod tests {
     use crate::motor::Motor;
 
     /// Angle and speed error after `n` samples behind a rotor with a constant acceleration (rad/s2).
-    fn behind(kind: i32, acceleration: f64, tau_ref: f64, n: u32) -> (f64, f64) {
+    fn behind(kind: TrackerKind, acceleration: f64, tau_ref: f64, n: u32) -> (f64, f64) {
         let par = EstimatorParameters {
             tracker: TrackerParameters { kind, ..TrackerParameters::default() },
             ..EstimatorParameters::default()
@@ -160,11 +160,11 @@ mod tests {
     #[test]
     fn steady_errors_are_those_of_the_loop_type() {
         let rho = TrackerParameters::default().bandwidth;
-        let (angle, speed) = behind(1, 0.0, 0.0, 5000);
+        let (angle, speed) = behind(TrackerKind::Pll, 0.0, 0.0, 5000);
         assert!(angle.abs() < 1e-10 && speed.abs() < 1e-9, "PLL at constant speed: {angle} rad, {speed} rad/s");
-        let (angle, _) = behind(1, 1000.0, 0.0, 5000);
+        let (angle, _) = behind(TrackerKind::Pll, 1000.0, 0.0, 5000);
         assert!((angle - 1000.0 / (rho * rho)).abs() < 1e-4, "PLL at constant acceleration: {angle} rad");
-        let (angle, speed) = behind(2, 1000.0, 0.0, 10_000);
+        let (angle, speed) = behind(TrackerKind::MechanicalObserver, 1000.0, 0.0, 10_000);
         assert!(angle.abs() < 1e-9 && speed.abs() < 0.2, "the unknown load becomes tau_load: {angle}, {speed}");
     }
 }

@@ -70,14 +70,14 @@ mod tests {
     fn asks_for_its_current_loop() {
         let mut pair = Pair::default();
         let par = &mut pair.controller.model.parameters;
-        par.estimator = Kind::VoltageFeedback as i32;
+        par.estimator = Kind::VoltageFeedback;
         (par.current.reference_feed_forward, par.current.integral) = (true, 0.2);
         pair.start().unwrap();
         pair.controller.model.parameters.current.reference_feed_forward = false;
         let fault = pair.start().unwrap_err();
         assert!(fault.message().contains("current.reference_feed_forward"), "{fault}");
         let mut pair = Pair::default();
-        pair.controller.model.parameters.estimator = Kind::ExtendedEmf as i32;
+        pair.controller.model.parameters.estimator = Kind::ExtendedEmf;
         pair.controller.model.parameters.estimators.tracker.bandwidth = 400.0;
         assert!(pair.start().unwrap_err().message().contains("tracker.bandwidth = 400 rad/s"));
     }

@@ -1,7 +1,7 @@
 //! A model with every kind of variable, that can be told to fail.
 
 use fmu_core::unit::{AMPERE, OHM, SPEED, VOLT};
-use fmu_core::{Block, Elapsed, Enumeration, Experiment, Fault, Info, Item, Model, Row, Step, Table};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Field, Info, Model, Row, Step, Table, enumeration};
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -13,7 +13,7 @@ pub struct Probe {
     map: [f64; 3],
     gain: f64,
     n: i32,
-    mode: i32,
+    mode: Mode,
     flag: bool,
     double_gain: f64,
     x: f64,
@@ -45,18 +45,17 @@ pub const DOUBLE_GAIN: u32 = 15;
 pub const UNKNOWN: u32 = 16;
 
 /// Values of `mode`.
-pub const FAULTY: i32 = 2;
-pub const PANICKY: i32 = 4;
+pub const FAULTY: i32 = Mode::Faulty as i32;
+pub const PANICKY: i32 = Mode::Panicky as i32;
 
-static MODES: Enumeration = Enumeration {
-    name: "Mode",
-    description: "What a step does",
-    items: &[
-        Item { value: 1, name: "Plain", description: "" },
-        Item { value: FAULTY, name: "Faulty", description: "" },
-        Item { value: PANICKY, name: "Panicky", description: "" },
-    ],
-};
+enumeration! {
+    #[derive(Serialize, Deserialize)]
+    pub enum Mode("Mode", "What a step does") {
+        1 Plain "";
+        2 Faulty "";
+        4 Panicky "";
+    }
+}
 
 impl Default for Probe {
     fn default() -> Self {
@@ -68,7 +67,7 @@ impl Default for Probe {
             map: [0.0, 1.0, 2.0],
             gain: 1.0,
             n: 1,
-            mode: 1,
+            mode: Mode::Plain,
             flag: false,
             double_gain: 0.0,
             x: 0.0,
@@ -104,7 +103,7 @@ impl Model for Probe {
                 V::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.model.map).at_least(-1.0),
                 V::parameter("gain", &OHM, "Gain", |m| &mut m.model.gain).at_least(0.0).at_most(10.0).tunable(),
                 V::integer_parameter("n", "Count", |m| &mut m.model.n).at_least(1.0),
-                V::enumeration_parameter("mode", &MODES, "Mode", |m| &mut m.model.mode),
+                V::enumeration_parameter("mode", "Mode", &Field(|m| &mut m.model.mode)),
                 V::boolean_parameter("flag", "Flag", |m| &mut m.model.flag),
                 V::calculated("double_gain", &OHM, "Twice the gain", |m| &mut m.model.double_gain),
             ]
@@ -136,9 +135,9 @@ impl Model for Probe {
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         match self.mode {
-            FAULTY => return Err(Fault::new("x left the finite numbers by 50 %, see #4")),
-            PANICKY => panic!("the model panicked"),
-            _ => {}
+            Mode::Faulty => return Err(Fault::new("x left the finite numbers by 50 %, see #4")),
+            Mode::Panicky => panic!("the model panicked"),
+            Mode::Plain => {}
         }
         if self.on {
             self.x += step.h * (self.double_gain * self.u / self.r - 0.1 * self.x + self.k + self.map[1]);

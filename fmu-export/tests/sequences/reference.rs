@@ -65,7 +65,11 @@ impl Snapshot {
     }
 
     fn integer(&self, reference: u32) -> i32 {
-        self.slot(reference, |slot| if let Slot::Integer(x) = slot { *x } else { unreachable!() })
+        self.slot(reference, |slot| match slot {
+            Slot::Integer(x) => *x,
+            Slot::Enumeration(x) => x.get(),
+            _ => unreachable!(),
+        })
     }
 
     fn truth(&self, reference: u32) -> bool {
@@ -77,6 +81,7 @@ impl Snapshot {
             Slot::Real(x) => *x = value.real,
             Slot::Integer(x) => *x = i32::try_from(value.integer).unwrap(),
             Slot::Boolean(x) => *x = value.truth != 0,
+            Slot::Enumeration(x) => assert!(x.set(i32::try_from(value.integer).unwrap())),
         }
     }
 

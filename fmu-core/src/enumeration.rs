@@ -1,0 +1,110 @@
+//! Enumerations: one declaration gives the Rust enum, its type definition and what its row needs.
+//!
+//! The importer sees an integer; the model holds the enum, so a value that does not exist cannot be stored.
+
+use crate::variable::Enumeration;
+use std::fmt::Debug;
+
+/// A Rust enum that crosses the interface as an integer; [`enumeration!`](crate::enumeration!) implements it.
+pub trait Enumerated: Copy + Debug + 'static {
+    /// Its type definition.
+    const ENUMERATION: &'static Enumeration;
+
+    /// The item with this value.
+    fn of(value: i32) -> Option<Self>;
+
+    /// The value of this item.
+    fn value(self) -> i32;
+}
+
+/// Where a model holds an enum of some type.
+pub trait Choice: Debug {
+    /// The value of the item that is chosen.
+    fn get(&self) -> i32;
+
+    /// Chooses the item with this value; returns false and changes nothing if there is none.
+    fn set(&mut self, value: i32) -> bool;
+}
+
+impl<E: Enumerated> Choice for E {
+    fn get(&self) -> i32 {
+        self.value()
+    }
+
+    fn set(&mut self, value: i32) -> bool {
+        let item = E::of(value);
+        *self = item.unwrap_or(*self);
+        item.is_some()
+    }
+}
+
+/// Where a `W` holds an enum `E`.
+pub struct Field<W: 'static, E: 'static>(pub fn(&mut W) -> &mut E);
+
+/// What a table asks of a [`Field`] without knowing its type.
+pub(crate) trait Place<W>: Sync {
+    fn find<'a>(&self, whole: &'a mut W) -> &'a mut dyn Choice;
+}
+
+impl<W, E: Enumerated> Place<W> for Field<W, E> {
+    fn find<'a>(&self, whole: &'a mut W) -> &'a mut dyn Choice {
+        (self.0)(whole)
+    }
+}
+
+/// Declares an enumeration: the Rust enum, `ALL`, `name`, and its type definition by [`Enumerated`](crate::Enumerated).
+///
+/// ```
+/// # use fmu_core::Enumerated;
+/// fmu_core::enumeration! {
+///     /// Rust documentation.
+///     pub enum Fan("FanMode", "What the fan does") {
+///         1 Off "Stands still";
+///         2 On "Turns";
+///     }
+/// }
+/// assert_eq!((Fan::of(2), Fan::of(3), Fan::On.value(), Fan::On.name()), (Some(Fan::On), None, 2, "On"));
+/// ```
+#[macro_export]
+macro_rules! enumeration {
+    ($(#[$attribute:meta])* $visibility:vis enum $type:ident($name:literal, $description:literal) {
+        $($value:literal $item:ident $about:literal;)*
+    }) => {
+        $(#[$attribute])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        $visibility enum $type {
+            $(#[doc = $about] $item = $value,)*
+        }
+
+        impl $type {
+            /// All items, in the order of the interface.
+            $visibility const ALL: &'static [Self] = &[$(Self::$item),*];
+
+            /// Name of the item.
+            $visibility fn name(self) -> &'static str {
+                match self {
+                    $(Self::$item => stringify!($item),)*
+                }
+            }
+        }
+
+        impl $crate::Enumerated for $type {
+            const ENUMERATION: &'static $crate::Enumeration = &$crate::Enumeration {
+                name: $name,
+                description: $description,
+                items: &[$($crate::Item { value: $value, name: stringify!($item), description: $about }),*],
+            };
+
+            fn of(value: i32) -> Option<Self> {
+                match value {
+                    $($value => Some(Self::$item),)*
+                    _ => None,
+                }
+            }
+
+            fn value(self) -> i32 {
+                self as i32
+            }
+        }
+    };
+}
