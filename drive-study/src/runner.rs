@@ -21,7 +21,7 @@ pub const U_DEAD: f64 = 10.8;
 
 /// The 2.2 kW machine with interior magnets.
 pub fn machine() -> Motor {
-    Motor { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 }
+    Motor::IPMSM_2_2_KW
 }
 
 /// The drive at rest with the gains that the figures were made with, for one estimator.

@@ -35,12 +35,10 @@ pub use pmsm_drive::PmsmDrive;
 
 /// What all models of this crate tell of themselves alike; each adds its own name, description and documentation.
 const PROJECT: fmu_core::Info = fmu_core::Info {
-    name: "",
-    description: "",
     version: env!("CARGO_PKG_VERSION"),
     author: "The sensorless-drive developers",
     license: "MIT OR Apache-2.0",
     copyright: "Copyright (c) 2026 The sensorless-drive developers",
     experiment: fmu_core::Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
-    documentation: "",
+    ..fmu_core::Info::DEFAULT
 };

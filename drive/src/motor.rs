@@ -27,6 +27,9 @@ impl Default for Motor {
 }
 
 impl Motor {
+    /// The 2.2 kW machine with interior magnets of the Kim & Sul figures (`motors/ipmsm-2.2kw.toml` has its source).
+    pub const IPMSM_2_2_KW: Self = Self { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 };
+
     /// Torque per ampere of i_q in N.m/A: K = 1.5 n_p psi_M.
     pub fn torque_constant(&self) -> f64 {
         1.5 * f64::from(self.n_p) * self.psi_M

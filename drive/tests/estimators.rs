@@ -10,7 +10,7 @@ use fmu_core::{Enumerated, Model};
 
 /// The 2.2 kW machine: its saliency suits every method.
 fn salient() -> Motor {
-    Motor { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 }
+    Motor::IPMSM_2_2_KW
 }
 
 #[test]

@@ -24,6 +24,20 @@ pub struct Info {
     pub documentation: &'static str,
 }
 
+impl Info {
+    /// Defaults for all but the name: `Info { name: "MyModel", description: "...", ..Info::DEFAULT }`.
+    pub const DEFAULT: Self = Self {
+        name: "",
+        description: "",
+        version: "0.1.0",
+        author: "",
+        license: "",
+        copyright: "",
+        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-3 },
+        documentation: "",
+    };
+}
+
 /// The default experiment: times in s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Experiment {

@@ -67,11 +67,8 @@ impl Model for Small {
         name: "Small",
         description: "A test",
         version: "1",
-        author: "",
-        license: "MIT",
-        copyright: "",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
-        documentation: "",
+        ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = &Table::new(
         const {

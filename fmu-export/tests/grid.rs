@@ -45,13 +45,9 @@ impl Model for Sampler {
     type Outputs = Outputs;
     const INFO: Info = Info {
         name: "Sampler",
-        description: "",
         version: "1",
-        author: "",
-        license: "MIT",
-        copyright: "",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
-        documentation: "",
+        ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = &Table::new(
         const {

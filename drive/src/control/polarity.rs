@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn pulses_that_cannot_decide_are_refused() {
-        let motor = Motor { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 };
+        let motor = Motor::IPMSM_2_2_KW;
         let par = PolarityParameters::default();
         par.validate(&motor, 1e-4, 40.0, 15.0).unwrap();
         let message = |par: &PolarityParameters, s_2, limit| {

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     fn salient() -> Motor {
-        Motor { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 }
+        Motor::IPMSM_2_2_KW
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::plant::machine::flux;
 
 /// The machine of the tests, salient.
 pub(crate) fn salient() -> Motor {
-    Motor { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 }
+    Motor::IPMSM_2_2_KW
 }
 
 /// Angle error theta - theta^ (rad) and speed error (rad/s) after `n` samples of 0.1 ms beside a machine with the

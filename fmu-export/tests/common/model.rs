@@ -84,11 +84,8 @@ impl Model for Probe {
         name: "Probe",
         description: "A model for tests",
         version: "1.0",
-        author: "",
-        license: "MIT",
-        copyright: "",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
-        documentation: "",
+        ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = &Table::new(
         const {
