@@ -63,10 +63,10 @@ fn watch(name: &'static str) -> Arc<AtomicU64> {
     let trial = Arc::new(AtomicU64::new(0));
     let seen = Arc::downgrade(&trial);
     std::thread::spawn(move || {
-        let (mut last, mut since) = (0, Instant::current());
+        let (mut last, mut since) = (0, Instant::now());
         while let Some(current) = seen.upgrade().map(|trial| trial.load(Relaxed)) {
             if current != last {
-                (last, since) = (current, Instant::current());
+                (last, since) = (current, Instant::now());
             }
             if since.elapsed() > PATIENCE {
                 eprintln!("{name}: trial {current} hangs");
@@ -206,7 +206,7 @@ fn trial<M: Model>(bytes: &[u8]) -> Option<Duration> {
             if instance.current.life.state() != State::Step {
                 return;
             }
-            let began = Instant::current();
+            let began = Instant::now();
             let done = instance.do_step(instance.current.end, H);
             longest = longest.max(began.elapsed());
             if done.is_err() {
