@@ -18,12 +18,12 @@ use fmu_export::snapshot::Snapshot;
 /// Saves and restores a block's state.
 fn again_and_again<M: Model>(block: Block<M>, what: &str) {
     let log = Log::new(Box::new(Silent), false);
-    let mut it = Instance::new(Standard::Fmi3, what.into(), log, Snapshot { block, ..Snapshot::default() });
-    let handle = it.save(0).unwrap();
+    let mut instance = Instance::new(Standard::Fmi3, what.into(), log, Snapshot { block, ..Snapshot::default() });
+    let handle = instance.save(0).unwrap();
     let before = calls();
     for _ in 0..100 {
-        assert_eq!(it.save(handle).unwrap(), handle);
-        it.restore(handle).unwrap();
+        assert_eq!(instance.save(handle).unwrap(), handle);
+        instance.restore(handle).unwrap();
     }
     assert_eq!(calls(), before, "saving and restoring {} with {what}", M::INFO.name);
     registry::free::<M>(handle).unwrap();

@@ -111,3 +111,23 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
         }
     }
 }
+
+/// A file of the checker names the module that a type lives in; types at the root would tie all files into one circle.
+#[test]
+fn no_module_of_the_checker_depends_on_its_root() {
+    let mut files = Vec::new();
+    sources(&root().join("fmu-check/src"), &mut files);
+    assert!(files.len() > 30, "{files:?}");
+    let own = ["lib.rs", "main.rs", "command.rs"].map(|name| root().join("fmu-check/src").join(name));
+    for file in files.iter().filter(|file| !own.contains(file)) {
+        let text = std::fs::read_to_string(file).unwrap();
+        let root_of = ["use crate::", "use super::"].map(|path| text.split(path).skip(1).collect::<Vec<_>>()).concat();
+        let named = root_of.iter().find(|rest| rest.starts_with(|c: char| c == '{' || c.is_uppercase()));
+        assert!(
+            named.is_none(),
+            "{}: imports from the root: {}",
+            file.display(),
+            named.unwrap().lines().next().unwrap()
+        );
+    }
+}

@@ -1,4 +1,4 @@
-//! The file that is checked: its archive, its description as a tree and as read, and what was unpacked of it.
+//! The file under check: archive, description as XML tree and as parsed, and the unpacked folders.
 
 use crate::zip_headers::{Archive, contents, is_inside};
 use fmu_import::platform::Platform;

@@ -7,7 +7,7 @@ use fmu_import::raw::{Arguments, Buffer, Handle, Raw, SavedState, Simple};
 use model_description::{FmiVersion, ModelVariable};
 use std::cell::Cell;
 
-/// An instance. It is not freed by itself: that the FMU frees it well is a probe of its own.
+/// An instance. Dropping it does not free it: a probe of its own checks freeing.
 pub(super) struct Instance<'b> {
     pub(super) session: &'b Session,
     pub(super) handle: Handle,
@@ -188,7 +188,7 @@ impl Instance<'_> {
         variables.iter().map(read).collect()
     }
 
-    /// Steps `n` times and tells all watched variables after each: the trajectory.
+    /// Steps `n` times with held inputs and returns all watched variables after each step.
     pub(super) fn run(&self, n: usize, h: f64) -> Result<Vec<Vec<Vec<u64>>>, Blocked> {
         let watched = self.session.watched();
         self.session.many(

@@ -7,7 +7,7 @@ use crate::session::{Blocked, Line, Session};
 use std::fs;
 use std::path::Path;
 
-/// Checks for which it is a violation that the probe cannot even begin. All others then are not determined.
+/// Checks that are violated if the probe cannot start; all others are then not determined.
 const VIOLATED_WHEN_BLOCKED: [&str; 2] = ["B00", "L00"];
 
 /// Runs one probe, in this process.

@@ -1,4 +1,4 @@
-//! What `fmu check` tells: as text, JSON and HTML.
+//! The report of `fmu check` as text, JSON and HTML.
 
 use crate::check::{Finding, Level, Verdict};
 use crate::checks::GROUPS;
@@ -15,7 +15,7 @@ pub struct Report {
     pub fmi_version: String,
     /// Name of the model, where the description can be read.
     pub model: Option<String>,
-    /// What wrote the file, as it says.
+    /// Attribute generationTool.
     pub generation_tool: Option<String>,
     /// One for each check.
     pub findings: Vec<Finding>,
@@ -104,7 +104,7 @@ impl Report {
         GROUPS.iter().map(move |g| (g.title, of(g.name))).filter(|(_, findings)| !findings.is_empty())
     }
 
-    /// For a terminal: what is wrong and what was left out; with `verbose` also what is right.
+    /// Text for a terminal: violated and undetermined checks; with `verbose` also all others.
     pub fn text(&self, verbose: bool) -> String {
         let mut out = format!("{}\n", self.heading());
         for (title, findings) in self.groups() {

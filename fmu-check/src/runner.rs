@@ -15,11 +15,11 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Time that a probe may take.
+/// Default time limit of a probe.
 const TIMEOUT: Duration = Duration::from_secs(10);
-/// Checks that say what is wrong when not even a plain life goes through.
+/// Checks that run even if a minimal run fails, because they show why.
 const WITHOUT_MINIMAL_RUN: [&str; 3] = ["B00", "L00", "X02b"];
-/// Most restarts of a probe whose cases kill it.
+/// Maximum number of restarts of a probe whose cases crash it.
 const MAX_RESTARTS: usize = 12;
 
 /// The verdicts of checks, in their order.
@@ -56,7 +56,7 @@ pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Ve
     verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect()
 }
 
-/// Why all other probes are in vain: not even a plain life goes through.
+/// Why all other probes would fail: the minimal run (L00) fails.
 fn why_no_run_succeeds(runner: &Result<Runner, String>) -> Option<String> {
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == "L00")?;
     match runner.as_ref().ok()?.run(check) {
@@ -78,7 +78,7 @@ fn store(place: &Mutex<Option<Verdict>>, verdict: Verdict) {
     }
 }
 
-/// What is the same for all probes of a subject.
+/// Settings that all probes of a file share.
 struct Runner {
     program: PathBuf,
     dir: PathBuf,
@@ -86,7 +86,7 @@ struct Runner {
     timeout: Duration,
 }
 
-/// How a child ended.
+/// How a child process ended.
 enum Outcome {
     Exit(ExitStatus),
     TimedOut,
@@ -213,7 +213,7 @@ fn read(out: &Path) -> Vec<Line> {
     text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
 }
 
-/// What the process said or left, although nobody asked it to.
+/// Unwanted console output and files of the process.
 fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
     let console = fs::read(folder.join("console")).unwrap_or_default();
     let console = String::from_utf8_lossy(&console);
@@ -224,7 +224,7 @@ fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
     findings
 }
 
-/// A verdict of what was written and of how often the process died.
+/// The verdict from the lines of the probe and from its crashes (how, and in which call).
 fn verdict_of(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>) -> Verdict {
     let (mut violated, mut notes, mut blocked, mut not_applicable) = (Vec::new(), Vec::new(), None, None);
     for line in lines {

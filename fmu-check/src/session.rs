@@ -1,7 +1,7 @@
-//! The probe's side: one FMU, loaded into a process of its own, and what is found out about it.
+//! The session of a probe: one FMU, loaded into its own process, and the findings about it.
 //!
-//! Everything that is found is written down at once, and every call before it is made, so that nothing is lost when the
-//! FMU takes the process down. `Err(Blocked)` ends a probe that cannot find out what it wants.
+//! Every finding is written at once and every call is written before it is made, so that nothing is lost if the FMU crashes the
+//! process. `Err(Blocked)` ends a probe that cannot decide.
 
 use crate::encoding::bits;
 use clap::Args;
@@ -18,11 +18,11 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Why something cannot be found out.
+/// Why a probe cannot decide.
 #[derive(Debug)]
 pub(super) struct Blocked(pub(super) String);
 
-/// One line of what a probe writes down.
+/// One line of a probe's output.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Line {
@@ -30,7 +30,7 @@ pub(super) enum Line {
     Case(usize),
     /// A violation.
     Violated(String),
-    /// Something worth telling of a pass.
+    /// Evidence for a pass.
     Note(String),
     /// The requirement is not about this FMU.
     NotApplicable(String),
@@ -83,7 +83,7 @@ pub(super) struct Session {
     timeout: Duration,
 }
 
-/// Most violations that one probe tells.
+/// Maximum number of violations that one probe reports.
 const MAX_VIOLATIONS: usize = 25;
 
 impl Session {
@@ -122,7 +122,7 @@ impl Session {
         self.duplicate_with(raw, number)
     }
 
-    /// The same FMU with another loaded binary; what it finds and calls goes to files that nobody reads.
+    /// The same FMU with another loaded binary; its findings and calls are discarded.
     pub(super) fn duplicate_with(&self, raw: Raw, number: usize) -> Result<Self, Blocked> {
         self.duplicate_at(&self.dir, raw, number)
     }
@@ -148,7 +148,7 @@ impl Session {
         })
     }
 
-    /// Tells instances from now on that the FMU was unpacked to another folder.
+    /// Passes another unpacked folder to all further instances.
     pub(super) fn move_to(&mut self, dir: &Path) {
         dir.clone_into(&mut self.dir);
     }
@@ -158,14 +158,14 @@ impl Session {
         self.dir.join("resources")
     }
 
-    /// Writes a line down.
+    /// Writes a line.
     pub(super) fn write(&self, line: &Line) {
         if let Ok(text) = serde_json::to_string(line) {
             let _ = writeln!(self.lines.borrow_mut(), "{text}");
         }
     }
 
-    /// Tells a violation.
+    /// Reports a violation.
     pub(super) fn violated(&self, text: impl Into<String>) {
         self.violations.set(self.violations.get() + 1);
         if self.violations.get() <= MAX_VIOLATIONS {
@@ -173,14 +173,14 @@ impl Session {
         }
     }
 
-    /// Tells a violation unless it holds.
+    /// Reports a violation unless `holds`.
     pub(super) fn require(&self, holds: bool, text: impl FnOnce() -> String) {
         if !holds {
             self.violated(text());
         }
     }
 
-    /// Tells something worth knowing.
+    /// Reports evidence.
     pub(super) fn note(&self, text: impl Into<String>) {
         self.write(&Line::Note(text.into()));
     }
@@ -192,7 +192,7 @@ impl Session {
         Ok(())
     }
 
-    /// A part of a probe that stands alone: after a crash the probe goes on with the next.
+    /// Runs an independent case of a probe: after a crash the probe continues with the next case.
     pub(super) fn case(&self, case: impl FnOnce() -> Result<(), Blocked>) {
         let number = self.next.get();
         self.next.set(number + 1);
@@ -210,7 +210,7 @@ impl Session {
         self.began.elapsed() > self.timeout / 2
     }
 
-    /// Notes the call that comes next.
+    /// Writes the next call to the journal.
     pub(super) fn calling(&self, call: &str) {
         if self.silent.get() {
             return;
@@ -223,7 +223,7 @@ impl Session {
         let _ = journal.set_len(end);
     }
 
-    /// Makes calls without noting each; the journal tells this instead.
+    /// Makes many calls with one journal entry.
     pub(super) fn many<T>(&self, what: &str, work: impl FnOnce() -> T) -> T {
         self.calling(what);
         let before = self.silent.replace(true);
@@ -240,7 +240,7 @@ impl Session {
         result
     }
 
-    /// Good arguments for an instantiation.
+    /// Valid arguments for an instantiation.
     pub(super) fn arguments(&self, name: &str) -> Arguments {
         let text = |text: &str| CString::new(text).unwrap_or_default();
         let resources = self.resources();
@@ -270,7 +270,7 @@ impl Session {
         self.description.default_experiment.start.filter(|t| t.is_finite()).unwrap_or(0.0)
     }
 
-    /// A communication step that should suit.
+    /// A suitable communication step in s.
     pub(super) fn h(&self) -> f64 {
         let x = self.description.default_experiment;
         let fixed = self

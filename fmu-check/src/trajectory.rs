@@ -1,9 +1,9 @@
-//! Runs and what comes out of them.
+//! Trajectories: the watched variables after each step.
 
 use crate::instance::Instance;
 use crate::session::Blocked;
 
-/// Inputs that move, so that instances do something.
+/// Steps `n` times with changing inputs and returns all watched variables after each step.
 pub(super) fn trajectory(instance: &Instance<'_>, n: u32) -> Result<Vec<Vec<Vec<u64>>>, Blocked> {
     let watched = instance.session.watched();
     (0..n)

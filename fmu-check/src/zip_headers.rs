@@ -1,4 +1,4 @@
-//! The raw headers of a ZIP archive: what is really in the file, not what a kind reader makes of it (APPNOTE 6.3).
+//! The raw headers of a ZIP archive, without the corrections of a tolerant reader (APPNOTE 6.3).
 
 use flate2::bufread::DeflateDecoder;
 use std::io::Read;

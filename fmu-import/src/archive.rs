@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use zip::ZipArchive;
 
-/// Most bytes that are unpacked; an archive that claims less and yields more is stopped there.
+/// Maximum number of unpacked bytes, also for an archive whose headers claim less.
 const LIMIT: u64 = 4 << 30;
-/// Most entries.
+/// Maximum number of entries.
 const ENTRIES: usize = 100_000;
 
 /// An FMU's archive, checked, with its description read.
@@ -40,7 +40,7 @@ impl Archive {
         Ok(Self { path: path.into(), zip, names, description })
     }
 
-    /// Its terminals and icons, where it has some.
+    /// Terminals and icons, if there are any.
     pub(super) fn terminals(&mut self) -> Result<Option<TerminalsAndIcons>, Error> {
         const NAME: &str = "terminalsAndIcons/terminalsAndIcons.xml";
         let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, cause);
@@ -49,7 +49,7 @@ impl Archive {
         xml.map(read).transpose()
     }
 
-    /// Extracts the binaries for this machine and the resources; returns the folder and the binary in it.
+    /// Extracts the binaries for this platform and the resources; returns the folder and the path of the binary.
     pub(super) fn extract(&mut self) -> Result<(TempDir, PathBuf), Error> {
         let wrong = |path: &Path, cause: &dyn std::fmt::Display| Error::file(path, cause);
         let Some(interface) = &self.description.co_simulation else {
@@ -129,7 +129,7 @@ impl Archive {
     }
 }
 
-/// The contents of an entry; `None` where there is none of this name.
+/// The contents of an entry; `None` if no entry has this name.
 fn contents(zip: &mut ZipArchive<File>, name: &str) -> Result<Option<Vec<u8>>, String> {
     let mut bytes = Vec::new();
     match zip.by_name(name) {

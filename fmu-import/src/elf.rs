@@ -1,4 +1,4 @@
-//! What a Linux binary needs of the machine that loads it, read from its ELF file.
+//! Requirements of a Linux binary on the system that loads it, read from its ELF file.
 
 use object::read::elf::{Dyn, ElfFile64, FileHeader, SectionHeader};
 use std::fmt;
@@ -29,10 +29,10 @@ pub struct Needs {
 }
 
 impl Needs {
-    /// Those of a 64-bit ELF file.
+    /// The requirements of a 64-bit ELF file.
     ///
     /// # Errors
-    /// It is none.
+    /// The file is not a 64-bit ELF file.
     pub fn of(bytes: &[u8]) -> Result<Self, object::Error> {
         let file = ElfFile64::parse(bytes)?;
         let others = strings(&file, NEEDED)?.into_iter().filter(|n| !is_system(n)).collect();
@@ -100,7 +100,7 @@ fn object_error() -> object::Error {
     object::File::parse(&[][..]).err().unwrap_or_else(|| unreachable!("nothing is no file"))
 }
 
-/// The newest version of the GNU C library among those that the symbols ask for.
+/// The newest version of the GNU C library that a symbol requires.
 ///
 /// # Errors
 /// The file is damaged.

@@ -1,4 +1,4 @@
-//! What goes wrong with an FMU: its file, its use, or a call into it.
+//! Errors of an FMU: in its file, in its use, or in a call.
 
 use std::path::{Path, PathBuf};
 
@@ -44,7 +44,7 @@ impl Error {
         Self::Usage { instance: instance.into(), cause: one_line(&cause.to_string()) }
     }
 
-    /// The cause, without what it happened to.
+    /// The cause without file, instance or function.
     pub(crate) fn cause(&self) -> String {
         match self {
             Self::File { cause, .. } | Self::Usage { cause, .. } => cause.clone(),

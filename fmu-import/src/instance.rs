@@ -38,7 +38,7 @@ impl Instance {
         &self.name
     }
 
-    /// What the FMU's modelDescription.xml says.
+    /// The contents of modelDescription.xml.
     pub fn description(&self) -> &ModelDescription {
         &self.description
     }
@@ -109,7 +109,7 @@ impl Instance {
         self.call(|s| s.set_reals(references, values))
     }
 
-    /// Switches remarks on or off; errors are always told.
+    /// Switches logging on or off; errors are always logged.
     ///
     /// # Errors
     /// The FMU refuses.
@@ -125,7 +125,7 @@ impl Instance {
         self.call(|s| s.setup(Experiment { start, stop, tolerance: None }))
     }
 
-    /// Initialisation begins: parameters and inputs are set, outputs may be read.
+    /// Initialization begins: parameters and inputs are set, outputs may be read.
     ///
     /// # Errors
     /// The FMU refuses.
@@ -133,7 +133,7 @@ impl Instance {
         self.call(|s| s.enter_initialization())
     }
 
-    /// Initialisation ends.
+    /// Initialization ends.
     ///
     /// # Errors
     /// The FMU refuses, for example parameters that do not fit together.
@@ -158,7 +158,7 @@ impl Instance {
         self.call(|s| s.shared().terminate())
     }
 
-    /// Back to what it was when it was made.
+    /// Restores the state after instantiation.
     ///
     /// # Errors
     /// The FMU refuses.

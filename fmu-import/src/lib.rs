@@ -1,8 +1,8 @@
-//! An importer of our own: runs any co-simulation FMU of FMI 2.0 and FMI 3.0, ours or not, with one face for both.
+//! An importer: runs any co-simulation FMU of FMI 2.0 and FMI 3.0, from any tool, with one interface for both.
 //!
-//! - [`Fmu`] and [`Instance`]: one FMU, as a well-behaved importer calls it; [`raw`]: single calls, as a checker makes them.
+//! - [`Fmu`] and [`Instance`]: one FMU with valid calls only; [`raw`]: single calls, valid or not, for a checker.
 //! - [`cosimulation`]: several FMUs connected; [`ssp`]: systems of FMUs from files.
-//! - [`elf`], [`platform`]: what a binary is made for.
+//! - [`elf`], [`platform`]: requirements and platforms of binaries.
 //!
 //! `abi` is the only module with `unsafe` code: every pointer that goes to an FMU points to memory of the size that the standard
 //! asks for. What no importer can check is the FMU itself: its code runs in this process with all of its rights.
@@ -61,7 +61,7 @@ pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u
     Ok((archive.description, files))
 }
 
-/// An FMU: unpacked, described, its binary loaded. Every `Fmu` has a copy of the binary of its own.
+/// An unpacked FMU with its description and its loaded binary. Every `Fmu` has its own copy of the binary.
 pub struct Fmu {
     path: PathBuf,
     description: Arc<ModelDescription>,
@@ -87,12 +87,12 @@ impl Fmu {
         Ok(Self { path: path.into(), description: Arc::new(description), terminals, functions, dir })
     }
 
-    /// What its modelDescription.xml says.
+    /// The contents of modelDescription.xml.
     pub fn description(&self) -> &ModelDescription {
         &self.description
     }
 
-    /// What its terminalsAndIcons.xml says, where it has one.
+    /// The contents of terminalsAndIcons.xml, if there is one.
     ///
     /// # Errors
     /// The file cannot be read; the FMU runs all the same.
@@ -105,7 +105,7 @@ impl Fmu {
         &self.path
     }
 
-    /// Makes an instance; with `logging`, the FMU tells more than errors.
+    /// Creates an instance; with `logging`, the FMU logs more than errors.
     ///
     /// # Errors
     /// The FMU refuses, or a name has a null byte.
@@ -131,7 +131,7 @@ fn text(instance: &str, text: &str) -> Result<CString, Error> {
     CString::new(text).map_err(|_| Error::usage(instance, format!("{text:?} has a null byte")))
 }
 
-/// Makes an error of a refusal and of what the FMU said meanwhile.
+/// Combines a refusal and the FMU's log message into an error.
 fn explain(instance: &str, refusal: Refusal, message: Option<String>) -> Error {
     let instance = instance.to_owned();
     match refusal {

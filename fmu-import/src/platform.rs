@@ -1,4 +1,4 @@
-//! Platforms and what the two standards call them.
+//! Platforms and their names in both standards.
 
 use model_description::FmiVersion;
 use std::env::consts;

@@ -1,4 +1,4 @@
-//! What the two standards have in common, as the facade uses it.
+//! The interface that both standards implement for the facade.
 
 use super::value::Values;
 use crate::abi::log::Status;

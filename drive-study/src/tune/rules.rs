@@ -8,7 +8,7 @@
 //!
 //! The current loop is stable with every current that is used: its gain, w_c L or with active resistance 2 w_c L - R, acts
 //! on the incremental inductance, which saturation lowers; and while the frame is not yet at the rotor, in a start, the gain
-//! of one axis acts on the inductance of the other. With the sample of delay i[k+2] = i[k+1] - (gain T_s / L) i[k], which
+//! of one axis acts on the inductance of the other. With the sample of delay `i[k+2] = i[k+1] - (gain T_s / L) i[k]`, which
 //! oscillates without end at gain T_s / L = 1: half of that is allowed (gain margin 6 dB), and w_c is lowered to it.
 
 use super::check::check;

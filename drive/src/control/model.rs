@@ -1,4 +1,4 @@
-//! The model `SensorlessController`: one digital controller on its own sample grid. [`cycle`](super::cycle) has what one
+//! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` has what one
 //! sample does.
 
 use crate::control::current::CurrentGains;

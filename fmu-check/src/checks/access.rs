@@ -1,4 +1,4 @@
-//! Getting and setting (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.6): what is refused, and what is there to begin with.
+//! Getting and setting (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.6): refused calls and start values.
 
 use super::values::{booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, tunable};
 use crate::check::{Check, Level, Levels, Run};

@@ -41,7 +41,7 @@ fn each_entry(fmu: &FmuFile, rule: impl Fn(&Entry) -> Option<String>) -> Verdict
     Verdict::of(fmu.zip.entries.iter().filter_map(say).collect())
 }
 
-/// Both headers of an entry, with what they are called.
+/// Both headers of an entry with their names.
 fn headers_of(entry: &Entry) -> impl Iterator<Item = (&'static str, &Header)> {
     [("central", Some(&entry.central)), ("local", entry.local.as_ref())].into_iter().filter_map(|(n, h)| Some((n, h?)))
 }

@@ -48,7 +48,7 @@ pub(super) fn functions(version: FmiVersion) -> Vec<&'static str> {
     found
 }
 
-/// The libraries that carry the FMU: the others in their folders are helpers.
+/// The libraries named after a modelIdentifier; other libraries in their folders are helpers.
 fn carriers(fmu: &FmuFile) -> Vec<&Binary> {
     let description = fmu.description.as_ref().ok();
     let names: Vec<&str> = description.map_or_else(Vec::new, |d| {
@@ -303,7 +303,7 @@ fn versions(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// A life as every importer leads it.
+/// Initialization, 20 steps, termination.
 fn complete_run(session: &Session) -> Result<(), Blocked> {
     let instance = session.stepping()?;
     for k in 0..20 {

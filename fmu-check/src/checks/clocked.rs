@@ -1,10 +1,10 @@
-//! What only FMI 3.0 has: aliases with display units, clocked states.
+//! Checks that only FMI 3.0 needs: aliases with display units, clocked states.
 
 use super::xml::with_description;
 use crate::check::Verdict;
 use crate::fmu_file::FmuFile;
 
-/// From the elements: what only clocked FMUs have is no part of the description that is read.
+/// Examines the XML elements, because the parsed description does not contain clocked states.
 pub(super) fn clocked_states(fmu: &FmuFile) -> Verdict {
     let Some(root) = fmu.root() else { return Verdict::NotDetermined("the description is not well-formed XML".into()) };
     let variables = || root.child("ModelVariables").map_or(&[][..], |list| &list.children).iter();

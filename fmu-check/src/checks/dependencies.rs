@@ -2,7 +2,7 @@
 
 use crate::session::{Blocked, Session, settable};
 
-/// Perturbs every known that an initial unknown does not name, and looks whether the unknown moves.
+/// Changes every known that is not a dependency of an initial unknown and requires that the unknown stays the same.
 pub(super) fn dependencies_hold(session: &Session) -> Result<(), Blocked> {
     let unknowns: Vec<_> = session
         .description

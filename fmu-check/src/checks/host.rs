@@ -1,4 +1,4 @@
-//! What an FMU may not do to the process that it is a guest of: its threads, its processor, its files.
+//! Side effects on the importer's process that an FMU must not have: threads, processor, files.
 
 use crate::check::{Check, Levels, Run};
 use crate::session::{Blocked, Session};
@@ -73,7 +73,7 @@ fn small_stack(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// What is called, and how.
+/// Name of a call and the call.
 type Call<'a> = (&'a str, &'a dyn Fn() -> Result<(), Blocked>);
 
 fn floating_point(session: &Session) -> Result<(), Blocked> {
@@ -115,7 +115,7 @@ fn floating_point(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// What of the process an FMU has no business with.
+/// Properties of the process that an FMU must leave unchanged.
 #[derive(PartialEq)]
 struct Surroundings {
     threads: usize,

@@ -56,7 +56,7 @@ fn interleaved(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// A bench has files that only one thread may write; each thread gets a loaded binary and a silent journal of its own.
+/// Only one thread may write the files of a session, so each thread gets its own loaded binary and a duplicate without journal.
 fn threads(session: &Session) -> Result<(), Blocked> {
     if only_once(session) {
         return session.not_applicable(ONLY_ONCE);

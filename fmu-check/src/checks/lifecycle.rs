@@ -1,4 +1,4 @@
-//! The life cycle: what is allowed goes through, what is not is refused, and nothing takes the process down
+//! The life cycle: allowed calls succeed, others are refused, and none crashes the process
 //! (FMI 2.0.5, 2.1.5 and 4.2.4; FMI 3.0.2, 2.2.3, 2.3 and 4.2).
 
 use super::lifecycle_states::State::{Error, Initialization, Instantiated, Step, Terminated};
@@ -75,7 +75,7 @@ fn null_arguments(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// From a arguments to a few steps and an error.
+/// Instantiates with the arguments, initializes, makes two steps and an invalid one.
 fn short_run(session: &Session, arguments: &fmu_import::raw::Arguments, what: &str) -> Result<(), Blocked> {
     let Some(instance) = session.instantiate(arguments)? else {
         session.violated(format!("{} with {what} returned NULL", session.instantiation()));

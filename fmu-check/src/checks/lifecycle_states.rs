@@ -40,7 +40,7 @@ pub(super) fn in_state(session: &Session, state: State) -> Result<Instance<'_>, 
 }
 
 impl Instance<'_> {
-    /// Makes the FMU return Error, by one of several mistakes.
+    /// Makes the FMU return Error with one of two wrong calls; returns the call that succeeded in doing so.
     pub(super) fn provoke(&self) -> Result<String, Blocked> {
         let (t, h) = (self.time.get(), self.session.h());
         if self.step_at(t, -h)? == Status::ERROR {

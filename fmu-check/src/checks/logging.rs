@@ -21,7 +21,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "M01", requirement: "With canNotUseMemoryManagementFunctions, the FMU does not call the memory functions of the importer, and they may be NULL.", clause: "2.0.5, 2.1.5 and 4.3.1", levels: Levels(Some(Level::Must), None), run: Run::Probe(memory) },
 ];
 
-/// A life with mistakes in it, and what was logged; the environment and the name that it was made with.
+/// The log of a run with an error, and the environment and name of its instance.
 fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<Event>, usize, String), Blocked> {
     let _ = take_events();
     let mut arguments = session.arguments("a probe's name");

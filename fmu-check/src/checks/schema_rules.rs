@@ -126,7 +126,7 @@ pub(super) const TERMINALS: &[Rule] = &[
     rule("Annotation", "type:s!", "*"),
 ];
 
-/// What an `@` word stands for.
+/// The attributes that an `@` word stands for.
 pub(super) fn expand(word: &str) -> &'static str {
     match word {
         "@support" => SUPPORT,

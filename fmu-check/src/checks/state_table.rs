@@ -10,7 +10,7 @@ use fmu_import::Status;
 use fmu_import::raw::{Buffer, Handle, Optional, Raw, SavedState, Simple, StepStatus};
 use model_description::{BaseType, Causality, CoSimulation, FmiVersion, ModelVariable};
 
-/// What makes a call on an instance.
+/// Makes the call on an instance.
 type Make<'b> = Box<dyn Fn(&Instance<'_>) -> Result<Status, Blocked> + 'b>;
 
 /// A call that can be made in any state.
@@ -21,7 +21,7 @@ struct Call<'b> {
     make: Make<'b>,
 }
 
-/// One scalar of a kind to try getters and setters with.
+/// A scalar variable for getters and setters.
 fn scalar(session: &Session, fits: impl Fn(&ModelVariable) -> bool) -> Option<&ModelVariable> {
     session.numeric().find(|v| v.clocks.is_empty() && !v.is_array() && fits(v))
 }
@@ -128,7 +128,7 @@ pub(super) fn allowed(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// What the texts leave open (the ambiguity register): either answer is fine.
+/// Whether the standard leaves the call open in this state: then both answers are accepted.
 fn is_ambiguous(session: &Session, call: &str, state: State) -> bool {
     let v2 = session.description.version == FmiVersion::V2;
     match (call, state) {
@@ -195,7 +195,7 @@ fn unsupported_functions(session: &Session) -> Vec<&'static str> {
     functions(session.description.version).into_iter().filter(fits).collect()
 }
 
-/// A function by its name, with arguments that are as good as possible.
+/// Calls a function by name with arguments that are as valid as possible.
 fn call_by_name(raw: &Raw, name: &str, handle: Handle, reference: u32) -> Option<Status> {
     if let Some(name) = Simple::named(name) {
         raw.simple(name, handle)

@@ -1,4 +1,4 @@
-//! ModelStructure (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). What the file says; that it is true is in `dependencies`.
+//! ModelStructure (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). Checks the file; `dependencies` checks the binary against it.
 
 use super::clocked::clocked_states;
 use super::dependencies::dependencies_hold;
@@ -52,7 +52,7 @@ fn outputs(fmu: &FmuFile) -> Verdict {
     })
 }
 
-/// States are what derivatives refer to.
+/// State derivatives and the states that they refer to.
 fn states_and_derivatives(d: &ModelDescription) -> Vec<&ModelVariable> {
     let derivatives = d.derivatives.iter().filter_map(|u| d.referenced(u.reference));
     derivatives.flat_map(|v| [Some(v), v.derivative.and_then(|s| d.referenced(s))]).flatten().collect()

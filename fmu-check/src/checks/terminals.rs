@@ -32,7 +32,7 @@ fn text(fmu: &FmuFile) -> Option<Result<String, String>> {
     Some(bytes.and_then(|bytes| String::from_utf8(bytes).map_err(|_| "is not UTF-8".to_owned())))
 }
 
-/// What is wrong, from the file as an importer reads it; a file that cannot be read is the matter of I01.
+/// Findings about the parsed file; I01 reports a file that cannot be parsed.
 fn read(fmu: &FmuFile, findings: impl FnOnce(&TerminalsAndIcons) -> Vec<String>) -> Verdict {
     match text(fmu) {
         None => Verdict::NotApplicable("the archive has no terminalsAndIcons.xml".into()),
@@ -45,7 +45,7 @@ fn read(fmu: &FmuFile, findings: impl FnOnce(&TerminalsAndIcons) -> Vec<String>)
     }
 }
 
-/// All terminals, those inside others too.
+/// All terminals, including nested ones.
 fn all(terminals: &[Terminal]) -> Vec<&Terminal> {
     terminals.iter().flat_map(|t| std::iter::once(t).chain(all(&t.terminals))).collect()
 }

@@ -287,7 +287,7 @@ fn determinism(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// What comes out is told as a number, which the parent compares.
+/// Notes a hash of all outputs, which the parent process compares.
 fn two_processes(session: &Session) -> Result<(), Blocked> {
     let instance = session.stepping()?;
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;

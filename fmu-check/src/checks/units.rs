@@ -1,4 +1,4 @@
-//! Units: what everybody knows of the common ones, to compare a file with (FMI 2.0.5, 2.2.2; FMI 3.0.2, 2.4.3).
+//! Base units and factors of common units, to compare a file with (FMI 2.0.5, 2.2.2; FMI 3.0.2, 2.4.3).
 
 use model_description::{ModelDescription, Unit};
 use std::f64::consts::PI;
@@ -25,7 +25,7 @@ const KNOWN: &[Known] = &[
     ("kg/m3", [1, -3, 0, 0, 0, 0, 0, 0], 1.0), ("N/m", [1, 0, -2, 0, 0, 0, 0, 0], 1.0),
 ];
 
-/// Radians are counted by some and left out by others; both are fine where the rest agrees.
+/// Index of the radian exponent, which tools may count or omit; only the others must agree.
 const RADIAN: usize = 7;
 
 fn known(name: &str) -> Option<&'static Known> {
@@ -36,7 +36,7 @@ fn differ(a: f64, b: f64) -> bool {
     (a - b).abs() > 1e-6 * b.abs()
 }
 
-/// Units whose base units are not what their name means.
+/// Units whose base unit contradicts their name.
 pub(super) fn wrong_bases(description: &ModelDescription) -> Vec<String> {
     let say = |unit: &Unit| {
         let (base, (_, exponents, factor)) = (unit.base?, known(&unit.name)?);
@@ -51,7 +51,7 @@ pub(super) fn wrong_bases(description: &ModelDescription) -> Vec<String> {
     description.units.iter().filter_map(say).collect()
 }
 
-/// Display units whose factor is not what their name means, for example because it is the reciprocal.
+/// Display units whose factor contradicts their name, for example because it is the reciprocal.
 pub(super) fn wrong_displays(description: &ModelDescription) -> Vec<String> {
     let mut findings = Vec::new();
     for unit in &description.units {

@@ -181,7 +181,7 @@ pub(super) fn tunable(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// One instance gets its values at once, another gets others first, is looked at, and gets them then.
+/// Sets values in one instance directly; in another, sets other values, reads the outputs, then sets the same values.
 pub(super) fn iterated_initialization(session: &Session) -> Result<(), Blocked> {
     let watched = session.watched();
     let settable: Vec<_> = session.numeric().filter(|v| settable(v) && v.base.is_float()).collect();

@@ -63,7 +63,7 @@ unsafe extern "C" fn logger(
     };
 }
 
-/// An instance. Owns what the FMU may keep pointers to.
+/// An instance. Owns the data that the FMU may keep pointers to.
 pub(super) struct Instance {
     // First, so that the instance is freed while the library and the callbacks are still there.
     shared: SharedInstance,

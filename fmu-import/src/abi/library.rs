@@ -42,7 +42,7 @@ pub(super) use symbols;
 
 /// Loads a shared library.
 pub(super) fn load(path: &Path) -> Result<Library, Error> {
-    // SAFETY: loading runs the library's initialisers. That is what running an FMU means: its code has every right of
+    // SAFETY: loading runs the library's initializers. That is what running an FMU means: its code has every right of
     // this process, and the user named the file.
     unsafe { Library::new(path) }.map_err(|e| Error::file(path, reason(&e)))
 }

@@ -1,11 +1,11 @@
-//! What an FMU says through its log callback.
+//! Log messages of an FMU.
 
 use std::collections::VecDeque;
 use std::ffi::{CStr, c_char, c_void};
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Messages kept; an FMU that talks all the time does not fill the memory.
+/// Maximum number of stored messages, so that logging does not fill the memory.
 const KEPT: usize = 10_000;
 
 /// One message.
@@ -27,13 +27,13 @@ pub struct Status(pub std::ffi::c_int);
 impl Status {
     /// The call succeeded.
     pub const OK: Self = Self(0);
-    /// It succeeded, and something is strange.
+    /// The call succeeded with a warning.
     pub const WARNING: Self = Self(1);
-    /// Nothing was done; the instance lives on.
+    /// The call did nothing; the instance remains usable.
     pub const DISCARD: Self = Self(2);
-    /// It failed; this instance is done for.
+    /// The call failed; only a reset, a restored state or freeing can follow.
     pub const ERROR: Self = Self(3);
-    /// Every instance of this FMU is done for.
+    /// No instance of this FMU can be used any more.
     pub const FATAL: Self = Self(4);
 
     /// Whether the call succeeded: OK or Warning.
@@ -69,12 +69,12 @@ pub(crate) struct Log(Mutex<Messages>);
 #[derive(Debug, Default)]
 struct Messages {
     all: VecDeque<Message>,
-    /// How many of the last ones no error has told yet.
+    /// Number of latest messages that no error has reported yet.
     fresh: usize,
 }
 
 impl Log {
-    /// What the callbacks get back as their first argument.
+    /// First argument of the callbacks.
     pub(crate) fn environment(self: &Arc<Self>) -> *mut c_void {
         Arc::as_ptr(self).cast_mut().cast()
     }
@@ -84,7 +84,7 @@ impl Log {
         self.messages().all.drain(..).collect()
     }
 
-    /// What an error tells: the last message since the last error that is not a mere remark, else the last of all since.
+    /// Message for an error: the last serious one since the previous error, otherwise the last of any status.
     pub(crate) fn reason(&self) -> Option<String> {
         let mut messages = self.messages();
         let fresh = std::mem::take(&mut messages.fresh);

@@ -33,22 +33,23 @@ pub(crate) enum Functions {
 }
 
 impl Functions {
-    /// Loads the binary, which lies in `dir`.
+    /// Loads the binary in `dir`.
     pub(crate) fn load(binary: &Path, version: FmiVersion, dir: &Arc<TempDir>) -> Result<Self, Error> {
         let library = library::load(binary)?;
         let load = || {
             // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that they go
             // to keeps the library.
-            let shared = Arc::new(unsafe { SharedFunctions::load(&library, version) }?);
+            let shared = || unsafe { SharedFunctions::load(&library, version) }.map(Arc::new);
+            // The functions of each standard first: a library that is not an FMU lacks the one that instantiates.
             Ok(match version {
                 FmiVersion::V2 => {
                     // SAFETY: as above.
-                    let api = unsafe { fmi2::Functions::load(&library) }?;
+                    let (api, shared) = (unsafe { fmi2::Functions::load(&library) }?, shared()?);
                     Self::V2(Arc::new(Loaded { api, shared, _library: library, _dir: dir.clone() }))
                 }
                 FmiVersion::V3 => {
                     // SAFETY: as above.
-                    let api = unsafe { fmi3::Functions::load(&library) }?;
+                    let (api, shared) = (unsafe { fmi3::Functions::load(&library) }?, shared()?);
                     Self::V3(Arc::new(Loaded { api, shared, _library: library, _dir: dir.clone() }))
                 }
             })

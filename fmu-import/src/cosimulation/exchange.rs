@@ -4,7 +4,7 @@ use super::{Port, Schedule};
 use crate::{Error, Instance, Values};
 use model_description::BaseType;
 
-/// What feeds an input.
+/// Source of an input.
 pub(super) enum Source {
     /// A variable of another instance.
     Port(Port),

@@ -9,7 +9,7 @@ pub struct Settings {
     pub stop: f64,
     /// Communication step in s. When it does not divide the time, the last step is shorter.
     pub step: f64,
-    /// Step the FMUs one after the other, each with what those before it have just computed.
+    /// Step the FMUs one after another; each receives the new outputs of those before it.
     pub sequential: bool,
 }
 

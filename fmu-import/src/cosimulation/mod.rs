@@ -79,7 +79,7 @@ impl System {
         &self.instances
     }
 
-    /// What the FMUs said since the last time, with the names of their instances.
+    /// Log messages since the last call, with the names of the instances.
     pub fn take_messages(&self) -> Vec<(String, Message)> {
         take_messages(&self.instances)
     }

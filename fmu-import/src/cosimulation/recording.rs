@@ -1,4 +1,4 @@
-//! What was recorded.
+//! Recordings: sampled variables.
 
 use model_description::DisplayUnit;
 use std::io::{self, Write};

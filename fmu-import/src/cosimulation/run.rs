@@ -22,7 +22,7 @@ impl Point<'_> {
         self.instances.iter_mut().find(|i| i.name() == name)
     }
 
-    /// What the FMUs said since the last time, with the names of their instances.
+    /// Log messages since the last call, with the names of the instances.
     pub fn take_messages(&self) -> Vec<(String, Message)> {
         take_messages(self.instances)
     }

@@ -10,7 +10,7 @@ pub struct Buffer {
     count: usize,
 }
 
-/// What the bytes behind the values are filled with.
+/// Pattern of the bytes after the values.
 pub(super) const CANARY: u64 = 0xc5c5_c5c5_c5c5_c5c5;
 const CANARIES: usize = 32;
 
@@ -45,7 +45,7 @@ impl Buffer {
         self.words[(self.count * self.width).div_ceil(8)..].iter().all(|w| *w == CANARY)
     }
 
-    /// Number of values that there is room for, those behind included.
+    /// Number of values that fit, including the bytes after them.
     pub(super) fn capacity(&self) -> usize {
         8 * self.words.len() / self.width
     }

@@ -1,4 +1,4 @@
-//! The callbacks that the FMU gets, and what comes through them.
+//! Callbacks for the FMU that record their calls.
 
 use super::super::log::{Status, copy_text};
 use super::super::signatures::v2::{calloc, free};
@@ -6,7 +6,7 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// What came through the log callback.
+/// A call of the log callback.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Event {
     /// The first argument, a number that was given on instantiation.

@@ -1,4 +1,4 @@
-//! Instantiation, with every argument in the checker's hands.
+//! Instantiation with arbitrary arguments.
 
 use super::super::signatures::{v2, v3};
 use super::callbacks::{allocate, logger2, logger3, release};
@@ -7,7 +7,7 @@ use model_description::FmiVersion;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::ptr;
 
-/// What kind of FMU an instance is to be.
+/// Interface type of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
     /// Co-simulation.

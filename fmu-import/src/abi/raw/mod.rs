@@ -34,7 +34,7 @@ use std::ptr;
 pub struct Handle(usize);
 
 impl Handle {
-    /// The instance that is none.
+    /// NULL.
     pub const NULL: Self = Self(0);
 
     fn pointer(self) -> *mut c_void {
@@ -82,7 +82,7 @@ impl Raw {
     /// Loads a binary.
     ///
     /// # Errors
-    /// What the system says.
+    /// The error message of the system.
     pub fn open(path: &Path, version: FmiVersion) -> Result<Self, String> {
         crate::abi::library::load(path).map(|library| Self { library, version }).map_err(|e| e.cause())
     }
@@ -90,7 +90,7 @@ impl Raw {
     /// Loads a binary with its symbols visible to all that are loaded later, and resolved at once.
     ///
     /// # Errors
-    /// What the system says.
+    /// The error message of the system.
     #[cfg(unix)]
     pub fn open_global(path: &Path, version: FmiVersion) -> Result<Self, String> {
         use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_NOW};
@@ -102,7 +102,7 @@ impl Raw {
     /// Unloads it.
     ///
     /// # Errors
-    /// What the system says.
+    /// The error message of the system.
     pub fn close(self) -> Result<(), String> {
         self.library.close().map_err(|e| e.to_string())
     }
@@ -131,7 +131,7 @@ impl Raw {
         unsafe { self.library.get::<T>(self.name(name)) }.ok().map(|f| *f)
     }
 
-    /// What the FMU says of itself.
+    /// A constant string of the FMU.
     pub fn text(&self, name: Text) -> Option<String> {
         let function: TextFunction = self.function(name.as_str())?;
         // SAFETY: the standard's type; the text is a constant of the FMU.
@@ -146,7 +146,7 @@ impl Raw {
         Some(())
     }
 
-    /// A function with nothing but the instance. `fmi3EnterInitializationMode` is none of them: see
+    /// Calls a function that takes only the instance. `fmi3EnterInitializationMode` takes more: see
     /// [`experiment`](Self::experiment).
     pub fn simple(&self, name: Simple, instance: Handle) -> Option<Status> {
         if name == Simple::EnterInitializationMode && self.version == FmiVersion::V3 {
@@ -354,7 +354,7 @@ impl Raw {
     }
 }
 
-/// Pointers to arrays that have room for what the counts say.
+/// Pointers to arrays that are at least as long as the counts.
 fn checked(
     references: Option<&[u32]>,
     n: usize,

@@ -1,4 +1,4 @@
-//! What a call may leave behind in the processor.
+//! Floating-point control of the processor, which a call must not change.
 
 /// Floating-point control of this thread: rounding, masks of exceptions, flushing to zero; without the flags that every
 /// calculation sets. `None` where this is not known.

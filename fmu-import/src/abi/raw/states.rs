@@ -1,4 +1,4 @@
-//! Saved states, with every argument in the checker's hands.
+//! Saved states with arbitrary arguments.
 
 use super::super::log::Status;
 use super::super::signatures::{Deserialize, Serialize, SetState, StatePlace, StatePointer, StateSize};
