@@ -66,7 +66,7 @@ impl Model for RcCircuit {
         },
     );
 
-    fn initialise(&mut self) {
+    fn initialize(&mut self) {
         self.u_c = self.u_start;
     }
 

@@ -41,7 +41,7 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
     out += &enumerations(d);
     put!(
         out,
-        "<h2>Licence</h2>\n<p>{} <br>{}. The full texts, and those of the libraries in the binary, are in \
+        "<h2>License</h2>\n<p>{} <br>{}. The full texts, and those of the libraries in the binary, are in \
          <a href=\"licenses/license.txt\">licenses/license.txt</a>.</p>\n",
         escape(&d.copyright),
         escape(&d.license),

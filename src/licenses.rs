@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-/// Licences to pack with an FMU.
+/// Licenses to pack with an FMU.
 #[derive(Clone, Debug, Default)]
 pub struct Licenses {
     /// Texts of the workspace's own license.

@@ -11,7 +11,7 @@ use std::process::Stdio;
 pub struct Workspace {
     /// Its root folder.
     pub root: PathBuf,
-    /// Cargo's target folder, `CARGO_TARGET_DIR` honoured.
+    /// Cargo's target folder, `CARGO_TARGET_DIR` honored.
     pub target: PathBuf,
     /// Every package that its members depend on, members included.
     pub packages: Vec<Package>,
@@ -27,7 +27,7 @@ pub struct Package {
     pub name: String,
     /// Version.
     pub version: String,
-    /// Licence, an SPDX expression.
+    /// License, an SPDX expression.
     pub license: Option<String>,
     /// Where it comes from.
     pub repository: Option<String>,

@@ -39,7 +39,7 @@ fn the_plots_are_those_of_a_run() {
     }
 }
 
-/// A page opens without a network: no address but those of the SVG name space and of the licences beside it.
+/// A page opens without a network: no address but those of the SVG name space and of the licenses beside it.
 #[test]
 fn pages_need_nothing_from_outside() {
     fn check<M: Model>() {

@@ -1,4 +1,4 @@
-//! The paper's figures and the behaviour around them, natively: what must come out, to the tolerance given for it.
+//! The paper's figures and the behavior around them, natively: what must come out, to the tolerance given for it.
 //!
 //! Numbers in the names are those of the project's list of reference figures.
 #![allow(missing_docs)]

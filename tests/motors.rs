@@ -94,7 +94,7 @@ fn mean_power_is_balanced_at_any_step() {
             let mut drive = Block::<PmsmDrive>::default();
             drive.model.pair = machine.tuned.pair();
             (drive.model.inputs.u_dc, drive.model.pair.plant.model.inputs.u_dc) = (machine.u_dc(), machine.u_dc());
-            drive.initialise();
+            drive.initialize();
             let mut now = Elapsed::ZERO;
             let of_drive = balance(&machine, h, &mut |speed_ref, tau_load| {
                 (drive.model.inputs.speed_ref, drive.model.inputs.tau_load) = (speed_ref, tau_load);

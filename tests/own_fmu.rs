@@ -40,7 +40,7 @@ fn it_charges_as_its_equation_says() {
     }
 }
 
-/// A value comes through a chain of FMUs within initialisation, whatever their order.
+/// A value comes through a chain of FMUs within initialization, whatever their order.
 #[test]
 fn a_chain_is_consistent_at_the_start() {
     for file in archives() {

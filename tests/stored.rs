@@ -90,7 +90,7 @@ fn put<M: Model>(current: &mut Snapshot<M>, name: &str, value: f64) {
     }
 }
 
-/// Ends initialisation as the gate would.
+/// Ends initialization as the gate would.
 fn exit<M: Model>(instance: &mut Instance<M>) -> bool {
     let done = instance.exit_initialization().is_ok();
     instance.current.life.after(done, Some(State::Step));

@@ -9,8 +9,8 @@ const SIZE: (u32, u32) = (820, 240);
 const NAMES: u32 = 240;
 /// Most points drawn of a curve: its highest and its lowest point in as many stretches as the picture can show.
 const STRETCHES: usize = 1000;
-/// Colours that people with any kind of colour vision tell apart (Okabe and Ito).
-const COLOURS: [RGBColor; 7] = [
+/// Colors that people with any kind of color vision tell apart (Okabe and Ito).
+const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -64,12 +64,12 @@ pub fn svg(recording: &Recording) -> Result<String> {
                 .draw()
                 .map_err(drawing)?;
             for (place, column) in columns.iter().enumerate() {
-                // The colours come again, paler, when they are used up.
-                let colour = COLOURS[place % COLOURS.len()].mix(if place < COLOURS.len() { 1.0 } else { 0.45 });
-                let line = LineSeries::new(thin(&recording.time, &column.values), colour.stroke_width(1));
+                // The colors come again, paler, when they are used up.
+                let color = COLORS[place % COLORS.len()].mix(if place < COLORS.len() { 1.0 } else { 0.45 });
+                let line = LineSeries::new(thin(&recording.time, &column.values), color.stroke_width(1));
                 chart.draw_series(line).map_err(drawing)?;
                 let y = 20 + 17 * i32::try_from(place)?;
-                names.draw(&PathElement::new([(0, y), (18, y)], colour.stroke_width(3))).map_err(drawing)?;
+                names.draw(&PathElement::new([(0, y), (18, y)], color.stroke_width(3))).map_err(drawing)?;
                 let name = Text::new(column.name.as_str(), (24, y - 5), ("sans-serif", 12));
                 names.draw(&name).map_err(drawing)?;
             }

@@ -21,7 +21,7 @@ fn off(set: impl FnOnce(&mut PlantParameters)) -> Bench {
     off.block.model.inputs.enable = false;
     // What the controller asks for does not matter.
     off.block.model.inputs.u.a = 100.0;
-    off.block.initialise();
+    off.block.initialize();
     off
 }
 
@@ -211,8 +211,8 @@ fn a_controller_that_ran_and_was_off_begins_anew() {
         let mut new = runner::drive(kind).controller;
         new.model.parameters.sensor.noise = 0.0;
         let (mut fresh, mut used) = (new.clone(), new);
-        fresh.initialise();
-        used.initialise();
+        fresh.initialize();
+        used.initialize();
         let mut now = Elapsed::ZERO;
         let first = commands(&mut used, &mut now);
         used.model.inputs.enable = false;
@@ -229,7 +229,7 @@ fn a_controller_that_ran_and_was_off_begins_anew() {
 #[test]
 fn a_running_drive_coasts_and_starts_again() {
     let mut drive = Block::<PmsmDrive>::default();
-    drive.initialise();
+    drive.initialize();
     drive.model.validate().unwrap();
     let mut now = Elapsed::ZERO;
     let mut run = |drive: &mut Block<PmsmDrive>, enable: bool, ms: u32| {
@@ -259,7 +259,7 @@ fn a_running_drive_coasts_and_starts_again() {
 fn a_drive_is_the_pair_with_enabled_on_the_gates() {
     let (mut pair, mut drive) = (Pair::default(), Block::<PmsmDrive>::default());
     pair.start().unwrap();
-    drive.initialise();
+    drive.initialize();
     let mut now = Elapsed::ZERO;
     for k in 0..300_u32 {
         let enable = !(100..200).contains(&k);

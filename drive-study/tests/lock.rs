@@ -154,7 +154,7 @@ fn finite_inputs_give_finite_outputs() {
     for &kind in Kind::ALL {
         let mut block = Block::<SensorlessController>::default();
         block.model.parameters = runner::drive(kind).controller.model.parameters;
-        block.initialise();
+        block.initialize();
         block.model.validate().unwrap();
         let (mut now, mut lost) = (Elapsed::ZERO, 0.0_f64);
         for k in 0..600_u32 {

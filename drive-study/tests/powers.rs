@@ -203,7 +203,7 @@ fn imposed(h: f64, steps: u32) -> (f64, f64, f64) {
         (par.mechanics.imposed, par.initial.theta_e) = (true, 0.0);
     });
     (bench.block.model.inputs.speed_shaft, bench.block.model.inputs.angle_shaft) = (run[0].0, run[0].1);
-    bench.block.initialise();
+    bench.block.initialize();
     let PlantParameters { motor, mechanics, .. } = bench.block.model.parameters.clone();
     let (mut apart, mut speed, mut off, mut fastest) = (0.0_f64, run[0].0, 0.0_f64, 0.0_f64);
     let mut tau = bench.block.out.tau_shaft;

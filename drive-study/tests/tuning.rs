@@ -248,7 +248,7 @@ fn the_plant_warms_up() {
     let mut plant = Block::<PmsmPlant>::default();
     plant.model.parameters.mechanics.imposed = true;
     plant.model.inputs.u.a = 15.0;
-    plant.initialise();
+    plant.initialize();
     let mut now = Elapsed::ZERO;
     for r_s in [2.0, 2.5] {
         let (meta, slot) = PmsmPlant::TABLE.entry(&mut plant, place::<PmsmPlant>("motor.R_s")).unwrap();

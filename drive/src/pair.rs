@@ -23,16 +23,16 @@ impl Pair {
     /// # Errors
     /// As [`Model::validate`] of either.
     pub fn start(&mut self) -> Result<(), Fault> {
-        self.initialise();
+        self.initialize();
         self.plant.model.validate()?;
         self.controller.model.validate()
     }
 
     /// State and outputs of both at the start.
-    pub fn initialise(&mut self) {
+    pub fn initialize(&mut self) {
         self.now = Elapsed::ZERO;
-        self.plant.initialise();
-        self.controller.initialise();
+        self.plant.initialize();
+        self.controller.initialize();
     }
 
     /// Inputs from outside: speed reference (rad/s), load torque (N.m), DC-link voltage of both (V).

@@ -8,7 +8,7 @@ use crate::control::signals::ControllerOutputs;
 use crate::control::tables::{self, ENABLED, LIMITED, LOCK_LOST};
 use crate::pair::Pair;
 use crate::plant::{power::Powers, signals::PlantOutputs, tables as plant};
-use fmu_core::unit::{AMPERE, NEWTON_METRE, ONE, RADIAN, SPEED, VOLT};
+use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
 
@@ -134,9 +134,9 @@ impl Model for PmsmDrive {
         self.pair.controller.model.validate().map_err(|fault| in_part("controller", fault))
     }
 
-    fn initialise(&mut self) {
+    fn initialize(&mut self) {
         self.set_inputs();
-        self.pair.initialise();
+        self.pair.initialize();
         self.period = Period { last: self.pair.plant.out.powers, ..Period::default() };
     }
 
@@ -188,7 +188,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
     const {
         &[
             V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
-            V::input("tau_load", &NEWTON_METRE, "Load torque at the shaft, positive against positive speed", |m| {
+            V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
                 &mut m.model.inputs.tau_load
             }),
             V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)
@@ -205,7 +205,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
             .unbounded(),
             V::input(
                 "tau_ref",
-                &NEWTON_METRE,
+                &NEWTON_METER,
                 "Torque reference; read with controller.speed_loop.torque_mode only",
                 |m| &mut m.model.inputs.tau_ref,
             ),
@@ -273,7 +273,7 @@ mod tests {
     fn drive(h: f64, steps: u32, events: Events) -> Block<PmsmDrive> {
         let mut block = Block::<PmsmDrive>::default();
         block.model.pair.plant.model.parameters.initial.theta_e = std::f64::consts::PI;
-        block.initialise();
+        block.initialize();
         block.model.validate().unwrap();
         let mut now = Elapsed::ZERO;
         for k in 0..steps {
@@ -323,7 +323,7 @@ mod tests {
         pair.controller.model.parameters.estimator = crate::estimator::Kind::Sensored;
         let mut drive = Block::<PmsmDrive>::default();
         drive.model.pair = pair.clone();
-        drive.initialise();
+        drive.initialize();
         pair.start().unwrap();
         let (mut now, mut angle) = (Elapsed::ZERO, 0.0);
         for k in 0..300_u32 {

@@ -21,7 +21,7 @@ fn the_first_command_is_turned_to_where_it_acts() {
             let (n_p, psi_M, k_p) = (f64::from(par.motor.n_p), par.motor.psi_M, par.current.bandwidth * par.motor.L_q);
             let inputs = &mut controller.model.inputs;
             (inputs.theta_meas, inputs.speed_meas, inputs.speed_ref) = (theta, sign * speed, sign * 130.0);
-            controller.initialise();
+            controller.initialize();
             controller.model.validate().unwrap();
             controller.step(&Step { start: Elapsed::ZERO, h: T_s }).unwrap();
             let out = &controller.out;

@@ -26,7 +26,7 @@ pub struct Description {
     pub version: String,
     /// Who wrote it.
     pub author: String,
-    /// Licence, an SPDX expression.
+    /// License, an SPDX expression.
     pub license: String,
     /// Copyright line.
     pub copyright: String,
@@ -131,7 +131,7 @@ impl Description {
     /// definition named like a variable, a terminal of variables that are not there.
     pub fn of<M: Model>() -> Result<Self, Fault> {
         let mut block = Block::<M>::default();
-        block.initialise();
+        block.initialize();
         let dependencies = probe::initial_dependencies::<M>();
         let table = M::TABLE;
         let mut variables: Vec<Variable> = Vec::new();
@@ -246,7 +246,7 @@ fn kind(kind: &Kind) -> VariableKind {
     }
 }
 
-/// The same judgement that a set gets.
+/// The same judgment that a set gets.
 fn check_start(name: &str, meta: &Meta, start: Value) -> Result<(), Fault> {
     let allowed = match start {
         Value::Real(x) => meta.range.contains(x),

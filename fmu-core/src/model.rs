@@ -10,11 +10,11 @@ pub struct Info {
     pub name: &'static str,
     /// One sentence.
     pub description: &'static str,
-    /// Version of the model; a change of behaviour or of a start value changes it.
+    /// Version of the model; a change of behavior or of a start value changes it.
     pub version: &'static str,
     /// Who wrote it.
     pub author: &'static str,
-    /// Licence, an SPDX expression.
+    /// License, an SPDX expression.
     pub license: &'static str,
     /// Copyright line.
     pub copyright: &'static str,
@@ -54,8 +54,8 @@ pub struct Experiment {
 /// The life of an instance:
 /// 1. `Default` makes it: inputs and parameters at their start values.
 /// 2. The importer sets parameters and inputs; each set is checked against its range in the table.
-/// 3. [`derive`](Model::derive), [`initialise`](Model::initialise) and [`output`](Model::output) run whenever the importer
-///    asks for a value after it has set one, so that initialisation can be iterated.
+/// 3. [`derive`](Model::derive), [`initialize`](Model::initialize) and [`output`](Model::output) run whenever the importer
+///    asks for a value after it has set one, so that initialization can be iterated.
 /// 4. [`validate`](Model::validate) judges the parameters together; then the simulation starts.
 /// 5. [`advance`](Model::advance) and [`output`](Model::output) run in turn. An `advance` does not allocate, lock, read a
 ///    clock or print, and never writes a parameter.
@@ -76,7 +76,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// Icon: an SVG document without text (a renderer may have no fonts) for a square from -100 to 100 both ways.
     const ICON: Option<&'static str> = None;
 
-    /// Layout of the serialised state; a change of a field changes it.
+    /// Layout of the serialized state; a change of a field changes it.
     const STATE_VERSION: u16 = 1;
 
     /// The instantiation token: a hash of name, version and table.
@@ -88,7 +88,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// Calculated parameters from the parameters; runs again when a tunable parameter was set.
     fn derive(&mut self) {}
 
-    /// Rules across parameters, checked on leaving initialisation and in the first step after a tunable parameter was set,
+    /// Rules across parameters, checked on leaving initialization and in the first step after a tunable parameter was set,
     /// both on a copy after [`derive`](Model::derive): a refusal changes nothing.
     ///
     /// # Errors
@@ -98,7 +98,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     }
 
     /// The state at the start time, from parameters and inputs.
-    fn initialise(&mut self);
+    fn initialize(&mut self);
 
     /// Computes the outputs from parameters and state at time `now`, and changes nothing else.
     fn output(&self, now: Elapsed, outputs: &mut Self::Outputs);
@@ -122,9 +122,9 @@ pub struct Block<M: Model> {
 
 impl<M: Model> Block<M> {
     /// Calculated parameters, state and outputs at the start, from what is set so far.
-    pub fn initialise(&mut self) {
+    pub fn initialize(&mut self) {
         self.model.derive();
-        self.model.initialise();
+        self.model.initialize();
         self.model.output(Elapsed::ZERO, &mut self.out);
     }
 

@@ -39,9 +39,9 @@ pub(crate) fn initial_dependencies<M: Model>() -> Vec<Option<Vec<usize>>> {
     found.iter().zip(&causality).map(|(of, &c)| unknown(c).then(|| list(of))).collect()
 }
 
-/// The bits of every value after initialisation.
+/// The bits of every value after initialization.
 fn values<M: Model>(block: &mut Block<M>) -> Vec<u64> {
-    block.initialise();
+    block.initialize();
     (0..M::TABLE.len())
         .map(|i| match M::TABLE.entry(block, i) {
             Some((_, Slot::Real(x))) => x.to_bits(),

@@ -135,7 +135,7 @@ impl<W: 'static> Row<W> {
         Self::new(name, description, Causality::Output, Variability::Discrete, Kind::Boolean, access)
     }
 
-    /// A real parameter, fixed after initialisation.
+    /// A real parameter, fixed after initialization.
     pub const fn parameter(
         name: &'static str,
         quantity: &'static Quantity,

@@ -54,14 +54,14 @@ pub enum MemberKind {
     Outflow,
 }
 
-/// Where a terminal is drawn: its centre, in a coordinate system from -100 to 100 with y upwards, and its icon.
+/// Where a terminal is drawn: its center, in a coordinate system from -100 to 100 with y upwards, and its icon.
 #[derive(Clone, Copy, Debug)]
 pub struct Picture {
     /// What is drawn.
     pub icon: &'static Icon,
-    /// Centre, to the right.
+    /// Center, to the right.
     pub x: f64,
-    /// Centre, upwards.
+    /// Center, upwards.
     pub y: f64,
 }
 
@@ -72,7 +72,7 @@ pub struct Icon {
     pub name: &'static str,
     /// SVG document without text: a renderer may have no fonts.
     pub svg: &'static str,
-    /// Colour of lines that connect such terminals: red, green, blue.
+    /// Color of lines that connect such terminals: red, green, blue.
     pub color: [u8; 3],
 }
 
@@ -117,7 +117,7 @@ impl Terminal {
         Self { name, description, rule, members, picture: None }
     }
 
-    /// The same, drawn with its centre at (x, y).
+    /// The same, drawn with its center at (x, y).
     pub const fn drawn(mut self, icon: &'static Icon, x: f64, y: f64) -> Self {
         self.picture = Some(Picture { icon, x, y });
         self

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub struct Exponents {
     /// Kilogram.
     pub kg: i8,
-    /// Metre.
+    /// Meter.
     pub m: i8,
     /// Second.
     pub s: i8,
@@ -33,7 +33,7 @@ impl Exponents {
     /// Dimensionless.
     pub const NONE: Self = Self { kg: 0, m: 0, s: 0, ampere: 0, kelvin: 0, mol: 0, cd: 0, rad: 0 };
 
-    /// Exponents of kilogram, metre, second and ampere.
+    /// Exponents of kilogram, meter, second and ampere.
     pub const fn mechanical(kg: i8, m: i8, s: i8, ampere: i8) -> Self {
         Self { kg, m, s, ampere, ..Self::NONE }
     }
@@ -116,7 +116,7 @@ pub const HENRY: Quantity = Quantity::new("Inductance", Unit::si("H", Exponents:
 /// Flux linkage in Wb.
 pub const WEBER: Quantity = Quantity::new("FluxLinkage", Unit::si("Wb", Exponents::mechanical(1, 2, -2, -1)));
 /// Torque in N.m.
-pub const NEWTON_METRE: Quantity = Quantity::new("Torque", Unit::si("N.m", Exponents::mechanical(1, 2, -2, 0)));
+pub const NEWTON_METER: Quantity = Quantity::new("Torque", Unit::si("N.m", Exponents::mechanical(1, 2, -2, 0)));
 /// Power in W.
 pub const WATT: Quantity = Quantity::new("Power", Unit::si("W", Exponents::mechanical(1, 2, -3, 0)));
 /// Energy in J.

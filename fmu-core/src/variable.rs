@@ -30,7 +30,7 @@ impl Causality {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Variability {
-    /// Constant after initialisation.
+    /// Constant after initialization.
     Fixed,
     /// A parameter that may change at communication points.
     Tunable,

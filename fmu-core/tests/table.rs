@@ -85,7 +85,7 @@ impl Model for Small {
     fn derive(&mut self) {
         self.gain = 2.0 * self.load.r;
     }
-    fn initialise(&mut self) {
+    fn initialize(&mut self) {
         self.i = if self.on { self.u / self.load.r * f64::from(self.n) } else { 0.0 };
     }
     fn output(&self, _: Elapsed, out: &mut SmallOutputs) {
@@ -153,7 +153,7 @@ mod terminals {
                     },
                 );
                 const TERMINALS: &'static [Terminal] = $terminals;
-                fn initialise(&mut self) {}
+                fn initialize(&mut self) {}
                 fn output(&self, _: Elapsed, _: &mut SmallOutputs) {}
                 fn advance(&mut self, _: &Step) -> Result<(), Fault> {
                     Ok(())

@@ -51,7 +51,7 @@ impl Model for Empty {
             ]
         },
     );
-    fn initialise(&mut self) {}
+    fn initialize(&mut self) {}
     fn output(&self, _: Elapsed, _: &mut Outputs) {}
     fn advance(&mut self, _: &Step) -> Result<(), Fault> {
         Ok(())

@@ -122,7 +122,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn checksum_of_the_catalogue() {
+    fn checksum_of_the_catalog() {
         assert_eq!(super::crc32(b"123456789"), 0xcbf4_3926);
     }
 }

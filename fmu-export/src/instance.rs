@@ -55,7 +55,7 @@ impl<M: Model> Instance<M> {
     pub fn exit_initialization(&mut self) -> Result<(), Fault> {
         self.current.check()?;
         self.current.judged()?;
-        self.current.block.initialise();
+        self.current.block.initialize();
         self.current.dirty = false;
         self.log.event(|| message::start(&self.name, &mut self.current));
         Ok(())
@@ -95,7 +95,7 @@ impl<M: Model> Instance<M> {
     /// Before the first step, recomputes the outputs if variables were set; afterwards a get returns the values of the last step.
     pub(crate) fn refresh(&mut self) {
         if self.current.dirty && matches!(self.current.life.state(), State::Instantiated | State::Initialization) {
-            self.current.block.initialise();
+            self.current.block.initialize();
             self.current.dirty = false;
         }
     }

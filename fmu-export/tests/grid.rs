@@ -1,7 +1,7 @@
 //! No control sample is lost or doubled, whatever the communication step and however the importer adds up its time.
 //!
 //! A model that counts its samples, through the C functions; what must come out is counted in integers. 1e7 steps of every
-//! step size: from every start with optimisation, from one of them without, and a tenth from the others.
+//! step size: from every start with optimization, from one of them without, and a tenth from the others.
 //! `FMU_STEPS=n` for another number.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
@@ -58,7 +58,7 @@ impl Model for Sampler {
         },
     );
 
-    fn initialise(&mut self) {
+    fn initialize(&mut self) {
         self.count = 0;
     }
 
@@ -78,7 +78,7 @@ impl Model for Sampler {
 fmu_export::export!(Sampler);
 use fmi::*;
 
-/// An instance of one of the standards after its initialisation.
+/// An instance of one of the standards after its initialization.
 struct Fmu(u8, Instance);
 
 impl Fmu {

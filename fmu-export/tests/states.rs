@@ -44,7 +44,7 @@ fn a_restored_state_continues_bit_for_bit() {
                 assert_eq!(other.restore(state), OK);
                 assert_eq!(run(&other, k, 100), first);
                 let mut again = null_mut();
-                assert_eq!(other.deserialise(&bytes, &mut again), OK);
+                assert_eq!(other.deserialize(&bytes, &mut again), OK);
                 assert_ne!(again, state);
                 assert_eq!(other.restore(again), OK);
                 assert_eq!(run(&other, k, 100), first);
@@ -116,7 +116,7 @@ fn wrong_handles_are_errors() {
                 &|fmu| fmu.restore(wrong),
                 &|fmu| fmu.save(&mut { wrong }),
                 &|fmu| fmu.free_state(&mut { wrong }),
-                &|fmu| fmu.serialise(wrong, &mut [0; 500]),
+                &|fmu| fmu.serialize(wrong, &mut [0; 500]),
                 &|fmu| unsafe {
                     let mut size = 0;
                     if version == 2 {
@@ -169,7 +169,7 @@ fn every_changed_byte_and_every_other_length_is_noticed() {
     let bytes = fmu.bytes();
     let refused = |bytes: &[u8], what: &str| {
         let mut state = null_mut();
-        assert_eq!(fmu.deserialise(bytes, &mut state), ERROR, "{what}");
+        assert_eq!(fmu.deserialize(bytes, &mut state), ERROR, "{what}");
         assert!(state.is_null());
         assert!(fmu.error().contains("are no state of this FMU: "), "{what}");
     };
@@ -189,7 +189,7 @@ fn every_changed_byte_and_every_other_length_is_noticed() {
         refused(&longer, "longer");
     }
     let mut state = null_mut();
-    assert_eq!(fmu.deserialise(&bytes, &mut state), OK);
+    assert_eq!(fmu.deserialize(&bytes, &mut state), OK);
     assert_eq!(fmu.free_state(&mut state), OK);
 }
 
@@ -225,9 +225,9 @@ fn reference_crc(bytes: &[u8]) -> u32 {
 fn values_that_no_importer_could_have_set_are_noticed() {
     let fmu = Fmu::started(3);
     assert_eq!(fmu.set(&[U, GAIN], &[0.123_456, 7.654_321]), OK);
-    let deserialise = |bytes: &[u8]| {
+    let deserialize = |bytes: &[u8]| {
         let mut state = null_mut();
-        let status = fmu.deserialise(bytes, &mut state);
+        let status = fmu.deserialize(bytes, &mut state);
         if status == OK {
             assert_eq!(fmu.restore(state), OK);
             assert_eq!(fmu.free_state(&mut state), OK);
@@ -235,7 +235,7 @@ fn values_that_no_importer_could_have_set_are_noticed() {
         }
         fmu.error()
     };
-    let forge = |from, to| deserialise(&forged(&Fmu::restored(&fmu), from, to));
+    let forge = |from, to| deserialize(&forged(&Fmu::restored(&fmu), from, to));
     assert_eq!(forge(7.654_321, 7.5), "", "a value in range is fine, so the forgery works");
     assert_eq!(fmu.get(GAIN), 7.5);
     assert_eq!(fmu.set(&[GAIN], &[7.654_321]), OK);
@@ -251,7 +251,7 @@ fn a_time_that_no_simulation_came_to_is_noticed() {
         let fmu = Fmu::new(3);
         assert_eq!((fmu.enter(start, None), fmu.exit(), fmu.step(start, h)), (OK, OK, OK));
         let mut state = null_mut();
-        if fmu.deserialise(&forged(&fmu, from, to), &mut state) == OK {
+        if fmu.deserialize(&forged(&fmu, from, to), &mut state) == OK {
             assert_eq!(fmu.free_state(&mut state), OK);
             return "taken".to_owned();
         }
@@ -280,7 +280,7 @@ fn bytes_of_another_fmu_are_told_from_damaged_ones() {
         let mut bytes = fmu.bytes();
         bytes[place] ^= 1;
         seal(&mut bytes);
-        assert_eq!(fmu.deserialise(&bytes, &mut null_mut()), ERROR);
+        assert_eq!(fmu.deserialize(&bytes, &mut null_mut()), ERROR);
         assert!(fmu.error().contains(why), "{place}: {}", fmu.error());
     }
 }
@@ -302,7 +302,7 @@ fn sizes_and_null() {
     let size = maker.size(state);
     for wrong in [0, 1, size - 1, size + 1] {
         let mut bytes = vec![7; wrong];
-        assert_eq!(fmu().serialise(state, &mut bytes), ERROR);
+        assert_eq!(fmu().serialize(state, &mut bytes), ERROR);
         assert_eq!(bytes, vec![7; wrong]);
     }
     unsafe {

@@ -125,9 +125,9 @@ fn tunable_parameters_that_do_not_fit_are_refused_by_the_step_which_changes_noth
         assert_eq!(fmu.error(), format!("fmi{version}DoStep: gain times motor.R is greater than 50"));
         assert_eq!((fmu.get(X), fmu.get(TIME), fmu.get(GAIN), fmu.get(DOUBLE_GAIN)), (x, count, 6.0, 2.0));
         assert_eq!(fmu.state(), 'e');
-        // What was saved before the step still waits for its judgement, as bytes too; there is time to mend it.
+        // What was saved before the step still waits for its judgment, as bytes too; there is time to mend it.
         let mut stored = null_mut();
-        assert_eq!(fmu.deserialise(&bytes, &mut stored), OK);
+        assert_eq!(fmu.deserialize(&bytes, &mut stored), OK);
         for state in [pending, stored] {
             assert_eq!((fmu.restore(state), fmu.step(H, H)), (OK, ERROR));
             assert_eq!((fmu.restore(state), fmu.set(&[GAIN], &[5.0]), fmu.step(H, H)), (OK, OK, OK));
@@ -138,7 +138,7 @@ fn tunable_parameters_that_do_not_fit_are_refused_by_the_step_which_changes_noth
 }
 
 #[test]
-fn parameters_that_do_not_fit_are_refused_at_the_end_of_initialisation_which_changes_nothing() {
+fn parameters_that_do_not_fit_are_refused_at_the_end_of_initialization_which_changes_nothing() {
     for version in [2, 3] {
         let fmu = Fmu::entered(version);
         let x = fmu.get(X);

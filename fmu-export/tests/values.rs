@@ -192,7 +192,7 @@ fn arrays_are_one_variable_in_fmi3_and_scalars_in_fmi2() {
 }
 
 #[test]
-fn initialisation_can_be_iterated_in_any_order() {
+fn initialization_can_be_iterated_in_any_order() {
     for version in [2, 3] {
         let fmu = Fmu::entered(version);
         assert_eq!(fmu.get(X), 0.5);
@@ -236,7 +236,7 @@ fn in_step_mode_a_get_shows_the_last_step() {
 }
 
 #[test]
-fn parameters_are_judged_together_on_leaving_initialisation() {
+fn parameters_are_judged_together_on_leaving_initialization() {
     for version in [2, 3] {
         let fmu = Fmu::entered(version);
         let set = if version == 2 { fmu.set(&[MAP], &[3.0]) } else { fmu.set(&[MAP], &[3.0, 1.0, 2.0]) };

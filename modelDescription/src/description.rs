@@ -23,7 +23,7 @@ pub struct ModelDescription {
     pub model_version: Option<String>,
     /// Copyright line.
     pub copyright: Option<String>,
-    /// Licence.
+    /// License.
     pub license: Option<String>,
     /// The tool that wrote the file.
     pub generation_tool: Option<String>,
@@ -112,7 +112,7 @@ impl CoSimulation {
         self.flag("canGetAndSetFMUstate") || self.flag("canGetAndSetFMUState")
     }
 
-    /// The state can be serialised.
+    /// The state can be serialized.
     pub fn can_serialize_state(&self) -> bool {
         self.flag("canSerializeFMUstate") || self.flag("canSerializeFMUState")
     }

@@ -110,7 +110,7 @@ pub struct TerminalPicture {
     pub area: Area,
     /// Base name of the picture's files.
     pub icon: String,
-    /// Colour of its connections: red, green, blue.
+    /// Color of its connections: red, green, blue.
     pub color: Option<[u8; 3]>,
     /// Width of its connections, in the coordinate system.
     pub stroke: Option<f64>,

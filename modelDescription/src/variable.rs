@@ -55,7 +55,7 @@ words! {
     Variability {
         /// Never.
         Constant = "constant",
-        /// Not after initialisation.
+        /// Not after initialization.
         Fixed = "fixed",
         /// A parameter that may change during the simulation.
         Tunable = "tunable",

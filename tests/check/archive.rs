@@ -36,7 +36,7 @@ fn each_fault_is_found_by_its_check() {
         ("no documentation", &["Z04a"], |e| {
             e.remove(1);
         }),
-        ("licences without entry", &["Z04b"], |e| e.push(Entry::new("documentation/licenses/x", b""))),
+        ("licenses without entry", &["Z04b"], |e| e.push(Entry::new("documentation/licenses/x", b""))),
         ("odd platform", &["Z03"], |e| e.push(Entry::new("binaries/My Computer/x", b""))),
         ("extra", &["Z06"], |e| e.push(Entry::new("extra/stuff/x", b""))),
         ("header", &["Z07"], |e| e.push(Entry::new("sources/fmi2Functions.h", b""))),

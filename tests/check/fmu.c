@@ -11,11 +11,11 @@
 #include <unistd.h>
 
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
-enum { INSTANTIATED = 1, INITIALISATION = 2, STEP = 4, TERMINATED = 8, FAILED = 16, ANY = 31 };
+enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8, FAILED = 16, ANY = 31 };
 #ifdef FMI3
 #define READABLE ANY
 #else
-#define READABLE (INITIALISATION | STEP | TERMINATED | FAILED)
+#define READABLE (INITIALIZATION | STEP | TERMINATED | FAILED)
 #endif
 
 typedef struct {
@@ -178,7 +178,7 @@ EXPORT void fmi2FreeInstance(void *c) {
 
 EXPORT int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const names[]) {
 #ifdef FAULT_L07
-    ENTER(ANY & ~INITIALISATION);
+    ENTER(ANY & ~INITIALIZATION);
 #else
     ENTER(ANY);
 #endif
@@ -214,12 +214,12 @@ EXPORT int fmi2EnterInitializationMode(void *c) {
     *(volatile int *)8 = 1;
 #endif
     if (!f->data.ready) return fail(f, "fmi2SetupExperiment was not called");
-    f->data.state = INITIALISATION;
+    f->data.state = INITIALIZATION;
     return OK;
 }
 
 EXPORT int fmi2ExitInitializationMode(void *c) {
-    ENTER(INITIALISATION);
+    ENTER(INITIALIZATION);
     f->data.state = STEP;
     return OK;
 }
@@ -279,10 +279,10 @@ EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) 
         if (!KNOWN(5)) return fail(f, "no such Real");
         double y = f->data.y;
 #ifdef FAULT_S04
-        if (f->data.state == INITIALISATION) y = f->data.gain;
+        if (f->data.state == INITIALIZATION) y = f->data.gain;
 #endif
 #ifdef FAULT_L11
-        if (f->data.state == INITIALISATION && vr[i] == 3) y = f->data.y += 1e-6;
+        if (f->data.state == INITIALIZATION && vr[i] == 3) y = f->data.y += 1e-6;
 #endif
 #ifdef FAULT_T10p
         y += getpid() * 1e-9;
@@ -335,7 +335,7 @@ EXPORT int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *val
 }
 
 EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double values[]) {
-    ENTER(INSTANTIATED | INITIALISATION | STEP);
+    ENTER(INSTANTIATED | INITIALIZATION | STEP);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (int write = 0; write < 2; write++) {
 #ifdef FAULT_G03c
@@ -384,13 +384,13 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
 }
 
 EXPORT int fmi2SetInteger(void *c, const unsigned vr[], size_t n, const int values[]) {
-    ENTER(INSTANTIATED | INITIALISATION | STEP);
+    ENTER(INSTANTIATED | INITIALIZATION | STEP);
     if (bad(vr, n, values)) return fail(f, "NULL");
     return n ? fail(f, "no Integer can be set") : OK;
 }
 
 EXPORT int fmi2SetBoolean(void *c, const unsigned vr[], size_t n, const int values[]) {
-    ENTER(INSTANTIATED | INITIALISATION | STEP);
+    ENTER(INSTANTIATED | INITIALIZATION | STEP);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(1)) return fail(f, "no such Boolean");
@@ -405,7 +405,7 @@ EXPORT int fmi2SetBoolean(void *c, const unsigned vr[], size_t n, const int valu
 }
 
 EXPORT int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *const values[]) {
-    ENTER(INSTANTIATED | INITIALISATION | STEP);
+    ENTER(INSTANTIATED | INITIALIZATION | STEP);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(1)) return fail(f, "no such String");
@@ -423,7 +423,7 @@ EXPORT int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *con
 }
 
 EXPORT int fmi2GetFMUstate(void *c, void **state) {
-    ENTER(INSTANTIATED | INITIALISATION | STEP | TERMINATED);
+    ENTER(INSTANTIATED | INITIALIZATION | STEP | TERMINATED);
     if (!state) return fail(f, "NULL");
 #ifdef FAULT_F01b
     if (*state) return OK;

@@ -95,7 +95,7 @@ EXPORT int fmi3SetBoolean(void *c, Refs vr, size_t n, const uint8_t v[], size_t 
 /* Types that no variable has. */
 #define ABSENT(type) \
     EXPORT int fmi3Get##type(void *c, Refs vr, size_t n, void *v) { (void)vr; (void)v; ENTER(READABLE); return n ? fail(f, "no such variable") : OK; } \
-    EXPORT int fmi3Set##type(void *c, Refs vr, size_t n, void *v) { (void)vr; (void)v; ENTER(INSTANTIATED | INITIALISATION | STEP); return n ? fail(f, "no such variable") : OK; }
+    EXPORT int fmi3Set##type(void *c, Refs vr, size_t n, void *v) { (void)vr; (void)v; ENTER(INSTANTIATED | INITIALIZATION | STEP); return n ? fail(f, "no such variable") : OK; }
 ABSENT(Float32) ABSENT(Int8) ABSENT(UInt8) ABSENT(Int16) ABSENT(UInt16)
 ABSENT(UInt32) ABSENT(Int64) ABSENT(UInt64) ABSENT(Binary)
 

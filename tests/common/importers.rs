@@ -114,7 +114,7 @@ pub fn times(h: f64, duration: f64) -> impl Iterator<Item = f64> {
 pub fn drive_speed(experiment: &Experiment, late: f64) -> Vec<f64> {
     let mut block = Block::<PmsmDrive>::default();
     block.model.pair.plant.model.parameters.initial.theta_e = experiment.theta_e;
-    block.initialise();
+    block.initialize();
     let (mut now, mut speed) = (Elapsed::ZERO, vec![block.out.plant.speed]);
     for t in times(DRIVE_STEP, experiment.duration) {
         block.model.inputs.speed_ref = at(&experiment.speed_ref, t - late);

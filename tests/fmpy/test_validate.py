@@ -146,7 +146,7 @@ def test_both_standards_tell_the_same(archives, archive):
 
 
 def test_contents(archive):
-    """Binary, documentation and licences are inside, and nothing strange."""
+    """Binary, documentation and licenses are inside, and nothing strange."""
     with zipfile.ZipFile(archive) as file:
         names = file.namelist()
         assert file.testzip() is None

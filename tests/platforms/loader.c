@@ -152,7 +152,7 @@ static void set_enumeration(void *instance, uint32_t reference, int value) {
     }
 }
 
-/* The whole state, as the FMU serialises it: its size and a hash (FNV-1a). */
+/* The whole state, as the FMU serializes it: its size and a hash (FNV-1a). */
 static void print_state(void *instance) {
     bool two = version == 2;
     int (*get)(void *, void **) = function(two ? "GetFMUstate" : "GetFMUState");

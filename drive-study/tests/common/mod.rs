@@ -17,7 +17,7 @@ impl Bench {
     pub(crate) fn new(set: impl FnOnce(&mut PlantParameters)) -> Self {
         let mut block = Block::<PmsmPlant>::default();
         set(&mut block.model.parameters);
-        block.initialise();
+        block.initialize();
         Self { block, now: Elapsed::ZERO }
     }
 

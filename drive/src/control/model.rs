@@ -10,7 +10,7 @@ use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
 use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::estimator::{Class, Estimator, Sample};
-use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED, VOLT};
+use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
 
@@ -150,7 +150,7 @@ impl Model for SensorlessController {
         Ok(())
     }
 
-    fn initialise(&mut self) {
+    fn initialize(&mut self) {
         self.state = State::new(&self.parameters, self.inputs.enable);
         self.tuned = false;
     }
@@ -200,7 +200,7 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             V::input("speed_meas", &SPEED, "Mechanical speed of a sensor; read only by the estimator Sensored", |m| {
                 &mut m.model.inputs.speed_meas
             }),
-            V::input("tau_ref", &NEWTON_METRE, "Torque reference; read only with speed_loop.torque_mode", |m| {
+            V::input("tau_ref", &NEWTON_METER, "Torque reference; read only with speed_loop.torque_mode", |m| {
                 &mut m.model.inputs.tau_ref
             }),
             V::boolean_input(

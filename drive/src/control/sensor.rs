@@ -1,4 +1,4 @@
-//! The current sensors and the converter behind them: gain, offset, noise, quantisation.
+//! The current sensors and the converter behind them: gain, offset, noise, quantization.
 //!
 //! measured = round((gain i + offset + noise) / resolution) resolution, per phase. They belong to the controller's input
 //! stage, where samples are taken: the plant's currents stay physical and continuous, and the noise of sample k is a

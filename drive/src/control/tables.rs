@@ -12,7 +12,7 @@ use crate::estimator::Kind;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
 use crate::motor::{MOTOR, Motor};
 use crate::plant::saturation::A_PER_WB2;
-use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METRE, ONE, RADIAN, SECOND, SPEED, VOLT};
+use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METER, ONE, RADIAN, SECOND, SPEED, VOLT};
 use fmu_core::{Field, Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -174,7 +174,7 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             })
             .above(0.0)
             .tunable(),
-            P::parameter("limit.tau", &NEWTON_METRE, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
+            P::parameter("limit.tau", &NEWTON_METER, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
                 .above(0.0)
                 .tunable(),
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),

@@ -205,7 +205,7 @@ mod tests {
 
     /// Reference figure 10: poles at -c_1/2 above |w| = c_1/2, a slow one at -w^2/c_1 below.
     #[test]
-    fn an_initial_error_decays_as_the_linearisation_says() {
+    fn an_initial_error_decays_as_the_linearization_says() {
         let (par, motor, start) = (RasmussenParameters::default(), Motor::default(), 20.0_f64.to_radians());
         for n in [300.0, 500.0, 1000.0, 1500.0] {
             let errors = beside(&par, &motor, rpm(n), DqHat::ZERO, start, 0.4);

@@ -9,7 +9,7 @@
 //! speeds in rad/s (mechanical).
 
 use crate::math::tanh;
-use fmu_core::unit::{KG_M2, NEWTON_METRE, NM_S_PER_RAD, SPEED};
+use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, SPEED};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -62,7 +62,7 @@ pub const MECHANICS: &Table<Mechanics> = &Table::new(
         &[
             P::parameter("J", &KG_M2, "Moment of inertia of rotor and load", |m| &mut m.J).above(0.0),
             P::parameter("B", &NM_S_PER_RAD, "Viscous friction coefficient", |m| &mut m.B).at_least(0.0),
-            P::parameter("tau_coulomb", &NEWTON_METRE, "Coulomb friction torque", |m| &mut m.tau_coulomb).at_least(0.0),
+            P::parameter("tau_coulomb", &NEWTON_METER, "Coulomb friction torque", |m| &mut m.tau_coulomb).at_least(0.0),
             P::parameter("w_coulomb", &SPEED, "Speed over which the Coulomb torque changes sign", |m| &mut m.w_coulomb)
                 .above(0.0),
             P::boolean_parameter(

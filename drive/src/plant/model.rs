@@ -9,7 +9,7 @@ use crate::plant::machine;
 use crate::plant::power::{Energy, Powers};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::{OUTPUTS, PARAMETERS, PlantParameters};
-use fmu_core::unit::{NEWTON_METRE, RADIAN, SPEED, VOLT};
+use fmu_core::unit::{NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, Table, Terminal};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -165,7 +165,7 @@ impl Model for PmsmPlant {
 
     const STATE_VERSION: u16 = 4;
 
-    fn initialise(&mut self) {
+    fn initialize(&mut self) {
         let PlantParameters { motor, mechanics, initial, .. } = &self.parameters;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         let (speed, angle) = if mechanics.imposed {
@@ -254,7 +254,7 @@ const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             V::discrete_input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
             V::discrete_input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
             V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
-            V::input("tau_load", &NEWTON_METRE, "Load torque at the shaft, positive against positive speed", |m| {
+            V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
                 &mut m.model.inputs.tau_load
             }),
             V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft; read only with mechanics.imposed", |m| {
@@ -281,7 +281,7 @@ mod tests {
     fn after(h: f64, speed: f64) -> Block<PmsmPlant> {
         let mut block = Block::<PmsmPlant>::default();
         block.model.parameters.initial.speed = speed;
-        block.initialise();
+        block.initialize();
         let mut now = Elapsed::ZERO;
         for k in 0..200_u32 {
             let theta = 3.0 * speed * 1e-4 * f64::from(k) + 1.8;
@@ -314,7 +314,7 @@ mod tests {
             let inverter = &mut block.model.parameters.inverter;
             (inverter.dead_time, inverter.i_zero) = (2e-6, i_zero);
             block.model.inputs.u = Phases { a: 4.0, b: -2.0, c: -2.0 };
-            block.initialise();
+            block.initialize();
             let mut now = Elapsed::ZERO;
             for _ in 0..100 {
                 let step = Step { start: now, h: 1e-4 };
@@ -331,7 +331,7 @@ mod tests {
         let mut block = Block::<PmsmPlant>::default();
         block.model.inputs.u = Phases { a: 20.0, b: -10.0, c: -10.0 };
         block.model.parameters.motor.L_q = 9e-3;
-        block.initialise();
+        block.initialize();
         let energy = |b: &Block<PmsmPlant>| {
             let PlantParameters { motor, mechanics, .. } = &b.model.parameters;
             let (i_d, i_q) = (b.out.i_d, b.out.i_q);
@@ -361,7 +361,7 @@ mod tests {
     #[test]
     fn a_step_beyond_all_measure_is_refused() {
         let mut block = Block::<PmsmPlant>::default();
-        block.initialise();
+        block.initialize();
         let fault = block.step(&Step { start: Elapsed::ZERO, h: 1e300 }).unwrap_err();
         assert!(fault.message().contains("at most 500 s"), "{fault}");
     }

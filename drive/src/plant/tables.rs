@@ -6,7 +6,7 @@ use crate::plant::mechanics::{MECHANICS, Mechanics};
 use crate::plant::power::{ENERGY, POWERS};
 use crate::plant::saturation::{SATURATION, Saturation};
 use crate::plant::signals::PlantOutputs;
-use fmu_core::unit::{AMPERE, NEWTON_METRE, RADIAN, SPEED};
+use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED};
 use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -48,13 +48,13 @@ pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
             O::output("theta_e", &RADIAN, "Electrical rotor angle from phase a to the d axis, in (-pi, pi]", |o| {
                 &mut o.theta_e
             }),
-            O::output("tau_e", &NEWTON_METRE, "Electromagnetic torque", |o| &mut o.tau_e),
+            O::output("tau_e", &NEWTON_METER, "Electromagnetic torque", |o| &mut o.tau_e),
             O::output("i_d", &AMPERE, "d-axis stator current", |o| &mut o.i_d),
             O::output("i_q", &AMPERE, "q-axis stator current", |o| &mut o.i_q),
             O::part("", &Part { table: POWERS, lens: |o| &mut o.powers }),
             O::output(
                 "tau_shaft",
-                &NEWTON_METRE,
+                &NEWTON_METER,
                 "Torque of the shaft on the load: tau_load, or with mechanics.imposed tau_e minus friction",
                 |o| &mut o.tau_shaft,
             ),

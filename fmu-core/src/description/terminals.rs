@@ -41,7 +41,7 @@ pub struct TerminalPicture {
     pub icon: String,
     /// The icon: an SVG document.
     pub svg: String,
-    /// Colour of lines that connect it: red, green, blue.
+    /// Color of lines that connect it: red, green, blue.
     pub color: [u8; 3],
 }
 

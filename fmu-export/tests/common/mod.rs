@@ -292,7 +292,7 @@ impl Fmu {
         size
     }
 
-    pub fn serialise(&self, state: FmuState, bytes: &mut [u8]) -> c_int {
+    pub fn serialize(&self, state: FmuState, bytes: &mut [u8]) -> c_int {
         let (p, n) = (bytes.as_mut_ptr(), bytes.len());
         unsafe {
             if self.version == 2 {
@@ -303,7 +303,7 @@ impl Fmu {
         }
     }
 
-    pub fn deserialise(&self, bytes: &[u8], state: &mut FmuState) -> c_int {
+    pub fn deserialize(&self, bytes: &[u8], state: &mut FmuState) -> c_int {
         let (p, n) = (bytes.as_ptr(), bytes.len());
         unsafe {
             if self.version == 2 {
@@ -319,7 +319,7 @@ impl Fmu {
         let mut state = null_mut();
         assert_eq!(self.save(&mut state), OK);
         let mut bytes = vec![0xaa; self.size(state)];
-        assert_eq!(self.serialise(state, &mut bytes), OK);
+        assert_eq!(self.serialize(state, &mut bytes), OK);
         assert_eq!(self.free_state(&mut state), OK);
         bytes
     }

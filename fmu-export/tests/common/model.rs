@@ -118,7 +118,7 @@ impl Model for Probe {
         if self.map[0] <= self.map[2] { Ok(()) } else { Err(Fault::new("map[1] is greater than map[3]")) }
     }
 
-    fn initialise(&mut self) {
+    fn initialize(&mut self) {
         assert!(self.n != 13, "thirteen is bad luck");
         self.x = self.u / self.r * f64::from(self.n);
         self.steps = 0;

@@ -148,13 +148,13 @@ pub(crate) enum Call {
         null: bool,
     },
     /// Into the blob of this number; `room`: bytes more than needed.
-    Serialise {
+    Serialize {
         slot: Slot,
         blob: usize,
         room: i8,
         null: bool,
     },
-    Deserialise {
+    Deserialize {
         blob: usize,
         damage: Damage,
         slot: Slot,
@@ -274,8 +274,8 @@ fn states() -> impl Strategy<Value = Call> {
         4 => slot().prop_map(Call::Restore),
         1 => slot().prop_map(Call::Free),
         1 => (slot(), rarely()).prop_map(|(slot, null)| Call::Size { slot, null }),
-        2 => (slot(), blob(), room, rarely()).prop_map(|(slot, blob, room, null)| Call::Serialise { slot, blob, room, null }),
-        2 => (blob(), damage, slot()).prop_map(|(blob, damage, slot)| Call::Deserialise { blob, damage, slot }),
+        2 => (slot(), blob(), room, rarely()).prop_map(|(slot, blob, room, null)| Call::Serialize { slot, blob, room, null }),
+        2 => (blob(), damage, slot()).prop_map(|(blob, damage, slot)| Call::Deserialize { blob, damage, slot }),
     ]
 }
 

@@ -240,11 +240,11 @@ pub(crate) fn size(version: u8, it: Instance, state: FmuState, size: *mut usize)
     either!(version, fmi2SerializedFMUstateSize(it, state, size), fmi3SerializedFMUStateSize(it, state, size))
 }
 
-pub(crate) fn serialise(version: u8, it: Instance, state: FmuState, bytes: *mut u8, n: usize) -> Done {
+pub(crate) fn serialize(version: u8, it: Instance, state: FmuState, bytes: *mut u8, n: usize) -> Done {
     either!(version, fmi2SerializeFMUstate(it, state, bytes, n), fmi3SerializeFMUState(it, state, bytes, n))
 }
 
-pub(crate) fn deserialise(version: u8, it: Instance, bytes: *const u8, n: usize, state: *mut FmuState) -> Done {
+pub(crate) fn deserialize(version: u8, it: Instance, bytes: *const u8, n: usize, state: *mut FmuState) -> Done {
     either!(version, fmi2DeSerializeFMUstate(it, bytes, n, state), fmi3DeserializeFMUState(it, bytes, n, state))
 }
 

@@ -89,7 +89,7 @@ impl Snapshot {
     pub(crate) fn refresh(&mut self) -> Result<(), ()> {
         if self.fresh && "in".contains(self.state) {
             self.guarded(|it| {
-                it.block.initialise();
+                it.block.initialize();
                 it.fresh = false;
             })?;
         }
@@ -221,7 +221,7 @@ impl Reference {
             if !it.now.is_valid() || !it.now.is_storable() {
                 return Err(());
             }
-            it.now.guarded(|now| now.block.initialise())?;
+            it.now.guarded(|now| now.block.initialize())?;
             it.now.fresh = false;
             it.now.state = 's';
             Ok(OK)

@@ -209,11 +209,11 @@ impl World {
                 let known = self.saved(*slot).is_some() && !null;
                 expected.call(ANY, |_| if known { Ok(OK) } else { Err(()) })
             }
-            Call::Serialise { slot, room, null, .. } => {
+            Call::Serialize { slot, room, null, .. } => {
                 let known = self.saved(*slot).is_some() && !null && *room == 0;
                 expected.call(ANY, |_| if known { Ok(OK) } else { Err(()) })
             }
-            Call::Deserialise { blob, damage, slot } => {
+            Call::Deserialize { blob, damage, slot } => {
                 let (bytes, snapshot) = &self.blobs[*blob];
                 let whole = matches!(damage, Damage::None) && !bytes.is_empty();
                 let fits = whole && snapshot.is_storable() && !matches!(slot, Slot::Null);
@@ -310,11 +310,11 @@ impl World {
                 assert_eq!(size, if done.0 == OK { self.size } else { 0 });
                 done
             }
-            Call::Serialise { slot, blob, room, null } => {
+            Call::Serialize { slot, blob, room, null } => {
                 let n = self.size.saturating_add_signed((*room).into());
                 let mut bytes = vec![0xa5; n];
                 let place = if *null { null_mut() } else { bytes.as_mut_ptr() };
-                let done = perform::serialise(version, it, self.handle(*slot), place, n);
+                let done = perform::serialize(version, it, self.handle(*slot), place, n);
                 if done.0 == OK {
                     let snapshot = self.saved(*slot).expect("a state").clone();
                     self.blobs[*blob] = (bytes, snapshot);
@@ -323,7 +323,7 @@ impl World {
                 }
                 done
             }
-            Call::Deserialise { blob, damage, slot } => self.deserialise(version, it, *blob, *damage, *slot),
+            Call::Deserialize { blob, damage, slot } => self.deserialize(version, it, *blob, *damage, *slot),
             Call::Status { function, kind, null } if version == 2 => perform::status(it, *function, *kind, *null),
             Call::Status { kind, .. } => perform::unsupported(version, it, kind.unsigned_abs() as usize),
             Call::Unsupported(number) => perform::unsupported(version, it, *number),
@@ -331,7 +331,7 @@ impl World {
         }
     }
 
-    fn deserialise(&mut self, version: u8, it: Instance, blob: usize, damage: Damage, slot: Slot) -> Done {
+    fn deserialize(&mut self, version: u8, it: Instance, blob: usize, damage: Damage, slot: Slot) -> Done {
         let (bytes, snapshot) = &self.blobs[blob];
         let mut bytes = bytes.clone();
         let n = bytes.len();
@@ -344,7 +344,7 @@ impl World {
         let mut state = before;
         let (from, n) = if matches!(damage, Damage::Null) { (null(), n) } else { (bytes.as_ptr(), bytes.len()) };
         let place = if matches!(slot, Slot::Null) { null_mut() } else { &raw mut state };
-        let done = perform::deserialise(version, it, from, n, place);
+        let done = perform::deserialize(version, it, from, n, place);
         if done.0 == OK {
             assert!(!state.is_null() && state != before, "always a new state");
             if let Slot::Own(i) = slot {
@@ -379,7 +379,7 @@ impl World {
         let (version, it) = (self.fmus[who].version, self.fmus[who].it);
         let mut bytes = vec![0; self.size];
         if perform::save(version, it, &raw mut self.glass).0 == OK {
-            let done = perform::serialise(version, it, self.glass, bytes.as_mut_ptr(), self.size);
+            let done = perform::serialize(version, it, self.glass, bytes.as_mut_ptr(), self.size);
             assert_eq!(done.0, OK);
         } else {
             assert_eq!(self.references[who].now.state, 'e');

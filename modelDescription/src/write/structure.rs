@@ -45,7 +45,7 @@ pub(super) fn structure(description: &Description, version: FmiVersion) -> Eleme
 
 fn unknown(element: &str, attribute: &str, (number, dependencies): &Unknown) -> Element {
     let list = |d: &Vec<u32>| d.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
-    // The only kind that is right for every function of a parameter in the initialisation mode.
+    // The only kind that is right for every function of a parameter in the initialization mode.
     let kinds = |d: &Vec<u32>| vec!["dependent"; d.len()].join(" ");
     Element::new(element)
         .with(attribute, number.to_string())

@@ -207,13 +207,13 @@ class Instance:
     # Life
 
     def set_up(self, start=0.0, stop=None):
-        """Times, and in FMI 3.0 entering initialisation as well; the status."""
+        """Times, and in FMI 3.0 entering initialization as well; the status."""
         name = "SetupExperiment" if self.version == 2 else "EnterInitializationMode"
         self.t, self.k = start, 0
         return self.call(name, 0, 0.0, start, stop is not None, stop or 0.0)
 
     def enter(self, start=0.0, stop=None):
-        """Into initialisation; must succeed."""
+        """Into initialization; must succeed."""
         assert self.set_up(start, stop) == OK, self.messages
         assert self.version == 3 or self.call("EnterInitializationMode") == OK, self.messages
         return self

@@ -51,7 +51,7 @@ impl Unit {
         names.iter().map(|name| self.references[*name]).collect()
     }
 
-    fn initialise(&mut self) -> Result<(), Box<dyn Error>> {
+    fn initialize(&mut self) -> Result<(), Box<dyn Error>> {
         FmiInstance::enter_initialization_mode(&mut self.instance, None, 0.0, None)?;
         FmiInstance::exit_initialization_mode(&mut self.instance)?;
         Ok(())
@@ -66,8 +66,8 @@ fn run(folder: &str, experiment: &Experiment) -> Result<usize, Box<dyn Error>> {
     let mut plant = Unit::load(folder, "PmsmPlant", "plant")?;
     let mut controller = Unit::load(folder, "SensorlessController", "controller")?;
     plant.instance.set_real(&plant.of(&["initial.theta_e"]), &[experiment.theta_e])?;
-    plant.initialise()?;
-    controller.initialise()?;
+    plant.initialize()?;
+    controller.initialize()?;
     let (from_plant, to_plant) = (plant.of(&["i_a", "i_b", "i_c", "speed"]), plant.of(&["u_a", "u_b", "u_c", "tau_load"]));
     let from_controller = controller.of(&["u_a", "u_b", "u_c", "theta_est"]);
     let to_controller = controller.of(&["i_a", "i_b", "i_c", "speed_ref"]);

@@ -88,7 +88,7 @@ def instances_are_freed(fmu):
         it.free()
         if n == 1000:
             before = resident()
-    # A state that was deserialised and never freed is the importer's leak: about 1 kB each here.
+    # A state that was deserialized and never freed is the importer's leak: about 1 kB each here.
     assert resident() - before < 2000 * 4096, f"{(resident() - before) / 2000:.0f} bytes per life"
 
 

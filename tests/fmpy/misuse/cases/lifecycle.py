@@ -7,7 +7,7 @@ from ..case import case
 from ..run import alone, excite, recovers, refused, run
 from ..signatures import FUNCTIONS, UNSUPPORTED
 
-STATES = "INSTE"  # instantiated, initialisation, step, terminated, error
+STATES = "INSTE"  # instantiated, initialization, step, terminated, error
 
 # Where each call is allowed (FMI 2.0.5, table in 4.2.4; FMI 3.0.2, 4.2.1). After an error: get, reset, states, free.
 ALLOWED = {
@@ -182,7 +182,7 @@ def free_in_every_state(fmu):
 
 @case
 def skipped_steps_of_life(fmu):
-    """Initialisation left out, half done, done twice; FMI 2.0 without times."""
+    """Initialization left out, half done, done twice; FMI 2.0 without times."""
     refused(it := fmu.instance(), it.step())
     refused(it := fmu.instance().enter(), it.step())
     refused(it := fmu.instance(), it.call("ExitInitializationMode"))
@@ -227,7 +227,7 @@ def error_is_final(fmu):
 
 
 @case
-def initialisation_is_iterated(fmu):
+def initialization_is_iterated(fmu):
     """Set and get in any order give what one set gives."""
     parameter = (fmu.find("initial.theta_e") or fmu.find("initial.theta_est")).name
     output = parameter.rsplit(".", 1)[-1]

@@ -118,7 +118,7 @@ def state_pointers_that_are_not_ours(fmu):
     trace, buffer = alone(fmu, 10), (c.c_uint8 * 4096)()
     it = fmu.instance().begin()
     for pointer in (None, *NOT_OURS, it.handle, c.addressof(buffer), c.cast(it.logger, c.c_void_p).value):
-        for what in ("set", "size", "serialise", "free", "get"):
+        for what in ("set", "size", "serialize", "free", "get"):
             if pointer is None and what in ("free", "get"):
                 continue
             match what:
@@ -126,7 +126,7 @@ def state_pointers_that_are_not_ours(fmu):
                     status = it.restore(pointer)
                 case "size":
                     status = it.state_call("SerializedFMUStateSize", pointer, c.byref(c.c_size_t()))
-                case "serialise":
+                case "serialize":
                     status = it.state_call("SerializeFMUState", pointer, buffer, len(buffer))
                 case "free":
                     status = it.forget(c.c_void_p(pointer))

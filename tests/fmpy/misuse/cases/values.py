@@ -159,7 +159,7 @@ def enumeration_values(fmu):
 
 @case
 def parameters_that_do_not_fit_together(fmu):
-    """Refused on leaving initialisation, with both names."""
+    """Refused on leaving initialization, with both names."""
     i_0 = fmu.find("zero_speed.i_0")
     if i_0 is None:
         return
@@ -171,7 +171,7 @@ def parameters_that_do_not_fit_together(fmu):
 
 @case
 def not_settable(fmu):
-    """Outputs and time never, fixed parameters not after initialisation; the value stays."""
+    """Outputs and time never, fixed parameters not after initialization; the value stays."""
     for variable in fmu.variables.values():
         if variable.causality == "input" or variable.variability == "tunable":
             continue
@@ -188,13 +188,13 @@ def not_settable(fmu):
 
 @case
 def set_and_get_again(fmu):
-    """Every settable variable, before and in initialisation, inputs and tunable parameters in between steps: bit for bit."""
-    for state in ("instantiated", "initialisation", "step"):
+    """Every settable variable, before and in initialization, inputs and tunable parameters in between steps: bit for bit."""
+    for state in ("instantiated", "initialization", "step"):
         for v in fmu.settable():
             if state == "step" and v.variability == "fixed":
                 continue
             it = fmu.instance()
-            it.enter() if state == "initialisation" else it.begin() if state == "step" else None
+            it.enter() if state == "initialization" else it.begin() if state == "step" else None
             real = v.type == REAL[fmu.version]
             if real:
                 value = 0.7 * float(v.start) or 0.1
