@@ -14,7 +14,7 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The file.
+/// The text of the file with these settings.
 pub fn text(name: &str, settings: &[Setting]) -> String {
     text_of(name, settings.iter().map(|s| (s.name, &s.value)))
 }

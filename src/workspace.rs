@@ -23,9 +23,9 @@ pub struct Workspace {
 #[derive(Clone, Debug, Deserialize)]
 pub struct Package {
     pub(crate) id: String,
-    /// Name.
+    /// Name of the package.
     pub name: String,
-    /// Version.
+    /// Version of the package.
     pub version: String,
     /// License, an SPDX expression.
     pub license: Option<String>,

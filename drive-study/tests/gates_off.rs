@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Bench, T_S};
+use common::{SteppedPlant, T_S};
 use drive::control::start::StartMode;
 use drive::estimator::Kind;
 use drive::frame::{AlphaBeta, Phases};
@@ -16,8 +16,8 @@ use fmu_core::{Block, Elapsed, Model, Step};
 use std::f64::consts::FRAC_PI_2;
 
 /// A plant with its gates off.
-fn off(set: impl FnOnce(&mut PlantParameters)) -> Bench {
-    let mut off = Bench::new(set);
+fn off(set: impl FnOnce(&mut PlantParameters)) -> SteppedPlant {
+    let mut off = SteppedPlant::new(set);
     off.block.model.inputs.enable = false;
     // What the controller asks for does not matter.
     off.block.model.inputs.u.a = 100.0;
@@ -25,7 +25,7 @@ fn off(set: impl FnOnce(&mut PlantParameters)) -> Bench {
     off
 }
 
-impl Bench {
+impl SteppedPlant {
     /// One step of a shaft that is imposed at `speed` (rad/s).
     fn turn(&mut self, speed: f64, h: f64) {
         let angle = self.block.out.angle;
@@ -60,7 +60,7 @@ fn a_current_decays_into_the_link_and_stays_away() {
         off.turn(100.0, T_S);
     }
     assert!(off.block.out.i.a.abs() > 1.0, "{:?}", off.block.out.i);
-    let stored = |off: &Bench| {
+    let stored = |off: &SteppedPlant| {
         let out = &off.block.out;
         0.75 * 6e-3 * (out.i_d * out.i_d + out.i_q * out.i_q)
     };

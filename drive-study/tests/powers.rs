@@ -4,12 +4,12 @@
 
 mod common;
 
-use common::{Bench, T_S};
+use common::{SteppedPlant, T_S};
 use drive::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
 use drive::plant::power::Energy;
 use drive::plant::tables::PlantParameters;
 
-impl Bench {
+impl SteppedPlant {
     /// The voltage that keeps the current `i` (A) of a linear machine with these parameters, turned by half a sample.
     fn hold(&mut self, i: Dq) {
         let motor = &self.block.model.parameters.motor;
@@ -49,27 +49,27 @@ impl Bench {
 
 /// Energy in J that passed the DC link both ways, and how much of it is not accounted for, over 40 ms in steps of `h` (s) in
 /// which the current is held at `i` (A) and let go in turn.
-fn unbalanced(mut bench: Bench, i: Dq, h: f64, mut input: impl FnMut(&mut Bench, u32)) -> (f64, f64) {
-    let (mut passed, mut sums, start) = (0.0, Energy::default(), bench.accounted());
+fn unbalanced(mut plant: SteppedPlant, i: Dq, h: f64, mut input: impl FnMut(&mut SteppedPlant, u32)) -> (f64, f64) {
+    let (mut passed, mut sums, start) = (0.0, Energy::default(), plant.accounted());
     for k in 0..whole(0.04 / h) {
         // A voltage is held for three steps at least: it turns against the rotor.
         if k % 3 == 0 {
-            bench.hold(if k % 40 < 30 { i } else { Dq::ZERO });
+            plant.hold(if k % 40 < 30 { i } else { Dq::ZERO });
         }
         // A drive train that turns on where the step ended.
-        bench.block.model.inputs.angle_shaft = bench.block.out.angle;
-        input(&mut bench, k);
-        bench.step(h);
-        let p = &bench.block.out.powers;
-        assert!((p.p_in - bench.block.model.inputs.u_dc * p.i_dc).abs() <= 1e-12 * p.p_in.abs(), "p_in = u_dc i_dc");
+        plant.block.model.inputs.angle_shaft = plant.block.out.angle;
+        input(&mut plant, k);
+        plant.step(h);
+        let p = &plant.block.out.powers;
+        assert!((p.p_in - plant.block.model.inputs.u_dc * p.i_dc).abs() <= 1e-12 * p.p_in.abs(), "p_in = u_dc i_dc");
         sums.add(&Energy { r#in: p.p_in * h, mech: p.p_mech * h, loss: p.p_loss * h });
         passed += p.p_in.abs() * h;
     }
-    let energy = bench.block.out.energy;
+    let energy = plant.block.out.energy;
     for (mean, energy) in [(sums.r#in, energy.r#in), (sums.mech, energy.mech), (sums.loss, energy.loss)] {
         assert!((mean - energy).abs() < 1e-12 * passed, "the powers are means: {mean} J, {energy} J");
     }
-    (passed, energy.r#in - (bench.accounted() - start))
+    (passed, energy.r#in - (plant.accounted() - start))
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of steps")]
@@ -101,8 +101,8 @@ fn energy_is_balanced_with_the_shaft_free() {
     for h in STEPS {
         for (i, tau) in [(Dq::new(-4.0, 3.0), 1.5), (Dq::new(2.0, -5.0), -2.0), (Dq::new(-6.0, 0.5), 0.0)] {
             for dead_time in [0.0, 2e-6] {
-                let (passed, lost) = unbalanced(Bench::new(|par| hard(par, dead_time)), i, h, |bench, _| {
-                    bench.block.model.inputs.tau_load = tau;
+                let (passed, lost) = unbalanced(SteppedPlant::new(|par| hard(par, dead_time)), i, h, |plant, _| {
+                    plant.block.model.inputs.tau_load = tau;
                 });
                 balanced((h, i, dead_time), passed, lost);
             }
@@ -120,10 +120,10 @@ fn energy_is_balanced_with_an_imposed_speed() {
         for i in [Dq::new(-4.0, 3.0), Dq::new(1.0, -5.0)] {
             // The load of a free shaft is not read; the angle of the drive train jumps by as much as an acceleration makes it.
             for dead_time in [0.0, 2e-6] {
-                let (passed, lost) = unbalanced(Bench::new(|par| imposed(par, dead_time)), i, h, |bench, k| {
-                    let inputs = &mut bench.block.model.inputs;
+                let (passed, lost) = unbalanced(SteppedPlant::new(|par| imposed(par, dead_time)), i, h, |plant, k| {
+                    let inputs = &mut plant.block.model.inputs;
                     (inputs.tau_load, inputs.speed_shaft) = (77.0, 300.0 + f64::from(k % 50));
-                    inputs.angle_shaft = bench.block.out.angle + 1e-3 * f64::from(k % 2);
+                    inputs.angle_shaft = plant.block.out.angle + 1e-3 * f64::from(k % 2);
                 });
                 balanced((h, i, dead_time), passed, lost);
             }
@@ -133,31 +133,31 @@ fn energy_is_balanced_with_an_imposed_speed() {
 
 #[test]
 fn a_link_without_voltage_carries_current_but_no_power() {
-    let mut bench = Bench::new(|par| par.initial.speed = 300.0);
-    bench.block.model.inputs.u_dc = 0.0;
-    bench.block.model.inputs.u = Phases { a: 100.0, b: -50.0, c: -50.0 };
+    let mut plant = SteppedPlant::new(|par| par.initial.speed = 300.0);
+    plant.block.model.inputs.u_dc = 0.0;
+    plant.block.model.inputs.u = Phases { a: 100.0, b: -50.0, c: -50.0 };
     for _ in 0..20 {
-        bench.step(T_S);
-        let (p, i) = (bench.block.out.powers, bench.block.out.i);
+        plant.step(T_S);
+        let (p, i) = (plant.block.out.powers, plant.block.out.i);
         // Leg a is on the upper rail, the others on the lower one: i_dc = i_a.
         assert!(p.p_in == 0.0 && (p.i_dc - i.a).abs() < 1e-12 && i.a.abs() > 0.1, "{p:?} {i:?}");
     }
-    bench.block.model.inputs.u = Phases::default();
-    bench.step(T_S);
-    assert_eq!(bench.block.out.powers.i_dc.to_bits(), 0.0_f64.to_bits(), "all legs on one rail");
+    plant.block.model.inputs.u = Phases::default();
+    plant.step(T_S);
+    assert_eq!(plant.block.out.powers.i_dc.to_bits(), 0.0_f64.to_bits(), "all legs on one rail");
 }
 
 #[test]
 fn a_steady_state_by_hand() {
     // i_q = 4 A held at 200 rad/s, nothing else: p_in = copper + torque times speed, whatever the voltage's turn in the step.
-    let mut bench = Bench::new(|par| par.mechanics.imposed = true);
-    bench.block.model.inputs.speed_shaft = 200.0;
+    let mut plant = SteppedPlant::new(|par| par.mechanics.imposed = true);
+    plant.block.model.inputs.speed_shaft = 200.0;
     for _ in 0..2000 {
-        bench.hold(Dq::new(0.0, 4.0));
-        bench.block.model.inputs.angle_shaft = bench.block.out.angle;
-        bench.step(T_S);
+        plant.hold(Dq::new(0.0, 4.0));
+        plant.block.model.inputs.angle_shaft = plant.block.out.angle;
+        plant.step(T_S);
     }
-    let p = bench.block.out.powers;
+    let p = plant.block.out.powers;
     let friction = 2e-4 * 200.0 + 0.03;
     // A held voltage that turns by 0.06 rad against the rotor is shorter by 0.06^2 / 24 on average: 14 mV of the 90 V of EMF,
     // 7 mA across 2 Ohm, 0.2 % of the current.
@@ -168,15 +168,15 @@ fn a_steady_state_by_hand() {
 
 /// A free run: speed and angle at the beginning of every step of `h` (s), and the currents at its end.
 fn free(h: f64, steps: u32) -> Vec<(f64, f64, AlphaBeta, Phases)> {
-    let mut bench = Bench::new(accelerated);
-    bench.block.model.inputs.tau_load = 0.4;
+    let mut plant = SteppedPlant::new(accelerated);
+    plant.block.model.inputs.tau_load = 0.4;
     (0..steps)
         .map(|k| {
-            let (speed, angle) = (bench.block.out.speed, bench.block.out.angle);
-            excite(&mut bench, k, h);
-            let u = bench.block.model.inputs.u.to_stator();
-            bench.step(h);
-            (speed, angle, u, bench.block.out.i)
+            let (speed, angle) = (plant.block.out.speed, plant.block.out.angle);
+            excite(&mut plant, k, h);
+            let u = plant.block.model.inputs.u.to_stator();
+            plant.step(h);
+            (speed, angle, u, plant.block.out.i)
         })
         .collect()
 }
@@ -187,32 +187,32 @@ fn accelerated(par: &mut PlantParameters) {
 }
 
 /// A voltage that accelerates and brakes, a function of time alone.
-fn excite(bench: &mut Bench, k: u32, h: f64) {
+fn excite(plant: &mut SteppedPlant, k: u32, h: f64) {
     let t = f64::from(k) * h;
     let theta = 0.9 + 3.0 * 300.0 * t;
     let u = Dq::new(-10.0, 135.0 + 20.0 * (400.0 * t).sin());
-    bench.block.model.inputs.u = Phases::from_stator(Axis::<Rotor>::at(theta).to_stator(u));
+    plant.block.model.inputs.u = Phases::from_stator(Axis::<Rotor>::at(theta).to_stator(u));
 }
 
 /// Greatest deviation of a current (A) and of the speed (rad/s) that `tau_shaft` gives, when the free run is imposed, and
 /// the bound of the former: an acceleration turns the true rotor on by half of it times h^2 before the next angle comes.
 fn imposed(h: f64, steps: u32) -> (f64, f64, f64) {
     let run = free(h, steps);
-    let mut bench = Bench::new(|par| {
+    let mut plant = SteppedPlant::new(|par| {
         accelerated(par);
         (par.mechanics.imposed, par.initial.theta_e) = (true, 0.0);
     });
-    (bench.block.model.inputs.speed_shaft, bench.block.model.inputs.angle_shaft) = (run[0].0, run[0].1);
-    bench.block.initialize();
-    let PlantParameters { motor, mechanics, .. } = bench.block.model.parameters.clone();
+    (plant.block.model.inputs.speed_shaft, plant.block.model.inputs.angle_shaft) = (run[0].0, run[0].1);
+    plant.block.initialize();
+    let PlantParameters { motor, mechanics, .. } = plant.block.model.parameters.clone();
     let (mut apart, mut speed, mut off, mut fastest) = (0.0_f64, run[0].0, 0.0_f64, 0.0_f64);
-    let mut tau = bench.block.out.tau_shaft;
+    let mut tau = plant.block.out.tau_shaft;
     for &(w, angle, u, i) in &run {
         off = off.max((speed - w).abs());
-        let inputs = &mut bench.block.model.inputs;
+        let inputs = &mut plant.block.model.inputs;
         (inputs.u, inputs.speed_shaft, inputs.angle_shaft) = (Phases::from_stator(u), w, angle);
-        bench.step(h);
-        let (out, tau_last) = (&bench.block.out, tau);
+        plant.step(h);
+        let (out, tau_last) = (&plant.block.out, tau);
         tau = out.tau_shaft;
         speed += h * (0.5 * (tau + tau_last) - 0.4) / mechanics.J;
         fastest = fastest.max((tau - 0.4).abs() / mechanics.J);

@@ -63,7 +63,7 @@ pub struct DriveOutputs {
 /// A whole sensorless drive.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub struct PmsmDrive {
-    /// Inputs.
+    /// Inputs, held over a communication step.
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,

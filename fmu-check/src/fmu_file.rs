@@ -31,7 +31,7 @@ pub(super) struct Binary {
 
 /// An FMU to be checked.
 pub struct FmuFile {
-    /// The file.
+    /// Path of the `.fmu` file.
     pub path: PathBuf,
     pub(super) bytes: Vec<u8>,
     pub(super) zip: Archive,

@@ -9,7 +9,7 @@ use std::fmt::Write;
 /// All findings about one file.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// The file.
+    /// Path of the checked file.
     pub file: String,
     /// The standard: 2.0 or 3.0.
     pub fmi_version: String,

@@ -15,7 +15,7 @@ pub struct Terminal {
     pub description: &'static str,
     /// How the members of two connected terminals find each other.
     pub rule: MatchingRule,
-    /// The variables.
+    /// The variables that it groups.
     pub members: &'static [Member],
     /// Where it is drawn, and how; `None`: the importer chooses.
     pub picture: Option<Picture>,

@@ -56,9 +56,9 @@ pub struct Enumeration {
 pub struct Item {
     /// The integer that crosses the interface.
     pub value: i32,
-    /// Name.
+    /// Name that tools show and SSV files may use.
     pub name: &'static str,
-    /// Description.
+    /// What the value means.
     pub description: &'static str,
 }
 

@@ -8,7 +8,7 @@ pub enum Error {
     /// The file is not an FMU that can be run here.
     #[error("{}: {cause}", path.display())]
     File {
-        /// The file.
+        /// Path of the file that cannot be used.
         path: PathBuf,
         /// What is wrong with it.
         cause: String,

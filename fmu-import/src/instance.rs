@@ -33,7 +33,7 @@ impl Instance {
         Self { name: name.into(), description, standard, states: Vec::new(), dead: false, log }
     }
 
-    /// Its name.
+    /// The name that the instance was given.
     pub fn name(&self) -> &str {
         &self.name
     }

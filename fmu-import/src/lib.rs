@@ -100,7 +100,7 @@ impl Fmu {
         self.terminals.as_ref().map(Option::as_ref).map_err(Clone::clone)
     }
 
-    /// The file.
+    /// Path of the `.fmu` file.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -59,7 +59,7 @@ impl Default for CoordinateSystem {
 /// A terminal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Terminal {
-    /// Name.
+    /// Name, unique among its siblings.
     pub name: String,
     /// `plug`, `bus`, `sequence`, `none`, or a rule of others.
     pub matching_rule: String,

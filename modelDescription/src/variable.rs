@@ -134,7 +134,7 @@ pub enum Dimension {
 /// Another name of a variable (FMI 3.0 only).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Alias {
-    /// Name.
+    /// Structured name, unique in the FMU.
     pub name: String,
     /// One sentence.
     pub description: Option<String>,

@@ -11,7 +11,7 @@ pub struct Measure {
     pub name: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// Its value.
+    /// The value, infinite where the drive was lost.
     pub value: f64,
     /// What it must be, where there is a figure.
     pub expected: Option<Expected>,

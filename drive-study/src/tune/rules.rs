@@ -37,7 +37,7 @@ pub enum Value {
 pub struct Setting {
     /// Variable of the model.
     pub name: &'static str,
-    /// Its value.
+    /// The value, in the unit of the variable.
     pub value: Value,
     /// The rule.
     pub rule: String,
@@ -193,7 +193,7 @@ fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
 }
 
 /// Greatest product of the current loop's gain and T_s / L: half of the one at which it oscillates.
-const MOST_GAIN: f64 = 0.5;
+const MAX_GAIN: f64 = 0.5;
 
 /// Lowers the bandwidth of the current loop to what the least inductance allows, and says so.
 fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<String>) {
@@ -204,7 +204,7 @@ fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<Str
     let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
     let least = least_inductance(data, i);
     let greatest = machine.L_d.get_ref().max(*machine.L_q.get_ref());
-    let gain = MOST_GAIN * least / number("T_s");
+    let gain = MAX_GAIN * least / number("T_s");
     let most = match value("current.active_resistance") {
         Some(Value::Boolean(true)) => (gain + number("motor.R_s")) / (2.0 * greatest),
         _ => gain / greatest,
@@ -219,7 +219,7 @@ fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<Str
         ));
         for setting in controller.iter_mut().filter(|s| s.name == "current.bandwidth") {
             setting.value = Value::Real(most);
-            setting.rule = format!("lowered from {asked:.0} Hz: gain T_s / L <= {MOST_GAIN} with the least inductance");
+            setting.rule = format!("lowered from {asked:.0} Hz: gain T_s / L <= {MAX_GAIN} with the least inductance");
         }
     }
 }

@@ -8,12 +8,12 @@ use fmu_core::{Block, Elapsed, Step};
 pub(crate) const T_S: f64 = 1e-4;
 
 /// A plant and its time.
-pub(crate) struct Bench {
+pub(crate) struct SteppedPlant {
     pub(crate) block: Block<PmsmPlant>,
     now: Elapsed,
 }
 
-impl Bench {
+impl SteppedPlant {
     pub(crate) fn new(set: impl FnOnce(&mut PlantParameters)) -> Self {
         let mut block = Block::<PmsmPlant>::default();
         set(&mut block.model.parameters);

@@ -29,7 +29,7 @@ pub const LOST: f64 = 10.0;
 /// Bandwidth in rad/s at which the voltage is smoothed.
 const FILTER: f64 = TAU * 50.0;
 
-/// Parameters.
+/// The parameters with the prefix `lock.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LockParameters {
     /// Tolerated voltage error in V, > 0.

@@ -3,7 +3,7 @@
 
 use crate::control::current::CurrentGains;
 use crate::control::lock::{LOST, Lock, LockGains};
-use crate::control::reference::greatest_torque;
+use crate::control::reference::max_torque;
 use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
 use crate::control::start::StartMode;
@@ -23,9 +23,9 @@ const MAX_SAMPLES: f64 = 1e7;
 /// Sensorless speed control of a permanent-magnet synchronous machine (Rasmussen, Fig. 2).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SensorlessController {
-    /// Inputs.
+    /// Inputs, held over a communication step.
     pub inputs: ControllerInputs,
-    /// Parameters.
+    /// Parameters; a step never writes them.
     pub parameters: ControllerParameters,
     pub(super) gains: Gains,
     /// Those of the last sample.
@@ -108,11 +108,8 @@ impl Model for SensorlessController {
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
         let k = motor.torque_constant();
-        let tau = if estimator.class() == Class::FluxObserver {
-            limit.tau
-        } else {
-            greatest_torque(motor, limit, current.mtpa)
-        };
+        let tau =
+            if estimator.class() == Class::FluxObserver { limit.tau } else { max_torque(motor, limit, current.mtpa) };
         let speed = SpeedGains::new(speed_loop, *J, k);
         if !self.tuned {
             self.last_gains.clone_from(&self.gains);

@@ -25,7 +25,7 @@ const REST: f64 = 4.0;
 /// Minimum difference of the peaks, by the controller's estimates, in units of x / L_d.
 const MIN_DIFFERENCE: f64 = 0.02;
 
-/// Parameters.
+/// The parameters with the prefix `polarity.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PolarityParameters {
     /// Time of injection in s, > 0.

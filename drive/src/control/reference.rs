@@ -33,8 +33,8 @@ fn along(motor: &Motor, i_q: f64) -> DqHat {
     DqHat::new(-dL * i_q * i_q / (half + root), i_q)
 }
 
-/// Greatest torque in N.m within the limits, on the curve (`mtpa`) or with i_d = 0.
-pub fn greatest_torque(motor: &Motor, limit: &Limits, mtpa: bool) -> f64 {
+/// Maximum torque in N.m within the limits, on the curve (`mtpa`) or with i_d = 0.
+pub fn max_torque(motor: &Motor, limit: &Limits, mtpa: bool) -> f64 {
     let i_q = limit.i_q.min(limit.i);
     let i = if mtpa {
         // |i| = limit.i on the curve: i_d = (psi_M - sqrt(psi_M^2 + 8 (dL i)^2)) / (4 dL), without the division.
@@ -78,12 +78,12 @@ mod tests {
     }
 
     #[test]
-    fn the_greatest_torque_is_at_a_limit() {
+    fn the_maximum_torque_is_at_a_limit() {
         let limit = Limits { i_q: 100.0, i: 10.0, tau: 1000.0 };
-        let tau = greatest_torque(&salient(), &limit, true);
+        let tau = max_torque(&salient(), &limit, true);
         assert!((max_torque_per_ampere(&salient(), tau).magnitude() - 10.0).abs() < 1e-9);
-        assert!((greatest_torque(&salient(), &Limits { tau: 5.0, ..limit.clone() }, true) - 5.0).abs() < 1e-12);
+        assert!((max_torque(&salient(), &Limits { tau: 5.0, ..limit.clone() }, true) - 5.0).abs() < 1e-12);
         let i_q = Limits { i_q: 4.0, ..limit };
-        assert!((greatest_torque(&salient(), &i_q, false) - salient().torque(0.0, 4.0)).abs() < 1e-12);
+        assert!((max_torque(&salient(), &i_q, false) - salient().torque(0.0, 4.0)).abs() < 1e-12);
     }
 }

@@ -44,7 +44,7 @@ enumeration! {
     }
 }
 
-/// Parameters.
+/// The parameters with the prefix `start.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StartParameters {
     /// Which start sequence.

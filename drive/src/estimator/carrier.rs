@@ -18,7 +18,7 @@ use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Parameters.
+/// The parameters with the prefix `carrier.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CarrierParameters {
     /// Voltage V, > 0.

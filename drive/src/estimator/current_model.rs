@@ -15,7 +15,7 @@ use crate::estimator::interval::Interval;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
 use serde::{Deserialize, Serialize};
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CurrentModel {
     follower: Follower,

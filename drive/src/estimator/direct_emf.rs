@@ -16,7 +16,7 @@ use crate::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DirectEmf {
     tracker: Tracker,

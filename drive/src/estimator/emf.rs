@@ -20,7 +20,7 @@ use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Parameters.
+/// The parameters with the prefix `emf.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EmfParameters {
     /// Bandwidth of the EMF in rad/s, > 0: both poles of the observers, the pole of the filter of the direct EMF.

@@ -14,7 +14,7 @@ use crate::estimator::{Context, Estimate, Estimating, Sample};
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EmfObserver {
     tracker: Tracker,

@@ -50,7 +50,7 @@ impl ExtendedEmfObserver {
     }
 }
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ExtendedEmf {
     tracker: Tracker,

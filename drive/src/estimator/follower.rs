@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 /// Greatest angle error in rad that is passed on.
 const CLIP: f64 = 0.5;
 
-/// Parameters.
+/// The parameters with the prefix `matsui.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MatsuiParameters {
     /// Gain rho of the angle in rad/s, > 0.

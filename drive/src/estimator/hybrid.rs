@@ -20,7 +20,7 @@ use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Parameters.
+/// The parameters with the prefix `hybrid.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HybridParameters {
     /// Electrical speed in rad/s up to which only the injection counts, >= 0.
@@ -46,7 +46,7 @@ impl HybridParameters {
     }
 }
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hybrid {
     tracker: Tracker,

@@ -20,7 +20,7 @@ use fmu_core::unit::VOLT;
 use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// Parameters.
+/// The parameters with the prefix `near_pwm.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NearPwmParameters {
     /// Voltage V, > 0.
@@ -33,7 +33,7 @@ impl Default for NearPwmParameters {
     }
 }
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NearPwmInjection {
     tracker: Tracker,

@@ -26,7 +26,7 @@ enumeration! {
     }
 }
 
-/// Parameters.
+/// The parameters with the prefix `pulsating.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PulsatingParameters {
     /// How the angle error is demodulated from the carrier current.
@@ -39,7 +39,7 @@ impl Default for PulsatingParameters {
     }
 }
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PulsatingInjection {
     tracker: Tracker,

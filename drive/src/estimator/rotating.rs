@@ -19,7 +19,7 @@ use crate::frame::{AlphaBeta, Axis, Estimated, Stator};
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RotatingInjection {
     tracker: Tracker,

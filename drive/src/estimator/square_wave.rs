@@ -20,7 +20,7 @@ use fmu_core::unit::VOLT;
 use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// Parameters.
+/// The parameters with the prefix `square_wave.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SquareWaveParameters {
     /// Voltage V, > 0.
@@ -83,7 +83,7 @@ impl SquareWave {
     }
 }
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SquareWaveInjection {
     tracker: Tracker,

@@ -23,7 +23,7 @@ enumeration! {
     }
 }
 
-/// Parameters.
+/// The parameters with the prefix `tracker.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrackerParameters {
     /// Which tracker.

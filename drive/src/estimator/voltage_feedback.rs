@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 /// Greatest angle error in rad that is passed on.
 const CLIP: f64 = 0.5;
 
-/// State.
+/// What a sample hands on to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VoltageFeedback {
     tracker: Tracker,

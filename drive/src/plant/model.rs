@@ -53,9 +53,9 @@ impl State {
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PmsmPlant {
-    /// Inputs.
+    /// Inputs, held over a communication step.
     pub inputs: PlantInputs,
-    /// Parameters.
+    /// Parameters; a step never writes them.
     pub parameters: PlantParameters,
     state: State,
     /// Means over the last step.

@@ -10,7 +10,7 @@ use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED};
 use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// Parameters.
+/// The parameters of machine, inverter and shaft.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlantParameters {
     /// The machine.

@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 /// A terminal of the description.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Terminal {
-    /// Name.
+    /// Name, unique in the FMU.
     pub name: String,
     /// One sentence.
     pub description: String,
     /// How members find each other.
     pub rule: MatchingRule,
-    /// The variables.
+    /// The variables that it groups.
     pub members: Vec<Member>,
     /// Where and how it is drawn.
     pub picture: Option<TerminalPicture>,

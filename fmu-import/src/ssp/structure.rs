@@ -27,7 +27,7 @@ pub struct Structure {
 /// An FMU of the system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Component {
-    /// Name.
+    /// Name, by which connections refer to it.
     pub name: String,
     /// Its archive, a path within the SSP.
     pub source: String,
