@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_import::Error> {
-//! use fmu::{cosimulation::{Schedule, Settings, System}, importer::Fmu};
+//! use fmu_import::{Fmu, cosimulation::{Schedule, Settings, System}};
 //!
 //! let mut system = System::default();
 //! system.add("plant", &Fmu::open("target/fmu/fmi3/PmsmPlant.fmu")?, false)?;
