@@ -1,5 +1,6 @@
-//! What is done with the drive: [`reproduce`], the paper's experiments through packed FMUs; [`compare`], the estimators side by
-//! side; [`tune`], parameter values for a machine; [`runner`], the closed loop that all of them run; [`plot`], curves as SVG.
+//! Studies of the drive: [`reproduce`], the paper's experiments with packed FMUs; [`compare`], the estimators side by
+//! side; [`tune`], parameter values for a machine; [`runner`], the closed loop that they share; [`plot`], curves as
+//! SVG.
 
 #![forbid(unsafe_code)]
 // The papers' symbols keep their case: J, T_s.

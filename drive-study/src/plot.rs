@@ -1,15 +1,15 @@
-//! A recording as a picture: one panel for each unit, time below.
+//! Plots a recording: one panel per unit, time on the horizontal axis.
 
 use anyhow::{Result, anyhow};
 use fmu_import::cosimulation::{Column, Recording};
 use plotters::prelude::*;
 
-/// Width of the curves and height of a panel, in pixels; the names stand beside the curves, never on them.
+/// Width of the curves and height of a panel in pixels; the names are beside the curves, never on them.
 const SIZE: (u32, u32) = (820, 240);
 const NAMES: u32 = 240;
-/// Most points drawn of a curve: its highest and its lowest point in as many stretches as the picture can show.
+/// Maximum number of points drawn per curve: the highest and lowest point of as many intervals as the picture resolves.
 const STRETCHES: usize = 1000;
-/// Colors that people with any kind of color vision tell apart (Okabe and Ito).
+/// Colors that remain distinguishable with color blindness (Okabe and Ito).
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -64,7 +64,7 @@ pub fn svg(recording: &Recording) -> Result<String> {
                 .draw()
                 .map_err(drawing)?;
             for (place, column) in columns.iter().enumerate() {
-                // The colors come again, paler, when they are used up.
+                // When the colors are used up, they repeat in a paler tone.
                 let color = COLORS[place % COLORS.len()].mix(if place < COLORS.len() { 1.0 } else { 0.45 });
                 let line = LineSeries::new(thin(&recording.time, &column.values), color.stroke_width(1));
                 chart.draw_series(line).map_err(drawing)?;
@@ -83,7 +83,7 @@ fn drawing(error: impl std::fmt::Display) -> anyhow::Error {
     anyhow!("drawing: {error}")
 }
 
-/// Leaves out what cannot be seen, and keeps every peak.
+/// Drops points that cannot be seen and keeps every peak.
 fn thin(time: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     let length = values.len().div_ceil(STRETCHES).max(1);
     let stretches = time.chunks(length).zip(values.chunks(length));

@@ -1,7 +1,7 @@
-//! The test bench of the Kim & Sul figures: the 2.2 kW machine, a preset per estimator, and what is measured of a run.
+//! The test bench of the Kim & Sul figures: the 2.2 kW machine, a preset per estimator, and the measurements of a run.
 //!
-//! Speeds are in units of the rated speed, torques of the rated torque (pu); angle errors are theta - theta^ in degrees, as in Kim & Sul.
-//! A run is the closed loop of plant and controller, stepped at the sample period as an importer steps it.
+//! Speeds are relative to rated speed, torques to rated torque (pu); angle errors are theta - theta^ in degrees, as in
+//! Kim & Sul.
 
 use drive::estimator::Kind;
 use drive::estimator::kalman::KalmanParameters;
@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 pub const RATED_SPEED: f64 = TAU * 25.0;
 /// Rated torque in N.m.
 pub const RATED_TORQUE: f64 = 14.0;
-/// Voltage that a leg of the inverter loses to 2 us dead time, in V.
+/// Voltage that an inverter leg loses to 2 us dead time, in V.
 pub const U_DEAD: f64 = 10.8;
 
 /// The 2.2 kW machine with interior magnets.
@@ -24,7 +24,7 @@ pub fn machine() -> Motor {
     Motor::IPMSM_2_2_KW
 }
 
-/// The drive at rest with the gains that the figures were made with, for one estimator.
+/// The drive at rest, with the gains behind the figures, for one estimator.
 pub fn drive(kind: Kind) -> Pair {
     let mut pair = Pair::default();
     let plant = &mut pair.plant.model;
@@ -44,7 +44,7 @@ pub fn drive(kind: Kind) -> Pair {
     (par.speed_loop.bandwidth, par.speed_loop.t_is, par.speed_loop.b) = (TAU * 5.0, 4.0, 1.0);
     (par.limit.i_q, par.limit.i, par.limit.tau) = (15.0, 15.0, 1.6 * RATED_TORQUE);
     (par.sensor.noise, par.sensor.resolution) = (0.01, 40.0 / 4096.0);
-    // What an uncompensated dead time leaves is no sign of a lost rotor.
+    // The error left by an uncompensated dead time is no sign of a lost rotor.
     par.lock.u = 15.0;
     (par.start.i, par.start.speed) = (8.0, 0.15 * RATED_SPEED);
     let w = 0.05 * 3.0 * RATED_SPEED;
@@ -66,7 +66,7 @@ pub fn drive(kind: Kind) -> Pair {
     pair
 }
 
-/// The mechanical observer as tracker, of the bandwidth of the injections' figures, and a speed loop of `bandwidth`
+/// The mechanical observer as tracker, with the bandwidth of the injection figures, and a speed loop of `bandwidth`
 /// (rad/s).
 pub fn with_mechanical_observer(mut pair: Pair, bandwidth: f64) -> Pair {
     let par = &mut pair.controller.model.parameters;
@@ -82,14 +82,14 @@ pub fn with_dead_time(mut pair: Pair, compensated: bool) -> Pair {
     pair
 }
 
-/// The machine's saturation: it tells the magnet's poles apart.
+/// The machine's saturation, which distinguishes the magnet's poles.
 pub fn with_saturation(mut pair: Pair) -> Pair {
     let saturation = &mut pair.plant.model.parameters.saturation;
     (saturation.s_2, saturation.s_3) = (40.0, 40.0);
     pair
 }
 
-/// The drive turning at `speed` (pu), its angle and speed known at the start.
+/// The drive running at `speed` (pu), with known angle and speed at the start.
 pub fn turning(mut pair: Pair, speed: f64) -> Pair {
     pair.plant.model.parameters.initial.speed = speed * RATED_SPEED;
     let controller = &mut pair.controller.model;
@@ -98,7 +98,7 @@ pub fn turning(mut pair: Pair, speed: f64) -> Pair {
     pair
 }
 
-/// How far the rotor is ahead of the estimate: theta - theta^ in deg, wrapped.
+/// Angle of the rotor ahead of the estimate: theta - theta^ in deg, wrapped.
 pub fn rotor_ahead(pair: &Pair) -> f64 {
     wrap(pair.plant.out.theta_e - pair.controller.out.theta_est).to_degrees()
 }
@@ -108,11 +108,11 @@ pub fn speed(pair: &Pair) -> f64 {
     pair.plant.out.speed / RATED_SPEED
 }
 
-/// Runs a pair for `duration` (s) in steps of `h` (s); `each` sees it before every step with the time, and at the end. False
-/// where a step fails: a drive that was lost.
+/// Runs a pair for `duration` (s) in steps of `h` (s). `each` gets the pair and the time before every step and at the
+/// end. Returns false when a step fails, which means that the drive was lost.
 ///
 /// # Errors
-/// The parameters do not fit together.
+/// The parameters are inconsistent.
 pub fn run_in_steps(
     pair: &mut Pair,
     h: f64,
@@ -132,27 +132,27 @@ pub fn run_in_steps(
     Ok(true)
 }
 
-/// The same in steps of the sample period.
+/// The same, in steps of the sample period.
 ///
 /// # Panics
-/// When the parameters do not fit together.
+/// If the parameters are inconsistent.
 pub fn run(pair: &mut Pair, duration: f64, each: impl FnMut(f64, &mut Pair)) {
     let h = pair.controller.model.parameters.T_s;
     run_in_steps(pair, h, duration, each).expect("parameters that fit together");
 }
 
-/// Mean, standard deviation and greatest magnitude of a signal.
+/// Mean, standard deviation and maximum magnitude of a signal.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Statistics {
     n: f64,
     sum: f64,
     squares: f64,
-    /// Greatest magnitude.
+    /// Maximum magnitude.
     pub peak: f64,
 }
 
 impl Statistics {
-    /// One value more.
+    /// Adds a value.
     pub fn add(&mut self, x: f64) {
         self.n += 1.0;
         self.sum += x;
@@ -171,7 +171,7 @@ impl Statistics {
     }
 }
 
-/// A load that grows to `load` (pu) between 0.1 and 0.4 s.
+/// A load that ramps to `load` (pu) between 0.1 and 0.4 s.
 fn ramp(load: f64, t: f64) -> f64 {
     load * RATED_TORQUE * ((t - 0.1) / 0.3).clamp(0.0, 1.0)
 }
@@ -192,7 +192,7 @@ impl Steady {
     }
 }
 
-/// Turns at `speed`, takes `load` (both pu), settles until 2 s and is measured for 0.5 s.
+/// Runs at `speed`, takes `load` (both pu), settles until 2 s and measures for 0.5 s.
 pub fn steady(pair: Pair, speed: f64, load: f64) -> Steady {
     let (mut pair, mut steady) = (turning(pair, speed), Steady::default());
     run(&mut pair, 2.5, |t, p| {
@@ -205,7 +205,7 @@ pub fn steady(pair: Pair, speed: f64, load: f64) -> Steady {
     steady
 }
 
-/// Takes rated load at 0.5 pu, slows down to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and is measured for 0.5 s.
+/// Takes rated load at 0.5 pu, slows down to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and measures for 0.5 s.
 pub fn slowed_down(pair: Pair, speed: f64) -> Steady {
     let (mut pair, mut steady) = (turning(pair, 0.5), Steady::default());
     let arrival = 1.2 + (0.5 - speed) / 0.5;
@@ -225,7 +225,8 @@ pub fn lowest_speed(pair: &Pair, speeds: &[f64]) -> Option<f64> {
     speeds.iter().copied().take_while(|&speed| slowed_down(pair.clone(), speed).holds()).last()
 }
 
-/// A load step at `speed` (pu): dip of the true speed in pu, peak angle error in deg beside its mean before the step.
+/// A load step at `speed` (pu): dip of the true speed in pu, peak angle error in deg relative to its mean before the
+/// step.
 pub fn load_step(pair: Pair, speed: f64, load: f64) -> (f64, f64) {
     let (mut pair, mut dip, mut peak) = (turning(pair, speed), 0.0_f64, 0.0_f64);
     run(&mut pair, 2.0, |t, p| {
@@ -238,9 +239,9 @@ pub fn load_step(pair: Pair, speed: f64, load: f64) -> (f64, f64) {
     (dip, peak)
 }
 
-/// Gain of the closed speed loop at `frequency` (Hz) around `speed` (pu), by the true speed.
+/// Gain of the closed speed loop at `frequency` (Hz) around `speed` (pu), from the true speed.
 pub fn speed_gain(pair: Pair, speed: f64, frequency: f64) -> f64 {
-    // A swing of 0.02 pu, less where it would need more than half the rated torque.
+    // An amplitude of 0.02 pu, or less if that would need more than half the rated torque.
     let J = pair.plant.model.parameters.mechanics.J;
     let swing = (0.02 * RATED_SPEED).min(0.5 * RATED_TORQUE / (J * TAU * frequency));
     let (settle, periods) = (0.5, (0.5 * frequency).ceil().max(2.0));
@@ -272,10 +273,10 @@ pub fn speed_bandwidth(pair: &Pair, speed: f64) -> f64 {
     f64::INFINITY
 }
 
-/// Rms value in A of the current (as a vector) that an injection makes at standstill, between the samples too.
+/// RMS value in A of the current vector that an injection causes at standstill, including the time between samples.
 ///
 /// # Panics
-/// When a step fails.
+/// If a step fails.
 pub fn injected_current(mut pair: Pair) -> f64 {
     const PARTS: u32 = 20;
     (pair.controller.model.parameters.sensor.noise, pair.controller.model.parameters.sensor.resolution) = (0.0, 0.0);

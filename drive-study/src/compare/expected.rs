@@ -1,5 +1,5 @@
-//! The figures that a cell must show: those of the Kim & Sul review as derived again for the 2.2 kW machine, and for
-//! Rasmussen's observer those of its own reference motor. Where no tolerance is given it is 10 %, and 0.3 deg for angles.
+//! The expected figures of the cells. Those of the Kim & Sul review are derived again for the 2.2 kW machine; those of
+//! Rasmussen's observer hold for its own reference motor. The default tolerance is 10 %, and 0.3 deg for angles.
 
 use crate::reproduce::figures::Expected;
 use Expected::{AtLeast, AtMost, Near};
@@ -32,7 +32,7 @@ const FLUX: &[&str] = &["Rasmussen"];
 
 type Row = (&'static [&'static str], &'static str, &'static str, Expected);
 
-/// Within a tenth.
+/// Within 10 %.
 const fn tenth(x: f64) -> Expected {
     Near(x, 0.1 * x)
 }
@@ -50,7 +50,7 @@ const BANDWIDTH: &str = "speed bandwidth";
 
 /// Estimators, scenario, measure, figure.
 const FIGURES: &[Row] = &[
-    // Rated load held from, ideal and with compensated dead time.
+    // Lowest speed at which rated load is held: ideal inverter, and compensated dead time.
     (DIRECT, "lowest", LOWEST, AtMost(0.10)),
     (DIRECT, "lowest-dead", LOWEST, AtMost(0.10)),
     (OBSERVERS, "lowest", LOWEST, AtMost(0.03)),
@@ -60,7 +60,7 @@ const FIGURES: &[Row] = &[
     (FEEDBACK, "lowest", LOWEST, AtMost(0.02)),
     (FEEDBACK, "lowest-dead", LOWEST, AtMost(0.05)),
     (INJECTION, "lowest", LOWEST, AtMost(0.0)),
-    // Without the frame-speed term, 1-3 are lost below 0.21-0.25 pu.
+    // Without the frame-speed term, estimators 1-3 lose the rotor below 0.21-0.25 pu.
     (PRINTED, "as-printed", LOWEST, Near(0.23, 0.043)),
     (FEEDBACK, "as-printed", LOWEST, AtLeast(0.101)),
     // Wrong parameters.
@@ -79,7 +79,7 @@ const FIGURES: &[Row] = &[
     (DIRECT, "load-0.5", PEAK, deg(3.9)),
     (OBSERVERS, "load-0.5", "dip", tenth(0.092)),
     (OBSERVERS, "load-0.5", PEAK, deg(3.8)),
-    // Judged by the figures of the observers; it is better.
+    // Judged by the figures of the observers, although it performs better.
     (KALMAN, "load-0.5", "dip", AtMost(0.1012)),
     (KALMAN, "load-0.5", PEAK, AtMost(4.1)),
     (MODELS, "load-0.5", "dip", tenth(0.070)),
@@ -107,7 +107,8 @@ const FIGURES: &[Row] = &[
     (PULSATING, "bandwidth-fast", BANDWIDTH, tenth(52.0)),
     (BOTH_SQUARES, "bandwidth-fast", BANDWIDTH, Near(49.85, 8.45)),
     (NEAR_PWM, "bandwidth-fast", BANDWIDTH, tenth(39.0)),
-    // Injection: error at 0 and ±0.1 pu (the noise of the list was greater: no worse than it), what it costs, a full load step at standstill.
+    // Injection: error at 0 and ±0.1 pu (must not exceed the noise of the list), cost of the signal, full load step at
+    // standstill.
     (ROTATING, "rated-0", MEAN, Near(0.0, 0.4)),
     (ROTATING, "rated-0.1", MEAN, Near(0.0, 0.4)),
     (ROTATING, "rated-back", MEAN, Near(0.0, 0.4)),
@@ -147,7 +148,7 @@ const FIGURES: &[Row] = &[
     (FLUX, "reversal", PEAK, AtMost(13.0)),
 ];
 
-/// What a measure must be, where there is a figure. No estimator may fail to start.
+/// The expected value of a measure, if there is a figure. Every estimator must start.
 pub fn of(estimator: &str, scenario: &str, measure: &str) -> Option<Expected> {
     if (scenario, measure) == ("start", "failed starts") {
         return Some(Near(0.0, 0.0));

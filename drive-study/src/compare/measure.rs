@@ -1,24 +1,24 @@
-//! What is read off a run. Angle errors are theta - theta^ in deg, speeds in pu.
+//! The numbers measured in a run. Angle errors are theta - theta^ in deg, speeds are in pu.
 
 use crate::reproduce::figures::Expected;
 use crate::runner;
 use drive::Pair;
 
-/// A number of a cell. Infinite: never reached, or the rotor was lost.
+/// A number of a cell. It is infinite if the value was never reached or the rotor was lost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measure {
-    /// What it is.
+    /// Name of the quantity.
     pub name: &'static str,
     /// Its unit.
     pub unit: &'static str,
     /// The value, infinite where the drive was lost.
     pub value: f64,
-    /// What it must be, where there is a figure.
+    /// The expected value, if there is a figure.
     pub expected: Option<Expected>,
 }
 
 impl Measure {
-    /// A number that nothing is expected of, yet.
+    /// A number without an expected value.
     pub fn new(name: &'static str, unit: &'static str, value: f64) -> Self {
         Self { name, unit, value: if value.is_finite() { value } else { f64::INFINITY }, expected: None }
     }
@@ -35,13 +35,13 @@ pub struct Trace {
     pub speed: Vec<f64>,
     /// Angle error in deg.
     pub error: Vec<f64>,
-    /// Stator current in A, alpha and beta, at every sample; of an injected signal only.
+    /// Stator current in A, alpha and beta, at every sample; only for an injected signal.
     pub current: Vec<[f64; 2]>,
-    /// Electrical angle in deg, true and estimated, with them.
+    /// Electrical angle in deg, true and estimated, at the same samples.
     pub angles: Vec<[f64; 2]>,
 }
 
-/// Angle error in deg beyond which the rotor is lost: no torque is left.
+/// Angle error in deg beyond which the rotor counts as lost: no torque is left.
 const LOST: f64 = 90.0;
 /// Band in pu within which a speed has settled.
 const BAND: f64 = 0.02;
@@ -55,13 +55,13 @@ pub struct Follow {
     last: f64,
     /// Angle error.
     pub angle: runner::Statistics,
-    /// Deepest fall of the speed below its reference, along it, in pu.
+    /// Largest drop of the speed below its reference, in the direction of the reference, in pu.
     pub dip: f64,
     trace: Trace,
 }
 
 impl Follow {
-    /// The state of the drive at the time `t` (s), measured; the speed should be `reference` (pu).
+    /// Measures the drive at time `t` (s), with the speed reference `reference` (pu).
     pub fn add(&mut self, t: f64, reference: f64, pair: &Pair) {
         let (speed, error) = (runner::speed(pair), runner::rotor_ahead(pair));
         let off = speed - reference;
@@ -75,7 +75,7 @@ impl Follow {
         self.last = t;
     }
 
-    /// The state at the time `t` (s), for the plot.
+    /// Records the state at time `t` (s) for the plot.
     pub fn trace(&mut self, t: f64, reference: f64, pair: &Pair) {
         if self.trace.t.last().is_none_or(|last| t - last > 1e-3 - 1e-9) {
             self.trace.t.push(t);
@@ -99,12 +99,12 @@ impl Follow {
         Measure::new("rms speed error", "pu", self.or_lost((self.squares / self.n).sqrt()))
     }
 
-    /// Greatest angle error.
+    /// Maximum angle error.
     pub fn peak(&self) -> Measure {
         Measure::new("peak angle error", "deg", self.or_lost(self.angle.peak))
     }
 
-    /// Mean angle error, under a name.
+    /// Mean angle error, with a name of its own.
     pub fn mean(&self, name: &'static str) -> Measure {
         Measure::new(name, "deg", self.or_lost(self.angle.mean()))
     }
@@ -119,7 +119,7 @@ impl Follow {
         Measure::new("settling time", "s", self.or_lost(self.settled_anyway(from)))
     }
 
-    /// The same in s for a start, in which the angle may be anything at first.
+    /// The same in s for a start, where the initial angle error does not count.
     pub fn settled_anyway(&self, from: f64) -> f64 {
         match self.last_outside {
             Some(t) if t >= self.last - 1e-9 => f64::INFINITY,
@@ -128,7 +128,7 @@ impl Follow {
         }
     }
 
-    /// Hands out the run over time.
+    /// Returns the run over time.
     pub fn into_trace(self) -> Trace {
         self.trace
     }

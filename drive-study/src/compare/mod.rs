@@ -1,8 +1,9 @@
-//! The grid: every estimator through every scenario, natively, on all cores; measured, judged, drawn.
+//! The grid: runs every estimator through every scenario on all cores, with the native models, then measures, checks
+//! and plots the results.
 //!
-//! - [`subject`]: an estimator with the drive it is compared on; [`scenario`]: what it goes through;
-//! - [`measure`]: what is read off a run; [`expected`]: what the review's list of figures says about it;
-//! - [`queue`]: the runs on all cores; [`table`], [`html`], [`plots`]: what an engineer reads.
+//! - [`subject`]: an estimator with the drive it is compared on; [`scenario`]: the test it runs through;
+//! - [`measure`]: the numbers measured in a run; [`expected`]: the figures expected by the review's list;
+//! - [`queue`]: the runs on all cores; [`table`], [`html`], [`plots`]: the output for an engineer.
 
 pub mod expected;
 pub mod html;
@@ -22,14 +23,14 @@ use scenario::{Effort, SCENARIOS, Scenario};
 use std::path::Path;
 use subject::{Entry, Subject};
 
-/// What came of one estimator in one scenario.
+/// The result of one estimator in one scenario.
 #[derive(Clone, Debug)]
 pub enum Outcome {
-    /// Numbers, and the run over time where it is worth a plot.
+    /// Numbers, and the run over time if it is worth a plot.
     Measured(Vec<Measure>, Option<Trace>),
-    /// Why the scenario says nothing about this estimator.
+    /// Why the scenario does not apply to this estimator.
     NotApplicable(&'static str),
-    /// The drive could not even be started: the message of the parameters that do not fit together.
+    /// The drive could not be started: the message about inconsistent parameters.
     Refused(String),
 }
 
@@ -40,7 +41,7 @@ pub struct Cell {
     pub entry: Entry,
     /// The scenario.
     pub scenario: &'static Scenario,
-    /// What came of it.
+    /// The result.
     pub outcome: Outcome,
 }
 
@@ -61,12 +62,12 @@ impl Cell {
         }
     }
 
-    /// The numbers that are not what is expected of them.
+    /// The numbers that differ from their expected values.
     pub fn outside(&self) -> impl Iterator<Item = &Measure> {
         self.measures().iter().filter(|m| m.expected.is_some_and(|e| !e.holds(m.value)))
     }
 
-    /// Whether all that is expected of this cell is so.
+    /// Whether every number of this cell is as expected.
     pub fn holds(&self) -> bool {
         !matches!(self.outcome, Outcome::Refused(_)) && self.outside().next().is_none()
     }
@@ -90,7 +91,7 @@ impl Selection {
     }
 }
 
-/// Runs the cells on all cores; `done` hears of each that is finished.
+/// Runs the cells on all cores and calls `done` after each finished cell.
 pub fn run(selection: &Selection, done: impl Fn() + Sync) -> Vec<Cell> {
     let Selection { entries, scenarios, effort } = selection;
     let jobs: Vec<_> = entries.iter().flat_map(|&entry| scenarios.iter().map(move |&s| (entry, s))).collect();

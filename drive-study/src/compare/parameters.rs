@@ -1,4 +1,4 @@
-//! The scenarios of a controller that knows its drive badly: wrong machine parameters, dead time.
+//! Scenarios with an imperfect model of the drive in the controller: wrong machine parameters, dead time.
 
 use super::Outcome;
 use super::measure::Measure;
@@ -7,7 +7,7 @@ use super::subject::{Class, Subject};
 use drive::motor::Motor;
 use fmu_core::Fault;
 
-/// Mean angle error with a machine estimate 20 % too high and too low.
+/// Mean angle error with a machine parameter estimated 20 % too high and 20 % too low.
 pub(super) fn wrong(subject: &Subject, speed: f64, of: fn(&mut Motor) -> &mut f64) -> Result<Outcome, Fault> {
     let speed = if subject.class == Class::Injection { 0.1 } else { speed };
     let error = |factor: f64, name| -> Result<Measure, Fault> {
@@ -17,7 +17,7 @@ pub(super) fn wrong(subject: &Subject, speed: f64, of: fn(&mut Motor) -> &mut f6
     Ok(Outcome::Measured(vec![error(1.2, "+20 %")?, error(0.8, "-20 %")?], None))
 }
 
-/// Rated load at 0.1 pu behind an inverter with dead time.
+/// Rated load at 0.1 pu with an inverter that has dead time.
 pub(super) fn dead_time(subject: &Subject, compensated: bool) -> Result<Outcome, Fault> {
     let follow = slowed_down(&subject.with_dead_time(compensated), 0.1)?;
     Ok(Outcome::Measured(vec![follow.rms(), follow.mean("mean angle error"), follow.peak()], None))

@@ -1,5 +1,5 @@
-//! What the estimators did over time: speed and angle error of all in one picture a scenario, and, of each that injects
-//! a voltage, the current of the carrier and the angle found in it (Fig. 8 and 11 of the review).
+//! Plots over time: speed and angle error of all estimators in one picture per scenario and, for each estimator that
+//! injects a voltage, the carrier current and the angle found in it (Fig. 8 and 11 of the review).
 
 use super::Cell;
 use crate::plot;
@@ -9,7 +9,7 @@ use fmu_import::cosimulation::{Column, Recording};
 /// A picture.
 #[derive(Debug)]
 pub struct Plot {
-    /// Name of its file, without extension.
+    /// File name without extension.
     pub name: String,
     /// What it shows.
     pub title: String,
@@ -17,7 +17,7 @@ pub struct Plot {
     pub svg: String,
 }
 
-/// All pictures that the cells give.
+/// All pictures of the cells.
 ///
 /// # Errors
 /// When drawing fails.
@@ -50,7 +50,7 @@ fn together(id: &str, cells: &[&Cell]) -> Result<Plot> {
     }
     let full = |values: &[f64]| {
         let missing = recording.time.len() - values.len();
-        // A lost rotor may have any angle: a curve that leaves the picture hides all others.
+        // A lost rotor may have any angle; a curve that leaves the picture would hide all others.
         values.iter().map(|x| x.clamp(-100.0, 100.0)).chain(std::iter::repeat_n(f64::NAN, missing)).collect()
     };
     let mut columns = Vec::new();
@@ -65,7 +65,7 @@ fn together(id: &str, cells: &[&Cell]) -> Result<Plot> {
     Ok(Plot { name: id.into(), title, svg: plot::svg(&recording)? })
 }
 
-/// Fig. 8 and 11: the current of the carrier over six milliseconds, and the angle found in it.
+/// Fig. 8 and 11: the carrier current over six milliseconds, and the angle found in it.
 fn signal(cell: &Cell) -> Result<Vec<Plot>> {
     let Some(trace) = cell.trace() else { return Ok(Vec::new()) };
     let name = cell.entry.name;

@@ -1,10 +1,10 @@
-//! A work queue: every core takes the next job as soon as it is free; results come in the order of the jobs.
+//! A work queue: every core takes the next job when it is free; results are returned in the order of the jobs.
 
 use std::num::NonZero;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// Does `work` on every job, on all cores.
+/// Runs `work` on every job, on all cores.
 pub fn map<J: Sync, R: Send>(jobs: &[J], work: impl Fn(&J) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let worker = || {

@@ -1,4 +1,4 @@
-//! The scenarios of a drive that runs: start, ramp, reversal, load steps, rated load, lowest speed, bandwidth.
+//! Scenarios of a running drive: start, ramp, reversal, load steps, rated load, lowest speed, bandwidth.
 
 use super::Outcome;
 use super::measure::{Follow, Measure};
@@ -9,16 +9,17 @@ use drive::estimator::tracker::TrackerKind;
 use fmu_core::Fault;
 use std::f64::consts::TAU;
 
-/// Straight line from `a` at the time `from` to `b` at `to`, flat outside.
+/// Linear ramp from `a` at time `from` to `b` at time `to`, constant outside.
 fn line(t: f64, from: f64, a: f64, to: f64, b: f64) -> f64 {
     a + (b - a) * ((t - from) / (to - from)).clamp(0.0, 1.0)
 }
 
-/// Standstill to half the rated speed from angles all around: how many fail, and the worst of those that do not.
+/// Starts from standstill to half the rated speed at angles over the full circle: the number of failures, and the worst
+/// successful start.
 pub(super) fn start(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
     let (count, every) = if effort == Effort::Full { (24_u32, 15.0) } else { (4, 105.0) };
     let speed = if subject.class == Class::Injection { 0.1 } else { 0.5 };
-    // A start without a voltage that the dead time bends would be too easy.
+    // Without the voltage distortion by dead time, the start would be too easy.
     let starting = subject.starting().with_dead_time(true);
     let (mut failed, mut peak, mut settling) = (0.0, 0.0_f64, 0.0_f64);
     for k in 0..count {
@@ -70,7 +71,7 @@ pub(super) fn ramp(subject: &Subject, _effort: Effort) -> Result<Outcome, Fault>
     Ok(dynamic(follow, survived, 2.4, false))
 }
 
-/// Through standstill to the other side. The hybrid runs the profile that the review's list has a figure for.
+/// Speed reversal through standstill. The hybrid runs the profile that has a figure in the review's list.
 pub(super) fn reversal(subject: &Subject) -> Result<Outcome, Fault> {
     if subject.class == Class::Hybrid {
         return both_ways(subject);
@@ -88,8 +89,8 @@ pub(super) fn reversal(subject: &Subject) -> Result<Outcome, Fault> {
     Ok(dynamic(follow, survived, 1.2, false))
 }
 
-/// 0 -> 0.95 -> -0.95 -> 0 pu under a constant 0.8 pu of load. The list does not say how steep its ramps were and the peak
-/// follows them: 0.375 s from rest to speed give it.
+/// 0 -> 0.95 -> -0.95 -> 0 pu under a constant 0.8 pu of load. The list does not give the slope of its ramps, which
+/// determines the peak: 0.375 s from rest to speed reproduce it.
 fn both_ways(subject: &Subject) -> Result<Outcome, Fault> {
     let (top, ramp, stay, begin) = (0.95, 0.375, 0.5, 0.8);
     let (back, home) = (begin + ramp + stay, begin + 3.0 * ramp + 2.0 * stay);
@@ -135,7 +136,7 @@ fn dynamic(follow: Follow, survived: bool, from: f64, with_dip: bool) -> Outcome
     Outcome::Measured(measures, Some(follow.into_trace()))
 }
 
-/// Rated load at a constant speed, the last half second of it.
+/// Rated load at a constant speed, measured in the last half second.
 pub(super) fn rated(subject: &Subject, speed: f64) -> Result<Outcome, Fault> {
     let none = if speed == 0.0 { subject.no_standstill() } else { None };
     if let Some(why) = none.or(subject.no_speed(speed.abs())) {
@@ -145,17 +146,17 @@ pub(super) fn rated(subject: &Subject, speed: f64) -> Result<Outcome, Fault> {
     Ok(Outcome::Measured(vec![follow.mean("mean angle error"), follow.std(), follow.rms()], None))
 }
 
-/// Takes rated load and comes to `speed` (pu). It takes the load at 0.5 pu, so that what is found is how low it may go and
-/// not how low it may start.
+/// Takes rated load, then goes to `speed` (pu). It takes the load at 0.5 pu, so that the result is the lowest running
+/// speed and not the lowest starting speed.
 pub(super) fn slowed_down(subject: &Subject, speed: f64) -> Result<Follow, Fault> {
     let side = if speed < 0.0 { -1.0 } else { 1.0 };
-    // Injection has no voltage for half the speed: it takes the load where it is.
+    // Injection lacks the voltage for half the speed, so it takes the load at the target speed.
     let first = if subject.class == Class::Injection { speed } else { side * speed.abs().max(0.5) };
     loaded(subject, first, speed, side)
 }
 
-/// Takes `load` (pu) at `first` (pu) within 0.3 s, comes to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and is measured for
-/// 0.5 s.
+/// Takes `load` (pu) at speed `first` (pu) within 0.3 s, ramps to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and
+/// measures for 0.5 s.
 fn loaded(subject: &Subject, first: f64, speed: f64, load: f64) -> Result<Follow, Fault> {
     let (turning, mut follow) = (subject.turning(first), Follow::default());
     let arrival = 1.2 + (first - speed).abs() / 0.5;
@@ -169,12 +170,12 @@ fn loaded(subject: &Subject, first: f64, speed: f64, load: f64) -> Result<Follow
     Ok(if survived { follow } else { Follow::default() })
 }
 
-/// Whether the drive follows speed and rotor: 30 deg and 2 % of rated.
+/// Whether the drive follows speed and rotor: within 30 deg and 2 % of rated speed.
 fn holds(follow: &Follow) -> bool {
     !follow.lost() && follow.angle.peak < 30.0 && follow.settled(0.0).value == 0.0
 }
 
-/// Rated load that drives, arriving at `speed` (pu) within 0.3 s.
+/// Rated driving load, applied at `speed` (pu) within 0.3 s.
 pub(super) fn generating(subject: &Subject, speed: f64) -> Result<Outcome, Fault> {
     let follow = loaded(subject, speed, speed, -1.0)?;
     let mut measures = vec![follow.mean("mean angle error"), follow.std(), follow.rms()];
@@ -186,7 +187,7 @@ pub(super) fn generating(subject: &Subject, speed: f64) -> Result<Outcome, Fault
     Ok(Outcome::Measured(measures, None))
 }
 
-/// How rated load comes to a speed that is tried.
+/// How rated load is applied at a trial speed.
 type Approach = fn(&Subject, f64) -> Result<Follow, Fault>;
 
 fn lowest_of(subject: &Subject, approach: Approach, speeds: impl IntoIterator<Item = f64>) -> Result<Outcome, Fault> {
@@ -200,12 +201,12 @@ fn lowest_of(subject: &Subject, approach: Approach, speeds: impl IntoIterator<It
     Ok(Outcome::Measured(vec![Measure::new("held down to", "pu", lowest)], None))
 }
 
-/// Lowest speed at which rated load is held, from above.
+/// Lowest speed at which rated load is held, approached from above.
 pub(super) fn lowest(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
     lowest_by(subject, effort, slowed_down)
 }
 
-/// Lowest speed at which rated load may arrive, within 0.3 s.
+/// Lowest speed at which rated load may be applied within 0.3 s.
 pub(super) fn arriving(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
     lowest_by(subject, effort, |subject, speed| loaded(subject, speed, speed, 1.0))
 }
@@ -220,7 +221,7 @@ fn lowest_by(subject: &Subject, effort: Effort, approach: Approach) -> Result<Ou
     lowest_of(subject, approach, all.iter().copied().filter(|&speed| speed >= low))
 }
 
-/// The same without the term that the review drops, for those that have it.
+/// The same without the term that the review omits, for estimators that have it.
 pub(super) fn as_printed(subject: &Subject) -> Result<Outcome, Fault> {
     if !["DirectEmf", "EmfObserver", "ExtendedEmf", "VoltageFeedback"].contains(&subject.entry.kind.name()) {
         return Ok(Outcome::NotApplicable("has no frame-speed term to drop"));
@@ -229,7 +230,7 @@ pub(super) fn as_printed(subject: &Subject) -> Result<Outcome, Fault> {
     lowest_of(&printed, slowed_down, (10..=30_u32).rev().map(|k| 0.01 * f64::from(k)))
 }
 
-/// Bandwidth (-3 dB) of the speed loop at half the speed, by the true speed.
+/// Bandwidth (-3 dB) of the speed loop at half the rated speed, from the true speed.
 pub(super) fn bandwidth(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
     if effort == Effort::Reduced {
         return Ok(Outcome::NotApplicable("left out of the reduced grid"));
@@ -242,7 +243,7 @@ pub(super) fn bandwidth(subject: &Subject, effort: Effort) -> Result<Outcome, Fa
 
 /// The same with the speed loop (and the mechanical observer) of the review's faster figure.
 pub(super) fn bandwidth_fast(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
-    // Speed loop and tracker in Hz: the mechanical observer is what makes the fast speed loop possible.
+    // Speed loop and tracker in Hz: the mechanical observer makes the fast speed loop possible.
     let (loop_hz, observer_hz) = match subject.entry.kind.name() {
         "VoltageModel" | "CurrentModel" | "KalmanFilter" => (26.0, None),
         "ExtendedEmf" => (60.0, Some(15.0)),

@@ -1,10 +1,10 @@
-//! What an estimator goes through. A scenario is one row here: its function runs a drive and reads numbers off it.
+//! The scenarios. Each one is a row here; its function runs a drive and measures numbers.
 
 use super::subject::Subject;
 use super::{Outcome, parameters, running, signal};
 use fmu_core::Fault;
 
-/// How thoroughly: the reduced grid is for a test that runs in seconds.
+/// Extent of the grid. The reduced grid is for a test that runs in seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
     /// 24 starts, all speeds.
@@ -20,7 +20,7 @@ pub struct Scenario {
     pub id: &'static str,
     /// The table that it belongs to.
     pub group: &'static str,
-    /// What happens, in a sentence.
+    /// What happens, in one sentence.
     pub title: &'static str,
     /// Runs it.
     pub run: fn(&Subject, Effort) -> Result<Outcome, Fault>,
@@ -95,7 +95,7 @@ pub static SCENARIOS: &[Scenario] = &[
     row("signal-trace", SIGNAL, "Fig. 8 and 11: at 0.05 pu", |s, _| signal::response(s)),
 ];
 
-/// The scenario of a name.
+/// The scenario with this name.
 pub fn find(id: &str) -> Option<&'static Scenario> {
     SCENARIOS.iter().find(|s| s.id == id)
 }

@@ -1,4 +1,4 @@
-//! What an injected voltage costs, and what it shows: the current of the carrier and the angle found in it.
+//! Cost and effect of an injected voltage: the carrier current and the angle found in it.
 
 use super::Outcome;
 use super::measure::{Measure, Trace};
@@ -12,7 +12,7 @@ fn injects(subject: &Subject) -> bool {
     subject.class.injects()
 }
 
-/// RMS of the carrier's current (magnitude of its space vector) and its copper loss, 1.5 R i^2.
+/// RMS of the carrier current (magnitude of its space vector) and its copper loss, 1.5 R i^2.
 pub(super) fn cost(subject: &Subject) -> Result<Outcome, Fault> {
     if !injects(subject) {
         return Ok(NOTHING);

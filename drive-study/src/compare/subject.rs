@@ -1,9 +1,9 @@
 //! An estimator with the drive that it is compared on.
 //!
-//! All run on the 2.2 kW machine with interior magnets, with the gains of the review's figures ([`crate::runner`]), but
-//! for Rasmussen's observer: it is for machines without saliency, so it runs on its own reference motor with its own gains
-//! (the start values of the FMUs, R^ = 0.9 R), where 1 pu of torque is the 2 N.m of the paper's load steps.
-//! 1 pu of speed is 1500 rpm on both.
+//! All estimators but one run on the 2.2 kW machine with interior magnets, with the gains of the review's figures
+//! ([`crate::runner`]). Rasmussen's observer is for machines without saliency. It runs on its own reference motor with
+//! its own gains (the start values of the FMUs, R^ = 0.9 R), where 1 pu of torque is the 2 N.m of the paper's load
+//! steps. 1 pu of speed is 1500 rpm on both machines.
 
 use crate::runner;
 use crate::runner::RATED_SPEED;
@@ -17,12 +17,12 @@ use drive::math::tanh;
 use fmu_core::Fault;
 use std::f64::consts::TAU;
 
-/// A row of the grid: an estimator, or a variant of one that the review has figures for.
+/// A row of the grid: an estimator, or a variant of one that has figures in the review.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// The estimator.
     pub kind: Kind,
-    /// Its name, or that of the variant.
+    /// Name of the estimator or variant.
     pub name: &'static str,
     set: fn(&mut ControllerParameters),
 }
@@ -44,7 +44,7 @@ const VARIANTS: &[Entry] = &[
 ];
 
 impl Entry {
-    /// The machine that it runs on, and what 1 pu of torque is there.
+    /// The machine it runs on, which also sets 1 pu of torque.
     pub fn machine(&self) -> &'static str {
         match self.kind.class() {
             Class::FluxObserver => "reference motor, 2 N.m",
@@ -52,7 +52,7 @@ impl Entry {
         }
     }
 
-    /// Its name in a table, with the machine where it is not that of the others.
+    /// Its name in a table, with the machine if it differs from that of the others.
     pub fn label(&self) -> String {
         match self.kind.class() {
             Class::FluxObserver => format!("{} ({})", self.name, self.machine()),
@@ -60,7 +60,7 @@ impl Entry {
         }
     }
 
-    /// All estimators there are, each with its variants.
+    /// All estimators, each with its variants.
     pub fn all() -> Vec<Self> {
         let one = |&kind: &Kind| Self { kind, name: kind.name(), set: |_| () };
         let with_variants = |kind: &Kind| {
@@ -76,7 +76,7 @@ impl Entry {
 pub struct Subject {
     /// The row.
     pub entry: Entry,
-    /// The signal that it finds the rotor by.
+    /// The signal from which it finds the rotor.
     pub class: Class,
     /// The drive at rest.
     pub pair: Pair,
@@ -97,12 +97,12 @@ impl Subject {
         Self { entry, class, pair, torque }
     }
 
-    /// Why nothing can be said at standstill.
+    /// Why the estimator cannot be judged at standstill.
     pub fn no_standstill(&self) -> Option<&'static str> {
         (!self.entry.kind.holds_standstill()).then_some("no EMF at standstill")
     }
 
-    /// Why nothing can be said at `speed` (pu).
+    /// Why the estimator cannot be judged at `speed` (pu).
     pub fn no_speed(&self, speed: f64) -> Option<&'static str> {
         (self.class == Class::Injection && speed > 0.2)
             .then_some("injection above 0.2 pu is limited by the voltage: Hybrid goes on from there")
@@ -124,12 +124,12 @@ impl Subject {
         })
     }
 
-    /// Turning at `speed` (pu), angle and speed known.
+    /// Running at `speed` (pu) with known angle and speed.
     pub fn turning(&self, speed: f64) -> Self {
         self.with(|p| *p = runner::turning(p.clone(), speed))
     }
 
-    /// As it starts from an unknown angle: by I-f, by polarity pulses (which need the saturation), or by itself.
+    /// The start from an unknown angle: by I-f, by polarity pulses (which need saturation), or by the estimator itself.
     pub fn starting(&self) -> Self {
         self.with(|p| {
             let mode = &mut p.controller.model.parameters.start.mode;
@@ -145,11 +145,11 @@ impl Subject {
         })
     }
 
-    /// Runs for `duration` (s): `each` sees the drive before every step with the time, sets its inputs by
-    /// [`set`](Self::set) and reads its outputs. False when a step fails: a drive that was lost.
+    /// Runs for `duration` (s). Before every step, `each` gets the drive and the time, sets inputs by
+    /// [`set`](Self::set) and reads outputs. Returns false when a step fails, which means that the drive was lost.
     ///
     /// # Errors
-    /// The parameters do not fit together.
+    /// The parameters are inconsistent.
     pub fn run(&self, duration: f64, each: impl FnMut(f64, &mut Pair)) -> Result<bool, Fault> {
         let mut pair = self.pair.clone();
         let h = pair.controller.model.parameters.T_s;

@@ -1,4 +1,4 @@
-//! The grid as text, Markdown and CSV. Estimators down, scenarios across, one table for each group of scenarios.
+//! The grid as text, Markdown and CSV: estimators as rows, scenarios as columns, one table per group of scenarios.
 
 use super::measure::Measure;
 use super::{Cell, Outcome};
@@ -10,15 +10,15 @@ use std::fmt::Write as _;
 pub struct Block {
     /// What the scenarios have in common.
     pub title: &'static str,
-    /// Heading of each column: name of the scenario, and what the numbers are.
+    /// Heading of each column: the scenario's name and its quantities.
     pub headings: Vec<(String, String)>,
-    /// Estimator, its texts, and whether each holds.
+    /// Estimator, its texts, and whether each is as expected.
     pub rows: Vec<(String, Vec<(String, bool)>)>,
     /// Notes under the table.
     pub notes: Vec<String>,
 }
 
-/// A number in the resolution that an engineer reads of its unit.
+/// A number in a resolution that suits its unit.
 pub fn number(m: &Measure) -> String {
     if m.value.is_infinite() {
         return if m.name == "settling time" { "never" } else { "lost" }.into();
@@ -33,7 +33,7 @@ pub fn number(m: &Measure) -> String {
     if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { text.replace('-', "") } else { text }
 }
 
-/// A cell: its numbers, each with a mark where something is expected of it.
+/// A cell: its numbers, with a mark at each that has an expected value.
 fn cell_text(cell: &Cell) -> String {
     match &cell.outcome {
         Outcome::NotApplicable(_) => "-".into(),
@@ -115,7 +115,7 @@ fn block(group: &'static str, cells: &[Cell]) -> Block {
     }
 }
 
-/// Rows of texts under each other, columns aligned; `rule` draws the line under the first row.
+/// Aligns rows of texts in columns; `rule` draws the line below the first row.
 fn aligned(rows: &[Vec<String>], left: &str, between: &str, right: &str, rule: impl Fn(&[usize]) -> String) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|x| x.chars().count()).max().unwrap_or(0);
@@ -132,7 +132,7 @@ fn aligned(rows: &[Vec<String>], left: &str, between: &str, right: &str, rule: i
     text
 }
 
-/// The tables in plain text, with the list of what is outside.
+/// The tables in plain text, with a list of the numbers outside their tolerances.
 pub fn text(cells: &[Cell]) -> String {
     let mut text = String::new();
     for block in blocks(cells) {
@@ -151,7 +151,7 @@ pub fn text(cells: &[Cell]) -> String {
     text
 }
 
-/// How many figures there are, and those that are not as expected.
+/// The number of figures, and those that are not as expected.
 pub fn verdict(cells: &[Cell]) -> String {
     let figures = cells.iter().flat_map(Cell::measures).filter(|m| m.expected.is_some()).count();
     let outside: Vec<_> = cells.iter().flat_map(|c| c.outside().map(move |m| (c, m))).collect();
@@ -176,7 +176,7 @@ pub fn verdict(cells: &[Cell]) -> String {
     text
 }
 
-/// What each estimator runs on, in a sentence each.
+/// The machine of each estimator, in one sentence each.
 pub const MACHINES: &str = "All on the 2.2 kW machine with interior magnets (R 3.6 ohm, L_d 36 mH, L_q 51 mH, psi 0.545 Wb, \
      1 pu = 1500 rpm and 14 N.m), 10 kHz, 10 mA of current noise, 12 bit; Rasmussen, which is for machines without saliency, \
      on its own reference motor (assumed; 1 pu = 1500 rpm and 2 N.m) with R^ = 0.9 R and without noise. \
@@ -233,7 +233,7 @@ pub fn markdown(cells: &[Cell]) -> String {
     text
 }
 
-/// Every number with what is expected of it, one a line.
+/// Every number with its expected value, one per line.
 pub fn csv(cells: &[Cell]) -> String {
     let mut text = String::from("estimator,scenario,measure,unit,value,expected,verdict,machine\n");
     for cell in cells {

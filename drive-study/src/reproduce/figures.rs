@@ -1,11 +1,11 @@
-//! What each experiment must show: one measured number, what is expected of it, and the verdict.
+//! The expected results of each experiment: a measured number, its expected value, and the verdict.
 //!
 //! Expected values and tolerances were computed with an independent model of the same drive (the paper prints curves,
 //! no numbers, and its motor table is missing); they hold for the reference motor and the start values of the FMUs.
 
 use super::scenario::Trace;
 
-/// What a number must be.
+/// The expected value of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Expected {
     /// Within a tolerance of a value.
@@ -17,7 +17,7 @@ pub enum Expected {
 }
 
 impl Expected {
-    /// Whether `x` is as expected; NaN never is.
+    /// Whether `x` is as expected; false for NaN.
     pub fn holds(&self, x: f64) -> bool {
         match *self {
             Self::Near(value, tolerance) => (x - value).abs() <= tolerance,
@@ -48,7 +48,7 @@ pub struct Figure {
     pub unit: &'static str,
     /// What is expected.
     pub expected: Expected,
-    /// What came out.
+    /// The result.
     pub measured: f64,
 }
 
@@ -59,7 +59,7 @@ impl Figure {
     }
 }
 
-/// Reads numbers off a trace between two times.
+/// Measures numbers in a trace between two times.
 struct Window<'a> {
     trace: &'a Trace,
     from: usize,
@@ -125,7 +125,7 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Within a tenth of a value.
+/// Within 10 % of a value.
 fn within_a_tenth(value: f64) -> Expected {
     Expected::Near(value, (value * 1e5).round() / 1e6)
 }

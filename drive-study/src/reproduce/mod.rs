@@ -1,4 +1,4 @@
-//! The paper's start-up, speed steps and load steps: run through the packed FMUs, measured, judged, drawn.
+//! The paper's start-up, speed steps and load steps: runs the packed FMUs, then measures, checks and plots the results.
 
 pub mod figures;
 pub mod packed;
@@ -19,14 +19,15 @@ const STEP: f64 = 1e-4;
 /// table as text with the verdict.
 ///
 /// # Errors
-/// An archive cannot run, a step is refused, or a file cannot be written. A figure that is off is a verdict, no error.
+/// An archive cannot run, a step is refused, or a file cannot be written. A figure outside its tolerance is not an
+/// error.
 pub fn run(folder: &Path, out: &Path) -> Result<(String, bool)> {
     let all = |standard: &str| -> Result<Vec<Trace>> {
         let pair = Packed::open(&folder.join(standard))?;
         let run = |s: &scenario::Scenario| pair.run(s, STEP).with_context(|| format!("{standard}, {}", s.title));
         ALL.iter().map(run).collect()
     };
-    // One thread a standard: the two runs do not know of each other.
+    // One thread per standard: the two runs are independent.
     let (fmi2, fmi3) = std::thread::scope(|scope| {
         let other = scope.spawn(|| all("fmi2"));
         let fmi3 = all("fmi3");

@@ -1,4 +1,4 @@
-//! The closed loop of the two packed FMUs, run by our own importer as any other would run it.
+//! The closed loop of the two packed FMUs, run by our own importer through the standard interface.
 
 use super::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
 use anyhow::Result;

@@ -20,7 +20,7 @@ struct Panel<'a> {
     /// Time window in s.
     window: (f64, f64),
     curves: Vec<Curve<'a>>,
-    /// Where the legend hides nothing.
+    /// A place where the legend hides no curve.
     legend: SeriesLabelPosition,
 }
 
@@ -28,9 +28,9 @@ const BLUE_INK: RGBColor = RGBColor(0, 84, 166);
 const RED_INK: RGBColor = RGBColor(200, 60, 40);
 const GREY: RGBColor = RGBColor(150, 150, 150);
 
-/// Most points of a curve; the eye sees no more at the size of a panel.
+/// Maximum number of points per curve; more would not be visible at the size of a panel.
 const POINTS: usize = 600;
-/// Greatest distance of a point that is left out from the curve drawn, in units of the panel's width and height.
+/// Maximum distance of a dropped point from the drawn curve, relative to the panel's width and height.
 const UNSEEN: f64 = 5e-4;
 
 impl Panel<'_> {
@@ -83,7 +83,7 @@ impl Panel<'_> {
     }
 }
 
-/// The points of a curve without which it would look different (Douglas and Peucker 1973); `size` is that of the panel.
+/// The points that preserve the shape of a curve (Douglas and Peucker 1973); `size` is that of the panel.
 fn seen(points: &[(f64, f64)], size: (f64, f64)) -> Vec<(f64, f64)> {
     let [first, between @ .., last] = points else { return points.to_vec() };
     let place = |p: &(f64, f64)| ((p.0 - first.0) / size.0, (p.1 - first.1) / size.1);

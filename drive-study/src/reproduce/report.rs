@@ -1,4 +1,4 @@
-//! What `reproduce` leaves behind: the table on the terminal, CSV, plots and `report.html`.
+//! The output of `reproduce`: the table on the terminal, CSV, plots and `report.html`.
 
 use super::figures::Figure;
 use super::scenario::{Scenario, Trace};
@@ -76,7 +76,7 @@ impl Table {
     }
 }
 
-/// A number with four significant digits; what is below 1e-6 is no figure's measure and shows as 0.
+/// A number with four significant digits; values below 1e-6 are negligible for every figure and show as 0.
 fn number(x: f64) -> String {
     if x.abs() < 1e-6 {
         return "0".into();
@@ -106,7 +106,7 @@ pub(super) fn csv(trace: &Trace) -> String {
     text
 }
 
-/// The verdict on all figures and on the two standards in a sentence each.
+/// The verdicts on the figures and on the agreement of the two standards, one sentence each.
 pub(super) fn verdict(holds: bool, identical: bool) -> String {
     let figures = if holds { "Every figure is inside its tolerance." } else { "Some figures are OFF." };
     let same = if identical { "are equal bit for bit" } else { "DIFFER" };

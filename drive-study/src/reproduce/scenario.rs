@@ -1,11 +1,11 @@
-//! The paper's experiments as data: what is set, what happens when, and what is recorded.
+//! The paper's experiments as data: parameters, events and recorded quantities.
 
 use std::f64::consts::PI;
 
 /// 1 rpm in rad/s.
 pub const RPM: f64 = PI / 30.0;
 
-/// Values of one input over time: each holds from its time (s) on.
+/// Values of one input over time: each holds from its time (s) to the next.
 pub type Schedule = &'static [(f64, f64)];
 
 /// One experiment with plant and controller.
@@ -29,7 +29,7 @@ pub struct Scenario {
     pub duration: f64,
 }
 
-/// An experiment in which nothing is set and nothing happens.
+/// An experiment without settings and events.
 pub const REST: Scenario =
     Scenario { id: "", figure: "", title: "", plant: &[], controller: &[], speed_ref: &[], load: &[], duration: 1.0 };
 
@@ -107,7 +107,7 @@ pub fn at(schedule: Schedule, t: f64) -> f64 {
     schedule.iter().rev().find(|(from, _)| t >= from - 1e-9).map_or(0.0, |(_, value)| *value)
 }
 
-/// What was recorded at every communication point.
+/// The record of every communication point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// Time in s.
@@ -124,9 +124,9 @@ pub struct Trace {
     pub theta_est: Vec<f64>,
     /// Angle error theta^ - theta in deg, in (-180, 180].
     pub error: Vec<f64>,
-    /// Current along the estimated magnet axis in A.
+    /// Current along the estimated magnet axis (d) in A.
     pub i_d: Vec<f64>,
-    /// Current across the estimated magnet axis in A.
+    /// Current across the estimated magnet axis (q) in A.
     pub i_q: Vec<f64>,
 }
 
@@ -178,8 +178,8 @@ impl Trace {
     }
 }
 
-/// Number of communication steps of `h` (s) from one recorded point to the next: between its samples (0.1 ms apart) the
-/// controller holds its estimate while the rotor turns on, so that only points on the sample grid can be compared.
+/// Number of communication steps of `h` (s) between recorded points. Between its samples (0.1 ms apart) the controller
+/// holds its estimate while the rotor keeps turning, so only points on the sample grid can be compared.
 pub fn samples_apart(h: f64) -> u32 {
     let mut steps = 1;
     while f64::from(steps) * h < 1e-4 - 1e-9 {
@@ -188,12 +188,12 @@ pub fn samples_apart(h: f64) -> u32 {
     steps
 }
 
-/// A closed loop that can run an experiment: the packed FMUs, or natively in the tests.
+/// A closed loop that can run an experiment: the packed FMUs, or the native models in the tests.
 pub trait ClosedLoop {
     /// Runs `scenario` with communication steps of `h` (s) and records every [`samples_apart`]th point.
     ///
     /// # Errors
-    /// Whatever a step or a set refused.
+    /// A step or a set call fails.
     fn run(&self, scenario: &Scenario, h: f64) -> anyhow::Result<Trace>;
 }
 
