@@ -59,7 +59,7 @@ fn install_name(name: &str) -> [String; 2] {
     ["-C".into(), format!("link-arg=-Wl,-install_name,@rpath/lib{}.dylib", name.replace('-', "_"))]
 }
 
-/// The command, but for what follows `--`.
+/// The command, except for what follows `--`.
 fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target) -> Command {
     let mut build = match target.linker {
         Linker::Usual => cargo(),
@@ -77,7 +77,7 @@ fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target
     };
     build.args(packages.iter().flat_map(|name| ["--package", name]));
     build.env("CARGO_ENCODED_RUSTFLAGS", flags(&workspace.root, target));
-    // A panic becomes a status at the C interface, whatever the workspace asks for its programs.
+    // The C interface turns a panic into a status, whatever panic strategy the workspace sets for its programs.
     build.env("CARGO_PROFILE_RELEASE_PANIC", "unwind");
     // The whole library optimized as one, and no names in it beside those exported: unless the caller says otherwise.
     for (setting, value) in [("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "symbols")] {
@@ -158,7 +158,7 @@ fn flags(root: &Path, target: &Target) -> OsString {
         add(&remap(&Path::new(root.trim()).join("lib/rustlib/src/rust"), "/rust"));
     }
     if target.triple.ends_with("-windows-gnu") {
-        // A DLL has a place for when it was linked.
+        // A DLL contains a link time stamp.
         add(OsStr::new("-Clink-arg=-Wl,--no-insert-timestamp"));
     }
     flags

@@ -1,4 +1,4 @@
-//! `documentation/index.html`: a page that needs no network, made from the description.
+//! `documentation/index.html`: a self-contained page generated from the description.
 
 use fmu_core::description::{Description, Member, Value, Variable, VariableKind};
 use fmu_core::terminal::MemberKind;
@@ -150,7 +150,7 @@ fn section(title: &str, variables: &[&Variable]) -> String {
 }
 
 fn table(variables: &[&Variable]) -> String {
-    // What is calculated has no start value and no bounds: then no empty columns.
+    // Calculated variables have no start value and no bounds; omit empty columns.
     let settable = variables.iter().any(|v| v.start.is_some());
     let columns = if settable { "<th class=\"number\">Start</th><th>Allowed</th>" } else { "" };
     let mut out = format!(
@@ -235,7 +235,7 @@ fn enumerations(d: &Description) -> String {
     out
 }
 
-/// A number as a person writes it: six digits tell an engineer enough, the XML has them all.
+/// A number for display: six digits are enough for an engineer; the XML has all digits.
 fn number(x: f64) -> String {
     let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
     let plain = rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs());

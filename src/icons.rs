@@ -42,7 +42,7 @@ pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<
 
 /// The picture as PNG with a transparent ground; the same SVG gives the same bytes.
 fn png(svg: &str) -> Result<Vec<u8>> {
-    // Without fonts a text is left out without a word.
+    // Without fonts, the renderer silently omits text.
     if svg.contains("<text") {
         bail!("has <text>, which is drawn differently wherever the fonts differ: draw paths instead");
     }

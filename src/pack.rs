@@ -127,7 +127,7 @@ pub fn archive(files: &BTreeMap<String, Entry>, moment: Moment) -> Result<Vec<u8
     Ok(zip.finish()?.into_inner())
 }
 
-/// Writes a file at once: nobody ever sees half of it.
+/// Writes a file atomically, so that nobody sees a partial file.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -140,7 +140,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // A temporary file is private; an FMU is for everybody.
+        // Temporary files are private, but an FMU must be readable by everyone.
         file.as_file().set_permissions(fs::Permissions::from_mode(0o644)).with_context(of)?;
     }
     file.persist(path).map_err(|e| e.error).with_context(of)?;
@@ -167,7 +167,7 @@ mod tests {
         assert_eq!(make(0), make(5), "before 1980");
     }
 
-    /// Reads the raw headers: `zip`'s own reader is too kind.
+    /// Reads the raw headers, because `zip`'s own reader is too lenient.
     #[test]
     fn headers_are_plain() {
         let bytes = archive(&sample(), Moment::fixed(1_700_000_000)).unwrap();

@@ -1,5 +1,6 @@
-//! The closed loop of plant and controller as an SSP, from the packed FMUs: connected by their terminals, what is left over
-//! led to the outside under the names that `PmsmDrive` has. What some importer stumbles over is there on demand only.
+//! Writes the closed loop of plant and controller as an SSP, from the packed FMUs. Terminals connect them; the
+//! remaining variables become connectors of the system, named as in `PmsmDrive`. Features that some importers do not
+//! support are optional.
 
 use crate::pack::{Entry, Moment, TOOL};
 use crate::ssv;
@@ -40,7 +41,7 @@ pub struct Values {
     pub text: String,
 }
 
-/// What not every importer takes.
+/// Features that not every importer supports.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
     /// Whether truth values are connected, of which there is one: `enabled` of the controller to `enable` of the plant.
@@ -115,7 +116,7 @@ fn binding_file(name: &str) -> String {
     format!("resources/{name}.ssv")
 }
 
-/// One step, which says of values whether they fit together.
+/// One step, which checks that the values are consistent.
 fn start(system: &mut System, descriptions: &[(&str, ModelDescription)]) -> Result<()> {
     let step = descriptions.iter().filter_map(|(_, d)| d.default_experiment.step).fold(f64::INFINITY, f64::min);
     let step = if step.is_finite() { step } else { 1e-4 };

@@ -9,17 +9,17 @@ use std::process::{Command, Stdio};
 /// How to get zig as a linker.
 pub const ZIG: &str = "pip install cargo-zigbuild ziglang";
 
-/// By this Cargo builds the standard library from source.
+/// Makes Cargo build the standard library from source.
 pub(crate) const BUILD_STD: &str = "CARGO_UNSTABLE_BUILD_STD";
 
 /// A target that can be built for here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Target {
-    /// Its name, as rustc has it.
+    /// Its rustc name.
     pub triple: String,
-    /// What FMI calls it.
+    /// Its FMI platform name.
     pub platform: Platform,
-    /// Whether it is the machine that builds.
+    /// Whether it is the build machine.
     pub is_host: bool,
     /// What links it.
     pub linker: Linker,
@@ -43,7 +43,7 @@ pub struct Tools {
 }
 
 impl Tools {
-    /// Looks for them.
+    /// Detects the compiler and its helpers.
     ///
     /// # Errors
     /// rustc cannot be run.
@@ -81,7 +81,7 @@ impl Tools {
         let platform = Platform::of(os, processor)
             .ok_or_else(|| wrong(format!("is no platform of FMUs here; there are {}", known())))?;
         if os == "linux" && environment != "gnu" {
-            // A process has one C library, and importers have that of GNU.
+            // A process has one C library, and importers use the GNU one.
             let instead = format!("{processor}-unknown-linux-gnu");
             return Err(wrong(format!("importers on Linux do not load a library for {environment}; take {instead}")));
         }

@@ -1,4 +1,4 @@
-//! The neutral description: what a binary tells of its model, from which XML, documentation and tools are made.
+//! The neutral description of a model, from which the XML, documentation and tools are generated.
 
 mod terminals;
 
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
 
-/// All that an importer can know of a model.
+/// Everything that an importer can know about a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Description {
     /// Name and model identifier.
@@ -38,7 +38,7 @@ pub struct Description {
     pub documentation: String,
     /// The variables in the order of their value references, without `time`.
     pub variables: Vec<Variable>,
-    /// Variables that are connected together.
+    /// Groups of variables that are connected together.
     pub terminals: Vec<Terminal>,
     /// Icon: an SVG document.
     pub icon: Option<String>,
@@ -63,19 +63,19 @@ pub struct Variable {
     pub min: Option<f64>,
     /// Upper bound.
     pub max: Option<f64>,
-    /// The lower bound itself is not allowed.
+    /// The lower bound itself is excluded.
     pub above: bool,
-    /// The upper bound itself is not allowed.
+    /// The upper bound itself is excluded.
     pub below: bool,
     /// Typical magnitude.
     pub nominal: Option<f64>,
-    /// Grows without bound.
+    /// The value is unbounded.
     pub unbounded: bool,
     /// Number of elements, `None` for a scalar.
     pub dimension: Option<usize>,
-    /// Start values (one, or one per element) of what the importer may set; `None` for what is calculated.
+    /// Start values (one, or one per element) of variables that the importer may set; `None` for calculated ones.
     pub start: Option<Vec<Value>>,
-    /// Value references of all that the initial value depends on; `None` for what the importer sets.
+    /// Value references that the initial value depends on; `None` for variables that the importer sets.
     pub initial_dependencies: Option<Vec<u32>>,
 }
 
@@ -127,8 +127,8 @@ impl Description {
     /// Describes model `M`; start values come from its `Default`, dependencies from probing it.
     ///
     /// # Errors
-    /// Names what no compile-time check can see: a name that two parts share, a start value outside its range, a type
-    /// definition named like a variable, a terminal of variables that are not there.
+    /// Reports problems that no compile-time check can find: a name shared by two parts, a start value outside its
+    /// range, a type definition named like a variable, a terminal with missing variables.
     pub fn of<M: Model>() -> Result<Self, Fault> {
         let mut block = Block::<M>::default();
         block.initialize();
@@ -246,7 +246,7 @@ fn kind(kind: &Kind) -> VariableKind {
     }
 }
 
-/// The same judgment that a set gets.
+/// The same check as in a set call.
 fn check_start(name: &str, meta: &Meta, start: Value) -> Result<(), Fault> {
     let allowed = match start {
         Value::Real(x) => meta.range.contains(x),

@@ -1,8 +1,8 @@
-//! What a model says when something is wrong: one sentence that names the thing, its value and what was allowed.
+//! Error messages of a model: one sentence with the variable, its value and the allowed values.
 
 use std::fmt::Display;
 
-/// A fault of the caller or of the model, with a message for a person who does not know the code.
+/// An error of the caller or of the model, with a message for users who do not know the code.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct Fault {
@@ -10,7 +10,7 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// A fault in free words.
+    /// A fault with free text.
     pub fn new(message: impl Into<String>) -> Self {
         Self { message: message.into() }
     }

@@ -1,9 +1,9 @@
-//! The trait a model implements, and its life as an importer lives it.
+//! The trait that a model implements, and the life cycle of an instance.
 
 use crate::{Elapsed, Fault, Hash, Step, Table, Terminal, Token};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-/// What a model tells of itself besides its variables.
+/// General information about a model, besides its variables.
 #[derive(Clone, Copy, Debug)]
 pub struct Info {
     /// Name and model identifier: a C identifier.
@@ -64,7 +64,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// The outputs, a plain struct of their own.
     type Outputs: Default + Clone + Serialize + DeserializeOwned + Send + 'static;
 
-    /// What the model tells of itself.
+    /// General information about the model.
     const INFO: Info;
 
     /// The variables: the one place where a name, a unit or a range is written.
@@ -82,7 +82,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// The instantiation token: a hash of name, version and table.
     const TOKEN: Token = Self::HASH.guid();
 
-    /// What the token writes down.
+    /// The data that the token hashes.
     const HASH: Hash = Hash::START.text(Self::INFO.name).text(Self::INFO.version).join(&Self::TABLE.hash());
 
     /// Calculated parameters from the parameters; runs again when a tunable parameter was set.
@@ -92,7 +92,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// both on a copy after [`derive`](Model::derive): a refusal changes nothing.
     ///
     /// # Errors
-    /// Says which parameters do not fit together, their values and why.
+    /// Names the inconsistent parameters, their values and the reason.
     fn validate(&self) -> Result<(), Fault> {
         Ok(())
     }
@@ -106,11 +106,11 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// Advances the state by one step with the inputs held.
     ///
     /// # Errors
-    /// Says what made the step impossible, for example a state that left the finite numbers.
+    /// Gives the reason why the step is impossible, for example a state that is no longer finite.
     fn advance(&mut self, step: &Step) -> Result<(), Fault>;
 }
 
-/// A model and its outputs side by side: what the rows of its table see.
+/// A model together with its outputs, as the rows of its table see it.
 #[derive(Clone, Default, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Block<M: Model> {
@@ -131,7 +131,7 @@ impl<M: Model> Block<M> {
     /// One step and the outputs at its end.
     ///
     /// # Errors
-    /// As [`Model::advance`].
+    /// Same as [`Model::advance`].
     #[inline]
     pub fn step(&mut self, step: &Step) -> Result<(), Fault> {
         self.model.advance(step)?;

@@ -1,7 +1,7 @@
-//! What an initial value depends on, found by trying: the model itself is asked, so that the answer is true.
+//! Finds the dependencies of initial values by running the model itself.
 //!
-//! At several operating points every input and parameter is changed alone, and the outputs and calculated parameters
-//! whose bits change are noted (`InitialUnknowns` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
+//! At several operating points, each input and parameter is changed alone; every output and calculated parameter whose
+//! bits change depends on it (`InitialUnknowns` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
 
 use crate::model::{Block, Model};
 use crate::row::Slot;

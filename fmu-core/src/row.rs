@@ -195,10 +195,10 @@ impl<W: 'static> Row<W> {
         Self::real((Causality::CalculatedParameter, Variability::Fixed), name, quantity, description, get)
     }
 
-    /// A parameter becomes tunable: it may change at communication points.
+    /// Makes a parameter tunable: it may change at communication points.
     ///
     /// # Panics
-    /// While compiling, on anything but a parameter.
+    /// At compile time, if the variable is not a parameter.
     pub const fn tunable(mut self) -> Self {
         assert!(matches!(self.meta.causality, Causality::Parameter), "only a parameter can be tunable");
         self.meta.variability = Variability::Tunable;
@@ -231,7 +231,7 @@ impl<W: 'static> Row<W> {
         self
     }
 
-    /// The variable grows without bound, like an angle that is not wrapped (FMI 3.0.2, 2.4.7.5 `unbounded`).
+    /// The variable is unbounded, like an angle that is not wrapped (FMI 3.0.2, 2.4.7.5 `unbounded`).
     pub const fn unbounded(mut self) -> Self {
         self.meta.unbounded = true;
         self
@@ -240,7 +240,7 @@ impl<W: 'static> Row<W> {
     /// Typical magnitude, for solvers' scaling; not 0.
     ///
     /// # Panics
-    /// While compiling, on 0.
+    /// At compile time, if the value is 0.
     pub const fn nominal(mut self, magnitude: f64) -> Self {
         assert!(magnitude != 0.0, "a nominal value must not be 0");
         self.meta.nominal = Some(magnitude);

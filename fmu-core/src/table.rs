@@ -10,7 +10,7 @@ use crate::variable::{Causality, Kind, Meta, Variability};
 use std::fmt::Display;
 use std::ptr;
 
-/// Most variables a table can hold, its parts' included.
+/// Maximum number of variables in a table, including those of its parts.
 pub const CAPACITY: usize = 512;
 
 /// The table of `P` seen through `W`, of which `P` is a part.
@@ -69,7 +69,7 @@ impl<W: 'static> Table<W> {
     /// Builds the table.
     ///
     /// # Panics
-    /// While compiling, on a duplicate name, an empty range or more than [`CAPACITY`] variables.
+    /// At compile time, on a duplicate name, an empty range or more than [`CAPACITY`] variables.
     #[expect(clippy::cast_possible_truncation, reason = "CAPACITY fits in 16 bits, asserted below")]
     pub const fn new(rows: &'static [Row<W>]) -> Self {
         assert!(CAPACITY <= u16::MAX as usize);
@@ -106,7 +106,7 @@ impl<W: 'static> Table<W> {
         self.len
     }
 
-    /// Whether there is no variable at all.
+    /// Whether the table is empty.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }

@@ -17,7 +17,7 @@ pub struct Terminal {
     pub rule: MatchingRule,
     /// The variables that it groups.
     pub members: &'static [Member],
-    /// Where it is drawn, and how; `None`: the importer chooses.
+    /// Its position and icon; with `None`, the importer chooses.
     pub picture: Option<Picture>,
 }
 
@@ -25,9 +25,9 @@ pub struct Terminal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum MatchingRule {
-    /// By name, all of them.
+    /// By name; all members must match.
     Plug,
-    /// By name, those that both have.
+    /// By name; only the members that both terminals have.
     Bus,
 }
 
@@ -38,19 +38,19 @@ pub struct Member {
     pub name: &'static str,
     /// Name of the variable in the table.
     pub variable: &'static str,
-    /// What a connection makes of it.
+    /// How a connection combines the values of a member.
     pub kind: MemberKind,
 }
 
-/// What a connection makes of a member.
+/// How a connection combines the values of a member.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum MemberKind {
     /// Both sides have the same value.
     Signal,
-    /// Flows into the model through the terminal; what all connected terminals take in sums up to zero.
+    /// Flow into the model through the terminal; the inflows of all connected terminals sum to zero.
     Inflow,
-    /// Flows out of the model through the terminal.
+    /// Flow out of the model through the terminal.
     Outflow,
 }
 
@@ -82,10 +82,10 @@ impl Picture {
 }
 
 impl Terminal {
-    /// A terminal that is only connected as a whole.
+    /// A terminal that can only be connected as a whole.
     ///
     /// # Panics
-    /// While compiling, on two members of one name or none at all.
+    /// At compile time, on two members with the same name or on no members.
     pub const fn plug(name: &'static str, description: &'static str, members: &'static [Member]) -> Self {
         Self::new(name, description, MatchingRule::Plug, members)
     }
@@ -93,7 +93,7 @@ impl Terminal {
     /// A terminal that may be connected in part.
     ///
     /// # Panics
-    /// As [`plug`](Self::plug).
+    /// Same as [`plug`](Self::plug).
     pub const fn bus(name: &'static str, description: &'static str, members: &'static [Member]) -> Self {
         Self::new(name, description, MatchingRule::Bus, members)
     }

@@ -1,4 +1,4 @@
-//! What a variable is, but for where its value lives: causality, variability, type, range.
+//! The properties of a variable except the location of its value: causality, variability, type, range.
 
 use crate::unit::Quantity;
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ pub enum Causality {
     Input,
     /// Computed by the model.
     Output,
-    /// Computed by the model, for the curious.
+    /// Computed by the model, for inspection only.
     Local,
 }
 
@@ -113,7 +113,7 @@ impl std::fmt::Display for Range {
     }
 }
 
-/// Everything about a variable but where its value lives.
+/// All properties of a variable except the location of its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meta {
     /// Name, relative to the part that it belongs to.
@@ -130,7 +130,7 @@ pub struct Meta {
     pub range: Range,
     /// Typical magnitude, for solvers' scaling.
     pub nominal: Option<f64>,
-    /// Grows without bound, like an angle that is not wrapped.
+    /// The value is unbounded, like an angle that is not wrapped.
     pub unbounded: bool,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,

@@ -4,8 +4,8 @@ const DAY: i64 = 86_400;
 
 /// `YYYY-MM-DDThh:mm:ssZ` of a number of seconds since 1970-01-01T00:00:00Z, for example of `SOURCE_DATE_EPOCH`.
 ///
-/// FMI 2.0.5, 2.2.1 and FMI 3.0.2, 2.4.1 want one character `Z`, not an offset of zero. Seconds outside the years 0001 to
-/// 9999 give the first or the last second of them: the form has four digits for the year.
+/// FMI 2.0.5, 2.2.1 and FMI 3.0.2, 2.4.1 require the character `Z`, not an offset of zero. The year has four digits, so
+/// seconds outside the years 0001 to 9999 give the first or the last second of that range.
 ///
 /// ```
 /// assert_eq!(model_description::date_from_epoch(1_700_000_000), "2023-11-14T22:13:20Z");
@@ -20,8 +20,8 @@ pub fn date_from_epoch(seconds: i64) -> String {
 
 /// Year, month and day of a day counted from 1970-01-01, in the proleptic Gregorian calendar.
 ///
-/// Years are counted from March: then the leap day is the last day of the year, and the months' lengths (31, 30, 31, 30,
-/// 31 and again) are a straight line of slope 153/5. An era is 400 years of 146097 days.
+/// Years are counted from March, so that the leap day is the last day of the year and the months' lengths (31, 30, 31,
+/// 30, 31, repeating) follow a straight line of slope 153/5. An era is 400 years of 146097 days.
 fn civil(day: i64) -> (i64, i64, i64) {
     let shifted = day + 719_468; // days since 0000-03-01
     let (era, of_era) = (shifted.div_euclid(146_097), shifted.rem_euclid(146_097));

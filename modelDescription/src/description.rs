@@ -1,4 +1,4 @@
-//! All that a modelDescription.xml tells an importer of co-simulation FMUs.
+//! The content of a modelDescription.xml, as far as importers of co-simulation FMUs need it.
 
 use crate::units::{TypeDefinition, Unit};
 use crate::variable::ModelVariable;
@@ -27,15 +27,15 @@ pub struct ModelDescription {
     pub license: Option<String>,
     /// The tool that wrote the file.
     pub generation_tool: Option<String>,
-    /// When it was written, as the file says it.
+    /// Time of generation, as written in the file.
     pub generation_date_and_time: Option<String>,
     /// Names are structured (`part.name[1]`), not flat.
     pub structured_names: bool,
-    /// What the FMU tells of its co-simulation interface, where it has one.
+    /// The co-simulation interface, if there is one.
     pub co_simulation: Option<CoSimulation>,
-    /// The model exchange interface's model identifier, where there is one.
+    /// The model exchange interface's model identifier, if there is one.
     pub model_exchange: Option<String>,
-    /// The scheduled execution interface's model identifier, where there is one (FMI 3.0 only).
+    /// The scheduled execution interface's model identifier, if there is one (FMI 3.0 only).
     pub scheduled_execution: Option<String>,
     /// Default experiment.
     pub default_experiment: Experiment,
@@ -56,14 +56,14 @@ pub struct ModelDescription {
 }
 
 impl ModelDescription {
-    /// The variable of this name, or of this alias.
+    /// The variable with this name or alias.
     pub fn variable(&self, name: &str) -> Option<&ModelVariable> {
         let named = self.variables.iter().find(|v| v.name == name);
         named.or_else(|| self.variables.iter().find(|v| v.aliases.iter().any(|a| a.name == name)))
     }
 
-    /// The variable that the model structure means by a number: the place in the list, from 1, in FMI 2.0 (2.2.8), the
-    /// value reference in FMI 3.0 (2.4.8).
+    /// The variable that a number in the model structure refers to: its position in the list, from 1, in FMI 2.0
+    /// (2.2.8); its value reference in FMI 3.0 (2.4.8).
     pub fn referenced(&self, reference: u32) -> Option<&ModelVariable> {
         match self.version {
             FmiVersion::V2 => self.variables.get(usize::try_from(reference).ok()?.checked_sub(1)?),
@@ -71,25 +71,25 @@ impl ModelDescription {
         }
     }
 
-    /// The unit of this name.
+    /// The unit with this name.
     pub fn unit(&self, name: &str) -> Option<&Unit> {
         self.units.iter().find(|u| u.name == name)
     }
 
-    /// The type definition of this name.
+    /// The type definition with this name.
     pub fn type_definition(&self, name: &str) -> Option<&TypeDefinition> {
         self.types.iter().find(|t| t.name == name)
     }
 }
 
-/// The co-simulation interface: its model identifier and everything it claims to be able to do.
+/// The co-simulation interface: its model identifier and the capabilities it claims.
 ///
-/// Capabilities are kept as written, for a checker wants to see a misspelt one; [`flag`](Self::flag) reads them.
+/// Capabilities are kept as written, so that a checker can find misspelled ones; [`flag`](Self::flag) reads them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoSimulation {
     /// Base name of the binaries.
     pub model_identifier: String,
-    /// Every attribute but the model identifier, as written.
+    /// Every attribute except the model identifier, as written.
     pub attributes: Vec<(String, String)>,
     /// Line of the element.
     pub line: usize,
@@ -101,14 +101,14 @@ impl CoSimulation {
         self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
     }
 
-    /// Whether a capability is claimed; what is not mentioned is `false` in both standards.
+    /// Whether a capability is claimed; a missing one is `false` in both standards.
     pub fn flag(&self, name: &str) -> bool {
         self.attribute(name).is_some_and(|value| matches!(value.trim(), "true" | "1"))
     }
 
-    /// The state can be got and set.
+    /// The state can be read and set.
     pub fn can_get_and_set_state(&self) -> bool {
-        // The two standards spell it apart: FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2.
+        // The standards spell it differently: FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2.
         self.flag("canGetAndSetFMUstate") || self.flag("canGetAndSetFMUState")
     }
 
@@ -122,7 +122,7 @@ impl CoSimulation {
         self.flag("canHandleVariableCommunicationStepSize")
     }
 
-    /// Another program must be installed.
+    /// The FMU needs another program to run.
     pub fn needs_execution_tool(&self) -> bool {
         self.flag("needsExecutionTool")
     }
@@ -138,7 +138,7 @@ impl CoSimulation {
     }
 }
 
-/// The default experiment, as far as the file tells it: times in the unit of the independent variable, mostly s.
+/// The default experiment as given in the file: times in the unit of the independent variable, usually s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Experiment {
     /// Start time.
@@ -165,9 +165,9 @@ pub struct LogCategory {
 pub struct Unknown {
     /// The variable.
     pub reference: u32,
-    /// What it depends on: `None` when the file does not say (then on everything), empty for on nothing.
+    /// Its dependencies: `None` if the file gives none (it then depends on everything), empty if there are none.
     pub dependencies: Option<Vec<u32>>,
-    /// How, one word for each dependency.
+    /// Kind of each dependency, one word per dependency.
     pub kinds: Option<Vec<String>>,
     /// Line of the element.
     pub line: usize,

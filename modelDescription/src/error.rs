@@ -1,6 +1,6 @@
-//! What makes a modelDescription.xml unreadable.
+//! Reasons why a modelDescription.xml cannot be read.
 
-/// Why the XML cannot be read: the line, what is there and what was expected.
+/// Why the XML cannot be read: the line, what was found and what was expected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -9,7 +9,7 @@ pub enum Error {
     NotXml {
         /// Line, from 1.
         line: usize,
-        /// What the parser says.
+        /// Message of the parser.
         reason: String,
     },
     /// An XML document of another kind.
@@ -30,7 +30,7 @@ pub enum Error {
         /// The value of `fmiVersion`.
         found: String,
     },
-    /// A required attribute is not there.
+    /// A required attribute is missing.
     #[error("line {line}: <{element}> has no attribute \"{attribute}\"")]
     MissingAttribute {
         /// Line, from 1.
@@ -40,7 +40,7 @@ pub enum Error {
         /// Name of the attribute.
         attribute: String,
     },
-    /// A required element is not there.
+    /// A required element is missing.
     #[error("line {line}: <{parent}> has no element <{element}>")]
     MissingElement {
         /// Line of the parent, from 1.
@@ -50,7 +50,7 @@ pub enum Error {
         /// Name of the missing element.
         element: String,
     },
-    /// An attribute has a value of another form.
+    /// An attribute value has the wrong form.
     #[error("line {line}: <{element}> has {attribute}=\"{found}\", expected {expected}")]
     Value {
         /// Line, from 1.

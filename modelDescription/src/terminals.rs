@@ -5,16 +5,16 @@
 pub struct TerminalsAndIcons {
     /// The standard that defines the file: 3.0, in an FMU of FMI 2.0 as well.
     pub fmi_version: String,
-    /// What coordinates mean; the standard's default where the file has none.
+    /// The coordinate system; the standard's default if the file has none.
     pub coordinates: CoordinateSystem,
-    /// Where the icon of the FMU is.
+    /// Position of the FMU's icon.
     pub icon: Option<Area>,
     /// The terminals, in the order of the file.
     pub terminals: Vec<Terminal>,
 }
 
 impl TerminalsAndIcons {
-    /// The terminal at a path of names joined by dots, `outer.inner` for one inside another; names may have dots themselves.
+    /// The terminal at a path of names joined by dots, such as `outer.inner`; names may contain dots themselves.
     pub fn terminal(&self, path: &str) -> Option<&Terminal> {
         find(&self.terminals, path)
     }
@@ -31,13 +31,13 @@ fn find<'a>(terminals: &'a [Terminal], path: &str) -> Option<&'a Terminal> {
 /// Two corners: the lower left and the upper right one, unless a picture is flipped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
-    /// To the right, first corner.
+    /// x of the first corner.
     pub x1: f64,
-    /// Upwards, first corner.
+    /// y of the first corner.
     pub y1: f64,
-    /// To the right, second corner.
+    /// x of the second corner.
     pub x2: f64,
-    /// Upwards, second corner.
+    /// y of the second corner.
     pub y2: f64,
 }
 
@@ -61,9 +61,9 @@ impl Default for CoordinateSystem {
 pub struct Terminal {
     /// Name, unique among its siblings.
     pub name: String,
-    /// `plug`, `bus`, `sequence`, `none`, or a rule of others.
+    /// `plug`, `bus`, `sequence`, `none`, or a rule defined elsewhere.
     pub matching_rule: String,
-    /// Kind, which others define.
+    /// Kind, defined outside the standard.
     pub kind: Option<String>,
     /// One sentence.
     pub description: Option<String>,
@@ -86,7 +86,7 @@ pub struct Member {
     pub variable: String,
     /// Name within the terminal.
     pub name: Option<String>,
-    /// `signal`, `inflow`, `outflow`, or a kind of others.
+    /// `signal`, `inflow`, `outflow`, or a kind defined elsewhere.
     pub kind: String,
     /// Line of the element.
     pub line: usize,
@@ -95,9 +95,9 @@ pub struct Member {
 /// The two variables of a transported quantity.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StreamMember {
-    /// Variable and member name for what comes in.
+    /// Variable and member name of the inflow.
     pub inside: (String, String),
-    /// Variable and member name for what goes out.
+    /// Variable and member name of the outflow.
     pub outside: (String, String),
     /// Line of the element.
     pub line: usize,

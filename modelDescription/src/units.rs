@@ -7,7 +7,7 @@ use crate::variable::BaseType;
 pub struct Unit {
     /// Name, for example `N.m`.
     pub name: String,
-    /// Its relation to the SI base units, where the file tells it.
+    /// Its relation to the SI base units, if the file gives it.
     pub base: Option<BaseUnit>,
     /// Units to show values in.
     pub display_units: Vec<DisplayUnit>,
@@ -43,7 +43,7 @@ impl BaseUnit {
 pub struct DisplayUnit {
     /// Name, for example `rpm`.
     pub name: String,
-    /// Factor from the unit to the display unit: the other way round than in [`BaseUnit`].
+    /// Factor from the unit to the display unit, the inverse direction of [`BaseUnit`].
     pub factor: f64,
     /// Offset in the display unit.
     pub offset: f64,
@@ -63,7 +63,7 @@ impl DisplayUnit {
     }
 }
 
-/// A type definition: what variables that declare it have in common.
+/// A type definition: the common properties of the variables that refer to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TypeDefinition {
     /// Name.

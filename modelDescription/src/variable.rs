@@ -41,9 +41,9 @@ words! {
         CalculatedParameter = "calculatedParameter",
         /// Set by the importer at communication points.
         Input = "input",
-        /// Computed by the model, for others.
+        /// Computed by the model, for connection to other models.
         Output = "output",
-        /// Computed by the model, for the curious.
+        /// Computed by the model, for inspection only.
         Local = "local",
         /// Time.
         Independent = "independent",
@@ -73,7 +73,7 @@ words! {
         Exact = "exact",
         /// An iteration that begins at the start value.
         Approx = "approx",
-        /// Other variables.
+        /// Calculated from other variables.
         Calculated = "calculated",
     }
 }
@@ -142,7 +142,7 @@ pub struct Alias {
     pub display_unit: Option<String>,
 }
 
-/// A variable. What it does not say itself is taken from its type definition, and then from the standard's default.
+/// A variable. Missing properties come from its type definition, then from the standard's default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelVariable {
     /// Full name.

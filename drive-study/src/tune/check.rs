@@ -1,4 +1,4 @@
-//! Whether the models have the variables that the rules give values to, of that type and in that range.
+//! Checks that the models have the variables that the rules set, with matching type and range.
 
 use super::motor::MotorFile;
 use super::rules::{Setting, Value};
@@ -10,7 +10,7 @@ use fmu_core::description::VariableKind;
 /// Checks both lists against the descriptions of the models.
 ///
 /// # Errors
-/// Names the variable, and the place in the machine's file that its value comes from.
+/// Names the variable, and the place in the machine's file from which its value comes.
 pub fn check(plant_settings: &[Setting], controller_settings: &[Setting], motor: &MotorFile) -> Result<()> {
     let plant = Description::of::<PmsmPlant>().map_err(|e| anyhow!("{e}"))?;
     let controller = Description::of::<SensorlessController>().map_err(|e| anyhow!("{e}"))?;

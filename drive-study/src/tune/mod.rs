@@ -19,15 +19,15 @@ use std::path::Path;
 /// Reads a machine's file and derives the values of both FMUs.
 ///
 /// # Errors
-/// Names file, line and column, and what is wrong: a key, a type, a value, or values that do not fit together.
+/// Gives file, line and column, and the problem: a key, a type, a value, or inconsistent values.
 pub fn tune(path: &Path) -> Result<Tuned> {
     let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
     let motor = MotorFile::parse(&text, path)?;
     rules::tune(&motor)
 }
 
-/// What importers have to be told, of plant and controller: the settings that differ from the start values of the FMUs. An
-/// enumeration's value is the name of its item, or with `integers` the integer behind it.
+/// The settings of plant and controller for importers: the values that differ from the start values of the FMUs. The
+/// value of an enumeration is the name of its item, or with `integers` its integer.
 ///
 /// # Errors
 /// A model cannot be described.

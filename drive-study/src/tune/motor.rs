@@ -1,23 +1,23 @@
-//! The file of a machine: what it is, what drives it, and how fast its loops shall be.
+//! The file of a machine: its data, its supply, and the bandwidths of its loops.
 
 use anyhow::{Result, anyhow};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
-/// A number of the file with its place.
+/// A number of the file with its position.
 pub type Number = Spanned<f64>;
 
 /// A machine's file, read.
 #[derive(Debug)]
 pub struct MotorFile {
-    /// What it says.
+    /// Its content.
     pub data: Data,
     path: PathBuf,
     text: String,
 }
 
-/// What the file says. SI units; currents and fluxes are peak values.
+/// The content of the file, in SI units; currents and fluxes are peak values.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Data {
@@ -33,11 +33,11 @@ pub struct Data {
     pub rating: Rating,
     /// What feeds the inverter.
     pub dc_link: DcLink,
-    /// How fast the loops shall be.
+    /// Bandwidths of the loops.
     pub bandwidth: Bandwidth,
     /// Saturation of the plant.
     pub saturation: Option<Saturation>,
-    /// What the rules would choose by themselves.
+    /// Overrides of what the rules choose.
     #[serde(default)]
     pub control: Control,
 }
@@ -51,9 +51,9 @@ pub struct Machine {
     pub n_p: Spanned<i32>,
     /// Stator resistance in Ohm.
     pub R_s: Number,
-    /// Inductance along the magnet in H.
+    /// Inductance along the magnet axis (L_d) in H.
     pub L_d: Number,
-    /// Inductance across the magnet in H.
+    /// Inductance across the magnet axis (L_q) in H.
     pub L_q: Number,
     /// Flux linkage of the magnet in Wb.
     pub psi_M: Number,
@@ -66,11 +66,11 @@ pub struct Machine {
 pub struct Mechanics {
     /// Inertia in kg.m2.
     pub J: Number,
-    /// Viscous friction in N.m.s/rad; none without it.
+    /// Viscous friction in N.m.s/rad; none if omitted.
     pub B: Option<Number>,
-    /// Coulomb friction in N.m; none without it.
+    /// Coulomb friction in N.m; none if omitted.
     pub tau_coulomb: Option<Number>,
-    /// Speed in rad/s over which that changes sign.
+    /// Speed range in rad/s over which the Coulomb friction changes sign.
     pub w_coulomb: Option<Number>,
 }
 
@@ -82,7 +82,7 @@ pub struct Rating {
     pub speed: Number,
     /// Torque in N.m.
     pub torque: Number,
-    /// Greatest magnitude of the current in A.
+    /// Maximum magnitude of the current in A.
     pub current: Number,
 }
 
@@ -94,7 +94,7 @@ pub struct DcLink {
     pub u_dc: Number,
 }
 
-/// How fast the loops shall be, in rad/s.
+/// Bandwidths of the loops, in rad/s.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bandwidth {
@@ -110,15 +110,15 @@ pub struct Bandwidth {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Saturation {
-    /// Of second order along the magnet.
+    /// Second-order coefficient along the magnet axis.
     pub s_2: Option<Number>,
-    /// Of third order along the magnet.
+    /// Third-order coefficient along the magnet axis.
     pub s_3: Option<Number>,
-    /// Between the axes.
+    /// Cross-coupling between the axes.
     pub s_dq: Option<Number>,
 }
 
-/// What the rules would choose by themselves.
+/// Overrides of what the rules choose.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
@@ -133,7 +133,7 @@ impl MotorFile {
     /// Reads the text of the file at `path`.
     ///
     /// # Errors
-    /// Says at which line and column a key is unknown or missing, or a value has the wrong type.
+    /// Gives the line and column of an unknown or missing key, or of a value of the wrong type.
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let data: Result<Data, toml::de::Error> = toml::from_str(text);
         data.map(|data| Self { data, path: path.into(), text: text.into() }).map_err(|error| {
@@ -144,12 +144,12 @@ impl MotorFile {
         })
     }
 
-    /// Where a value stands: `file:line:column`.
+    /// Position of a value: `file:line:column`.
     pub fn place<T>(&self, value: &Spanned<T>) -> String {
         self.place_at(value.span().start)
     }
 
-    /// Where an offset of the file is.
+    /// Position of an offset in the file.
     pub fn place_at(&self, offset: usize) -> String {
         place(&self.path, &self.text, offset)
     }

@@ -8,7 +8,7 @@ impl Tuned {
     /// Plant and controller with these values, at rest.
     ///
     /// # Panics
-    /// A value has no variable: [`check`](super::check) has refused it before.
+    /// If a value has no variable; [`check`](super::check) refuses such values first.
     pub fn pair(&self) -> Pair {
         let mut pair = Pair::default();
         self.plant.iter().for_each(|setting| set(&mut pair.plant, setting));

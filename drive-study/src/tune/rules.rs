@@ -1,4 +1,4 @@
-//! The rules by which parameter values follow from machine and bandwidths.
+//! The rules that derive parameter values from machine data and bandwidths.
 //!
 //! For a machine without saliency (L_q within a tenth of L_d) Rasmussen's observer, which holds standstill; with saliency
 //! the extended EMF and an I-f start. Rules for Rasmussen's observer: w_n = observer, zeta = 1;
@@ -6,10 +6,11 @@
 //! electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest electrical
 //! acceleration alpha = n_p K i_q / J. R^ = 0.9 R: the safe side at standstill, where R^ > R runs away.
 //!
-//! The current loop is stable with every current that is used: its gain, w_c L or with active resistance 2 w_c L - R, acts
-//! on the incremental inductance, which saturation lowers; and while the frame is not yet at the rotor, in a start, the gain
-//! of one axis acts on the inductance of the other. With the sample of delay `i[k+2] = i[k+1] - (gain T_s / L) i[k]`, which
-//! oscillates without end at gain T_s / L = 1: half of that is allowed (gain margin 6 dB), and w_c is lowered to it.
+//! The current loop must be stable with every current in use. Its gain, w_c L or with active resistance 2 w_c L - R,
+//! acts on the incremental inductance, which saturation lowers. During a start, while the frame is not yet aligned with
+//! the rotor, the gain of one axis acts on the inductance of the other. With one sample of delay, `i[k+2] = i[k+1] -
+//! (gain T_s / L) i[k]` is undamped at gain T_s / L = 1. The rules allow half of that (gain margin 6 dB) and lower w_c
+//! to meet it.
 
 use super::check::check;
 use super::motor::{Data, MotorFile, Number};
@@ -32,7 +33,7 @@ pub enum Value {
     Item(String),
 }
 
-/// A variable with its value, and how it came about.
+/// A variable with its value and the origin of the value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Variable of the model.
@@ -41,7 +42,7 @@ pub struct Setting {
     pub value: Value,
     /// The rule.
     pub rule: String,
-    /// Offset in the machine's file of the value that it comes from.
+    /// Offset of the source value in the machine's file.
     pub origin: Option<usize>,
 }
 
@@ -50,13 +51,13 @@ pub struct Setting {
 pub struct Tuned {
     /// Name of the machine.
     pub name: String,
-    /// Where its data come from.
+    /// Source of its data.
     pub source: String,
     /// Values of `PmsmPlant`.
     pub plant: Vec<Setting>,
     /// Values of `SensorlessController`.
     pub controller: Vec<Setting>,
-    /// What is outside the ranges that the rules were tried in.
+    /// Warnings: values outside the ranges that the rules were tested in.
     pub notes: Vec<String>,
 }
 
@@ -75,14 +76,14 @@ fn real(name: &'static str, x: f64, rule: &str) -> Setting {
 /// Derives the values.
 ///
 /// # Errors
-/// Values that do not fit together, with their place and what to do.
+/// Inconsistent values, with their position and a remedy.
 pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     let data = &motor.data;
     let plant = plant(data);
     let estimator = estimator(motor)?;
     let mut notes = Vec::new();
     let mut controller = common(data, &estimator);
-    // What is given must be in range before anything is computed from it.
+    // Check the given values before computing anything from them.
     check(&plant, &controller, motor)?;
     fits(motor, &mut notes)?;
     if estimator == "Rasmussen" {
@@ -136,7 +137,7 @@ fn plant(data: &Data) -> Vec<Setting> {
     all
 }
 
-/// What every estimator needs.
+/// Values that every estimator needs.
 fn common(data: &Data, estimator: &str) -> Vec<Setting> {
     let Data { machine, mechanics, bandwidth, control, .. } = data;
     let mut all = vec![set("estimator", Value::Item(estimator.into()), "by the saliency, or as given")];
@@ -162,7 +163,7 @@ fn torque_constant(data: &Data) -> f64 {
     1.5 * f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref()
 }
 
-/// What holds for every estimator.
+/// Rules for every estimator.
 fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
     let Data { machine, rating, dc_link, bandwidth, .. } = &motor.data;
     for (name, x) in [("speed", &rating.speed), ("torque", &rating.torque), ("current", &rating.current)] {
@@ -192,15 +193,15 @@ fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
     Ok(())
 }
 
-/// Greatest product of the current loop's gain and T_s / L: half of the one at which it oscillates.
+/// Maximum product of the current loop's gain and T_s / L: half of the value at which the loop oscillates.
 const MAX_GAIN: f64 = 0.5;
 
-/// Lowers the bandwidth of the current loop to what the least inductance allows, and says so.
+/// Lowers the bandwidth of the current loop to what the smallest inductance allows, and reports it.
 fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<String>) {
     let value = |name: &str| controller.iter().find(|s| s.name == name).map(|s| &s.value);
     let number = |name: &str| if let Some(Value::Real(x)) = value(name) { *x } else { 0.0 };
     let Data { machine, rating, bandwidth, .. } = data;
-    // A start may have its current on one axis and as much damping on the other.
+    // During a start, the current may be on one axis and the same damping on the other.
     let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
     let least = least_inductance(data, i);
     let greatest = machine.L_d.get_ref().max(*machine.L_q.get_ref());
@@ -224,7 +225,7 @@ fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<Str
     }
 }
 
-/// The least incremental inductance in H of the plant with a current of `i` (A) in any direction.
+/// The smallest incremental inductance in H of the plant with a current of `i` (A) in any direction.
 fn least_inductance(data: &Data, i: f64) -> f64 {
     let (m, of) = (&data.machine, |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref()));
     let motor = Motor {
@@ -304,7 +305,8 @@ fn extended_emf(data: &Data, notes: &mut Vec<String>) -> Vec<Setting> {
             "bandwidth.observer is {rho} rad/s; below 94 rad/s a load step of half the torque loses the rotor"
         ));
     }
-    // A current along the magnet holds the rotor only while the magnet outweighs the reluctance: |L_q - L_d| i < psi_M.
+    // A current along the magnet axis holds the rotor only while magnet torque exceeds reluctance torque: |L_q - L_d| i
+    // < psi_M.
     let k = torque_constant(data);
     let saliency = (data.machine.L_q.get_ref() - data.machine.L_d.get_ref()).abs();
     let (wanted, stable) = ((1.4 * torque / k).min(limit), 0.5 * data.machine.psi_M.get_ref() / saliency);

@@ -28,7 +28,7 @@ pub struct Member {
     pub name: String,
     /// Name of the variable.
     pub variable: String,
-    /// What a connection makes of it.
+    /// How a connection combines the values.
     pub kind: MemberKind,
 }
 
@@ -45,7 +45,7 @@ pub struct TerminalPicture {
     pub color: [u8; 3],
 }
 
-/// The terminals, with what no compile-time check can see.
+/// The terminals, after the checks that cannot run at compile time.
 pub(super) fn describe(terminals: &[terminal::Terminal], variables: &[Variable]) -> Result<Vec<Terminal>, Fault> {
     let mut described: Vec<Terminal> = Vec::new();
     for terminal::Terminal { name, description, rule, members, picture } in terminals {

@@ -5,7 +5,7 @@ use crate::number::parse;
 use crate::xml::Element;
 use std::str::FromStr;
 
-/// A value of another form.
+/// A value of the wrong form.
 pub(super) fn wrong(element: &Element, attribute: &str, expected: impl Into<String>) -> Error {
     Error::Value {
         line: element.line,
@@ -16,7 +16,7 @@ pub(super) fn wrong(element: &Element, attribute: &str, expected: impl Into<Stri
     }
 }
 
-/// A text that must be there.
+/// A required text.
 pub(super) fn required<'a>(element: &'a Element, attribute: &str) -> Result<&'a str, Error> {
     element.get(attribute).ok_or_else(|| Error::MissingAttribute {
         line: element.line,
@@ -42,7 +42,7 @@ pub(super) fn integer<T: FromStr>(element: &Element, attribute: &str) -> Result<
     element.get(attribute).map(read).transpose()
 }
 
-/// An integer that must be there.
+/// A required integer.
 pub(super) fn required_integer<T: FromStr>(element: &Element, attribute: &str) -> Result<T, Error> {
     required(element, attribute)?.trim().parse().map_err(|_| wrong(element, attribute, an_integer::<T>()))
 }

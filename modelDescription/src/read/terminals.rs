@@ -8,7 +8,7 @@ use crate::xml::Element;
 
 /// Reads terminalsAndIcons.xml of an FMU of either standard; the bytes must be UTF-8.
 ///
-/// As [`read`](crate::read()) it does not judge: a variable that the FMU does not have is read as it is.
+/// Like [`read`](crate::read()), it does not judge: it accepts a variable that the FMU does not have.
 ///
 /// # Errors
 /// Names the line, what is there and what was expected.
