@@ -32,7 +32,7 @@ struct ArtifactTarget {
 /// holds the usual one). Paths of this machine stay out of the binaries, so that builds at two places agree byte for byte.
 ///
 /// # Errors
-/// Cargo fails; it has then told why.
+/// Cargo fails; it has then printed the reason.
 pub fn compile(workspace: &Workspace, packages: &[String], target: &Target) -> Result<Vec<Library>> {
     let mut libraries = Vec::new();
     if is_darwin(target) {
@@ -169,7 +169,7 @@ mod tests {
     use super::*;
     use crate::target::Tools;
 
-    /// What a profile of the workspace says of panics is not asked: Cargo takes the environment first.
+    /// The workspace profile's panic setting has no effect: Cargo gives priority to the environment.
     #[test]
     fn an_fmu_is_compiled_so_that_a_panic_unwinds() {
         let workspace = Workspace::find().unwrap();

@@ -12,7 +12,7 @@ use std::path::Path;
 pub struct Licenses {
     /// Texts of the workspace's own license.
     own: Vec<String>,
-    /// What is linked into the binary; `None` when that is not known.
+    /// The packages linked into the binary; `None` if unknown.
     crates: Option<Vec<Crate>>,
 }
 
@@ -105,7 +105,7 @@ impl Crate {
     }
 }
 
-/// The texts of licenses and notices in a folder; where MIT is one of the choices and has a file, that one only.
+/// The texts of licenses and notices in a folder; if MIT is one of the choices and has a file, only that one.
 fn texts_in(folder: &Path, license: &str) -> Vec<String> {
     let is_text =
         |name: &str| ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"].iter().any(|n| name.starts_with(n));

@@ -1,4 +1,4 @@
-//! The archive of an FMU: what is in it, and writing it so that the same contents give the same bytes.
+//! The archive of an FMU: its contents, and a writer that gives the same bytes for the same contents.
 
 use crate::documentation;
 use crate::licenses::Licenses;
@@ -40,7 +40,7 @@ pub struct Moment {
 }
 
 impl Moment {
-    /// What the environment says, or the clock.
+    /// The time from the environment, or from the clock.
     ///
     /// # Errors
     /// `SOURCE_DATE_EPOCH` is no number of seconds.
@@ -59,7 +59,7 @@ impl Moment {
         Self { seconds, fixed: true }
     }
 
-    /// As `generationDateAndTime` has it.
+    /// The time in the form of `generationDateAndTime`.
     pub fn date_and_time(self) -> String {
         date_from_epoch(self.seconds)
     }
@@ -77,7 +77,7 @@ impl Moment {
             small(14..16),
             small(17..19),
         );
-        // ZIP counts from 1980; an earlier moment becomes that.
+        // ZIP time starts in 1980; an earlier time becomes 1980-01-01.
         if self.fixed { time.unwrap_or_default() } else { DateTime::default() }
     }
 }

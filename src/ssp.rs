@@ -44,7 +44,7 @@ pub struct Values {
 /// Features that not every importer supports.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
-    /// Whether truth values are connected, of which there is one: `enabled` of the controller to `enable` of the plant.
+    /// Whether to connect Booleans. There is one: `enabled` of the controller to `enable` of the plant.
     pub gates: bool,
     /// Whether the system has a size in a diagram.
     pub geometry: bool,
@@ -148,7 +148,7 @@ fn inputs<'a>(
     found
 }
 
-/// All outputs. A name that both have is the plant's; the controller's is that of an estimate.
+/// All outputs. If both components have a name, it denotes the plant's output; the controller's is an estimate.
 fn outputs<'a>(descriptions: &'a [(&'static str, ModelDescription)]) -> Vec<Outside<'a>> {
     let outputs = |md: &'a ModelDescription| md.variables.iter().filter(|v| v.causality == Causality::Output);
     let plant = |name: &str| {

@@ -1,4 +1,4 @@
-//! The Rust targets that FMUs are built for, and whether what a build for one needs is on this machine.
+//! The Rust targets that FMUs are built for, and a check that this machine has what a build needs.
 
 use anyhow::{Context, Result, anyhow, bail};
 use fmu_import::platform::Platform;
@@ -28,7 +28,7 @@ pub struct Target {
 /// What links a target's libraries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Linker {
-    /// The one that rustc takes, or the one that the user told Cargo.
+    /// The default linker of rustc, or the one that the user configured in Cargo.
     Usual,
     /// zig, through cargo-zigbuild: it has the C library of every Linux and of macOS.
     Zig,
@@ -58,7 +58,7 @@ impl Tools {
         Target { triple: self.host.clone(), platform, is_host: true, linker }
     }
 
-    /// A target by its name, with all that a build for it needs.
+    /// A target by its name, with everything that its build needs.
     ///
     /// # Errors
     /// rustc does not know it, FMI has no platform for it, its standard library or a linker is missing: what, and how to
@@ -144,7 +144,7 @@ pub fn host_triple() -> Result<String> {
     Ok(host.to_owned())
 }
 
-/// Whether cargo-zigbuild is here and finds a zig.
+/// Whether cargo-zigbuild is installed and finds zig.
 fn zig() -> Result<(), String> {
     if find("cargo-zigbuild").is_none() {
         return Err(format!("its linker zig needs cargo-zigbuild, which is not in PATH: {ZIG}"));

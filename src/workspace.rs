@@ -1,4 +1,4 @@
-//! The Cargo workspace around the current folder, and what it holds.
+//! The Cargo workspace around the current folder, and its packages.
 
 use crate::target::{cargo, host_triple};
 use anyhow::{Context, Result, bail};
@@ -29,7 +29,7 @@ pub struct Package {
     pub version: String,
     /// License, an SPDX expression.
     pub license: Option<String>,
-    /// Where it comes from.
+    /// Source of the package.
     pub repository: Option<String>,
     manifest_path: PathBuf,
     targets: Vec<Target>,
@@ -134,7 +134,7 @@ impl Workspace {
         self.members.contains(&package.id)
     }
 
-    /// What is linked into a package's library, the package included, sorted by name.
+    /// The packages linked into a package's library, including the package itself, sorted by name.
     pub fn linked(&self, package: &str) -> Vec<&Package> {
         let mut open: Vec<&str> = self.package(package).map(|p| p.id.as_str()).into_iter().collect();
         let mut seen = HashSet::new();

@@ -17,12 +17,12 @@ pub trait Enumerated: Copy + Debug + 'static {
     fn value(self) -> i32;
 }
 
-/// Where a model holds an enum of some type.
+/// The place where a model holds an enum of some type.
 pub trait Choice: Debug {
-    /// The value of the item that is chosen.
+    /// The value of the current item.
     fn get(&self) -> i32;
 
-    /// Chooses the item with this value; returns false and changes nothing if there is none.
+    /// Selects the item with this value; returns false and changes nothing if there is none.
     fn set(&mut self, value: i32) -> bool;
 }
 
@@ -41,7 +41,7 @@ impl<E: Enumerated> Choice for E {
 /// Where a `W` holds an enum `E`.
 pub struct Field<W: 'static, E: 'static>(pub fn(&mut W) -> &mut E);
 
-/// What a table asks of a [`Field`] without knowing its type.
+/// The interface of a [`Field`] for a table that does not know its type.
 pub(crate) trait Place<W>: Sync {
     fn find<'a>(&self, whole: &'a mut W) -> &'a mut dyn Choice;
 }

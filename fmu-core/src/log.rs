@@ -1,6 +1,6 @@
 //! The log categories, by the standards' own names (FMI 2.0.5, 2.2.4; FMI 3.0.2, 2.4.5).
 
-/// What happened, as a step or a set succeeded.
+/// Events, when a step or a set call succeeded.
 pub const EVENTS: &str = "logEvents";
 /// A status Warning.
 pub const WARNING: &str = "logStatusWarning";
@@ -11,7 +11,7 @@ pub const ERROR: &str = "logStatusError";
 /// A status Fatal.
 pub const FATAL: &str = "logStatusFatal";
 
-/// Every category that a message can have: its name and its description. No message has another one.
+/// Every message category: its name and its description. Messages use no other category.
 pub const CATEGORIES: &[(&str, &str)] = &[
     (EVENTS, "What happens when all is well"),
     (WARNING, "Messages that come with the status Warning"),

@@ -8,7 +8,7 @@ use crate::token::Hash;
 use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
 
-/// What a table asks of a part without knowing its type.
+/// The interface of a part for a table that does not know its type.
 pub(crate) trait Node<W>: Sync {
     fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;

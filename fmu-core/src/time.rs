@@ -86,7 +86,7 @@ pub struct SampleGrid {
 }
 
 impl SampleGrid {
-    /// Instants closer than this many seconds are the same.
+    /// Instants closer than this many seconds are the same instant.
     pub fn width(&self) -> f64 {
         SAME_INSTANT * self.period
     }
@@ -109,7 +109,7 @@ impl SampleGrid {
             reason = "saturates; a time is not negative"
         )]
         let mut k = (now.seconds() / self.period) as u64;
-        // The quotient is right to an instant or two; where doubles no longer tell instants apart, nothing would.
+        // The quotient is correct to within one or two instants, unless doubles can no longer distinguish instants.
         for _ in 0..3 {
             if self.reached(k, now) {
                 k = k.saturating_add(1);

@@ -1,7 +1,7 @@
 //! The instantiation token: a hash of the interface, computed while compiling.
 //!
-//! Binaries of one model built apart, for several platforms, have the same token; a changed name, unit, range or
-//! version changes it. 128 bits of FNV-1a, written as a GUID.
+//! Binaries of one model built separately, for several platforms, have the same token; a changed name, unit, range or
+//! version changes it. The token is a 128-bit FNV-1a hash, written as a GUID.
 
 use crate::unit::Quantity;
 use crate::variable::{Kind, Meta};
@@ -35,7 +35,7 @@ impl Hash {
         self.bytes(&other.0.to_le_bytes())
     }
 
-    /// Hash of this and all that a table row says.
+    /// Hash of this and the content of a table row.
     pub(crate) const fn meta(self, meta: &Meta) -> Self {
         let range = &meta.range;
         let dimension = match meta.dimension {

@@ -76,11 +76,11 @@ impl Unit {
 /// What a variable measures: the type definition that it refers to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
-    /// Name of the type definition, for example `Voltage`; no variable may bear it.
+    /// Name of the type definition, for example `Voltage`; no variable may have this name.
     pub name: &'static str,
     /// Unit of the value.
     pub unit: Unit,
-    /// Unit an importer shows by default, where that is another one.
+    /// Unit an importer shows by default, if it differs.
     pub display: Option<DisplayUnit>,
 }
 

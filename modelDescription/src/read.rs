@@ -1,8 +1,8 @@
 //! modelDescription.xml of any FMU of either standard.
 //!
-//! The reader wants what an importer cannot do without: well-formed XML, a version it knows, required attributes, values of
-//! the right form. It does not judge: two variables of one name or an undefined unit are read as they are, for a checker to
-//! find. Elements and attributes that it does not know are passed over.
+//! The reader requires what an importer cannot work without: well-formed XML, a known version, required attributes and
+//! values of the right form. It does not judge the content: it accepts duplicate names and undefined units for a
+//! checker to find. It ignores unknown elements and attributes.
 
 mod attributes;
 mod structure;
@@ -21,7 +21,7 @@ use attributes::{boolean, number, owned, required};
 /// Reads modelDescription.xml; the bytes must be UTF-8, as both standards require.
 ///
 /// # Errors
-/// Names the line, what is there and what was expected.
+/// Gives the line, what was found and what was expected.
 pub fn read(xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
     let root = tree(xml.as_ref(), "fmiModelDescription")?;
     let version = version(&root)?;

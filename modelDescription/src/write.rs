@@ -12,7 +12,7 @@ use crate::version::FmiVersion;
 use crate::xml::{Element, print};
 use fmu_core::Description;
 
-/// Who writes the file, and when: the only two things in it that do not follow from the description.
+/// The tool and the time of generation: the only content that does not follow from the description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Generation {
     /// Name and version of the tool.
@@ -72,7 +72,7 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
     match version {
         FmiVersion::V2 => element
             .with("canInterpolateInputs", "false")
-            // A Rust library has an allocator of its own; using it without this flag is a violation.
+            // A Rust library has its own allocator; using it without this flag violates the standard.
             .with("canNotUseMemoryManagementFunctions", "true")
             .with("canGetAndSetFMUstate", "true")
             .with("canSerializeFMUstate", "true"),

@@ -20,7 +20,7 @@ pub struct Element {
 }
 
 impl Element {
-    /// An element with nothing in it.
+    /// An empty element.
     pub fn new(name: &str) -> Self {
         Self { name: name.into(), ..Self::default() }
     }
@@ -58,7 +58,7 @@ impl Element {
     /// The root element of an XML document.
     ///
     /// # Errors
-    /// It is not well-formed, or nested too deep.
+    /// The document is not well-formed or is nested too deeply.
     pub fn parse(text: &str) -> Result<Self, crate::Error> {
         parse(text)
     }
@@ -68,12 +68,12 @@ impl Element {
         self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
     }
 
-    /// The first child of this name.
+    /// The first child with this name.
     pub fn child(&self, name: &str) -> Option<&Element> {
         self.children.iter().find(|c| c.name == name)
     }
 
-    /// All children of this name.
+    /// All children with this name.
     pub fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Element> {
         self.children.iter().filter(move |c| c.name == name)
     }

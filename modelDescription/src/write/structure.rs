@@ -8,10 +8,10 @@ use fmu_core::description::{TIME, Variable};
 use fmu_core::{Causality, Description};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An entry: the number of the variable and those of what it depends on, `None` where that is not known.
+/// An entry: the number of the variable and those of its dependencies, `None` if they are unknown.
 type Unknown = (u32, Option<Vec<u32>>);
 
-/// The model structure of a model whose outputs change through steps only.
+/// The model structure of a model whose outputs change only in steps.
 pub(super) fn structure(description: &Description, version: FmiVersion) -> Element {
     let numbering = Numbering::of(description, version);
     let (mut outputs, mut initial) = (Vec::new(), Vec::new());
@@ -33,7 +33,7 @@ pub(super) fn structure(description: &Description, version: FmiVersion) -> Eleme
             let list = |name: &str, unknowns: Vec<Unknown>| {
                 Element::new(name).children(unknowns.iter().map(|u| unknown("Unknown", "index", u)))
             };
-            // A list that is there must not be empty.
+            // A list must not be empty.
             let lists = [list("Outputs", outputs), list("InitialUnknowns", initial)];
             root.children(lists.into_iter().filter(|list| !list.children.is_empty()))
         }
@@ -45,7 +45,7 @@ pub(super) fn structure(description: &Description, version: FmiVersion) -> Eleme
 
 fn unknown(element: &str, attribute: &str, (number, dependencies): &Unknown) -> Element {
     let list = |d: &Vec<u32>| d.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
-    // The only kind that is right for every function of a parameter in the initialization mode.
+    // The only kind that is valid for every function of a parameter in initialization mode.
     let kinds = |d: &Vec<u32>| vec!["dependent"; d.len()].join(" ");
     Element::new(element)
         .with(attribute, number.to_string())
@@ -82,7 +82,7 @@ impl<'a> Numbering<'a> {
         Self { variables, known }
     }
 
-    /// Numbers of what the initial value depends on, ascending, each once.
+    /// Numbers of the variables that the initial value depends on, ascending and without duplicates.
     fn known(&self, v: &Variable) -> Option<Vec<u32>> {
         let references = v.initial_dependencies.as_ref()?;
         let numbers: BTreeSet<u32> = references.iter().filter_map(|r| self.known.get(r).copied()).collect();

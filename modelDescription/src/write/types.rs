@@ -23,7 +23,7 @@ pub(super) fn units(description: &Description) -> Element {
             units.len() - 1
         });
         let Some((display, factor, offset)) = display else { continue };
-        // Two quantities may share a unit, and only one of them be shown in another: rad/s is a speed and a bandwidth.
+        // Two quantities may share a unit but differ in display unit: rad/s is used for speeds and bandwidths.
         if !units[at].all("DisplayUnit").any(|d| d.get("name") == Some(display)) {
             units[at].children.push(display_unit(display, *factor, *offset));
         }

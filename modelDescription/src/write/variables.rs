@@ -77,7 +77,7 @@ fn variable(v: &Variable) -> Element {
     element.with_some("start", start).children(dimension)
 }
 
-/// Who the variable is: all that does not depend on its base type.
+/// The properties of the variable that do not depend on its base type.
 fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> Element {
     let (causality, initial) = match v.causality {
         Causality::Parameter => ("parameter", Some("exact")),
@@ -102,8 +102,8 @@ fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> El
         .with_some("initial", initial)
 }
 
-/// Type definition, unit and bounds. A strict bound is written like any other: the XML has no word for it, the FMU refuses
-/// the bound itself and says why.
+/// Type definition, unit and bounds. The XML cannot express a strict bound, so it is written like any other; the FMU
+/// refuses the bound itself and gives the reason.
 fn type_attributes(v: &Variable) -> Vec<(String, String)> {
     let element = Element::default();
     let element = match &v.kind {

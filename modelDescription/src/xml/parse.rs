@@ -1,5 +1,5 @@
-//! Reads an element tree. Any bytes are answered by a tree or an error: no panic, no unbounded recursion, no entity
-//! expansion, no external file.
+//! Reads an element tree. Any input gives a tree or an error: no panic, no unbounded recursion, no entity expansion, no
+//! external file.
 
 use super::Element;
 use crate::error::Error;
@@ -49,7 +49,7 @@ pub(crate) fn parse(text: &str) -> Result<Element, Error> {
             return Err(wrong(&format!("more than {DEEPEST} levels of elements")));
         }
         let mut element = start(&tag).map_err(|e| wrong(&e))?;
-        // The position is behind the tag, which may have line breaks between its attributes.
+        // The position is after the tag, which may contain line breaks between its attributes.
         element.line = line - tag.matches('\n').count();
         if empty {
             place(element, &mut open, &mut root);
@@ -82,7 +82,7 @@ fn start(tag: &BytesStart<'_>) -> Result<Element, quick_xml::Error> {
     Ok(element)
 }
 
-/// Counts lines while positions grow, so that all of them together cost one pass.
+/// Counts lines incrementally, so that all positions together cost one pass.
 struct Lines<'a> {
     text: &'a str,
     offset: usize,

@@ -10,7 +10,7 @@ pub(crate) fn print(root: &Element) -> String {
     let mut events = vec![Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None))];
     collect(root, &mut events);
     for event in events {
-        // A Vec takes all that is written to it, and the writer has no other reason to fail.
+        // Writing to a Vec cannot fail, and the writer has no other source of errors.
         let _ = writer.write_event(event);
     }
     let mut bytes = writer.into_inner();
@@ -33,7 +33,7 @@ fn collect<'a>(element: &'a Element, events: &mut Vec<Event<'a>>) {
     events.push(Event::End(BytesEnd::new(element.name.as_str())));
 }
 
-/// A character that XML 1.0 has no way to write, not even as a reference, becomes the replacement character.
+/// Replaces characters that XML 1.0 cannot represent, not even by reference, with the replacement character.
 fn legal(c: char) -> char {
     match c {
         '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..='\u{10ffff}' => c,
