@@ -1,7 +1,7 @@
-//! Space vectors that know their frame: a vector of one frame cannot be added to a vector of another.
+//! Space vectors typed by frame: vectors of different frames cannot be added.
 //!
 //! `Vector<Stator>` has components alpha and beta; `Vector<Rotor>` and `Vector<Estimated>` have d and q. An [`Axis`] is
-//! the direction of a rotating frame's d axis; only it turns vectors from one frame into another.
+//! the direction of a rotating frame's d-axis; only an axis transforms vectors from one frame to another.
 
 use crate::math::sin_cos;
 use nalgebra::Complex;
@@ -9,24 +9,24 @@ use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// The frame of the stator: alpha along phase a, beta 90 degrees ahead.
+/// The stator frame: alpha along phase a, beta 90 degrees ahead.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stator;
 
-/// The frame of the true rotor: d along the magnet, q 90 degrees ahead.
+/// The true rotor frame: d along the magnet flux, q 90 degrees ahead.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rotor;
 
-/// The frame of the estimated rotor.
+/// The estimated rotor frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimated;
 
-/// A frame that turns.
+/// A rotating frame.
 pub trait Rotating {}
 impl Rotating for Rotor {}
 impl Rotating for Estimated {}
 
-/// A peak-valued space vector in frame `F`, in the unit of the quantity that it carries.
+/// A peak-valued space vector in frame `F`, in the unit of its quantity.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Vector<F> {
@@ -35,11 +35,11 @@ pub struct Vector<F> {
     frame: PhantomData<F>,
 }
 
-/// A vector in the frame of the stator.
+/// A vector in the stator frame.
 pub type AlphaBeta = Vector<Stator>;
-/// A vector in the frame of the true rotor.
+/// A vector in the true rotor frame.
 pub type Dq = Vector<Rotor>;
-/// A vector in the frame of the estimated rotor.
+/// A vector in the estimated rotor frame.
 pub type DqHat = Vector<Estimated>;
 
 impl<F> Clone for Vector<F> {
@@ -72,7 +72,7 @@ impl<F> Vector<F> {
     /// The zero vector.
     pub const ZERO: Self = Self { z: Complex::new(0.0, 0.0), frame: PhantomData };
 
-    /// From components along the frame's two axes.
+    /// Creates a vector from its components along the frame's two axes.
     #[inline]
     pub const fn new(first: f64, second: f64) -> Self {
         Self { z: Complex::new(first, second), frame: PhantomData }
@@ -101,7 +101,7 @@ impl<F> Vector<F> {
         self.z.re * other.z.im - self.z.im * other.z.re
     }
 
-    /// The vector turned by +90 degrees (multiplied by j).
+    /// The vector rotated by +90 degrees (multiplied by j).
     #[inline]
     pub fn turned(self) -> Self {
         Self::new(-self.z.im, self.z.re)
@@ -128,13 +128,13 @@ impl AlphaBeta {
 }
 
 impl<F: Rotating> Vector<F> {
-    /// Component along the magnet.
+    /// Component along the magnet flux.
     #[inline]
     pub fn d(self) -> f64 {
         self.z.re
     }
 
-    /// Component 90 degrees ahead of the magnet.
+    /// Component 90 degrees ahead of the magnet flux.
     #[inline]
     pub fn q(self) -> f64 {
         self.z.im
@@ -180,7 +180,7 @@ impl<F> Mul<f64> for Vector<F> {
     }
 }
 
-/// Direction of the d axis of the rotating frame `F`, seen from the stator.
+/// Direction of the d-axis of the rotating frame `F`, seen from the stator.
 pub struct Axis<F: Rotating> {
     direction: Complex<f64>,
     frame: PhantomData<F>,
@@ -195,20 +195,20 @@ impl<F: Rotating> Clone for Axis<F> {
 impl<F: Rotating> Copy for Axis<F> {}
 
 impl<F: Rotating> Axis<F> {
-    /// The frame at electrical angle `theta` (rad).
+    /// The frame at the electrical angle `theta` (rad).
     #[inline]
     pub fn at(theta: f64) -> Self {
         let (sin, cos) = sin_cos(theta);
         Self { direction: Complex::new(cos, sin), frame: PhantomData }
     }
 
-    /// A stator vector seen from the rotating frame: v e^{-j theta}.
+    /// Transforms a stator vector to the rotating frame: v e^{-j theta}.
     #[inline]
     pub fn from_stator(self, v: AlphaBeta) -> Vector<F> {
         Vector::of(v.z * self.direction.conj())
     }
 
-    /// A vector of the rotating frame seen from the stator: v e^{j theta}.
+    /// Transforms a vector of the rotating frame to the stator frame: v e^{j theta}.
     #[inline]
     pub fn to_stator(self, v: Vector<F>) -> AlphaBeta {
         Vector::of(v.z * self.direction)
@@ -242,7 +242,7 @@ impl Phases {
         Self { a: alpha, b: -0.5 * alpha + HALF_SQRT_3 * beta, c: -0.5 * alpha - HALF_SQRT_3 * beta }
     }
 
-    /// Greatest difference between two phases.
+    /// Largest difference between two phases.
     #[inline]
     pub fn span(self) -> f64 {
         self.a.max(self.b).max(self.c) - self.a.min(self.b).min(self.c)

@@ -1,4 +1,4 @@
-//! The classical Runge-Kutta method of fourth order (Kutta 1901) for a small fixed state.
+//! The classical fourth-order Runge-Kutta method (Kutta 1901) for a small fixed-size state.
 
 use nalgebra::SVector;
 

@@ -1,11 +1,11 @@
-//! Permanent-magnet synchronous machine drives: the plant, its control, its estimators, and the models made of them.
+//! Permanent-magnet synchronous machine drives: plant, control, estimators, and the models built from them.
 //!
-//! Conventions, everywhere: SI units; motor sign (currents flow into the machine, torque positive with positive speed);
-//! space vectors are peak-valued (amplitude-invariant Clarke transform), so torque and power carry a factor 3/2; angles
-//! are electrical unless the name says mechanical; the d axis is the magnet's axis. An angle error states its sign:
-//! `theta~ = theta - theta^` (Kim & Sul: how far the rotor is ahead) in estimators, trackers and the comparison;
-//! `theta^ - theta` (Rasmussen: how far the estimate is ahead) in his observer and in the figures of his paper.
-//! A value with `_hat` belongs to an estimator; the controller never sees the plant's parameters.
+//! Conventions throughout: SI units; motor sign (currents flow into the machine, torque is positive with positive
+//! speed); space vectors are peak-valued (amplitude-invariant Clarke transform), so torque and power carry a factor
+//! 3/2; angles are electrical unless the name says mechanical; the d-axis is the magnet axis. Each angle error states
+//! its sign: `theta~ = theta - theta^` (Kim & Sul: how far the rotor is ahead) in estimators, trackers and the
+//! comparison; `theta^ - theta` (Rasmussen: how far the estimate is ahead) in his observer and in the figures of his
+//! paper. A value with `_hat` belongs to an estimator; the controller never reads the plant's parameters.
 //!
 //! Papers: Rasmussen, *Sensorless speed control including zero speed of non salient PM synchronous drives*, Bull. Polish
 //! Acad. Sci. Tech. Sci. 54 (3), 2006, quoted as "Rasmussen (n)"; Kim & Sul, *Sensorless control of AC motor - where are
@@ -33,7 +33,7 @@ pub use pair::Pair;
 pub use plant::model::PmsmPlant;
 pub use pmsm_drive::PmsmDrive;
 
-/// What all models of this crate tell of themselves alike; each adds its own name, description and documentation.
+/// Information common to all models of this crate; each adds its own name, description and documentation.
 const PROJECT: fmu_core::Info = fmu_core::Info {
     version: env!("CARGO_PKG_VERSION"),
     author: "The sensorless-drive developers",

@@ -1,4 +1,4 @@
-//! Elementary functions from the `libm` crate: the same bits on every platform, which the C library does not promise.
+//! Elementary functions from the `libm` crate: identical bits on every platform; the C library does not guarantee this.
 
 /// Sine and cosine of `x` (rad).
 #[inline]
@@ -30,7 +30,7 @@ pub fn tanh(x: f64) -> f64 {
     libm::tanh(x)
 }
 
-/// The angle `x` (rad) brought into (-pi, pi].
+/// The angle `x` (rad) wrapped to (-pi, pi].
 pub fn wrap(x: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     if x > -PI && x <= PI {

@@ -1,15 +1,16 @@
-//! What three inverter legs make of a voltage command on average over a PWM period: the hexagon of the DC link, and the
-//! dead-time voltage. Plant and controller use the same functions: the one is the inverter, the other knows it.
+//! The average output of three inverter legs over a PWM period for a voltage command: the hexagon of the DC link and
+//! the dead-time voltage. Plant and controller share these functions: the plant models the inverter, and the controller
+//! knows it.
 //!
-//! The hexagon follows from three legs between the rails, here. Dead time: a leg loses u_dead sign(i), below i_zero the
-//! linear part of it, u_dead i / i_zero; the field's usual mean-value model, in neither paper. u in V, i in A.
+//! The hexagon is derived here from three legs between the rails. Dead time: a leg loses u_dead sign(i), or u_dead i /
+//! i_zero below i_zero. This is the field's usual mean-value model; neither paper contains it. u in V, i in A.
 
 use crate::frame::{AlphaBeta, Phases};
 
-/// The stator voltage (V) that an inverter on `u_dc` (V, >= 0) applies for the references `u` (V).
+/// Stator voltage (V) that an inverter on `u_dc` (V, >= 0) applies for the references `u` (V).
 ///
-/// Only differences of the references matter; the inverter chooses the zero sequence. It reproduces each vector inside
-/// the hexagon (no line-to-line voltage above `u_dc`) and scales the others back radially to its edge.
+/// Only differences of the references matter; the inverter chooses the zero sequence. It reproduces every vector inside
+/// the hexagon (no line-to-line voltage above `u_dc`) and scales any other vector back radially to the edge.
 #[inline]
 pub fn limit_to_hexagon(u: Phases, u_dc: f64) -> AlphaBeta {
     let span = u.span();
@@ -17,7 +18,7 @@ pub fn limit_to_hexagon(u: Phases, u_dc: f64) -> AlphaBeta {
     if span > u_dc { v * (u_dc.max(0.0) / span) } else { v }
 }
 
-/// The stator voltage (V) lost to dead time at the phase currents `i` (A): up to `u_dead` (V) per leg, linear within
+/// Stator voltage (V) lost to dead time at the phase currents `i` (A): up to `u_dead` (V) per leg, linear within
 /// +-`i_zero` (A).
 #[inline]
 pub fn dead_time_loss(u_dead: f64, i_zero: f64, i: Phases) -> AlphaBeta {

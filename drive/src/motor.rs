@@ -20,14 +20,14 @@ pub struct Motor {
 }
 
 impl Default for Motor {
-    /// The reference motor: 800 W, assumed, since the paper's table is missing.
+    /// The reference motor: 800 W; its values are assumed because the paper's table is missing.
     fn default() -> Self {
         Self { n_p: 3, R_s: 2.0, L_d: 6e-3, L_q: 6e-3, psi_M: 0.15 }
     }
 }
 
 impl Motor {
-    /// The 2.2 kW machine with interior magnets of the Kim & Sul figures (`motors/ipmsm-2.2kw.toml` has its source).
+    /// The 2.2 kW interior-magnet machine of the Kim & Sul figures (source: `motors/ipmsm-2.2kw.toml`).
     pub const IPMSM_2_2_KW: Self = Self { n_p: 3, R_s: 3.6, L_d: 36e-3, L_q: 51e-3, psi_M: 0.545 };
 
     /// Torque per ampere of i_q in N.m/A: K = 1.5 n_p psi_M.
@@ -35,7 +35,7 @@ impl Motor {
         1.5 * f64::from(self.n_p) * self.psi_M
     }
 
-    /// Torque in N.m of the currents `i_d` and `i_q` (A): 1.5 n_p (psi_M + (L_d - L_q) i_d) i_q.
+    /// Torque in N.m for the currents `i_d` and `i_q` (A): 1.5 n_p (psi_M + (L_d - L_q) i_d) i_q.
     #[inline]
     pub fn torque(&self, i_d: f64, i_q: f64) -> f64 {
         1.5 * f64::from(self.n_p) * (self.psi_M + (self.L_d - self.L_q) * i_d) * i_q
@@ -44,7 +44,7 @@ impl Motor {
 
 type P = Row<Motor>;
 
-/// The machine's variables; their owner gives the prefix `motor.`.
+/// Variables of the machine; their owner supplies the prefix `motor.`.
 pub const MOTOR: &Table<Motor> = &Table::new(
     const {
         &[

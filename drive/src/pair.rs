@@ -1,5 +1,5 @@
-//! Plant and controller side by side, exchanging values as an importer does: all outputs read, all inputs set, both
-//! stepped (Jacobi). The native reference that the packed FMUs must equal bit for bit.
+//! Plant and controller side by side. They exchange values as an importer does: read all outputs, set all inputs, step
+//! both (Jacobi). The packed FMUs must match this native reference bit for bit.
 
 use crate::control::signals::ControllerInputs;
 use crate::{PmsmPlant, SensorlessController};
@@ -18,10 +18,10 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Parameters are set: both start.
+    /// Sets the parameters and starts both.
     ///
     /// # Errors
-    /// As [`Model::validate`] of either.
+    /// Those of [`Model::validate`] of either model.
     pub fn start(&mut self) -> Result<(), Fault> {
         self.initialize();
         self.plant.model.validate()?;
@@ -35,7 +35,7 @@ impl Pair {
         self.controller.initialize();
     }
 
-    /// Inputs from outside: speed reference (rad/s), load torque (N.m), DC-link voltage of both (V).
+    /// External inputs: speed reference (rad/s), load torque (N.m), DC-link voltage of both (V).
     pub fn set_inputs(&mut self, speed_ref: f64, tau_load: f64, u_dc: f64) {
         self.controller.model.inputs.speed_ref = speed_ref;
         self.controller.model.inputs.u_dc = u_dc;
@@ -43,10 +43,10 @@ impl Pair {
         self.plant.model.inputs.u_dc = u_dc;
     }
 
-    /// One communication step of `h` (s): exchange, then both advance.
+    /// One communication step of `h` (s): exchanges values, then advances both.
     ///
     /// # Errors
-    /// As [`Model::advance`] of either.
+    /// Those of [`Model::advance`] of either model.
     #[inline]
     pub fn step(&mut self, h: f64) -> Result<(), Fault> {
         self.plant.model.inputs.u = self.controller.out.u;

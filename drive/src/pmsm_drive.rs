@@ -1,8 +1,9 @@
-//! The model `PmsmDrive`: plant and controller closed inside one block, for drive-train models that step at 1 ms or more.
+//! The model `PmsmDrive`: plant and controller in one closed-loop block, for drive-train models with steps of 1 ms or
+//! more.
 //!
-//! It is the pair of [`PmsmPlant`] and [`SensorlessController`], exchanging values at every sample instant, and for a
-//! communication step that is a multiple of T_s it gives the pair's results bit for bit. At any other communication step
-//! plant and controller also stop at the sample instants between, which an importer's exchange cannot do.
+//! It combines [`PmsmPlant`] and [`SensorlessController`], which exchange values at every sample instant. For a
+//! communication step that is a multiple of T_s, it gives the results of the pair bit for bit. With any other step,
+//! plant and controller also stop at the sample instants in between; an importer's exchange cannot do this.
 
 use crate::control::signals::ControllerOutputs;
 use crate::control::tables::{self, ENABLED, LIMITED, LOCK_LOST};
@@ -25,7 +26,7 @@ pub struct DriveInputs {
     pub speed_ref: f64,
     /// Load torque in N.m, positive against positive speed.
     pub tau_load: f64,
-    /// DC-link voltage in V, >= 0, of the inverter and as the controller measures it.
+    /// DC-link voltage in V, >= 0, of the inverter and as measured by the controller.
     pub u_dc: f64,
     /// Imposed mechanical speed of the shaft in rad/s.
     pub speed_shaft: f64,
@@ -33,7 +34,7 @@ pub struct DriveInputs {
     pub angle_shaft: f64,
     /// Torque reference in N.m, in torque mode.
     pub tau_ref: f64,
-    /// The drive works; false: the controller stands at its start, the gates are off.
+    /// The drive operates; false: the controller stays in its initial state and the gates are off.
     pub enable: bool,
 }
 
@@ -51,7 +52,7 @@ impl Default for DriveInputs {
     }
 }
 
-/// Outputs of both parts.
+/// Outputs of plant and controller.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DriveOutputs {
     /// The plant's.
@@ -60,7 +61,7 @@ pub struct DriveOutputs {
     pub controller: ControllerOutputs,
 }
 
-/// A whole sensorless drive.
+/// A complete sensorless drive.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub struct PmsmDrive {
     /// Inputs, held over a communication step.
@@ -70,22 +71,22 @@ pub struct PmsmDrive {
     period: Period,
 }
 
-/// Mean powers over the sample periods, of which a communication step may end within one.
+/// Mean powers over the sample periods; a communication step may end within a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Period {
-    /// Over the last whole one.
+    /// Mean over the last complete period.
     last: Powers,
-    /// Over this one so far.
+    /// Mean over the current period so far.
     mean: Powers,
-    /// Length of that in s.
+    /// Elapsed part of the current period in s.
     time: f64,
 }
 
 impl Period {
-    /// Counts the `powers` of a step of `h` (s), after which a period may end.
+    /// Adds the `powers` of a step of `h` (s), at whose end a period may end.
     fn add(&mut self, powers: Powers, h: f64, ends: bool) {
         self.time += h;
-        // A step of a whole period counts as it is, to the last bit.
+        // A step of a whole period is taken unchanged, to the last bit.
         self.mean = if self.time > h { self.mean.with(powers, h / self.time) } else { powers };
         if ends {
             (self.last, self.time) = (self.mean, 0.0);
@@ -158,7 +159,7 @@ impl Model for PmsmDrive {
         while end.since(pair.now) > grid.width() {
             let (left, next) = (end.since(pair.now), to_next_sample(grid, pair.now));
             let before = pair.now;
-            // An imposed shaft turns on with the held speed, over all samples of the step.
+            // An imposed shaft keeps turning at the held speed over all samples of the step.
             pair.plant.model.inputs.angle_shaft = inputs.angle_shaft + inputs.speed_shaft * before.since(step.start);
             let ends = next <= left + grid.width();
             let h = if ends { next } else { left };
@@ -175,8 +176,8 @@ impl Model for PmsmDrive {
     }
 }
 
-/// Time in s from `now` to the first sample instant after it: exactly one period where `now` is an instant itself, since
-/// the pair at T_s takes steps of T_s and no other.
+/// Time in s from `now` to the next sample instant: exactly one period if `now` is a sample instant, because the pair
+/// at T_s takes only steps of T_s.
 fn to_next_sample(grid: SampleGrid, now: Elapsed) -> f64 {
     let k = grid.first_after(now);
     if k > 0 && !grid.passed(k - 1, now) { grid.period } else { -now.minus_periods(k, grid.period) }
@@ -227,7 +228,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
 
 type O = Row<ControllerOutputs>;
 
-/// The controller's outputs under names that leave `i_d` and `i_q` to the plant.
+/// The controller's outputs, renamed so that `i_d` and `i_q` remain the plant's.
 const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
     const {
         &[
@@ -261,7 +262,7 @@ mod tests {
 
     const RPM: f64 = std::f64::consts::PI / 30.0;
 
-    /// Times in s of a speed step and a load step, on the grid of every step that is compared.
+    /// Times in s of a speed step and a load step, on the grid of every step size compared.
     type Events = (f64, f64);
 
     /// Speed reference and load at `t` (s).
@@ -304,7 +305,7 @@ mod tests {
 
     #[test]
     fn other_steps_also_stop_at_the_samples() {
-        // 0.7 and 3.3 samples: the pair would lose angle or the drive; here only the rounding of the pieces differs.
+        // 0.7 and 3.3 samples: the pair would lose the angle or the drive; here only rounding of the pieces differs.
         let events = (0.0504, 0.399);
         let reference = drive(1e-4, 4200, events).out.plant;
         for (h, steps) in [(0.7e-4, 6000), (3.5e-4, 1200), (1.4e-3, 300)] {
@@ -316,10 +317,10 @@ mod tests {
 
     #[test]
     fn an_imposed_shaft_turns_on_within_a_step() {
-        // 0.3 s of a drive train that speeds up in steps of 1 ms, seen by the drive in one step and by the pair in ten.
+        // A drive train accelerates for 0.3 s in steps of 1 ms; the drive takes each in one step, the pair in ten.
         let mut pair = Pair::default();
         pair.plant.model.parameters.mechanics.imposed = true;
-        // A sensor: a sensorless drive against a shaft that does not yield can lose it, and then enlarges any rounding.
+        // With a sensor: a sensorless drive can lose a shaft that does not yield, and then amplifies rounding errors.
         pair.controller.model.parameters.estimator = crate::estimator::Kind::Sensored;
         let mut drive = Block::<PmsmDrive>::default();
         drive.model.pair = pair.clone();

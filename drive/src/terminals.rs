@@ -1,9 +1,9 @@
-//! What is connected together: terminals of the models, and their icons.
+//! Connections between the models: their terminals and icons.
 //!
-//! `phases` and `sensor` are there twice, on the plant and mirrored on the controller: members of one name belong together.
-//! The inverter is inside the plant, so the phases carry references and measured values, and a connection makes them equal
-//! (signals). Where power leaves the model, at the shaft and at the DC link, the torque and the current are flows: they
-//! sum up to zero with those of whatever is connected.
+//! `phases` and `sensor` exist twice, on the plant and mirrored on the controller: members with the same name connect.
+//! The inverter is inside the plant, so the phases carry references and measured values, and a connection makes them
+//! equal (signals). At the shaft and the DC link, where power leaves the model, torque and current are flows: they sum
+//! to zero with those of the connected component.
 
 use fmu_core::{Member, Terminal};
 
@@ -45,7 +45,7 @@ pub(crate) const CONTROLLER: &[Terminal] = &[
 /// Terminals of `PmsmDrive`.
 pub(crate) const DRIVE: &[Terminal] = &[SHAFT, SHAFT_IMPOSED, DC_LINK];
 
-/// What goes between controller and inverter.
+/// Signals between controller and inverter.
 const fn phases(enable: Member) -> [Member; 7] {
     [
         Member::signal("u_a"),
@@ -58,7 +58,7 @@ const fn phases(enable: Member) -> [Member; 7] {
     ]
 }
 
-/// The shaft's end: the load sees speed and angle, and takes its torque out.
+/// The shaft end: the load receives speed and angle and returns its torque.
 const SHAFT: Terminal = Terminal::plug(
     "shaft",
     "The shaft's end, turning freely: speed and angle to the load, the torque that it takes",
@@ -66,7 +66,7 @@ const SHAFT: Terminal = Terminal::plug(
 )
 .drawn(&icon::SHAFT, 100.0, 40.0);
 
-/// The same the other way round, with `mechanics.imposed`.
+/// The shaft end in the reverse direction, with `mechanics.imposed`.
 const SHAFT_IMPOSED: Terminal = Terminal::plug(
     "shaft_imposed",
     "The shaft's end where the drive train imposes speed and angle (mechanics.imposed), the torque on the train",
@@ -85,7 +85,7 @@ const DC_LINK: Terminal = Terminal::plug(
 )
 .drawn(&icon::DC_LINK, 0.0, 100.0);
 
-/// What terminals look like.
+/// Icons of the terminals.
 mod icon {
     use fmu_core::Icon;
 
@@ -118,7 +118,7 @@ mod tests {
         assert!([plant, controller, drive].iter().all(|d| d.icon.is_some()));
     }
 
-    /// Of every pair of members one side sends and the other receives, in the same unit.
+    /// In each pair of members, one side sends and the other receives, in the same unit.
     #[test]
     fn plant_and_controller_are_mirrored() {
         let (plant, controller) = (described::<PmsmPlant>(), described::<SensorlessController>());
@@ -136,7 +136,7 @@ mod tests {
         }
     }
 
-    /// A drive can be put in the plant's place.
+    /// A drive can replace the plant.
     #[test]
     fn plant_and_drive_have_the_same_power_terminals() {
         let (plant, drive) = (described::<PmsmPlant>(), described::<PmsmDrive>());

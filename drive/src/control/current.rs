@@ -1,12 +1,12 @@
 //! The current loop: PI in the estimated rotor frame, decoupled, limited to the hexagon, with back-calculation.
 //!
-//! u_d = K_p e_d + I_d - w^ L_q i_q, u_q = K_p e_q + I_q + w^ (L_d i_d + psi_M), one PI per axis with K_p = w_c L and
-//! K_i = w_c R^; or, with active resistance, K_i = w_c^2 L and -(w_c L - R^) i besides. What the hexagon cuts off drives
-//! the integrators back: I += T_s K_i (e + (u_limited - u) / K_p).
+//! u_d = K_p e_d + I_d - w^ L_q i_q, u_q = K_p e_q + I_q + w^ (L_d i_d + psi_M), with one PI controller per axis, K_p =
+//! w_c L and K_i = w_c R^. With active resistance, K_i = w_c^2 L and the term -(w_c L - R^) i is added. The voltage cut
+//! off by the hexagon drives the integrators back: I += T_s K_i (e + (u_limited - u) / K_p).
 //!
-//! The structure is that of Rasmussen 2006, Fig. 2; the paper gives no gains. These cancel the pole of the axis, so that the loop is
-//! of first order with w_c (internal model control); active resistance and back-calculation are the field's common practice.
-//! u in V, i in A, w_c and w^ in rad/s (electrical).
+//! The structure follows Rasmussen 2006, Fig. 2; the paper gives no gains. These gains cancel the pole of the axis, so
+//! the loop is first-order with bandwidth w_c (internal model control); active resistance and back-calculation are
+//! common practice in the field. u in V, i in A, w_c and w^ in rad/s (electrical).
 
 use crate::frame::{Axis, DqHat, Estimated};
 use crate::motor::Motor;
@@ -21,11 +21,11 @@ pub struct CurrentLoop {
     pub bandwidth: f64,
     /// Integral gain w_c^2 L and active resistance w_c L - R instead of K_i = w_c R.
     pub active_resistance: bool,
-    /// Integral gain in units of w_c^2 L, >= 0; 0: as `active_resistance` says.
+    /// Integral gain in units of w_c^2 L, >= 0; 0: determined by `active_resistance`.
     pub integral: f64,
-    /// Decoupling from the references, with R, instead of from the measured currents.
+    /// Decouples with the references, including R, instead of with the measured currents.
     pub reference_feed_forward: bool,
-    /// Maximum torque per ampere instead of i_d = 0, where the low-speed law does not rule.
+    /// Maximum torque per ampere instead of i_d = 0 wherever the low-speed law is not active.
     pub mtpa: bool,
 }
 
@@ -65,7 +65,7 @@ pub struct CurrentGains {
     d: AxisGains,
     q: AxisGains,
     reference_feed_forward: bool,
-    /// Feed-forward of the references in Ohm.
+    /// Feed-forward gain of the references in Ohm.
     R: f64,
 }
 
@@ -88,7 +88,7 @@ pub struct CurrentController {
 }
 
 impl CurrentController {
-    /// Voltage command (V) for the current error at the electrical speed `w` (rad/s), before the limit.
+    /// Voltage command (V) for the current error at the electrical speed `w` (rad/s), before limiting.
     #[inline]
     pub fn command(&self, gains: &CurrentGains, motor: &Motor, i_ref: DqHat, i: DqHat, w: f64) -> DqHat {
         let error = i_ref - i;
@@ -105,7 +105,7 @@ impl CurrentController {
         )
     }
 
-    /// From the gains `old` to `new` without a jump of the command at the reference `i_ref` and the current `i` (A).
+    /// Changes from the gains `old` to `new` without a step in the command at reference `i_ref` and current `i` (A).
     pub fn retune(&mut self, old: &CurrentGains, new: &CurrentGains, i_ref: DqHat, i: DqHat) {
         let error = i_ref - i;
         let direct = |gains: &CurrentGains| {
@@ -117,14 +117,14 @@ impl CurrentController {
         self.integral += direct(old) - direct(new);
     }
 
-    /// The controller in a frame `angle` (rad) behind the one that it was in: the same voltage.
+    /// The controller in a frame `angle` (rad) behind its previous frame: the voltage is unchanged.
     pub fn in_frame_behind(self, angle: f64) -> Self {
         let by = Axis::<Estimated>::at(angle);
         let turned = by.to_stator(self.integral);
         Self { integral: DqHat::new(turned.alpha(), turned.beta()) }
     }
 
-    /// What the PI gives for `error` (A), without decoupling and active resistance, in V.
+    /// PI output for `error` (A) without decoupling and active resistance, in V.
     #[inline]
     pub fn output(&self, gains: &CurrentGains, error: DqHat) -> DqHat {
         self.integral + DqHat::new(gains.d.k_p * error.d(), gains.q.k_p * error.q())
@@ -143,7 +143,7 @@ impl CurrentController {
 
 type P = Row<CurrentLoop>;
 
-/// The current loop's variables; their owner gives the prefix `current.`.
+/// Variables of the current loop; their owner supplies the prefix `current.`.
 pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
     const {
         &[
@@ -178,7 +178,7 @@ pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
 mod tests {
     use super::*;
 
-    /// Time constant of the closed loop on an R-L circuit, sampled fast so that the delay does not count.
+    /// Time constant of the closed loop on an R-L circuit, sampled so fast that the delay is negligible.
     fn time_constant(active_resistance: bool) -> f64 {
         let motor = Motor::default();
         let gains = CurrentGains::new(&CurrentLoop { active_resistance, ..CurrentLoop::default() }, &motor);

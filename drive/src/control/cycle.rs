@@ -9,14 +9,14 @@ use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
 use crate::math::wrap;
 use crate::modulation::{dead_time_loss, limit_to_hexagon};
 
-/// The estimated rotor frame at a sample, and what is controlled in it.
+/// The estimated rotor frame at a sample and the quantities controlled in it.
 struct Frame {
     axis: Axis<Estimated>,
     /// Electrical angle in rad.
     theta: f64,
     /// Electrical speed in rad/s.
     w: f64,
-    /// Stator current to control in A, without a carrier.
+    /// Stator current to control in A, with the carrier removed.
     i: DqHat,
     /// Injected voltage in V.
     injection: Injection,
@@ -51,12 +51,12 @@ impl SensorlessController {
         }
     }
 
-    /// What the sensors and the last samples tell.
+    /// Values from the sensors and the previous samples.
     #[inline]
     fn measure(&self) -> Sample {
         let Self { inputs, parameters: par, state, .. } = self;
         let i = par.sensor.measure(inputs.i, state.samples).to_stator();
-        // The command that acted since the last sample: the newest one without a delay.
+        // The command applied since the last sample: the newest one if there is no delay.
         let acted = match (par.delay, state.commands) {
             (0, [newest, ..]) => newest,
             (1, [_, older, _]) => older,
@@ -77,7 +77,7 @@ impl SensorlessController {
         }
     }
 
-    /// The estimated frame, and what the loops do in it. Parameters that were `tuned` act on the estimator from here on.
+    /// The estimated frame and the action of the loops in it. Parameters that were `tuned` then act on the estimator.
     #[inline]
     fn estimate(&mut self, sample: &Sample, tuned: bool) -> (Frame, Mode) {
         let Self { inputs, parameters: par, gains, in_use, state, .. } = self;
@@ -120,7 +120,7 @@ impl SensorlessController {
         } else {
             state.current.command(&gains.current, motor, i_ref, frame.i, frame.w)
         };
-        // The command acts from `delay` to `delay + 1` samples from now: turned to the middle of that interval.
+        // The command acts from `delay` to `delay + 1` samples from now, so rotate it to the middle of that interval.
         let acting = Axis::<Estimated>::at(frame.theta + (f64::from(par.delay) + 0.5) * T_s * frame.w);
         let injected = match frame.injection {
             Injection::None => AlphaBeta::ZERO,
@@ -144,7 +144,7 @@ impl SensorlessController {
         }
     }
 
-    /// The output `lock_lost`; 0 during a start sequence, whose angle is no estimate.
+    /// The output `lock_lost`; 0 during a start sequence, because its angle is not an estimate.
     #[inline]
     fn lock(&mut self, mode: Mode, frame: &Frame, sample: &Sample) -> f64 {
         let Self { parameters: par, gains, state, .. } = self;
@@ -159,7 +159,7 @@ impl SensorlessController {
         }
     }
 
-    /// Keeps what the next sample needs: the references and the current `i` (A) of this one.
+    /// Stores what the next sample needs: the references and the current `i` (A) of this sample.
     #[inline]
     fn keep(&mut self, sample: &Sample, i_ref: DqHat, i: DqHat) {
         let Self { parameters: par, gains, state, .. } = self;
@@ -170,7 +170,7 @@ impl SensorlessController {
     }
 }
 
-/// The voltage `u` (V) within the hexagon of `u_dc` (V), and whether it was outside.
+/// The voltage `u` (V) limited to the hexagon of `u_dc` (V), and whether it was outside.
 fn within_hexagon(u: AlphaBeta, u_dc: f64) -> (AlphaBeta, bool) {
     let phases = Phases::from_stator(u);
     (limit_to_hexagon(phases, u_dc), phases.span() > u_dc)

@@ -1,19 +1,21 @@
-//! Whether the estimate still is at the rotor: the voltage that acted against the one that a machine there would need.
+//! Detects a lost rotor: compares the applied voltage with the voltage that a machine at the estimate would need.
 //!
-//! psi^ = e^{j theta^} (L e^{-j theta^} i + psi_M) is the flux of a rotor at the estimated angle with the measured current;
-//! over the last interval `epsilon = u - R (i[k-1] + i[k]) / 2 - (psi^[k] - psi^[k-1]) / T_s` is zero where estimate and
-//! machine values are right, whatever is injected. A rotor elsewhere leaves j w psi_M (e^{j theta} - e^{j theta^}), of the
-//! magnitude 2 sin(theta~/2) |w| psi_M; a wrong speed the difference of the two EMFs. Seen from the estimated frame and
-//! smoothed at 50 Hz, epsilon is compared with
-//! lock.u + 2 sin(lock.angle / 2) psi_M |w^|, and the quotient smoothed with lock.time is the output `lock_lost`:
-//! 0 fits, 1 and more is lost, at most 10. It needs no estimator's help, so it is the same for all of them.
+//! psi^ = e^{j theta^} (L e^{-j theta^} i + psi_M) is the flux linkage of a rotor at the estimated angle with the
+//! measured current. Over the last interval, `epsilon = u - R (i[k-1] + i[k]) / 2 - (psi^[k] - psi^[k-1]) / T_s` is
+//! zero if the estimate and the machine values are correct, with any injection. A rotor at another angle leaves j w
+//! psi_M (e^{j theta} - e^{j theta^}), with magnitude 2 sin(theta~/2) |w| psi_M; a wrong speed leaves the difference of
+//! the two back EMFs. epsilon is transformed to the estimated frame, smoothed at 50 Hz, and divided by lock.u + 2
+//! sin(lock.angle / 2) psi_M |w^|. The quotient, smoothed with lock.time, is the output `lock_lost`: 0 means that the
+//! estimate fits, 1 and above that it is lost; the maximum is 10. It does not depend on the estimator, so it is the
+//! same for all of them.
 //!
-//! `lock.u` covers what is wrong beside a good estimate: (R - R^) i, and of the dead time 4/3 of a leg's voltage. Less of it
-//! sees more, where the machine values are good.
-//! Limits: an angle shows in the EMF alone. Below |w| psi_M = lock.u / 2, the creep of a Rasmussen observer with R^ > R
-//! among it, nothing shows that a rotor is lost.
+//! `lock.u` covers the errors that remain with a good estimate: (R - R^) i, and for the dead time 4/3 of a leg's
+//! voltage. A smaller value detects more if the machine values are accurate.
+//! Limits: only the back EMF reveals an angle error. Below |w| psi_M = lock.u / 2, nothing reveals a lost rotor; this
+//! includes the creep of a Rasmussen observer with R^ > R.
 //!
-//! Derived here from Kim & Sul 2011, eq (1), for every estimator alike. u in V, psi in Wb, theta in rad, w in rad/s (electrical).
+//! Derived here from Kim & Sul 2011, eq (1), for all estimators alike. u in V, psi in Wb, theta in rad, w in rad/s
+//! (electrical).
 
 use crate::estimator::Sample;
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
@@ -24,9 +26,9 @@ use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
-/// Greatest value, and that of a controller which had to start again.
+/// Maximum value, also reported by a controller that had to restart.
 pub const LOST: f64 = 10.0;
-/// Bandwidth in rad/s at which the voltage is smoothed.
+/// Bandwidth in rad/s of the voltage smoothing.
 const FILTER: f64 = TAU * 50.0;
 
 /// The parameters with the prefix `lock.`.
@@ -34,7 +36,7 @@ const FILTER: f64 = TAU * 50.0;
 pub struct LockParameters {
     /// Tolerated voltage error in V, > 0.
     pub u: f64,
-    /// Angle error in rad at which the lock is lost, where the EMF shows it, > 0.
+    /// Angle error in rad at which the lock counts as lost, if the back EMF reveals it, > 0.
     pub angle: f64,
     /// Time constant of the output in s, > 0.
     pub time: f64,
@@ -74,7 +76,7 @@ impl LockGains {
 /// State at a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lock {
-    /// Whether there was a sample.
+    /// Whether a sample has been taken.
     started: bool,
     /// Flux linkage of a rotor at the estimate in Wb.
     psi: AlphaBeta,
@@ -85,7 +87,7 @@ pub struct Lock {
 }
 
 impl Lock {
-    /// Lost, beyond doubt.
+    /// Clearly lost.
     pub fn lost() -> Self {
         Self { level: LOST, ..Self::default() }
     }
@@ -109,7 +111,7 @@ impl Lock {
 
 type P = Row<LockParameters>;
 
-/// The variables; their owner gives the prefix `lock.`.
+/// The variables; their owner supplies the prefix `lock.`.
 pub const LOCK: &Table<LockParameters> = &Table::new(
     const {
         &[
@@ -132,7 +134,7 @@ mod tests {
 
     const T_S: f64 = 1e-4;
 
-    /// `lock_lost` of an estimate `theta_tilde` (rad) away from a loaded rotor that turns at `w` (rad/s), estimated `w_hat`.
+    /// `lock_lost` for an estimate `theta_tilde` (rad) off a loaded rotor turning at `w` (rad/s), estimated as `w_hat`.
     fn beside(theta_tilde: f64, w: f64, w_hat: f64) -> f64 {
         let (motor, i) = (Motor { L_q: 9e-3, ..Motor::default() }, Dq::new(-1.0, 4.0));
         let gains = LockGains::new(&LockParameters { u: 1e-9, ..LockParameters::default() }, &motor, T_S);
@@ -152,7 +154,7 @@ mod tests {
     #[test]
     fn an_angle_error_is_measured_by_the_emf() {
         assert!(beside(0.0, 300.0, 300.0) < 1e-9);
-        // Without saliency it would be exactly 1; here (L_q - L_d) i adds to the EMF.
+        // Without saliency it would be exactly 1; here (L_q - L_d) i adds to the back EMF.
         for (degrees, expected) in [(-30.0_f64, 1.0), (30.0, 1.0), (180.0, 1.0 / 15.0_f64.to_radians().sin())] {
             let level = beside(degrees.to_radians(), -300.0, -300.0);
             assert!((level / expected - 1.0).abs() < 0.1, "{degrees} deg: {level}");

@@ -1,4 +1,4 @@
-//! The control: current and speed loops, the low-speed law, and the model `SensorlessController` made of them.
+//! The control: current and speed loops, the low-speed law, and the model `SensorlessController` built from them.
 
 pub mod current;
 mod cycle;

@@ -1,5 +1,4 @@
-//! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` has what one
-//! sample does.
+//! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
 use crate::control::current::CurrentGains;
 use crate::control::lock::{LOST, Lock, LockGains};
@@ -14,7 +13,7 @@ use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
 
-/// Maximum rotation of the estimate in one sample in rad: a faster one is a lost estimator.
+/// Maximum rotation of the estimate in one sample in rad: faster rotation means that the estimator is lost.
 const MAX_TURN: f64 = 20.0 * std::f64::consts::PI;
 
 /// Maximum number of samples in one communication step: bounds its duration for any step size and `T_s`.
@@ -25,20 +24,20 @@ const MAX_SAMPLES: f64 = 1e7;
 pub struct SensorlessController {
     /// Inputs, held over a communication step.
     pub inputs: ControllerInputs,
-    /// Parameters; a step never writes them.
+    /// Parameters; a step never changes them.
     pub parameters: ControllerParameters,
     pub(super) gains: Gains,
     /// Those of the last sample.
     pub(super) last_gains: Gains,
-    /// A parameter was set since the last sample.
+    /// A parameter has been set since the last sample.
     pub(super) tuned: bool,
     pub(super) in_use: InUse,
     pub(super) state: State,
 }
 
 impl SensorlessController {
-    /// One sample of the controller: currents in, voltage references out. What a lost estimator makes of its state may
-    /// leave the finite numbers; then the controller starts again from where it was last, at rest, and says so.
+    /// One sample of the controller: currents in, voltage references out. If a lost estimator makes the state
+    /// non-finite, the controller restarts at rest from its last angle and reports the loss.
     fn sample(&mut self) -> ControllerOutputs {
         if !self.inputs.enable {
             return self.rest();
@@ -59,7 +58,7 @@ impl SensorlessController {
         out
     }
 
-    /// At the angle of the last sample and at rest; no voltage.
+    /// Restarts at the angle of the last sample, at rest and without voltage.
     #[cold]
     fn start_again(&mut self) -> ControllerOutputs {
         let Self { parameters: par, state, .. } = self;
@@ -80,7 +79,7 @@ impl SensorlessController {
     }
 }
 
-/// The fault of a current that exceeds the limit.
+/// The fault reported for a current above the limit.
 fn above_limit(par: &ControllerParameters, get: impl FnOnce(&mut ControllerParameters) -> &mut f64) -> Fault {
     let limit = PARAMETERS.tell(par, |p| &mut p.limit.i);
     PARAMETERS.fault(par, get, format!("at most {limit}"))

@@ -1,16 +1,18 @@
-//! The start from standstill by injection: the angle from any initial angle, then which end of the magnet it is.
+//! Start from standstill by injection: finds the magnet axis from any initial angle, then identifies the north pole.
 //!
-//! 1. The estimator injects for `t_find` and finds the magnet's axis, one end or the other; the current stays at zero.
-//! 2. No voltage for 4 L/R: the currents of the injection decay.
-//! 3. +V along the estimated d axis for `samples`, -V for as many; the peak of i_d; no voltage for 4 L/R. The same mirrored.
-//! 4. Along the magnet the iron saturates and the current is greater: the greater peak was on the side of the north pole.
-//!    The estimate stays, or turns by half a turn. Then speed and current control begin.
+//! 1. The estimator injects for `t_find` and finds the magnet axis, but not its polarity; the current reference is
+//!    zero.
+//! 2. No voltage for 4 L/R: the injection currents decay.
+//! 3. +V along the estimated d-axis for `samples`, then -V for as many; the peak of i_d is stored; then no voltage for
+//!    4 L/R. The same sequence follows with the opposite sign.
+//! 4. Along the magnet flux, the iron saturates and the current is larger, so the larger peak marks the north pole. The
+//!    estimate stays or turns by half a turn. Then speed and current control begin.
 //!
-//! With the flux linkage x = V T_s `samples` the peaks are x / L_d + s_2 x^2 and x / L_d - s_2 x^2, nearly.
-//! Limits: the rotor stands still; where nothing saturates the noise decides.
+//! With the flux linkage x = V T_s `samples`, the peaks are approximately x / L_d + s_2 x^2 and x / L_d - s_2 x^2.
+//! Limits: the rotor must stand still; without saturation, noise decides the polarity.
 //!
-//! The saliency cannot tell the ends apart (Kim & Sul 2011, eq (36): the angle is in it as 2 theta); the sequence of pulses is derived
-//! here from the saturation of [`saturation`](crate::plant::saturation). V in V, x in Wb, L in H, s_2 in A/Wb2.
+//! Saliency cannot distinguish the poles (Kim & Sul 2011, eq (36) contains the angle as 2 theta); the pulse sequence is
+//! derived here from the saturation of [`saturation`](crate::plant::saturation). V in V, x in Wb, L in H, s_2 in A/Wb2.
 
 use crate::estimator::{Context, Sample};
 use crate::frame::{Axis, DqHat, Estimated};
@@ -20,9 +22,9 @@ use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// Rests in units of L/R.
+/// Duration of the pauses in units of L/R.
 const REST: f64 = 4.0;
-/// Minimum difference of the peaks, by the controller's estimates, in units of x / L_d.
+/// Minimum difference of the peaks, computed from the controller's estimates, in units of x / L_d.
 const MIN_DIFFERENCE: f64 = 0.02;
 
 /// The parameters with the prefix `polarity.`.
@@ -43,11 +45,11 @@ impl Default for PolarityParameters {
 }
 
 impl PolarityParameters {
-    /// Whether the pulses tell the ends of the magnet apart, with the estimate `s_2` (A/Wb2) of its saturation, and stay
+    /// Checks that the pulses distinguish the poles, given the estimated saturation coefficient `s_2` (A/Wb2), and stay
     /// within the current `limit` (A).
     ///
     /// # Errors
-    /// Says which parameters do not fit.
+    /// States which parameters do not fit.
     pub fn validate(&self, motor: &Motor, T_s: f64, s_2: f64, limit: f64) -> Result<(), Fault> {
         let Self { voltage, samples, .. } = self;
         let x = voltage * T_s * f64::from(*samples);
@@ -84,18 +86,18 @@ pub struct PolaritySearch {
     stage: Stage,
     /// Samples in this stage.
     n: f64,
-    /// The axis that was found, in rad.
+    /// The axis found, in rad.
     theta: f64,
-    /// Greatest current in A of the pulses along the axis, and against it.
+    /// Largest current in A of the pulses along the axis and of those against it.
     peaks: [f64; 2],
 }
 
 /// What the search requests at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SearchStep {
-    /// The estimator injects; the current stays at zero.
+    /// The estimator injects; the current reference is zero.
     Inject,
-    /// Apply the voltage `u` (V) in the frame at `theta` (rad) instead of the current controller's.
+    /// Apply the voltage `u` (V) in the frame at `theta` (rad) instead of the current controller's output.
     Pulse {
         /// Angle of the frame.
         theta: f64,
@@ -153,7 +155,7 @@ impl PolaritySearch {
 
 type P = Row<PolarityParameters>;
 
-/// The search's variables; their owner gives the prefix `polarity.`.
+/// Variables of the search; their owner supplies the prefix `polarity.`.
 pub const POLARITY: &Table<PolarityParameters> = &Table::new(
     const {
         &[

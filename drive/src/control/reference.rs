@@ -1,19 +1,19 @@
-//! From a torque to currents: maximum torque per ampere, or i_d = 0.
+//! Converts torque to currents: maximum torque per ampere, or i_d = 0.
 //!
-//! tau = 1.5 n_p (psi_M + (L_d - L_q) i_d) i_q. The least current for a torque lies where, with dL = L_q - L_d,
-//! i_d = -dL i_q^2 / (psi_M / 2 + sqrt(psi_M^2 / 4 + (dL i_q)^2)) (Morimoto et al. 1990), so that
-//! tau = 1.5 n_p i_q (psi_M / 2 + sqrt(psi_M^2 / 4 + (dL i_q)^2)): odd and convex in i_q, solved by Newton's method from
-//! above. Without saliency i_d = 0.
+//! tau = 1.5 n_p (psi_M + (L_d - L_q) i_d) i_q. With dL = L_q - L_d, the smallest current for a torque satisfies i_d =
+//! -dL i_q^2 / (psi_M / 2 + sqrt(psi_M^2 / 4 + (dL i_q)^2)) (Morimoto et al. 1990), so tau = 1.5 n_p i_q (psi_M / 2 +
+//! sqrt(psi_M^2 / 4 + (dL i_q)^2)). This function is odd in i_q and convex for i_q > 0; Newton's method solves it from
+//! above. Without saliency, i_d = 0.
 
 use crate::control::tables::Limits;
 use crate::frame::DqHat;
 use crate::motor::Motor;
 
-/// Currents (A) of least magnitude for the torque `tau` (N.m).
+/// Currents (A) of minimum magnitude for the torque `tau` (N.m).
 #[inline]
 pub fn max_torque_per_ampere(motor: &Motor, tau: f64) -> DqHat {
     let (k, half, dL) = (1.5 * f64::from(motor.n_p), 0.5 * motor.psi_M, motor.L_q - motor.L_d);
-    // Magnet alone and reluctance alone would need more current: the lesser is above the solution by a third at most.
+    // Magnet or reluctance alone would need more current: the smaller value is above the solution by a third at most.
     let mut i_q = (tau / (2.0 * k * half)).abs().min((tau / (k * dL)).abs().sqrt()).copysign(tau);
     for _ in 0..STEPS {
         let root = (half * half + dL * dL * i_q * i_q).sqrt();
@@ -23,10 +23,10 @@ pub fn max_torque_per_ampere(motor: &Motor, tau: f64) -> DqHat {
     along(motor, i_q)
 }
 
-/// Newton steps to the last digits.
+/// Newton steps to full precision.
 const STEPS: u32 = 4;
 
-/// The currents of that curve with this i_q (A).
+/// Currents (A) on that curve for the given i_q (A).
 fn along(motor: &Motor, i_q: f64) -> DqHat {
     let (half, dL) = (0.5 * motor.psi_M, motor.L_q - motor.L_d);
     let root = (half * half + dL * dL * i_q * i_q).sqrt();

@@ -1,10 +1,11 @@
-//! The current sensors and the converter behind them: gain, offset, noise, quantization.
+//! The current sensors and their analog-to-digital converter: gain, offset, noise, quantization.
 //!
-//! measured = round((gain i + offset + noise) / resolution) resolution, per phase. They belong to the controller's input
-//! stage, where samples are taken: the plant's currents stay physical and continuous, and the noise of sample k is a
-//! function of seed, k and phase, the same at every communication step and after every restored state.
+//! measured = round((gain i + offset + noise) / resolution) resolution, per phase. The sensors belong to the
+//! controller's input stage, where samples are taken: the plant's currents stay physical and continuous. The noise of
+//! sample k depends only on seed, k and phase, so it is the same for every communication step and after every state
+//! restore.
 //!
-//! Noise: normal, from a counter through SplitMix64 (Steele, Lea, Flood 2014) and Box & Muller.
+//! Noise: normally distributed, generated from a counter by SplitMix64 (Steele, Lea, Flood 2014) and Box & Muller.
 
 use crate::frame::Phases;
 use crate::math::{ln, sin_cos};
@@ -13,7 +14,7 @@ use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Parameters; at the start the sensors are ideal.
+/// Parameters; by default the sensors are ideal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
     /// Gain of each phase.
@@ -36,7 +37,7 @@ impl Default for Sensor {
 }
 
 impl Sensor {
-    /// What sample `k` shows of the currents `i` (A).
+    /// The measured values of the currents `i` (A) at sample `k`.
     #[inline]
     pub fn measure(&self, i: Phases, k: u64) -> Phases {
         let mut i = Phases {
@@ -55,7 +56,7 @@ impl Sensor {
         i
     }
 
-    /// Three standard normal numbers of sample `k`.
+    /// Three standard normal numbers for sample `k`.
     fn normal(&self, k: u64) -> [f64; 3] {
         let seed = mix(u64::from(self.seed.cast_unsigned()));
         let uniform = |of: u64| uniform(seed.wrapping_add(k.wrapping_mul(4)).wrapping_add(of));
@@ -73,7 +74,7 @@ const fn mix(counter: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A number in (0, 1): 32 bits of the generator.
+/// A number in (0, 1) from 32 bits of the generator.
 fn uniform(counter: u64) -> f64 {
     let [.., a, b, c, d] = mix(counter).to_le_bytes();
     (f64::from(u32::from_le_bytes([a, b, c, d])) + 0.5) / 4_294_967_296.0
@@ -81,7 +82,7 @@ fn uniform(counter: u64) -> f64 {
 
 type P = Row<Sensor>;
 
-/// The sensors' variables; their owner gives the prefix `sensor.`.
+/// Variables of the sensors; their owner supplies the prefix `sensor.`.
 pub const SENSOR: &Table<Sensor> = &Table::new(
     const {
         &[

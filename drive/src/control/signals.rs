@@ -1,4 +1,4 @@
-//! What goes into the controller and what comes out of it.
+//! Inputs and outputs of the controller.
 
 use crate::frame::{DqHat, Phases};
 use serde::{Deserialize, Serialize};
@@ -18,12 +18,12 @@ pub struct ControllerInputs {
     pub speed_meas: f64,
     /// Torque reference in N.m, in torque mode.
     pub tau_ref: f64,
-    /// The controller works; false: it stands at its start and commands 0 V.
+    /// The controller operates; false: it stays in its initial state and commands 0 V.
     pub enable: bool,
 }
 
 impl ControllerInputs {
-    /// Whether all of them are numbers.
+    /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
         let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _ } = self;
         [i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref].iter().all(|x| x.is_finite())
@@ -44,7 +44,7 @@ impl Default for ControllerInputs {
     }
 }
 
-/// Outputs: what sample k computed, shown from t_k + T_s on.
+/// Outputs: the results of sample k, visible from t_k + T_s on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ControllerOutputs {
     /// Stator voltage references in V, inside the hexagon of u_dc.
@@ -57,9 +57,9 @@ pub struct ControllerOutputs {
     pub i: DqParts,
     /// Its reference in A.
     pub i_ref: DqParts,
-    /// Whether the estimate is at the rotor: 0 yes, 1 and more no.
+    /// Lock indicator: 0 if the estimate follows the rotor, 1 and above if it is lost.
     pub lock_lost: f64,
-    /// Whether the controller is at work.
+    /// Whether the controller operates.
     pub enabled: bool,
     /// Whether the hexagon of u_dc limited the voltage references.
     pub voltage_limited: bool,
@@ -68,7 +68,7 @@ pub struct ControllerOutputs {
 }
 
 impl ControllerOutputs {
-    /// Whether all of them are numbers.
+    /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
         let Self { u, speed_est, theta_est, i, i_ref, lock_lost, .. } = self;
         let all = [u.a, u.b, u.c, *speed_est, *theta_est, i.d, i.q, i_ref.d, i_ref.q, *lock_lost];

@@ -1,13 +1,14 @@
-//! The speed loop: PI with set-point weight, limited, its integrator held while the limit is hit.
+//! The speed loop: PI controller with set-point weight and limit; the integrator holds while the output is limited.
 //!
 //! i_q,ref = K_p (b w_ref - w) + I, K_p = J w_s / K, dI/dt = (K_p w_s / t_is)(w_ref - w), with K = 1.5 n_p psi_M and all
 //! speeds mechanical. The integrator holds while i_q is at its limit and the error drives it further in.
 //!
-//! With `ramp` the reference goes to the set point no faster than that. In torque mode there is no speed loop: the torque
-//! reference divided by K is the set point, within the same limits.
+//! With `ramp`, the reference approaches the set point at no more than that rate. In torque mode there is no speed
+//! loop: the torque reference divided by K is the set point, within the same limits.
 //!
-//! The structure is that of Rasmussen 2006, Fig. 2; the paper gives no gains: K_p cancels the inertia, so that w_s is the loop's
-//! crossover in rad/s, and b < 1 lessens the overshoot. w in rad/s, K in N.m/A, J in kg.m2, K_p in A.s/rad.
+//! The structure follows Rasmussen 2006, Fig. 2; the paper gives no gains. K_p cancels the inertia, so w_s is the
+//! crossover frequency of the loop in rad/s; b < 1 reduces the overshoot. w in rad/s, K in N.m/A, J in kg.m2, K_p in
+//! A.s/rad.
 
 use crate::control::start::RAD_PER_S2;
 use fmu_core::unit::{ONE, RAD_PER_S};
@@ -25,7 +26,7 @@ pub struct SpeedLoop {
     pub b: f64,
     /// Maximum rate of change of the reference in rad/s2, mechanical, >= 0; 0: no ramp.
     pub ramp: f64,
-    /// The torque reference rules instead of the speed's.
+    /// Uses the torque reference instead of the speed reference.
     pub torque_mode: bool,
 }
 
@@ -36,7 +37,7 @@ impl Default for SpeedLoop {
 }
 
 impl SpeedLoop {
-    /// The reference (rad/s) a sample of `T_s` (s) after it was `last`, on its way to `w_ref` (rad/s).
+    /// The reference (rad/s) one sample of `T_s` (s) after `last`, on its way to `w_ref` (rad/s).
     #[inline]
     pub fn ramped(&self, last: f64, w_ref: f64, T_s: f64) -> f64 {
         let max_change = self.ramp * T_s;
@@ -71,8 +72,8 @@ pub struct SpeedController {
 }
 
 impl SpeedController {
-    /// Reference of i_q in A at the speed reference `w_ref` and the speed `w` (rad/s), within +-`limit` (A), and what it would
-    /// be without the limit; one sample of `T_s` (s).
+    /// Reference of i_q in A at speed reference `w_ref` and speed `w` (rad/s), within +-`limit` (A), and its value
+    /// without the limit; one sample of `T_s` (s).
     #[inline]
     pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limit: f64, T_s: f64) -> (f64, f64) {
         let error = w_ref - w;
@@ -87,7 +88,7 @@ impl SpeedController {
 }
 
 impl SpeedController {
-    /// From the gains `old` to `new` without a jump of the output at the speed reference `w_ref` and the speed `w` (rad/s).
+    /// Changes from gains `old` to `new` without a step in the output at speed reference `w_ref` and speed `w` (rad/s).
     pub fn retune(&mut self, old: &SpeedGains, new: &SpeedGains, w_ref: f64, w: f64) {
         let proportional = |gains: &SpeedGains| gains.k_p * (gains.b * w_ref - w);
         self.integral += proportional(old) - proportional(new);
@@ -101,7 +102,7 @@ impl SpeedController {
 
 type P = Row<SpeedLoop>;
 
-/// The speed loop's variables; their owner gives the prefix `speed_loop.`.
+/// Variables of the speed loop; their owner supplies the prefix `speed_loop.`.
 pub const SPEED_LOOP: &Table<SpeedLoop> = &Table::new(
     const {
         &[

@@ -1,20 +1,24 @@
-//! The I-f start: a current of fixed magnitude leads the rotor to a speed at which an EMF shows the angle.
+//! The I-f start: a current of fixed magnitude accelerates the rotor to a speed at which the back EMF reveals the
+//! angle.
 //!
-//! 1. Two alignments of `t_align`: the current on the axis 90 degrees behind `initial.theta_est`, then on it. One alone has
-//!    a dead point where the rotor is half a turn away.
-//! 2. Waits for a reference, of speed or in torque mode of torque; then the frame speeds up by `acceleration` to `speed`, to
-//!    the side of the reference.
-//! 3. Holds that speed for `settle`, then hands over: the angle is the frame's and that of the EMF in it,
-//!    theta = theta_f + atan2(-s e_d, s e_q), e = v - R i - j w_f (L_d i_d + j L_q i_q), low-passed. The integrators of the
-//!    current controller are turned into the new frame, that of the speed controller takes the torque over.
+//! 1. Two alignments of `t_align` each: the current first points 90 degrees behind `initial.theta_est`, then at it. A
+//!    single alignment fails if the rotor is half a turn away.
+//! 2. Waits for a reference (of speed, or of torque in torque mode); then the frame accelerates at `acceleration` to
+//!    `speed` in the direction of the reference.
+//! 3. Holds that speed for `settle`, then hands over: the angle is the frame angle corrected by the angle of the back
+//!    EMF, theta = theta_f + atan2(-s e_d, s e_q), e = v - R i - j w_f (L_d i_d + j L_q i_q), low-passed. The current
+//!    controller's integrators are rotated to the new frame; the speed controller's integrator starts with the present
+//!    torque.
 //!
-//! Damping: a rotor on a current vector swings with w_0 = sqrt(n_p K I / J) and nothing damps it. e_q / psi_M is its speed,
-//! so i_q = -2 zeta w_0 J / (n_p K) (e_q / psi_M - w_f), at most I, is a damping torque, at standstill too.
+//! Damping: a rotor on a current vector oscillates with w_0 = sqrt(n_p K I / J) without damping. e_q / psi_M is its
+//! speed, so i_q = -2 zeta w_0 J / (n_p K) (e_q / psi_M - w_f), limited to I, produces a damping torque, even at
+//! standstill.
 //!
-//! Limits: the load must stay below K I; at standstill the voltage errors of the inverter are in e_q.
+//! Limits: the load must stay below K I; at standstill, e_q contains the voltage errors of the inverter.
 //!
-//! Neither paper starts so: the sequence and the damping are derived here for the methods on the EMF (Kim & Sul 2011, section II),
-//! which see nothing at standstill. Angles in rad (electrical), w_0 and w_f in rad/s (electrical), i in A, K in N.m/A.
+//! Neither paper uses this start: the sequence and the damping are derived here for the back-EMF methods (Kim & Sul
+//! 2011, section II), which have no signal at standstill. Angles in rad (electrical), w_0 and w_f in rad/s
+//! (electrical), i in A, K in N.m/A.
 
 use crate::estimator::interval::Interval;
 use crate::estimator::{Context, Sample};
@@ -31,11 +35,11 @@ pub(crate) const RAD_PER_S2: Quantity =
 
 /// Damping ratio of the rotor on the current vector.
 const ZETA: f64 = 0.5;
-/// Bandwidth of the EMF in rad/s.
+/// Bandwidth of the back-EMF filter in rad/s.
 const FILTER: f64 = TAU * 60.0;
 
 enumeration! {
-    /// The start sequences; a value never changes.
+    /// The start sequences; the assigned values never change.
     #[derive(Serialize, Deserialize)]
     pub enum StartMode("Start", "Start sequence before the estimator takes over") {
         1 Direct "No sequence: the estimator starts at once";
@@ -47,7 +51,7 @@ enumeration! {
 /// The parameters with the prefix `start.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StartParameters {
-    /// Which start sequence.
+    /// Selected start sequence.
     pub mode: StartMode,
     /// Current I in A, > 0.
     pub i: f64,
@@ -55,7 +59,7 @@ pub struct StartParameters {
     pub t_align: f64,
     /// Mechanical acceleration in rad/s2, > 0.
     pub acceleration: f64,
-    /// Mechanical speed of the hand-over in rad/s, > 0: 0.15 of the rated speed is good.
+    /// Mechanical speed of the handover in rad/s, > 0: 0.15 of the rated speed is a good value.
     pub speed: f64,
     /// Time at that speed in s, >= 0.
     pub settle: f64,
@@ -86,7 +90,7 @@ pub struct CurrentFrequencyStart {
     theta: f64,
     /// Electrical speed of the frame in rad/s.
     w: f64,
-    /// EMF in the frame in V, low-passed.
+    /// Back EMF in the frame in V, low-passed.
     e: DqHat,
 }
 
@@ -108,14 +112,14 @@ pub enum StartStep {
         theta: f64,
         /// Speed of the rotor.
         w: f64,
-        /// Last angle of the frame.
+        /// Final angle of the frame.
         theta_frame: f64,
     },
 }
 
 impl CurrentFrequencyStart {
-    /// One sample. The second alignment brings the rotor to `theta_est` (rad); the sign of `reference` decides the direction
-    /// of rotation.
+    /// One sample. The second alignment brings the rotor to `theta_est` (rad); the sign of `reference` sets the
+    /// direction of rotation.
     pub fn update(
         &mut self,
         par: &StartParameters,
@@ -147,7 +151,7 @@ impl CurrentFrequencyStart {
             Stage::Behind if t >= par.t_align => self.enter(Stage::On),
             Stage::On if t >= par.t_align && reference != 0.0 => self.enter(Stage::Ramp),
             Stage::Ramp => {
-                // The side is chosen once: at the first sample of the ramp.
+                // The direction is set once, at the first sample of the ramp.
                 let side = if self.w == 0.0 { side } else { self.w.signum() };
                 self.w = side * (self.w.abs() + T_s * n_p * par.acceleration).min(rated);
                 if self.w.abs() >= rated {
@@ -176,7 +180,7 @@ impl CurrentFrequencyStart {
 
 type P = Row<StartParameters>;
 
-/// The start's variables; their owner gives the prefix `start.`.
+/// Variables of the start; their owner supplies the prefix `start.`.
 pub const START: &Table<StartParameters> = &Table::new(
     const {
         &[

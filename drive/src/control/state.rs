@@ -1,4 +1,4 @@
-//! What the controller keeps from one sample to the next, and who leads: a start sequence or the estimator.
+//! The controller state from one sample to the next, and the source of the angle: a start sequence or the estimator.
 
 use crate::control::current::{CurrentController, CurrentGains};
 use crate::control::lock::{Lock, LockGains};
@@ -14,7 +14,7 @@ use crate::math::wrap;
 use crate::motor::Motor;
 use serde::{Deserialize, Serialize};
 
-/// What an estimator may know of the parameters, with its own ones and the estimates of the machine.
+/// Parameters available to an estimator: its own and the machine estimates.
 pub(super) fn context<'a>(
     par: &'a ControllerParameters,
     estimators: &'a EstimatorParameters,
@@ -31,12 +31,12 @@ pub(super) struct Gains {
     pub(super) speed: SpeedGains,
     /// Torque constant in N.m/A.
     pub(super) k: f64,
-    /// Greatest torque in N.m over the torque constant: the limit of the speed loop in A.
+    /// Maximum torque in N.m divided by the torque constant: the limit of the speed loop in A.
     pub(super) i_tau: f64,
     pub(super) lock: LockGains,
 }
 
-/// What the estimator works with: at the first sample after a tuning still what it was.
+/// Parameters the estimator uses: at the first sample after retuning, still the previous ones.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct InUse {
     pub(super) estimators: EstimatorParameters,
@@ -50,7 +50,7 @@ impl InUse {
     }
 }
 
-/// Who determines the angle of the frame in which the current is controlled.
+/// Source of the angle of the frame in which the current is controlled.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) enum Leader {
     /// The estimator.
@@ -63,7 +63,7 @@ pub(super) enum Leader {
 }
 
 impl Leader {
-    /// The first one with `start.mode` = `mode`.
+    /// The initial source for `start.mode` = `mode`.
     fn of(mode: StartMode) -> Self {
         match mode {
             StartMode::CurrentFrequency => Self::Start(CurrentFrequencyStart::default()),
@@ -73,12 +73,12 @@ impl Leader {
     }
 }
 
-/// What the loops do in a sample.
+/// Action of the loops in a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Mode {
-    /// A start sequence is at work: control this current (A), no speed.
+    /// A start sequence is active: control this current (A), without speed control.
     Current(DqHat),
-    /// A start sequence is at work: apply this voltage (V), no current control.
+    /// A start sequence is active: apply this voltage (V), without current control.
     Voltage(DqHat),
     /// The first sample of speed and current control after the I-f start.
     AfterStart,
@@ -88,20 +88,20 @@ pub(super) enum Mode {
     ClosedLoop,
 }
 
-/// What a sample hands on to the next.
+/// Values passed from one sample to the next.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
     /// Number of samples taken: the next one is at `samples` T_s.
     #[serde(with = "fixed_size")]
     pub(super) samples: u64,
-    /// Number of them since the controller began to work: at t_0, or when it was enabled.
+    /// Number of samples since the controller began to operate: at t_0, or when it was enabled.
     #[serde(with = "fixed_size")]
     pub(super) k: u64,
     pub(super) estimator: Estimator,
     pub(super) leader: Leader,
     pub(super) speed: SpeedController,
     pub(super) current: CurrentController,
-    /// Commands of the last samples, the newest first: the one at `timing.delay` acted since the last sample.
+    /// Recent commands, the newest first: the one at `timing.delay` was applied since the last sample.
     pub(super) commands: [Command; 3],
     /// Current of the last sample in A.
     pub(super) i_last: AlphaBeta,
@@ -114,9 +114,9 @@ pub(super) struct State {
     /// Output of the current PI at the last sample in V.
     pub(super) u_pi: DqHat,
     pub(super) lock: Lock,
-    /// Outputs of the last sample, not shown before the next instant.
+    /// Outputs of the last sample, hidden until the next instant.
     pub(super) computed: ControllerOutputs,
-    /// Outputs shown now.
+    /// Outputs visible now.
     pub(super) shown: ControllerOutputs,
 }
 
@@ -133,8 +133,8 @@ impl State {
         }
     }
 
-    /// From the I-f start's frame at `theta_frame` (rad) to the estimated one at `theta` (rad), turning at `w` (rad/s): the
-    /// same voltage, the same torque.
+    /// Changes from the I-f start's frame at `theta_frame` (rad) to the estimated one at `theta` (rad), which turns at
+    /// `w` (rad/s), with unchanged voltage and torque.
     pub(super) fn take_over(
         &mut self,
         gains: &Gains,
@@ -154,7 +154,7 @@ impl State {
         self.leader = Leader::Estimator;
     }
 
-    /// The estimate at a sample, from whoever leads, and what the loops do with it.
+    /// The estimate at a sample, from the active source, and the action of the loops.
     pub(super) fn estimate(
         &mut self,
         kind: Kind,
@@ -224,7 +224,7 @@ impl State {
             };
             (limited, requested.abs() > limit)
         };
-        // Only a flux observer needs the low-speed law at standstill; the other methods would pay losses for nothing.
+        // Only a flux observer needs the low-speed law at standstill; with the other methods it would only add losses.
         if kind.class() == Class::FluxObserver {
             let i_d_ref = par.zero_speed.i_d_ref(speed);
             let (i_q_ref, limited) = i_q_ref(par.limit.i_q_beside(i_d_ref).min(gains.i_tau));
@@ -239,7 +239,7 @@ impl State {
         (i_ref, limited)
     }
 
-    /// The north pole is found: the estimator leads, and both loops begin at rest.
+    /// The north pole is known: the estimator supplies the angle, and both loops start at rest.
     fn begin_at_rest(&mut self) {
         (self.current, self.speed) = (CurrentController::default(), SpeedController::default());
         self.leader = Leader::Estimator;
@@ -249,13 +249,13 @@ impl State {
 /// A voltage command in stator axes, limited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Command {
-    /// All of it, in V.
+    /// Total voltage in V.
     pub(super) u: AlphaBeta,
     /// The injected part, in V.
     pub(super) injected: AlphaBeta,
 }
 
-/// A count in eight bytes whatever its value, so that every stored state has the same size.
+/// A count stored in eight bytes regardless of its value, so that every stored state has the same size.
 mod fixed_size {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

@@ -28,19 +28,19 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Maximum |i_q| in A that `i_d` (A), which has priority, leaves.
+    /// Maximum |i_q| in A that remains beside `i_d` (A), which has priority.
     #[inline]
     pub fn i_q_beside(&self, i_d: f64) -> f64 {
         self.i_q.min((self.i * self.i - i_d * i_d).max(0.0).sqrt())
     }
 }
 
-/// What is added to the command for the inverter's dead time; the estimators get the command without it.
+/// Dead-time compensation, added to the command; the estimators receive the command without it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compensation {
     /// Voltage that a leg loses in V, >= 0; 0: none.
     pub u_dead: f64,
-    /// Current in A below which less is added, > 0.
+    /// Current in A below which the compensation is reduced, > 0.
     pub i_zero: f64,
 }
 
@@ -52,7 +52,7 @@ impl Default for Compensation {
 
 type C = Row<Compensation>;
 
-/// The compensation's variables; their owner gives the prefix `compensation.`.
+/// Variables of the compensation; their owner supplies the prefix `compensation.`.
 const COMPENSATION: &Table<Compensation> = &Table::new(
     const {
         &[
@@ -71,12 +71,12 @@ const COMPENSATION: &Table<Compensation> = &Table::new(
     },
 );
 
-/// Everything a commissioning engineer sets.
+/// All parameters that a commissioning engineer sets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ControllerParameters {
     /// Sample period in s, > 0.
     pub T_s: f64,
-    /// Samples from taking the currents to the voltage acting: 0, 1 (Jacobi exchange) or 2.
+    /// Delay in samples between current sampling and voltage output: 0, 1 (Jacobi exchange) or 2.
     pub delay: i32,
     /// The estimator of angle and speed.
     pub estimator: Kind,
@@ -92,7 +92,7 @@ pub struct ControllerParameters {
     pub current: CurrentLoop,
     /// The speed loop.
     pub speed_loop: SpeedLoop,
-    /// Inertia in kg.m2 that tunes the speed loop, > 0.
+    /// Inertia in kg.m2 used to tune the speed loop, > 0.
     pub J: f64,
     /// Limits of the references.
     pub limit: Limits,
@@ -106,9 +106,9 @@ pub struct ControllerParameters {
     pub polarity: PolarityParameters,
     /// Estimate of the second-order d-axis saturation coefficient in A/Wb2, >= 0; 0: unknown.
     pub s_2: f64,
-    /// First estimate of the electrical angle in rad.
+    /// Initial estimate of the electrical angle in rad.
     pub theta_est: f64,
-    /// First estimate of the mechanical speed in rad/s.
+    /// Initial estimate of the mechanical speed in rad/s.
     pub speed_est: f64,
 }
 
@@ -205,7 +205,7 @@ pub const LOCK_LOST: &str =
 /// Description of the output `enabled`, on the controller and on `PmsmDrive`.
 pub const ENABLED: &str = "The controller is running: the voltage references are its own";
 
-/// Outputs that report a reached limit: the last outputs of the controller and of `PmsmDrive`.
+/// Outputs that report an active limit: the last outputs of the controller and of `PmsmDrive`.
 pub const LIMITED: &Table<ControllerOutputs> = &Table::new(
     const {
         &[

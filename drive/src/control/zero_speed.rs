@@ -1,4 +1,4 @@
-//! The low-speed law: a d-axis current that the rotor follows at speeds where no estimate is possible.
+//! The low-speed law: a d-axis current that the rotor follows at speeds too low for estimation.
 //!
 //! Rasmussen (25): i_sd,ref = i_0 exp(-|w_r^| / w_0), with the MECHANICAL speed.
 
@@ -32,7 +32,7 @@ impl ZeroSpeed {
 
 type P = Row<ZeroSpeed>;
 
-/// The law's variables; their owner gives the prefix `zero_speed.`.
+/// Variables of the law; their owner supplies the prefix `zero_speed.`.
 pub const ZERO_SPEED: &Table<ZeroSpeed> = &Table::new(
     const {
         &[

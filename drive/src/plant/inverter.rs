@@ -1,17 +1,17 @@
 //! Parameters of the average inverter: the dead time between the two switches of a leg.
 //!
-//! While both switches are off the current chooses the diode: over a PWM period the leg's voltage is off by
-//! -u_dead sign(i) with u_dead = dead_time u_dc / T_pwm. Below i_zero the current crosses zero within the dead time (the
-//! ripple, the capacitances of the switches) and the error falls linearly: -u_dead i / i_zero.
+//! While both switches are off, the current direction selects the diode: averaged over a PWM period, the leg voltage
+//! has an error of -u_dead sign(i) with u_dead = dead_time u_dc / T_pwm. Below i_zero, the current crosses zero within
+//! the dead time (ripple, switch capacitances) and the error falls linearly: -u_dead i / i_zero.
 //!
-//! [`modulation`](crate::modulation) has the voltages. The dead time is the field's usual mean-value model, in neither paper.
-//! u in V, i in A, times in s.
+//! [`modulation`](crate::modulation) computes the voltages. The dead-time model is the field's usual mean-value model;
+//! neither paper contains it. u in V, i in A, times in s.
 
 use fmu_core::unit::{AMPERE, SECOND};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// Parameters; no dead time is the ideal average inverter.
+/// Parameters; zero dead time gives the ideal average inverter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Inverter {
     /// Dead time in s, >= 0.
@@ -38,7 +38,7 @@ impl Inverter {
 
 type P = Row<Inverter>;
 
-/// The inverter's variables; their owner gives the prefix `inverter.`.
+/// Variables of the inverter; their owner supplies the prefix `inverter.`.
 pub const INVERTER: &Table<Inverter> = &Table::new(
     const {
         &[

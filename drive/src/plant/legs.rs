@@ -1,55 +1,56 @@
-//! What stands against the current of a leg: its dead time, or with the gates off its diodes.
+//! Voltage drop of an inverter leg that opposes its current: from dead time, or from the diodes if the gates are off.
 //!
-//! The voltage of a leg on the mean of a PWM period is off by `-share u_dc sign(i)`, below i_zone by the linear part of it.
-//! Dead time: share = dead_time / T_pwm, i_zone = `inverter.i_zero`. Gates off: the current chooses the diode to the one or
-//! the other rail, so share = 1/2 and nothing else gives a voltage.
+//! Averaged over a PWM period, the leg voltage has an error of `-share u_dc sign(i)`, linear in the current below
+//! i_zone. Dead time: share = dead_time / T_pwm, i_zone = `inverter.i_zero`. Gates off: the current selects the diode
+//! to the upper or the lower rail, so share = 1/2, and the leg has no other voltage.
 //!
-//! Diodes block: where no current is above i_zone and no line-to-line EMF above u_dc, the currents are zero and stay so.
-//! What is left in the zone goes at once, 0.75 L i_zone^2 of energy. i_zone is `inverter.i_zero`, or more where the machine
-//! would leave that zone faster than the shortest substep resolves.
+//! Blocking diodes: if no current exceeds i_zone and no line-to-line back EMF exceeds u_dc, the currents become and
+//! stay zero. The energy of the remaining current, 0.75 L i_zone^2, is lost at once. i_zone is `inverter.i_zero`, or
+//! larger if the machine would leave that zone faster than the shortest substep resolves.
 //!
-//! Derived here from the ideal diode bridge; `drive/tests/gates_off.rs` compares it with such a bridge in stator axes. u in V, i in A.
+//! Derived here from the ideal diode bridge; `drive/tests/gates_off.rs` compares it with such a bridge in stator axes.
+//! u in V, i in A.
 
 use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
 use crate::modulation::dead_time_loss;
 use crate::motor::Motor;
 use crate::plant::inverter::Inverter;
 
-/// Shortest substep in s that the diodes ask for.
+/// Shortest substep in s that the diodes require.
 const SHORTEST_SUBSTEP: f64 = 1e-6;
 
-/// What stands against the current, at a DC-link voltage.
+/// Voltage drop of the legs at a given DC-link voltage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Legs {
-    /// The greatest voltage as a share of the DC link's.
+    /// The maximum voltage drop as a fraction of the DC-link voltage.
     share: f64,
     /// The same in V.
     u: f64,
-    /// Current in A below which it falls linearly.
+    /// Current in A below which the drop falls linearly.
     i_zone: f64,
 }
 
 impl Legs {
-    /// Of legs that switch.
+    /// For switching legs.
     #[inline]
     pub fn switching(inverter: &Inverter, u_dc: f64) -> Self {
         let share = inverter.dead_time / inverter.T_pwm;
         Self { share, u: share * u_dc, i_zone: inverter.i_zero }
     }
 
-    /// Of legs whose gates are off.
+    /// For legs with the gates off.
     pub fn off(inverter: &Inverter, motor: &Motor, u_dc: f64) -> Self {
         let narrowest = SHORTEST_SUBSTEP * u_dc / motor.L_d.min(motor.L_q);
         Self { share: 0.5, u: 0.5 * u_dc, i_zone: inverter.i_zero.max(narrowest) }
     }
 
-    /// Time constant in s of a current within the zone, where the legs are resistances; infinite without a voltage.
+    /// Time constant in s of a current within the zone, where the legs act as resistances; infinite without a voltage.
     #[inline]
     pub fn time(&self, motor: &Motor) -> f64 {
         self.i_zone * motor.L_d.min(motor.L_q) / self.u
     }
 
-    /// The voltage (V) that the stator lacks with the current `i` (A) in the rotor frame on `axis`.
+    /// Voltage (V) lost at the stator with the current `i` (A) in the rotor frame on `axis`.
     #[inline]
     pub fn loss(&self, axis: Axis<Rotor>, i: Dq) -> AlphaBeta {
         if self.u > 0.0 {
@@ -59,12 +60,12 @@ impl Legs {
         }
     }
 
-    /// The current (A) that legs with the currents `i` (A) feed into the DC link so.
+    /// Current (A) that legs with the currents `i` (A) feed into the DC link through this voltage drop.
     #[inline]
     pub fn feed(&self, i: Phases) -> f64 {
         let leg = |i: f64| (i / self.i_zone).clamp(-1.0, 1.0) * i;
         let current = leg(i.a) + leg(i.b) + leg(i.c);
-        // No current, no matter how absurd the dead time.
+        // Zero current for any dead time, however large.
         if self.share > 0.0 && current > 0.0 { self.share * current } else { 0.0 }
     }
 

@@ -1,19 +1,20 @@
 //! The salient permanent-magnet machine in its rotor frame (Rasmussen (2) for L_d = L_q, Kim & Sul (1) in general).
 //!
-//! d psi_d/dt = u_d - R_s i_d + w psi_q, d psi_q/dt = u_q - R_s i_q - w psi_d, psi_d = L_d i_d + psi_M, psi_q = L_q i_q,
-//! tau_e = 1.5 n_p (psi_d i_q - psi_q i_d), and what [`saturation`](crate::plant::saturation) adds to the current. Flux linkages are the state: they stay right when inductances saturate.
+//! d psi_d/dt = u_d - R_s i_d + w psi_q, d psi_q/dt = u_q - R_s i_q - w psi_d, psi_d = L_d i_d + psi_M, psi_q = L_q
+//! i_q, tau_e = 1.5 n_p (psi_d i_q - psi_q i_d); [`saturation`](crate::plant::saturation) adds to the current. The flux
+//! linkages are the state, so the equations remain valid when the inductances saturate.
 
 use crate::frame::Dq;
 use crate::motor::Motor;
 use crate::plant::saturation::Saturation;
 
-/// Flux linkage (Wb) that goes with the current `i` (A) where nothing saturates.
+/// Flux linkage (Wb) for the current `i` (A) without saturation.
 #[inline]
 pub fn flux(motor: &Motor, i: Dq) -> Dq {
     Dq::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q())
 }
 
-/// Current (A) that goes with the flux linkage `psi` (Wb).
+/// Current (A) for the flux linkage `psi` (Wb).
 #[inline]
 pub fn current(motor: &Motor, saturation: &Saturation, psi: Dq) -> Dq {
     Dq::new((psi.d() - motor.psi_M) / motor.L_d, psi.q() / motor.L_q) + saturation.current(motor, psi)
@@ -25,7 +26,7 @@ pub fn flux_derivative(motor: &Motor, psi: Dq, u: Dq, i: Dq, w: f64) -> Dq {
     u - i * motor.R_s - psi.turned() * w
 }
 
-/// Magnetic energy in J at the flux linkage `psi` (Wb), without the magnet's own: 0 without current.
+/// Magnetic energy in J at the flux linkage `psi` (Wb), excluding that of the magnet: 0 without current.
 #[inline]
 pub fn magnetic_energy(motor: &Motor, saturation: &Saturation, psi: Dq) -> f64 {
     let (x, q) = (psi.d() - motor.psi_M, psi.q());

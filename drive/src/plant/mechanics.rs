@@ -1,12 +1,12 @@
-//! The rotor and what is coupled to it: one inertia with viscous and Coulomb friction.
+//! The rotor and its coupled load: one inertia with viscous and Coulomb friction.
 //!
 //! J d speed/dt = tau_e - tau_load - B speed - tau_coulomb tanh(speed / w_coulomb).
 //!
-//! With an imposed speed the drive train outside integrates: speed and angle come in, tau_e minus friction goes out, and J
-//! belongs to the drive train.
+//! With an imposed speed, the external drive train integrates the motion: speed and angle are inputs, tau_e minus
+//! friction is an output, and J belongs to the drive train.
 //!
-//! Rasmussen 2006 has the torque, not the load: friction is that of the assumed machine. J in kg.m2, B in N.m.s/rad, torques in N.m,
-//! speeds in rad/s (mechanical).
+//! Rasmussen 2006 gives the torque but not the load; the friction is that of the assumed machine. J in kg.m2, B in
+//! N.m.s/rad, torques in N.m, speeds in rad/s (mechanical).
 
 use crate::math::tanh;
 use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, SPEED};
@@ -24,7 +24,7 @@ pub struct Mechanics {
     pub tau_coulomb: f64,
     /// Speed in rad/s over which the Coulomb torque changes sign, > 0.
     pub w_coulomb: f64,
-    /// Speed and angle come from a drive train outside.
+    /// Speed and angle come from an external drive train.
     pub imposed: bool,
 }
 
@@ -41,13 +41,13 @@ impl Mechanics {
         self.B * speed + self.tau_coulomb * tanh(speed / self.w_coulomb)
     }
 
-    /// Torque of the shaft on the load in N.m: `tau_load`, or with an imposed speed `tau_e` minus `friction` (N.m).
+    /// Torque of the shaft on the load in N.m: `tau_load`, or `tau_e` minus `friction` (N.m) with an imposed speed.
     #[inline]
     pub fn tau_shaft(&self, tau_e: f64, tau_load: f64, friction: f64) -> f64 {
         if self.imposed { tau_e - friction } else { tau_load }
     }
 
-    /// Angular acceleration in rad/s2 by electromagnetic, shaft and friction torque (N.m); none where the drive train imposes the speed.
+    /// Acceleration in rad/s2 from electromagnetic, shaft and friction torque (N.m); zero with an imposed speed.
     #[inline]
     pub fn acceleration(&self, tau_e: f64, tau_shaft: f64, friction: f64) -> f64 {
         if self.imposed { 0.0 } else { (tau_e - tau_shaft - friction) / self.J }
@@ -56,7 +56,7 @@ impl Mechanics {
 
 type P = Row<Mechanics>;
 
-/// The mechanical variables; their owner gives the prefix `mechanics.`.
+/// Mechanical variables; their owner supplies the prefix `mechanics.`.
 pub const MECHANICS: &Table<Mechanics> = &Table::new(
     const {
         &[

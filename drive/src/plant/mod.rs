@@ -1,4 +1,4 @@
-//! The plant: machine, mechanics and inverter, and the model `PmsmPlant` made of them.
+//! The plant: machine, mechanics and inverter, and the model `PmsmPlant` built from them.
 
 pub mod inverter;
 pub mod legs;

@@ -14,13 +14,13 @@ use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-/// Longest step of the integration in s. At 4500 rpm of the reference motor a current is off by less than 1e-5 A.
+/// Longest integration step in s. At 4500 rpm of the reference motor, the current error is less than 1e-5 A.
 const LONGEST_SUBSTEP: f64 = 50e-6;
 
 /// Maximum number of substeps in one communication step: 500 s of simulated time.
 const MAX_SUBSTEPS: f64 = 1e7;
 
-/// What the integration advances: the state, and the energies of the step beside it.
+/// Integrated quantities: the state and the energies of the step.
 type Vector = SVector<f64, 7>;
 
 /// The state of machine and shaft.
@@ -35,7 +35,7 @@ struct State {
 }
 
 impl State {
-    /// With the energy that has passed in the step so far.
+    /// The state with the energy transferred so far in the step.
     fn to_vector(self, energy: &Energy) -> Vector {
         let Self { psi, speed, angle } = self;
         Vector::from([psi.d(), psi.q(), speed, angle, energy.r#in, energy.mech, energy.loss])
@@ -55,7 +55,7 @@ impl State {
 pub struct PmsmPlant {
     /// Inputs, held over a communication step.
     pub inputs: PlantInputs,
-    /// Parameters; a step never writes them.
+    /// Parameters; a step never changes them.
     pub parameters: PlantParameters,
     state: State,
     /// Means over the last step.
@@ -65,7 +65,7 @@ pub struct PmsmPlant {
 }
 
 impl PmsmPlant {
-    /// What stands against the currents.
+    /// Voltage drop of the inverter legs.
     #[inline]
     fn legs(&self) -> Legs {
         let PlantParameters { motor, inverter, .. } = &self.parameters;
@@ -82,9 +82,9 @@ impl PmsmPlant {
         (i, Phases::from_stator(axis.to_stator(i)))
     }
 
-    /// The state at the beginning of a step, and the energy of getting there: an imposed shaft is where the drive train
-    /// says. What differs from the angle that the last step ended with turns the rotor under the flux linkage of the
-    /// stator, which no jump changes; the magnetic field does work on the shaft then.
+    /// The state at the beginning of a step and the energy needed to reach it: an imposed shaft takes the angle of the
+    /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
+    /// linkage, which cannot jump; the magnetic field then does work on the shaft.
     #[inline]
     fn at_the_shaft(&self) -> (State, Energy) {
         let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
@@ -133,7 +133,7 @@ impl PmsmPlant {
         }
     }
 
-    /// The state without current, where the diodes block; the energy of what was left of it is lost.
+    /// The state without current, when the diodes block; the energy of the remaining current is lost.
     fn blocked(&self, x: &Vector, legs: &Legs) -> Option<Vector> {
         let PlantParameters { motor, saturation, .. } = &self.parameters;
         let State { psi, speed, angle } = State::from_vector(x);
@@ -175,7 +175,7 @@ impl Model for PmsmPlant {
         };
         self.state = State { psi: machine::flux(motor, Dq::ZERO), speed, angle };
         self.energy = Energy::default();
-        // No current yet: nothing but the shaft has a power.
+        // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
         let tau_shaft = mechanics.tau_shaft(0.0, self.inputs.tau_load, friction);
         self.powers = Powers { p_mech: tau_shaft * speed, p_loss: friction * speed, ..Powers::default() };
@@ -277,7 +277,7 @@ const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
 mod tests {
     use super::*;
 
-    /// The plant after 20 ms in steps of `h` with a voltage that jumps every 0.1 ms.
+    /// The plant after 20 ms in steps of `h`, with a voltage that jumps every 0.1 ms.
     fn after(h: f64, speed: f64) -> Block<PmsmPlant> {
         let mut block = Block::<PmsmPlant>::default();
         block.model.parameters.initial.speed = speed;

@@ -6,21 +6,22 @@
 //! p_in   = p_loss + p_mech + d/dt (magnetic energy + J speed^2 / 2)
 //! ```
 //!
-//! u_x is the voltage that the leg gives on average over a PWM period, after the hexagon and with what the dead time takes,
-//! or that of its diodes while the gates are off; switches and diodes lose nothing. The magnetic energy is
-//! 0.75 (L_d i_d^2 + L_q i_q^2) where nothing saturates. With an imposed speed tau_shaft is tau_e minus friction and the
-//! kinetic energy is the drive train's; otherwise tau_shaft is tau_load, and J stores the rest.
+//! u_x is the voltage that the leg supplies on average over a PWM period, after the hexagon limit and the dead-time
+//! loss, or the voltage of its diodes while the gates are off; switches and diodes are lossless. The magnetic energy is
+//! 0.75 (L_d i_d^2 + L_q i_q^2) without saturation. With an imposed speed, tau_shaft is tau_e minus friction and the
+//! kinetic energy belongs to the drive train; otherwise tau_shaft is tau_load, and J stores the rest.
 //!
-//! A voltage that is held while the rotor turns makes the power rise or fall within the step, so a value at an instant is no
-//! measure of the power: the outputs are means over the plant's last step, integrated beside the state by the same method,
-//! and `energy.in`, `energy.mech` and `energy.loss` are the sums of power and time. Before the first step the powers are those
-//! of the start. i_dc is defined without u_dc as well: a link of 0 V still sees the current of the legs that are connected to
-//! it; there it is the value at the end of the step.
+//! With a held voltage and a turning rotor, the power changes within the step, so an instantaneous value does not
+//! represent it. The outputs are therefore means over the plant's last step, integrated with the state by the same
+//! method, and `energy.in`, `energy.mech` and `energy.loss` are the time integrals of the powers. Before the first
+//! step, the powers are the initial values. i_dc is also defined for u_dc = 0 V: the link still carries the current of
+//! the legs connected to it; in this case it is the value at the end of the step.
 //!
-//! Two things move energy at an instant and count in the step in which they do: an imposed angle that jumps does the work of the
-//! magnetic field on the shaft, and what is left of the current when the diodes block is lost.
+//! Two events transfer energy instantly and count in the step in which they occur: a jump of the imposed angle, where
+//! the magnetic field does work on the shaft, and blocking diodes, where the energy of the remaining current is lost.
 //!
-//! Definitions; the balance is derived from the voltage equation of [`machine`](crate::plant::machine), and tested.
+//! These are definitions; the balance is derived from the voltage equation of [`machine`](crate::plant::machine) and
+//! tested.
 
 use crate::frame::Phases;
 use crate::plant::legs::Legs;
@@ -52,7 +53,7 @@ impl Powers {
         Self { i_dc, p_in, p_mech: energy.mech / h, p_loss: energy.loss / h }
     }
 
-    /// The mean of this one and `last`, which is to count for the share `share` (0..1).
+    /// The mean of this value and `last`, which has the weight `share` (0..1).
     #[inline]
     pub fn with(self, last: Self, share: f64) -> Self {
         let mean = |a: f64, b: f64| a + (b - a) * share;
@@ -69,12 +70,12 @@ impl Powers {
 fn link_current(inputs: &PlantInputs, legs: &Legs, i: Phases) -> f64 {
     let u = &inputs.u;
     let full = inputs.u_dc.max(u.span());
-    // Currents sum to zero, so that a common part of the voltages has no power.
+    // The currents sum to zero, so a common part of the voltages has no power.
     let apparent = if inputs.enable { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { 0.0 };
     if full > 0.0 { apparent / full - legs.feed(i) + 0.0 } else { 0.0 - legs.feed(i) }
 }
 
-/// Energy that passed, in J; motor sign, from the DC link to the load.
+/// Transferred energy in J; motor sign, from the DC link to the load.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energy {
     /// From the DC link.
@@ -86,7 +87,7 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// Counts what passed in a step.
+    /// Adds the energy transferred in a step.
     #[inline]
     pub fn add(&mut self, step: &Self) {
         self.r#in += step.r#in;
@@ -94,7 +95,7 @@ impl Energy {
         self.loss += step.loss;
     }
 
-    /// Whether all of them are numbers.
+    /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
         self.r#in.is_finite() && self.mech.is_finite() && self.loss.is_finite()
     }
@@ -102,7 +103,7 @@ impl Energy {
 
 type P = Row<Powers>;
 
-/// The powers' variables.
+/// Variables of the powers.
 pub const POWERS: &Table<Powers> = &Table::new(
     const {
         &[
@@ -136,7 +137,7 @@ pub const POWERS: &Table<Powers> = &Table::new(
 
 type E = Row<Energy>;
 
-/// The energies' variables; their owner gives the prefix `energy.`.
+/// Variables of the energies; their owner supplies the prefix `energy.`.
 pub const ENERGY: &Table<Energy> = &Table::new(
     const {
         &[

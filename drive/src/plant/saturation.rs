@@ -3,10 +3,12 @@
 //! With x = psi_d - psi_M: i_d = x / L_d + s_2 x^2 + s_3 x^3 + s_dq psi_q^2 / 2, i_q = psi_q / L_q + s_dq x psi_q.
 //! Both are derivatives of one energy, so no cycle yields energy: d i_d / d psi_q = d i_q / d psi_d = s_dq psi_q.
 //!
-//! s_2 > 0 distinguishes the magnet's poles: a positive d-axis current (x > 0) meets a smaller inductance than a negative one.
-//! Limits: a polynomial, good to about the flux at which d i_d / d psi_d = 1 / L_d + 2 s_2 x + 3 s_3 x^2 stays positive.
+//! s_2 > 0 distinguishes the magnet's poles: a positive d-axis current (x > 0) sees a smaller inductance than a
+//! negative one.
+//! Limits: the polynomial is usable about as long as d i_d / d psi_d = 1 / L_d + 2 s_2 x + 3 s_3 x^2 is positive.
 //!
-//! Neither paper saturates: a polynomial chosen here that has an energy. Flux linkages in Wb, s_2 and s_dq in A/Wb2, s_3 in A/Wb3.
+//! Neither paper includes saturation: this polynomial is chosen here because it has an energy. Flux linkages in Wb, s_2
+//! and s_dq in A/Wb2, s_3 in A/Wb3.
 
 use crate::frame::Dq;
 use crate::motor::Motor;
@@ -24,7 +26,7 @@ const fn per_weber(n: i8) -> Exponents {
     Exponents::mechanical(-n, -2 * n, 2 * n, 1 + n)
 }
 
-/// Parameters; all zero is the linear machine.
+/// Parameters; all zero gives the linear machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Saturation {
     /// Second-order d-axis coefficient in A/Wb2.
@@ -43,8 +45,8 @@ impl Saturation {
         Dq::new((self.s_2 + self.s_3 * x) * x * x + 0.5 * self.s_dq * q * q, self.s_dq * x * q)
     }
 
-    /// The least incremental inductance (H) of the machine at the flux linkage `psi` (Wb) over all directions:
-    /// 1 over the greatest eigenvalue of d i / d psi, which is symmetric.
+    /// The smallest incremental inductance (H) of the machine at the flux linkage `psi` (Wb) over all directions: 1
+    /// over the largest eigenvalue of d i / d psi, which is symmetric.
     pub fn least_inductance(&self, motor: &Motor, psi: Dq) -> f64 {
         let (x, q) = (psi.d() - motor.psi_M, psi.q());
         let by_d = 1.0 / motor.L_d + (2.0 * self.s_2 + 3.0 * self.s_3 * x) * x;
@@ -62,7 +64,7 @@ impl Saturation {
 
 type P = Row<Saturation>;
 
-/// The saturation's variables; their owner gives the prefix `saturation.`.
+/// Variables of the saturation; their owner supplies the prefix `saturation.`.
 pub const SATURATION: &Table<Saturation> = &Table::new(
     const {
         &[

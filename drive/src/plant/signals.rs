@@ -1,4 +1,4 @@
-//! What goes into the plant and what comes out of it.
+//! Inputs and outputs of the plant.
 
 use crate::frame::Phases;
 use crate::plant::power::{Energy, Powers};
@@ -11,13 +11,13 @@ pub struct PlantInputs {
     pub u: Phases,
     /// DC-link voltage in V, >= 0.
     pub u_dc: f64,
-    /// Load torque in N.m, positive against positive speed; not read with an imposed speed.
+    /// Load torque in N.m, positive against positive speed; ignored with an imposed speed.
     pub tau_load: f64,
     /// Imposed mechanical speed of the shaft in rad/s.
     pub speed_shaft: f64,
     /// Imposed mechanical angle of the shaft in rad, at the beginning of the step.
     pub angle_shaft: f64,
-    /// The gates switch; false: only the diodes conduct.
+    /// Whether the gates switch; false: only the diodes conduct.
     pub enable: bool,
 }
 

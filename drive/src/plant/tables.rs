@@ -25,7 +25,7 @@ pub struct PlantParameters {
     pub initial: Initial,
 }
 
-/// Where the rotor is and how fast it turns at the start.
+/// Initial position and speed of the rotor.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Initial {
     /// Electrical rotor angle in rad.
