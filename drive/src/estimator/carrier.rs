@@ -1,13 +1,14 @@
-//! The sinusoidal carrier of rotating and pulsating injection, and its filters.
+//! The sinusoidal carrier for rotating and pulsating injection, with its filters.
 //!
-//! Band-pass: H(z) = alpha (1 - z^-2) / (1 + alpha - 2 cos(phi) z^-1 + (1 - alpha) z^-2), phi = w_h T_s,
-//! alpha = zeta sin(phi); gain 1 and phase 0 at the carrier, beside it the phase turns by -1/alpha per radian. i - H i is
-//! the current that is controlled.
+//! Band-pass: H(z) = alpha (1 - z^-2) / (1 + alpha - 2 cos(phi) z^-1 + (1 - alpha) z^-2), phi = w_h T_s, alpha = zeta
+//! sin(phi). Its gain is 1 and its phase 0 at the carrier; near the carrier, the phase changes by -1/alpha per radian.
+//! The controlled current is i - H i.
 //!
-//! Low-pass behind the demodulation: the mean over one period of the carrier, zero at its multiples, where what is left
-//! of the fundamental and of the part without an angle comes to lie.
+//! Low-pass after the demodulation: the mean over one carrier period. It has zeros at the multiples of the carrier
+//! frequency, which removes the residual fundamental and the term that does not depend on the angle.
 //!
-//! For Kim & Sul 2011, eq (38) to (45), Figs. 7 and 9, which draw the filters as blocks: the transfer functions are derived here.
+//! Kim & Sul 2011, eq (38) to (45), Figs. 7 and 9, show the filters only as blocks: the transfer functions are derived
+//! here.
 //! w_h in rad/s, T_s in s.
 
 use crate::estimator::Context;
@@ -23,7 +24,7 @@ use std::f64::consts::TAU;
 pub struct CarrierParameters {
     /// Voltage V, > 0.
     pub voltage: f64,
-    /// Angular frequency w_h in rad/s, > 0; a period is a whole number of samples.
+    /// Angular frequency w_h in rad/s, > 0; one period must be a whole number of samples.
     pub frequency: f64,
     /// Damping zeta of the band-pass, > 0.
     pub zeta: f64,
@@ -40,10 +41,10 @@ const MIN_SAMPLES: usize = 6;
 /// Maximum samples per period.
 const MAX_SAMPLES: usize = 32;
 
-/// The carrier at a sample.
+/// The carrier at one sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Carrier {
-    /// V cos(phi k) of the command of this sample, in V.
+    /// V cos(phi k) of this sample's command, in V.
     pub cos: f64,
     /// V sin(phi k), in V.
     pub sin: f64,
@@ -51,9 +52,9 @@ pub struct Carrier {
     pub alpha: f64,
     /// cos(phi).
     cos_phi: f64,
-    /// Samples in a period.
+    /// Samples per period.
     samples: usize,
-    /// Place of this sample in a period, from 0.
+    /// Index of this sample within the period, from 0.
     place: usize,
 }
 
@@ -63,7 +64,7 @@ impl Carrier {
     pub fn at(context: &Context, k: u64) -> Self {
         let par = &context.par.carrier;
         let phi = par.frequency * context.T_s;
-        // A period is a whole number of samples: counted in integers, the phase never drifts.
+        // A period is a whole number of samples. Integer counting keeps the phase from drifting.
         let samples = samples(context).unwrap_or(MIN_SAMPLES);
         let place = usize::try_from(k % samples as u64).unwrap_or(0);
         let (sin_phi, cos_phi) = sin_cos(phi);
@@ -72,7 +73,7 @@ impl Carrier {
     }
 }
 
-/// Samples in a period of the carrier, when they are a whole number that the filters can do.
+/// Samples per carrier period, if this is a whole number that the filters support.
 #[inline]
 fn samples(context: &Context) -> Option<usize> {
     let exact = TAU / (context.par.carrier.frequency * context.T_s);
@@ -89,7 +90,7 @@ fn float(samples: usize) -> f64 {
     samples as f64
 }
 
-/// The band-pass of a vector.
+/// The band-pass for a vector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct BandPass<F> {
@@ -98,7 +99,7 @@ pub struct BandPass<F> {
 }
 
 impl<F> BandPass<F> {
-    /// After a long time at `x`.
+    /// The settled state for a constant input `x`.
     pub fn start(x: Vector<F>) -> Self {
         Self { x: [x; 2], y: [Vector::ZERO; 2] }
     }
@@ -115,14 +116,14 @@ impl<F> BandPass<F> {
     }
 }
 
-/// The mean over a period of the carrier.
+/// The mean over one carrier period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PeriodMean {
     x: [f64; MAX_SAMPLES],
 }
 
 impl PeriodMean {
-    /// The mean with the value `x` of this sample.
+    /// The mean, including this sample's value `x`.
     #[inline]
     pub fn update(&mut self, carrier: &Carrier, x: f64) -> f64 {
         self.x[carrier.place] = x;
@@ -130,10 +131,10 @@ impl PeriodMean {
     }
 }
 
-/// Whether the carrier fits the sample period.
+/// Checks that the carrier fits the sample period.
 ///
 /// # Errors
-/// A period is not a whole number of samples, or one of too few or too many.
+/// The period is not a whole number of samples, or it has too few or too many samples.
 pub fn validate(context: &Context) -> Result<(), Fault> {
     if samples(context).is_some() {
         return Ok(());
@@ -149,7 +150,7 @@ pub fn validate(context: &Context) -> Result<(), Fault> {
 
 type P = Row<CarrierParameters>;
 
-/// The variables; their owner gives the prefix `carrier.`.
+/// The variables; their owner adds the prefix `carrier.`.
 pub const CARRIER: &Table<CarrierParameters> = &Table::new(
     const {
         &[

@@ -1,13 +1,15 @@
-//! The current model (Kim & Sul (28)-(30), Fig. 5, after Matsui 1993): 5 of the review.
+//! The current model (Kim & Sul (28)-(30), Fig. 5, after Matsui 1993): method 5 of the review.
 //!
-//! One step from the measured current of the last sample, with the estimated speed in a right frame,
-//! i_dM = i_d + T_s / L_d (v_d - R i_d + w L_q i_q + (w_f - w) L_d i_q), i_qM = i_q + T_s / L_q (v_q - R i_q - w L_d i_d -
-//! (w_f - w) L_q i_d - w psi_M). What the machine does otherwise, `di = i[k] - i_M`, is the speed error on q and the angle
-//! error on d: di_d = psi_M T_s w sin theta~ / L_d, di_q = psi_M T_s (w - w_r cos theta~) / L_q. The speed is drawn through a
-//! low-pass, the angle as in the voltage model ([`follower`](crate::estimator::follower)).
-//! Corrected print: in (30) the q row is psi_M T_s (w^ - w_r cos theta~) / L_q, the speed error within the fraction.
+//! The model predicts one step from the measured current of the last sample. It uses the estimated speed and assumes a
+//! correctly aligned frame: i_dM = i_d + T_s / L_d (v_d - R i_d + w L_q i_q + (w_f - w) L_d i_q), i_qM = i_q + T_s /
+//! L_q (v_q - R i_q - w L_d i_d - (w_f - w) L_q i_d - w psi_M). The deviation `di = i[k] - i_M` shows the speed error
+//! on the q-axis and the angle error on the d-axis: di_d = psi_M T_s w sin theta~ / L_d, di_q = psi_M T_s (w - w_r cos
+//! theta~) / L_q. A low-pass smooths the speed; the angle is corrected as in the voltage model
+//! ([`follower`](crate::estimator::follower)).
+//! Correction to the paper: the q row of (30) is psi_M T_s (w^ - w_r cos theta~) / L_q, with the speed error in the
+//! fraction.
 //!
-//! Limits: those of the voltage model: the two differ in form, not in content.
+//! Limits: the same as for the voltage model, because the two models are equivalent and differ only in form.
 
 use crate::estimator::emf::pole;
 use crate::estimator::follower::Follower;
@@ -15,7 +17,7 @@ use crate::estimator::interval::Interval;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
 use serde::{Deserialize, Serialize};
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CurrentModel {
     follower: Follower,

@@ -1,12 +1,12 @@
-//! The back EMF calculated from the voltage equation (Kim & Sul (11)-(13)): 1 of the review.
+//! The back EMF calculated from the voltage equation (Kim & Sul (11)-(13)): method 1 of the review.
 //!
-//! The currents taken as constant: e_d = v_d - R i_d + w L_q i_q + (w_f - w) L_d i_q,
-//! e_q = v_q - R i_q - w L_d i_d - (w_f - w) L_q i_d, a low-pass of first order on both (`emf.bandwidth`), and
-//! (e_d, e_q) = w psi_M (-sin theta~, cos theta~) gives theta~ = atan2(-s e_d, s e_q) to a tracker.
-//! Corrected print: (11) has w_r where it prints the estimate.
+//! The method assumes constant currents: e_d = v_d - R i_d + w L_q i_q + (w_f - w) L_d i_q, e_q = v_q - R i_q - w L_d
+//! i_d - (w_f - w) L_q i_d. A first-order low-pass filters both (`emf.bandwidth`). From (e_d, e_q) = w psi_M (-sin
+//! theta~, cos theta~), a tracker receives theta~ = atan2(-s e_d, s e_q).
+//! Correction to the paper: (11) contains w_r, not the printed speed estimate.
 //!
-//! Limits: L p i is in the EMF: noise of the current loop's voltage and each change of load. Rated load is held from 0.1 of
-//! the rated speed. A reversal at light load is ambiguous by half a turn.
+//! Limits: the calculated EMF includes L p i, and therefore the current loop's voltage noise and each load change. The
+//! method holds rated load from 0.1 of the rated speed. A reversal at light load is ambiguous by half a turn.
 
 use crate::estimator::emf::{self, Direction, pole};
 use crate::estimator::interval::Interval;
@@ -16,7 +16,7 @@ use crate::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DirectEmf {
     tracker: Tracker,

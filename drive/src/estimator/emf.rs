@@ -1,16 +1,16 @@
-//! What the estimators on the magnet's EMF share: parameters, the observer of one axis, the sign of the direction.
+//! Shared parts of the back-EMF estimators: parameters, the observer of one axis, the sign of the direction.
 //!
-//! In the estimated frame, which turns at w_f, every voltage equation of a row is v = R i + L p i + cross + e. The part
-//! that is known gives r = v - R i - cross, and what is left, e = r - L p i, holds the angle: (e_d, e_q) =
-//! E (-sin theta~, cos theta~) with theta~ = theta - theta^ and E of the sign of w.
+//! In the estimated frame, which turns at w_f, each axis has the voltage equation v = R i + L p i + cross + e. The
+//! known terms give r = v - R i - cross. The remainder, e = r - L p i, contains the angle: (e_d, e_q) = E (-sin theta~,
+//! cos theta~) with theta~ = theta - theta^, where E has the sign of w.
 //!
-//! [`AxisObserver`] is Kim & Sul (14), (15) and (21) for one axis with the corrections of the print: the innovation is
-//! i - i^ with the MEASURED i, the gain on the EMF is negative (continuous: l_1 = 2 w_o - R/L, l_2 = -w_o^2 L), and R i
-//! and the cross terms take the measured current, so that no speed moves the poles. Sampled, with both poles at
-//! z = exp(-w_o T_s): i' = i^ + T_s / L (r - e^), i^ = i' + (1 - z^2)(i - i'), e^ = e^ - (1 - z)^2 L / T_s (i - i').
+//! [`AxisObserver`] is Kim & Sul (14), (15) and (21) for one axis with corrections: the innovation is i - i^ with the
+//! MEASURED i, the EMF gain is negative (continuous: l_1 = 2 w_o - R/L, l_2 = -w_o^2 L), and R i and the cross terms
+//! use the measured current, so that the poles do not depend on the speed. Sampled, with both poles at z = exp(-w_o
+//! T_s): i' = i^ + T_s / L (r - e^), i^ = i' + (1 - z^2)(i - i'), e^ = e^ - (1 - z)^2 L / T_s (i - i').
 //!
-//! The paper drops (w_f - w) L i in (18). With it dropped a zero in the right half plane at about E / (L_d i_q) appears
-//! when motoring, and rated load is lost below 0.21-0.25 of the rated speed: `frame_term` keeps it.
+//! The paper neglects (w_f - w) L i in (18). Without this term, motoring produces a right-half-plane zero at about E /
+//! (L_d i_q), and the drive cannot hold rated load below 0.21-0.25 of the rated speed: `frame_term` keeps the term.
 
 use crate::estimator::Context;
 use crate::estimator::interval::Interval;
@@ -23,11 +23,11 @@ use std::f64::consts::TAU;
 /// The parameters with the prefix `emf.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EmfParameters {
-    /// Bandwidth of the EMF in rad/s, > 0: both poles of the observers, the pole of the filter of the direct EMF.
+    /// EMF bandwidth in rad/s, > 0: both poles of the observers, and the pole of the direct-EMF filter.
     pub bandwidth: f64,
-    /// Electrical speed in rad/s, > 0, that the estimate must reach on the other side to change the direction.
+    /// Electrical speed in rad/s, > 0, that the estimate must reach in the opposite direction to change the sign.
     pub w_sign: f64,
-    /// Keep the term of the frame's speed.
+    /// Keeps the frame-speed term.
     pub frame_term: bool,
 }
 
@@ -38,7 +38,7 @@ impl Default for EmfParameters {
 }
 
 impl EmfParameters {
-    /// Speed of the frame beyond the speed `w` (rad/s), or 0 where the term is dropped.
+    /// Frame speed minus the speed `w` (rad/s), or 0 if the term is neglected.
     #[inline]
     pub fn slip(&self, interval: &Interval, w: f64) -> f64 {
         if self.frame_term { interval.w_frame - w } else { 0.0 }
@@ -61,7 +61,7 @@ impl Direction {
         Self(if w < 0.0 { -1.0 } else { 1.0 })
     }
 
-    /// The sign once the speed is `w` (rad/s): it changes where `w` passes `w_sign` on the other side.
+    /// The sign for the speed `w` (rad/s): it changes when `w` passes `w_sign` in the opposite direction.
     #[inline]
     pub fn update(&mut self, w: f64, w_sign: f64) -> f64 {
         if w * self.0 < -w_sign {
@@ -71,13 +71,13 @@ impl Direction {
     }
 }
 
-/// The angle error theta - theta^ in rad that the EMF (`e_d`, `e_q`) (V) shows in a direction of rotation with the sign `s`.
+/// The angle error theta - theta^ in rad from the EMF (`e_d`, `e_q`) (V), for the direction sign `s`.
 #[inline]
 pub fn angle_error(s: f64, e_d: f64, e_q: f64) -> f64 {
     atan2(-s * e_d, s * e_q)
 }
 
-/// Observer of current and EMF of one axis.
+/// Observer for the current and EMF of one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AxisObserver {
     i: f64,
@@ -90,8 +90,8 @@ impl AxisObserver {
         Self { i, e }
     }
 
-    /// The EMF in V from `r` (V), the voltage without R i and cross terms, the current `i` (A) at the interval's end, and
-    /// the inductance `L` (H); pole `z` = exp(-w_o T_s).
+    /// The EMF in V. Inputs: the voltage `r` (V) without R i and cross terms, the current `i` (A) at the end of the
+    /// interval, and the inductance `L` (H); the pole is `z` = exp(-w_o T_s).
     #[inline]
     pub fn update(&mut self, z: f64, L: f64, T_s: f64, r: f64, i: f64) -> f64 {
         let predicted = self.i + T_s / L * (r - self.e);
@@ -102,10 +102,10 @@ impl AxisObserver {
     }
 }
 
-/// A tracker needs a third of the bandwidth of the EMF behind which it works.
+/// Checks that the tracker's bandwidth is at most one third of the EMF bandwidth.
 ///
 /// # Errors
-/// Says by how much it is too fast.
+/// States by how much the tracker is too fast.
 pub fn validate(context: &Context) -> Result<(), Fault> {
     let (rho, w_o) = (context.par.tracker.bandwidth, context.par.emf.bandwidth);
     if rho > w_o / 3.0 * (1.0 + 1e-9) {
@@ -116,7 +116,7 @@ pub fn validate(context: &Context) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Pole of a sampled first-order system of the bandwidth `w` (rad/s).
+/// Pole of a sampled first-order system with the bandwidth `w` (rad/s).
 #[inline]
 pub fn pole(w: f64, T_s: f64) -> f64 {
     exp(-w * T_s)
@@ -124,7 +124,7 @@ pub fn pole(w: f64, T_s: f64) -> f64 {
 
 type P = Row<EmfParameters>;
 
-/// The variables; their owner gives the prefix `emf.`.
+/// The variables; their owner adds the prefix `emf.`.
 pub const EMF: &Table<EmfParameters> = &Table::new(
     const {
         &[

@@ -1,11 +1,13 @@
-//! State observer of the back EMF (Kim & Sul (14), (15), after Son et al. 2002): 2 of the review.
+//! State observer for the back EMF (Kim & Sul (14), (15), after Son et al. 2002): method 2 of the review.
 //!
-//! As the extended EMF, with L_d on the d axis and L_q on the q axis:
+//! This is the extended-EMF observer, but with L_d on the d-axis and L_q on the q-axis:
 //! v_d = R i_d + L_d p i_d - w L_q i_q - (w_f - w) L_d i_q + e_d, v_q = R i_q + L_q p i_q + w L_d i_d + (w_f - w) L_q i_d + e_q,
-//! and (e_d, e_q) = w psi_M (-sin theta~, cos theta~) to first order in theta~ and with constant currents (11).
-//! Corrected print: in (14) the EMF columns have -1/L_d and -1/L_q, the input is (v_ds, v_qs); (11) has w_r.
+//! The relation (e_d, e_q) = w psi_M (-sin theta~, cos theta~) holds to first order in theta~ for constant currents
+//! (11).
+//! Correction to the paper: in (14) the EMF columns have -1/L_d and -1/L_q, and the input is (v_ds, v_qs); (11) has
+//! w_r.
 //!
-//! Limits: those of the extended EMF; at great angle errors the neglected saliency slows it down.
+//! Limits: those of the extended EMF; for large angle errors, the neglected saliency slows convergence.
 
 use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
@@ -14,7 +16,7 @@ use crate::estimator::{Context, Estimate, Estimating, Sample};
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EmfObserver {
     tracker: Tracker,

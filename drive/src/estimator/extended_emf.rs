@@ -1,13 +1,14 @@
-//! Observer of the extended EMF (Kim & Sul (16)-(23), after Morimoto et al. 2002): 3 of the review.
+//! Observer for the extended EMF (Kim & Sul (16)-(23), after Morimoto et al. 2002): method 3 of the review.
 //!
-//! All saliency is in the EMF: with L_d on both axes and w L_q in both cross terms,
+//! The EMF contains all of the saliency: with L_d on both axes and w L_q in both cross terms,
 //! v_d = R i_d + L_d p i_d - w L_q i_q - (w_f - w) L_d i_q + e_d, v_q = R i_q + L_d p i_q + w L_q i_d + (w_f - w) L_d i_d + e_q,
 //! (e_d, e_q) = E_ex (-sin theta~, cos theta~), E_ex = w ((L_d - L_q) i_d + psi_M) - (L_d - L_q) p i_q, exactly.
-//! One observer per axis ([`emf`]), theta~ = atan2(-s e_d, s e_q) with s the sign of w, then a
-//! tracker. Corrected print: (19) and (21) have the measured current in the innovation; (20) is missing.
+//! Each axis has one observer ([`emf`]). A tracker receives theta~ = atan2(-s e_d, s e_q), where s is the sign of w.
+//! Correction to the paper: (19) and (21) use the measured current in the innovation; (20) is missing.
 //!
-//! Limits: no EMF, no angle: rated load is held from 0.03 of the rated speed with an ideal inverter, 0.05 with a
-//! compensated one; a reversal at light load is ambiguous by half a turn. L_q + 20 % at rated load turns by 5.8 deg.
+//! Limits: the angle requires an EMF. The method holds rated load from 0.03 of the rated speed with an ideal inverter,
+//! 0.05 with a compensated one; a reversal at light load is ambiguous by half a turn. L_q + 20 % at rated load shifts
+//! the angle by 5.8 deg.
 
 use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
@@ -16,7 +17,7 @@ use crate::estimator::{Context, Estimate, Estimating, Sample};
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
-/// The observer of both axes: angle errors from intervals, in a frame that someone else turns.
+/// The observer for both axes: it gives one angle error per interval; the caller turns the frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ExtendedEmfObserver {
     d: AxisObserver,
@@ -25,7 +26,7 @@ pub struct ExtendedEmfObserver {
 }
 
 impl ExtendedEmfObserver {
-    /// At the electrical speed `w` (rad/s) in a right frame, with the currents of `now`.
+    /// At the electrical speed `w` (rad/s) in a correctly aligned frame, with the currents of `now`.
     pub fn start(context: &Context, now: &Interval, w: f64) -> Self {
         let motor = context.motor;
         let e_q = w * (motor.psi_M + (motor.L_d - motor.L_q) * now.i_now.d());
@@ -50,7 +51,7 @@ impl ExtendedEmfObserver {
     }
 }
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ExtendedEmf {
     tracker: Tracker,

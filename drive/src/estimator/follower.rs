@@ -1,8 +1,8 @@
-//! What voltage model and current model share: parameters, and the frame that turns at a calculated speed.
+//! Shared parts of the voltage model and the current model: parameters, and the frame that turns at a calculated speed.
 //!
-//! The speed comes from the q row, smoothed by a low-pass; the angle follows it and is drawn by the d row's error e:
-//! theta' = w + x + rho e, x' = rho^2/4 e. Without the integral x a bias of the speed becomes an angle error bias / rho:
-//! L_q + 20 % then loses the drive at half the rated speed. Both poles of the angle are at -rho/2.
+//! The speed comes from the q row, smoothed by a low-pass. The angle integrates it, corrected by the d row's error e:
+//! theta' = w + x + rho e, x' = rho^2/4 e. Without the integral x, a speed bias becomes an angle error bias / rho: with
+//! L_q + 20 %, the drive then loses synchronism at half the rated speed. Both angle poles are at -rho/2.
 
 use crate::estimator::Context;
 use crate::estimator::emf::Direction;
@@ -11,17 +11,17 @@ use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Greatest angle error in rad that is passed on.
+/// Largest angle error in rad that is passed on.
 const CLIP: f64 = 0.5;
 
 /// The parameters with the prefix `matsui.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MatsuiParameters {
-    /// Gain rho of the angle in rad/s, > 0.
+    /// Angle gain rho in rad/s, > 0.
     pub bandwidth: f64,
-    /// Bandwidth of the speed's low-pass in rad/s, > 0.
+    /// Bandwidth of the speed low-pass in rad/s, > 0.
     pub filter: f64,
-    /// With the integral.
+    /// Uses the integral.
     pub integral: bool,
 }
 
@@ -38,11 +38,11 @@ pub struct Follower {
     pub theta: f64,
     /// Electrical angle at the last sample in rad.
     pub theta_last: f64,
-    /// Smoothed speed of the q row in rad/s.
+    /// Smoothed speed from the q row in rad/s.
     pub w: f64,
-    /// Integral of the angle error in rad/s: what w lacks.
+    /// Integral of the angle error in rad/s: the correction to w.
     pub x: f64,
-    /// Speed of the frame to the next sample in rad/s.
+    /// Frame speed until the next sample in rad/s.
     w_frame: f64,
     direction: Direction,
 }
@@ -53,7 +53,7 @@ impl Follower {
         Self { theta, theta_last: theta - T_s * w, w, x: 0.0, w_frame: w, direction: Direction::of(w) }
     }
 
-    /// To the next sample: first thing in an update.
+    /// Advances to the next sample; each update calls this first.
     #[inline]
     pub fn advance(&mut self, T_s: f64) {
         self.theta_last = self.theta;
@@ -66,7 +66,7 @@ impl Follower {
         self.w + self.x
     }
 
-    /// Corrects by the voltage -w psi_M sin theta~ (V) that the d row shows.
+    /// Corrects the state with the voltage -w psi_M sin theta~ (V) from the d row.
     #[inline]
     pub fn correct(&mut self, context: &Context, e_d: f64) {
         let par = &context.par.matsui;
@@ -82,7 +82,7 @@ impl Follower {
 
 type P = Row<MatsuiParameters>;
 
-/// The variables; their owner gives the prefix `matsui.`.
+/// The variables; their owner adds the prefix `matsui.`.
 pub const MATSUI: &Table<MatsuiParameters> = &Table::new(
     const {
         &[

@@ -1,13 +1,13 @@
-//! Hybrid: square-wave injection at low speed, extended EMF above it; 12 of the review (Kim & Sul 2011, IV).
+//! Hybrid: square-wave injection at low speed, extended EMF above it; method 12 of the review (Kim & Sul 2011, IV).
 //!
-//! e = (1 - h) e_injection + h e_EMF, h = (|w^| - w_low) / (w_high - w_low) within [0, 1], of
-//! [`square_wave`](crate::estimator::square_wave) and [`extended_emf`](crate::estimator::extended_emf); one tracker, whose
-//! pole goes from `tracker.bandwidth` to `hybrid.bandwidth` with h. Both observers see every sample, so neither has to
-//! settle at the change; at h = 1 nothing is injected, and at h = 0 the EMF may be as wrong as it likes. The EMF observer
-//! sees the carrier in voltage and current alike.
+//! The angle error is e = (1 - h) e_injection + h e_EMF, with h = (|w^| - w_low) / (w_high - w_low) limited to [0, 1].
+//! [`square_wave`](crate::estimator::square_wave) and [`extended_emf`](crate::estimator::extended_emf) supply the two
+//! errors. One tracker follows e; its pole changes with h from `tracker.bandwidth` to `hybrid.bandwidth`. Both
+//! observers process every sample, so neither has to settle at the transition. At h = 1 the hybrid injects nothing; at
+//! h = 0 it ignores the EMF. The EMF observer sees the carrier in both voltage and current.
 //!
-//! Speed of change: 0.1 and 0.2 of the rated speed; the injection lacks voltage above, the EMF below.
-//! Limits: those of either where it rules; a machine without saliency needs another low-speed method.
+//! Transition speeds: 0.1 and 0.2 of the rated speed; above them the injection lacks voltage, below them the EMF is too
+//! small. Limits: those of the active method; a machine without saliency needs another low-speed method.
 
 use crate::estimator::extended_emf::ExtendedEmfObserver;
 use crate::estimator::interval::Interval;
@@ -23,11 +23,11 @@ use std::f64::consts::TAU;
 /// The parameters with the prefix `hybrid.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HybridParameters {
-    /// Electrical speed in rad/s up to which only the injection counts, >= 0.
+    /// Electrical speed in rad/s up to which only the injection is used, >= 0.
     pub w_low: f64,
-    /// Electrical speed in rad/s from which only the EMF counts, > w_low.
+    /// Electrical speed in rad/s from which only the EMF is used, > w_low.
     pub w_high: f64,
-    /// Pole of the tracker in rad/s where only the EMF counts, > 0.
+    /// Tracker pole in rad/s where only the EMF is used, > 0.
     pub bandwidth: f64,
 }
 
@@ -46,7 +46,7 @@ impl HybridParameters {
     }
 }
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hybrid {
     tracker: Tracker,
@@ -101,7 +101,7 @@ impl Estimating for Hybrid {
 
 type P = Row<HybridParameters>;
 
-/// The variables; their owner gives the prefix `hybrid.`.
+/// The variables; their owner adds the prefix `hybrid.`.
 pub const HYBRID: &Table<HybridParameters> = &Table::new(
     const {
         &[
@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn finds_the_rotor_at_standstill_and_at_speed() {
         let mut par = EstimatorParameters::default();
-        // The bench of the injections has no EMF: only the injection counts there.
+        // The injection test bench has no EMF: only the injection is used there.
         (par.hybrid.w_low, par.hybrid.w_high) = (1e3, 2e3);
         finds_the_rotor::<Hybrid>(&par, 0.05);
         comes_to_the_rotor::<Hybrid>(100.0);

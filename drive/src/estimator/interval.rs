@@ -1,7 +1,8 @@
-//! The last sample interval [k - 1, k) seen from a turning frame: what the estimators in the estimated rotor frame share.
+//! The last sample interval [k - 1, k) in a turning frame, shared by the estimators in the estimated rotor frame.
 //!
-//! The voltage was held in stator axes, so its mean in the frame is the one seen from the middle of the interval; R i and
-//! the cross terms take the mean of the two currents. With these the EMF has no bias of first order in T_s.
+//! The inverter holds the voltage constant in stator axes, so its mean in the frame is its value seen from the middle
+//! of the interval. R i and the cross terms use the mean of the two currents. The EMF then has no first-order bias in
+//! T_s.
 
 use crate::estimator::Sample;
 use crate::frame::{Axis, DqHat, Estimated};
@@ -17,12 +18,12 @@ pub struct Interval {
     pub i_last: DqHat,
     /// Current at sample k in A.
     pub i_now: DqHat,
-    /// Speed of the frame in rad/s.
+    /// Frame speed in rad/s.
     pub w_frame: f64,
 }
 
 impl Interval {
-    /// The interval before `sample`, in the frame that turned from `theta_last` to `theta` (rad) in `T_s` (s).
+    /// The interval before `sample`, in the frame that turned from `theta_last` to `theta` (rad) within `T_s` (s).
     #[inline]
     pub fn new(theta_last: f64, theta: f64, sample: &Sample, T_s: f64) -> Self {
         let middle = Axis::<Estimated>::at(0.5 * (theta_last + theta));

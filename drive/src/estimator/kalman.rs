@@ -1,7 +1,8 @@
-//! Extended Kalman filter on stator flux, speed and angle: named in section II.A of Kim & Sul, here from first principles.
+//! Extended Kalman filter for stator flux, speed and angle: Kim & Sul name it in section II.A; derived here.
 //!
-//! State x = (psi_d, psi_q, w, theta), the flux in the rotor frame. With the flux instead of the current nothing of the
-//! saliency is in the prediction, which is exact for a voltage held in stator axes:
+//! The state is x = (psi_d, psi_q, w, theta), with the flux in the rotor frame. Because the state holds the flux
+//! instead of the current, the prediction does not depend on the saliency. It is exact for a voltage held in stator
+//! axes:
 //!
 //! ```text
 //! psi[k]   = e^{-j theta[k]} (e^{j theta[k-1]} psi[k-1] + T_s (u - R (i[k-1] + i[k]) / 2))
@@ -10,30 +11,31 @@
 //! ```
 //!
 //! The measurement is the current, i = e^{j theta} L^-1 (psi - psi_M), L = diag(L_d, L_q);
-//! the innovation is seen from the estimated frame, r = e^{-j theta^} i - L^-1 (psi^ - psi_M).
+//! the innovation, seen from the estimated frame, is r = e^{-j theta^} i - L^-1 (psi^ - psi_M).
 //!
-//! The rotor frame matters: there flux and angle share the measurement by the constants 1/L and the current alone. With the
-//! flux in stator axes, as is common, the direction in which the measurement says nothing turns with the noise of theta^,
-//! the filter takes noise for knowledge, and the angle is off by 0.18 deg at 0.1 of the rated speed with 10 mA of noise,
+//! The rotor frame is essential: in it, only the constants 1/L and the current divide the measurement between flux and
+//! angle. With the usual flux in stator axes, the unobservable direction turns with the noise of theta^. The filter
+//! then mistakes noise for information, and the angle error is 0.18 deg at 0.1 of the rated speed with 10 mA of noise,
 //! fifteen times as much as here.
 //!
-//! Noise as spectral densities, so that the filter is the same at every T_s: of the voltage S_d on the d axis and S_q on the
-//! q axis, of the acceleration S_a, of the current S_i. The EMF then shows the angle with the density S_d / (w psi_M)^2 and,
-//! on the q axis, the speed with S_q / psi_M^2. Where the angle rules (S_q >> S_d) the poles are those of a PLL with
-//! w_0^2 = |w| psi_M sqrt(S_a / S_d) and the damping 1/sqrt(2): a bandwidth that grows with the root of the speed.
+//! The noise is given as spectral densities, so that the filter is the same at every T_s: voltage S_d on the d-axis and
+//! S_q on the q-axis, acceleration S_a, current S_i. The EMF then shows the angle with the density S_d / (w psi_M)^2
+//! and, on the q-axis, the speed with S_q / psi_M^2. Where the angle information dominates (S_q >> S_d), the poles are
+//! those of a PLL with w_0^2 = |w| psi_M sqrt(S_a / S_d) and the damping 1/sqrt(2): the bandwidth grows with the square
+//! root of the speed.
 //!
-//! The rule of [`KalmanParameters::new`]: S_i = sigma^2 T_s of the sensors; S_d = (1 V)^2 1 ms, what a good inverter
-//! leaves; S_q = 1000 S_d, since errors of R, psi_M and dead time lie along the current and the EMF and must not turn the
-//! angle (with S_q = 100 S_d an R + 20 % at 0.1 of the rated speed turns by 1.5 deg instead of 1.3); S_a so that w_0 is the
-//! bandwidth asked for at one speed: 2 pi 20 rad/s at 0.05 of the rated speed.
+//! [`KalmanParameters::new`] sets S_i = sigma^2 T_s from the sensors and S_d = (1 V)^2 1 ms, the residual error of a
+//! good inverter. It sets S_q = 1000 S_d, because errors of R, psi_M and dead time lie along the current and the EMF
+//! and must not shift the angle (with S_q = 100 S_d, R + 20 % at 0.1 of the rated speed shifts it by 1.5 deg instead of
+//! 1.3). S_a sets w_0 to the requested bandwidth at one speed: 2 pi 20 rad/s at 0.05 of the rated speed.
 //!
-//! The covariance is updated in Joseph's form and kept symmetric. At standstill nothing shows the angle and its variance
-//! would grow without end: above (1 rad)^2 it is scaled back, with its covariances.
+//! The covariance update uses Joseph's form and keeps the matrix symmetric. At standstill the angle is unobservable and
+//! its variance would grow without bound: above (1 rad)^2 the filter scales it back, together with its covariances.
 //!
-//! A filter that was led astray can leave every measure. No voltage moves the flux by psi_M within one sample: where the
-//! innovation says so, it starts again at its angle.
+//! A filter with a wrong state can diverge. No voltage changes the flux by psi_M within one sample: if the innovation
+//! implies such a change, the filter restarts at its current angle.
 //!
-//! Limits: no EMF, no angle. Of errors in the machine's values those of L_q turn it as they turn every method on the EMF.
+//! Limits: the angle requires an EMF. An error in L_q shifts the angle as it does in every back-EMF method.
 
 use crate::estimator::{Context, Estimate, Estimating, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
@@ -56,7 +58,7 @@ const RAD2_PER_S3: Quantity =
 const MAX_VARIANCE: f64 = 1.0;
 /// Standard deviation of the angle at the start in rad.
 const THETA_DEVIATION: f64 = 0.3;
-/// Time in s over which the speed may have wandered at the start.
+/// Assumed time in s of random speed drift before the start.
 const WANDERING_TIME: f64 = 0.05;
 
 /// Parameters: spectral densities.
@@ -80,8 +82,8 @@ impl Default for KalmanParameters {
 }
 
 impl KalmanParameters {
-    /// By the natural frequency `w_0` (rad/s) of the filter at the electrical speed `w` (rad/s) of a machine with the
-    /// magnet's flux `psi_M` (Wb), for sensors with the standard deviation `sigma` (A) at each sample of `T_s` (s).
+    /// Inputs: the filter's natural frequency `w_0` (rad/s) at the electrical speed `w` (rad/s), the permanent-magnet
+    /// flux linkage `psi_M` (Wb), and the sensors' standard deviation `sigma` (A) at each sample of `T_s` (s).
     pub fn new(psi_M: f64, w_0: f64, w: f64, sigma: f64, T_s: f64) -> Self {
         let voltage_d = 1e-3;
         let ratio = w_0 * w_0 / (w * psi_M);
@@ -108,7 +110,7 @@ pub struct Kalman {
 }
 
 impl Kalman {
-    /// The Jacobian of the prediction that gave `self`, where the flux gained `gain` (Wb) in the new frame.
+    /// The Jacobian of the prediction that gave `self`, where `gain` (Wb) is the flux change in the new frame.
     #[inline]
     fn F(&self, gain: DqHat, T_s: f64) -> Matrix4<f64> {
         let (sin, cos) = sin_cos(T_s * self.w);
@@ -122,7 +124,7 @@ impl Kalman {
         F
     }
 
-    /// To the next sample by the model; gives its Jacobian.
+    /// Advances to the next sample with the model; returns the Jacobian.
     #[inline]
     fn predict(&mut self, motor: &Motor, sample: &Sample, T_s: f64) -> Matrix4<f64> {
         let gain = (sample.u - (sample.i_last + sample.i) * (0.5 * motor.R_s)) * T_s;
@@ -148,7 +150,7 @@ impl Kalman {
         }
     }
 
-    /// The current in A of the flux, in the rotor frame, and its Jacobian in a frame that stays.
+    /// The current in A from the flux, in the rotor frame, and its Jacobian in a stationary frame.
     #[inline]
     fn current(&self, motor: &Motor) -> (DqHat, Matrix2x4<f64>) {
         let (g_d, g_q) = (1.0 / motor.L_d, 1.0 / motor.L_q);
@@ -156,7 +158,7 @@ impl Kalman {
         (i, Matrix2x4::new(g_d, 0.0, 0.0, -i.q(), 0.0, g_q, 0.0, i.d()))
     }
 
-    /// Corrects by the measured current; gives the innovation in A.
+    /// Corrects the state with the measured current; returns the innovation in A.
     #[inline]
     fn correct(&mut self, motor: &Motor, i: AlphaBeta, variance: f64) -> DqHat {
         let (i_hat, H) = self.current(motor);
@@ -178,12 +180,12 @@ impl Kalman {
 }
 
 impl Estimating for Kalman {
-    /// The flux is known to within the noise of the current sensors; angle and speed are uncertain.
+    /// The flux is uncertain only by the noise of the current sensors; angle and speed are uncertain.
     fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let Context { motor, par, T_s, .. } = *context;
         let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
         let psi = DqHat::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q());
-        // By the angle at the measured current: -j i turned into flux.
+        // Flux derivative with respect to the angle at the measured current: -j i converted to flux.
         let v = Vector4::new(motor.L_d * i.q(), -motor.L_q * i.d(), 0.0, 1.0) * THETA_DEVIATION;
         let flux = par.kalman.current / T_s;
         let own = Vector4::new(
@@ -211,7 +213,7 @@ impl Estimating for Kalman {
 
 type P = Row<KalmanParameters>;
 
-/// The filter's variables; their owner gives the prefix `kalman.`.
+/// The filter's variables; their owner adds the prefix `kalman.`.
 pub const KALMAN: &Table<KalmanParameters> = &Table::new(
     const {
         &[
@@ -272,7 +274,7 @@ mod tests {
         }
     }
 
-    /// A filter in some state of the machine.
+    /// A filter in an arbitrary state of the machine.
     fn at(k: u32) -> Kalman {
         let wave = |rate: f64, size: f64| size * (rate * f64::from(k) + 0.3).sin();
         let (motor, i) = (salient(), Dq::new(wave(0.7, 8.0), wave(1.3, 9.0)));
@@ -290,7 +292,7 @@ mod tests {
         }
     }
 
-    /// Derivative by component `k` of the state, by central differences of `f`.
+    /// Derivative with respect to component `k` of the state, by central differences of `f`.
     fn slope<const N: usize>(
         filter: &Kalman,
         k: usize,
@@ -334,7 +336,7 @@ mod tests {
         }
     }
 
-    /// The innovation (A) at the end of `T_s` (s) of the machine's own equations, where the filter was right before.
+    /// The innovation (A) after `T_s` (s) of the machine's own equations, starting from a correct filter state.
     fn residual(n: u32, T_s: f64) -> f64 {
         let (motor, before) = (salient(), at(n));
         let current = |psi: Dq| machine::current(&motor, &Saturation::default(), psi);
@@ -356,7 +358,7 @@ mod tests {
         filter.correct(&motor, i, 1.0).magnitude()
     }
 
-    /// All that is left of the plant's equations is the trapezoid of R i: of third order.
+    /// The only remaining difference from the plant's equations is the third-order trapezoid error of R i.
     #[test]
     fn the_model_is_the_plant() {
         for n in 0..50 {
@@ -371,7 +373,7 @@ mod tests {
         let (motor, par) = (salient(), EstimatorParameters::default());
         let context =
             Context { par: &par, motor: &motor, current: &CurrentLoop::default(), J: 15e-3, T_s: T_S, delay: 1.0 };
-        // Standstill, noise, and voltages that fit nothing: the worst that a lost drive offers.
+        // Standstill, noise, and inconsistent voltages: the worst case for a drive that has lost synchronism.
         for size in [0.0, 1e-2, 1.0] {
             let mut last = AlphaBeta::ZERO;
             let (mut filter, _) = Kalman::start(&context, &Sample::default(), 0.3, 0.0);
@@ -381,7 +383,8 @@ mod tests {
                 let estimate = filter.update(&context, &sample);
                 assert!(estimate.theta.is_finite() && estimate.w.is_finite());
                 assert!((filter.P - filter.P.transpose()).norm() == 0.0);
-                // Positive in any units: of the correlations, whatever the size of the variances.
+                // Positive definite in any units: this tests the correlations, independent of the size of the
+                // variances.
                 let scale = filter.P.diagonal().map(|x| 1.0 / x.sqrt());
                 let correlation = Matrix4::from_fn(|r, c| filter.P[(r, c)] * scale[r] * scale[c]);
                 let least = correlation.symmetric_eigenvalues().min();

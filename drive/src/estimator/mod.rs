@@ -1,13 +1,14 @@
-//! Estimators of rotor angle and speed: one file each, one row in the list here.
+//! Estimators of rotor angle and speed: each has one file and one row in the list in this module.
 //!
-//! At sample k an estimator gets a [`Sample`], the currents of that instant and the voltage that acted since the last
-//! one, and gives an [`Estimate`]: angle and speed at that instant, the current to control, and, if it injects a
-//! carrier, the voltage to add to this sample's command. What it needs of other parts (machine estimates, inertia, its
-//! parameters) comes in a [`Context`].
+//! At sample k an estimator receives a [`Sample`]: the currents at that instant and the voltage that acted since the
+//! previous sample. It returns an [`Estimate`]: angle and speed at that instant, the current to control, and, if it
+//! injects a carrier, the voltage to add to this sample's command. A [`Context`] supplies the other inputs (machine
+//! estimates, inertia, its parameters).
 //!
-//! A new estimator implements [`Estimating`], has a row in the list at the end of this file and, for parameters of its
-//! own, a row in [`tables`]. The row says what the method is ([`Class`]) and whether it holds standstill. The estimator then
-//! appears in the enumeration, the FMUs, their documentation and every scenario of the comparison.
+//! A new estimator implements [`Estimating`] and adds a row to the list at the end of this file. If it has parameters
+//! of its own, it also adds a row to [`tables`]. The list row states the method's type ([`Class`]) and whether it holds
+//! standstill. The estimator then appears in the enumeration, the FMUs, their documentation and every scenario of the
+//! comparison.
 
 pub mod carrier;
 pub mod current_model;
@@ -42,20 +43,20 @@ use std::fmt::Display;
 use tables::ESTIMATOR_PARAMETERS;
 pub use tables::EstimatorParameters;
 
-/// What a controller knows at sample k.
+/// The controller's inputs to an estimator at sample k.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// Number of the sample, 0 at the start.
+    /// Sample number, 0 at the start.
     pub k: u64,
     /// Stator current measured at sample k, in A.
     pub i: AlphaBeta,
-    /// Stator current measured at sample k - 1, in A; at the first sample that of sample 0.
+    /// Stator current measured at sample k - 1, in A; the first sample repeats the current of sample 0.
     pub i_last: AlphaBeta,
-    /// Stator voltage command that acted in [k - 1, k), in V: limited, injection included, without dead-time
-    /// compensation. Held in stator axes. It is the command of sample k - 1 - delay, and so is the injection in it: a
-    /// carrier is told from `u_injected`, never from the sign that was asked for last.
+    /// Stator voltage command that acted in [k - 1, k), in V: limited, with injection, without dead-time compensation,
+    /// held in stator axes. It is the command of sample k - 1 - delay, and so is the injection in it: identify the
+    /// carrier from `u_injected`, not from the most recently requested sign.
     pub u: AlphaBeta,
-    /// The injected part of `u`, in V, reduced as `u` was where the limit cut it.
+    /// The injected part of `u`, in V, reduced in the same way as `u` if the voltage limit applied.
     pub u_injected: AlphaBeta,
     /// Output of the current PI at sample k - 1, without feed-forward and injection, in V.
     pub u_pi: DqHat,
@@ -63,15 +64,15 @@ pub struct Sample {
     pub i_ref: DqHat,
     /// Torque reference of sample k - 1, limited, in N.m.
     pub tau_ref: f64,
-    /// Electrical angle of a sensor in rad.
+    /// Electrical angle from a sensor in rad.
     pub theta_meas: f64,
-    /// Electrical speed of a sensor in rad/s.
+    /// Electrical speed from a sensor in rad/s.
     pub w_meas: f64,
     /// DC-link voltage in V.
     pub u_dc: f64,
 }
 
-/// What an estimator may know besides the sample: parameters and the controller's estimates.
+/// An estimator's inputs besides the sample: parameters and the controller's estimates.
 #[derive(Clone, Copy, Debug)]
 pub struct Context<'a> {
     /// The estimators' parameters.
@@ -84,8 +85,8 @@ pub struct Context<'a> {
     pub J: f64,
     /// Sample period in s.
     pub T_s: f64,
-    /// Samples from taking the currents to the voltage acting: the command of sample k acts in
-    /// [k + delay, k + delay + 1).
+    /// Delay in samples from current sampling to the voltage output: the command of sample k acts in [k + delay, k +
+    /// delay + 1).
     pub delay: f64,
 }
 
@@ -95,13 +96,13 @@ impl Context<'_> {
         ESTIMATOR_PARAMETERS.tell(self.par, get)
     }
 
-    /// The fault that one of the estimators' parameters is not what is `allowed`.
+    /// The fault for an estimator parameter that is not what is `allowed`.
     pub fn fault<T>(&self, get: impl FnOnce(&mut EstimatorParameters) -> &mut T, allowed: impl Display) -> Fault {
         ESTIMATOR_PARAMETERS.fault(self.par, get, allowed)
     }
 }
 
-/// A voltage to be added to the command of this sample, in V.
+/// A voltage to add to this sample's command, in V.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Injection {
     /// None.
@@ -109,69 +110,71 @@ pub enum Injection {
     None,
     /// In stator axes.
     Stator(AlphaBeta),
-    /// In the estimated rotor frame, turned as the command is: to the middle of the interval in which it acts.
+    /// In the estimated rotor frame, transformed like the command: at the angle in the middle of the interval in which
+    /// it acts.
     Estimated(DqHat),
 }
 
-/// What an estimator knows at sample k, and what it asks for.
+/// An estimator's results at sample k, and the voltage it requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
     /// Electrical rotor angle in rad, not wrapped.
     pub theta: f64,
     /// Electrical speed in rad/s.
     pub w: f64,
-    /// Stator current to control in A: the measured one without the carrier.
+    /// Stator current to control in A: the measured current without the carrier.
     pub i: AlphaBeta,
     /// Voltage to add.
     pub injection: Injection,
 }
 
 impl Estimate {
-    /// Angle (rad) and speed (rad/s) without injection: the measured current is controlled.
+    /// Angle (rad) and speed (rad/s) without injection: the drive controls the measured current.
     #[inline]
     pub fn new(theta: f64, w: f64, sample: &Sample) -> Self {
         Self { theta, w, i: sample.i, injection: Injection::None }
     }
 }
 
-/// The life of an estimator: started at the first sample, updated at each later one. A step does not allocate.
+/// The interface of an estimator: it starts at the first sample and updates at each later one. A step does not
+/// allocate.
 pub trait Estimating: Sized {
     /// The estimator at the first sample, at the electrical angle `theta` (rad) and speed `w` (rad/s).
     fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate);
 
-    /// One sample.
+    /// Processes one sample.
     fn update(&mut self, context: &Context, sample: &Sample) -> Estimate;
 
-    /// Puts the estimate at sample k to another electrical angle (rad) and speed (rad/s), known from elsewhere: while an
-    /// I-f start leads the rotor, and by half a turn when a magnet turns out to point the other way.
+    /// Sets the estimate at sample k to an electrical angle (rad) and speed (rad/s) from another source: during an I-f
+    /// start, which leads the rotor, and by half a turn when the magnet polarity turns out to be reversed.
     fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
         *self = Self::start(context, sample, theta, w).0;
     }
 
-    /// Parameters went from those of `old` to those of `new` after this sample. What the estimate was stays; where a gain
-    /// acts directly on angle or speed the state takes up the difference.
+    /// Adapts the state after the parameters changed from `old` to `new` after this sample. The estimate stays the
+    /// same; where a gain acts directly on angle or speed, the state absorbs the difference.
     fn retune(&mut self, old: &Context, new: &Context) {
         let _ = (old, new);
     }
 
-    /// Whether the parameters suit this estimator.
+    /// Checks that the parameters suit this estimator.
     ///
     /// # Errors
-    /// Says which parameters do not, and why.
+    /// States which parameters are unsuitable, and why.
     fn validate(context: &Context) -> Result<(), Fault> {
         let _ = context;
         Ok(())
     }
 }
 
-/// The signal that a method finds the rotor by; it decides how a drive starts and which scenarios it can run.
+/// The signal from which a method finds the rotor; it determines how a drive starts and which scenarios it can run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// The stator flux. Starts by itself and holds standstill with the d-axis current of `zero_speed`.
+    /// The stator flux. The method starts by itself and holds standstill with the d-axis current of `zero_speed`.
     FluxObserver,
-    /// The back EMF, which vanishes at standstill: an I-f start takes the rotor to a speed that shows it.
+    /// The back EMF, which vanishes at standstill: an I-f start accelerates the rotor until the EMF is large enough.
     BackEmf,
-    /// The saliency, by an injected voltage: standstill and low speed, as far as the voltage suffices.
+    /// The saliency, by an injected voltage: for standstill and low speed, as far as the voltage suffices.
     Injection,
     /// Injection at low speed, the back EMF above.
     Hybrid,
@@ -180,17 +183,17 @@ pub enum Class {
 }
 
 impl Class {
-    /// Whether the method injects a voltage that finds the d axis at standstill.
+    /// Whether the method injects a voltage that finds the d-axis at standstill.
     pub fn injects(self) -> bool {
         matches!(self, Self::Injection | Self::Hybrid)
     }
 }
 
-/// The list: value, name, state, class, standstill and description make the enumeration and the one place of dispatch.
+/// The list: value, name, state, class, standstill and description define the enumeration and the single dispatch.
 macro_rules! estimators {
     ($($value:literal $name:ident($state:ty): $class:ident, standstill $standstill:literal, $description:literal;)*) => {
         enumeration! {
-            /// The estimators, in the order of the interface: a value never changes, new ones are appended.
+            /// The estimators, in the order of the interface: values never change; new estimators are appended.
             #[derive(Serialize, Deserialize)]
             pub enum Kind("Estimator", "Estimator of rotor angle and speed") {
                 $($value $name $description;)*
@@ -198,7 +201,7 @@ macro_rules! estimators {
         }
 
         impl Kind {
-            /// The signal that it finds the rotor by.
+            /// The signal from which it finds the rotor.
             pub fn class(self) -> Class {
                 match self {
                     $(Self::$name => Class::$class,)*
@@ -212,10 +215,10 @@ macro_rules! estimators {
                 }
             }
 
-            /// Whether the parameters suit this estimator.
+            /// Checks that the parameters suit this estimator.
             ///
             /// # Errors
-            /// As [`Estimating::validate`]; the tracker cannot work.
+            /// As for [`Estimating::validate`], or the tracker cannot work.
             pub fn validate(self, context: &Context) -> Result<(), Fault> {
                 tracker::validate(context)?;
                 match self {
@@ -224,14 +227,14 @@ macro_rules! estimators {
             }
         }
 
-        /// The state of the estimator that is at work.
+        /// The state of the active estimator.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         pub enum Estimator {
             $(#[doc = $description] $name($state),)*
         }
 
         impl Estimator {
-            /// As [`Estimating::start`].
+            /// See [`Estimating::start`].
             pub fn start(kind: Kind, context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
                 match kind {
                     $(Kind::$name => {
@@ -241,7 +244,7 @@ macro_rules! estimators {
                 }
             }
 
-            /// As [`Estimating::update`].
+            /// See [`Estimating::update`].
             #[inline]
             pub fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
                 match self {
@@ -249,14 +252,14 @@ macro_rules! estimators {
                 }
             }
 
-            /// As [`Estimating::retune`].
+            /// See [`Estimating::retune`].
             pub fn retune(&mut self, old: &Context, new: &Context) {
                 match self {
                     $(Self::$name(state) => state.retune(old, new),)*
                 }
             }
 
-            /// As [`Estimating::place`].
+            /// See [`Estimating::place`].
             pub fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
                 match self {
                     $(Self::$name(state) => state.place(context, sample, theta, w),)*

@@ -1,15 +1,16 @@
-//! Injection near the PWM frequency, a period of three samples: 10 of the review (Kim & Sul 2011, III, its reference 13).
+//! Injection near the PWM frequency with a period of three samples: method 10 of the review (Kim & Sul 2011, III,
+//! reference 13).
 //!
-//! A voltage V e^{j 2 pi k / 3} in stator axes. The changes of current and injected flux linkage from one interval to the
-//! next obey delta i = S delta psi + D e^{j 2 theta} conj(delta psi), as complex numbers. Times delta psi and summed over
-//! one period, the first term turns away: sum(delta i delta psi) = D e^{j 2 theta} sum |delta psi|^2. Seen from the
-//! estimated frame the argument of the sum is 2 theta~: the angle comes straight from voltage and current differences,
-//! whatever the amplitude and with no inductance but the sign of D, and has no dead point at 90 deg. The share of the
-//! current controller's voltage in delta i is known and taken off first ([`response`]): it would not turn away. The mean
-//! of three currents is free of the carrier.
+//! The method injects a voltage V e^{j 2 pi k / 3} in stator axes. The changes of current and injected flux linkage
+//! from one interval to the next obey delta i = S delta psi + D e^{j 2 theta} conj(delta psi), as complex numbers.
+//! After multiplication by delta psi and summation over one period, the first term cancels: sum(delta i delta psi) = D
+//! e^{j 2 theta} sum |delta psi|^2. In the estimated frame, the argument of the sum is 2 theta~: the angle comes
+//! directly from voltage and current differences. It does not depend on the amplitude, needs no inductance except the
+//! sign of D, and has no dead point at 90 deg. The current controller's voltage contributes a known share to delta i,
+//! which would not cancel; [`response`] subtracts it first. The mean of three currents does not contain the carrier.
 //!
-//! Limits: above about 0.2 of the rated speed the voltage is missed elsewhere; one sample of delay in the current that is
-//! controlled.
+//! Limits: above about 0.2 of the rated speed, the injection takes voltage that the drive needs; the controlled current
+//! has one sample of delay.
 
 use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
 use crate::estimator::tracker::Tracker;
@@ -33,7 +34,7 @@ impl Default for NearPwmParameters {
     }
 }
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NearPwmInjection {
     tracker: Tracker,
@@ -47,7 +48,7 @@ pub struct NearPwmInjection {
     currents: [DqHat; 2],
 }
 
-/// Product of two vectors as complex numbers.
+/// Product of two vectors, taken as complex numbers.
 #[inline]
 fn product(a: DqHat, b: DqHat) -> DqHat {
     DqHat::new(a.d() * b.d() - a.q() * b.q(), a.d() * b.q() + a.q() * b.d())
@@ -104,7 +105,7 @@ impl Estimating for NearPwmInjection {
 
 type P = Row<NearPwmParameters>;
 
-/// The variables; their owner gives the prefix `near_pwm.`.
+/// The variables; their owner adds the prefix `near_pwm.`.
 pub const NEAR_PWM: &Table<NearPwmParameters> = &Table::new(
     const {
         &[P::parameter("voltage", &VOLT, "Injected voltage vector, which turns by 120 degrees each sample", |p| {
@@ -125,7 +126,7 @@ mod tests {
         finds_the_rotor::<NearPwmInjection>(&EstimatorParameters::default(), 0.05);
     }
 
-    /// The argument of the sum is 2 theta~ for every angle and any inductances of the right order.
+    /// The argument of the sum is 2 theta~ for every angle and any inductances of the correct order.
     #[test]
     fn the_angle_is_straight() {
         let mut par = EstimatorParameters::default();

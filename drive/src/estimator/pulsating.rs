@@ -1,13 +1,15 @@
-//! Pulsating injection along the estimated d axis: 8 of the review (Kim & Sul (42)-(45)).
+//! Pulsating injection along the estimated d-axis: method 8 of the review (Kim & Sul (42)-(45)).
 //!
-//! A voltage u = V cos(phi k) along the estimated d axis changes the current in a sample, with theta~ = theta - theta^ and
-//! S, D of [`saliency`](crate::estimator::saliency), by x_d = T_s (S + D cos 2 theta~) u, x_q = T_s D sin(2 theta~) u.
+//! A voltage u = V cos(phi k) along the estimated d-axis changes the current within one sample by x_d = T_s (S + D cos
+//! 2 theta~) u, x_q = T_s D sin(2 theta~) u, with theta~ = theta - theta^ and S, D from
+//! [`saliency`](crate::estimator::saliency).
 //! - Heterodyne: band-pass, times 2 u, low-pass ([`carrier`]): eps = T_s D V^2 sin(2 theta~).
 //! - 45-degree measurement axes (Fig. 10): the magnitudes of (x_d + x_q) / sqrt 2 and (x_d - x_q) / sqrt 2 are equal where
 //!   theta~ = 0. Rectified, subtracted, low-pass: 2 sqrt 2 / pi T_s D V sin(2 theta~), whatever the phase of the carrier.
 //!
-//! e = eps / (2 T_s D V^2). Corrected print: (44) has cos^2 and sin^2 of theta~ and no 1/2, so (45) is a factor 2 low.
-//! Limits: the delay of the filters; e has zeros at 0, 90 and 180 deg, of which 90 deg is unstable.
+//! The error is e = eps / (2 T_s D V^2). Correction to the paper: (44) has cos^2 and sin^2 of theta~ and no 1/2, so
+//! (45) is low by a factor of 2. Limits: the filters add delay; e has zeros at 0, 90 and 180 deg, of which 90 deg is
+//! unstable.
 
 use crate::estimator::carrier::{self, BandPass, Carrier, PeriodMean};
 use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
@@ -18,7 +20,7 @@ use fmu_core::{Fault, Field, Row, Table, enumeration};
 use serde::{Deserialize, Serialize};
 
 enumeration! {
-    /// The demodulations; a value never changes.
+    /// The demodulation methods; values never change.
     #[derive(Serialize, Deserialize)]
     pub enum Demodulation("Demodulation", "Demodulation of pulsating injection") {
         1 Heterodyne "Product with the carrier, Kim & Sul 2011, Fig. 9";
@@ -29,7 +31,7 @@ enumeration! {
 /// The parameters with the prefix `pulsating.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PulsatingParameters {
-    /// How the angle error is demodulated from the carrier current.
+    /// Demodulation method that extracts the angle error from the carrier current.
     pub demodulation: Demodulation,
 }
 
@@ -39,13 +41,13 @@ impl Default for PulsatingParameters {
     }
 }
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PulsatingInjection {
     tracker: Tracker,
-    /// Of the current.
+    /// For the current.
     notch: BandPass<Estimated>,
-    /// Of the response to the injected voltage.
+    /// For the response to the injected voltage.
     band_pass: BandPass<Estimated>,
     low_pass: PeriodMean,
 }
@@ -99,7 +101,7 @@ impl Estimating for PulsatingInjection {
 
 type P = Row<PulsatingParameters>;
 
-/// The variables; their owner gives the prefix `pulsating.`.
+/// The variables; their owner adds the prefix `pulsating.`.
 pub const PULSATING: &Table<PulsatingParameters> = &Table::new(
     const {
         &[P::enumeration_parameter(

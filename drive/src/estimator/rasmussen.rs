@@ -1,24 +1,24 @@
-//! Rasmussen's flux observer with speed adaptation, eq (21), and with zeta = 0 its integral form (16).
+//! Rasmussen's flux observer with speed adaptation, eq (21), and, for zeta = 0, its integral form (16).
 //!
 //! In the estimated rotor frame: psi_r^ = psi_s^ - L i, d psi_s^/dt = u - R i + v - j w^ psi_s^,
 //! v = -c_1 (psi_rd^ - psi_M) - j c_2 psi_rq^, w^ = g_1 psi_rq^ + g_2 int psi_rq^ dt, d theta^/dt = w^.
-//! The j on c_2 is missing in the text before (7) of the paper; (7), (16) and (21) have it. In this file theta~ = theta^ - theta,
-//! Rasmussen's sign.
+//! The text before (7) of the paper omits the j on c_2; (7), (16) and (21) have it. In this file theta~ = theta^ -
+//! theta, Rasmussen's sign.
 //!
-//! Gains by the poles of the speed adaptation: g_2 = w_n^2 / psi_M, g_1 = 2 zeta w_n / psi_M.
+//! The poles of the speed adaptation set the gains: g_2 = w_n^2 / psi_M, g_1 = 2 zeta w_n / psi_M.
 //!
-//! Sampled without bias: psi_s^ is kept in stator axes, where nothing turns,
+//! To sample without bias, psi_s^ is kept in stator axes, which do not turn:
 //!
 //! ```text
 //! psi_s[k]  = psi_s[k-1] + T_s (u - R (i[k-1] + i[k]) / 2 + v[k-1] e^{j (theta^[k-1] + w^[k-1] T_s / 2)})
 //! theta^[k] = theta^[k-1] + T_s w^[k-1]
 //! ```
 //!
-//! Forward Euler in the estimated frame would be biased by w T_s / 2 (1.4 deg at
-//! 1500 rpm and 10 kHz), the newest command instead of the one that acted by w T_s.
+//! Forward Euler in the estimated frame would add a bias of w T_s / 2 (1.4 deg at 1500 rpm and 10 kHz). Using the
+//! newest command instead of the one that acted would add w T_s.
 //!
-//! Limits: at w = 0 the angle is not observable (the slow pole is -w^2/c_1 below |w| = c_1/2); a resistance estimate
-//! above the true one runs away at standstill, one below it is the safe side.
+//! Limits: at w = 0 the angle is not observable (the slow pole is -w^2/c_1 below |w| = c_1/2). A resistance estimate
+//! above the true value diverges at standstill; one below it is safe.
 
 use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
@@ -30,13 +30,13 @@ use serde::{Deserialize, Serialize};
 /// Parameters of the observer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RasmussenParameters {
-    /// Feedback of the d flux error in 1/s, >= 0.
+    /// Feedback gain for the d-axis flux error in 1/s, >= 0.
     pub c_1: f64,
-    /// Feedback of the q flux in 1/s, >= 0.
+    /// Feedback gain for the q-axis flux in 1/s, >= 0.
     pub c_2: f64,
     /// Natural frequency of the speed adaptation in rad/s, > 0.
     pub w_n: f64,
-    /// Damping of the speed adaptation, >= 0; 0 is the integral form (16).
+    /// Damping of the speed adaptation, >= 0; 0 gives the integral form (16).
     pub zeta: f64,
 }
 
@@ -64,7 +64,7 @@ pub struct Rasmussen {
 }
 
 impl Estimating for Rasmussen {
-    /// The magnet's flux is on the estimated d axis.
+    /// The permanent-magnet flux linkage lies on the estimated d-axis.
     fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let (motor, i) = (context.motor, sample.i);
         let axis = Axis::<Estimated>::at(theta);
@@ -90,7 +90,7 @@ impl Estimating for Rasmussen {
         Estimate::new(self.theta, self.w, sample)
     }
 
-    /// w^ = g_1 psi_rq^ + w_I stays where g_1 changes.
+    /// Keeps w^ = g_1 psi_rq^ + w_I constant when g_1 changes.
     fn retune(&mut self, old: &Context, new: &Context) {
         let g_1 = |context: &Context| context.par.rasmussen.g_1(context.motor);
         self.w_i += (g_1(old) - g_1(new)) * self.psi_r(new.motor).q();
@@ -122,7 +122,7 @@ fn inductive(motor: &Motor, i: DqHat) -> DqHat {
 
 type P = Row<RasmussenParameters>;
 
-/// The observer's variables; their owner gives the prefix `rasmussen.`.
+/// The observer's variables; their owner adds the prefix `rasmussen.`.
 pub const RASMUSSEN: &Table<RasmussenParameters> = &Table::new(
     const {
         &[
@@ -168,9 +168,9 @@ mod tests {
         Context { par, motor, current: CURRENT, J: 1.5e-3, T_s: T_S, delay: 1.0 }
     }
 
-    /// The observer beside a machine that turns at `w` (rad/s, electrical) with the current `i` in its rotor frame:
-    /// angle errors in rad at each sample, from `theta_tilde` on. The voltage is the exact mean of each interval, plus
-    /// `du` (V) in the rotor frame, which the machine does not see.
+    /// Runs the observer next to a machine that turns at `w` (rad/s, electrical) with the current `i` in its rotor
+    /// frame. Returns the angle error in rad at each sample, from `theta_tilde` on. The voltage is the exact mean of
+    /// each interval plus `du` (V) in the rotor frame, which the machine does not receive.
     fn beside(par: &RasmussenParameters, hat: &Motor, w: f64, i: DqHat, theta_tilde: f64, seconds: f64) -> Vec<f64> {
         let motor = Motor::default();
         let rotor = |theta: f64| Axis::<Estimated>::at(theta);
@@ -183,7 +183,7 @@ mod tests {
         let (mut theta, mut errors) = (0.0, vec![theta_tilde]);
         for _ in 0..samples(seconds) {
             let next = theta + w * T_S;
-            // The trapezoid of R i on both sides: what the observer assumes of the current between samples.
+            // Both sides use the trapezoid of R i: the observer's assumption for the current between samples.
             let resistive = (current(theta) + current(next)) * (0.5 * motor.R_s);
             let u = (flux(next) - flux(theta)) * (1.0 / T_S) + resistive;
             theta = next;
@@ -203,7 +203,7 @@ mod tests {
         n * std::f64::consts::PI / 10.0 // 3 pole pairs
     }
 
-    /// Reference figure 10: poles at -c_1/2 above |w| = c_1/2, a slow one at -w^2/c_1 below.
+    /// Rasmussen's Fig. 10: poles at -c_1/2 above |w| = c_1/2, a slow pole at -w^2/c_1 below.
     #[test]
     fn an_initial_error_decays_as_the_linearization_says() {
         let (par, motor, start) = (RasmussenParameters::default(), Motor::default(), 20.0_f64.to_radians());
@@ -218,18 +218,18 @@ mod tests {
         assert!((rate / expected - 1.0).abs() < 0.15, "20 rpm: {rate} 1/s, not {expected}");
     }
 
-    /// At standstill the error does not move: nothing of it is in the voltage.
+    /// At standstill the error stays constant: the voltage does not depend on it.
     #[test]
     fn standstill_is_unobservable() {
         let errors = beside(&RasmussenParameters::default(), &Motor::default(), 0.0, DqHat::ZERO, 0.3, 1.0);
-        // What moves is the fast transient of the adaptation; after it the error stays where it is.
+        // Only the fast transient of the adaptation changes the error; after it, the error stays constant.
         let (early, late) = (errors[2000], errors[10_000]);
         assert!((early - late).abs() < 1e-6 && late.abs() > 0.05, "{early} {late}");
     }
 
     /// The steady state that corrects Rasmussen (24): with du = (R - R^) i, exactly
     /// w (psi_rd^ - psi_M cos theta~) = du_q and -w psi_M sin theta~ = du_d - c_1 (psi_rd^ - psi_M), in the estimated
-    /// frame. To first order sin theta~ = (-du_d + c_1 du_q / w) / (w psi_M): the opposite sign of the print.
+    /// frame. To first order sin theta~ = (-du_d + c_1 du_q / w) / (w psi_M): opposite in sign to the paper.
     #[test]
     fn resistance_error_turns_the_estimate_as_corrected_24_says() {
         let (par, motor) = (RasmussenParameters::default(), Motor::default());
@@ -240,7 +240,7 @@ mod tests {
             (rpm(-800.0), DqHat::new(2.0, 3.0)),
         ] {
             let theta_tilde = *beside(&par, &hat, w, i, 0.0, 1.5).last().unwrap();
-            // Current in the estimated frame: the rotor frame's turned back by theta~.
+            // Current in the estimated frame: the rotor-frame current turned back by theta~.
             let seen = Axis::<Rotor>::at(theta_tilde).from_stator(AlphaBeta::new(i.d(), i.q()));
             let (du_d, du_q) = (0.4 * seen.d(), 0.4 * seen.q());
             let psi_rd = du_q / w + motor.psi_M * theta_tilde.cos();
@@ -251,7 +251,7 @@ mod tests {
         }
     }
 
-    /// At the start psi_r^ is the magnet's flux whatever the current, so nothing moves.
+    /// At the start, psi_r^ is the permanent-magnet flux linkage for any current, so the state stays constant.
     #[test]
     fn start_is_an_equilibrium() {
         let motor = Motor::default();

@@ -1,15 +1,15 @@
-//! Rotating injection in stator axes: 7 of the review (Kim & Sul (38)-(40)).
+//! Rotating injection in stator axes: method 7 of the review (Kim & Sul (38)-(40)).
 //!
-//! A voltage u = V e^{j phi k} in stator axes changes the current by T_s (S u + D e^{j 2 theta} conj(u)) in a sample
-//! ([`saliency`](crate::estimator::saliency)): one part turns with the carrier, the other against it. Band-pass,
-//! heterodyne with u e^{-j 2 theta^}, low-pass ([`carrier`]): eps = T_s D V^2 sin(2 theta~), and
+//! A voltage u = V e^{j phi k} in stator axes changes the current by T_s (S u + D e^{j 2 theta} conj(u)) per sample
+//! ([`saliency`](crate::estimator::saliency)): one part turns with the carrier, the other against it. A band-pass, a
+//! multiplication by u e^{-j 2 theta^} (heterodyne) and a low-pass ([`carrier`]) give eps = T_s D V^2 sin(2 theta~) and
 //! e = eps / (2 T_s D V^2).
 //!
-//! The band-pass holds the part that turns against the carrier back by 2 w T_s / alpha; e is compensated by half of it,
-//! w T_s / alpha, which is w / (zeta w_h) for a short T_s: 0.9 deg at 0.1 of the rated speed of a 2.2 kW machine. R would
-//! turn the angle by R S / w_h, 0.8 deg, if the response still had R i in it.
+//! The band-pass delays the part that turns against the carrier by 2 w T_s / alpha. The estimator adds half of this to
+//! e: w T_s / alpha, which is w / (zeta w_h) for a short T_s, or 0.9 deg at 0.1 of the rated speed of a 2.2 kW machine.
+//! R i in the response would shift the angle by R S / w_h, 0.8 deg.
 //!
-//! Limits: the delay of the filters; a current of the carrier in both axes.
+//! Limits: the filters add delay; both axes carry carrier current.
 
 use crate::estimator::carrier::{self, BandPass, Carrier, PeriodMean};
 use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
@@ -19,13 +19,13 @@ use crate::frame::{AlphaBeta, Axis, Estimated, Stator};
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RotatingInjection {
     tracker: Tracker,
-    /// Of the measured current.
+    /// For the measured current.
     notch: BandPass<Stator>,
-    /// Of the response to the injected voltage.
+    /// For the response to the injected voltage.
     band_pass: BandPass<Stator>,
     low_pass: PeriodMean,
 }
@@ -53,7 +53,7 @@ impl Estimating for RotatingInjection {
         let middle = Axis::<Estimated>::at(0.5 * (tracker.theta_last + tracker.theta));
         let response = middle.to_stator(response(motor, middle, sample, T_s));
         let (x, u) = (middle.from_stator(band_pass.update(&carrier, response)), middle.from_stator(sample.u_injected));
-        // Im(x u): what turns against the carrier stands still, what turns with it turns twice as fast.
+        // Im(x u): the part against the carrier becomes constant; the part with the carrier turns twice as fast.
         let epsilon = low_pass.update(&carrier, x.d() * u.q() + x.q() * u.d());
 
         let (V, D) = (par.carrier.voltage, Admittance::of(motor).difference);
@@ -80,7 +80,7 @@ mod tests {
         finds_the_rotor::<RotatingInjection>(&EstimatorParameters::default(), 0.1);
     }
 
-    /// What the response is rid of: with R^ = 0 the angle is off by R S / w_h, 0.78 deg.
+    /// The effect of subtracting R i from the response: with R^ = 0 the angle error is R S / w_h, 0.78 deg.
     #[test]
     fn resistance_would_turn_the_angle() {
         let par = EstimatorParameters::default();

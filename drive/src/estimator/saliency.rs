@@ -1,34 +1,35 @@
-//! What the estimators by injection share: the machine's high-frequency admittance and the checks of their parameters.
+//! Shared parts of the injection estimators: the machine's high-frequency admittance and the parameter checks.
 //!
-//! In stator axes, with u and i as complex numbers, di/dt = S u + D e^{j 2 theta} conj(u), where S = (1/L_d + 1/L_q) / 2
-//! and D = (1/L_d - 1/L_q) / 2: the angle is in D only, and as twice itself. So no injection tells the two ends of the
-//! magnet apart; [`polarity`](crate::control::polarity) does. Limits, of all of them: saliency is needed, and
-//! cross-saturation turns the axis of the inductances itself, by -9 to -21 deg at rated load.
+//! In stator axes, with u and i as complex numbers, di/dt = S u + D e^{j 2 theta} conj(u), where S = (1/L_d + 1/L_q) /
+//! 2 and D = (1/L_d - 1/L_q) / 2. Only the D term contains the angle, and it contains 2 theta. Injection therefore
+//! cannot identify the magnet polarity; [`polarity`](crate::control::polarity) does. Limits of all injection methods:
+//! the machine must be salient, and cross-saturation shifts the axis of the inductances itself, by -9 to -21 deg at
+//! rated load.
 //!
-//! Kim & Sul 2011, eq (33) to (37), inverted: there the voltage is a function of the current. S and D in 1/H.
+//! Kim & Sul 2011, eq (33) to (37), inverted: the paper gives the voltage as a function of the current. S and D in 1/H.
 
 use crate::estimator::Sample;
 use crate::frame::{Axis, DqHat, Estimated};
 use crate::motor::Motor;
 use fmu_core::Fault;
 
-/// Greatest angle error in rad that is passed to a tracker.
+/// Largest angle error in rad that is passed to a tracker.
 pub const CLIP: f64 = 0.5;
 
-/// Least |L_q - L_d| / (L_q + L_d): below it the noise of the current sensors is all there is.
+/// Smallest |L_q - L_d| / (L_q + L_d): below it, the noise of the current sensors hides the saliency.
 const MIN_SALIENCY: f64 = 0.01;
 
 /// The high-frequency admittance in 1/H.
 #[derive(Clone, Copy, Debug)]
 pub struct Admittance {
-    /// S, the same in all directions.
+    /// S, equal in all directions.
     pub sum: f64,
-    /// D, from the saliency; of the sign of L_q - L_d.
+    /// D, from the saliency; it has the sign of L_q - L_d.
     pub difference: f64,
 }
 
 impl Admittance {
-    /// Of the machine estimates.
+    /// From the machine estimates.
     #[inline]
     pub fn of(motor: &Motor) -> Self {
         let (d, q) = (1.0 / motor.L_d, 1.0 / motor.L_q);
@@ -36,11 +37,11 @@ impl Admittance {
     }
 }
 
-/// Response to the injected voltage in [k - 1, k): the change of the current (A) without the shares of the current
-/// controller's voltage and of R i, which are known. The back EMF is left in it; it is slow. Without the first share taken
-/// off, noise goes round through the current controller into the angle; without the second, a carrier that turns by w_h
-/// in stator axes is behind and the angle off by R S / w_h. Seen from `middle`, the estimated frame in the middle of the
-/// interval.
+/// Response to the injected voltage in [k - 1, k): the change of the current (A) minus the known shares of the current
+/// controller's voltage and of R i. The slowly varying back EMF remains in it. Without the first subtraction, noise
+/// feeds back through the current controller into the angle. Without the second, a carrier that turns at w_h in stator
+/// axes lags and the angle error is R S / w_h. The result is in the estimated frame at `middle`, its angle in the
+/// middle of the interval.
 #[inline]
 pub fn response(motor: &Motor, middle: Axis<Estimated>, sample: &Sample, T_s: f64) -> DqHat {
     let i = middle.from_stator(sample.i - sample.i_last);
@@ -49,10 +50,10 @@ pub fn response(motor: &Motor, middle: Axis<Estimated>, sample: &Sample, T_s: f6
     DqHat::new(i.d() - psi.d() / motor.L_d, i.q() - psi.q() / motor.L_q)
 }
 
-/// Whether the machine can be found by injection.
+/// Checks that injection can find the machine's axis.
 ///
 /// # Errors
-/// The two inductances are too close.
+/// The two inductances are too close to each other.
 pub fn validate_saliency(motor: &Motor) -> Result<(), Fault> {
     let Motor { L_d, L_q, .. } = motor;
     if (L_q - L_d).abs() < MIN_SALIENCY * (L_q + L_d) {

@@ -1,12 +1,12 @@
-//! The measured angle and speed (Kim & Sul, Fig. 1a): the yardstick of all estimators.
+//! The measured angle and speed (Kim & Sul, Fig. 1a): the reference for all estimators.
 //!
-//! Limits: none of its own; the sensor is ideal unless the importer makes it otherwise.
+//! Limits: none of its own; the sensor is ideal unless the importer adds errors.
 
 use crate::estimator::{Context, Estimate, Estimating, Sample};
 use crate::math::wrap;
 use serde::{Deserialize, Serialize};
 
-/// State: the angle of the last sample, so that the estimate is not wrapped.
+/// State: the angle of the last sample, which keeps the estimate unwrapped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sensored {
     /// Electrical angle in rad, not wrapped.
@@ -24,6 +24,6 @@ impl Estimating for Sensored {
         Estimate::new(self.theta, sample.w_meas, sample)
     }
 
-    /// A sensor is not told where the rotor is.
+    /// A sensor ignores an angle from another source.
     fn place(&mut self, _: &Context, _: &Sample, _: f64, _: f64) {}
 }

@@ -1,16 +1,16 @@
-//! Square-wave injection at half the PWM frequency: 9 of the review (Kim & Sul 2011, III; Yoon, Sul, Morimoto, Ide 2011).
+//! Square-wave injection at half the PWM frequency: method 9 (Kim & Sul 2011, III; Yoon, Sul, Morimoto, Ide 2011).
 //!
-//! A voltage u = +-V along the estimated d axis, a period of 2 samples (+-) or 4 (+--+). With the changes delta from one
-//! half period to the next, in the estimated frame, theta~ = theta - theta^, and x the response and D of
-//! [`saliency`](crate::estimator::saliency): delta x_q = T_s D sin(2 theta~) delta u_d, so
-//! e = delta x_q / (2 T_s D delta u_d). No filter anywhere.
+//! The method injects u = +-V along the estimated d-axis, with a period of 2 samples (+-) or 4 (+--+). Let delta be the
+//! change from one half period to the next in the estimated frame, theta~ = theta - theta^, and x and D the response
+//! and D of [`saliency`](crate::estimator::saliency). Then delta x_q = T_s D sin(2 theta~) delta u_d, so e = delta
+//! x_q / (2 T_s D delta u_d). The method uses no filter.
 //!
-//! x is the change of the current less what the current controller's voltage made of it. Without that, T_s / L_q du_q,
-//! noise goes round through the current loop into the angle: a limit cycle that pins the speed loop near 20 Hz. The mean
-//! of two currents half a period apart is free of the carrier.
+//! x is the change of the current minus the share of the current controller's voltage. Without subtracting this share,
+//! T_s / L_q du_q, noise feeds back through the current loop into the angle: a limit cycle that locks the speed loop
+//! near 20 Hz. The mean of two currents half a period apart does not contain the carrier.
 //!
-//! Limits: above about 0.2 of the rated speed the voltage is missed elsewhere; e has zeros at 0, 90 and 180 deg, of which
-//! 90 deg is unstable.
+//! Limits: above about 0.2 of the rated speed, the injection takes voltage that the drive needs; e has zeros at 0, 90
+//! and 180 deg, of which 90 deg is unstable.
 
 use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
 use crate::estimator::tracker::Tracker;
@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 pub struct SquareWaveParameters {
     /// Voltage V, > 0.
     pub voltage: f64,
-    /// Samples in a period: 2 or 4.
+    /// Samples per period: 2 or 4.
     pub samples: i32,
 }
 
@@ -36,7 +36,7 @@ impl Default for SquareWaveParameters {
 }
 
 impl SquareWaveParameters {
-    /// The voltage of the command of sample `k` in V.
+    /// The voltage for the command of sample `k` in V.
     #[inline]
     pub fn command(&self, k: u64) -> f64 {
         let positive = if self.samples == 4 { matches!(k % 4, 0 | 3) } else { k.is_multiple_of(2) };
@@ -44,12 +44,12 @@ impl SquareWaveParameters {
     }
 }
 
-/// The demodulation: angle errors in a frame that someone else turns, and the current without the carrier.
+/// The demodulation: angle errors, and the current without the carrier; the caller turns the frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SquareWave {
-    /// Responses in the last intervals along q, in A, the newest first.
+    /// Responses in the last intervals along the q-axis, in A, the newest first.
     x: [f64; 2],
-    /// Injected voltages along d, in V, the newest first.
+    /// Injected voltages along the d-axis, in V, the newest first.
     u: [f64; 2],
     /// Currents of the last samples in the estimated frame, in A, the newest first.
     currents: [DqHat; 2],
@@ -72,7 +72,7 @@ impl SquareWave {
         let (x, u) = (response(motor, middle, sample, T_s).q(), middle.from_stator(sample.u_injected).d());
         let (delta_x, delta_u) = (x - self.x[half], u - self.u[half]);
         (self.x, self.u) = ([x, self.x[0]], [u, self.u[0]]);
-        // Where the limit cuts the injection off there is no angle, not a division by nothing.
+        // If the voltage limit removes the injection, there is no angle information; this avoids a division by zero.
         let square = (delta_u * delta_u).max(par.voltage * par.voltage);
         let e = delta_x * delta_u / (2.0 * T_s * Admittance::of(motor).difference * square);
 
@@ -83,7 +83,7 @@ impl SquareWave {
     }
 }
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SquareWaveInjection {
     tracker: Tracker,
@@ -128,7 +128,7 @@ impl Estimating for SquareWaveInjection {
 
 type P = Row<SquareWaveParameters>;
 
-/// The variables; their owner gives the prefix `square_wave.`.
+/// The variables; their owner adds the prefix `square_wave.`.
 pub const SQUARE_WAVE: &Table<SquareWaveParameters> = &Table::new(
     const {
         &[
@@ -159,7 +159,7 @@ mod tests {
         finds_the_rotor::<SquareWaveInjection>(&with(4), 0.05);
     }
 
-    /// delta i_q / (T_s delta u_d) = D sin(2 theta~), for every angle: the first error a still estimate sees.
+    /// delta i_q / (T_s delta u_d) = D sin(2 theta~) for every angle: the first error of a stationary estimate.
     #[test]
     fn the_response_is_that_of_the_admittance() {
         let mut par = with(2);

@@ -1,4 +1,4 @@
-//! The estimators' parameters: one part each, under its own prefix.
+//! The estimators' parameters: each part has its own prefix.
 
 use crate::estimator::carrier::{CARRIER, CarrierParameters};
 use crate::estimator::emf::{EMF, EmfParameters};
@@ -13,14 +13,14 @@ use crate::estimator::tracker::{TRACKER, TrackerParameters};
 use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// Parameters of all estimators; each reads its own part.
+/// Parameters of all estimators; each estimator reads its own part.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EstimatorParameters {
     /// The Rasmussen observer.
     pub rasmussen: RasmussenParameters,
-    /// The tracker of those that find an angle error.
+    /// The tracker of the estimators that calculate an angle error.
     pub tracker: TrackerParameters,
-    /// Those on the EMF.
+    /// The back-EMF estimators.
     pub emf: EmfParameters,
     /// Voltage model and current model.
     pub matsui: MatsuiParameters,

@@ -1,4 +1,4 @@
-//! An estimator beside a machine that turns steadily, for the estimators' unit tests: no control, no noise.
+//! Runs an estimator next to a machine at constant speed, for the estimators' unit tests: no control, no noise.
 
 use crate::control::current::CurrentLoop;
 use crate::estimator::{Context, Estimating, EstimatorParameters, Injection, Sample};
@@ -7,15 +7,15 @@ use crate::math::wrap;
 use crate::motor::Motor;
 use crate::plant::machine::flux;
 
-/// The machine of the tests, salient.
+/// The salient machine used in the tests.
 pub(crate) fn salient() -> Motor {
     Motor::IPMSM_2_2_KW
 }
 
-/// Angle error theta - theta^ (rad) and speed error (rad/s) after `n` samples of 0.1 ms beside a machine with the
-/// current `i` (A, rotor frame), turning at `w` (rad/s, electrical). The estimate starts `theta_tilde` (rad) behind with
-/// the right speed; `hat` are its machine values. The voltage of each interval is the exact mean, the resistive part by
-/// the trapezoid that every estimator assumes between samples.
+/// Angle error theta - theta^ (rad) and speed error (rad/s) after `n` samples of 0.1 ms next to a machine that has the
+/// current `i` (A, rotor frame) and turns at `w` (rad/s, electrical). The estimate starts `theta_tilde` (rad) behind
+/// with the correct speed; `hat` holds its machine values. The voltage of each interval is the exact mean; its
+/// resistive part uses the trapezoid that every estimator assumes between samples.
 pub(crate) fn beside<E: Estimating>(
     par: &EstimatorParameters,
     hat: &Motor,
@@ -42,7 +42,8 @@ pub(crate) fn beside<E: Estimating>(
     (wrap(theta - estimate.theta), w - estimate.w)
 }
 
-/// From 20 degrees on either side, in both directions, loaded: the estimate must come to the rotor; slowest at `slowest` (rad/s).
+/// Starts 20 degrees off on either side, in both directions, loaded: the estimate must converge, slowest at `slowest`
+/// (rad/s).
 pub(crate) fn comes_to_the_rotor<E: Estimating>(slowest: f64) {
     let par = EstimatorParameters::default();
     for w in [slowest, 235.0, 471.0, -235.0] {
@@ -64,9 +65,10 @@ pub(crate) fn with_L_q<E: Estimating>(factor: f64) -> f64 {
     beside::<E>(&EstimatorParameters::default(), &hat, point, 0.0, 10_000).0.to_degrees()
 }
 
-/// Angle error theta - theta^ (rad) after `n` samples of 0.1 ms beside the machine `plant`, which turns at `w` (rad/s,
-/// electrical) with no current but what the estimator injects, `delay` samples later. The estimate starts `theta_tilde`
-/// (rad) behind with the right speed and the values of [`salient`]; `each` sees it after every sample.
+/// Angle error theta - theta^ (rad) after `n` samples of 0.1 ms next to the machine `plant`, which turns at `w` (rad/s,
+/// electrical). Its only current comes from the estimator's injection, `delay` samples later. The estimate starts
+/// `theta_tilde` (rad) behind with the correct speed and the values of [`salient`]; `each` receives it after every
+/// sample.
 pub(crate) fn injected<E: Estimating>(
     par: &EstimatorParameters,
     plant: &Motor,
@@ -84,7 +86,7 @@ pub(crate) fn injected<E: Estimating>(
     let (mut theta, mut psi, mut i_last) = (0.3_f64, Dq::ZERO, AlphaBeta::ZERO);
     let first = Sample { k: 0, ..Sample::default() };
     let (mut estimator, mut estimate) = E::start(&context, &first, theta - theta_tilde, w);
-    // What was asked for at the last samples, the newest first.
+    // The voltages requested at the last samples, the newest first.
     let mut asked = [AlphaBeta::ZERO; 3];
     for k in 1..=n {
         let acting = Axis::<Estimated>::at(estimate.theta + lead * T_s * estimate.w);
@@ -95,7 +97,7 @@ pub(crate) fn injected<E: Estimating>(
         };
         asked = [newest, asked[0], asked[1]];
         let u = asked[delay];
-        // The flux linkage of the injection alone, in stator axes: d psi/dt = u - R i, by Heun's method.
+        // The injected flux linkage in stator axes: d psi/dt = u - R i, by Heun's method.
         let h = T_s / f64::from(PARTS);
         let current = |theta: f64, psi: AlphaBeta| {
             let psi = rotor(theta).from_stator(psi);
@@ -118,8 +120,8 @@ pub(crate) fn injected<E: Estimating>(
     wrap(theta - estimate.theta)
 }
 
-/// From 40 degrees on either side, at standstill and turning, with every delay, the estimate must come to the rotor within
-/// `tolerance` (deg), and from 130 degrees to its other end.
+/// Starts 40 degrees off on either side, at standstill and turning, with every delay: the estimate must converge to the
+/// rotor within `tolerance` (deg). From 130 degrees it must converge to the opposite pole.
 pub(crate) fn finds_the_rotor<E: Estimating>(par: &EstimatorParameters, tolerance: f64) {
     for delay in [0, 1, 2] {
         for w in [0.0, 47.0, -47.0] {

@@ -1,12 +1,12 @@
-//! Trackers: from an angle error e = theta - theta^ (Kim & Sul's sign) to angle and speed.
+//! Trackers: they calculate angle and speed from an angle error e = theta - theta^ (Kim & Sul's sign).
 //!
 //! - PLL, poles (s + rho)^2: theta^ += T_s (w^ + 2 rho e), w^ += T_s rho^2 e.
 //! - Mechanical observer, poles (s + rho)^3, with the torque reference tau* as feed-forward:
 //!   theta^ += T_s (w^ + 3 rho e), w^ += T_s (n_p / J (tau* - tau_L) + 3 rho^2 e), tau_L -= T_s J / n_p rho^3 e.
 //!
-//! The PLL follows a constant speed without an error; the mechanical observer a constant load and, as far as J is right,
-//! each torque of its own, so its speed has no lag.
-//! Limits: behind a filter or observer of bandwidth w_o, rho <= w_o / 3; below 2 pi 15 rad/s a 50 % load step loses it.
+//! The PLL follows a constant speed without an error. The mechanical observer follows a constant load without an error
+//! and, if J is correct, every change of its own torque, so its speed does not lag. Limits: after a filter or observer
+//! of bandwidth w_o, rho <= w_o / 3; below 2 pi 15 rad/s, a 50 % load step loses synchronism.
 
 use crate::estimator::{Context, Estimate, Sample};
 use fmu_core::unit::RAD_PER_S;
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
 enumeration! {
-    /// The trackers; a value never changes.
+    /// The trackers; values never change.
     #[derive(Serialize, Deserialize)]
     pub enum TrackerKind("Tracker", "Tracker of angle and speed from an angle error") {
         1 Pll "Phase-locked loop of second order";
@@ -26,9 +26,9 @@ enumeration! {
 /// The parameters with the prefix `tracker.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrackerParameters {
-    /// Which tracker.
+    /// The selected tracker.
     pub kind: TrackerKind,
-    /// Pole rho in rad/s, > 0, of multiplicity two or three.
+    /// Pole rho in rad/s, > 0, with multiplicity two or three.
     pub bandwidth: f64,
 }
 
@@ -47,7 +47,7 @@ pub struct Tracker {
     pub theta_last: f64,
     /// Electrical speed in rad/s.
     pub w: f64,
-    /// Speed of the frame from this sample to the next in rad/s: w and the correction of the angle.
+    /// Frame speed from this sample to the next in rad/s: w plus the angle correction.
     pub w_frame: f64,
     /// Load torque in N.m (mechanical observer).
     pub tau_load: f64,
@@ -59,15 +59,15 @@ impl Tracker {
         Self { theta, theta_last: theta - w * T_s, w, w_frame: w, tau_load: 0.0 }
     }
 
-    /// To the next sample, `T_s` (s) later: first thing in an update.
+    /// Advances to the next sample, `T_s` (s) later; each update calls this first.
     #[inline]
     pub fn advance(&mut self, T_s: f64) {
         self.theta_last = self.theta;
         self.theta += T_s * self.w_frame;
     }
 
-    /// Corrects by the angle error `e` (rad) with the bandwidth `rho` (rad/s): the angle from the next sample on, the
-    /// speed at once. `tau_ref` (N.m) is the torque reference.
+    /// Corrects the state with the angle error `e` (rad) and the bandwidth `rho` (rad/s): the angle from the next
+    /// sample on, the speed immediately. `tau_ref` (N.m) is the torque reference.
     #[inline]
     pub fn correct(&mut self, context: &Context, rho: f64, e: f64, tau_ref: f64) {
         let T_s = context.T_s;
@@ -83,10 +83,10 @@ impl Tracker {
     }
 }
 
-/// Whether the tracker can work.
+/// Checks that the tracker can work.
 ///
 /// # Errors
-/// The mechanical observer has no inertia.
+/// The mechanical observer has no inertia value.
 pub fn validate(context: &Context) -> Result<(), Fault> {
     if context.par.tracker.kind == TrackerKind::MechanicalObserver
         && context.J.partial_cmp(&0.0) != Some(Ordering::Greater)
@@ -101,8 +101,8 @@ pub fn validate(context: &Context) -> Result<(), Fault> {
 }
 
 impl Tracker {
-    /// The common end of the methods that find an angle error: the tracker follows `e` (rad), and its angle and speed are
-    /// the estimate.
+    /// The common last step of the methods that calculate an angle error: the tracker follows `e` (rad) and supplies
+    /// the estimated angle and speed.
     #[inline]
     pub fn follow(&mut self, context: &Context, e: f64, sample: &Sample) -> Estimate {
         self.correct(context, context.par.tracker.bandwidth, e, sample.tau_ref);
@@ -112,7 +112,7 @@ impl Tracker {
 
 type P = Row<TrackerParameters>;
 
-/// The tracker's variables; their owner gives the prefix `tracker.`.
+/// The tracker's variables; their owner adds the prefix `tracker.`.
 pub const TRACKER: &Table<TrackerParameters> = &Table::new(
     const {
         &[
@@ -137,7 +137,7 @@ mod tests {
     use crate::estimator::EstimatorParameters;
     use crate::motor::Motor;
 
-    /// Angle and speed error after `n` samples behind a rotor with a constant acceleration (rad/s2).
+    /// Angle and speed error after `n` samples when following a rotor with a constant acceleration (rad/s2).
     fn behind(kind: TrackerKind, acceleration: f64, tau_ref: f64, n: u32) -> (f64, f64) {
         let par = EstimatorParameters {
             tracker: TrackerParameters { kind, ..TrackerParameters::default() },

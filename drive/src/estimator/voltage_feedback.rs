@@ -1,13 +1,14 @@
-//! Fundamental voltage feedback (Kim & Sul (31), (32), after Bae et al. 2003): 6 of the review.
+//! Fundamental voltage feedback (Kim & Sul (31), (32), after Bae et al. 2003): method 6 of the review.
 //!
-//! The current controller's feed-forward (31) is all the voltage that a right frame needs, so what its PI adds on the
-//! d axis is the angle error: v_d,fb = -w psi_M sin theta~. e = -s v_d,fb / (psi_M |w|) to a tracker. With the frame's speed
-//! kept, e = -s (v_d,fb + (w_f - w) L_d i_q) / (psi_M |w|). Corrected print: (31) has R_s in both rows.
+//! In a correctly aligned frame, the current controller's feed-forward (31) supplies the full voltage. The PI output on
+//! the d-axis therefore shows the angle error: v_d,fb = -w psi_M sin theta~. A tracker receives e = -s v_d,fb / (psi_M
+//! |w|), or, with the frame-speed term, e = -s (v_d,fb + (w_f - w) L_d i_q) / (psi_M |w|). Correction to the paper:
+//! (31) has R_s in both rows.
 //!
-//! It asks for a current loop of its own kind: feed-forward from the references and no active resistance, best with
+//! The method needs a specific current loop: feed-forward from the references and no active resistance, preferably with
 //! `current.integral` = 0.2.
-//! Limits: L p i is neglected; rated load is held from 0.02 of the rated speed with the frame term; as printed it fails at
-//! 0.1 with rho = 2 pi 15 rad/s. A reversal at light load is ambiguous by half a turn.
+//! Limits: L p i is neglected. The method holds rated load from 0.02 of the rated speed with the frame term; as
+//! printed, it fails at 0.1 with rho = 2 pi 15 rad/s. A reversal at light load is ambiguous by half a turn.
 
 use crate::estimator::emf::{self, Direction, pole};
 use crate::estimator::interval::Interval;
@@ -16,15 +17,15 @@ use crate::estimator::{Context, Estimate, Estimating, Sample};
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
-/// Greatest angle error in rad that is passed on.
+/// Largest angle error in rad that is passed on.
 const CLIP: f64 = 0.5;
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VoltageFeedback {
     tracker: Tracker,
     direction: Direction,
-    /// Smoothed voltage of the frame's speed in V.
+    /// Smoothed frame-speed voltage in V.
     frame: f64,
 }
 

@@ -1,12 +1,13 @@
-//! The voltage model (Kim & Sul (24)-(27), Fig. 4, after Matsui 1993): 4 of the review.
+//! The voltage model (Kim & Sul (24)-(27), Fig. 4, after Matsui 1993): method 4 of the review.
 //!
-//! Speed from the q row: w_cal = (v_q - R i_q - L_q p i_q - (w_f - w) L_q i_d) / (psi_M + L_d i_d), smoothed to w. Angle from
-//! what the d row then lacks: dv_d = v_d - R i_d - L_d p i_d + w L_q i_q + (w_f - w) L_d i_q = -w psi_M sin theta~, and
-//! e = -s dv_d / (psi_M |w|) draws the frame ([`follower`](crate::estimator::follower)).
-//! Corrected print: the q row of (24) is L_q p i_q + w L_d i_d; (25) is exact only with the frame term.
+//! The q row gives the speed: w_cal = (v_q - R i_q - L_q p i_q - (w_f - w) L_q i_d) / (psi_M + L_d i_d), smoothed to w.
+//! The residual of the d row, dv_d = v_d - R i_d - L_d p i_d + w L_q i_q + (w_f - w) L_d i_q = -w psi_M sin theta~,
+//! gives the angle: e = -s dv_d / (psi_M |w|) corrects the frame ([`follower`](crate::estimator::follower)).
+//! Correction to the paper: the q row of (24) is L_q p i_q + w L_d i_d; (25) is exact only with the frame-speed term.
 //!
-//! Limits: rated load is held from 0.03 of the rated speed, 0.05 with a compensated inverter; L_q + 20 % turns by 5.5 deg.
-//! With L_q + 20 % rated load oscillates above 0.75 of the rated speed. The derivative of the current makes the speed noisy.
+//! Limits: the method holds rated load from 0.03 of the rated speed, 0.05 with a compensated inverter. L_q + 20 %
+//! shifts the angle by 5.5 deg and makes rated load oscillate above 0.75 of the rated speed. The derivative of the
+//! current makes the speed noisy.
 
 use crate::estimator::emf::pole;
 use crate::estimator::follower::Follower;
@@ -14,7 +15,7 @@ use crate::estimator::interval::Interval;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
 use serde::{Deserialize, Serialize};
 
-/// What a sample hands on to the next.
+/// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VoltageModel {
     follower: Follower,
