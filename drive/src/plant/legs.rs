@@ -50,14 +50,16 @@ impl Legs {
         self.i_zone * motor.L_d.min(motor.L_q) / self.u
     }
 
-    /// Voltage (V) lost at the stator with the current `i` (A) in the rotor frame on `axis`.
+    /// Whether the legs drop a voltage.
     #[inline]
-    pub fn loss(&self, axis: Axis<Rotor>, i: Dq) -> AlphaBeta {
-        if self.u > 0.0 {
-            dead_time_loss(self.u, self.i_zone, Phases::from_stator(axis.to_stator(i)))
-        } else {
-            AlphaBeta::ZERO
-        }
+    pub fn drop(&self) -> bool {
+        self.u > 0.0
+    }
+
+    /// Voltage (V) lost at the stator with the current `i` (A).
+    #[inline(never)]
+    pub fn loss(&self, i: AlphaBeta) -> AlphaBeta {
+        dead_time_loss(self.u, self.i_zone, Phases::from_stator(i))
     }
 
     /// Current (A) that legs with the currents `i` (A) feed into the DC link through this voltage drop.

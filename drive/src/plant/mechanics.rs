@@ -8,7 +8,7 @@
 //! Rasmussen 2006 gives the torque but not the load; the friction is that of the assumed machine. J in kg.m2, B in
 //! N.m.s/rad, torques in N.m, speeds in rad/s (mechanical).
 
-use crate::math::tanh;
+use crate::math::{tanh, tanh_beside};
 use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, SPEED};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
@@ -41,17 +41,46 @@ impl Mechanics {
         self.B * speed + self.tau_coulomb * tanh(speed / self.w_coulomb)
     }
 
+    /// What [`friction_beside`](Self::friction_beside) needs of the friction at `speed` (rad/s).
+    #[inline]
+    pub fn friction_at(&self, speed: f64) -> FrictionAt {
+        FrictionAt { speed, share: tanh(speed / self.w_coulomb) }
+    }
+
+    /// Friction torque in N.m at a `speed` (rad/s), quickly if it is close to that of `start`.
+    #[inline]
+    pub fn friction_beside(&self, start: &FrictionAt, speed: f64) -> f64 {
+        let d = (speed - start.speed) * (1.0 / self.w_coulomb);
+        let share = if d.abs() > 0.5 {
+            tanh(speed / self.w_coulomb)
+        } else if start.share.abs() < 1.0 {
+            tanh_beside(start.share, d)
+        } else {
+            start.share
+        };
+        self.B * speed + self.tau_coulomb * share
+    }
+
     /// Torque of the shaft on the load in N.m: `tau_load`, or `tau_e` minus `friction` (N.m) with an imposed speed.
     #[inline]
-    pub fn tau_shaft(&self, tau_e: f64, tau_load: f64, friction: f64) -> f64 {
-        if self.imposed { tau_e - friction } else { tau_load }
+    pub fn tau_shaft(&self, tau_e: f64, tau_load: f64, friction: impl FnOnce() -> f64) -> f64 {
+        if self.imposed { tau_e - friction() } else { tau_load }
     }
 
     /// Acceleration in rad/s2 from electromagnetic, shaft and friction torque (N.m); zero with an imposed speed.
     #[inline]
     pub fn acceleration(&self, tau_e: f64, tau_shaft: f64, friction: f64) -> f64 {
-        if self.imposed { 0.0 } else { (tau_e - tau_shaft - friction) / self.J }
+        if self.imposed { 0.0 } else { (tau_e - tau_shaft - friction) * (1.0 / self.J) }
     }
+}
+
+/// The Coulomb friction at a speed, for the speeds close to it.
+#[derive(Clone, Copy, Debug)]
+pub struct FrictionAt {
+    /// Speed in rad/s.
+    speed: f64,
+    /// Share of the Coulomb torque, tanh(speed / w_coulomb).
+    share: f64,
 }
 
 type P = Row<Mechanics>;
