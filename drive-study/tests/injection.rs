@@ -351,55 +351,6 @@ fn hybrid_holds_rated_load_at_every_speed() {
     }
 }
 
-/// The message with which a combination is refused.
-fn refused(kind: Kind, set: impl Fn(&mut ControllerParameters)) -> String {
-    let mut pair = preset(kind);
-    set(&mut pair.controller.model.parameters);
-    let fault = pair.controller.model.validate().expect_err("must be refused");
-    fault.message().to_owned()
-}
-
-#[test]
-fn what_cannot_work_is_refused_with_names_and_reasons() {
-    for method in &METHODS {
-        let message = refused(method.kind, |p| p.motor.L_q = p.motor.L_d);
-        for part in ["motor.L_d = 0.036 H", "motor.L_q = 0.036 H", "differ"] {
-            assert!(message.contains(part), "{message}");
-        }
-    }
-    for kind in [Kind::RotatingInjection, Kind::PulsatingInjection] {
-        for frequency in [1100.0, 2500.0, 200.0, 1e9, 1e-9] {
-            let message = refused(kind, |p| p.estimators.carrier.frequency = TAU * frequency);
-            for part in ["carrier.frequency = ", "T_s = 0.0001 s", "whole number from 6 to 32"] {
-                assert!(message.contains(part), "{message}");
-            }
-        }
-    }
-    let message = refused(Kind::Hybrid, |p| p.estimators.hybrid.w_high = p.estimators.hybrid.w_low);
-    assert!(message.contains("hybrid.w_high = ") && message.contains("above hybrid.w_low = "), "{message}");
-    let message = refused(Kind::Hybrid, |p| p.motor.L_q = p.motor.L_d);
-    assert!(message.contains("motor.L_d = 0.036 H"), "{message}");
-    let message = refused(Kind::SquareWaveInjection, |p| p.estimators.square_wave.samples = 3);
-    assert!(message.contains("square_wave.samples") && message.contains("2 or 4"), "{message}");
-    let message = refused(Kind::SquareWaveInjection, |p| {
-        p.estimators.tracker.kind = TrackerKind::MechanicalObserver;
-        p.J = 0.0;
-    });
-    for part in ["mechanics.J = 0 kg.m2", "tracker.kind", "MechanicalObserver"] {
-        assert!(message.contains(part), "{message}");
-    }
-}
-
-#[test]
-fn a_start_that_cannot_work_is_refused() {
-    let message = refused(Kind::ExtendedEmf, |p| p.start.mode = StartMode::Injection);
-    for part in ["start.mode = 3", "estimator = 4 (ExtendedEmf)"] {
-        assert!(message.contains(part), "{message}");
-    }
-    let message = refused(Kind::SquareWaveInjection, |p| p.start.mode = StartMode::Injection);
-    assert!(message.contains("saturation.s_2 = 0 A/Wb2"), "{message}");
-}
-
 /// A rotor that is torn away, voltages that are not there: nothing but finite numbers.
 #[test]
 fn a_lost_rotor_yields_numbers() {

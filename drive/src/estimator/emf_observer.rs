@@ -9,6 +9,7 @@
 //!
 //! Limits: those of the extended EMF; for large angle errors, the neglected saliency slows convergence.
 
+use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
@@ -53,8 +54,8 @@ impl Estimating for EmfObserver {
         self.tracker.follow(context, emf::angle_error(s, e_d, e_q), sample)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        emf::validate(context)
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        emf::validate(par)
     }
 }
 
