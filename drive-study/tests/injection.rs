@@ -6,9 +6,7 @@ use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 use drive::estimator::pulsating::Demodulation;
-use drive::estimator::tracker::TrackerKind;
 use drive_study::runner::{drive as preset, *};
-use fmu_core::Model;
 use std::f64::consts::TAU;
 
 /// One row of the table: what is set and what must come out.
@@ -30,77 +28,26 @@ struct Method {
     current: (f64, f64),
 }
 
+#[rustfmt::skip]
 const METHODS: [Method; 6] = [
-    Method {
-        name: "rotating",
-        kind: Kind::RotatingInjection,
-        set: |_| (),
-        mean: 0.4,
-        std: 1.2,
-        std_theory: 0.66,
-        pll: 10.6,
-        observer: (34.0, 42.0, 42.0),
-        current: (0.263, 0.37),
-    },
-    Method {
-        name: "pulsating, heterodyne",
-        kind: Kind::PulsatingInjection,
-        set: |_| (),
-        mean: 0.4,
-        std: 2.1,
-        std_theory: 0.93,
-        pll: 10.3,
-        observer: (45.0, 52.0, 52.0),
-        current: (0.215, 0.25),
-    },
-    Method {
-        name: "pulsating, 45-degree axes",
-        kind: Kind::PulsatingInjection,
-        set: |p| p.estimators.pulsating.demodulation = Demodulation::MeasurementAxes,
-        mean: 0.4,
-        std: 2.1,
-        std_theory: 0.93,
-        pll: 10.3,
-        observer: (45.0, 52.0, 52.0),
-        current: (0.215, 0.25),
-    },
-    Method {
-        name: "square wave, 2 samples",
-        kind: Kind::SquareWaveInjection,
-        set: |_| (),
-        mean: 0.15,
-        std: 2.0,
-        std_theory: 1.40,
-        pll: 24.0,
-        observer: (36.0, 46.0, 53.0),
-        current: (0.121, 0.08),
-    },
-    Method {
-        name: "square wave, 4 samples",
-        kind: Kind::SquareWaveInjection,
-        set: |p| {
-            p.estimators.square_wave.samples = 4;
-            p.speed_loop.bandwidth = TAU * 8.0;
-        },
-        mean: 0.25,
-        std: 1.5,
-        std_theory: 0.99,
-        pll: 16.0,
-        observer: (36.0, 46.0, 53.0),
-        current: (0.241, 0.31),
-    },
-    Method {
-        name: "near PWM",
-        kind: Kind::NearPwmInjection,
-        set: |_| (),
-        mean: 0.3,
-        std: 1.9,
-        std_theory: 1.22,
-        pll: 26.0,
-        observer: (30.0, 39.0, 39.0),
-        current: (0.147, 0.12),
-    },
+    Method { name: "rotating", kind: Kind::RotatingInjection, set: |_| (),
+        mean: 0.4, std: 1.2, std_theory: 0.66, pll: 10.6, observer: (34.0, 42.0, 42.0), current: (0.263, 0.37) },
+    HETERODYNE,
+    Method { name: "pulsating, 45-degree axes",
+        set: |p| p.estimators.pulsating.demodulation = Demodulation::MeasurementAxes, ..HETERODYNE },
+    Method { name: "square wave, 2 samples", kind: Kind::SquareWaveInjection, set: |_| (),
+        mean: 0.15, std: 2.0, std_theory: 1.40, pll: 24.0, observer: (36.0, 46.0, 53.0), current: (0.121, 0.08) },
+    Method { name: "square wave, 4 samples", kind: Kind::SquareWaveInjection,
+        set: |p| (p.estimators.square_wave.samples, p.speed_loop.bandwidth) = (4, TAU * 8.0),
+        mean: 0.25, std: 1.5, std_theory: 0.99, pll: 16.0, observer: (36.0, 46.0, 53.0), current: (0.241, 0.31) },
+    Method { name: "near PWM", kind: Kind::NearPwmInjection, set: |_| (),
+        mean: 0.3, std: 1.9, std_theory: 1.22, pll: 26.0, observer: (30.0, 39.0, 39.0), current: (0.147, 0.12) },
 ];
+
+#[rustfmt::skip]
+const HETERODYNE: Method =
+    Method { name: "pulsating, heterodyne", kind: Kind::PulsatingInjection, set: |_| (),
+        mean: 0.4, std: 2.1, std_theory: 0.93, pll: 10.3, observer: (45.0, 52.0, 52.0), current: (0.215, 0.25) };
 
 impl Method {
     fn pair(&self) -> Pair {
@@ -133,7 +80,7 @@ fn error_at_standstill_and_low_speed() {
 
 /// The second way to the standard deviation: the noise of the currents through the demodulation and the PLL.
 ///
-/// Per axis sigma^2 = 2/3 (noise^2 + resolution^2 / 12). The demodulation makes of it an error of the density g sigma /
+/// Per axis sigma^2 = 2/3 (noise^2 + resolution^2 / 12). The demodulation turns it into an error of the density g sigma /
 /// (2 T_s D U) per sample, with the gain g of its filter at the carrier and U the voltage it works with; the PLL lets
 /// 2 B T_s of it pass, B = 5/8 rho.
 #[test]

@@ -32,9 +32,9 @@ const MIN_DIFFERENCE: f64 = 0.02;
 pub struct PolarityParameters {
     /// Time of injection in s, > 0.
     pub t_find: f64,
-    /// Voltage V of the pulses, > 0.
+    /// Magnitude V of the voltage pulses in V, > 0.
     pub voltage: f64,
-    /// Samples of a pulse, >= 1.
+    /// Duration of a pulse in samples, >= 1.
     pub samples: i32,
 }
 

@@ -23,7 +23,7 @@ use std::f64::consts::TAU;
 /// The parameters with the prefix `carrier.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CarrierParameters {
-    /// Voltage V, > 0.
+    /// Amplitude V of the carrier voltage in V, > 0.
     pub voltage: f64,
     /// Angular frequency w_h in rad/s, > 0; one period must be a whole number of samples.
     pub frequency: f64,
@@ -74,7 +74,8 @@ impl Carrier {
     }
 }
 
-/// Samples of `T_s` (s) per period of the carrier `frequency` (rad/s), if this is a whole number that the filters support.
+/// Samples of `T_s` (s) per period of the carrier `frequency` (rad/s), if this is a whole number that the filters
+/// support.
 #[inline]
 fn samples(frequency: f64, T_s: f64) -> Option<usize> {
     let exact = TAU / (frequency * T_s);

@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 /// The parameters with the prefix `near_pwm.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NearPwmParameters {
-    /// Voltage V, > 0.
+    /// Magnitude V of the injected voltage in V, > 0.
     pub voltage: f64,
 }
 

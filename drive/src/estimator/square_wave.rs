@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 /// The parameters with the prefix `square_wave.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SquareWaveParameters {
-    /// Voltage V, > 0.
+    /// Amplitude V of the injected voltage in V, > 0.
     pub voltage: f64,
     /// Samples per period: 2 or 4.
     pub samples: i32,
