@@ -1,6 +1,6 @@
 //! The average output of three inverter legs over a PWM period for a voltage command: the hexagon of the DC link and
-//! the dead-time voltage. Plant and controller share these functions: the plant models the inverter, and the controller
-//! knows it.
+//! the dead-time voltage. The plant models its inverter with these functions, and the controller takes its limits and
+//! its dead time into account with the same ones.
 //!
 //! The hexagon is derived here from three legs between the rails. Dead time: a leg loses u_dead sign(i), or u_dead i /
 //! i_zero below i_zero. This is the field's usual mean-value model; neither paper contains it. u in V, i in A.

@@ -154,9 +154,9 @@ impl<W: 'static> Row<W> {
         get: fn(&mut W) -> &mut [f64],
     ) -> Self {
         let kind = Kind::Real(quantity);
-        let mut it = Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Reals(get));
-        it.meta.dimension = Some(dimension);
-        it
+        let mut row = Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Reals(get));
+        row.meta.dimension = Some(dimension);
+        row
     }
 
     /// An integer parameter.

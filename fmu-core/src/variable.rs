@@ -43,7 +43,7 @@ pub enum Variability {
 /// An enumeration: a type with named values.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Enumeration {
-    /// Name of the type definition; no variable may bear it.
+    /// Name of the type definition; no variable may have it.
     pub name: &'static str,
     /// Description of the type.
     pub description: &'static str,

@@ -122,7 +122,7 @@ impl<M: Model> Instance<M> {
                     done += 1;
                 }
                 value.write(slot);
-                // The model sees an input by itself; the rest waits for `initialize` or `derive`.
+                // The model reads inputs directly; parameters take effect through `initialize` or `derive`.
                 dirty |= meta.causality == Causality::Parameter;
             }
         }

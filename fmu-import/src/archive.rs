@@ -1,13 +1,13 @@
 //! Opens the archive of an FMU: reads its description and extracts what is needed to run it.
 
 use super::Error;
+use crate::folder::Folder;
 use crate::platform::Platform;
 use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 use zip::ZipArchive;
 
 /// Maximum number of unpacked bytes, also for an archive whose headers claim less.
@@ -49,8 +49,9 @@ impl Archive {
         xml.map(read).transpose()
     }
 
-    /// Extracts the binaries for this platform and the resources; returns the folder and the path of the binary.
-    pub(super) fn extract(&mut self) -> Result<(TempDir, PathBuf), Error> {
+    /// Extracts the binaries for this platform and the resources; returns the folder, the path of the binary, and whether
+    /// that is the only file.
+    pub(super) fn extract(&mut self) -> Result<(Folder, PathBuf, bool), Error> {
         let wrong = |path: &Path, cause: &dyn std::fmt::Display| Error::file(path, cause);
         let Some(interface) = &self.description.co_simulation else {
             return Err(wrong(&self.path, &"has no co-simulation interface"));
@@ -62,13 +63,13 @@ impl Archive {
         let Some(&folder) = folders.iter().find(has) else {
             return Err(wrong(&self.path, &self.missing_binary(folders[0], &name)));
         };
-        let dir = tempfile::Builder::new().prefix("fmu-").tempdir().map_err(|e| wrong(&self.path, &e))?;
+        let dir = Folder::new().map_err(|e| wrong(&self.path, &e))?;
         // The resources folder is named to the FMU, so it exists even when the archive has none.
         fs::create_dir(dir.path().join("resources")).map_err(|e| wrong(&self.path, &e))?;
         let binaries = format!("binaries/{folder}/");
-        self.extract_into(dir.path(), &[&binaries, "resources/"]).map_err(|e| wrong(&self.path, &e))?;
+        let files = self.extract_into(dir.path(), &[&binaries, "resources/"]).map_err(|e| wrong(&self.path, &e))?;
         let binary = dir.path().join(&binaries).join(name);
-        Ok((dir, binary))
+        Ok((dir, binary, files == 1))
     }
 
     /// Every file, with its name.
@@ -91,8 +92,9 @@ impl Archive {
         Ok(files)
     }
 
-    fn extract_into(&mut self, dir: &Path, prefixes: &[&str]) -> io::Result<()> {
-        let mut left = LIMIT;
+    /// Extracts what begins with one of the prefixes; returns the number of files.
+    fn extract_into(&mut self, dir: &Path, prefixes: &[&str]) -> io::Result<usize> {
+        let (mut left, mut files) = (LIMIT, 0);
         for (index, name) in self.names.iter().enumerate() {
             if !prefixes.iter().any(|p| name.starts_with(p)) {
                 continue;
@@ -113,8 +115,9 @@ impl Archive {
             let too_much = || io::Error::other(format!("{name}: unpacks to more than {LIMIT} bytes"));
             left = left.checked_sub(copied).ok_or_else(too_much)?;
             out.flush()?;
+            files += 1;
         }
-        Ok(())
+        Ok(files)
     }
 
     fn missing_binary<'a>(&'a self, folder: &str, name: &str) -> String {

@@ -3,8 +3,8 @@
 use super::standard::{Experiment, Outcome, Refusal, Standard};
 use super::{Error, Values, explain};
 use crate::abi::log::{Log, Message, Status};
+use crate::abi::shared::Handle;
 use model_description::{BaseType, Dimension, ModelDescription, ModelVariable};
-use std::ffi::c_void;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct State(usize);
 
-/// An instance of an FMU. Dropping it frees it.
+/// An instance of an FMU, which may go from thread to thread. Dropping it frees it.
 pub struct Instance {
     name: String,
     description: Arc<ModelDescription>,
-    standard: Box<dyn Standard>,
-    states: Vec<Option<*mut c_void>>,
+    standard: Box<dyn Standard + Send>,
+    states: Vec<Option<Handle>>,
     dead: bool,
     // After the instance, which may log while it is freed.
     log: Arc<Log>,
@@ -27,7 +27,7 @@ impl Instance {
     pub(super) fn new(
         name: &str,
         description: Arc<ModelDescription>,
-        standard: Box<dyn Standard>,
+        standard: Box<dyn Standard + Send>,
         log: Arc<Log>,
     ) -> Self {
         Self { name: name.into(), description, standard, states: Vec::new(), dead: false, log }
@@ -214,7 +214,7 @@ impl Instance {
         Ok(State(self.states.len() - 1))
     }
 
-    fn state(&self, state: State) -> Result<*mut c_void, Error> {
+    fn state(&self, state: State) -> Result<Handle, Error> {
         let alive = self.states.get(state.0).copied().flatten();
         alive.ok_or_else(|| Error::usage(&self.name, "the state was freed, or is of another instance"))
     }

@@ -27,6 +27,7 @@ mod archive;
 pub mod cosimulation;
 pub mod elf;
 mod error;
+mod folder;
 mod instance;
 pub mod platform;
 pub mod ssp;
@@ -49,7 +50,6 @@ use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tempfile::TempDir;
 
 /// The description of an `.fmu` file, and all its files.
 ///
@@ -61,13 +61,15 @@ pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u
     Ok((archive.description, files))
 }
 
-/// An unpacked FMU with its description and its loaded binary. Every `Fmu` has its own copy of the binary.
+/// An FMU with its description and its loaded binary. Every opening loads a copy of the binary of its own; clones share it.
+#[derive(Clone)]
 pub struct Fmu {
     path: PathBuf,
     description: Arc<ModelDescription>,
-    terminals: Result<Option<TerminalsAndIcons>, Error>,
+    terminals: Arc<Result<Option<TerminalsAndIcons>, Error>>,
     functions: Functions,
-    dir: Arc<TempDir>,
+    /// Path of the unpacked folder `resources`, which is only there if the archive has one.
+    resources: PathBuf,
 }
 
 impl Fmu {
@@ -79,12 +81,15 @@ impl Fmu {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let mut archive = Archive::open(path)?;
-        let (dir, binary) = archive.extract()?;
-        let terminals = archive.terminals();
-        let (description, dir) = (archive.description, Arc::new(dir));
+        let (folder, binary, alone) = archive.extract()?;
+        let folder = Arc::new(folder);
+        let (terminals, description) = (Arc::new(archive.terminals()), Arc::new(archive.description));
+        let resources = folder.path().join("resources");
+        // A binary that is loaded needs its file no more, except on Windows: then a kill leaves nothing behind.
+        let kept = (cfg!(windows) || !alone).then(|| folder.clone());
         let functions =
-            Functions::load(&binary, description.version, &dir).map_err(|e| Error::file(path, e.cause()))?;
-        Ok(Self { path: path.into(), description: Arc::new(description), terminals, functions, dir })
+            Functions::load(&binary, description.version, kept).map_err(|e| Error::file(path, e.cause()))?;
+        Ok(Self { path: path.into(), description, terminals, functions, resources })
     }
 
     /// The contents of modelDescription.xml.
@@ -97,7 +102,7 @@ impl Fmu {
     /// # Errors
     /// The file cannot be read; the FMU runs all the same.
     pub fn terminals(&self) -> Result<Option<&TerminalsAndIcons>, Error> {
-        self.terminals.as_ref().map(Option::as_ref).map_err(Clone::clone)
+        (*self.terminals).as_ref().map(Option::as_ref).map_err(Clone::clone)
     }
 
     /// Path of the `.fmu` file.
@@ -112,12 +117,11 @@ impl Fmu {
     pub fn instantiate(&self, name: &str, logging: bool) -> Result<Instance, Error> {
         let c_name = text(name, name)?;
         let token = text(name, &self.description.token)?;
-        let resources = self.dir.path().join("resources");
         let log = Arc::<Log>::default();
         let resources = match self.description.version {
-            FmiVersion::V2 => file_uri(&resources),
+            FmiVersion::V2 => file_uri(&self.resources),
             // FMI 3.0 wants a path of this system with a separator at its end (FMI 3.0.2, 2.3.1).
-            FmiVersion::V3 => format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR),
+            FmiVersion::V3 => format!("{}{}", self.resources.display(), std::path::MAIN_SEPARATOR),
         };
         let resources = text(name, &resources)?;
         match self.functions.instantiate(&c_name, &token, &resources, &log, logging) {
@@ -155,6 +159,14 @@ pub fn file_uri(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn threads_share_fmus_and_pass_instances_on() {
+        fn shared<T: Clone + Send + Sync>() {}
+        fn passed_on<T: Send>() {}
+        shared::<Fmu>();
+        passed_on::<Instance>();
+    }
 
     #[test]
     #[cfg(unix)]

@@ -117,19 +117,9 @@ impl CoSimulation {
         self.flag("canSerializeFMUstate") || self.flag("canSerializeFMUState")
     }
 
-    /// The communication step may change.
-    pub fn can_handle_variable_step(&self) -> bool {
-        self.flag("canHandleVariableCommunicationStepSize")
-    }
-
     /// The FMU needs another program to run.
     pub fn needs_execution_tool(&self) -> bool {
         self.flag("needsExecutionTool")
-    }
-
-    /// One instance per process only.
-    pub fn only_one_instance(&self) -> bool {
-        self.flag("canBeInstantiatedOnlyOncePerProcess")
     }
 
     /// There is an event mode (FMI 3.0 only).

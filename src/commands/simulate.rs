@@ -232,7 +232,7 @@ fn write(recording: &Recording, args: &Simulate) -> Result<()> {
         Some(path) if path == Path::new("-") => {
             to_stdout = true;
             match recording.write_csv(&mut BufWriter::new(io::stdout().lock())) {
-                // A reader like `head` has seen enough.
+                // A reader such as `head` closes the pipe early.
                 Err(e) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
                 other => other.context("standard output")?,
             }
@@ -273,7 +273,7 @@ fn name_and_path(text: &str) -> Result<(String, &Path)> {
         return Ok((name.into(), Path::new(path)));
     }
     let path = Path::new(text);
-    let stem = path.file_stem().ok_or_else(|| anyhow!("{text}: is no file"))?;
+    let stem = path.file_stem().ok_or_else(|| anyhow!("{text}: is not a file"))?;
     Ok((stem.to_string_lossy().into_owned(), path))
 }
 

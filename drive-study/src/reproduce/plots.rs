@@ -105,13 +105,13 @@ fn seen(points: &[(f64, f64)], size: (f64, f64)) -> Vec<(f64, f64)> {
     }
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "the signature that map_err wants")]
+#[expect(clippy::needless_pass_by_value, reason = "the signature that map_err requires")]
 fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> anyhow::Error {
     anyhow!("drawing a plot: {error}")
 }
 
 /// A tick's number in its shortest form.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "plotters hands out references")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that plotters requires")]
 fn tick(x: &f64) -> String {
     ((x * 1e6).round() / 1e6).to_string()
 }

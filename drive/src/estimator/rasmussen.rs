@@ -145,7 +145,6 @@ pub const RASMUSSEN: &Table<RasmussenParameters> = &Table::new(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::current::CurrentLoop;
     use crate::frame::Rotor;
     use crate::math::wrap;
 
@@ -158,14 +157,7 @@ mod tests {
     }
 
     fn context<'a>(par: &'a EstimatorParameters, motor: &'a Motor) -> Context<'a> {
-        const CURRENT: &CurrentLoop = &CurrentLoop {
-            bandwidth: 1571.0,
-            active_resistance: false,
-            integral: 0.0,
-            reference_feed_forward: false,
-            mtpa: false,
-        };
-        Context { par, motor, current: CURRENT, J: 1.5e-3, T_s: T_S, delay: 1.0 }
+        Context { par, motor, J: 1.5e-3, T_s: T_S }
     }
 
     /// Runs the observer next to a machine that turns at `w` (rad/s, electrical) with the current `i` in its rotor

@@ -8,7 +8,7 @@
 //! stay zero. The energy of the remaining current, 0.75 L i_zone^2, is lost at once. i_zone is `inverter.i_zero`, or
 //! larger if the machine would leave that zone faster than the shortest substep resolves.
 //!
-//! Derived here from the ideal diode bridge; `drive/tests/gates_off.rs` compares it with such a bridge in stator axes.
+//! Derived here from the ideal diode bridge; `drive-study/tests/gates_off.rs` compares it with such a bridge in stator axes.
 //! u in V, i in A.
 
 use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};

@@ -14,8 +14,8 @@ use model_description::BaseType;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::ops::ControlFlow;
 use std::ptr;
-use std::rc::Rc;
 use std::sync::Arc;
+use std::sync::atomic::AtomicPtr;
 
 symbols! {
     /// The functions of FMI 2.0 that this importer calls.
@@ -69,7 +69,7 @@ pub(super) struct Instance {
     shared: SharedInstance,
     functions: Arc<Loaded<Functions>>,
     // FMI 2.0 before its revision 5 let the FMU keep the pointer to the callbacks.
-    _callbacks: Rc<Callbacks>,
+    _callbacks: Arc<Callbacks>,
 }
 
 impl Instance {
@@ -81,12 +81,12 @@ impl Instance {
         log: &Arc<Log>,
         logging: bool,
     ) -> Outcome<Self> {
-        let callbacks = Rc::new(Callbacks {
+        let callbacks = Arc::new(Callbacks {
             logger: Some(logger),
             allocate: Some(calloc),
             free: Some(free),
             step_finished: None,
-            environment: log.environment(),
+            environment: AtomicPtr::new(log.environment()),
         });
         // SAFETY: the strings and the callbacks outlive the call, the callbacks and the log outlive the instance.
         let component = unsafe {
@@ -95,7 +95,7 @@ impl Instance {
                 CO_SIMULATION,
                 token.as_ptr(),
                 resources.as_ptr(),
-                Rc::as_ptr(&callbacks),
+                Arc::as_ptr(&callbacks),
                 0,
                 c_int::from(logging),
             )
@@ -110,13 +110,13 @@ impl Instance {
 
     fn get_one<T: Copy>(&self, name: &'static str, function: Get<T>, reference: u32, mut value: T) -> Outcome<T> {
         // SAFETY: the instance is alive; one reference, room for one value.
-        let status = unsafe { function(self.shared.pointer, &raw const reference, 1, &raw mut value) };
+        let status = unsafe { function(self.shared.pointer(), &raw const reference, 1, &raw mut value) };
         judge(name, status).map(|()| value)
     }
 
     fn set_one<T: Copy>(&self, name: &'static str, function: Set<T>, reference: u32, value: T) -> Outcome {
         // SAFETY: the instance is alive; one reference, one value.
-        judge(name, unsafe { function(self.shared.pointer, &raw const reference, 1, &raw const value) })
+        judge(name, unsafe { function(self.shared.pointer(), &raw const reference, 1, &raw const value) })
     }
 }
 
@@ -128,8 +128,9 @@ impl Standard for Instance {
     fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         let n = references.len().min(values.len());
         // SAFETY: the instance is alive; both slices have at least n elements.
-        let status =
-            unsafe { (self.functions.api.get_real)(self.shared.pointer, references.as_ptr(), n, values.as_mut_ptr()) };
+        let status = unsafe {
+            (self.functions.api.get_real)(self.shared.pointer(), references.as_ptr(), n, values.as_mut_ptr())
+        };
         judge("fmi2GetReal", status)
     }
 
@@ -137,7 +138,7 @@ impl Standard for Instance {
         let n = references.len().min(values.len());
         // SAFETY: as above.
         let status =
-            unsafe { (self.functions.api.set_real)(self.shared.pointer, references.as_ptr(), n, values.as_ptr()) };
+            unsafe { (self.functions.api.set_real)(self.shared.pointer(), references.as_ptr(), n, values.as_ptr()) };
         judge("fmi2SetReal", status)
     }
 
@@ -184,7 +185,7 @@ impl Standard for Instance {
     fn set_debug_logging(&mut self, on: bool) -> Outcome {
         let function = self.functions.api.set_debug_logging.ok_or_else(|| missing("fmi2SetDebugLogging"))?;
         // SAFETY: the instance is alive; no categories, so no array.
-        judge("fmi2SetDebugLogging", unsafe { function(self.shared.pointer, c_int::from(on), 0, ptr::null()) })
+        judge("fmi2SetDebugLogging", unsafe { function(self.shared.pointer(), c_int::from(on), 0, ptr::null()) })
     }
 
     fn setup(&mut self, x: Experiment) -> Outcome {
@@ -192,7 +193,7 @@ impl Standard for Instance {
         let (with_tolerance, with_stop) = (c_int::from(x.tolerance.is_some()), c_int::from(x.stop.is_some()));
         // SAFETY: the instance is alive.
         let status = unsafe {
-            (self.functions.api.setup)(self.shared.pointer, with_tolerance, tolerance, x.start, with_stop, stop)
+            (self.functions.api.setup)(self.shared.pointer(), with_tolerance, tolerance, x.start, with_stop, stop)
         };
         judge("fmi2SetupExperiment", status)
     }
@@ -203,11 +204,11 @@ impl Standard for Instance {
 
     fn do_step(&mut self, t: f64, h: f64) -> Outcome<ControlFlow<()>> {
         // SAFETY: the instance is alive. "No set state before this point" is false: a state may be set at any time.
-        let status = unsafe { (self.functions.api.do_step)(self.shared.pointer, t, h, 0) };
+        let status = unsafe { (self.functions.api.do_step)(self.shared.pointer(), t, h, 0) };
         if let (Status::DISCARD, Some(function)) = (status, self.functions.api.get_boolean_status) {
             let mut ended = 0;
             // SAFETY: the instance is alive, there is room for one value.
-            let asked = unsafe { function(self.shared.pointer, TERMINATED, &raw mut ended) };
+            let asked = unsafe { function(self.shared.pointer(), TERMINATED, &raw mut ended) };
             if asked == Status::OK && ended != 0 {
                 return Ok(ControlFlow::Break(()));
             }

@@ -111,13 +111,13 @@ impl Instance {
 
     fn get_all<T: Clone>(&self, name: &'static str, f: Get<T>, reference: u32, mut values: Vec<T>) -> Outcome<Vec<T>> {
         // SAFETY: the instance is alive; one reference, and room for as many values as said.
-        let status = unsafe { f(self.shared.pointer, &raw const reference, 1, values.as_mut_ptr(), values.len()) };
+        let status = unsafe { f(self.shared.pointer(), &raw const reference, 1, values.as_mut_ptr(), values.len()) };
         judge(name, status).map(|()| values)
     }
 
     fn set_all<T>(&self, name: &'static str, f: Set<T>, reference: u32, values: &[T]) -> Outcome {
         // SAFETY: the instance is alive; one reference, as many values as said.
-        judge(name, unsafe { f(self.shared.pointer, &raw const reference, 1, values.as_ptr(), values.len()) })
+        judge(name, unsafe { f(self.shared.pointer(), &raw const reference, 1, values.as_ptr(), values.len()) })
     }
 }
 
@@ -155,14 +155,15 @@ impl Standard for Instance {
     fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         let (n, api) = (references.len().min(values.len()), &self.functions.api);
         // SAFETY: the instance is alive; both slices have at least n elements.
-        let status = unsafe { (api.get_float64)(self.shared.pointer, references.as_ptr(), n, values.as_mut_ptr(), n) };
+        let status =
+            unsafe { (api.get_float64)(self.shared.pointer(), references.as_ptr(), n, values.as_mut_ptr(), n) };
         judge("fmi3GetFloat64", status)
     }
 
     fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
         let (n, api) = (references.len().min(values.len()), &self.functions.api);
         // SAFETY: as above.
-        let status = unsafe { (api.set_float64)(self.shared.pointer, references.as_ptr(), n, values.as_ptr(), n) };
+        let status = unsafe { (api.set_float64)(self.shared.pointer(), references.as_ptr(), n, values.as_ptr(), n) };
         judge("fmi3SetFloat64", status)
     }
 
@@ -228,7 +229,7 @@ impl Standard for Instance {
     fn set_debug_logging(&mut self, on: bool) -> Outcome {
         let function = function!(self.set_debug_logging, "fmi3SetDebugLogging");
         // SAFETY: the instance is alive; no categories, so no array.
-        judge("fmi3SetDebugLogging", unsafe { function(self.shared.pointer, on, 0, ptr::null()) })
+        judge("fmi3SetDebugLogging", unsafe { function(self.shared.pointer(), on, 0, ptr::null()) })
     }
 
     fn setup(&mut self, experiment: Experiment) -> Outcome {
@@ -241,7 +242,7 @@ impl Standard for Instance {
         let (tolerance, stop) = (x.tolerance.unwrap_or(0.0), x.stop.unwrap_or(0.0));
         // SAFETY: the instance is alive.
         let status =
-            unsafe { enter(self.shared.pointer, x.tolerance.is_some(), tolerance, x.start, x.stop.is_some(), stop) };
+            unsafe { enter(self.shared.pointer(), x.tolerance.is_some(), tolerance, x.start, x.stop.is_some(), stop) };
         judge("fmi3EnterInitializationMode", status)
     }
 
@@ -251,7 +252,7 @@ impl Standard for Instance {
         // state may be set at any time.
         let status = unsafe {
             (self.functions.api.do_step)(
-                self.shared.pointer,
+                self.shared.pointer(),
                 t,
                 h,
                 false,

@@ -9,6 +9,7 @@ pub(crate) mod shared;
 mod signatures;
 
 use crate::Error;
+use crate::folder::Folder;
 use crate::standard::{Outcome, Standard};
 use log::Log;
 use model_description::FmiVersion;
@@ -16,27 +17,27 @@ use shared::SharedFunctions;
 use std::ffi::CString;
 use std::path::Path;
 use std::sync::Arc;
-use tempfile::TempDir;
 
-/// The functions of a library, the library, and the folder that contains it; dropped in this order.
+/// The functions of a library, the library, and the folder that contains it, if it is kept; dropped in this order.
 pub(crate) struct Loaded<F> {
     api: F,
     shared: Arc<SharedFunctions>,
     _library: libloading::Library,
-    _dir: Arc<TempDir>,
+    _folder: Option<Arc<Folder>>,
 }
 
 /// The functions of either standard.
+#[derive(Clone)]
 pub(crate) enum Functions {
     V2(Arc<Loaded<fmi2::Functions>>),
     V3(Arc<Loaded<fmi3::Functions>>),
 }
 
 impl Functions {
-    /// Loads the binary in `dir`.
-    pub(crate) fn load(binary: &Path, version: FmiVersion, dir: &Arc<TempDir>) -> Result<Self, Error> {
+    /// Loads the binary, and keeps the folder as long as the library is loaded.
+    pub(crate) fn load(binary: &Path, version: FmiVersion, folder: Option<Arc<Folder>>) -> Result<Self, Error> {
         let library = library::load(binary)?;
-        let load = || {
+        let load = move || {
             // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that they go
             // to keeps the library.
             let shared = || unsafe { SharedFunctions::load(&library, version) }.map(Arc::new);
@@ -45,12 +46,12 @@ impl Functions {
                 FmiVersion::V2 => {
                     // SAFETY: as above.
                     let (api, shared) = (unsafe { fmi2::Functions::load(&library) }?, shared()?);
-                    Self::V2(Arc::new(Loaded { api, shared, _library: library, _dir: dir.clone() }))
+                    Self::V2(Arc::new(Loaded { api, shared, _library: library, _folder: folder }))
                 }
                 FmiVersion::V3 => {
                     // SAFETY: as above.
                     let (api, shared) = (unsafe { fmi3::Functions::load(&library) }?, shared()?);
-                    Self::V3(Arc::new(Loaded { api, shared, _library: library, _dir: dir.clone() }))
+                    Self::V3(Arc::new(Loaded { api, shared, _library: library, _folder: folder }))
                 }
             })
         };
@@ -65,7 +66,7 @@ impl Functions {
         resources: &CString,
         log: &Arc<Log>,
         logging: bool,
-    ) -> Outcome<Box<dyn Standard>> {
+    ) -> Outcome<Box<dyn Standard + Send>> {
         match self {
             Self::V2(functions) => {
                 fmi2::Instance::new(functions.clone(), name, token, resources, log, logging).map(|i| Box::new(i) as _)

@@ -1,11 +1,12 @@
 //! What both standards share: functions with one C type, and an instance that calls them.
 
 use super::signatures::{
-    Deserialize, FreeInstance, InstancePointer, OfInstance, Serialize, SetState, StatePlace, StatePointer, StateSize,
+    Deserialize, FreeInstance, InstancePointer, OfInstance, Serialize, SetState, StatePlace, StateSize,
 };
 use crate::standard::{Outcome, Refusal, judge};
 use libloading::Library;
 use model_description::FmiVersion;
+use std::ffi::c_void;
 use std::ptr;
 use std::sync::Arc;
 
@@ -78,24 +79,39 @@ impl SharedFunctions {
     }
 }
 
+/// A pointer that an FMU gave out, to an instance or to a saved state. Only the FMU follows it.
+#[derive(Clone, Copy)]
+pub(crate) struct Handle(*mut c_void);
+
+// SAFETY: an instance and its states go from thread to thread together, and every call takes the instance by `&mut`, so that
+// calls follow one another. More than that neither standard lets an FMU ask for: "FMI functions of one instance do not need to
+// be thread-safe", and the importer that calls them from several threads guarantees the calling sequence (FMI 2.0.5, 2.1;
+// FMI 3.0.2, 2.2.1).
+unsafe impl Send for Handle {}
+
 /// An instance with the functions that both standards share. Dropping it frees the instance.
 pub(crate) struct SharedInstance {
     functions: Arc<SharedFunctions>,
     /// Alive until this is dropped; null after [`abandon`](Self::abandon).
-    pub(super) pointer: InstancePointer,
+    instance: Handle,
 }
 
 impl SharedInstance {
     /// # Safety
     /// `pointer` is an instance of the library of these functions. The library stays loaded as long as this lives.
     pub(super) unsafe fn new(functions: &Arc<SharedFunctions>, pointer: InstancePointer) -> Self {
-        Self { functions: functions.clone(), pointer }
+        Self { functions: functions.clone(), instance: Handle(pointer) }
+    }
+
+    /// For a call while this is borrowed mutably.
+    pub(super) fn pointer(&self) -> InstancePointer {
+        self.instance.0
     }
 
     /// Calls a function that takes only the instance.
     pub(super) fn call(&self, name: &'static str, function: OfInstance) -> Outcome {
         // SAFETY: the instance is alive.
-        judge(name, unsafe { function(self.pointer) })
+        judge(name, unsafe { function(self.pointer()) })
     }
 
     pub(crate) fn exit_initialization(&self) -> Outcome {
@@ -111,53 +127,54 @@ impl SharedInstance {
         self.call(self.functions.reset.name, self.functions.reset.get()?)
     }
 
-    pub(crate) fn get_state(&self) -> Outcome<StatePointer> {
+    pub(crate) fn get_state(&self) -> Outcome<Handle> {
         let (function, mut state) = (self.functions.get_state.get()?, ptr::null_mut());
         // SAFETY: the instance is alive; a null state asks for a new one.
-        judge(self.functions.get_state.name, unsafe { function(self.pointer, &raw mut state) }).map(|()| state)
+        judge(self.functions.get_state.name, unsafe { function(self.pointer(), &raw mut state) })
+            .map(|()| Handle(state))
     }
 
-    pub(crate) fn set_state(&self, state: StatePointer) -> Outcome {
+    pub(crate) fn set_state(&self, state: Handle) -> Outcome {
         let function = self.functions.set_state.get()?;
         // SAFETY: the instance is alive; the facade passes only states that it got and has not freed.
-        judge(self.functions.set_state.name, unsafe { function(self.pointer, state) })
+        judge(self.functions.set_state.name, unsafe { function(self.pointer(), state.0) })
     }
 
-    pub(crate) fn free_state(&self, mut state: StatePointer) -> Outcome {
+    pub(crate) fn free_state(&self, mut state: Handle) -> Outcome {
         let function = self.functions.free_state.get()?;
         // SAFETY: as above; the facade forgets the state.
-        judge(self.functions.free_state.name, unsafe { function(self.pointer, &raw mut state) })
+        judge(self.functions.free_state.name, unsafe { function(self.pointer(), &raw mut state.0) })
     }
 
-    pub(crate) fn serialize(&self, state: StatePointer) -> Outcome<Vec<u8>> {
+    pub(crate) fn serialize(&self, state: Handle) -> Outcome<Vec<u8>> {
         let (size_of, serialize) = (self.functions.state_size.get()?, self.functions.serialize.get()?);
         let mut size = 0;
         // SAFETY: the instance and the state are alive; there is room for the size.
-        judge(self.functions.state_size.name, unsafe { size_of(self.pointer, state, &raw mut size) })?;
+        judge(self.functions.state_size.name, unsafe { size_of(self.pointer(), state.0, &raw mut size) })?;
         let mut bytes = vec![0_u8; size];
         // SAFETY: as above; the buffer has the size that the FMU asked for.
-        let status = unsafe { serialize(self.pointer, state, bytes.as_mut_ptr(), size) };
+        let status = unsafe { serialize(self.pointer(), state.0, bytes.as_mut_ptr(), size) };
         judge(self.functions.serialize.name, status).map(|()| bytes)
     }
 
-    pub(crate) fn deserialize(&self, bytes: &[u8]) -> Outcome<StatePointer> {
+    pub(crate) fn deserialize(&self, bytes: &[u8]) -> Outcome<Handle> {
         let (function, mut state) = (self.functions.deserialize.get()?, ptr::null_mut());
         // SAFETY: the instance is alive; the pointer and the length are those of one slice.
-        let status = unsafe { function(self.pointer, bytes.as_ptr(), bytes.len(), &raw mut state) };
-        judge(self.functions.deserialize.name, status).map(|()| state)
+        let status = unsafe { function(self.pointer(), bytes.as_ptr(), bytes.len(), &raw mut state) };
+        judge(self.functions.deserialize.name, status).map(|()| Handle(state))
     }
 
     /// Forgets the instance without freeing it: after a fatal error the standard forbids every further call.
     pub(crate) fn abandon(&mut self) {
-        self.pointer = ptr::null_mut();
+        self.instance = Handle(ptr::null_mut());
     }
 }
 
 impl Drop for SharedInstance {
     fn drop(&mut self) {
-        if let (false, Some(free)) = (self.pointer.is_null(), self.functions.free.pointer) {
+        if let (false, Some(free)) = (self.pointer().is_null(), self.functions.free.pointer) {
             // SAFETY: the instance is alive, and nothing uses it after this.
-            unsafe { free(self.pointer) };
+            unsafe { free(self.pointer()) };
         }
     }
 }

@@ -25,6 +25,7 @@ pub(super) type Deserialize = unsafe extern "C" fn(InstancePointer, *const u8, u
 /// FMI 2.0.
 pub(super) mod v2 {
     use super::{InstancePointer, Status, c_char, c_int, c_void};
+    use std::sync::atomic::AtomicPtr;
 
     pub(in crate::abi) type Instantiate = unsafe extern "C" fn(
         *const c_char,
@@ -60,7 +61,8 @@ pub(super) mod v2 {
         pub(in crate::abi) allocate: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
         pub(in crate::abi) free: Option<unsafe extern "C" fn(*mut c_void)>,
         pub(in crate::abi) step_finished: Option<unsafe extern "C" fn(*mut c_void, Status)>,
-        pub(in crate::abi) environment: *mut c_void,
+        /// A C pointer, atomic because instances with these callbacks go from thread to thread.
+        pub(in crate::abi) environment: AtomicPtr<c_void>,
     }
 
     // The C library's, which `Callbacks` passes on.

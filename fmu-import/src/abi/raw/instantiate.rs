@@ -79,7 +79,7 @@ impl Raw {
             allocate: b.memory.then_some(allocate),
             free: b.memory.then_some(release),
             step_finished: None,
-            environment,
+            environment: environment.into(),
         }));
         let kind = c_int::from(b.interface == Interface::CoSimulation);
         let given = if b.callbacks { ptr::from_mut(callbacks) } else { ptr::null_mut() };

@@ -1,0 +1,94 @@
+//! The folder of an unpacked archive: the process that made it removes it, or, if that process was killed, a later one.
+
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process;
+
+const PREFIX: &str = "fmu-";
+/// Locked as long as a process uses the folder. The system unlocks it when the process ends, however it ends, so nobody has
+/// to guess from the number in the name whether that process lives, perhaps in another container or on another machine.
+const LOCK: &str = ".lock";
+
+/// A folder `fmu-PID-XXXXXX` for temporary files.
+pub(crate) struct Folder {
+    path: PathBuf,
+    owner: u32,
+    lock: Option<File>,
+}
+
+impl Folder {
+    /// Makes a folder, and removes those that killed processes have left.
+    pub(crate) fn new() -> io::Result<Self> {
+        remove_abandoned();
+        let owner = process::id();
+        loop {
+            let dir = tempfile::Builder::new().prefix(&format!("{PREFIX}{owner}-")).tempdir()?;
+            let lock = File::create_new(dir.path().join(LOCK))?;
+            match lock.try_lock() {
+                // Another process took the new folder for an abandoned one, and removes it.
+                Err(TryLockError::WouldBlock) => {}
+                // Without locks in this file system the folder works all the same; only nobody cleans up after a kill.
+                Ok(()) | Err(TryLockError::Error(_)) => return Ok(Self { path: dir.keep(), owner, lock: Some(lock) }),
+            }
+        }
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A forked process has a copy of this and not the right to remove what its parent still uses.
+        if self.owner == process::id() {
+            self.lock = None;
+            let _ = fs::remove_dir_all(&self.path);
+        }
+    }
+}
+
+/// Removes the folders whose lock nobody holds. What cannot be read or removed is not ours.
+fn remove_abandoned() {
+    let Ok(entries) = fs::read_dir(std::env::temp_dir()) else { return };
+    for entry in entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX)) {
+        if entry.file_type().is_ok_and(|kind| kind.is_dir())
+            && let Ok(lock) = File::open(entry.path().join(LOCK))
+            && lock.try_lock().is_ok()
+        {
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Another process that opens an FMU meanwhile removes what is abandoned, too.
+    #[test]
+    fn only_what_nobody_uses_is_removed() {
+        let used = Folder::new().unwrap();
+        let mut abandoned = Folder::new().unwrap();
+        let path = abandoned.path().to_owned();
+        // What a kill does: the lock is gone, the folder is not.
+        abandoned.lock = None;
+        abandoned.owner = 0;
+        drop(abandoned);
+        let later = Folder::new().unwrap();
+        assert!(!path.exists() && used.path().is_dir() && later.path().is_dir());
+        assert!(used.path().file_name().unwrap().to_string_lossy().starts_with(&format!("fmu-{}-", process::id())));
+    }
+
+    #[test]
+    fn a_forked_process_removes_nothing() {
+        let mut folder = Folder::new().unwrap();
+        let path = folder.path().to_owned();
+        folder.owner = 0;
+        let _in_use = folder.lock.take();
+        drop(folder);
+        assert!(path.is_dir());
+        fs::remove_dir_all(path).unwrap();
+    }
+}
