@@ -25,10 +25,9 @@ pub fn ln(x: f64) -> f64 {
 }
 
 /// Hyperbolic tangent of `x`.
-#[inline(never)]
+#[inline]
 pub fn tanh(x: f64) -> f64 {
-    // From here on, the nearest number to tanh is +-1.
-    if x.abs() >= 20.0 { 1.0_f64.copysign(x) } else { libm::tanh(x) }
+    libm::tanh(x)
 }
 
 /// Sine and cosine of a small angle `d` (rad), by their series; of a larger one, [`sin_cos`].
@@ -76,13 +75,24 @@ pub fn tanh_beside(t: f64, d: f64) -> f64 {
     (t * below + above) / (below + t * above)
 }
 
+/// Whether all values are numbers: 0 times any other is not 0.
+#[inline]
+pub fn all_finite<const N: usize>(values: [f64; N]) -> bool {
+    values.iter().map(|x| x * 0.0).sum::<f64>() == 0.0
+}
+
 /// The angle `x` (rad) wrapped to (-pi, pi].
+#[inline]
 pub fn wrap(x: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     if x > -PI && x <= PI {
         return x;
     }
-    let turned = x - TAU * (x / TAU).round();
+    // A number above this one has no fractional digits, so adding and subtracting it rounds.
+    const ROUNDS: f64 = 6_755_399_441_055_744.0;
+    let turns = x * (1.0 / TAU);
+    let whole = if turns.abs() < 1e15 { (turns + ROUNDS) - ROUNDS } else { turns.round() };
+    let turned = x - TAU * whole;
     if turned <= -PI { turned + TAU } else { turned }
 }
 
@@ -104,9 +114,6 @@ mod tests {
                 assert!((near - exact).abs() < 5e-16, "tanh({x} + {d}): {near} {exact}");
             }
         }
-        assert_eq!(tanh(20.0).to_bits(), libm::tanh(20.0).to_bits());
-        assert_eq!(tanh(-400.0).to_bits(), (-1.0_f64).to_bits());
-        assert!(tanh(f64::NAN).is_nan());
     }
 
     #[test]

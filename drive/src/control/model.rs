@@ -167,9 +167,12 @@ impl Model for SensorlessController {
             return Err(Fault::value("the step size", format!("{} s", step.h), longest));
         }
         while grid.passed(self.state.samples, end) {
-            self.state.shown = self.state.computed.clone();
-            self.state.computed = self.sample();
+            let new = self.sample();
             self.state.samples += 1;
+            let last = std::mem::replace(&mut self.state.computed, new);
+            if !grid.reached(self.state.samples, end) {
+                self.state.shown = last;
+            }
         }
         if grid.reached(self.state.samples, end) {
             self.state.shown = self.state.computed.clone();

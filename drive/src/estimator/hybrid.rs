@@ -64,7 +64,8 @@ impl Hybrid {
         } else {
             Injection::None
         };
-        Estimate { theta, w, i: Axis::<Estimated>::at(theta).to_stator(i), injection }
+        let axis = Axis::<Estimated>::at(theta);
+        Estimate { theta, axis, w, i: axis.to_stator(i), injection }
     }
 }
 

@@ -347,7 +347,7 @@ mod tests {
             x = rk4(x, T_s / 20.0, |x| {
                 let psi = Dq::new(x[0], x[1]);
                 let seen = Axis::<Rotor>::at(x[2]).from_stator(u);
-                let d = machine::flux_derivative(&motor, psi, seen, current(psi), w);
+                let d = seen - current(psi) * motor.R_s - psi.turned() * w;
                 Vector4::new(d.d(), d.q(), w, 0.0)
             });
         }

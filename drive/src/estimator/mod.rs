@@ -35,7 +35,7 @@ pub mod voltage_feedback;
 pub mod voltage_model;
 
 use crate::control::tables::ControllerParameters;
-use crate::frame::{AlphaBeta, DqHat};
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use crate::motor::Motor;
 use fmu_core::{Fault, enumeration};
 use serde::{Deserialize, Serialize};
@@ -101,6 +101,8 @@ pub enum Injection {
 pub struct Estimate {
     /// Electrical rotor angle in rad, not wrapped.
     pub theta: f64,
+    /// The estimated d-axis at this angle.
+    pub axis: Axis<Estimated>,
     /// Electrical speed in rad/s.
     pub w: f64,
     /// Stator current to control in A: the measured current without the carrier.
@@ -113,7 +115,13 @@ impl Estimate {
     /// Angle (rad) and speed (rad/s) without injection: the drive controls the measured current.
     #[inline]
     pub fn new(theta: f64, w: f64, sample: &Sample) -> Self {
-        Self { theta, w, i: sample.i, injection: Injection::None }
+        Self::injecting(theta, w, sample.i, Injection::None)
+    }
+
+    /// Angle (rad) and speed (rad/s), the current `i` (A) to control and the voltage to add.
+    #[inline]
+    pub fn injecting(theta: f64, w: f64, i: AlphaBeta, injection: Injection) -> Self {
+        Self { theta, axis: Axis::at(theta), w, i, injection }
     }
 }
 

@@ -63,12 +63,9 @@ impl NearPwmInjection {
             1 => AlphaBeta::new(-0.5, HALF_SQRT_3),
             _ => AlphaBeta::new(-0.5, -HALF_SQRT_3),
         };
-        Estimate {
-            theta: self.tracker.theta,
-            w: self.tracker.w,
-            i: Axis::<Estimated>::at(self.tracker.theta).to_stator(i),
-            injection: Injection::Stator(direction * context.par.near_pwm.voltage),
-        }
+        let axis = Axis::<Estimated>::at(self.tracker.theta);
+        let injection = Injection::Stator(direction * context.par.near_pwm.voltage);
+        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: axis.to_stator(i), injection }
     }
 }
 

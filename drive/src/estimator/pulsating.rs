@@ -56,7 +56,7 @@ pub struct PulsatingInjection {
 impl PulsatingInjection {
     fn estimate(&self, carrier: &Carrier, i: AlphaBeta) -> Estimate {
         let injection = Injection::Estimated(DqHat::new(carrier.cos, 0.0));
-        Estimate { theta: self.tracker.theta, w: self.tracker.w, i, injection }
+        Estimate::injecting(self.tracker.theta, self.tracker.w, i, injection)
     }
 }
 

@@ -34,7 +34,7 @@ pub struct RotatingInjection {
 impl RotatingInjection {
     fn estimate(&self, carrier: &Carrier, i: AlphaBeta) -> Estimate {
         let injection = Injection::Stator(AlphaBeta::new(carrier.cos, carrier.sin));
-        Estimate { theta: self.tracker.theta, w: self.tracker.w, i, injection }
+        Estimate::injecting(self.tracker.theta, self.tracker.w, i, injection)
     }
 }
 

@@ -93,12 +93,9 @@ pub struct SquareWaveInjection {
 
 impl SquareWaveInjection {
     fn estimate(&self, context: &Context, sample: &Sample, i: DqHat) -> Estimate {
-        Estimate {
-            theta: self.tracker.theta,
-            w: self.tracker.w,
-            i: Axis::<Estimated>::at(self.tracker.theta).to_stator(i),
-            injection: Injection::Estimated(DqHat::new(context.par.square_wave.command(sample.k), 0.0)),
-        }
+        let axis = Axis::<Estimated>::at(self.tracker.theta);
+        let injection = Injection::Estimated(DqHat::new(context.par.square_wave.command(sample.k), 0.0));
+        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: axis.to_stator(i), injection }
     }
 }
 

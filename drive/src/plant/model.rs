@@ -2,12 +2,12 @@
 
 use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Turn};
 use crate::integrate::rk4;
-use crate::math::wrap;
+use crate::math::{all_finite, wrap};
 use crate::modulation::limit_to_hexagon;
 use crate::plant::legs::Legs;
 use crate::motor::Motor;
-use crate::plant::machine;
-use crate::plant::mechanics::FrictionAt;
+use crate::plant::machine::{self, Machine};
+use crate::plant::mechanics::{Motion, Shaft};
 use crate::plant::power::{Energy, Powers};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::{OUTPUTS, PARAMETERS, PlantParameters};
@@ -48,8 +48,8 @@ impl State {
         Self { psi, speed, angle, axis: axis_at(motor, angle) }
     }
 
-    fn is_finite(self) -> bool {
-        self.psi.is_finite() && self.speed.is_finite() && self.angle.is_finite()
+    fn is_finite(&self) -> bool {
+        all_finite([self.psi.d(), self.psi.q(), self.speed, self.angle])
     }
 }
 
@@ -61,12 +61,12 @@ fn axis_at(motor: &Motor, angle: f64) -> Axis<Rotor> {
 
 /// What stays over an integration step.
 struct Held<'a> {
+    machine: Machine<'a>,
     /// Stator voltage without the drop of the legs, in V.
     u: AlphaBeta,
     /// Legs with a voltage drop.
     legs: Option<&'a Legs>,
-    /// Friction at the beginning.
-    friction: FrictionAt,
+    shaft: Shaft<'a>,
 }
 
 /// Derivatives and powers at an instant.
@@ -77,6 +77,22 @@ struct Rates {
     acceleration: f64,
     /// Power from the DC link, to the load, lost, in W.
     powers: Energy,
+}
+
+impl Held<'_> {
+    /// Derivatives and powers with the d-axis on `axis`, the flux linkage `psi` (Wb) and the `speed` (rad/s).
+    // Inlined at its four calls: half of the time of a step is spent here.
+    #[inline(always)]
+    fn rates(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> Rates {
+        let psi = axis.from_stator(psi);
+        let i = self.machine.current(psi);
+        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
+        let i = axis.to_stator(i);
+        let u = self.legs.map_or(self.u, |legs| self.u - legs.loss(i));
+        let loss = self.machine.copper_loss(i) + p_friction;
+        let powers = Energy { r#in: 1.5 * u.dot(i), mech: p_shaft, loss };
+        Rates { d_psi: self.machine.flux_derivative(u, i), acceleration, powers }
+    }
 }
 
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
@@ -102,12 +118,10 @@ impl PmsmPlant {
         if enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
     }
 
-    /// Stator current in the rotor frame and in the phases, in A.
-    #[inline]
-    fn currents(&self) -> (Dq, Phases) {
+    /// Stator currents in A.
+    fn currents(&self) -> Phases {
         let PlantParameters { motor, saturation, .. } = &self.parameters;
-        let i = machine::current(motor, saturation, self.state.psi);
-        (i, Phases::from_stator(self.state.axis.to_stator(i)))
+        Phases::from_stator(self.state.axis.to_stator(machine::current(motor, saturation, self.state.psi)))
     }
 
     /// The state at the beginning of a step and the energy needed to reach it: an imposed shaft takes the angle of the
@@ -144,61 +158,43 @@ impl PmsmPlant {
         Ok(count)
     }
 
-    /// One integration step of `h` (s) under the voltage `u` (V), with the classical Runge-Kutta method of
-    /// [`rk4`]: the flux linkage in stator axes, and the angle as a deviation from a motion at constant speed.
+    /// One integration step of `h` (s) under the voltage `u` (V), with the classical Runge-Kutta method ([`rk4`]): the
+    /// flux linkage in stator axes, and the angle as the deviation from a motion at constant speed.
     ///
     /// In stator axes, the flux linkage is the integral of the held voltage minus R_s i. Only this small resistive part
     /// follows the rotor, so a step is more exact than two of half its length in rotor axes.
     #[inline]
     fn drive(&self, start: &State, h: f64, u: AlphaBeta, legs: &Legs) -> (State, Energy) {
-        let PlantParameters { motor, mechanics, .. } = &self.parameters;
-        let held = Held { u, legs: legs.drop().then_some(legs), friction: mechanics.friction_at(start.speed) };
+        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let held = Held {
+            machine: Machine::new(motor, saturation),
+            u,
+            legs: legs.drop().then_some(legs),
+            shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
+        };
         let (n_p, half, speed) = (f64::from(motor.n_p), 0.5 * h, start.speed);
         let psi = start.axis.to_stator(start.psi);
         let turn = Turn::new(n_p * half * speed);
         let middle = start.axis.ahead(turn);
 
-        let k_1 = self.rates(&held, start.axis, psi, speed);
-        let k_2 = self.rates(&held, middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
+        let k_1 = held.rates(start.axis, psi, speed);
+        let k_2 = held.rates(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
         let axis = middle.ahead(Turn::tiny(n_p * half * half * k_1.acceleration));
-        let k_3 = self.rates(&held, axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
+        let k_3 = held.rates(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
         let axis = middle.ahead(turn).ahead(Turn::tiny(n_p * half * h * k_2.acceleration));
-        let k_4 = self.rates(&held, axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
+        let k_4 = held.rates(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
 
         let sixth = h / 6.0;
         let psi = psi + (k_1.d_psi + (k_2.d_psi + k_3.d_psi) * 2.0 + k_4.d_psi) * sixth;
         let acceleration = k_2.acceleration + k_3.acceleration;
         let angle = start.angle + h * (speed + sixth * (k_1.acceleration + acceleration));
         let speed = speed + sixth * (k_1.acceleration + 2.0 * acceleration + k_4.acceleration);
-        let mean = |power: fn(&Energy) -> f64| {
+        let over = |power: fn(&Energy) -> f64| {
             sixth * (power(&k_1.powers) + 2.0 * (power(&k_2.powers) + power(&k_3.powers)) + power(&k_4.powers))
         };
-        let energy = Energy { r#in: mean(|p| p.r#in), mech: mean(|p| p.mech), loss: mean(|p| p.loss) };
+        let energy = Energy { r#in: over(|p| p.r#in), mech: over(|p| p.mech), loss: over(|p| p.loss) };
         let axis = axis_at(motor, angle);
         (State { psi: axis.from_stator(psi), speed, angle, axis }, energy)
-    }
-
-    /// Derivatives and powers with the d-axis on `axis`, the flux linkage `psi` (Wb) and the `speed` (rad/s).
-    #[inline(always)]
-    fn rates(&self, held: &Held, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> Rates {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
-        let psi = axis.from_stator(psi);
-        let i = machine::current(motor, saturation, psi);
-        let [acceleration, mech, friction] = self.motion(speed, machine::torque(motor, psi, i), &held.friction);
-        let i = axis.to_stator(i);
-        let u = held.legs.map_or(held.u, |legs| held.u - legs.loss(i));
-        let loss = 1.5 * motor.R_s * i.dot(i) + friction;
-        let powers = Energy { r#in: 1.5 * u.dot(i), mech, loss };
-        Rates { d_psi: u - i * motor.R_s, acceleration, powers }
-    }
-
-    /// Acceleration (rad/s2), power to the load and friction loss (W) at `speed` (rad/s) and torque `tau_e` (N.m).
-    #[inline]
-    fn motion(&self, speed: f64, tau_e: f64, beside: &FrictionAt) -> [f64; 3] {
-        let mechanics = &self.parameters.mechanics;
-        let friction = mechanics.friction_beside(beside, speed);
-        let tau_shaft = mechanics.tau_shaft(tau_e, self.inputs.tau_load, || friction);
-        [mechanics.acceleration(tau_e, tau_shaft, friction), tau_shaft * speed, friction * speed]
     }
 
     /// One integration step of `h` (s) with the gates off.
@@ -206,13 +202,12 @@ impl PmsmPlant {
         let Some(lost) = self.blocked(start, legs) else {
             return self.drive(start, h, AlphaBeta::ZERO, legs);
         };
-        let motor = &self.parameters.motor;
-        let friction = self.parameters.mechanics.friction_at(start.speed);
-        let shaft = |x: &SVector<f64, 4>| {
-            let [acceleration, p_mech, p_friction] = self.motion(x[0], 0.0, &friction);
-            SVector::from([acceleration, x[0], p_mech, p_friction])
-        };
-        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost]), h, shaft);
+        let PlantParameters { motor, mechanics, .. } = &self.parameters;
+        let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
+        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost]), h, |x| {
+            let Motion { acceleration, p_shaft, p_friction } = shaft.motion(x[0], 0.0);
+            SVector::from([acceleration, x[0], p_shaft, p_friction])
+        });
         let state = State::new(motor, machine::flux(motor, Dq::ZERO), x[0], x[1]);
         (state, Energy { r#in: 0.0, mech: x[2], loss: x[3] })
     }
@@ -257,15 +252,18 @@ impl Model for PmsmPlant {
         self.energy = Energy::default();
         // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
-        let tau_shaft = mechanics.tau_shaft(0.0, self.inputs.tau_load, || friction);
+        let tau_shaft = mechanics.tau_shaft(0.0, self.inputs.tau_load, friction);
         self.powers = Powers { p_mech: tau_shaft * speed, p_loss: friction * speed, ..Powers::default() };
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
-        let PlantParameters { motor, mechanics, .. } = &self.parameters;
-        let State { psi, speed, angle, .. } = self.state;
-        let (i, phases) = self.currents();
-        let tau_e = machine::torque(motor, psi, i);
+        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let State { psi, speed, angle, axis } = self.state;
+        let machine = Machine::new(motor, saturation);
+        let i = machine.current(psi);
+        let (phases, tau_e) = (Phases::from_stator(axis.to_stator(i)), machine.torque(psi, i));
+        let friction = if mechanics.imposed { mechanics.friction(speed) } else { 0.0 };
+        let tau_shaft = mechanics.tau_shaft(tau_e, self.inputs.tau_load, friction);
         *out = PlantOutputs {
             i: phases,
             speed,
@@ -275,7 +273,7 @@ impl Model for PmsmPlant {
             i_d: i.d(),
             i_q: i.q(),
             powers: self.powers,
-            tau_shaft: mechanics.tau_shaft(tau_e, self.inputs.tau_load, || mechanics.friction(speed)),
+            tau_shaft,
             energy: self.energy,
         };
     }
@@ -310,7 +308,7 @@ impl Model for PmsmPlant {
         }
         self.state = state;
         self.energy.add(&energy);
-        self.powers = Powers::mean(&energy, step.h, &self.inputs, &legs, || self.currents().1);
+        self.powers = Powers::mean(&energy, step.h, &self.inputs, &legs, || self.currents());
         Ok(())
     }
 }

@@ -24,6 +24,7 @@
 //! tested.
 
 use crate::frame::Phases;
+use crate::math::all_finite;
 use crate::plant::legs::Legs;
 use crate::plant::signals::PlantInputs;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
@@ -98,7 +99,7 @@ impl Energy {
 
     /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
-        self.r#in.is_finite() && self.mech.is_finite() && self.loss.is_finite()
+        all_finite([self.r#in, self.mech, self.loss])
     }
 }
 
