@@ -37,13 +37,13 @@ pub struct ModelDescription {
     pub model_exchange: Option<String>,
     /// The scheduled execution interface's model identifier, if there is one (FMI 3.0 only).
     pub scheduled_execution: Option<String>,
-    /// Default experiment.
+    /// Recommended times, step size and tolerance.
     pub default_experiment: Experiment,
-    /// Units.
+    /// Units with their display units.
     pub units: Vec<Unit>,
-    /// Type definitions.
+    /// Types that variables refer to with `declaredType`.
     pub types: Vec<TypeDefinition>,
-    /// Log categories.
+    /// Categories of log messages, which an importer can switch on and off.
     pub log_categories: Vec<LogCategory>,
     /// Variables, in the order of the file.
     pub variables: Vec<ModelVariable>,
@@ -144,9 +144,9 @@ pub struct Experiment {
 /// A log category.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogCategory {
-    /// Name.
+    /// Name that messages and `SetDebugLogging` use.
     pub name: String,
-    /// Description.
+    /// Meaning of its messages.
     pub description: Option<String>,
 }
 
