@@ -57,7 +57,8 @@ impl Candidate {
 /// The loop in C as a library, or why there is none.
 fn c_loop() -> Result<Library, String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let (source, library) = (Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/c_period.c"), folder.join("c_period.so"));
+    let (source, library) =
+        (Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/c_period.c"), folder.join("c_period.so"));
     let mut cc = Command::new("cc");
     cc.args(["-O3", "-march=native", "-shared", "-fPIC", "-o"]).arg(&library).arg(source).arg("-lm");
     match cc.status() {

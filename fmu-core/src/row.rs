@@ -11,6 +11,7 @@ use crate::variable::{Causality, Kind, Meta, Range, Variability};
 /// The interface of a part for a table that does not know its type.
 pub(crate) trait Node<W>: Sync {
     fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
+    fn real<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut f64)>;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
 }

@@ -34,7 +34,7 @@ impl Legs {
     /// For switching legs.
     #[inline]
     pub fn switching(inverter: &Inverter, u_dc: f64) -> Self {
-        let share = inverter.dead_time / inverter.T_pwm;
+        let share = if inverter.dead_time > 0.0 { inverter.dead_time / inverter.T_pwm } else { 0.0 };
         Self { share, u: share * u_dc, i_zone: inverter.i_zero }
     }
 
