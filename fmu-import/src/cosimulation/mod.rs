@@ -191,16 +191,20 @@ impl System {
     /// Records all outputs of all instances.
     ///
     /// # Errors
-    /// None that is known: outputs that are no numbers are left out.
+    /// None that is known.
     pub fn record_outputs(&mut self) -> Result<(), Error> {
+        self.outputs().iter().try_for_each(|port| self.record(port))
+    }
+
+    /// All outputs of all instances but those that are no numbers, written `instance.variable`.
+    pub fn outputs(&self) -> Vec<String> {
         let outputs = |i: &Instance| {
             let is_scalar =
                 |v: &&ModelVariable| v.causality == Causality::Output && !v.is_array() && kind(v.base).is_some();
             let name = |v: &ModelVariable| format!("{}.{}", i.name(), v.name);
             i.description().variables.iter().filter(is_scalar).map(name).collect::<Vec<_>>()
         };
-        let all: Vec<String> = self.instances.iter().flat_map(outputs).collect();
-        all.iter().try_for_each(|port| self.record(port))
+        self.instances.iter().flat_map(outputs).collect()
     }
 
     fn feed(&mut self, target: Port, written: &str, source: Source) -> Result<(), Error> {
