@@ -23,6 +23,8 @@ struct Shared {
     measures: Vec<Measure>,
     columns: Vec<Column>,
     trace: Vec<usize>,
+    /// `instance.variable` of all that the definition sets.
+    set: Vec<String>,
     outputs: Vec<String>,
     reuse: bool,
     notes: Vec<String>,
@@ -89,8 +91,10 @@ impl Plan {
         if definition.auto_connect {
             loaded.system.connect_by_name()?;
         }
+        let mut set = Vec::new();
         for (name, value) in &definition.set.0 {
             loaded.set(name, &value.to_string())?;
+            set.extend(loaded.connectors.ports(name)?);
         }
         let Definition { start, stop, step, .. } = *definition;
         let settings = loaded.settings(start, stop, step, definition.sequential);
@@ -126,7 +130,7 @@ impl Plan {
         let columns = columns.collect();
         let measures = measures.into_iter().map(|(measure, _)| measure).collect();
         let reuse = definition.reuse.unwrap_or(true);
-        Ok(Self(Arc::new(Shared { system, connectors, measures, columns, trace, outputs, reuse, notes })))
+        Ok(Self(Arc::new(Shared { system, connectors, measures, columns, trace, set, outputs, reuse, notes })))
     }
 
     /// Names and units of the measures.
@@ -164,7 +168,8 @@ impl Plan {
             let system = &self.0.system;
             let mut targets = Vec::new();
             for port in self.0.connectors.ports(name)? {
-                if system.sets(&port) {
+                // Values in an SSP file are what a run may replace; those of the definition are for all runs.
+                if self.0.set.contains(&port) {
                     return invalid(format!("{name} is set for all runs and varied: remove one of them"));
                 }
                 targets.push(system.target(&port)?);

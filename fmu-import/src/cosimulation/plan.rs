@@ -148,11 +148,6 @@ impl Plan {
         })
     }
 
-    /// Whether something in the plan sets a variable, written `instance.variable`.
-    pub fn sets(&self, written: &str) -> bool {
-        self.parts.port(written).is_ok_and(|port| self.set.iter().any(|(set, _)| *set == port))
-    }
-
     /// Start, stop and step.
     pub fn settings(&self) -> &Settings {
         self.grid.settings()
