@@ -78,15 +78,10 @@ const STARTS: &str = "stop = 0.4\nstep = 1e-3\ninput.'d.speed_ref' = '0:0,0.05:1
     [measure]\npeak = { of = 'd.speed', is = 'max' }\nlast = { of = 'd.speed', is = 'final' }\n\
     error = { of = 'd.theta_est - d.theta_e', wrap = '2pi', is = 'rms', after = 0.005 }\n";
 
-/// The measure `error` has the name of a column.
-fn starts() -> String {
-    STARTS.replace("\nerror =", "\nangle =")
-}
-
 #[test]
 fn a_killed_sweep_resumes_to_the_same_bytes() {
     let folder = Folder::new();
-    let file = folder.define("starts.toml", &starts());
+    let file = folder.define("starts.toml", STARTS);
     let temporary = folder.path("tmp");
     fs::create_dir(&temporary).unwrap();
     assert_eq!(ends(folder.sweep(&file, "whole").args(["--jobs", "1"]), 0), "");
@@ -154,7 +149,7 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
 #[test]
 fn jobs_processes_and_a_program_give_the_same_bits() {
     let folder = Folder::new();
-    let file = folder.define("starts.toml", &starts());
+    let file = folder.define("starts.toml", STARTS);
     ends(folder.sweep(&file, "two").args(["--jobs", "2"]), 0);
     let two = folder.results("two");
     // Three processes on one folder, each with a third of the parts.
@@ -185,6 +180,8 @@ fn jobs_processes_and_a_program_give_the_same_bits() {
     }
     let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
     assert_eq!(plan.run_many(&variables, &slices, 1, &go_on).unwrap(), outcomes);
+    let named: Vec<String> = sweep.columns().into_iter().map(|column| column.name).collect();
+    assert_eq!(named[4..], ["peak", "last", "error", "end", "error_"], "the measure has the name of a column");
     let rows = folder.rows("two");
     for k in 0..300 {
         let cells: Vec<f64> = rows[100 + k].split(',').take(8).map(|cell| cell.parse().unwrap()).collect();
@@ -271,7 +268,7 @@ fn what_can_be_known_before_the_first_run_is_told_before_it() {
         (vary(good).replace("d.speed'", "d.spede'"), "d: PmsmDrive has no variable spede"),
         (vary(good).replace("d.speed'", "d.speed d.i_d'"), "\"d.i_d\" is not expected"),
         (vary(good).replace("'final'", "'final', after = 2"), "m: after = 2 s, expected a time from 0 to 0.01 s"),
-        (vary(good).replace("\nm =", "\nend ="), "measure: end is the name of another column"),
+        (vary(good).replace("\nm =", "\n'd.plant.motor.R_s' ="), "is the name of a varied variable"),
         (format!("{design}[vary]\n{good}\n"), "nothing is measured"),
         (measure.into(), "expected a table [design]"),
         (vary(good).replace("[vary]", "[varied]"), "line 4: unknown field `varied`"),
@@ -326,7 +323,7 @@ fn another_sweep_does_not_go_on_in_the_same_folder() {
     let folder = Folder::new();
     let copy = folder.path("drive.fmu");
     fs::copy(common::archives().join("fmi3/PmsmDrive.fmu"), &copy).unwrap();
-    let text = starts().replace("stop = 0.4", "stop = 0.01").replace("runs = 400", "runs = 40");
+    let text = STARTS.replace("stop = 0.4", "stop = 0.01").replace("runs = 400", "runs = 40");
     let define = |text: &str| {
         fs::write(folder.path("a.toml"), format!("fmus = ['d=drive.fmu']\n{text}")).unwrap();
         folder.path("a.toml")
@@ -357,7 +354,7 @@ fn another_sweep_does_not_go_on_in_the_same_folder() {
 #[test]
 fn a_full_disk_names_the_file_and_loses_no_part() {
     let folder = Folder::new();
-    let text = starts().replace("stop = 0.4", "stop = 0.01");
+    let text = STARTS.replace("stop = 0.4", "stop = 0.01");
     let file = folder.define("a.toml", &text);
     ends(&mut folder.sweep(&file, "whole"), 0);
     let sweep =
@@ -426,7 +423,7 @@ fn systems_of_several_fmus_and_ssp_files_are_swept() {
 fn chosen_runs_are_recorded() {
     let folder = Folder::new();
     let trace = "[trace]\nof = ['d.speed', 'd.i_q']\nevery = 2\nruns = [3, 17]\n";
-    let text = starts().replace("stop = 0.4", "stop = 0.01").replace("runs = 400", "runs = 20");
+    let text = STARTS.replace("stop = 0.4", "stop = 0.01").replace("runs = 400", "runs = 20");
     let file = folder.define("a.toml", &format!("{text}{trace}"));
     ends(&mut folder.sweep(&file, "out"), 0);
     let mut traces = names(&folder.path("out/traces"));

@@ -62,14 +62,12 @@ impl<'a> Process<'a> {
 
     /// [`Sweep::probe`] in the process; `None` if it dies.
     pub(crate) fn probe(&mut self) -> Result<Option<(f64, bool)>, Error> {
-        let answered = self.started()?.ask("probe").and_then(|running| running.answer());
-        match answered {
-            Ok(answer) => Ok(serde_json::from_str(&answer).ok()),
-            Err(Died(_)) => {
-                self.running = None;
-                Ok(None)
-            }
+        let answered = self.started()?.ask("probe").and_then(Running::answer);
+        if let Ok(answer) = answered {
+            return Ok(serde_json::from_str(&answer).ok());
         }
+        self.running = None;
+        Ok(None)
     }
 
     /// The lines of rows.
@@ -128,7 +126,7 @@ impl<'a> Process<'a> {
                 return Err(Error::file(program, "has no standard input or output"));
             };
             let mut running = Running { child, input, output: BufReader::new(output) };
-            match running.ask(&self.job).and_then(|running| running.answer()) {
+            match running.ask(&self.job).and_then(Running::answer) {
                 Ok(ready) if ready == "ready" => {}
                 Ok(cause) => return Err(Error::Invalid(cause.trim_start_matches("error ").into())),
                 Err(Died(how)) => {

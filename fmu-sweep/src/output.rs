@@ -176,7 +176,7 @@ pub(crate) fn restart(folder: &Path) -> Result<(), Error> {
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let ours = ["sweep.json", "results.csv", "log.txt"].contains(&name.as_str())
-            || (name.starts_with("part-") && name.ends_with(".csv"))
+            || name.starts_with("part-")
             || [".part-", ".sweep.json-", ".results.csv-", ".running-"].iter().any(|start| name.starts_with(start));
         let traces = name == "traces" && path.is_dir();
         let removed = if traces {

@@ -188,7 +188,9 @@ impl Work<'_> {
         let mut lines = String::new();
         match executor {
             Executor::Here(writer) => {
-                range.clone().try_for_each(|row| writer.run(row).map(|line| lines.push_str(&line)))?
+                for row in range.clone() {
+                    lines.push_str(&writer.run(row)?);
+                }
             }
             Executor::Process(process) => process.run(range.clone(), &mut lines)?,
         }

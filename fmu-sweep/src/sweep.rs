@@ -54,8 +54,8 @@ impl Sweep {
             return invalid("expected a table [measure]: nothing is measured");
         }
         for (name, _) in &definition.measure.0 {
-            if rows.names().any(|other| other == name) || ["run", "end", "error"].contains(&name.as_str()) {
-                return invalid(format!("measure: {name} is the name of another column: rename it"));
+            if rows.names().any(|other| other == name) {
+                return invalid(format!("measure: {name} is the name of a varied variable: rename it"));
             }
             if name.contains([',', '"', '\n']) {
                 return invalid(format!("measure: {name:?} has a comma, a quote or a line break: rename it"));
@@ -115,13 +115,20 @@ impl Sweep {
         self.plan.run_rows(&self.variables, count, &row, threads, progress)
     }
 
-    /// All columns of the results: `run`, the varied variables, the measures, `end`, `error`.
+    /// All columns of the results: `run`, the varied variables, the measures, `end`, `error`. Where a measure has one of these
+    /// names, an underscore follows it.
     pub fn columns(&self) -> Vec<Column> {
-        let plain = |name: &str, unit: &str| Column { name: name.into(), unit: unit.into() };
         let varied = self.variables.iter().map(|variable| variable.column.clone());
-        let measured = self.plan.measures().iter().cloned();
-        let last = [plain("end", "s"), plain("error", "")];
-        std::iter::once(plain("run", "")).chain(varied).chain(measured).chain(last).collect()
+        let named: Vec<Column> = varied.chain(self.plan.measures().iter().cloned()).collect();
+        let plain = |name: &str, unit: &str| {
+            let mut name = name.to_owned();
+            while named.iter().any(|column| column.name == name) {
+                name.push('_');
+            }
+            Column { name, unit: unit.into() }
+        };
+        let (run, last) = (plain("run", ""), [plain("end", "s"), plain("error", "")]);
+        std::iter::once(run).chain(named).chain(last).collect()
     }
 
     /// The header of the results, with its line break.
@@ -164,9 +171,9 @@ impl Sweep {
             line.push(',');
             push_number(&mut line, x);
         };
-        values.iter().for_each(|x| number(*x));
+        values.iter().copied().for_each(&mut number);
         match &outcome.result {
-            Ok(measures) => measures.iter().for_each(|x| number(*x)),
+            Ok(measures) => measures.iter().copied().for_each(number),
             Err(_) => line.extend(std::iter::repeat_n(',', self.plan.measures().len())),
         }
         line.push(',');

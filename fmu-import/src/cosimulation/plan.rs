@@ -23,11 +23,11 @@
 
 use super::exchange::{Exchange, Wiring};
 use super::grid::Grid;
-use super::parts::{Parts, Port};
+use super::parts::{Part, Parts, Port};
 use super::run::{Ended, simulate};
 use super::{Column, Recording, Settings, System};
 use crate::{Error, Fmu, Instance, Values};
-use model_description::BaseType;
+use model_description::{BaseType, CoSimulation};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -155,8 +155,8 @@ impl Plan {
 
     /// The name of an FMU of which a process can have one instance only, if there is one: then there is one worker.
     pub fn only_one_instance(&self) -> Option<&str> {
-        let only_one = |fmu: &Fmu| fmu.description().co_simulation.as_ref().is_some_and(|c| c.only_one_instance());
-        self.parts.0.iter().find(|part| only_one(&part.fmu)).map(|part| part.name.as_str())
+        let only_one = |part: &&Part| part.description().co_simulation.iter().any(CoSimulation::only_one_instance);
+        self.parts.0.iter().find(only_one).map(|part| part.name.as_str())
     }
 
     /// Someone who runs this plan, for one thread.

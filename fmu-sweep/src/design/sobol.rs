@@ -114,6 +114,7 @@ const NUMBERS: [(usize, u32, &[u32]); 63] = [
 ];
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact")]
 mod tests {
     use super::*;
 

@@ -144,23 +144,23 @@ mod tests {
         text.parse().map_err(|_| format!("{text} is not a number"))
     }
 
-    fn source(vary: Vary) -> Result<Source, String> {
-        Source::new(&vary, &number)
+    fn source(vary: &Vary) -> Result<Source, String> {
+        Source::new(vary, &number)
     }
 
     #[test]
     #[expect(clippy::float_cmp, reason = "exact at the ends")]
     fn values_stay_where_they_belong() {
-        let uniform = source(Vary { uniform: Some([2.0, 4.0]), ..Vary::default() }).unwrap();
+        let uniform = source(&Vary { uniform: Some([2.0, 4.0]), ..Vary::default() }).unwrap();
         assert_eq!([0.0, 0.25, 1.0].map(|u| uniform.at(u)), [2.0, 2.5, 4.0]);
-        let log = source(Vary { log: Some([1.0, 100.0]), ..Vary::default() }).unwrap();
+        let log = source(&Vary { log: Some([1.0, 100.0]), ..Vary::default() }).unwrap();
         assert!((log.at(0.5) - 10.0).abs() < 1e-14 && log.at(0.0) == 1.0 && log.at(1.0) == 100.0);
         let normal = Vary { normal: Some([3.0, 0.15]), within: Some([2.5, 3.2]), ..Vary::default() };
-        let normal = source(normal).unwrap();
+        let normal = source(&normal).unwrap();
         let all: Vec<f64> = (0..=1000).map(|k| normal.at(f64::from(k) / 1000.0)).collect();
         assert!(all.windows(2).all(|w| w[0] <= w[1]) && all[0] >= 2.5 && all[1000] <= 3.2);
         assert!(all[999] > 3.19 && all[1] < 2.62);
-        let levels = source(Vary { from: Some(0.0), to: Some(0.3), count: Some(4), ..Vary::default() }).unwrap();
+        let levels = source(&Vary { from: Some(0.0), to: Some(0.3), count: Some(4), ..Vary::default() }).unwrap();
         assert_eq!([0.0, 0.3, 0.6, 0.9, 1.0].map(|u| levels.at(u)), [0.0, 0.3 * 1.0 / 3.0, 0.3 * 2.0 / 3.0, 0.3, 0.3]);
     }
 
@@ -182,7 +182,7 @@ mod tests {
             (Vary { from: Some(0.0), ..v() }, "from, to and count belong together"),
             (Vary { uniform: Some([0.0, 1.0]), times: Some(2.0), ..v() }, "times belongs to same"),
         ] {
-            let error = source(vary.clone()).unwrap_err();
+            let error = source(&vary).unwrap_err();
             assert!(error.contains(part), "{vary:?}: {error}");
         }
     }
