@@ -44,7 +44,7 @@ impl Folder {
 
     /// All files of the results that may not differ, with their bytes.
     fn results(&self, out: &str) -> Vec<(String, Vec<u8>)> {
-        let results = |name: &str| name == "results.csv" || (name.starts_with("part-") && name.ends_with(".csv"));
+        let results = |name: &str| name == "results.csv" || name.starts_with("part-");
         let mut all: Vec<_> = names(&self.path(out)).into_iter().filter(|name| results(name)).collect();
         all.sort();
         all.into_iter().map(|name| (name.clone(), fs::read(self.path(out).join(name)).unwrap())).collect()
@@ -90,12 +90,12 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
 
     let parts = |out: &str| names(&folder.path(out)).iter().filter(|name| name.starts_with("part-")).count();
     let mut kills = 0;
-    let mut start = || -> Child {
+    let start = || -> Child {
         let mut command = folder.sweep(&file, "killed");
         command.args(["--jobs", "2"]).env("TMPDIR", &temporary).stderr(Stdio::null()).stdout(Stdio::null());
         command.spawn().unwrap()
     };
-    let mut kill = |child: &mut Child| {
+    let kill = |child: &mut Child| {
         child.kill().unwrap();
         child.wait().unwrap();
         for (name, bytes) in folder.results("killed") {
@@ -361,7 +361,8 @@ fn a_full_disk_names_the_file_and_loses_no_part() {
         |out: &Path| format!("'{}' sweep '{}' --out '{}'", env!("CARGO_BIN_EXE_fmu"), file.display(), out.display());
     // A disk of 64 KiB, where a process may have one of its own.
     let (disk, copy) = (folder.path("disk"), folder.path("copy"));
-    [&disk, &copy].map(|path| fs::create_dir(path).unwrap());
+    fs::create_dir(&disk).unwrap();
+    fs::create_dir(&copy).unwrap();
     let script = format!(
         "mount -t tmpfs -o size=64k none '{disk}' || exit 77; {run}; echo status $?; ls -a '{disk}' > '{copy}/ls'; \
          mount -o remount,size=4m '{disk}'; {run} || exit 1; cp '{disk}'/* '{copy}'",
@@ -433,6 +434,57 @@ fn chosen_runs_are_recorded() {
     let lines: Vec<&str> = trace.lines().collect();
     assert_eq!((lines[0], lines.len()), ("time,d.speed,d.i_q", 7));
     assert!(lines[1].starts_with("0,") && lines[6].starts_with("0.01,"), "{trace}");
+}
+
+/// FMUs in C that forget to reset a state, end their binary by the status Fatal, print what they like, or can be there once.
+#[test]
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn rude_fmus_run_as_well_as_polite_ones() {
+    let folder = Folder::new();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let pack = |fault: &str| {
+        let library = folder.path(&format!("{fault}.so"));
+        let mut cc = Command::new("cc");
+        cc.args(["-shared", "-fPIC", "-O1", "-w", "-fvisibility=hidden", &format!("-DFAULT_{fault}")]);
+        ends(cc.arg(root.join("tests/check/fmu.c")).arg("-o").arg(&library).arg("-lm"), 0);
+        let mut xml = fs::read_to_string(root.join("tests/check/fmu.xml")).unwrap();
+        if fault == "ONCE" {
+            xml = xml.replace("canGetAndSet", "canBeInstantiatedOnlyOncePerProcess=\"true\" canGetAndSet");
+        }
+        let mut zip = zip::ZipWriter::new(fs::File::create(folder.path(&format!("{fault}.fmu"))).unwrap());
+        let library = fs::read(library).unwrap();
+        for (name, bytes) in [("modelDescription.xml", xml.as_bytes()), ("binaries/linux64/Small.so", &library[..])] {
+            zip.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+            std::io::Write::write_all(&mut zip, bytes).unwrap();
+        }
+        zip.finish().unwrap();
+    };
+    fs::write(folder.path("rows.csv"), "s.bias\n1\n2\n9\n3\n4\n5\n6\n7\n8\n1.5\n").unwrap();
+    let sweep = |fault: &str, arguments: &[&str], status: i32| {
+        pack(fault);
+        let text = format!(
+            "fmus = ['s={fault}.fmu']\nstop = 0.1\nstep = 0.01\ninput.'s.u' = '1'\n\
+             design = {{ kind = 'list', file = 'rows.csv', part = 4 }}\n[measure]\ny = {{ of = 's.y', is = 'final' }}\n"
+        );
+        fs::write(folder.path(&format!("{fault}.toml")), text).unwrap();
+        let said = ends(folder.sweep(&folder.path(&format!("{fault}.toml")), fault).args(arguments), status);
+        (said, folder.rows(fault))
+    };
+    let (said, polite) = sweep("NONE", &["--jobs", "2"], 0);
+    assert!(said.is_empty() && polite[9].starts_with("9,1.5,0.35") && polite[9].ends_with(",0.1,"), "{said}{polite:?}");
+    let (said, rows) = sweep("L06", &["--jobs", "2"], 0);
+    assert!(said.contains("note: a run after a reset differs from a run of a new instance"), "{said}");
+    assert_eq!(rows, polite);
+    let (said, mut rows) = sweep("FATAL", &["--jobs", "1"], 1);
+    assert!(said.contains("row 2: s: fmi2DoStep returned Fatal") && said.contains("1 of 10 rows failed"), "{said}");
+    rows[2].clone_from(&polite[2]);
+    assert_eq!(rows, polite, "after the status Fatal there is another copy of the binary");
+    assert_eq!(sweep("PRINT", &["--isolate", "--jobs", "2"], 0), (String::new(), polite.clone()));
+    let (said, rows) = sweep("ONCE", &["--jobs", "2"], 0);
+    assert_eq!(said, "note: s can have one instance per process: rows run in processes, as with --isolate\n");
+    assert_eq!(rows, polite);
+    fs::remove_dir_all(folder.path("ONCE")).unwrap();
+    assert_eq!(sweep("ONCE", &["--jobs", "1"], 0), (String::new(), polite));
 }
 
 /// A run of one period beside the model: reset, two values, initialization, end.
