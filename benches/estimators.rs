@@ -19,8 +19,7 @@ const W: f64 = TAU * 10.0;
 const N: usize = 6000;
 
 fn context(par: &drive::control::tables::ControllerParameters) -> Context<'_> {
-    let delay = f64::from(par.delay);
-    Context { par: &par.estimators, motor: &par.motor, current: &par.current, J: par.J, T_s: T_S, delay }
+    Context { par: &par.estimators, motor: &par.motor, J: par.J, T_s: T_S }
 }
 
 /// Samples of a machine that turns steadily at its rated current, its estimator's injection one sample late.

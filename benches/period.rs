@@ -1,31 +1,97 @@
-//! One 10 kHz period of controller and plant: natively, and the same through the C interface with its gets and sets.
+//! One 10 kHz period of plant and controller: natively, through the C interface of both standards with its gets and sets,
+//! and 1 s of PmsmDrive; as a ratio to a loop that is written by hand in C (`c_period.c`), if a C compiler `cc` is there.
+//!
+//! The candidates take turns in one run, so that whatever else the computer does affects all of them; the figures are
+//! medians. `PERIOD_BASELINE=DIR` adds the FMUs of another build from `DIR/fmi2` and `DIR/fmi3`.
 #![allow(missing_docs)]
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use criterion::{Criterion, criterion_group, criterion_main};
 use drive::Pair;
 use drive_study::reproduce::scenario::RPM;
 use fmu_import::{Fmu, Instance};
+use libloading::{Library, Symbol};
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
 
 const T_S: f64 = 1e-4;
 
-/// At 1000 rpm with a load of 1 N.m.
-fn native(c: &mut Criterion) {
-    let mut pair = Pair::default();
-    pair.start().unwrap();
-    pair.set_inputs(1000.0 * RPM, 1.0, 325.0);
-    for _ in 0..10_000 {
-        pair.step(T_S).unwrap();
-    }
-    c.bench_function("period/native", |b| b.iter(|| pair.step(T_S).unwrap()));
-    assert!((pair.plant.out.speed - 1000.0 * RPM).abs() < 1.0, "the drive is still on its speed");
+/// Periods in one turn of a candidate: about 5 ms.
+const PERIODS: u32 = 10_000;
+
+/// Turns of each candidate.
+const TURNS: usize = 61;
+
+/// Speed reference in rad/s and load torque in N.m of an operating point.
+#[derive(Clone, Copy)]
+struct Point {
+    name: &'static str,
+    speed: f64,
+    load: f64,
 }
 
-fn start(standard: &str, name: &str) -> Instance {
-    let path = common::archives().join(standard).join(name).with_extension("fmu");
-    let mut instance = Fmu::open(path).unwrap().instantiate(name, false).unwrap();
+const POINTS: [Point; 2] =
+    [Point { name: "1000 rpm", speed: 1000.0 * RPM, load: 1.0 }, Point { name: "3 rpm", speed: 3.0 * RPM, load: 0.1 }];
+
+/// A name and what runs [`PERIODS`] periods.
+struct Candidate {
+    name: String,
+    turn: Box<dyn FnMut()>,
+    /// Time of a period in ns, one of each turn.
+    times: Vec<f64>,
+}
+
+impl Candidate {
+    fn new(name: impl Into<String>, turn: impl FnMut() + 'static) -> Self {
+        Self { name: name.into(), turn: Box::new(turn), times: Vec::new() }
+    }
+
+    fn median(&mut self) -> f64 {
+        self.times.sort_by(f64::total_cmp);
+        self.times[self.times.len() / 2]
+    }
+}
+
+/// The loop in C as a library, or why there is none.
+fn c_loop() -> Result<Library, String> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let (source, library) =
+        (Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/c_period.c"), folder.join("c_period.so"));
+    let mut cc = Command::new("cc");
+    cc.args(["-O3", "-march=native", "-shared", "-fPIC", "-o"]).arg(&library).arg(source).arg("-lm");
+    match cc.status() {
+        Ok(status) if status.success() => {}
+        Ok(status) => return Err(format!("cc: {status}")),
+        Err(error) => return Err(format!("cc: {error}")),
+    }
+    // SAFETY: a library without initialization code, compiled above.
+    unsafe { Library::new(library) }.map_err(|error| error.to_string())
+}
+
+fn c(point: Point, library: &'static Library) -> Candidate {
+    // SAFETY: the type of the function in c_period.c.
+    let periods: Symbol<unsafe extern "C" fn(i64, f64) -> f64> = unsafe { library.get(b"c_periods") }.unwrap();
+    Candidate::new("C loop", move || {
+        // SAFETY: the function works on its own static data, in this thread only.
+        assert!(unsafe { periods(i64::from(PERIODS), point.speed) }.is_finite());
+    })
+}
+
+fn native(point: Point) -> Candidate {
+    let mut pair = Pair::default();
+    pair.start().unwrap();
+    pair.set_inputs(point.speed, point.load, 325.0);
+    Candidate::new("native", move || {
+        for _ in 0..PERIODS {
+            pair.step(T_S).unwrap();
+        }
+    })
+}
+
+fn start(folder: &Path, name: &str) -> Instance {
+    let mut instance = Fmu::open(folder.join(name).with_extension("fmu")).unwrap().instantiate(name, false).unwrap();
     instance.setup(0.0, None).unwrap();
     instance.enter_initialization().unwrap();
     instance.exit_initialization().unwrap();
@@ -36,50 +102,76 @@ fn references<const N: usize>(instance: &Instance, names: [&str; N]) -> [u32; N]
     names.map(|name| instance.variable(name).unwrap().value_reference)
 }
 
-fn through_abi(c: &mut Criterion, standard: &str) {
-    let (mut plant, mut controller) = (start(standard, "PmsmPlant"), start(standard, "SensorlessController"));
+fn through_c(point: Point, folder: &Path, name: String) -> Candidate {
+    let (mut plant, mut controller) = (start(folder, "PmsmPlant"), start(folder, "SensorlessController"));
     let (i, u) = (["i_a", "i_b", "i_c"], ["u_a", "u_b", "u_c"]);
     let (plant_i, plant_u) = (references(&plant, i), references(&plant, u));
     let (controller_i, controller_u) = (references(&controller, i), references(&controller, u));
-    controller.set_reals(&references(&controller, ["speed_ref"]), &[1000.0 * RPM]).unwrap();
-    plant.set_reals(&references(&plant, ["tau_load"]), &[1.0]).unwrap();
+    controller.set_reals(&references(&controller, ["speed_ref"]), &[point.speed]).unwrap();
+    plant.set_reals(&references(&plant, ["tau_load"]), &[point.load]).unwrap();
     let (mut current, mut voltage, mut k) = ([0.0; 3], [0.0; 3], 0_u32);
-    let mut period = || {
-        plant.get_reals(&plant_i, &mut current).unwrap();
-        controller.get_reals(&controller_u, &mut voltage).unwrap();
-        plant.set_reals(&plant_u, &voltage).unwrap();
-        controller.set_reals(&controller_i, &current).unwrap();
-        let t = f64::from(k) * T_S;
-        let _ = plant.do_step(t, T_S).unwrap();
-        let _ = controller.do_step(t, T_S).unwrap();
-        k += 1;
-    };
-    for _ in 0..10_000 {
-        period();
-    }
-    c.bench_function(&format!("period/{standard}"), |b| b.iter(&mut period));
+    Candidate::new(name, move || {
+        for _ in 0..PERIODS {
+            plant.get_reals(&plant_i, &mut current).unwrap();
+            controller.get_reals(&controller_u, &mut voltage).unwrap();
+            plant.set_reals(&plant_u, &voltage).unwrap();
+            controller.set_reals(&controller_i, &current).unwrap();
+            let t = f64::from(k) * T_S;
+            let _ = plant.do_step(t, T_S).unwrap();
+            let _ = controller.do_step(t, T_S).unwrap();
+            k += 1;
+        }
+    })
 }
 
-/// One second of PmsmDrive in steps of 1 ms.
-fn whole_drive(c: &mut Criterion) {
-    let mut drive = start("fmi3", "PmsmDrive");
-    drive.set_reals(&references(&drive, ["speed_ref", "tau_load"]), &[1000.0 * RPM, 1.0]).unwrap();
+/// PmsmDrive in steps of 1 ms.
+fn whole_drive(point: Point, folder: &Path, name: String) -> Candidate {
+    let mut drive = start(folder, "PmsmDrive");
+    drive.set_reals(&references(&drive, ["speed_ref", "tau_load"]), &[point.speed, point.load]).unwrap();
     let mut k = 0_u32;
-    c.bench_function("pmsm_drive/1 s at 1 ms", |b| {
-        b.iter(|| {
-            for _ in 0..1000 {
-                let _ = drive.do_step(f64::from(k) * 1e-3, 1e-3).unwrap();
-                k += 1;
+    Candidate::new(name, move || {
+        for _ in 0..PERIODS / 10 {
+            let _ = drive.do_step(f64::from(k) * 1e-3, 1e-3).unwrap();
+            k += 1;
+        }
+    })
+}
+
+fn measure(candidates: &mut [Candidate]) {
+    // The first turns start the drive and warm the caches.
+    for _ in 0..3 {
+        candidates.iter_mut().for_each(|candidate| (candidate.turn)());
+    }
+    for _ in 0..TURNS {
+        for candidate in &mut *candidates {
+            let start = Instant::now();
+            (candidate.turn)();
+            candidate.times.push(start.elapsed().as_secs_f64() * 1e9 / f64::from(PERIODS));
+        }
+    }
+}
+
+fn main() {
+    let library = c_loop().inspect_err(|cause| println!("without the loop in C: {cause}")).ok();
+    let library: Option<&'static Library> = library.map(|library| &*Box::leak(Box::new(library)));
+    let mut builds = vec![(String::new(), common::archives().to_owned())];
+    builds.extend(std::env::var_os("PERIOD_BASELINE").map(|folder| ("baseline ".to_owned(), folder.into())));
+    for point in POINTS {
+        let mut candidates = Vec::new();
+        candidates.extend(library.map(|library| c(point, library)));
+        candidates.push(native(point));
+        for (build, folder) in &builds {
+            for standard in ["fmi2", "fmi3"] {
+                candidates.push(through_c(point, &folder.join(standard), format!("{build}pair, {standard}")));
             }
-        });
-    });
+            candidates.push(whole_drive(point, &folder.join("fmi3"), format!("{build}PmsmDrive at 1 ms")));
+        }
+        measure(&mut candidates);
+        let to = candidates[0].median();
+        println!("\n{} with {} N.m: ns per period of 0.1 ms, ratio to {}", point.name, point.load, candidates[0].name);
+        for candidate in &mut candidates {
+            let median = candidate.median();
+            println!("{:<28}{median:>7.0}{:>7.2}", candidate.name, median / to);
+        }
+    }
 }
-
-fn abi(c: &mut Criterion) {
-    through_abi(c, "fmi2");
-    through_abi(c, "fmi3");
-    whole_drive(c);
-}
-
-criterion_group!(benches, native, abi);
-criterion_main!(benches);

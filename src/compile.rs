@@ -36,8 +36,8 @@ struct ArtifactTarget {
 pub fn compile(workspace: &Workspace, packages: &[String], target: &Target) -> Result<Vec<Library>> {
     let mut libraries = Vec::new();
     if is_darwin(target) {
-        // The name by which macOS knows a library is written into it; without this one it is the path that it was linked
-        // to. An argument for one library only: one Cargo each.
+        // macOS stores an install name in a library, by default the path of the build. The argument that sets it applies to
+        // one library only, so Cargo runs once per library.
         for name in packages {
             let one = std::slice::from_ref(name);
             let mut rustc = build("rustc", workspace, one, target);
@@ -79,7 +79,7 @@ fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target
     build.env("CARGO_ENCODED_RUSTFLAGS", flags(&workspace.root, target));
     // The C interface turns a panic into a status, whatever panic strategy the workspace sets for its programs.
     build.env("CARGO_PROFILE_RELEASE_PANIC", "unwind");
-    // The whole library optimized as one, and no names in it beside those exported: unless the caller says otherwise.
+    // Link-time optimization, and no symbols except the exported ones, unless the caller sets otherwise.
     for (setting, value) in [("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "symbols")] {
         let name = format!("CARGO_PROFILE_RELEASE_{setting}");
         if env::var_os(&name).is_none() {
@@ -87,11 +87,11 @@ fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target
         }
     }
     if target.is_host {
-        // It has one, and Cargo wants --target otherwise.
+        // The host has a standard library; building one would require --target.
         build.env_remove(BUILD_STD);
     }
     if is_darwin(target) && env::var_os("MACOSX_DEPLOYMENT_TARGET").is_none() {
-        // The oldest with 64-bit ARM.
+        // The first macOS with 64-bit ARM.
         build.env("MACOSX_DEPLOYMENT_TARGET", "11.0");
     }
     build

@@ -50,22 +50,22 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
     format!("{head}{contents}<main>\n{body}</main>\n</body>\n</html>\n")
 }
 
-/// A list of the headings that lead to their places, and the body with these places.
+/// A table of contents that links to the headings, and the body with their anchors.
 fn with_contents(body: &str) -> (String, String) {
     let mut parts = body.split("<h2>");
     let mut out = parts.next().unwrap_or_default().to_owned();
     let mut list = String::from("<nav>\n<ul>\n");
     for part in parts {
         let title = part.split("</h2>").next().unwrap_or_default();
-        let place = place(title);
-        put!(list, "<li><a href=\"#{place}\">{title}</a></li>\n");
-        put!(out, "<h2 id=\"{place}\">{part}");
+        let anchor = anchor(title);
+        put!(list, "<li><a href=\"#{anchor}\">{title}</a></li>\n");
+        put!(out, "<h2 id=\"{anchor}\">{part}");
     }
     (list + "</ul>\n</nav>\n", out)
 }
 
-/// The name of a heading's place: its letters and digits, joined; the enumerations' places are their names, in capitals.
-fn place(title: &str) -> String {
+/// The anchor of a heading: its letters and digits, joined. The anchors of enumerations are their names, capitalized.
+fn anchor(title: &str) -> String {
     let words = title.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.map(str::to_lowercase).collect::<Vec<_>>().join("-")
 }
@@ -106,7 +106,7 @@ fn parameters(d: &Description) -> String {
     for p in prefixes {
         let variables: Vec<_> = all.iter().copied().filter(|v| prefix(&v.name) == p).collect();
         if !p.is_empty() {
-            put!(out, "<h3 id=\"parameters-{}\">{}</h3>\n", place(p), escape(p));
+            put!(out, "<h3 id=\"parameters-{}\">{}</h3>\n", anchor(p), escape(p));
         }
         out += &table(&variables);
     }

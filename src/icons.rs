@@ -18,7 +18,7 @@ const LARGEST: f32 = 2048.0;
 /// The files; none for a model without terminals and icon.
 ///
 /// # Errors
-/// A picture is no SVG document, or has text in it.
+/// A picture is not an SVG document, or contains text.
 pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<String, Entry>> {
     let mut files = BTreeMap::new();
     let file = |bytes: Vec<u8>| Entry { bytes, executable: false };
@@ -30,7 +30,7 @@ pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<
     pictures.extend(description.icon.as_ref().map(|svg| ("icon", svg.as_str())));
     for (name, svg) in pictures {
         let png = png(svg).with_context(|| format!("the picture {name} of {}", description.name))?;
-        // FMI 2.0.5, 2.3: the icon's place before there were terminals.
+        // FMI 2.0.5, 2.3: the icon's location without terminals.
         if name == "icon" && version == FmiVersion::V2 {
             files.insert("model.png".into(), file(png.clone()));
         }
@@ -46,7 +46,7 @@ fn png(svg: &str) -> Result<Vec<u8>> {
     if svg.contains("<text") {
         bail!("has <text>, which is drawn differently wherever the fonts differ: draw paths instead");
     }
-    let tree = Tree::from_str(svg, &usvg::Options::default()).map_err(|e| anyhow!("is no SVG document: {e}"))?;
+    let tree = Tree::from_str(svg, &usvg::Options::default()).map_err(|e| anyhow!("is not an SVG document: {e}"))?;
     let size = tree.size();
     let pixels = |x: f32| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive and at most LARGEST")]
@@ -79,7 +79,7 @@ mod tests {
         let svg = |inside: &str| format!("<svg xmlns='http://www.w3.org/2000/svg' {inside}</svg>");
         let why = |svg: &str| png(svg).unwrap_err().to_string();
         assert!(why(&svg("width='9' height='9'><text>a</text>")).contains("draw paths instead"));
-        assert!(why("<svg").contains("is no SVG document"));
+        assert!(why("<svg").contains("is not an SVG document"));
         assert!(why(&svg("width='9999' height='9'>")).contains("9999 x 9 pixels; at most 2048"));
     }
 

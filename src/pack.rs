@@ -43,11 +43,11 @@ impl Moment {
     /// The time from the environment, or from the clock.
     ///
     /// # Errors
-    /// `SOURCE_DATE_EPOCH` is no number of seconds.
+    /// `SOURCE_DATE_EPOCH` is not a number of seconds.
     pub fn of_environment() -> Result<Self> {
         if let Ok(text) = std::env::var("SOURCE_DATE_EPOCH") {
             let seconds =
-                text.trim().parse().with_context(|| format!("SOURCE_DATE_EPOCH={text} is no number of seconds"))?;
+                text.trim().parse().with_context(|| format!("SOURCE_DATE_EPOCH={text} is not a number of seconds"))?;
             return Ok(Self::fixed(seconds));
         }
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -64,7 +64,7 @@ impl Moment {
         date_from_epoch(self.seconds)
     }
 
-    /// The time of every file: 1980-01-01 unless it is fixed, for an archive need not tell when it was made twice.
+    /// The time of every file: 1980-01-01 unless it is fixed, since the description already has the date.
     fn of_files(self) -> DateTime {
         let text = date_from_epoch(self.seconds);
         let field = |range: std::ops::Range<usize>| text[range].parse::<u16>().unwrap_or(0);
@@ -108,7 +108,7 @@ pub fn contents(
     files
 }
 
-/// The bytes of a ZIP archive as FMI wants it (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5): deflate, `/` in names, files only, no
+/// The bytes of a ZIP archive as FMI requires it (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5): deflate, `/` in names, files only, no
 /// ZIP64, no data descriptors; and the same for the same files: sorted, one time, one compressor.
 ///
 /// # Errors
@@ -127,7 +127,7 @@ pub fn archive(files: &BTreeMap<String, Entry>, moment: Moment) -> Result<Vec<u8
     Ok(zip.finish()?.into_inner())
 }
 
-/// Writes a file atomically, so that nobody sees a partial file.
+/// Writes a file atomically, so that no reader sees a partial file.
 ///
 /// # Errors
 /// The file cannot be written.

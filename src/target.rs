@@ -38,7 +38,7 @@ pub enum Linker {
 #[derive(Debug)]
 pub struct Tools {
     host: String,
-    /// Or what is missing.
+    /// zig as a linker, or what is missing.
     zig: Result<(), String>,
 }
 
@@ -79,7 +79,7 @@ impl Tools {
         let (os, processor, environment) = (value("target_os"), value("target_arch"), value("target_env"));
         let known = || Platform::ALL.map(Platform::tuple).join(", ");
         let platform = Platform::of(os, processor)
-            .ok_or_else(|| wrong(format!("is no platform of FMUs here; there are {}", known())))?;
+            .ok_or_else(|| wrong(format!("is not a platform of FMUs here; there are {}", known())))?;
         if os == "linux" && environment != "gnu" {
             // A process has one C library, and importers use the GNU one.
             let instead = format!("{processor}-unknown-linux-gnu");

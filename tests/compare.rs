@@ -1,9 +1,9 @@
 //! The grid of estimators and scenarios: its reduced form against the golden copy, its figures, its command line.
 #![allow(missing_docs)]
 
+use drive_study::compare::candidate::Entry;
 use drive_study::compare::measure::Measure;
 use drive_study::compare::scenario::{Effort, SCENARIOS};
-use drive_study::compare::subject::Entry;
 use drive_study::compare::{self, Cell, Selection, html, table};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -17,7 +17,7 @@ pub const RATED_SPEED: f64 = TAU * 25.0;
 /// Rated torque in N.m.
 pub const RATED_TORQUE: f64 = 14.0;
 /// Voltage that an inverter leg loses to 2 us dead time, in V.
-pub const U_DEAD: f64 = 10.8;
+const U_DEAD: f64 = 10.8;
 
 /// The 2.2 kW machine with interior magnets.
 pub fn machine() -> Motor {
@@ -240,7 +240,7 @@ pub fn load_step(pair: Pair, speed: f64, load: f64) -> (f64, f64) {
 }
 
 /// Gain of the closed speed loop at `frequency` (Hz) around `speed` (pu), from the true speed.
-pub fn speed_gain(pair: Pair, speed: f64, frequency: f64) -> f64 {
+fn speed_gain(pair: Pair, speed: f64, frequency: f64) -> f64 {
     // An amplitude of 0.02 pu, or less if that would need more than half the rated torque.
     let J = pair.plant.model.parameters.mechanics.J;
     let swing = (0.02 * RATED_SPEED).min(0.5 * RATED_TORQUE / (J * TAU * frequency));

@@ -5,9 +5,11 @@
 mod common;
 
 use common::{SteppedPlant, T_S};
+use drive::PmsmDrive;
 use drive::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
 use drive::plant::power::Energy;
 use drive::plant::tables::PlantParameters;
+use fmu_core::{Block, Elapsed, Step};
 
 impl SteppedPlant {
     /// The voltage that keeps the current `i` (A) of a linear machine with these parameters, turned by half a sample.
@@ -135,16 +137,78 @@ fn energy_is_balanced_with_an_imposed_speed() {
 fn a_link_without_voltage_carries_current_but_no_power() {
     let mut plant = SteppedPlant::new(|par| par.initial.speed = 300.0);
     plant.block.model.inputs.u_dc = 0.0;
-    plant.block.model.inputs.u = Phases { a: 100.0, b: -50.0, c: -50.0 };
+    plant.block.model.inputs.u = Phases { a: 100.0, b: 25.0, c: -50.0 };
     for _ in 0..20 {
         plant.step(T_S);
         let (p, i) = (plant.block.out.powers, plant.block.out.i);
-        // Leg a is on the upper rail, the others on the lower one: i_dc = i_a.
-        assert!(p.p_in == 0.0 && (p.i_dc - i.a).abs() < 1e-12 && i.a.abs() > 0.1, "{p:?} {i:?}");
+        // Leg a is on the upper rail, leg c on the lower one, leg b half of the period on either: i_dc = i_a + i_b / 2.
+        assert!(p.p_in == 0.0 && (p.i_dc - i.a - 0.5 * i.b).abs() < 1e-12, "{p:?} {i:?}");
+        assert!(i.a.abs() > 0.1 && i.b.abs() > 0.1, "{i:?}");
     }
     plant.block.model.inputs.u = Phases::default();
     plant.step(T_S);
     assert_eq!(plant.block.out.powers.i_dc.to_bits(), 0.0_f64.to_bits(), "all legs on one rail");
+    // During the dead time, the diode of every leg feeds the link, here 4 % of the period.
+    (plant.block.model.parameters.inverter.dead_time, plant.block.model.parameters.inverter.T_pwm) = (4e-6, T_S);
+    plant.step(T_S);
+    let (p, Phases { a, b, c }) = (plant.block.out.powers, plant.block.out.i);
+    let leg = |i: f64| i.abs() * (i.abs() / plant.block.model.parameters.inverter.i_zero).min(1.0);
+    let feed = 0.04 * (leg(a) + leg(b) + leg(c));
+    assert!(feed > 0.01 && (p.i_dc + feed).abs() < 1e-12, "{p:?}, {feed} A");
+}
+
+#[test]
+fn before_the_first_step_only_the_shaft_has_power() {
+    for speed in [200.0, -200.0] {
+        let mut plant = SteppedPlant::new(|par| par.initial.speed = speed);
+        plant.block.model.inputs.tau_load = 1.5;
+        plant.block.initialize();
+        let (p, friction) = (plant.block.out.powers, 2e-4 * 200.0 + 0.03);
+        assert!(p.p_in == 0.0 && p.i_dc == 0.0 && (p.p_mech - 1.5 * speed).abs() < 1e-9, "{p:?}");
+        assert!((p.p_loss - friction * 200.0).abs() < 1e-9, "{p:?}");
+    }
+}
+
+#[test]
+fn the_drive_shows_the_means_of_its_last_sample_period() {
+    // Steps that divide no period: the energies at the ends of the periods come from a drive that steps by T_s.
+    let drive = || {
+        let mut drive = Block::<PmsmDrive>::default();
+        drive.model.inputs.speed_ref = 50.0;
+        drive.model.inputs.tau_load = 0.5;
+        drive.initialize();
+        drive
+    };
+    let step = |drive: &mut Block<PmsmDrive>, start: Elapsed, h: f64| {
+        drive.step(&Step { start, h }).unwrap();
+        start.plus(h)
+    };
+    let (mut whole, mut parts) = (drive(), drive());
+    let (mut now, mut t) = (Elapsed::ZERO, Elapsed::ZERO);
+    for k in 1..=2000_u32 {
+        let before = whole.out.plant.energy;
+        now = step(&mut whole, now, T_S);
+        while t.since(now) < -0.31 * T_S {
+            t = step(&mut parts, t, 0.3 * T_S);
+        }
+        let rest = now.since(t);
+        t = step(&mut parts, t, rest);
+        let (p, after) = (parts.out.plant.powers, whole.out.plant.energy);
+        for (mean, energy) in [
+            (p.p_in, after.r#in - before.r#in),
+            (325.0 * p.i_dc, after.r#in - before.r#in),
+            (p.p_mech, after.mech - before.mech),
+            (p.p_loss, after.loss - before.loss),
+        ] {
+            assert!(
+                (mean - energy / T_S).abs() < 1e-3 * (1.0 + mean.abs()),
+                "sample {k}: {mean} W, {} W",
+                energy / T_S
+            );
+        }
+    }
+    let p = parts.out.plant.powers;
+    assert!(p.p_in > 20.0 && p.p_mech > 20.0 && p.p_loss > 1.0, "{p:?}");
 }
 
 #[test]

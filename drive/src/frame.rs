@@ -3,7 +3,7 @@
 //! `Vector<Stator>` has components alpha and beta; `Vector<Rotor>` and `Vector<Estimated>` have d and q. An [`Axis`] is
 //! the direction of a rotating frame's d-axis; only an axis transforms vectors from one frame to another.
 
-use crate::math::sin_cos;
+use crate::math::{sin_cos, sin_cos_small, sin_cos_tiny};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
@@ -181,9 +181,30 @@ impl<F> Mul<f64> for Vector<F> {
 }
 
 /// Direction of the d-axis of the rotating frame `F`, seen from the stator.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct Axis<F: Rotating> {
     direction: Complex<f64>,
+    #[serde(skip)]
     frame: PhantomData<F>,
+}
+
+impl<F: Rotating> Default for Axis<F> {
+    fn default() -> Self {
+        Self { direction: Complex::new(1.0, 0.0), frame: PhantomData }
+    }
+}
+
+impl<F: Rotating> PartialEq for Axis<F> {
+    fn eq(&self, other: &Self) -> bool {
+        self.direction == other.direction
+    }
+}
+
+impl<F: Rotating> std::fmt::Debug for Axis<F> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "({}, {})", self.direction.re, self.direction.im)
+    }
 }
 
 impl<F: Rotating> Clone for Axis<F> {
@@ -202,6 +223,12 @@ impl<F: Rotating> Axis<F> {
         Self { direction: Complex::new(cos, sin), frame: PhantomData }
     }
 
+    /// The frame further on by `turn`.
+    #[inline]
+    pub fn ahead(self, turn: Turn) -> Self {
+        Self { direction: self.direction * turn.0, frame: PhantomData }
+    }
+
     /// Transforms a stator vector to the rotating frame: v e^{-j theta}.
     #[inline]
     pub fn from_stator(self, v: AlphaBeta) -> Vector<F> {
@@ -212,6 +239,26 @@ impl<F: Rotating> Axis<F> {
     #[inline]
     pub fn to_stator(self, v: Vector<F>) -> AlphaBeta {
         Vector::of(v.z * self.direction)
+    }
+}
+
+/// A rotation by an angle that is usually small: [`Axis::ahead`].
+#[derive(Clone, Copy, Debug)]
+pub struct Turn(Complex<f64>);
+
+impl Turn {
+    /// By `angle` (rad); quick for less than 0.3 rad.
+    #[inline]
+    pub fn new(angle: f64) -> Self {
+        let (sin, cos) = sin_cos_small(angle);
+        Self(Complex::new(cos, sin))
+    }
+
+    /// By `angle` (rad); quicker still for less than 0.004 rad.
+    #[inline]
+    pub fn tiny(angle: f64) -> Self {
+        let (sin, cos) = sin_cos_tiny(angle);
+        Self(Complex::new(cos, sin))
     }
 }
 
@@ -245,7 +292,10 @@ impl Phases {
     /// Largest difference between two phases.
     #[inline]
     pub fn span(self) -> f64 {
-        self.a.max(self.b).max(self.c) - self.a.min(self.b).min(self.c)
+        // One instruction each, unlike `f64::max`, which also orders NaN.
+        let max = |a: f64, b: f64| if a > b { a } else { b };
+        let min = |a: f64, b: f64| if a < b { a } else { b };
+        max(max(self.a, self.b), self.c) - min(min(self.a, self.b), self.c)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The average output of three inverter legs over a PWM period for a voltage command: the hexagon of the DC link and
-//! the dead-time voltage. Plant and controller share these functions: the plant models the inverter, and the controller
-//! knows it.
+//! the dead-time voltage. The plant models its inverter with these functions, and the controller takes its limits and
+//! its dead time into account with the same ones.
 //!
 //! The hexagon is derived here from three legs between the rails. Dead time: a leg loses u_dead sign(i), or u_dead i /
 //! i_zero below i_zero. This is the field's usual mean-value model; neither paper contains it. u in V, i in A.
@@ -13,9 +13,13 @@ use crate::frame::{AlphaBeta, Phases};
 /// the hexagon (no line-to-line voltage above `u_dc`) and scales any other vector back radially to the edge.
 #[inline]
 pub fn limit_to_hexagon(u: Phases, u_dc: f64) -> AlphaBeta {
-    let span = u.span();
-    let v = u.to_stator();
-    if span > u_dc { v * (u_dc.max(0.0) / span) } else { v }
+    limit_span(u.to_stator(), u.span(), u_dc)
+}
+
+/// The voltage `u` (V), whose largest line-to-line voltage is `span` (V), scaled back to the hexagon of `u_dc` (V).
+#[inline]
+pub fn limit_span(u: AlphaBeta, span: f64, u_dc: f64) -> AlphaBeta {
+    if span > u_dc { u * (u_dc.max(0.0) / span) } else { u }
 }
 
 /// Stator voltage (V) lost to dead time at the phase currents `i` (A): up to `u_dead` (V) per leg, linear within

@@ -212,7 +212,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
             ),
             V::boolean_input(
                 "enable",
-                "The drive works; false: the controller stands at its start, and the gates are off as `enabled` goes false",
+                "The drive operates; false: the controller stays in its initial state, and the gates are off once enabled is false",
                 |m| &mut m.model.inputs.enable,
             ),
             V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),

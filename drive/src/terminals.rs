@@ -69,7 +69,7 @@ const SHAFT: Terminal = Terminal::plug(
 /// The shaft end in the reverse direction, with `mechanics.imposed`.
 const SHAFT_IMPOSED: Terminal = Terminal::plug(
     "shaft_imposed",
-    "The shaft's end where the drive train imposes speed and angle (mechanics.imposed), the torque on the train",
+    "The shaft's end with speed and angle imposed by the drive train (mechanics.imposed): the torque that it receives",
     &[
         Member::signal("speed").of("speed_shaft"),
         Member::signal("angle").of("angle_shaft"),

@@ -1,6 +1,5 @@
 //! One row in the list makes an estimator: name, class, start, update, retuning and placing all derive from it.
 
-use drive::control::current::CurrentLoop;
 use drive::control::start::StartMode;
 use drive::estimator::{Class, Context, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use drive::frame::AlphaBeta;
@@ -28,12 +27,10 @@ fn the_row_is_an_item_of_the_enumeration() {
 #[test]
 fn the_row_dispatches_every_call() {
     let (par, motor) = (EstimatorParameters::default(), salient());
-    let current = CurrentLoop { reference_feed_forward: true, ..CurrentLoop::default() };
-    let context = Context { par: &par, motor: &motor, current: &current, J: 15e-3, T_s: 1e-4, delay: 1.0 };
+    let context = Context { par: &par, motor: &motor, J: 15e-3, T_s: 1e-4 };
     let at = |k, theta_meas| Sample { k, i: AlphaBeta::ZERO, theta_meas, ..Sample::default() };
     for &kind in Kind::ALL {
         let name = kind.name();
-        kind.validate(&context).unwrap_or_else(|fault| panic!("{name}: {fault}"));
         let (mut estimator, estimate) = Estimator::start(kind, &context, &at(0, 0.3), 0.3, 0.0);
         assert!(format!("{estimator:?}").starts_with(name), "{name}: {estimator:?}");
         assert!((estimate.theta - 0.3).abs() < 1e-12, "{name} starts where it is told: {}", estimate.theta);

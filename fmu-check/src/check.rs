@@ -1,7 +1,7 @@
 //! The vocabulary of the checker: levels, checks, groups, verdicts and options.
 
 use super::fmu_file::FmuFile;
-use super::session::{Blocked, Session};
+use super::session::{NotDetermined, Session};
 use model_description::FmiVersion;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -60,11 +60,11 @@ pub(super) enum Run {
     /// Examines the file.
     File(fn(&FmuFile) -> Verdict),
     /// Calls the binary in its own process.
-    Probe(fn(&Session) -> Result<(), Blocked>),
+    Probe(fn(&Session) -> Result<(), NotDetermined>),
     /// As `Probe`; any output to the console or the working directory is a violation.
-    Silent(fn(&Session) -> Result<(), Blocked>),
+    Silent(fn(&Session) -> Result<(), NotDetermined>),
     /// As `Probe`, in two processes that must report the same.
-    Twice(fn(&Session) -> Result<(), Blocked>),
+    Twice(fn(&Session) -> Result<(), NotDetermined>),
 }
 
 /// Checks that belong together.

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// Most bytes of a description, and of everything that is unpacked.
+/// Maximum size in bytes of a description, and of everything that is unpacked.
 const MAX_XML_BYTES: u64 = 256 << 20;
 const MAX_BYTES: u64 = 2 << 30;
 
@@ -36,9 +36,9 @@ pub struct FmuFile {
     pub(super) bytes: Vec<u8>,
     pub(super) zip: Archive,
     pub(super) xml: Vec<u8>,
-    /// The standard that it says it follows.
+    /// The standard that it claims to follow.
     pub version: FmiVersion,
-    /// The description as elements, or why it is no XML.
+    /// The description as elements, or why it is not XML.
     pub(super) tree: Result<Element, String>,
     /// The description as an importer reads it, or why it cannot.
     pub(super) description: Result<ModelDescription, String>,
@@ -87,8 +87,8 @@ impl FmuFile {
         Ok(fmu)
     }
 
-    /// Where it was unpacked: `modelDescription.xml`, `binaries/` of every platform, `resources/`, and what probes take
-    /// away (I02).
+    /// Where it was unpacked: `modelDescription.xml`, `binaries/` of every platform, `resources/`, and the folders
+    /// that the probe of I02 removes.
     pub(super) fn dir(&self) -> &Path {
         self.dir.path()
     }

@@ -1,7 +1,7 @@
 //! An instance under test.
 
 use crate::encoding::show;
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::{Arguments, Buffer, Handle, Raw, SavedState, Simple};
 use model_description::{FmiVersion, ModelVariable};
@@ -14,15 +14,15 @@ pub(super) struct Instance<'b> {
     event_mode: bool,
     start: Cell<f64>,
     stop: Cell<Option<f64>>,
-    /// Where the next step begins.
+    /// Start time of the next step in s.
     pub(super) time: Cell<f64>,
 }
 
 impl Session {
     /// Instantiates; `None` for NULL.
-    pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<Instance<'_>>, Blocked> {
-        self.calling(&format!("{}({:?})", self.instantiation(), arguments.name.as_deref().unwrap_or_default()));
-        let handle = self.raw.instantiate(arguments).map_err(Blocked)?;
+    pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<Instance<'_>>, NotDetermined> {
+        self.record_call(&format!("{}({:?})", self.instantiation(), arguments.name.as_deref().unwrap_or_default()));
+        let handle = self.raw.instantiate(arguments).map_err(NotDetermined)?;
         Ok(handle.map(|handle| Instance::new(self, handle, arguments.event_mode)))
     }
 
@@ -34,23 +34,23 @@ impl Session {
         }
     }
 
-    /// A new instance that works.
-    pub(super) fn fresh(&self) -> Result<Instance<'_>, Blocked> {
+    /// A new instance; NULL ends the probe.
+    pub(super) fn fresh(&self) -> Result<Instance<'_>, NotDetermined> {
         self.prepare(|| {
             let made = self.instantiate(&self.arguments("probe"))?;
-            made.ok_or_else(|| Blocked(format!("{} returned NULL", self.instantiation())))
+            made.ok_or_else(|| NotDetermined(format!("{} returned NULL", self.instantiation())))
         })
     }
 
     /// A new instance in initialization mode.
-    pub(super) fn initializing(&self) -> Result<Instance<'_>, Blocked> {
+    pub(super) fn initializing(&self) -> Result<Instance<'_>, NotDetermined> {
         let instance = self.fresh()?;
         self.prepare(|| instance.enter())?;
         Ok(instance)
     }
 
     /// A new instance that is ready to step.
-    pub(super) fn stepping(&self) -> Result<Instance<'_>, Blocked> {
+    pub(super) fn stepping(&self) -> Result<Instance<'_>, NotDetermined> {
         let instance = self.initializing()?;
         self.prepare(|| instance.exit())?;
         Ok(instance)
@@ -65,21 +65,30 @@ impl<'b> Instance<'b> {
 }
 
 impl Instance<'_> {
-    /// Calls a function that the FMU must have; notes it before.
-    pub(super) fn call(&self, call: &str, function: impl FnOnce(&Raw) -> Option<Status>) -> Result<Status, Blocked> {
+    /// Calls a function that the FMU must have, after recording the call.
+    pub(super) fn call(
+        &self,
+        call: &str,
+        function: impl FnOnce(&Raw) -> Option<Status>,
+    ) -> Result<Status, NotDetermined> {
         let name = self.session.raw.name(call);
-        self.session.calling(&name);
-        let missing = || Blocked(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
+        self.session.record_call(&name);
+        let missing =
+            || NotDetermined(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
         function(&self.session.raw).ok_or_else(missing)
     }
 
     /// A function without arguments.
-    pub(super) fn simple(&self, name: Simple) -> Result<Status, Blocked> {
+    pub(super) fn simple(&self, name: Simple) -> Result<Status, NotDetermined> {
         self.call(name.as_str(), |raw| raw.simple(name, self.handle))
     }
 
-    fn must(&self, name: &str, status: Status) -> Result<(), Blocked> {
-        if status.is_ok() { Ok(()) } else { Err(Blocked(format!("{} returned {status}", self.session.raw.name(name)))) }
+    fn must(&self, name: &str, status: Status) -> Result<(), NotDetermined> {
+        if status.is_ok() {
+            Ok(())
+        } else {
+            Err(NotDetermined(format!("{} returned {status}", self.session.raw.name(name))))
+        }
     }
 
     /// Sets the experiment's times, before [`enter`](Self::enter).
@@ -89,8 +98,8 @@ impl Instance<'_> {
         self.stop.set(stop);
     }
 
-    /// To initialization mode.
-    pub(super) fn enter(&self) -> Result<(), Blocked> {
+    /// Enters initialization mode.
+    pub(super) fn enter(&self) -> Result<(), NotDetermined> {
         let (start, stop) = (self.start.get(), self.stop.get());
         let name = if self.session.description.version == FmiVersion::V2 {
             "SetupExperiment"
@@ -107,14 +116,14 @@ impl Instance<'_> {
         Ok(())
     }
 
-    /// From initialization mode to where steps are made.
-    pub(super) fn exit(&self) -> Result<(), Blocked> {
+    /// Leaves initialization mode; the instance is then ready to step.
+    pub(super) fn exit(&self) -> Result<(), NotDetermined> {
         self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
         if self.event_mode { self.events() } else { Ok(()) }
     }
 
-    /// Through event mode, to step mode.
-    fn events(&self) -> Result<(), Blocked> {
+    /// Passes through event mode to step mode.
+    fn events(&self) -> Result<(), NotDetermined> {
         for _ in 0..100 {
             let mut again = false;
             let status = self.call("UpdateDiscreteStates", |raw| {
@@ -130,8 +139,8 @@ impl Instance<'_> {
         self.must("EnterStepMode", self.simple(Simple::EnterStepMode)?)
     }
 
-    /// A step, from where the last one ended.
-    pub(super) fn step(&self, h: f64) -> Result<Status, Blocked> {
+    /// A step from the end of the last one.
+    pub(super) fn step(&self, h: f64) -> Result<Status, NotDetermined> {
         let t = self.time.get();
         let status = self.step_at(t, h)?;
         if status.is_ok() {
@@ -141,7 +150,7 @@ impl Instance<'_> {
     }
 
     /// A step from any time.
-    pub(super) fn step_at(&self, t: f64, h: f64) -> Result<Status, Blocked> {
+    pub(super) fn step_at(&self, t: f64, h: f64) -> Result<Status, NotDetermined> {
         let call = if self.session.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?})") };
         let status = self.call(&call, |raw| raw.do_step(self.handle, t, h, false, [true; 4]).map(|(s, _)| s))?;
         if self.event_mode && status.is_ok() {
@@ -152,7 +161,7 @@ impl Instance<'_> {
     }
 
     /// Steps that must succeed.
-    pub(super) fn steps(&self, n: usize, h: f64) -> Result<(), Blocked> {
+    pub(super) fn steps(&self, n: usize, h: f64) -> Result<(), NotDetermined> {
         for _ in 0..n {
             self.must("DoStep", self.step(h)?)?;
         }
@@ -160,20 +169,20 @@ impl Instance<'_> {
     }
 
     /// A variable's values.
-    pub(super) fn get(&self, v: &ModelVariable) -> Result<(Status, Vec<u64>), Blocked> {
+    pub(super) fn get(&self, v: &ModelVariable) -> Result<(Status, Vec<u64>), NotDetermined> {
         let n = self.session.elements(v);
         let mut buffer = Buffer::room(v.base, self.session.description.version, n);
         let status = self.call(&format!("Get({})", v.name), |raw| {
             raw.get(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), n)
         })?;
         if !buffer.intact() {
-            return Err(Blocked(format!("getting {} wrote past its {n} values", v.name)));
+            return Err(NotDetermined(format!("getting {} wrote past its {n} values", v.name)));
         }
         Ok((status, buffer.bits()))
     }
 
     /// Sets a variable's values.
-    pub(super) fn set(&self, v: &ModelVariable, values: &[u64]) -> Result<Status, Blocked> {
+    pub(super) fn set(&self, v: &ModelVariable, values: &[u64]) -> Result<Status, NotDetermined> {
         let mut buffer = Buffer::of(v.base, self.session.description.version, values);
         let call = format!("Set({} = {})", v.name, show(v, self.session.description.version, values));
         self.call(&call, |raw| {
@@ -182,16 +191,16 @@ impl Instance<'_> {
     }
 
     /// The values of several variables; those that cannot be read are left out.
-    pub(super) fn snapshot(&self, variables: &[&ModelVariable]) -> Result<Vec<Vec<u64>>, Blocked> {
+    pub(super) fn snapshot(&self, variables: &[&ModelVariable]) -> Result<Vec<Vec<u64>>, NotDetermined> {
         let read =
             |v: &&ModelVariable| self.get(v).map(|(status, bits)| if status.is_ok() { bits } else { Vec::new() });
         variables.iter().map(read).collect()
     }
 
     /// Steps `n` times with held inputs and returns all watched variables after each step.
-    pub(super) fn run(&self, n: usize, h: f64) -> Result<Vec<Vec<Vec<u64>>>, Blocked> {
+    pub(super) fn run(&self, n: usize, h: f64) -> Result<Vec<Vec<Vec<u64>>>, NotDetermined> {
         let watched = self.session.watched();
-        self.session.many(
+        self.session.record_calls(
             &format!("{n} steps of {h} from {}, each followed by getting all outputs", self.time.get()),
             || {
                 (0..n)
@@ -204,8 +213,8 @@ impl Instance<'_> {
         )
     }
 
-    /// Moves every input that is a number, a bit; the standard allows it between steps.
-    pub(super) fn change_inputs(&self, k: u32) -> Result<(), Blocked> {
+    /// Changes every numeric input slightly, which the standard allows between steps.
+    pub(super) fn change_inputs(&self, k: u32) -> Result<(), NotDetermined> {
         for v in self.session.float_inputs() {
             if let Some(values) = self.session.different_value(v, f64::from(k % 5)) {
                 let _ = self.set(v, &values)?;
@@ -215,15 +224,15 @@ impl Instance<'_> {
     }
 
     /// Saves the state.
-    pub(super) fn save(&self) -> Result<SavedState, Blocked> {
+    pub(super) fn save(&self) -> Result<SavedState, NotDetermined> {
         let mut state = SavedState::NULL;
         let status = self.call("GetFMUState", |raw| raw.get_state(self.handle, Some(&mut state)))?;
         self.must("GetFMUState", status)?;
         Ok(state)
     }
 
-    /// Goes back to a saved state, which was saved at this time.
-    pub(super) fn restore(&self, state: SavedState, time: f64) -> Result<(), Blocked> {
+    /// Restores a state that was saved at `time`.
+    pub(super) fn restore(&self, state: SavedState, time: f64) -> Result<(), NotDetermined> {
         let status = self.call("SetFMUState", |raw| raw.set_state(self.handle, state))?;
         self.must("SetFMUState", status)?;
         self.time.set(time);
@@ -231,7 +240,7 @@ impl Instance<'_> {
     }
 
     /// A saved state as bytes.
-    pub(super) fn serialize(&self, state: SavedState) -> Result<Vec<u8>, Blocked> {
+    pub(super) fn serialize(&self, state: SavedState) -> Result<Vec<u8>, NotDetermined> {
         let mut size = 0;
         let status = self.call("SerializedFMUStateSize", |raw| {
             let (status, n) = raw.state_size(self.handle, state)?;
@@ -247,14 +256,14 @@ impl Instance<'_> {
         })?;
         self.must("SerializeFMUState", status)?;
         if !out.1 {
-            return Err(Blocked(format!("SerializeFMUState wrote past its {size} bytes")));
+            return Err(NotDetermined(format!("SerializeFMUState wrote past its {size} bytes")));
         }
         Ok(out.0)
     }
 
     /// Frees the instance.
-    pub(super) fn free(self) -> Result<(), Blocked> {
-        self.session.calling(&self.session.raw.name("FreeInstance"));
-        self.session.raw.free(self.handle).ok_or_else(|| Blocked("the function FreeInstance is missing".into()))
+    pub(super) fn free(self) -> Result<(), NotDetermined> {
+        self.session.record_call(&self.session.raw.name("FreeInstance"));
+        self.session.raw.free(self.handle).ok_or_else(|| NotDetermined("the function FreeInstance is missing".into()))
     }
 }

@@ -1,9 +1,9 @@
-//! One probe: runs one check of the binary in this process and writes down what it finds, for the parent to read.
+//! One probe: runs one check of the binary in this process and writes its findings to a file for the parent.
 
 use crate::check::Run;
 use crate::checks::GROUPS;
 pub use crate::session::ProbeArguments;
-use crate::session::{Blocked, Line, Session};
+use crate::session::{Line, NotDetermined, Session};
 use std::fs;
 use std::path::Path;
 
@@ -21,21 +21,21 @@ pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
     };
     match Session::open(args) {
         Ok(session) => {
-            if let Err(Blocked(why)) = probe(&session) {
+            if let Err(NotDetermined(why)) = probe(&session) {
                 session.write(&if VIOLATED_WHEN_BLOCKED.contains(&check.map_or("", |c| c.id)) {
                     Line::Violated(why)
                 } else {
-                    Line::Blocked(why)
+                    Line::NotDetermined(why)
                 });
             }
             session.write(&Line::Done);
-            // The parent judges by what was written; the end of the process is a check of its own.
-            session.calling("(the process ends)");
+            // The parent reads the findings; a crash while the process ends is a finding too.
+            session.record_call("(the process ends)");
             std::mem::forget(session);
         }
-        Err(Blocked(why)) => {
+        Err(NotDetermined(why)) => {
             let tool = needs_tool(&args.dir);
-            let line = if args.id == "B00" && !tool { Line::Violated(why) } else { Line::Blocked(why) };
+            let line = if args.id == "B00" && !tool { Line::Violated(why) } else { Line::NotDetermined(why) };
             let text = [line, Line::Done].iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>()?;
             fs::write(&args.out, text.join("\n"))?;
         }

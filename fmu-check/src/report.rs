@@ -21,16 +21,16 @@ pub struct Report {
     pub findings: Vec<Finding>,
 }
 
-/// How many of which verdict.
+/// The number of checks with each verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Requirements that hold.
     pub passed: usize,
     /// Violated: must, should, hard.
     pub violated: [usize; 3],
-    /// Not about this FMU.
+    /// Not applicable to this FMU.
     pub not_applicable: usize,
-    /// Not found out.
+    /// Not determined.
     pub not_determined: usize,
 }
 
@@ -67,7 +67,7 @@ impl Report {
         self.findings.iter().all(is_clean)
     }
 
-    /// How many of which verdict.
+    /// The number of checks with each verdict.
     pub fn counts(&self) -> Counts {
         let mut counts = Counts::default();
         for finding in &self.findings {
@@ -110,7 +110,7 @@ impl Report {
         for (title, findings) in self.groups() {
             let passed = findings.iter().filter(|f| matches!(f.verdict, Verdict::Pass(_))).count();
             let _ = writeln!(out, "\n{title} ({passed} of {} passed)", findings.len());
-            // What hinders a whole group is told once.
+            // Print a reason that checks share only once.
             let mut shown_reasons: Vec<&str> = Vec::new();
             for f in &findings {
                 match &f.verdict {
@@ -141,12 +141,12 @@ impl Report {
     /// As JSON.
     ///
     /// # Errors
-    /// Never, but for memory.
+    /// None that is known.
     pub fn json(&self) -> serde_json::Result<String> {
         serde_json::to_string_pretty(self)
     }
 
-    /// One HTML page that needs nothing else.
+    /// A self-contained HTML page.
     pub fn html(&self) -> String {
         let mut out = format!(
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title><style>\
@@ -157,7 +157,7 @@ impl Report {
             escape(&self.heading()),
             escape(&self.summary())
         );
-        // What is wrong first.
+        // Violations first.
         if self.violated().next().is_some() {
             out.push_str("<ul>\n");
             for f in self.violated() {
@@ -235,7 +235,7 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The list of all checks, as a Markdown table a group.
+/// The list of all checks: one Markdown table per group.
 pub fn list() -> String {
     let mut out = String::new();
     for group in GROUPS {

@@ -1,4 +1,4 @@
-//! Runs the probes: each check of the binary in a process of its own with a timeout, all cores at work.
+//! Runs the probes: each check of the binary in a process of its own, with a time limit, on all cores.
 //!
 //! The parent starts the same program with the hidden command `probe`. The child appends its findings to a file, line by line,
 //! and writes the call that it is about to make to another file. When the child dies, the parent knows what was found and which
@@ -139,7 +139,7 @@ impl Runner {
             crashes.push((end.describe(self.timeout), last_call.trim().to_owned()));
             let last = lines.iter().rev().find_map(|l| if let Line::Case(n) = l { Some(*n) } else { None });
             match last {
-                // Not twice at the same place, not for ever.
+                // Continue with the next case, within a limit of restarts and time.
                 Some(n) if crashes.len() <= MAX_RESTARTS && began.elapsed() < 2 * self.timeout => from = n + 1,
                 _ => break,
             }
@@ -226,12 +226,12 @@ fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
 
 /// The verdict from the lines of the probe and from its crashes (how, and in which call).
 fn verdict_of(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>) -> Verdict {
-    let (mut violated, mut notes, mut blocked, mut not_applicable) = (Vec::new(), Vec::new(), None, None);
+    let (mut violated, mut notes, mut not_determined, mut not_applicable) = (Vec::new(), Vec::new(), None, None);
     for line in lines {
         match line {
             Line::Violated(text) => violated.push(text),
             Line::Note(text) => notes.push(text),
-            Line::Blocked(why) => blocked = blocked.or(Some(why)),
+            Line::NotDetermined(why) => not_determined = not_determined.or(Some(why)),
             Line::NotApplicable(why) => not_applicable = not_applicable.or(Some(why)),
             Line::Case(_) | Line::Done => {}
         }
@@ -241,15 +241,15 @@ fn verdict_of(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>) -> Ver
             violated.push(format!("{call} {how}"));
             continue;
         }
-        // Before the probe proper: another check tells of it.
+        // Preparing the probe failed: another check reports that.
         let call = call.strip_prefix("P ").unwrap_or("the start");
         if id == "B00" || (id == "L00" && !call.starts_with("loading")) {
             violated.push(format!("{call} {how}"));
         } else {
-            blocked = blocked.or(Some(format!("{call} {how}, before the probe began")));
+            not_determined = not_determined.or(Some(format!("{call} {how}, before the probe began")));
         }
     }
-    match (violated.is_empty(), blocked, not_applicable) {
+    match (violated.is_empty(), not_determined, not_applicable) {
         (false, ..) => Verdict::Violated(violated),
         (_, Some(why), _) => Verdict::NotDetermined(why),
         (_, _, Some(why)) => Verdict::NotApplicable(why),

@@ -1,7 +1,7 @@
 //! The session of a probe: one FMU, loaded into its own process, and the findings about it.
 //!
 //! Every finding is written at once and every call is written before it is made, so that nothing is lost if the FMU crashes the
-//! process. `Err(Blocked)` ends a probe that cannot decide.
+//! process. `Err(NotDetermined)` ends a probe that cannot decide.
 
 use crate::encoding::bits;
 use clap::Args;
@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 
 /// Why a probe cannot decide.
 #[derive(Debug)]
-pub(super) struct Blocked(pub(super) String);
+pub(super) struct NotDetermined(pub(super) String);
 
 /// One line of a probe's output.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -32,11 +32,11 @@ pub(super) enum Line {
     Violated(String),
     /// Evidence for a pass.
     Note(String),
-    /// The requirement is not about this FMU.
+    /// The requirement does not apply to this FMU.
     NotApplicable(String),
-    /// It could not be found out.
-    Blocked(String),
-    /// The probe came to its end.
+    /// The check could not decide.
+    NotDetermined(String),
+    /// The probe is complete.
     Done,
 }
 
@@ -88,16 +88,16 @@ const MAX_VIOLATIONS: usize = 25;
 
 impl Session {
     /// Loads the FMU.
-    pub(super) fn open(args: &ProbeArguments) -> Result<Self, Blocked> {
-        let blocked = |e: &dyn std::fmt::Display| Blocked(e.to_string());
-        let xml = std::fs::read(args.dir.join("modelDescription.xml")).map_err(|e| blocked(&e))?;
-        let description = model_description::read(&xml).map_err(|e| blocked(&e))?;
-        let create = |path: &Path| File::options().create(true).append(true).open(path).map_err(|e| blocked(&e));
+    pub(super) fn open(args: &ProbeArguments) -> Result<Self, NotDetermined> {
+        let lost = |e: &dyn std::fmt::Display| NotDetermined(e.to_string());
+        let xml = std::fs::read(args.dir.join("modelDescription.xml")).map_err(|e| lost(&e))?;
+        let description = model_description::read(&xml).map_err(|e| lost(&e))?;
+        let create = |path: &Path| File::options().create(true).append(true).open(path).map_err(|e| lost(&e));
         let lines = create(&args.out)?;
-        let mut journal = File::create(args.out.with_extension("call")).map_err(|e| blocked(&e))?;
+        let mut journal = File::create(args.out.with_extension("call")).map_err(|e| lost(&e))?;
         let _ = journal.write_all(b"P loading the binary");
         let raw = Raw::open(&args.binary, description.version)
-            .map_err(|e| Blocked(format!("the binary does not load: {e}")))?;
+            .map_err(|e| NotDetermined(format!("the binary does not load: {e}")))?;
         Ok(Self {
             raw,
             description,
@@ -117,19 +117,19 @@ impl Session {
     }
 
     /// The same FMU once more, for another thread.
-    pub(super) fn duplicate(&self, number: usize) -> Result<Self, Blocked> {
-        let raw = Raw::open(&self.binary, self.description.version).map_err(Blocked)?;
+    pub(super) fn duplicate(&self, number: usize) -> Result<Self, NotDetermined> {
+        let raw = Raw::open(&self.binary, self.description.version).map_err(NotDetermined)?;
         self.duplicate_with(raw, number)
     }
 
     /// The same FMU with another loaded binary; its findings and calls are discarded.
-    pub(super) fn duplicate_with(&self, raw: Raw, number: usize) -> Result<Self, Blocked> {
+    pub(super) fn duplicate_with(&self, raw: Raw, number: usize) -> Result<Self, NotDetermined> {
         self.duplicate_at(&self.dir, raw, number)
     }
 
     /// The same, unpacked to another folder.
-    pub(super) fn duplicate_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, Blocked> {
-        let scratch = || tempfile::tempfile().map_err(|e| Blocked(e.to_string()));
+    pub(super) fn duplicate_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, NotDetermined> {
+        let scratch = || tempfile::tempfile().map_err(|e| NotDetermined(e.to_string()));
         Ok(Self {
             raw,
             description: self.description.clone(),
@@ -187,21 +187,21 @@ impl Session {
 
     /// Reports that the requirement does not apply to this FMU, as the result of the probe.
     #[expect(clippy::unnecessary_wraps, reason = "probes return it")]
-    pub(super) fn not_applicable(&self, reason: impl Into<String>) -> Result<(), Blocked> {
+    pub(super) fn not_applicable(&self, reason: impl Into<String>) -> Result<(), NotDetermined> {
         self.write(&Line::NotApplicable(reason.into()));
         Ok(())
     }
 
     /// Runs an independent case of a probe: after a crash the probe continues with the next case.
-    pub(super) fn case(&self, case: impl FnOnce() -> Result<(), Blocked>) {
+    pub(super) fn case(&self, case: impl FnOnce() -> Result<(), NotDetermined>) {
         let number = self.next.get();
         self.next.set(number + 1);
         if number < self.from {
             return;
         }
         self.write(&Line::Case(number));
-        if let Err(Blocked(why)) = case() {
-            self.write(&Line::Blocked(why));
+        if let Err(NotDetermined(why)) = case() {
+            self.write(&Line::NotDetermined(why));
         }
     }
 
@@ -211,7 +211,7 @@ impl Session {
     }
 
     /// Writes the next call to the journal.
-    pub(super) fn calling(&self, call: &str) {
+    pub(super) fn record_call(&self, call: &str) {
         if self.silent.get() {
             return;
         }
@@ -224,19 +224,19 @@ impl Session {
     }
 
     /// Makes many calls with one journal entry.
-    pub(super) fn many<T>(&self, what: &str, work: impl FnOnce() -> T) -> T {
-        self.calling(what);
+    pub(super) fn record_calls<T>(&self, what: &str, work: impl FnOnce() -> T) -> T {
+        self.record_call(what);
         let before = self.silent.replace(true);
         let result = work();
         self.silent.set(before);
         result
     }
 
-    pub(super) fn prepare<T>(&self, work: impl FnOnce() -> Result<T, Blocked>) -> Result<T, Blocked> {
+    pub(super) fn prepare<T>(&self, work: impl FnOnce() -> Result<T, NotDetermined>) -> Result<T, NotDetermined> {
         let before = self.preparing.replace(true);
         let result = work();
         self.preparing.set(before);
-        self.calling("(between two calls)");
+        self.record_call("(between two calls)");
         result
     }
 

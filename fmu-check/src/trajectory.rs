@@ -1,10 +1,10 @@
 //! Trajectories: the watched variables after each step.
 
 use crate::instance::Instance;
-use crate::session::Blocked;
+use crate::session::NotDetermined;
 
 /// Steps `n` times with changing inputs and returns all watched variables after each step.
-pub(super) fn trajectory(instance: &Instance<'_>, n: u32) -> Result<Vec<Vec<Vec<u64>>>, Blocked> {
+pub(super) fn trajectory(instance: &Instance<'_>, n: u32) -> Result<Vec<Vec<Vec<u64>>>, NotDetermined> {
     let watched = instance.session.watched();
     (0..n)
         .map(|k| {

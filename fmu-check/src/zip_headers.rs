@@ -3,7 +3,7 @@
 use flate2::bufread::DeflateDecoder;
 use std::io::Read;
 
-/// Most entries that are read.
+/// Maximum number of entries that are read.
 const MAX_ENTRIES: usize = 100_000;
 
 /// One header, local or central.

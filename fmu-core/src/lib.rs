@@ -1,4 +1,4 @@
-//! What a model is, for an exporter and for an author: the trait [`Model`], its variable [`Table`], quantities and units,
+//! The definition of a model, for exporters and authors: the trait [`Model`], its variable [`Table`], quantities and units,
 //! time on an integer grid, and the neutral [`Description`].
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`table`], [`terminal`], [`model`], [`description`]. No motor, no XML, no C, no `unsafe`.

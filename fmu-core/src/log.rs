@@ -13,7 +13,7 @@ pub const FATAL: &str = "logStatusFatal";
 
 /// Every message category: its name and its description. Messages use no other category.
 pub const CATEGORIES: &[(&str, &str)] = &[
-    (EVENTS, "What happens when all is well"),
+    (EVENTS, "Successful calls"),
     (WARNING, "Messages that come with the status Warning"),
     (DISCARD, "Messages that come with the status Discard"),
     (ERROR, "Messages that come with the status Error"),

@@ -52,7 +52,7 @@ pub struct Experiment {
 /// A model of one block in a block diagram, sampled or continuous.
 ///
 /// The life of an instance:
-/// 1. `Default` makes it: inputs and parameters at their start values.
+/// 1. `Default` creates it: inputs and parameters at their start values.
 /// 2. The importer sets parameters and inputs; each set is checked against its range in the table.
 /// 3. [`derive`](Model::derive), [`initialize`](Model::initialize) and [`output`](Model::output) run whenever the importer
 ///    asks for a value after it has set one, so that initialization can be iterated.
@@ -70,7 +70,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// The variables: the one place where a name, a unit or a range is written.
     const TABLE: &'static Table<Block<Self>>;
 
-    /// Variables that are connected together; no part of the token.
+    /// Variables that are connected together; they are not part of the token.
     const TERMINALS: &'static [Terminal] = &[];
 
     /// Icon: an SVG document without text (a renderer may have no fonts) for a square from -100 to 100 both ways.

@@ -11,6 +11,7 @@ use crate::variable::{Causality, Kind, Meta, Range, Variability};
 /// The interface of a part for a table that does not know its type.
 pub(crate) trait Node<W>: Sync {
     fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
+    fn real<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut f64)>;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
 }
@@ -154,9 +155,9 @@ impl<W: 'static> Row<W> {
         get: fn(&mut W) -> &mut [f64],
     ) -> Self {
         let kind = Kind::Real(quantity);
-        let mut it = Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Reals(get));
-        it.meta.dimension = Some(dimension);
-        it
+        let mut row = Self::new(name, description, Causality::Parameter, Variability::Fixed, kind, Access::Reals(get));
+        row.meta.dimension = Some(dimension);
+        row
     }
 
     /// An integer parameter.

@@ -26,6 +26,10 @@ impl<W, P> Node<W> for Part<W, P> {
         self.table.entry((self.lens)(whole), index)
     }
 
+    fn real<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut f64)> {
+        self.table.real((self.lens)(whole), index)
+    }
+
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {
         self.table.locate_into(index, name)
     }
@@ -133,6 +137,21 @@ impl<W: 'static> Table<W> {
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
         };
         Some((&row.meta, slot))
+    }
+
+    /// The same for a real scalar only, quickly.
+    #[inline]
+    pub fn real<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut f64)> {
+        if index >= self.len {
+            return None;
+        }
+        let place = self.places[index];
+        let row = &self.rows[usize::from(place.row)];
+        match &row.access {
+            Access::Real(get) => Some((&row.meta, get(whole))),
+            Access::Part { node, .. } => node.real(whole, usize::from(place.inner)),
+            _ => None,
+        }
     }
 
     /// Which element of an array variable `index` is, 0 for a scalar; `None` past the end. Does not allocate.

@@ -43,7 +43,7 @@ pub enum Variability {
 /// An enumeration: a type with named values.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Enumeration {
-    /// Name of the type definition; no variable may bear it.
+    /// Name of the type definition; no variable may have it.
     pub name: &'static str,
     /// Description of the type.
     pub description: &'static str,
@@ -93,10 +93,10 @@ impl Range {
     pub const ALL: Self = Self { min: f64::NEG_INFINITY, max: f64::INFINITY, above: false, below: false };
 
     /// Whether `x` is finite and inside.
+    #[inline]
     pub fn contains(&self, x: f64) -> bool {
-        let low = if self.above { x > self.min } else { x >= self.min };
-        let high = if self.below { x < self.max } else { x <= self.max };
-        x.is_finite() && low && high
+        let on_the_edge = (self.above && x <= self.min) || (self.below && x >= self.max);
+        x.is_finite() && x >= self.min && x <= self.max && !on_the_edge
     }
 }
 

@@ -203,11 +203,11 @@ mod terminals {
         fn why<M: Model>() -> String {
             Description::of::<M>().unwrap_err().to_string()
         }
-        assert_eq!(why::<NoVariable>(), "the terminal port names a variable v that is not there");
+        assert_eq!(why::<NoVariable>(), "the terminal port names the variable v, which does not exist");
         assert!(why::<Array>().contains("has map: only a scalar"), "{}", why::<Array>());
-        assert!(why::<Twice>().contains("port is there twice"));
+        assert!(why::<Twice>().contains("port occurs twice"));
         assert!(why::<BadIcon>().contains("icon \"icon\""));
-        assert!(why::<OtherIcon>().contains("has another icon dot"));
+        assert!(why::<OtherIcon>().contains("draws its icon dot differently"));
     }
 }
 

@@ -61,6 +61,10 @@ impl<M: Model> Instance<M> {
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, place) in (0..count).zip(&mut places) {
                 let index = first.wrapping_add(offset);
+                if let Some((_, value)) = T::find(M::TABLE, &mut self.current.block, index) {
+                    place.write(*value);
+                    continue;
+                }
                 match M::TABLE.entry(&mut self.current.block, index).and_then(|(meta, slot)| T::read(meta, &slot)) {
                     Some(value) => place.write(value),
                     None => place.write(self.read_other(reference, index)?),
@@ -113,6 +117,18 @@ impl<M: Model> Instance<M> {
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, &value) in (0..count).zip(&mut next) {
                 let index = first.wrapping_add(offset);
+                if let Some((meta, place)) = T::find(M::TABLE, &mut self.current.block, index)
+                    && open(meta, state)
+                    && value.judge(meta) == Some(true)
+                {
+                    if let Some(old) = old.get_mut(done) {
+                        *old = (index, *place);
+                        done += 1;
+                    }
+                    *place = value;
+                    dirty |= meta.causality == Causality::Parameter;
+                    continue;
+                }
                 let Some((meta, slot)) = settable(M::TABLE.entry(&mut self.current.block, index), state, value) else {
                     self.take_back(&old[..done]);
                     return Err(self.refusal(reference, index, value));
@@ -122,7 +138,7 @@ impl<M: Model> Instance<M> {
                     done += 1;
                 }
                 value.write(slot);
-                // The model sees an input by itself; the rest waits for `initialize` or `derive`.
+                // The model reads inputs directly; parameters take effect through `initialize` or `derive`.
                 dirty |= meta.causality == Causality::Parameter;
             }
         }

@@ -9,7 +9,7 @@
 //! | 16 | `Model::HASH`, the model and its interface |
 //! | 4 | length of the payload |
 //! | n | payload in postcard's encoding, padded with zeros to a multiple of a fixed number |
-//! | 4 | CRC-32 of all before |
+//! | 4 | CRC-32 of all preceding bytes |
 
 use crate::lifecycle::State;
 use crate::snapshot::Snapshot;
@@ -51,13 +51,13 @@ pub fn write<M: Model>(state: &Snapshot<M>) -> Result<Vec<u8>, Fault> {
 /// # Errors
 /// Names the invalid part of the bytes: length, kind, version, checksum or content.
 pub fn read<M: Model>(bytes: &[u8]) -> Result<Snapshot<M>, Fault> {
-    let refuse = |why: String| Fault::new(format!("these {} bytes are no state of this FMU: {why}", bytes.len()));
+    let refuse = |why: String| Fault::new(format!("these {} bytes are not a state of this FMU: {why}", bytes.len()));
     let Some((body, checksum)) = bytes.split_last_chunk::<CHECKSUM>() else { return Err(refuse("too short".into())) };
     let Some((header, room)) = body.split_first_chunk::<HEADER>() else { return Err(refuse("too short".into())) };
     let (fixed, length) = header.split_at(HEADER - 4);
     let expected = self::header::<M>(0);
     if header[..8] != MAGIC[..] {
-        return Err(refuse("they do not begin like one".into()));
+        return Err(refuse("they lack the header of a state".into()));
     }
     if header[12..28] != expected[12..28] {
         return Err(refuse(format!("another model, or another version than {} {}", M::INFO.name, M::INFO.version)));

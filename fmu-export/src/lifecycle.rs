@@ -149,7 +149,7 @@ impl Call {
             Self::Get => each(&[Initialization, Step, Terminated, Error], &State::ALL),
             Self::Set => both(&[Instantiated, Initialization, Step], None),
             Self::DoStep => both(&[Step], None),
-            // What an error left behind is not worth going back to.
+            // A state that an error left behind is of no use.
             Self::SaveState => both(&[Instantiated, Initialization, Step, Terminated], None),
             Self::Status => each(&[Step, Terminated], &[]),
         }

@@ -103,7 +103,7 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>) -> Stri
             changes.push(format!("{} = {}", name::<M>(index), value(&new)));
         }
     }
-    let changes = if changes.is_empty() { "all start values as they were".into() } else { changes.join(", ") };
+    let changes = if changes.is_empty() { "all start values unchanged".into() } else { changes.join(", ") };
     format!("{instance}: initialized at {} s with {changes}", current.end)
 }
 

@@ -45,7 +45,7 @@ pub struct Snapshot<M: Model> {
     pub elapsed: Elapsed,
     /// End of the last step as the importer computes it, `t + h`; before the first step the start time.
     pub end: f64,
-    /// The model has not processed a set call yet: before the start of any variable, afterwards of a tunable parameter.
+    /// A set call awaits processing by the model: before the start for any variable, afterwards for a tunable parameter.
     pub dirty: bool,
     /// The model and its outputs.
     pub block: Block<M>,

@@ -1,6 +1,6 @@
 //! Values as they cross the C interface: which base type of the table each C type carries.
 
-use fmu_core::{Kind, Meta, Slot};
+use fmu_core::{Kind, Meta, Slot, Table};
 use std::ffi::c_int;
 use std::fmt::{self, Display};
 
@@ -17,6 +17,11 @@ pub trait Value: Copy + Display {
 
     /// Whether the variable may take this value, `None` if it has another base type.
     fn judge(self, meta: &Meta) -> Option<bool>;
+
+    /// The place of a scalar that holds this very type, quickly; `None` if there is none, or no quick way to it.
+    fn find<'a, W>(_table: &Table<W>, _whole: &'a mut W, _index: usize) -> Option<(&'static Meta, &'a mut Self)> {
+        None
+    }
 
     /// The independent variable as a value, for the one type that can carry it.
     fn time(_seconds: f64) -> Option<Self> {
@@ -75,6 +80,11 @@ impl Value for f64 {
     #[inline]
     fn judge(self, meta: &Meta) -> Option<bool> {
         matches!(meta.kind, Kind::Real(_)).then(|| meta.range.contains(self))
+    }
+
+    #[inline]
+    fn find<'a, W>(table: &Table<W>, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut Self)> {
+        table.real(whole, index)
     }
 
     fn time(seconds: f64) -> Option<Self> {

@@ -171,7 +171,7 @@ fn every_changed_byte_and_every_other_length_is_noticed() {
         let mut state = null_mut();
         assert_eq!(fmu.deserialize(bytes, &mut state), ERROR, "{what}");
         assert!(state.is_null());
-        assert!(fmu.error().contains("are no state of this FMU: "), "{what}");
+        assert!(fmu.error().contains("are not a state of this FMU: "), "{what}");
     };
     for i in 0..bytes.len() {
         for flip in [1, 0x80, 0xff] {
@@ -270,7 +270,7 @@ fn a_time_that_no_simulation_came_to_is_noticed() {
 #[test]
 fn bytes_of_another_fmu_are_told_from_damaged_ones() {
     for (place, why) in [
-        (0, "they do not begin like one"),
+        (0, "they lack the header of a state"),
         (8, "written by another version of this FMU"),
         (10, "written by another version of this FMU"),
         (12, "another model, or another version than"),

@@ -22,9 +22,9 @@ impl fmt::Display for Glibc {
 /// Needs of a Linux binary.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Needs {
-    /// The newest version of the GNU C library that one of its symbols has.
+    /// The newest version of the GNU C library that one of its symbols requires.
     pub glibc: Option<Glibc>,
-    /// Needed libraries that are no part of it.
+    /// Needed libraries that are not part of it.
     pub others: Vec<String>,
 }
 
@@ -159,7 +159,7 @@ mod tests {
     fn this_program_needs_the_c_library() {
         let bytes = std::fs::read(std::env::current_exe().unwrap()).unwrap();
         let needs = Needs::of(&bytes).unwrap();
-        // The names of all versions stand among the strings of the dynamic symbols.
+        // The names of all versions are among the strings of the dynamic symbols.
         let file = ElfFile64::<object::Endianness>::parse(&*bytes).unwrap();
         let strings = file.section_by_name(".dynstr").unwrap().data().unwrap();
         let names = strings.split(|byte| *byte == 0).map(String::from_utf8_lossy);

@@ -37,13 +37,13 @@ pub struct ModelDescription {
     pub model_exchange: Option<String>,
     /// The scheduled execution interface's model identifier, if there is one (FMI 3.0 only).
     pub scheduled_execution: Option<String>,
-    /// Default experiment.
+    /// Recommended times, step size and tolerance.
     pub default_experiment: Experiment,
-    /// Units.
+    /// Units with their display units.
     pub units: Vec<Unit>,
-    /// Type definitions.
+    /// Types that variables refer to with `declaredType`.
     pub types: Vec<TypeDefinition>,
-    /// Log categories.
+    /// Categories of log messages, which an importer can switch on and off.
     pub log_categories: Vec<LogCategory>,
     /// Variables, in the order of the file.
     pub variables: Vec<ModelVariable>,
@@ -117,19 +117,9 @@ impl CoSimulation {
         self.flag("canSerializeFMUstate") || self.flag("canSerializeFMUState")
     }
 
-    /// The communication step may change.
-    pub fn can_handle_variable_step(&self) -> bool {
-        self.flag("canHandleVariableCommunicationStepSize")
-    }
-
     /// The FMU needs another program to run.
     pub fn needs_execution_tool(&self) -> bool {
         self.flag("needsExecutionTool")
-    }
-
-    /// One instance per process only.
-    pub fn only_one_instance(&self) -> bool {
-        self.flag("canBeInstantiatedOnlyOncePerProcess")
     }
 
     /// There is an event mode (FMI 3.0 only).
@@ -154,9 +144,9 @@ pub struct Experiment {
 /// A log category.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogCategory {
-    /// Name.
+    /// Name that messages and `SetDebugLogging` use.
     pub name: String,
-    /// Description.
+    /// Meaning of its messages.
     pub description: Option<String>,
 }
 

@@ -2,8 +2,8 @@
 //!
 //! [`write()`] turns the neutral description of a model (`fmu_core::Description`) into XML of either standard; [`read()`]
 //! opens the XML of any FMU of either standard; [`write_terminals()`] and [`read_terminals()`] do the same for its terminals and
-//! icons. Writer and reader share the element tree of `xml` and nothing else, so that the
-//! reader does not believe what the writer does. No pointers, and no FMU links this crate.
+//! icons. Writer and reader share only the element tree of `xml`, so that the reader detects
+//! errors of the writer. The crate uses no pointers, and no FMU links it.
 //!
 //! Clauses are cited as FMI 2.0.5 and FMI 3.0.2.
 

@@ -66,7 +66,7 @@ impl DisplayUnit {
 /// A type definition: the common properties of the variables that refer to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TypeDefinition {
-    /// Name.
+    /// Name to which `declaredType` refers.
     pub name: String,
     /// Base type.
     pub base: BaseType,
@@ -74,7 +74,7 @@ pub struct TypeDefinition {
     pub description: Option<String>,
     /// Physical quantity.
     pub quantity: Option<String>,
-    /// Unit.
+    /// Name of the unit.
     pub unit: Option<String>,
     /// Unit to show values in.
     pub display_unit: Option<String>,
@@ -93,11 +93,11 @@ pub struct TypeDefinition {
 /// One value of an enumeration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Item {
-    /// Name.
+    /// Name that tools show.
     pub name: String,
     /// The integer that crosses the interface.
     pub value: i64,
-    /// Description.
+    /// Meaning of the value.
     pub description: Option<String>,
 }
 

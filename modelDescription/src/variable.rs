@@ -167,7 +167,7 @@ pub struct ModelVariable {
     pub start_texts: Vec<String>,
     /// Physical quantity.
     pub quantity: Option<String>,
-    /// Unit.
+    /// Name of the unit.
     pub unit: Option<String>,
     /// Unit to show values in.
     pub display_unit: Option<String>,

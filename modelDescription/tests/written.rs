@@ -57,8 +57,14 @@ fn capabilities() {
         for name in [format!("canGetAndSet{state}"), format!("canSerialize{state}")] {
             assert_eq!(cs.attribute(&name), Some("true"), "X07: {name}");
         }
-        assert!(cs.can_get_and_set_state() && cs.can_serialize_state() && cs.can_handle_variable_step(), "X08");
-        assert!(!cs.needs_execution_tool() && !cs.only_one_instance() && !cs.has_event_mode(), "X08");
+        assert!(
+            cs.can_get_and_set_state() && cs.can_serialize_state() && cs.flag("canHandleVariableCommunicationStepSize"),
+            "X08"
+        );
+        assert!(
+            !cs.needs_execution_tool() && !cs.flag("canBeInstantiatedOnlyOncePerProcess") && !cs.has_event_mode(),
+            "X08"
+        );
         assert_eq!(cs.flag("canNotUseMemoryManagementFunctions"), version == FmiVersion::V2, "X08");
         assert_eq!(cs.attribute("canInterpolateInputs"), (version == FmiVersion::V2).then_some("false"));
     }

@@ -83,7 +83,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
         (compiled(&workspace, args)?, out)
     } else {
         let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("fmu")), Ok);
-        (vec![given(&args.library)?], out.context("--out says where to write to when there is no workspace")?)
+        (vec![given(&args.library)?], out.context("there is no workspace here: name the output folder with --out")?)
     };
     for note in notes(&models) {
         eprintln!("note: {note}");
@@ -103,7 +103,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
 }
 
 fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
-    // Before anything is compiled: what is missing for the last target is told at once.
+    // Check all targets before compiling anything.
     let tools = Tools::find()?;
     let targets = match &args.target[..] {
         [] => vec![tools.host()],
@@ -112,7 +112,7 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
     let packages = match &args.package {
         Some(name) => {
             let package = workspace.package(name).filter(|p| p.has_cdylib());
-            vec![package.ok_or_else(|| anyhow!("{name} is no package with crate-type = [\"cdylib\"] here"))?]
+            vec![package.ok_or_else(|| anyhow!("{name} is not a package with crate-type = [\"cdylib\"] here"))?]
         }
         None => choose(&workspace.fmus(), &args.fmus)?,
     };

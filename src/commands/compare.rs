@@ -3,8 +3,8 @@
 use crate::workspace::Workspace;
 use anyhow::{Result, anyhow};
 use clap::Args;
+use drive_study::compare::candidate::Entry;
 use drive_study::compare::scenario::{self, Effort, SCENARIOS};
-use drive_study::compare::subject::Entry;
 use drive_study::compare::{self, Cell, Selection, table};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, stderr};

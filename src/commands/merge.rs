@@ -68,7 +68,7 @@ fn merge(mut parts: Vec<Part>) -> Result<BTreeMap<String, Vec<u8>>> {
             other_platforms(a, b)?;
         }
     }
-    // The latest is the base: it has the date of the whole.
+    // The base is the latest FMU: the result keeps its date.
     parts.sort_by(|a, b| (date(a), &a.files).cmp(&(date(b), &b.files)));
     Ok(parts.into_iter().flat_map(|part| part.files).collect())
 }
@@ -105,7 +105,7 @@ fn same_files(a: &Part, b: &Part) -> Result<()> {
             bail!("{}: has no {name}, but {} has; build both from the same sources", other.name, one.name);
         }
     }
-    // The description first: where it differs, so does the page that is made of it.
+    // The description first: if it differs, the documentation page generated from it differs too.
     let mut names = shared(a);
     names.sort_by_key(|name| name != DESCRIPTION);
     for name in names {

@@ -203,7 +203,7 @@ fn write(recording: &Recording, args: &Simulate) -> Result<()> {
         Some(path) if path == Path::new("-") => {
             to_stdout = true;
             match recording.write_csv(&mut BufWriter::new(io::stdout().lock())) {
-                // A reader like `head` has seen enough.
+                // A reader such as `head` closes the pipe early.
                 Err(e) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
                 other => other.context("standard output")?,
             }

@@ -104,7 +104,7 @@ impl Follow {
         Measure::new("peak angle error", "deg", self.or_lost(self.angle.peak))
     }
 
-    /// Mean angle error, with a name of its own.
+    /// Mean angle error as the quantity `name`.
     pub fn mean(&self, name: &'static str) -> Measure {
         Measure::new(name, "deg", self.or_lost(self.angle.mean()))
     }
@@ -116,11 +116,11 @@ impl Follow {
 
     /// Time from `from` (s) until the speed stays within 2 % of rated; infinite if it never does.
     pub fn settled(&self, from: f64) -> Measure {
-        Measure::new("settling time", "s", self.or_lost(self.settled_anyway(from)))
+        Measure::new("settling time", "s", self.or_lost(self.settling_time(from)))
     }
 
-    /// The same in s for a start, where the initial angle error does not count.
-    pub fn settled_anyway(&self, from: f64) -> f64 {
+    /// The same in s, whether or not the angle was lost: for a start, where the initial angle error does not count.
+    pub fn settling_time(&self, from: f64) -> f64 {
         match self.last_outside {
             Some(t) if t >= self.last - 1e-9 => f64::INFINITY,
             Some(t) => (t - from).max(0.0),

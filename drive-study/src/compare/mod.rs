@@ -1,10 +1,11 @@
 //! The grid: runs every estimator through every scenario on all cores, with the native models, then measures, checks
 //! and plots the results.
 //!
-//! - [`subject`]: an estimator with the drive it is compared on; [`scenario`]: the test it runs through;
+//! - [`candidate`]: an estimator with the drive it is compared on; [`scenario`]: the test it runs through;
 //! - [`measure`]: the numbers measured in a run; [`expected`]: the figures expected by the review's list;
 //! - [`queue`]: the runs on all cores; [`table`], [`html`], [`plots`]: the output for an engineer.
 
+pub mod candidate;
 pub mod expected;
 pub mod html;
 pub mod measure;
@@ -14,14 +15,13 @@ pub mod queue;
 mod running;
 pub mod scenario;
 mod signal;
-pub mod subject;
 pub mod table;
 
 use anyhow::{Context, Result};
+use candidate::{Candidate, Entry};
 use measure::{Measure, Trace};
 use scenario::{Effort, SCENARIOS, Scenario};
 use std::path::Path;
-use subject::{Entry, Subject};
 
 /// The result of one estimator in one scenario.
 #[derive(Clone, Debug)]
@@ -96,8 +96,8 @@ pub fn run(selection: &Selection, done: impl Fn() + Sync) -> Vec<Cell> {
     let Selection { entries, scenarios, effort } = selection;
     let jobs: Vec<_> = entries.iter().flat_map(|&entry| scenarios.iter().map(move |&s| (entry, s))).collect();
     queue::map(&jobs, |&(entry, scenario)| {
-        let subject = Subject::new(entry);
-        let mut outcome = match (scenario.run)(&subject, *effort) {
+        let candidate = Candidate::new(entry);
+        let mut outcome = match (scenario.run)(&candidate, *effort) {
             Ok(outcome) => outcome,
             Err(fault) => Outcome::Refused(fault.message().into()),
         };

@@ -1,9 +1,9 @@
 //! Scenarios of a running drive: start, ramp, reversal, load steps, rated load, lowest speed, bandwidth.
 
 use super::Outcome;
+use super::candidate::{Candidate, Class};
 use super::measure::{Follow, Measure};
 use super::scenario::Effort;
-use super::subject::{Class, Subject};
 use crate::runner;
 use drive::estimator::tracker::TrackerKind;
 use fmu_core::Fault;
@@ -16,11 +16,11 @@ fn line(t: f64, from: f64, a: f64, to: f64, b: f64) -> f64 {
 
 /// Starts from standstill to half the rated speed at angles over the full circle: the number of failures, and the worst
 /// successful start.
-pub(super) fn start(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
+pub(super) fn start(candidate: &Candidate, effort: Effort) -> Result<Outcome, Fault> {
     let (count, every) = if effort == Effort::Full { (24_u32, 15.0) } else { (4, 105.0) };
-    let speed = if subject.class == Class::Injection { 0.1 } else { 0.5 };
+    let speed = if candidate.class == Class::Injection { 0.1 } else { 0.5 };
     // Without the voltage distortion by dead time, the start would be too easy.
-    let starting = subject.starting().with_dead_time(true);
+    let starting = candidate.starting().with_dead_time(true);
     let (mut failed, mut peak, mut settling) = (0.0, 0.0_f64, 0.0_f64);
     for k in 0..count {
         let load = if k % 2 == 0 { 0.0 } else { 0.3 };
@@ -31,7 +31,7 @@ pub(super) fn start(subject: &Subject, effort: Effort) -> Result<Outcome, Fault>
         let mut after = Follow::default();
         let survived = at.run(2.5, |t, p| {
             let reference = if t > 0.6 { target } else { 0.0 };
-            at.set(p, reference, Subject::opposing(p, load));
+            at.set(p, reference, Candidate::opposing(p, load));
             if t > 0.6 {
                 follow.add(t, target, p);
             }
@@ -39,7 +39,7 @@ pub(super) fn start(subject: &Subject, effort: Effort) -> Result<Outcome, Fault>
                 after.add(t, target, p);
             }
         })?;
-        let settled = follow.settled_anyway(0.6);
+        let settled = follow.settling_time(0.6);
         if !survived || after.lost() || !settled.is_finite() {
             failed += 1.0;
             continue;
@@ -55,14 +55,14 @@ pub(super) fn start(subject: &Subject, effort: Effort) -> Result<Outcome, Fault>
 }
 
 /// From standstill to rated speed, measured from 0.15 pu on.
-pub(super) fn ramp(subject: &Subject, _effort: Effort) -> Result<Outcome, Fault> {
-    if let Some(why) = subject.no_speed(1.0) {
+pub(super) fn ramp(candidate: &Candidate, _effort: Effort) -> Result<Outcome, Fault> {
+    if let Some(why) = candidate.no_speed(1.0) {
         return Ok(Outcome::NotApplicable(why));
     }
-    let (subject, mut follow) = (subject.starting(), Follow::default());
-    let survived = subject.run(3.2, |t, p| {
+    let (candidate, mut follow) = (candidate.starting(), Follow::default());
+    let survived = candidate.run(3.2, |t, p| {
         let reference = if t < 0.5 { 0.0 } else { line(t, 1.4, 0.15, 2.4, 1.0) };
-        subject.set(p, reference, Subject::opposing(p, 0.3));
+        candidate.set(p, reference, Candidate::opposing(p, 0.3));
         follow.trace(t, reference, p);
         if t > 1.4 {
             follow.add(t, reference, p);
@@ -72,15 +72,15 @@ pub(super) fn ramp(subject: &Subject, _effort: Effort) -> Result<Outcome, Fault>
 }
 
 /// Speed reversal through standstill. The hybrid runs the profile that has a figure in the review's list.
-pub(super) fn reversal(subject: &Subject) -> Result<Outcome, Fault> {
-    if subject.class == Class::Hybrid {
-        return both_ways(subject);
+pub(super) fn reversal(candidate: &Candidate) -> Result<Outcome, Fault> {
+    if candidate.class == Class::Hybrid {
+        return both_ways(candidate);
     }
-    let top = if subject.class == Class::Injection { 0.1 } else { 0.5 };
-    let (turning, mut follow) = (subject.turning(top), Follow::default());
+    let top = if candidate.class == Class::Injection { 0.1 } else { 0.5 };
+    let (turning, mut follow) = (candidate.turning(top), Follow::default());
     let survived = turning.run(2.5, |t, p| {
         let reference = line(t, 0.7, top, 1.2, -top);
-        turning.set(p, reference, Subject::opposing(p, 0.3));
+        turning.set(p, reference, Candidate::opposing(p, 0.3));
         follow.trace(t, reference, p);
         if t > 0.5 {
             follow.add(t, reference, p);
@@ -91,14 +91,14 @@ pub(super) fn reversal(subject: &Subject) -> Result<Outcome, Fault> {
 
 /// 0 -> 0.95 -> -0.95 -> 0 pu under a constant 0.8 pu of load. The list does not give the slope of its ramps, which
 /// determines the peak: 0.375 s from rest to speed reproduce it.
-fn both_ways(subject: &Subject) -> Result<Outcome, Fault> {
+fn both_ways(candidate: &Candidate) -> Result<Outcome, Fault> {
     let (top, ramp, stay, begin) = (0.95, 0.375, 0.5, 0.8);
     let (back, home) = (begin + ramp + stay, begin + 3.0 * ramp + 2.0 * stay);
     let mut follow = Follow::default();
-    let survived = subject.run(home + ramp + 0.5, |t, p| {
+    let survived = candidate.run(home + ramp + 0.5, |t, p| {
         let up = line(t, begin, 0.0, begin + ramp, top);
         let reference = up - line(t, back, 0.0, back + 2.0 * ramp, 2.0 * top) + line(t, home, 0.0, home + ramp, top);
-        subject.set(p, reference, line(t, 0.1, 0.0, 0.4, 0.8));
+        candidate.set(p, reference, line(t, 0.1, 0.0, 0.4, 0.8));
         follow.trace(t, reference, p);
         follow.add(t, reference, p);
     })?;
@@ -106,12 +106,12 @@ fn both_ways(subject: &Subject) -> Result<Outcome, Fault> {
 }
 
 /// A load step at a constant speed.
-pub(super) fn load_step(subject: &Subject, speed: f64, load: f64) -> Result<Outcome, Fault> {
-    let none = if speed == 0.0 { subject.no_standstill() } else { None };
-    if let Some(why) = none.or(subject.no_speed(speed)) {
+pub(super) fn load_step(candidate: &Candidate, speed: f64, load: f64) -> Result<Outcome, Fault> {
+    let none = if speed == 0.0 { candidate.no_standstill() } else { None };
+    if let Some(why) = none.or(candidate.no_speed(speed)) {
         return Ok(Outcome::NotApplicable(why));
     }
-    let (turning, mut follow) = (subject.turning(speed), Follow::default());
+    let (turning, mut follow) = (candidate.turning(speed), Follow::default());
     let survived = turning.run(if speed == 0.0 { 4.0 } else { 2.0 }, |t, p| {
         turning.set(p, speed, if t >= 0.5 - 1e-9 { load } else { 0.0 });
         if t <= 2.0 {
@@ -137,28 +137,28 @@ fn dynamic(follow: Follow, survived: bool, from: f64, with_dip: bool) -> Outcome
 }
 
 /// Rated load at a constant speed, measured in the last half second.
-pub(super) fn rated(subject: &Subject, speed: f64) -> Result<Outcome, Fault> {
-    let none = if speed == 0.0 { subject.no_standstill() } else { None };
-    if let Some(why) = none.or(subject.no_speed(speed.abs())) {
+pub(super) fn rated(candidate: &Candidate, speed: f64) -> Result<Outcome, Fault> {
+    let none = if speed == 0.0 { candidate.no_standstill() } else { None };
+    if let Some(why) = none.or(candidate.no_speed(speed.abs())) {
         return Ok(Outcome::NotApplicable(why));
     }
-    let follow = slowed_down(subject, speed)?;
+    let follow = slowed_down(candidate, speed)?;
     Ok(Outcome::Measured(vec![follow.mean("mean angle error"), follow.std(), follow.rms()], None))
 }
 
 /// Takes rated load, then goes to `speed` (pu). It takes the load at 0.5 pu, so that the result is the lowest running
 /// speed and not the lowest starting speed.
-pub(super) fn slowed_down(subject: &Subject, speed: f64) -> Result<Follow, Fault> {
+pub(super) fn slowed_down(candidate: &Candidate, speed: f64) -> Result<Follow, Fault> {
     let side = if speed < 0.0 { -1.0 } else { 1.0 };
     // Injection lacks the voltage for half the speed, so it takes the load at the target speed.
-    let first = if subject.class == Class::Injection { speed } else { side * speed.abs().max(0.5) };
-    loaded(subject, first, speed, side)
+    let first = if candidate.class == Class::Injection { speed } else { side * speed.abs().max(0.5) };
+    loaded(candidate, first, speed, side)
 }
 
 /// Takes `load` (pu) at speed `first` (pu) within 0.3 s, ramps to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and
 /// measures for 0.5 s.
-fn loaded(subject: &Subject, first: f64, speed: f64, load: f64) -> Result<Follow, Fault> {
-    let (turning, mut follow) = (subject.turning(first), Follow::default());
+fn loaded(candidate: &Candidate, first: f64, speed: f64, load: f64) -> Result<Follow, Fault> {
+    let (turning, mut follow) = (candidate.turning(first), Follow::default());
     let arrival = 1.2 + (first - speed).abs() / 0.5;
     let survived = turning.run(arrival + 2.0, |t, p| {
         let reference = line(t, 1.2, first, arrival.max(1.2 + 1e-9), speed);
@@ -176,8 +176,8 @@ fn holds(follow: &Follow) -> bool {
 }
 
 /// Rated driving load, applied at `speed` (pu) within 0.3 s.
-pub(super) fn generating(subject: &Subject, speed: f64) -> Result<Outcome, Fault> {
-    let follow = loaded(subject, speed, speed, -1.0)?;
+pub(super) fn generating(candidate: &Candidate, speed: f64) -> Result<Outcome, Fault> {
+    let follow = loaded(candidate, speed, speed, -1.0)?;
     let mut measures = vec![follow.mean("mean angle error"), follow.std(), follow.rms()];
     if !holds(&follow) {
         for m in &mut measures {
@@ -188,12 +188,16 @@ pub(super) fn generating(subject: &Subject, speed: f64) -> Result<Outcome, Fault
 }
 
 /// How rated load is applied at a trial speed.
-type Approach = fn(&Subject, f64) -> Result<Follow, Fault>;
+type Approach = fn(&Candidate, f64) -> Result<Follow, Fault>;
 
-fn lowest_of(subject: &Subject, approach: Approach, speeds: impl IntoIterator<Item = f64>) -> Result<Outcome, Fault> {
+fn lowest_of(
+    candidate: &Candidate,
+    approach: Approach,
+    speeds: impl IntoIterator<Item = f64>,
+) -> Result<Outcome, Fault> {
     let mut lowest = f64::INFINITY;
     for speed in speeds {
-        if !holds(&approach(subject, speed)?) {
+        if !holds(&approach(candidate, speed)?) {
             break;
         }
         lowest = speed;
@@ -202,49 +206,49 @@ fn lowest_of(subject: &Subject, approach: Approach, speeds: impl IntoIterator<It
 }
 
 /// Lowest speed at which rated load is held, approached from above.
-pub(super) fn lowest(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
-    lowest_by(subject, effort, slowed_down)
+pub(super) fn lowest(candidate: &Candidate, effort: Effort) -> Result<Outcome, Fault> {
+    lowest_by(candidate, effort, slowed_down)
 }
 
 /// Lowest speed at which rated load may be applied within 0.3 s.
-pub(super) fn arriving(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
-    lowest_by(subject, effort, |subject, speed| loaded(subject, speed, speed, 1.0))
+pub(super) fn arriving(candidate: &Candidate, effort: Effort) -> Result<Outcome, Fault> {
+    lowest_by(candidate, effort, |candidate, speed| loaded(candidate, speed, speed, 1.0))
 }
 
-fn lowest_by(subject: &Subject, effort: Effort, approach: Approach) -> Result<Outcome, Fault> {
+fn lowest_by(candidate: &Candidate, effort: Effort, approach: Approach) -> Result<Outcome, Fault> {
     let all: &[f64] = if effort == Effort::Full {
         &[0.2, 0.15, 0.12, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02, 0.01, 0.0]
     } else {
         &[0.2, 0.1, 0.05, 0.03, 0.02, 0.0]
     };
-    let low = if subject.no_standstill().is_some() { 1e-9 } else { 0.0 };
-    lowest_of(subject, approach, all.iter().copied().filter(|&speed| speed >= low))
+    let low = if candidate.no_standstill().is_some() { 1e-9 } else { 0.0 };
+    lowest_of(candidate, approach, all.iter().copied().filter(|&speed| speed >= low))
 }
 
 /// The same without the term that the review omits, for estimators that have it.
-pub(super) fn as_printed(subject: &Subject) -> Result<Outcome, Fault> {
-    if !["DirectEmf", "EmfObserver", "ExtendedEmf", "VoltageFeedback"].contains(&subject.entry.kind.name()) {
+pub(super) fn as_printed(candidate: &Candidate) -> Result<Outcome, Fault> {
+    if !["DirectEmf", "EmfObserver", "ExtendedEmf", "VoltageFeedback"].contains(&candidate.entry.kind.name()) {
         return Ok(Outcome::NotApplicable("has no frame-speed term to drop"));
     }
-    let printed = subject.with(|p| p.controller.model.parameters.estimators.emf.frame_term = false);
+    let printed = candidate.with(|p| p.controller.model.parameters.estimators.emf.frame_term = false);
     lowest_of(&printed, slowed_down, (10..=30_u32).rev().map(|k| 0.01 * f64::from(k)))
 }
 
 /// Bandwidth (-3 dB) of the speed loop at half the rated speed, from the true speed.
-pub(super) fn bandwidth(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
+pub(super) fn bandwidth(candidate: &Candidate, effort: Effort) -> Result<Outcome, Fault> {
     if effort == Effort::Reduced {
         return Ok(Outcome::NotApplicable("left out of the reduced grid"));
     }
-    subject.pair.clone().start()?;
-    let speed = if subject.class == Class::Injection { 0.1 } else { 0.5 };
-    let bandwidth = runner::speed_bandwidth(&subject.pair, speed);
+    candidate.pair.clone().start()?;
+    let speed = if candidate.class == Class::Injection { 0.1 } else { 0.5 };
+    let bandwidth = runner::speed_bandwidth(&candidate.pair, speed);
     Ok(Outcome::Measured(vec![Measure::new("speed bandwidth", "Hz", bandwidth)], None))
 }
 
 /// The same with the speed loop (and the mechanical observer) of the review's faster figure.
-pub(super) fn bandwidth_fast(subject: &Subject, effort: Effort) -> Result<Outcome, Fault> {
+pub(super) fn bandwidth_fast(candidate: &Candidate, effort: Effort) -> Result<Outcome, Fault> {
     // Speed loop and tracker in Hz: the mechanical observer makes the fast speed loop possible.
-    let (loop_hz, observer_hz) = match subject.entry.kind.name() {
+    let (loop_hz, observer_hz) = match candidate.entry.kind.name() {
         "VoltageModel" | "CurrentModel" | "KalmanFilter" => (26.0, None),
         "ExtendedEmf" => (60.0, Some(15.0)),
         "RotatingInjection" => (34.0, Some(25.0)),
@@ -253,7 +257,7 @@ pub(super) fn bandwidth_fast(subject: &Subject, effort: Effort) -> Result<Outcom
         "NearPwmInjection" => (30.0, Some(25.0)),
         _ => return Ok(Outcome::NotApplicable("no faster figure")),
     };
-    let fast = subject.with(|p| {
+    let fast = candidate.with(|p| {
         let par = &mut p.controller.model.parameters;
         par.speed_loop.bandwidth = TAU * loop_hz;
         if let Some(hz) = observer_hz {

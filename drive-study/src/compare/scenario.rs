@@ -1,6 +1,6 @@
 //! The scenarios. Each one is a row here; its function runs a drive and measures numbers.
 
-use super::subject::Subject;
+use super::candidate::Candidate;
 use super::{Outcome, parameters, running, signal};
 use fmu_core::Fault;
 
@@ -23,7 +23,7 @@ pub struct Scenario {
     /// What happens, in one sentence.
     pub title: &'static str,
     /// Runs it.
-    pub run: fn(&Subject, Effort) -> Result<Outcome, Fault>,
+    pub run: fn(&Candidate, Effort) -> Result<Outcome, Fault>,
 }
 
 const START: &str = "Start, ramp, reversal";
@@ -40,7 +40,7 @@ const fn row(
     id: &'static str,
     group: &'static str,
     title: &'static str,
-    run: fn(&Subject, Effort) -> Result<Outcome, Fault>,
+    run: fn(&Candidate, Effort) -> Result<Outcome, Fault>,
 ) -> Scenario {
     Scenario { id, group, title, run }
 }
@@ -70,15 +70,15 @@ pub static SCENARIOS: &[Scenario] = &[
     row("rated-back", RATED, "rated load at -0.1 pu", |s, _| running::rated(s, -0.1)),
     row("rated-0.5", RATED, "rated load at 0.5 pu", |s, _| running::rated(s, 0.5)),
     row("rated-1", RATED, "rated load at 1 pu", |s, _| running::rated(s, 1.0)),
-    row("lowest", LOWEST, "ideal inverter, the load taken at 0.5 pu (injection: at the speed itself)", running::lowest),
+    row("lowest", LOWEST, "ideal inverter, the load applied at 0.5 pu (injection: at that speed)", running::lowest),
     row("lowest-dead", LOWEST, "the same with 2 us dead time, compensated", |s, e| {
         running::lowest(&s.with_dead_time(true), e)
     }),
     row("as-printed", LOWEST, "without the frame-speed term, as the review prints (18)", |s, _| running::as_printed(s)),
-    row("arriving", LOWEST, "ideal inverter, the load arriving within 0.3 s at the speed itself", running::arriving),
-    row("generating-0.02", GENERATING, "arriving within 0.3 s at 0.02 pu", |s, _| running::generating(s, 0.02)),
-    row("generating-0.05", GENERATING, "arriving within 0.3 s at 0.05 pu", |s, _| running::generating(s, 0.05)),
-    row("generating-0.1", GENERATING, "arriving within 0.3 s at 0.1 pu", |s, _| running::generating(s, 0.1)),
+    row("arriving", LOWEST, "ideal inverter, the load applied at that speed within 0.3 s", running::arriving),
+    row("generating-0.02", GENERATING, "applied within 0.3 s at 0.02 pu", |s, _| running::generating(s, 0.02)),
+    row("generating-0.05", GENERATING, "applied within 0.3 s at 0.05 pu", |s, _| running::generating(s, 0.05)),
+    row("generating-0.1", GENERATING, "applied within 0.3 s at 0.1 pu", |s, _| running::generating(s, 0.1)),
     row("wrong-r", WRONG, "R at rated load and 0.1 pu", |s, _| parameters::wrong(s, 0.1, |m| &mut m.R_s)),
     row("wrong-l-q", WRONG, "L_q at rated load and 0.5 pu (injection 0.1)", |s, _| {
         parameters::wrong(s, 0.5, |m| &mut m.L_q)

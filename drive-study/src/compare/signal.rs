@@ -1,35 +1,35 @@
 //! Cost and effect of an injected voltage: the carrier current and the angle found in it.
 
 use super::Outcome;
+use super::candidate::Candidate;
 use super::measure::{Measure, Trace};
-use super::subject::Subject;
 use crate::runner;
 use fmu_core::Fault;
 
 const NOTHING: Outcome = Outcome::NotApplicable("injects nothing");
 
-fn injects(subject: &Subject) -> bool {
-    subject.class.injects()
+fn injects(candidate: &Candidate) -> bool {
+    candidate.class.injects()
 }
 
 /// RMS of the carrier current (magnitude of its space vector) and its copper loss, 1.5 R i^2.
-pub(super) fn cost(subject: &Subject) -> Result<Outcome, Fault> {
-    if !injects(subject) {
+pub(super) fn cost(candidate: &Candidate) -> Result<Outcome, Fault> {
+    if !injects(candidate) {
         return Ok(NOTHING);
     }
-    subject.pair.clone().start()?;
-    let rms = runner::injected_current(subject.pair.clone());
-    let r_s = subject.pair.plant.model.parameters.motor.R_s;
+    candidate.pair.clone().start()?;
+    let rms = runner::injected_current(candidate.pair.clone());
+    let r_s = candidate.pair.plant.model.parameters.motor.R_s;
     let measures = vec![Measure::new("i_hf rms", "A", rms), Measure::new("copper loss", "W", 1.5 * r_s * rms * rms)];
     Ok(Outcome::Measured(measures, None))
 }
 
 /// Half a second at 0.05 pu: currents and angles at every sample, which [`super::plots`] draws as Fig. 8 and 11.
-pub(super) fn response(subject: &Subject) -> Result<Outcome, Fault> {
-    if !injects(subject) {
+pub(super) fn response(candidate: &Candidate) -> Result<Outcome, Fault> {
+    if !injects(candidate) {
         return Ok(NOTHING);
     }
-    let (turning, mut trace, mut error) = (subject.turning(0.05), Trace::default(), runner::Statistics::default());
+    let (turning, mut trace, mut error) = (candidate.turning(0.05), Trace::default(), runner::Statistics::default());
     turning.run(0.5, |t, p| {
         turning.set(p, 0.05, 0.0);
         if t > 0.2 {

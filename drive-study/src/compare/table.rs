@@ -2,7 +2,7 @@
 
 use super::measure::Measure;
 use super::{Cell, Outcome};
-use crate::compare::subject::Class;
+use crate::compare::candidate::Class;
 use std::fmt::Write as _;
 
 /// A group of scenarios with its cells, as texts.
@@ -206,9 +206,7 @@ pub fn starts(cells: &[Cell]) -> String {
 /// The tables in Markdown.
 pub fn markdown(cells: &[Cell]) -> String {
     let mut text = format!("# Estimators compared\n\n{MACHINES}\n\n{}\n\n", starts(cells));
-    text.push_str(
-        "✓ is inside, ✗ outside the tolerance of the figure there is for it; a number without a mark has none.\n\n",
-    );
+    text.push_str("✓: inside the tolerance of its expected figure; ✗: outside; no mark: no expected figure.\n\n");
     for block in blocks(cells) {
         let _ = writeln!(text, "## {}\n", block.title);
         let heading =

@@ -26,7 +26,7 @@ struct Panel<'a> {
 
 const BLUE_INK: RGBColor = RGBColor(0, 84, 166);
 const RED_INK: RGBColor = RGBColor(200, 60, 40);
-const GREY: RGBColor = RGBColor(150, 150, 150);
+const GRAY: RGBColor = RGBColor(150, 150, 150);
 
 /// Maximum number of points per curve; more would not be visible at the size of a panel.
 const POINTS: usize = 600;
@@ -63,7 +63,7 @@ impl Panel<'_> {
             .map_err(drawing)?;
         let stride = (to - from).div_ceil(POINTS).max(1);
         for Curve { name, color, values } in &self.curves {
-            let style = color.stroke_width(if *color == GREY { 1 } else { 2 });
+            let style = color.stroke_width(if *color == GRAY { 1 } else { 2 });
             let points: Vec<_> = (from..to).step_by(stride).map(|k| (t[k], values[k])).collect();
             let points = seen(&points, (self.window.1 - self.window.0, high - low + 2.0 * margin));
             let series = chart.draw_series(LineSeries::new(points, style)).map_err(drawing)?;
@@ -74,7 +74,7 @@ impl Panel<'_> {
                 .configure_series_labels()
                 .position(self.legend.clone())
                 .background_style(WHITE.mix(0.8))
-                .border_style(GREY)
+                .border_style(GRAY)
                 .label_font(("sans-serif", 15))
                 .draw()
                 .map_err(drawing)?;
@@ -105,13 +105,13 @@ fn seen(points: &[(f64, f64)], size: (f64, f64)) -> Vec<(f64, f64)> {
     }
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "the signature that map_err wants")]
+#[expect(clippy::needless_pass_by_value, reason = "the signature that map_err requires")]
 fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> anyhow::Error {
     anyhow!("drawing a plot: {error}")
 }
 
 /// A tick's number in its shortest form.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "plotters hands out references")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that plotters requires")]
 fn tick(x: &f64) -> String {
     ((x * 1e6).round() / 1e6).to_string()
 }
@@ -134,7 +134,7 @@ fn page(panels: &[Panel<'_>]) -> Result<String> {
 
 fn speed<'a>(title: &'static str, trace: &'a Trace, window: (f64, f64)) -> Panel<'a> {
     let curves = vec![
-        Curve { name: "reference", color: GREY, values: &trace.speed_ref },
+        Curve { name: "reference", color: GRAY, values: &trace.speed_ref },
         Curve { name: "true", color: RED_INK, values: &trace.speed },
         Curve { name: "estimated", color: BLUE_INK, values: &trace.speed_est },
     ];

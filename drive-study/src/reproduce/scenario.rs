@@ -33,7 +33,7 @@ pub struct Scenario {
 pub const REST: Scenario =
     Scenario { id: "", figure: "", title: "", plant: &[], controller: &[], speed_ref: &[], load: &[], duration: 1.0 };
 
-/// Start from the worst angle, then a stop and a second start.
+/// Start from the worst angle, stop, second start.
 pub const START: Scenario = Scenario {
     id: "start-180",
     figure: "4a, 4b",
@@ -124,9 +124,9 @@ pub struct Trace {
     pub theta_est: Vec<f64>,
     /// Angle error theta^ - theta in deg, in (-180, 180].
     pub error: Vec<f64>,
-    /// Current along the estimated magnet axis (d) in A.
+    /// d-axis current in the estimated rotor frame in A.
     pub i_d: Vec<f64>,
-    /// Current across the estimated magnet axis (q) in A.
+    /// q-axis current in the estimated rotor frame in A.
     pub i_q: Vec<f64>,
 }
 

@@ -51,11 +51,11 @@ pub struct Machine {
     pub n_p: Spanned<i32>,
     /// Stator resistance in Ohm.
     pub R_s: Number,
-    /// Inductance along the magnet axis (L_d) in H.
+    /// d-axis inductance in H.
     pub L_d: Number,
-    /// Inductance across the magnet axis (L_q) in H.
+    /// q-axis inductance in H.
     pub L_q: Number,
-    /// Flux linkage of the magnet in Wb.
+    /// Permanent-magnet flux linkage in Wb, peak value.
     pub psi_M: Number,
 }
 
@@ -110,11 +110,11 @@ pub struct Bandwidth {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Saturation {
-    /// Second-order coefficient along the magnet axis.
+    /// Second-order d-axis coefficient.
     pub s_2: Option<Number>,
-    /// Third-order coefficient along the magnet axis.
+    /// Third-order d-axis coefficient.
     pub s_3: Option<Number>,
-    /// Cross-coupling between the axes.
+    /// Cross-saturation coefficient.
     pub s_dq: Option<Number>,
 }
 

@@ -1,7 +1,7 @@
 //! The rules that derive parameter values from machine data and bandwidths.
 //!
-//! For a machine without saliency (L_q within a tenth of L_d) Rasmussen's observer, which holds standstill; with saliency
-//! the extended EMF and an I-f start. Rules for Rasmussen's observer: w_n = observer, zeta = 1;
+//! The rules choose Rasmussen's observer, which holds standstill, for a machine without saliency (L_q within a tenth of
+//! L_d), and the extended EMF with an I-f start for a salient one. Rules for Rasmussen's observer: w_n = observer, zeta = 1;
 //! c_1 = 4 |R - R^| i_0 / psi_M within 50..200 1/s, c_2 = c_1 / 50; K i_0 = 1.35 times the rated torque; w_0 = 30 rad/s
 //! electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest electrical
 //! acceleration alpha = n_p K i_q / J. R^ = 0.9 R: the safe side at standstill, where R^ > R runs away.
@@ -175,7 +175,7 @@ fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
     if w_s > w_o / 3.0 * (1.0 + 1e-9) {
         let place = motor.place(&bandwidth.speed);
         bail!(
-            "{place}: bandwidth.speed = {w_s} rad/s is more than a third of bandwidth.observer = {w_o} rad/s: lower it, or raise that"
+            "{place}: bandwidth.speed = {w_s} rad/s is more than a third of bandwidth.observer = {w_o} rad/s: lower the former or raise the latter"
         );
     }
     let emf = f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * machine.psi_M.get_ref();
@@ -305,7 +305,7 @@ fn extended_emf(data: &Data, notes: &mut Vec<String>) -> Vec<Setting> {
             "bandwidth.observer is {rho} rad/s; below 94 rad/s a load step of half the torque loses the rotor"
         ));
     }
-    // A current along the magnet axis holds the rotor only while magnet torque exceeds reluctance torque: |L_q - L_d| i
+    // A d-axis current holds the rotor only while magnet torque exceeds reluctance torque: |L_q - L_d| i
     // < psi_M.
     let k = torque_constant(data);
     let saliency = (data.machine.L_q.get_ref() - data.machine.L_d.get_ref()).abs();

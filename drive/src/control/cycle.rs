@@ -5,9 +5,9 @@ use crate::control::model::SensorlessController;
 use crate::control::signals::ControllerOutputs;
 use crate::control::state::{Command, Mode, context};
 use crate::estimator::{Estimate, Injection, Sample};
-use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
 use crate::math::wrap;
-use crate::modulation::{dead_time_loss, limit_to_hexagon};
+use crate::modulation::{dead_time_loss, limit_span};
 
 /// The estimated rotor frame at a sample and the quantities controlled in it.
 struct Frame {
@@ -87,8 +87,7 @@ impl SensorlessController {
             state.estimator.retune(&context(par, &in_use.estimators, &in_use.motor), &new);
             in_use.take_up(par);
         }
-        let Estimate { theta, w, i, injection } = estimate;
-        let axis = Axis::<Estimated>::at(theta);
+        let Estimate { theta, axis, w, i, injection } = estimate;
         (Frame { axis, theta, w, i: axis.from_stator(i), injection }, mode)
     }
 
@@ -121,7 +120,7 @@ impl SensorlessController {
             state.current.command(&gains.current, motor, i_ref, frame.i, frame.w)
         };
         // The command acts from `delay` to `delay + 1` samples from now, so rotate it to the middle of that interval.
-        let acting = Axis::<Estimated>::at(frame.theta + (f64::from(par.delay) + 0.5) * T_s * frame.w);
+        let acting = frame.axis.ahead(Turn::new((f64::from(par.delay) + 0.5) * T_s * frame.w));
         let injected = match frame.injection {
             Injection::None => AlphaBeta::ZERO,
             Injection::Stator(u) => u,
@@ -131,9 +130,9 @@ impl SensorlessController {
         let (command, limited) = within_hexagon(whole, inputs.u_dc);
         let limitation = acting.from_stator(command - injected) - requested;
         state.current.integrate(&gains.current, i_ref - frame.i, limitation, T_s);
-        let share = if whole.magnitude() > 0.0 { command.magnitude() / whole.magnitude() } else { 1.0 };
+        let injected = if limited { injected * (command.magnitude() / whole.magnitude()) } else { injected };
         let [newest, older, _] = state.commands;
-        state.commands = [Command { u: command, injected: injected * share }, newest, older];
+        state.commands = [Command { u: command, injected }, newest, older];
         if par.compensation.u_dead > 0.0 {
             let legs = Phases::from_stator(acting.to_stator(i_ref));
             let loss = dead_time_loss(par.compensation.u_dead, par.compensation.i_zero, legs);
@@ -172,6 +171,6 @@ impl SensorlessController {
 
 /// The voltage `u` (V) limited to the hexagon of `u_dc` (V), and whether it was outside.
 fn within_hexagon(u: AlphaBeta, u_dc: f64) -> (AlphaBeta, bool) {
-    let phases = Phases::from_stator(u);
-    (limit_to_hexagon(phases, u_dc), phases.span() > u_dc)
+    let span = Phases::from_stator(u).span();
+    (limit_span(u, span, u_dc), span > u_dc)
 }

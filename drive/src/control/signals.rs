@@ -1,6 +1,7 @@
 //! Inputs and outputs of the controller.
 
 use crate::frame::{DqHat, Phases};
+use crate::math::all_finite;
 use serde::{Deserialize, Serialize};
 
 /// Inputs, read at the sample instants.
@@ -26,7 +27,7 @@ impl ControllerInputs {
     /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
         let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _ } = self;
-        [i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref].iter().all(|x| x.is_finite())
+        all_finite([i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref])
     }
 }
 
@@ -71,8 +72,7 @@ impl ControllerOutputs {
     /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
         let Self { u, speed_est, theta_est, i, i_ref, lock_lost, .. } = self;
-        let all = [u.a, u.b, u.c, *speed_est, *theta_est, i.d, i.q, i_ref.d, i_ref.q, *lock_lost];
-        all.iter().all(|x| x.is_finite())
+        all_finite([u.a, u.b, u.c, *speed_est, *theta_est, i.d, i.q, i_ref.d, i_ref.q, *lock_lost])
     }
 }
 

@@ -20,8 +20,7 @@ pub(super) fn context<'a>(
     estimators: &'a EstimatorParameters,
     motor: &'a Motor,
 ) -> Context<'a> {
-    let ControllerParameters { current, J, T_s, delay, .. } = par;
-    Context { par: estimators, motor, current, J: *J, T_s: *T_s, delay: f64::from(*delay) }
+    Context { par: estimators, motor, J: par.J, T_s: par.T_s }
 }
 
 /// Gains computed from the parameters.

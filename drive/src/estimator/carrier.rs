@@ -11,6 +11,7 @@
 //! here.
 //! w_h in rad/s, T_s in s.
 
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::Context;
 use crate::frame::Vector;
 use crate::math::sin_cos;
@@ -22,7 +23,7 @@ use std::f64::consts::TAU;
 /// The parameters with the prefix `carrier.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CarrierParameters {
-    /// Voltage V, > 0.
+    /// Amplitude V of the carrier voltage in V, > 0.
     pub voltage: f64,
     /// Angular frequency w_h in rad/s, > 0; one period must be a whole number of samples.
     pub frequency: f64,
@@ -65,7 +66,7 @@ impl Carrier {
         let par = &context.par.carrier;
         let phi = par.frequency * context.T_s;
         // A period is a whole number of samples. Integer counting keeps the phase from drifting.
-        let samples = samples(context).unwrap_or(MIN_SAMPLES);
+        let samples = samples(par.frequency, context.T_s).unwrap_or(MIN_SAMPLES);
         let place = usize::try_from(k % samples as u64).unwrap_or(0);
         let (sin_phi, cos_phi) = sin_cos(phi);
         let (sin, cos) = sin_cos(phi * float(place));
@@ -73,10 +74,11 @@ impl Carrier {
     }
 }
 
-/// Samples per carrier period, if this is a whole number that the filters support.
+/// Samples of `T_s` (s) per period of the carrier `frequency` (rad/s), if this is a whole number that the filters
+/// support.
 #[inline]
-fn samples(context: &Context) -> Option<usize> {
-    let exact = TAU / (context.par.carrier.frequency * context.T_s);
+fn samples(frequency: f64, T_s: f64) -> Option<usize> {
+    let exact = TAU / (frequency * T_s);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, and is checked")]
     let whole = exact.round() as usize;
     let fits = (MIN_SAMPLES..=MAX_SAMPLES).contains(&whole) && (exact - float(whole)).abs() < 1e-6 * exact;
@@ -135,16 +137,17 @@ impl PeriodMean {
 ///
 /// # Errors
 /// The period is not a whole number of samples, or it has too few or too many samples.
-pub fn validate(context: &Context) -> Result<(), Fault> {
-    if samples(context).is_some() {
+pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+    let (frequency, T_s) = (par.estimators.carrier.frequency, par.T_s);
+    if samples(frequency, T_s).is_some() {
         return Ok(());
     }
-    let (w, frequency) = (context.par.carrier.frequency, context.tell(|p| &mut p.carrier.frequency));
-    let exact = TAU / (w * context.T_s);
     Err(Fault::new(format!(
-        "{frequency} and T_s = {} s: a period of the carrier is {exact} samples; it must be a whole \
-         number from {MIN_SAMPLES} to {MAX_SAMPLES}",
-        context.T_s
+        "{} and {}: a period of the carrier is {} samples; it must be a whole number from {MIN_SAMPLES} to \
+         {MAX_SAMPLES}",
+        PARAMETERS.tell(par, |p| &mut p.estimators.carrier.frequency),
+        PARAMETERS.tell(par, |p| &mut p.T_s),
+        TAU / (frequency * T_s)
     )))
 }
 

@@ -8,6 +8,7 @@
 //! Limits: the calculated EMF includes L p i, and therefore the current loop's voltage noise and each load change. The
 //! method holds rated load from 0.1 of the rated speed. A reversal at light load is ambiguous by half a turn.
 
+use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
@@ -48,8 +49,8 @@ impl Estimating for DirectEmf {
         self.tracker.follow(context, emf::angle_error(s, self.e.d(), self.e.q()), sample)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        emf::validate(context)
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        emf::validate(par)
     }
 }
 

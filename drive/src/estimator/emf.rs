@@ -12,7 +12,7 @@
 //! The paper neglects (w_f - w) L i in (18). Without this term, motoring produces a right-half-plane zero at about E /
 //! (L_d i_q), and the drive cannot hold rated load below 0.21-0.25 of the rated speed: `frame_term` keeps the term.
 
-use crate::estimator::Context;
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::interval::Interval;
 use crate::math::{atan2, exp};
 use fmu_core::unit::RAD_PER_S;
@@ -106,12 +106,12 @@ impl AxisObserver {
 ///
 /// # Errors
 /// States by how much the tracker is too fast.
-pub fn validate(context: &Context) -> Result<(), Fault> {
-    let (rho, w_o) = (context.par.tracker.bandwidth, context.par.emf.bandwidth);
+pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+    let (rho, w_o) = (par.estimators.tracker.bandwidth, par.estimators.emf.bandwidth);
     if rho > w_o / 3.0 * (1.0 + 1e-9) {
-        let observer = context.tell(|p| &mut p.emf.bandwidth);
+        let observer = PARAMETERS.tell(par, |p| &mut p.estimators.emf.bandwidth);
         let allowed = format!("at most a third of {observer}, or the tracker rings on the EMF's lag");
-        return Err(context.fault(|p| &mut p.tracker.bandwidth, allowed));
+        return Err(PARAMETERS.fault(par, |p| &mut p.estimators.tracker.bandwidth, allowed));
     }
     Ok(())
 }

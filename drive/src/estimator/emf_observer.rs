@@ -1,7 +1,7 @@
 //! State observer for the back EMF (Kim & Sul (14), (15), after Son et al. 2002): method 2 of the review.
 //!
 //! This is the extended-EMF observer, but with L_d on the d-axis and L_q on the q-axis:
-//! v_d = R i_d + L_d p i_d - w L_q i_q - (w_f - w) L_d i_q + e_d, v_q = R i_q + L_q p i_q + w L_d i_d + (w_f - w) L_q i_d + e_q,
+//! v_d = R i_d + L_d p i_d - w L_q i_q - (w_f - w) L_d i_q + e_d, v_q = R i_q + L_q p i_q + w L_d i_d + (w_f - w) L_q i_d + e_q.
 //! The relation (e_d, e_q) = w psi_M (-sin theta~, cos theta~) holds to first order in theta~ for constant currents
 //! (11).
 //! Correction to the paper: in (14) the EMF columns have -1/L_d and -1/L_q, and the input is (v_ds, v_qs); (11) has
@@ -9,6 +9,7 @@
 //!
 //! Limits: those of the extended EMF; for large angle errors, the neglected saliency slows convergence.
 
+use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
@@ -53,8 +54,8 @@ impl Estimating for EmfObserver {
         self.tracker.follow(context, emf::angle_error(s, e_d, e_q), sample)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        emf::validate(context)
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        emf::validate(par)
     }
 }
 

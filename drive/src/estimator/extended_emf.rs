@@ -10,6 +10,7 @@
 //! 0.05 with a compensated one; a reversal at light load is ambiguous by half a turn. L_q + 20 % at rated load shifts
 //! the angle by 5.8 deg.
 
+use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
@@ -75,8 +76,8 @@ impl Estimating for ExtendedEmf {
         tracker.follow(context, e, sample)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        emf::validate(context)
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        emf::validate(par)
     }
 }
 

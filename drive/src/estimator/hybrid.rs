@@ -9,6 +9,7 @@
 //! Transition speeds: 0.1 and 0.2 of the rated speed; above them the injection lacks voltage, below them the EMF is too
 //! small. Limits: those of the active method; a machine without saliency needs another low-speed method.
 
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::extended_emf::ExtendedEmfObserver;
 use crate::estimator::interval::Interval;
 use crate::estimator::square_wave::{SquareWave, SquareWaveInjection};
@@ -63,7 +64,8 @@ impl Hybrid {
         } else {
             Injection::None
         };
-        Estimate { theta, w, i: Axis::<Estimated>::at(theta).to_stator(i), injection }
+        let axis = Axis::<Estimated>::at(theta);
+        Estimate { theta, axis, w, i: axis.to_stator(i), injection }
     }
 }
 
@@ -89,13 +91,13 @@ impl Estimating for Hybrid {
         self.estimate(context, sample, i)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        let HybridParameters { w_low, w_high, .. } = context.par.hybrid;
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        let HybridParameters { w_low, w_high, .. } = par.estimators.hybrid;
         if w_low >= w_high {
-            let allowed = format!("above {}", context.tell(|p| &mut p.hybrid.w_low));
-            return Err(context.fault(|p| &mut p.hybrid.w_high, allowed));
+            let allowed = format!("above {}", PARAMETERS.tell(par, |p| &mut p.estimators.hybrid.w_low));
+            return Err(PARAMETERS.fault(par, |p| &mut p.estimators.hybrid.w_high, allowed));
         }
-        SquareWaveInjection::validate(context)
+        SquareWaveInjection::validate(par)
     }
 }
 

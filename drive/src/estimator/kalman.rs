@@ -240,7 +240,6 @@ pub const KALMAN: &Table<KalmanParameters> = &Table::new(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::current::CurrentLoop;
     use crate::estimator::EstimatorParameters;
     use crate::estimator::testing::{comes_to_the_rotor, salient, with_L_q};
     use crate::frame::{Dq, Rotor};
@@ -348,7 +347,7 @@ mod tests {
             x = rk4(x, T_s / 20.0, |x| {
                 let psi = Dq::new(x[0], x[1]);
                 let seen = Axis::<Rotor>::at(x[2]).from_stator(u);
-                let d = machine::flux_derivative(&motor, psi, seen, current(psi), w);
+                let d = seen - current(psi) * motor.R_s - psi.turned() * w;
                 Vector4::new(d.d(), d.q(), w, 0.0)
             });
         }
@@ -371,8 +370,7 @@ mod tests {
     #[test]
     fn the_covariance_stays_symmetric_and_positive() {
         let (motor, par) = (salient(), EstimatorParameters::default());
-        let context =
-            Context { par: &par, motor: &motor, current: &CurrentLoop::default(), J: 15e-3, T_s: T_S, delay: 1.0 };
+        let context = Context { par: &par, motor: &motor, J: 15e-3, T_s: T_S };
         // Standstill, noise, and inconsistent voltages: the worst case for a drive that has lost synchronism.
         for size in [0.0, 1e-2, 1.0] {
             let mut last = AlphaBeta::ZERO;

@@ -34,13 +34,11 @@ pub mod tracker;
 pub mod voltage_feedback;
 pub mod voltage_model;
 
-use crate::control::current::CurrentLoop;
-use crate::frame::{AlphaBeta, DqHat};
+use crate::control::tables::ControllerParameters;
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use crate::motor::Motor;
 use fmu_core::{Fault, enumeration};
 use serde::{Deserialize, Serialize};
-use std::fmt::Display;
-use tables::ESTIMATOR_PARAMETERS;
 pub use tables::EstimatorParameters;
 
 /// The controller's inputs to an estimator at sample k.
@@ -79,27 +77,10 @@ pub struct Context<'a> {
     pub par: &'a EstimatorParameters,
     /// Estimates of the machine.
     pub motor: &'a Motor,
-    /// Parameters of the current loop.
-    pub current: &'a CurrentLoop,
     /// Estimate of the inertia in kg.m2.
     pub J: f64,
     /// Sample period in s.
     pub T_s: f64,
-    /// Delay in samples from current sampling to the voltage output: the command of sample k acts in [k + delay, k +
-    /// delay + 1).
-    pub delay: f64,
-}
-
-impl Context<'_> {
-    /// Name, value and unit of one of the estimators' parameters, for messages.
-    pub fn tell<T>(&self, get: impl FnOnce(&mut EstimatorParameters) -> &mut T) -> String {
-        ESTIMATOR_PARAMETERS.tell(self.par, get)
-    }
-
-    /// The fault for an estimator parameter that is not what is `allowed`.
-    pub fn fault<T>(&self, get: impl FnOnce(&mut EstimatorParameters) -> &mut T, allowed: impl Display) -> Fault {
-        ESTIMATOR_PARAMETERS.fault(self.par, get, allowed)
-    }
 }
 
 /// A voltage to add to this sample's command, in V.
@@ -120,6 +101,8 @@ pub enum Injection {
 pub struct Estimate {
     /// Electrical rotor angle in rad, not wrapped.
     pub theta: f64,
+    /// The estimated d-axis at this angle.
+    pub axis: Axis<Estimated>,
     /// Electrical speed in rad/s.
     pub w: f64,
     /// Stator current to control in A: the measured current without the carrier.
@@ -132,7 +115,13 @@ impl Estimate {
     /// Angle (rad) and speed (rad/s) without injection: the drive controls the measured current.
     #[inline]
     pub fn new(theta: f64, w: f64, sample: &Sample) -> Self {
-        Self { theta, w, i: sample.i, injection: Injection::None }
+        Self::injecting(theta, w, sample.i, Injection::None)
+    }
+
+    /// Angle (rad) and speed (rad/s), the current `i` (A) to control and the voltage to add.
+    #[inline]
+    pub fn injecting(theta: f64, w: f64, i: AlphaBeta, injection: Injection) -> Self {
+        Self { theta, axis: Axis::at(theta), w, i, injection }
     }
 }
 
@@ -157,12 +146,12 @@ pub trait Estimating: Sized {
         let _ = (old, new);
     }
 
-    /// Checks that the parameters suit this estimator.
+    /// Checks that the controller's parameters suit this estimator.
     ///
     /// # Errors
     /// States which parameters are unsuitable, and why.
-    fn validate(context: &Context) -> Result<(), Fault> {
-        let _ = context;
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        let _ = par;
         Ok(())
     }
 }
@@ -215,14 +204,14 @@ macro_rules! estimators {
                 }
             }
 
-            /// Checks that the parameters suit this estimator.
+            /// Checks that the controller's parameters suit this estimator.
             ///
             /// # Errors
             /// As for [`Estimating::validate`], or the tracker cannot work.
-            pub fn validate(self, context: &Context) -> Result<(), Fault> {
-                tracker::validate(context)?;
+            pub fn validate(self, par: &ControllerParameters) -> Result<(), Fault> {
+                tracker::validate(par)?;
                 match self {
-                    $(Self::$name => <$state>::validate(context),)*
+                    $(Self::$name => <$state>::validate(par),)*
                 }
             }
         }

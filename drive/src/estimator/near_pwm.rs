@@ -12,7 +12,8 @@
 //! Limits: above about 0.2 of the rated speed, the injection takes voltage that the drive needs; the controlled current
 //! has one sample of delay.
 
-use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
+use crate::control::tables::ControllerParameters;
+use crate::estimator::saliency::{self, Admittance, CLIP, response};
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
@@ -24,7 +25,7 @@ use serde::{Deserialize, Serialize};
 /// The parameters with the prefix `near_pwm.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NearPwmParameters {
-    /// Voltage V, > 0.
+    /// Magnitude V of the injected voltage in V, > 0.
     pub voltage: f64,
 }
 
@@ -62,12 +63,9 @@ impl NearPwmInjection {
             1 => AlphaBeta::new(-0.5, HALF_SQRT_3),
             _ => AlphaBeta::new(-0.5, -HALF_SQRT_3),
         };
-        Estimate {
-            theta: self.tracker.theta,
-            w: self.tracker.w,
-            i: Axis::<Estimated>::at(self.tracker.theta).to_stator(i),
-            injection: Injection::Stator(direction * context.par.near_pwm.voltage),
-        }
+        let axis = Axis::<Estimated>::at(self.tracker.theta);
+        let injection = Injection::Stator(direction * context.par.near_pwm.voltage);
+        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: axis.to_stator(i), injection }
     }
 }
 
@@ -98,8 +96,8 @@ impl Estimating for NearPwmInjection {
         self.estimate(context, sample, free)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        validate_saliency(context.motor)
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        saliency::validate(par)
     }
 }
 

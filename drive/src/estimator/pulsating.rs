@@ -11,8 +11,9 @@
 //! (45) is low by a factor of 2. Limits: the filters add delay; e has zeros at 0, 90 and 180 deg, of which 90 deg is
 //! unstable.
 
+use crate::control::tables::ControllerParameters;
 use crate::estimator::carrier::{self, BandPass, Carrier, PeriodMean};
-use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
+use crate::estimator::saliency::{self, Admittance, CLIP, response};
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
@@ -55,7 +56,7 @@ pub struct PulsatingInjection {
 impl PulsatingInjection {
     fn estimate(&self, carrier: &Carrier, i: AlphaBeta) -> Estimate {
         let injection = Injection::Estimated(DqHat::new(carrier.cos, 0.0));
-        Estimate { theta: self.tracker.theta, w: self.tracker.w, i, injection }
+        Estimate::injecting(self.tracker.theta, self.tracker.w, i, injection)
     }
 }
 
@@ -93,9 +94,9 @@ impl Estimating for PulsatingInjection {
         self.estimate(&carrier, free)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        carrier::validate(context)?;
-        validate_saliency(context.motor)
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        carrier::validate(par)?;
+        saliency::validate(par)
     }
 }
 

@@ -20,8 +20,8 @@
 //! Limits: at w = 0 the angle is not observable (the slow pole is -w^2/c_1 below |w| = c_1/2). A resistance estimate
 //! above the true value diverges at standstill; one below it is safe.
 
-use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Sample};
-use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
+use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Injection, Sample};
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use crate::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND, RAD_PER_S};
 use fmu_core::{Row, Table};
@@ -75,25 +75,27 @@ impl Estimating for Rasmussen {
     #[inline]
     fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
         let Context { motor, T_s, par: EstimatorParameters { rasmussen: par, .. }, .. } = *context;
-        let half_way = Axis::<Estimated>::at(self.theta + 0.5 * T_s * self.w);
+        let turn = T_s * self.w;
+        self.theta += turn;
+        let axis = Axis::<Estimated>::at(self.theta);
+        let half_way = axis.ahead(Turn::new(-0.5 * turn));
         let resistive = (self.i + sample.i) * (0.5 * motor.R_s);
         self.psi_s += (sample.u - resistive + half_way.to_stator(self.v)) * T_s;
         self.i = sample.i;
-        self.theta += T_s * self.w;
 
-        let psi_r = self.psi_r(motor);
+        let psi_r = self.psi_r(motor, axis);
         let g_2 = par.w_n * par.w_n / motor.psi_M;
         let g_1 = par.g_1(motor);
         self.w_i += T_s * g_2 * psi_r.q();
         self.w = g_1 * psi_r.q() + self.w_i;
         self.v = DqHat::new(-par.c_1 * (psi_r.d() - motor.psi_M), -par.c_2 * psi_r.q());
-        Estimate::new(self.theta, self.w, sample)
+        Estimate { theta: self.theta, axis, w: self.w, i: sample.i, injection: Injection::None }
     }
 
     /// Keeps w^ = g_1 psi_rq^ + w_I constant when g_1 changes.
     fn retune(&mut self, old: &Context, new: &Context) {
         let g_1 = |context: &Context| context.par.rasmussen.g_1(context.motor);
-        self.w_i += (g_1(old) - g_1(new)) * self.psi_r(new.motor).q();
+        self.w_i += (g_1(old) - g_1(new)) * self.psi_r(new.motor, Axis::at(self.theta)).q();
     }
 }
 
@@ -106,10 +108,9 @@ impl RasmussenParameters {
 }
 
 impl Rasmussen {
-    /// Estimated permanent-magnet flux linkage in Wb at the last sample, in the estimated frame.
+    /// Estimated permanent-magnet flux linkage in Wb at the last sample, in the estimated frame on `axis`.
     #[inline]
-    fn psi_r(&self, motor: &Motor) -> DqHat {
-        let axis = Axis::<Estimated>::at(self.theta);
+    fn psi_r(&self, motor: &Motor, axis: Axis<Estimated>) -> DqHat {
         axis.from_stator(self.psi_s) - inductive(motor, axis.from_stator(self.i))
     }
 }
@@ -145,7 +146,6 @@ pub const RASMUSSEN: &Table<RasmussenParameters> = &Table::new(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::current::CurrentLoop;
     use crate::frame::Rotor;
     use crate::math::wrap;
 
@@ -158,14 +158,7 @@ mod tests {
     }
 
     fn context<'a>(par: &'a EstimatorParameters, motor: &'a Motor) -> Context<'a> {
-        const CURRENT: &CurrentLoop = &CurrentLoop {
-            bandwidth: 1571.0,
-            active_resistance: false,
-            integral: 0.0,
-            reference_feed_forward: false,
-            mtpa: false,
-        };
-        Context { par, motor, current: CURRENT, J: 1.5e-3, T_s: T_S, delay: 1.0 }
+        Context { par, motor, J: 1.5e-3, T_s: T_S }
     }
 
     /// Runs the observer next to a machine that turns at `w` (rad/s, electrical) with the current `i` in its rotor

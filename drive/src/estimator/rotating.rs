@@ -11,8 +11,9 @@
 //!
 //! Limits: the filters add delay; both axes carry carrier current.
 
+use crate::control::tables::ControllerParameters;
 use crate::estimator::carrier::{self, BandPass, Carrier, PeriodMean};
-use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
+use crate::estimator::saliency::{self, Admittance, CLIP, response};
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, Estimated, Stator};
@@ -33,7 +34,7 @@ pub struct RotatingInjection {
 impl RotatingInjection {
     fn estimate(&self, carrier: &Carrier, i: AlphaBeta) -> Estimate {
         let injection = Injection::Stator(AlphaBeta::new(carrier.cos, carrier.sin));
-        Estimate { theta: self.tracker.theta, w: self.tracker.w, i, injection }
+        Estimate::injecting(self.tracker.theta, self.tracker.w, i, injection)
     }
 }
 
@@ -63,9 +64,9 @@ impl Estimating for RotatingInjection {
         self.estimate(&carrier, free)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        carrier::validate(context)?;
-        validate_saliency(context.motor)
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        carrier::validate(par)?;
+        saliency::validate(par)
     }
 }
 

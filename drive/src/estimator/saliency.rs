@@ -8,6 +8,7 @@
 //!
 //! Kim & Sul 2011, eq (33) to (37), inverted: the paper gives the voltage as a function of the current. S and D in 1/H.
 
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::Sample;
 use crate::frame::{Axis, DqHat, Estimated};
 use crate::motor::Motor;
@@ -54,12 +55,14 @@ pub fn response(motor: &Motor, middle: Axis<Estimated>, sample: &Sample, T_s: f6
 ///
 /// # Errors
 /// The two inductances are too close to each other.
-pub fn validate_saliency(motor: &Motor) -> Result<(), Fault> {
-    let Motor { L_d, L_q, .. } = motor;
+pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+    let Motor { L_d, L_q, .. } = par.motor;
     if (L_q - L_d).abs() < MIN_SALIENCY * (L_q + L_d) {
         return Err(Fault::new(format!(
-            "motor.L_d = {L_d} H and motor.L_q = {L_q} H: an estimator by injection needs inductances that differ by \
-             more than {} % of their sum, since it finds the angle by their difference",
+            "{} and {}: an estimator by injection needs inductances that differ by more than {} % of their sum, since \
+             it finds the angle by their difference",
+            PARAMETERS.tell(par, |p| &mut p.motor.L_d),
+            PARAMETERS.tell(par, |p| &mut p.motor.L_q),
             100.0 * MIN_SALIENCY
         )));
     }

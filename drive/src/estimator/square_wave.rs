@@ -12,7 +12,8 @@
 //! Limits: above about 0.2 of the rated speed, the injection takes voltage that the drive needs; e has zeros at 0, 90
 //! and 180 deg, of which 90 deg is unstable.
 
-use crate::estimator::saliency::{Admittance, CLIP, response, validate_saliency};
+use crate::control::tables::{ControllerParameters, PARAMETERS};
+use crate::estimator::saliency::{self, Admittance, CLIP, response};
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
 use crate::frame::{Axis, DqHat, Estimated};
@@ -23,7 +24,7 @@ use serde::{Deserialize, Serialize};
 /// The parameters with the prefix `square_wave.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SquareWaveParameters {
-    /// Voltage V, > 0.
+    /// Amplitude V of the injected voltage in V, > 0.
     pub voltage: f64,
     /// Samples per period: 2 or 4.
     pub samples: i32,
@@ -92,12 +93,9 @@ pub struct SquareWaveInjection {
 
 impl SquareWaveInjection {
     fn estimate(&self, context: &Context, sample: &Sample, i: DqHat) -> Estimate {
-        Estimate {
-            theta: self.tracker.theta,
-            w: self.tracker.w,
-            i: Axis::<Estimated>::at(self.tracker.theta).to_stator(i),
-            injection: Injection::Estimated(DqHat::new(context.par.square_wave.command(sample.k), 0.0)),
-        }
+        let axis = Axis::<Estimated>::at(self.tracker.theta);
+        let injection = Injection::Estimated(DqHat::new(context.par.square_wave.command(sample.k), 0.0));
+        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: axis.to_stator(i), injection }
     }
 }
 
@@ -117,12 +115,12 @@ impl Estimating for SquareWaveInjection {
         self.estimate(context, sample, i)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        let samples = context.par.square_wave.samples;
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        let samples = par.estimators.square_wave.samples;
         if samples != 2 && samples != 4 {
-            return Err(context.fault(|p| &mut p.square_wave.samples, "2 or 4"));
+            return Err(PARAMETERS.fault(par, |p| &mut p.estimators.square_wave.samples, "2 or 4"));
         }
-        validate_saliency(context.motor)
+        saliency::validate(par)
     }
 }
 

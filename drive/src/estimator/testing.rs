@@ -1,6 +1,5 @@
 //! Runs an estimator next to a machine at constant speed, for the estimators' unit tests: no control, no noise.
 
-use crate::control::current::CurrentLoop;
 use crate::estimator::{Context, Estimating, EstimatorParameters, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, Dq, Estimated, Rotor};
 use crate::math::wrap;
@@ -24,7 +23,7 @@ pub(crate) fn beside<E: Estimating>(
     n: u32,
 ) -> (f64, f64) {
     let (motor, T_s) = (salient(), 1e-4);
-    let context = Context { par, motor: hat, current: &CurrentLoop::default(), J: 15e-3, T_s, delay: 1.0 };
+    let context = Context { par, motor: hat, J: 15e-3, T_s };
     let at = |theta: f64, v: Dq| -> AlphaBeta { Axis::<Rotor>::at(theta).to_stator(v) };
     let tau_ref = motor.torque(i.d(), i.q());
     let mut theta = 0.3;
@@ -81,7 +80,7 @@ pub(crate) fn injected<E: Estimating>(
     const PARTS: u32 = 20;
     let (hat, T_s) = (salient(), 1e-4);
     let lead = [0.5, 1.5, 2.5][delay];
-    let context = Context { par, motor: &hat, current: &CurrentLoop::default(), J: 15e-3, T_s, delay: lead - 0.5 };
+    let context = Context { par, motor: &hat, J: 15e-3, T_s };
     let rotor = |theta: f64| Axis::<Rotor>::at(theta);
     let (mut theta, mut psi, mut i_last) = (0.3_f64, Dq::ZERO, AlphaBeta::ZERO);
     let first = Sample { k: 0, ..Sample::default() };

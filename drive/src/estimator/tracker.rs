@@ -8,6 +8,7 @@
 //! and, if J is correct, every change of its own torque, so its speed does not lag. Limits: after a filter or observer
 //! of bandwidth w_o, rho <= w_o / 3; below 2 pi 15 rad/s, a 50 % load step loses synchronism.
 
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::{Context, Estimate, Sample};
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Fault, Field, Row, Table, enumeration};
@@ -87,14 +88,13 @@ impl Tracker {
 ///
 /// # Errors
 /// The mechanical observer has no inertia value.
-pub fn validate(context: &Context) -> Result<(), Fault> {
-    if context.par.tracker.kind == TrackerKind::MechanicalObserver
-        && context.J.partial_cmp(&0.0) != Some(Ordering::Greater)
-    {
+pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+    let observes_load = par.estimators.tracker.kind == TrackerKind::MechanicalObserver;
+    if observes_load && par.J.partial_cmp(&0.0) != Some(Ordering::Greater) {
         return Err(Fault::new(format!(
-            "mechanics.J = {} kg.m2 and {}: that observer divides torque by inertia, which must be above 0",
-            context.J,
-            context.tell(|p| &mut p.tracker.kind)
+            "{} and {}: that observer divides torque by inertia, which must be above 0",
+            PARAMETERS.tell(par, |p| &mut p.J),
+            PARAMETERS.tell(par, |p| &mut p.estimators.tracker.kind)
         )));
     }
     Ok(())
@@ -133,7 +133,6 @@ pub const TRACKER: &Table<TrackerParameters> = &Table::new(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::current::CurrentLoop;
     use crate::estimator::EstimatorParameters;
     use crate::motor::Motor;
 
@@ -144,8 +143,7 @@ mod tests {
             ..EstimatorParameters::default()
         };
         let motor = Motor::default();
-        let current = CurrentLoop::default();
-        let context = Context { par: &par, motor: &motor, current: &current, J: 1.5e-3, T_s: 1e-4, delay: 1.0 };
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
         let mut tracker = Tracker::at(0.3, 0.0, context.T_s);
         let (mut theta, mut w) = (0.0, 50.0);
         for _ in 0..n {

@@ -10,6 +10,7 @@
 //! Limits: L p i is neglected. The method holds rated load from 0.02 of the rated speed with the frame term; as
 //! printed, it fails at 0.1 with rho = 2 pi 15 rad/s. A reversal at light load is ambiguous by half a turn.
 
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::emf::{self, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
@@ -49,37 +50,16 @@ impl Estimating for VoltageFeedback {
         self.tracker.follow(context, e, sample)
     }
 
-    fn validate(context: &Context) -> Result<(), Fault> {
-        let current = context.current;
-        if !current.reference_feed_forward || current.active_resistance {
-            return Err(Fault::new(
-                "estimator = VoltageFeedback reads the angle error from the voltage of the current controller's \
-                 integrators: it needs current.reference_feed_forward = true, which leaves them nothing else, and \
-                 current.active_resistance = false",
-            ));
+    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+        if !par.current.reference_feed_forward || par.current.active_resistance {
+            return Err(Fault::new(format!(
+                "{} and {}: {} reads the angle error from the output of the current controller's integrators; set the \
+                 first to true and the second to false, so that nothing else appears there",
+                PARAMETERS.tell(par, |p| &mut p.current.reference_feed_forward),
+                PARAMETERS.tell(par, |p| &mut p.current.active_resistance),
+                PARAMETERS.tell(par, |p| &mut p.estimator)
+            )));
         }
-        emf::validate(context)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::Pair;
-    use crate::estimator::Kind;
-
-    #[test]
-    fn asks_for_its_current_loop() {
-        let mut pair = Pair::default();
-        let par = &mut pair.controller.model.parameters;
-        par.estimator = Kind::VoltageFeedback;
-        (par.current.reference_feed_forward, par.current.integral) = (true, 0.2);
-        pair.start().unwrap();
-        pair.controller.model.parameters.current.reference_feed_forward = false;
-        let fault = pair.start().unwrap_err();
-        assert!(fault.message().contains("current.reference_feed_forward"), "{fault}");
-        let mut pair = Pair::default();
-        pair.controller.model.parameters.estimator = Kind::ExtendedEmf;
-        pair.controller.model.parameters.estimators.tracker.bandwidth = 400.0;
-        assert!(pair.start().unwrap_err().message().contains("tracker.bandwidth = 400 rad/s"));
+        emf::validate(par)
     }
 }

@@ -8,7 +8,7 @@
 //! stay zero. The energy of the remaining current, 0.75 L i_zone^2, is lost at once. i_zone is `inverter.i_zero`, or
 //! larger if the machine would leave that zone faster than the shortest substep resolves.
 //!
-//! Derived here from the ideal diode bridge; `drive/tests/gates_off.rs` compares it with such a bridge in stator axes.
+//! Derived here from the ideal diode bridge; `drive-study/tests/gates_off.rs` compares it with such a bridge in stator axes.
 //! u in V, i in A.
 
 use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
@@ -34,7 +34,7 @@ impl Legs {
     /// For switching legs.
     #[inline]
     pub fn switching(inverter: &Inverter, u_dc: f64) -> Self {
-        let share = inverter.dead_time / inverter.T_pwm;
+        let share = if inverter.dead_time > 0.0 { inverter.dead_time / inverter.T_pwm } else { 0.0 };
         Self { share, u: share * u_dc, i_zone: inverter.i_zero }
     }
 
@@ -50,14 +50,16 @@ impl Legs {
         self.i_zone * motor.L_d.min(motor.L_q) / self.u
     }
 
-    /// Voltage (V) lost at the stator with the current `i` (A) in the rotor frame on `axis`.
+    /// Whether the legs drop a voltage.
     #[inline]
-    pub fn loss(&self, axis: Axis<Rotor>, i: Dq) -> AlphaBeta {
-        if self.u > 0.0 {
-            dead_time_loss(self.u, self.i_zone, Phases::from_stator(axis.to_stator(i)))
-        } else {
-            AlphaBeta::ZERO
-        }
+    pub fn drop(&self) -> bool {
+        self.u > 0.0
+    }
+
+    /// Voltage (V) lost at the stator with the current `i` (A).
+    #[inline(never)]
+    pub fn loss(&self, i: AlphaBeta) -> AlphaBeta {
+        dead_time_loss(self.u, self.i_zone, Phases::from_stator(i))
     }
 
     /// Current (A) that legs with the currents `i` (A) feed into the DC link through this voltage drop.

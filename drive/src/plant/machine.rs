@@ -4,7 +4,7 @@
 //! i_q, tau_e = 1.5 n_p (psi_d i_q - psi_q i_d); [`saturation`](crate::plant::saturation) adds to the current. The flux
 //! linkages are the state, so the equations remain valid when the inductances saturate.
 
-use crate::frame::Dq;
+use crate::frame::{AlphaBeta, Dq};
 use crate::motor::Motor;
 use crate::plant::saturation::Saturation;
 
@@ -17,13 +17,7 @@ pub fn flux(motor: &Motor, i: Dq) -> Dq {
 /// Current (A) for the flux linkage `psi` (Wb).
 #[inline]
 pub fn current(motor: &Motor, saturation: &Saturation, psi: Dq) -> Dq {
-    Dq::new((psi.d() - motor.psi_M) / motor.L_d, psi.q() / motor.L_q) + saturation.current(motor, psi)
-}
-
-/// Derivative of the flux linkage (V) at the voltage `u` (V), the current `i` (A) and the electrical speed `w` (rad/s).
-#[inline]
-pub fn flux_derivative(motor: &Motor, psi: Dq, u: Dq, i: Dq, w: f64) -> Dq {
-    u - i * motor.R_s - psi.turned() * w
+    Machine::new(motor, saturation).current(psi)
 }
 
 /// Magnetic energy in J at the flux linkage `psi` (Wb), excluding that of the magnet: 0 without current.
@@ -33,23 +27,68 @@ pub fn magnetic_energy(motor: &Motor, saturation: &Saturation, psi: Dq) -> f64 {
     0.75 * (x * x / motor.L_d + q * q / motor.L_q) + saturation.energy(motor, psi)
 }
 
-/// Electromagnetic torque in N.m.
-#[inline]
-pub fn torque(motor: &Motor, psi: Dq, i: Dq) -> f64 {
-    1.5 * f64::from(motor.n_p) * psi.cross(i)
+/// The machine with constants for many evaluations.
+#[derive(Clone, Copy, Debug)]
+pub struct Machine<'a> {
+    motor: &'a Motor,
+    /// `None` for a linear machine.
+    saturation: Option<&'a Saturation>,
+    psi_M: f64,
+    R_s: f64,
+    by_L_d: f64,
+    by_L_q: f64,
+    /// 1.5 n_p.
+    torque: f64,
+}
+
+impl<'a> Machine<'a> {
+    /// From the parameters.
+    #[inline]
+    pub fn new(motor: &'a Motor, saturation: &'a Saturation) -> Self {
+        let Motor { n_p, R_s, L_d, L_q, psi_M } = *motor;
+        let saturation = (!saturation.is_none()).then_some(saturation);
+        Self { motor, saturation, psi_M, R_s, by_L_d: 1.0 / L_d, by_L_q: 1.0 / L_q, torque: 1.5 * f64::from(n_p) }
+    }
+
+    /// Current (A) for the flux linkage `psi` (Wb).
+    #[inline]
+    pub fn current(&self, psi: Dq) -> Dq {
+        let linear = Dq::new((psi.d() - self.psi_M) * self.by_L_d, psi.q() * self.by_L_q);
+        self.saturation.map_or(linear, |saturation| linear + saturation.current(self.motor, psi))
+    }
+
+    /// Derivative of the flux linkage (V) in stator axes at the voltage `u` (V) and the current `i` (A).
+    #[inline]
+    pub fn flux_derivative(&self, u: AlphaBeta, i: AlphaBeta) -> AlphaBeta {
+        u - i * self.R_s
+    }
+
+    /// Copper loss in W at the current `i` (A).
+    #[inline]
+    pub fn copper_loss(&self, i: AlphaBeta) -> f64 {
+        1.5 * self.R_s * i.dot(i)
+    }
+
+    /// Electromagnetic torque in N.m at the flux linkage `psi` (Wb) and the current `i` (A).
+    #[inline]
+    pub fn torque(&self, psi: Dq, i: Dq) -> f64 {
+        self.torque * psi.cross(i)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::{Axis, Rotor};
 
     #[test]
     fn torque_of_magnet_and_reluctance() {
         let motor = Motor { L_q: 9e-3, ..Motor::default() };
         let i = Dq::new(-2.0, 4.0);
         let expected = 1.5 * 3.0 * (0.15 * 4.0 + (6e-3 - 9e-3) * -2.0 * 4.0);
-        assert!((torque(&motor, flux(&motor, i), i) - expected).abs() < 1e-14);
-        assert_eq!(current(&motor, &Saturation::default(), flux(&motor, i)).q().to_bits(), 4.0_f64.to_bits());
+        let (linear, psi) = (Saturation::default(), flux(&motor, i));
+        assert!((Machine::new(&motor, &linear).torque(psi, i) - expected).abs() < 1e-14);
+        assert!((current(&motor, &linear, psi).q() - 4.0).abs() < 1e-14);
     }
 
     #[test]
@@ -58,7 +97,10 @@ mod tests {
         let motor = Motor { L_q: 9e-3, ..Motor::default() };
         let (i, w) = (Dq::new(-1.0, 3.0), 200.0);
         let u = Dq::new(-2.0 - w * 9e-3 * 3.0, 2.0 * 3.0 + w * (-6e-3 + 0.15));
-        let rest = flux_derivative(&motor, flux(&motor, i), u, i, w);
+        let (linear, axis, psi) = (Saturation::default(), Axis::<Rotor>::at(0.4), flux(&motor, i));
+        // In stator axes, the flux linkage turns with the rotor.
+        let machine = Machine::new(&motor, &linear);
+        let rest = machine.flux_derivative(axis.to_stator(u), axis.to_stator(i)) - axis.to_stator(psi.turned() * w);
         assert!(rest.magnitude() < 1e-13, "{rest:?}");
     }
 }

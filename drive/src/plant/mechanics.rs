@@ -8,7 +8,7 @@
 //! Rasmussen 2006 gives the torque but not the load; the friction is that of the assumed machine. J in kg.m2, B in
 //! N.m.s/rad, torques in N.m, speeds in rad/s (mechanical).
 
-use crate::math::tanh;
+use crate::math::{tanh, tanh_beside};
 use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, SPEED};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
@@ -46,11 +46,69 @@ impl Mechanics {
     pub fn tau_shaft(&self, tau_e: f64, tau_load: f64, friction: f64) -> f64 {
         if self.imposed { tau_e - friction } else { tau_load }
     }
+}
 
-    /// Acceleration in rad/s2 from electromagnetic, shaft and friction torque (N.m); zero with an imposed speed.
+/// The shaft with constants for many evaluations at almost the same speed.
+#[derive(Clone, Copy, Debug)]
+pub struct Shaft<'a> {
+    mechanics: &'a Mechanics,
+    B: f64,
+    /// 1/J in 1/(kg.m2).
+    by_J: f64,
+    /// Load torque in N.m.
+    tau_load: f64,
+    /// Speed in rad/s, and the share of the Coulomb torque at it, tanh(speed / w_coulomb).
+    speed: f64,
+    share: f64,
+    /// The sign of the speed, and the speed in rad/s above which the share is +-1.
+    sign: f64,
+    full: f64,
+    /// The whole Coulomb torque against the speed, in N.m.
+    tau_full: f64,
+}
+
+/// The motion of the shaft at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion {
+    /// Acceleration in rad/s2; 0 with an imposed speed.
+    pub acceleration: f64,
+    /// Power to the load in W.
+    pub p_shaft: f64,
+    /// Friction loss in W.
+    pub p_friction: f64,
+}
+
+impl<'a> Shaft<'a> {
+    /// With the load `tau_load` (N.m) at speeds close to `speed` (rad/s).
     #[inline]
-    pub fn acceleration(&self, tau_e: f64, tau_shaft: f64, friction: f64) -> f64 {
-        if self.imposed { 0.0 } else { (tau_e - tau_shaft - friction) / self.J }
+    pub fn new(mechanics: &'a Mechanics, tau_load: f64, speed: f64) -> Self {
+        let sign = 1.0_f64.copysign(speed);
+        // From here on, the nearest number to tanh is +-1.
+        let full = 20.0 * mechanics.w_coulomb;
+        let share = if speed.abs() > full { sign } else { tanh(speed / mechanics.w_coulomb) };
+        let (B, by_J, tau_full) = (mechanics.B, 1.0 / mechanics.J, sign * mechanics.tau_coulomb);
+        Self { mechanics, B, by_J, tau_load, speed, share, sign, full, tau_full }
+    }
+
+    /// The motion at `speed` (rad/s) and the torque `tau_e` (N.m).
+    #[inline]
+    pub fn motion(&self, speed: f64, tau_e: f64) -> Motion {
+        let coulomb = if speed * self.sign > self.full { self.tau_full } else { self.coulomb(speed) };
+        let friction = self.B * speed + coulomb;
+        let p_friction = friction * speed;
+        if self.mechanics.imposed {
+            return Motion { acceleration: 0.0, p_shaft: (tau_e - friction) * speed, p_friction };
+        }
+        let acceleration = (tau_e - self.tau_load - friction) * self.by_J;
+        Motion { acceleration, p_shaft: self.tau_load * speed, p_friction }
+    }
+
+    /// Coulomb torque (N.m) at a `speed` (rad/s) near standstill.
+    #[inline(never)]
+    fn coulomb(&self, speed: f64) -> f64 {
+        let Mechanics { tau_coulomb, w_coulomb, .. } = *self.mechanics;
+        let d = (speed - self.speed) / w_coulomb;
+        tau_coulomb * if d.abs() <= 0.5 { tanh_beside(self.share, d) } else { tanh(speed / w_coulomb) }
     }
 }
 
@@ -84,6 +142,22 @@ mod tests {
         let m = Mechanics::default();
         assert!((m.friction(10.0) - (2e-3 + 0.03)).abs() < 1e-9);
         assert_eq!(m.friction(-0.2).to_bits(), (-m.friction(0.2)).to_bits());
-        assert!((m.acceleration(1.0, 0.4, m.friction(0.0)) - 400.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_shaft_near_a_speed_moves_as_its_equation_says() {
+        let m = Mechanics::default();
+        for start in [-50.0, -6.01, -0.2, 0.0, 1e-3, 0.4, 5.9, 30.0] {
+            let shaft = Shaft::new(&m, 0.4, start);
+            for speed in [start, start + 0.1, start - 0.14, start + 3.0, -start, start * 2.0] {
+                let Motion { acceleration, p_shaft, p_friction } = shaft.motion(speed, 1.0);
+                let friction = m.friction(speed);
+                assert!((acceleration - (1.0 - 0.4 - friction) / m.J).abs() < 1e-12, "{start} {speed}");
+                assert!((p_shaft - 0.4 * speed).abs() < 1e-15 && (p_friction - friction * speed).abs() < 1e-14);
+            }
+        }
+        let imposed = Mechanics { imposed: true, ..m };
+        let Motion { acceleration, p_shaft, .. } = Shaft::new(&imposed, 0.4, 2.0).motion(2.0, 1.0);
+        assert!(acceleration == 0.0 && (p_shaft - 2.0 * (1.0 - imposed.friction(2.0))).abs() < 1e-15);
     }
 }

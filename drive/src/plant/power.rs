@@ -24,6 +24,7 @@
 //! tested.
 
 use crate::frame::Phases;
+use crate::math::all_finite;
 use crate::plant::legs::Legs;
 use crate::plant::signals::PlantInputs;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
@@ -48,9 +49,10 @@ impl Powers {
     #[inline]
     pub fn mean(energy: &Energy, h: f64, inputs: &PlantInputs, legs: &Legs, i: impl FnOnce() -> Phases) -> Self {
         // -0 W, the product of no current and a negative voltage, is 0 W.
-        let p_in = energy.r#in / h + 0.0;
+        let rate = 1.0 / h;
+        let p_in = energy.r#in * rate + 0.0;
         let i_dc = if inputs.u_dc > 0.0 { p_in / inputs.u_dc } else { link_current(inputs, legs, i()) };
-        Self { i_dc, p_in, p_mech: energy.mech / h, p_loss: energy.loss / h }
+        Self { i_dc, p_in, p_mech: energy.mech * rate, p_loss: energy.loss * rate }
     }
 
     /// The mean of this value and `last`, which has the weight `share` (0..1).
@@ -97,7 +99,7 @@ impl Energy {
 
     /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
-        self.r#in.is_finite() && self.mech.is_finite() && self.loss.is_finite()
+        all_finite([self.r#in, self.mech, self.loss])
     }
 }
 

@@ -38,6 +38,12 @@ pub struct Saturation {
 }
 
 impl Saturation {
+    /// Whether the machine is linear.
+    #[inline]
+    pub fn is_none(&self) -> bool {
+        self.s_2 == 0.0 && self.s_3 == 0.0 && self.s_dq == 0.0
+    }
+
     /// The current (A) beyond the linear machine's at the flux linkage `psi` (Wb).
     #[inline]
     pub fn current(&self, motor: &Motor, psi: Dq) -> Dq {

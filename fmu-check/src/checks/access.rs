@@ -3,7 +3,7 @@
 use super::values::{booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, tunable};
 use crate::check::{Check, Level, Levels, Run};
 use crate::encoding::{bits, same, show};
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::Buffer;
 use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability, parse_number};
@@ -47,7 +47,7 @@ fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
     }
 }
 
-fn start_values(session: &Session) -> Result<(), Blocked> {
+fn start_values(session: &Session) -> Result<(), NotDetermined> {
     let v2 = session.description.version == FmiVersion::V2;
     let instance = if v2 { session.initializing()? } else { session.fresh()? };
     let mut compared = 0;
@@ -69,7 +69,7 @@ fn start_values(session: &Session) -> Result<(), Blocked> {
     }
     let fits = |v: &&ModelVariable| v.base == BaseType::String && !v.is_array() && v.start.is_some();
     for v in session.description.variables.iter().filter(fits) {
-        session.calling(&format!("GetString({})", v.name));
+        session.record_call(&format!("GetString({})", v.name));
         let Some((status, found)) = session.raw.get_strings(instance.handle, &[v.value_reference], 1) else { continue };
         compared += 1;
         let good = status.is_ok() && found.first().is_some_and(|f| f.as_deref() == v.start.as_deref());
@@ -81,7 +81,7 @@ fn start_values(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn ranges(session: &Session) -> Result<(), Blocked> {
+fn ranges(session: &Session) -> Result<(), NotDetermined> {
     let discrete = |v: &&ModelVariable| {
         matches!(v.causality, Causality::Output | Causality::Local)
             && !v.base.is_float()
@@ -117,7 +117,7 @@ fn plain_types(version: FmiVersion) -> Vec<BaseType> {
     if version == FmiVersion::V2 { v2.to_vec() } else { all() }
 }
 
-fn zero_variables(session: &Session) -> Result<(), Blocked> {
+fn zero_variables(session: &Session) -> Result<(), NotDetermined> {
     for base in plain_types(session.description.version) {
         session.case(|| {
             let instance = session.stepping()?;
@@ -138,7 +138,7 @@ fn zero_variables(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn null_arrays(session: &Session) -> Result<(), Blocked> {
+fn null_arrays(session: &Session) -> Result<(), NotDetermined> {
     for (references, values) in [(false, true), (true, false)] {
         for set in [false, true] {
             session.case(|| {
@@ -173,7 +173,7 @@ fn null_arrays(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn wrong_counts(session: &Session) -> Result<(), Blocked> {
+fn wrong_counts(session: &Session) -> Result<(), NotDetermined> {
     for (n, set) in [(0, false), (2, false), (0, true), (2, true)] {
         session.case(|| {
             let instance = session.stepping()?;
@@ -206,11 +206,11 @@ fn wrong_counts(session: &Session) -> Result<(), Blocked> {
 /// A reference that no variable has.
 fn free_reference(session: &Session) -> u32 {
     let used: Vec<u32> = session.description.variables.iter().map(|v| v.value_reference).collect();
-    // Elements of arrays may count as references inside; so far behind all of them.
+    // An FMU may number the elements of its arrays internally: choose a reference far beyond all of them.
     (0..1_000_000).map(|k| 0x0fff_fff0_u32 - k).find(|r| !used.contains(r)).unwrap_or(u32::MAX)
 }
 
-fn unknown_reference(session: &Session) -> Result<(), Blocked> {
+fn unknown_reference(session: &Session) -> Result<(), NotDetermined> {
     for reference in [free_reference(session), u32::MAX] {
         if session.description.variables.iter().any(|v| v.value_reference == reference) {
             continue;
@@ -225,7 +225,13 @@ fn unknown_reference(session: &Session) -> Result<(), Blocked> {
 }
 
 /// A getter or setter that must return Error.
-fn must_be_refused(session: &Session, base: BaseType, reference: u32, set: bool, what: &str) -> Result<(), Blocked> {
+fn must_be_refused(
+    session: &Session,
+    base: BaseType,
+    reference: u32,
+    set: bool,
+    what: &str,
+) -> Result<(), NotDetermined> {
     let instance = session.stepping()?;
     let mut buffer = Buffer::of(base, session.description.version, &[bits(base, 0.0)]);
     let call = format!("{}({base}, reference={reference})", if set { "Set" } else { "Get" });
@@ -241,10 +247,10 @@ fn must_be_refused(session: &Session, base: BaseType, reference: u32, set: bool,
     Ok(())
 }
 
-fn wrong_type(session: &Session) -> Result<(), Blocked> {
+fn wrong_type(session: &Session) -> Result<(), NotDetermined> {
     let carries = |base| fmu_import::raw::type_name(base, session.description.version);
     for base in plain_types(session.description.version) {
-        // FMI 2.0 numbers each type for itself, so the reference must be none of this type.
+        // In FMI 2.0 each type has its own value references, so the reference must not exist for this type.
         let taken = |r: u32| {
             session.description.variables.iter().any(|v| v.value_reference == r && carries(v.base) == carries(base))
         };
@@ -263,7 +269,7 @@ fn wrong_type(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn constants(session: &Session) -> Result<(), Blocked> {
+fn constants(session: &Session) -> Result<(), NotDetermined> {
     let constant = |v: &&ModelVariable| v.variability == Variability::Constant && !v.is_array();
     let Some(v) = session.numeric().find(constant) else { return session.not_applicable("there are no constants") };
     let instance = session.fresh()?;
@@ -273,7 +279,7 @@ fn constants(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn not_settable(session: &Session) -> Result<(), Blocked> {
+fn not_settable(session: &Session) -> Result<(), NotDetermined> {
     let fits = |v: &&ModelVariable| {
         !v.is_array()
             && v.clocks.is_empty()
@@ -310,7 +316,7 @@ fn not_settable(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn all_or_nothing(session: &Session) -> Result<(), Blocked> {
+fn all_or_nothing(session: &Session) -> Result<(), NotDetermined> {
     let inputs = session.float_inputs();
     let Some(v) = inputs.iter().find(|v| !v.is_array() && v.base == BaseType::Float64) else {
         return session.not_applicable("there is no scalar Float64 input");
@@ -324,7 +330,7 @@ fn all_or_nothing(session: &Session) -> Result<(), Blocked> {
         raw.set(instance.handle, v.base, Some(&list), 2, Some(&mut buffer), 2)
     })?;
     if status.is_ok() {
-        return Err(Blocked("the FMU does not refuse a reference that does not exist".into()));
+        return Err(NotDetermined("the FMU does not refuse a reference that does not exist".into()));
     }
     let (status, after) = instance.get(v)?;
     session.require(!status.is_ok() || before == after, || {

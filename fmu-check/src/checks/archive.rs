@@ -131,7 +131,7 @@ fn headers(fmu: &FmuFile) -> Verdict {
                 entry.name(),
                 String::from_utf8_lossy(&l.name)
             )),
-            // With a data descriptor the local header may be silent about sizes.
+            // With a data descriptor the local header may omit the sizes.
             Some(l) => {
                 let sizes = l.flags & 8 != 0 || (l.crc, l.packed, l.size) == (c.crc, c.packed, c.size);
                 if !sizes || l.method != c.method || l.flags != c.flags {

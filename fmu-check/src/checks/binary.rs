@@ -2,7 +2,7 @@
 
 use crate::check::{Check, Level, Levels, Run, Verdict};
 use crate::fmu_file::{Binary, FmuFile};
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use fmu_import::elf::{FLOOR, NEEDED, dynamic, is_system, newest_glibc, strings};
 use fmu_import::raw::{Simple, Text};
 use model_description::FmiVersion;
@@ -49,7 +49,7 @@ pub(super) fn functions(version: FmiVersion) -> Vec<&'static str> {
 }
 
 /// The libraries named after a modelIdentifier; other libraries in their folders are helpers.
-fn carriers(fmu: &FmuFile) -> Vec<&Binary> {
+fn libraries(fmu: &FmuFile) -> Vec<&Binary> {
     let description = fmu.description.as_ref().ok();
     let names: Vec<&str> = description.map_or_else(Vec::new, |d| {
         let identifiers = [&d.model_exchange, &d.scheduled_execution].into_iter().filter_map(|i| i.as_deref());
@@ -59,14 +59,14 @@ fn carriers(fmu: &FmuFile) -> Vec<&Binary> {
     fmu.binaries.iter().filter(|b| base(b).is_some_and(|base| names.contains(&base.as_str()))).collect()
 }
 
-/// Findings about each carrier that can be read.
+/// Findings about each of these libraries.
 fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>) -> Verdict {
-    let carriers = carriers(fmu);
-    if carriers.is_empty() {
+    let libraries = libraries(fmu);
+    if libraries.is_empty() {
         return Verdict::NotApplicable("no shared library is named after modelIdentifier".into());
     }
     let mut findings = Vec::new();
-    for binary in carriers {
+    for binary in libraries {
         match object::File::parse(&*binary.bytes) {
             Ok(file) => findings.extend(rule(binary, &file).into_iter().map(|f| format!("{}: {f}", binary.name))),
             Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
@@ -75,10 +75,10 @@ fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>)
     Verdict::of(findings)
 }
 
-/// Findings about each carrier that is a 64-bit ELF file.
+/// Findings about each of these libraries that is a 64-bit ELF file.
 fn elf(fmu: &FmuFile, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<String>, object::Error>) -> Verdict {
     let (mut findings, mut found_elf) = (Vec::new(), false);
-    for binary in carriers(fmu) {
+    for binary in libraries(fmu) {
         let Ok(file) = ElfFile64::parse(&*binary.bytes) else { continue };
         found_elf = true;
         match rule(binary, &file) {
@@ -95,7 +95,7 @@ fn elf(fmu: &FmuFile, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<Strin
 
 fn format(fmu: &FmuFile) -> Verdict {
     let mut findings = Vec::new();
-    for binary in carriers(fmu) {
+    for binary in libraries(fmu) {
         let expected = match binary.folder.as_str() {
             "linux64" => Some((BinaryFormat::Elf, Architecture::X86_64)),
             "win64" => Some((BinaryFormat::Pe, Architecture::X86_64)),
@@ -136,7 +136,7 @@ fn format(fmu: &FmuFile) -> Verdict {
     Verdict::of(findings)
 }
 
-/// Names of exported symbols; macOS puts an underscore before.
+/// Names of exported symbols; macOS prefixes an underscore.
 fn exported(file: &object::File<'_>) -> Vec<String> {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let mut names: Vec<String> = match file.format() {
@@ -284,17 +284,17 @@ fn processor(fmu: &FmuFile) -> Verdict {
 }
 
 /// The session has loaded it already.
-fn loads(_: &Session) -> Result<(), Blocked> {
+fn loads(_: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-fn versions(session: &Session) -> Result<(), Blocked> {
+fn versions(session: &Session) -> Result<(), NotDetermined> {
     let mut texts = vec![(Text::GetVersion, session.description.version.to_string())];
     if session.description.version == FmiVersion::V2 {
         texts.push((Text::GetTypesPlatform, "default".into()));
     }
     for (name, expected) in texts {
-        session.calling(&session.raw.name(name.as_str()));
+        session.record_call(&session.raw.name(name.as_str()));
         let version = session.raw.text(name);
         session.require(version.as_ref() == Some(&expected), || {
             format!("{} returned {version:?}, expected {expected:?}", session.raw.name(name.as_str()))
@@ -304,7 +304,7 @@ fn versions(session: &Session) -> Result<(), Blocked> {
 }
 
 /// Initialization, 20 steps, termination.
-fn complete_run(session: &Session) -> Result<(), Blocked> {
+fn complete_run(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.stepping()?;
     for k in 0..20 {
         instance.change_inputs(k)?;

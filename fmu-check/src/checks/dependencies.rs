@@ -1,9 +1,9 @@
 //! Dependencies proved by perturbation (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8).
 
-use crate::session::{Blocked, Session, settable};
+use crate::session::{NotDetermined, Session, settable};
 
 /// Changes every known that is not a dependency of an initial unknown and requires that the unknown stays the same.
-pub(super) fn dependencies_hold(session: &Session) -> Result<(), Blocked> {
+pub(super) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> {
     let unknowns: Vec<_> = session
         .description
         .initial_unknowns

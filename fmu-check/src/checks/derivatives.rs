@@ -1,10 +1,10 @@
 //! Derivatives of outputs with respect to time (FMI 2.0.5, 4.2.1; FMI 3.0.2, 4.2.1.1).
 
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use model_description::{BaseType, Causality, Variability};
 
-pub(super) fn output_derivatives(session: &Session) -> Result<(), Blocked> {
+pub(super) fn output_derivatives(session: &Session) -> Result<(), NotDetermined> {
     let order = session
         .description
         .co_simulation
@@ -26,13 +26,13 @@ pub(super) fn output_derivatives(session: &Session) -> Result<(), Blocked> {
     if outputs.is_empty() {
         return session.not_applicable("there is no continuous output of type Float64");
     }
-    let missing = || Blocked("the function GetOutputDerivatives is missing".into());
+    let missing = || NotDetermined("the function GetOutputDerivatives is missing".into());
     for wrong in [0, order + 1, -1] {
         session.case(|| {
             let instance = session.stepping()?;
             instance.steps(1, session.h())?;
             let name = format!("GetOutputDerivatives({}, order {wrong})", outputs[0].name);
-            session.calling(&name);
+            session.record_call(&name);
             let (status, _) =
                 session.raw.output_derivatives(instance.handle, &references[..1], wrong).ok_or_else(missing)?;
             session.require(status == Status::ERROR, || format!("{name} returned {status}"));
@@ -43,11 +43,11 @@ pub(super) fn output_derivatives(session: &Session) -> Result<(), Blocked> {
         let (instance, h) = (session.stepping()?, session.h());
         instance.change_inputs(1)?;
         instance.steps(3, h)?;
-        let read = || -> Result<Vec<f64>, Blocked> {
+        let read = || -> Result<Vec<f64>, NotDetermined> {
             let rows = instance.snapshot(&outputs)?;
             Ok(rows.iter().map(|bits| bits.first().map_or(f64::NAN, |b| f64::from_bits(*b))).collect())
         };
-        session.calling("GetOutputDerivatives(order 1)");
+        session.record_call("GetOutputDerivatives(order 1)");
         let (status, slopes) = session.raw.output_derivatives(instance.handle, &references, 1).ok_or_else(missing)?;
         session.require(status.is_ok(), || format!("GetOutputDerivatives of order 1 returned {status}"));
         if !status.is_ok() {

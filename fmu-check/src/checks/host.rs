@@ -1,7 +1,7 @@
 //! Side effects on the importer's process that an FMU must not have: threads, processor, files.
 
 use crate::check::{Check, Levels, Run};
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use crate::trajectory::difference;
 use fmu_import::raw::{Raw, Simple, float_control};
 use std::ffi::OsString;
@@ -17,14 +17,14 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "Z09", requirement: "The FMU runs from a folder whose path has blanks, '%', '#', non-ASCII letters and more than 200 characters, and that contains only its binaries and resources.", clause: "2.0.5, 2.1.5 and 2.3; 3.0.2, 2.3.1 and 2.5", levels: Levels::SHOULD, run: Run::Probe(unusual_path) },
 ];
 
-/// Bytes of stack of a thread that a modest importer makes.
+/// Stack in bytes of the smallest thread that an importer may run the FMU in.
 const STACK: usize = 256 << 10;
 
-fn failed(e: &std::io::Error) -> Blocked {
-    Blocked(e.to_string())
+fn failed(e: &std::io::Error) -> NotDetermined {
+    NotDetermined(e.to_string())
 }
 
-/// Copies a folder with all that is in it.
+/// Copies a folder with its contents.
 fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
@@ -41,20 +41,20 @@ fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// A copy of the binary below the working directory, which is thrown away; so that it is loaded once more.
-fn second_binary(session: &Session, folder: &str) -> Result<PathBuf, Blocked> {
+/// A copy of the binary below the working directory, which is temporary; under the new path it is loaded again.
+fn second_binary(session: &Session, folder: &str) -> Result<PathBuf, NotDetermined> {
     let folder_of_run = std::env::current_dir().map_err(|e| failed(&e))?.join(folder);
     copy(session.binary.parent().unwrap_or(&folder_of_run), &folder_of_run).map_err(|e| failed(&e))?;
     Ok(folder_of_run.join(session.binary.file_name().unwrap_or_default()))
 }
 
-fn small_stack(session: &Session) -> Result<(), Blocked> {
+fn small_stack(session: &Session) -> Result<(), NotDetermined> {
     let binary = second_binary(session, "small")?;
     let mut duplicate = session.duplicate(60)?;
-    session.calling(&format!("loading and running in a thread with {STACK} bytes of stack"));
+    session.record_call(&format!("loading and running in a thread with {STACK} bytes of stack"));
     let version = session.description.version;
     let work = move || {
-        duplicate.raw = Raw::open(&binary, version).map_err(Blocked)?;
+        duplicate.raw = Raw::open(&binary, version).map_err(NotDetermined)?;
         let instance = duplicate.stepping()?;
         for k in 0..5 {
             instance.change_inputs(k)?;
@@ -67,16 +67,16 @@ fn small_stack(session: &Session) -> Result<(), Blocked> {
     let thread = std::thread::Builder::new().stack_size(STACK).spawn(work).map_err(|e| failed(&e))?;
     match thread.join() {
         Ok(Ok(())) => {}
-        Ok(Err(Blocked(why))) => session.violated(why),
+        Ok(Err(NotDetermined(why))) => session.violated(why),
         Err(_) => session.violated("the thread panicked"),
     }
     Ok(())
 }
 
 /// Name of a call and the call.
-type Call<'a> = (&'a str, &'a dyn Fn() -> Result<(), Blocked>);
+type Call<'a> = (&'a str, &'a dyn Fn() -> Result<(), NotDetermined>);
 
-fn floating_point(session: &Session) -> Result<(), Blocked> {
+fn floating_point(session: &Session) -> Result<(), NotDetermined> {
     let Some(before) = float_control() else {
         return session.not_applicable("the control registers of this processor are not supported");
     };
@@ -88,8 +88,9 @@ fn floating_point(session: &Session) -> Result<(), Blocked> {
         current == before
     };
     let binary = second_binary(session, "floating")?;
-    session.calling("loading the binary once more");
-    let duplicate = session.duplicate_with(Raw::open(&binary, session.description.version).map_err(Blocked)?, 61)?;
+    session.record_call("loading the binary once more");
+    let duplicate =
+        session.duplicate_with(Raw::open(&binary, session.description.version).map_err(NotDetermined)?, 61)?;
     // One finding is enough: afterwards everything differs.
     if !check_control("loading") {
         return Ok(());
@@ -143,7 +144,7 @@ impl Surroundings {
     fn current(fmu_folder: &Path) -> Self {
         let count = |folder: &str| fs::read_dir(folder).map_or(0, Iterator::count);
         let links = fs::read_dir("/proc/self/fd").into_iter().flatten().flatten();
-        // The folder that is being read is one of them, under a name that changes.
+        // Reading the folder opens it, under a name that changes.
         let mut files: Vec<_> =
             links.filter_map(|e| fs::read_link(e.path()).ok()).filter(|p| !p.ends_with("fd")).collect();
         files.sort();
@@ -191,14 +192,14 @@ impl Surroundings {
     }
 }
 
-fn surroundings(session: &Session) -> Result<(), Blocked> {
+fn surroundings(session: &Session) -> Result<(), NotDetermined> {
     let binary = second_binary(session, "guest")?;
     let fmu_folder = session.binary.ancestors().nth(3).unwrap_or(&session.binary).to_owned();
     let before = Surroundings::current(&fmu_folder);
-    session.calling("loading, a complete run, unloading");
+    session.record_call("loading, a complete run, unloading");
     {
         let duplicate =
-            session.duplicate_with(Raw::open(&binary, session.description.version).map_err(Blocked)?, 62)?;
+            session.duplicate_with(Raw::open(&binary, session.description.version).map_err(NotDetermined)?, 62)?;
         let instance = duplicate.stepping()?;
         for k in 0..20 {
             instance.change_inputs(k)?;
@@ -209,7 +210,7 @@ fn surroundings(session: &Session) -> Result<(), Blocked> {
         instance.free()?;
     }
     let mut found = before.differences(&Surroundings::current(&fmu_folder));
-    // A thread that was told to end may still be on its way, for long on a busy machine.
+    // A thread may take a while to end, especially on a busy machine.
     for _ in 0..200 {
         if found.is_empty() {
             break;
@@ -223,7 +224,7 @@ fn surroundings(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn unusual_path(session: &Session) -> Result<(), Blocked> {
+fn unusual_path(session: &Session) -> Result<(), NotDetermined> {
     let run = |session: &Session| {
         let instance = session.stepping()?;
         instance.run(10, session.h())
@@ -232,7 +233,7 @@ fn unusual_path(session: &Session) -> Result<(), Blocked> {
     let folder_of_run = std::env::current_dir().map_err(|e| failed(&e))?;
     let folder_of_run =
         folder_of_run.join(format!("an FMU %41 #1 \u{e4}\u{4e2d} {}", "x".repeat(120))).join("y".repeat(120));
-    let platform = session.binary.parent().ok_or_else(|| Blocked("the binary has no folder".into()))?;
+    let platform = session.binary.parent().ok_or_else(|| NotDetermined("the binary has no folder".into()))?;
     let binaries = folder_of_run.join("binaries").join(platform.file_name().unwrap_or_default());
     copy(platform, &binaries).map_err(|e| failed(&e))?;
     let resources = session.resources();
@@ -240,7 +241,7 @@ fn unusual_path(session: &Session) -> Result<(), Blocked> {
         copy(&resources, &folder_of_run.join("resources")).map_err(|e| failed(&e))?;
     }
     let binary = binaries.join(session.binary.file_name().unwrap_or_default());
-    session.calling(&format!("a run in {}", folder_of_run.display()));
+    session.record_call(&format!("a run in {}", folder_of_run.display()));
     let raw = match Raw::open(&binary, session.description.version) {
         Ok(raw) => raw,
         Err(why) => {
@@ -251,7 +252,7 @@ fn unusual_path(session: &Session) -> Result<(), Blocked> {
     let mut duplicate = session.duplicate_with(raw, 63)?;
     duplicate.move_to(&folder_of_run);
     match run(&duplicate) {
-        Err(Blocked(why)) => session.violated(format!("in {}: {why}", folder_of_run.display())),
+        Err(NotDetermined(why)) => session.violated(format!("in {}: {why}", folder_of_run.display())),
         Ok(rows) => {
             if let Some((step, i)) = difference(&plain, &rows) {
                 session.violated(format!("{} differs after {} steps", session.watched()[i].name, step + 1));

@@ -2,7 +2,7 @@
 
 use crate::check::{Check, Levels, Run};
 use crate::instance::Instance;
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use crate::trajectory::{difference, trajectory};
 use fmu_import::raw::Raw;
 
@@ -24,12 +24,12 @@ fn only_once(session: &Session) -> bool {
 
 const ONLY_ONCE: &str = "canBeInstantiatedOnlyOncePerProcess is true";
 
-fn interleaved(session: &Session) -> Result<(), Blocked> {
+fn interleaved(session: &Session) -> Result<(), NotDetermined> {
     if only_once(session) {
         return session.not_applicable(ONLY_ONCE);
     }
     let alone = trajectory(&session.stepping()?, 20)?;
-    // That they can be made at all is what is asked here.
+    // Creating them is part of the requirement.
     let mut all = Vec::new();
     for k in 0..8 {
         let Some(instance) = session.instantiate(&session.arguments(&format!("probe {k}")))? else {
@@ -57,18 +57,20 @@ fn interleaved(session: &Session) -> Result<(), Blocked> {
 }
 
 /// Only one thread may write the files of a session, so each thread gets its own loaded binary and a duplicate without journal.
-fn threads(session: &Session) -> Result<(), Blocked> {
+fn threads(session: &Session) -> Result<(), NotDetermined> {
     if only_once(session) {
         return session.not_applicable(ONLY_ONCE);
     }
     let alone = trajectory(&session.stepping()?, 40)?;
-    session.calling("4 threads, each with an instance, 40 steps");
+    session.record_call("4 threads, each with an instance, 40 steps");
     let results: Vec<Result<Vec<Vec<Vec<u64>>>, String>> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..4)
             .map(|k| {
                 let duplicate = session.duplicate(k);
                 scope.spawn(move || {
-                    duplicate.and_then(|duplicate| trajectory(&duplicate.stepping()?, 40)).map_err(|Blocked(why)| why)
+                    duplicate
+                        .and_then(|duplicate| trajectory(&duplicate.stepping()?, 40))
+                        .map_err(|NotDetermined(why)| why)
                 })
             })
             .collect();
@@ -91,10 +93,10 @@ fn threads(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn moving_between_threads(session: &Session) -> Result<(), Blocked> {
+fn moving_between_threads(session: &Session) -> Result<(), NotDetermined> {
     let handle = session.stepping()?.handle;
     let (start, h, raw) = (session.start(), session.h(), &session.raw);
-    session.calling("DoStep in another thread");
+    session.record_call("DoStep in another thread");
     let stepped = std::thread::scope(|scope| {
         scope.spawn(move || raw.do_step(handle, start, h, false, [true; 4]).map(|(s, _)| s)).join()
     });
@@ -102,27 +104,27 @@ fn moving_between_threads(session: &Session) -> Result<(), Blocked> {
     session.require(status.is_some_and(fmu_import::Status::is_ok), || {
         format!("DoStep in another thread returned {status:?}")
     });
-    session.calling("FreeInstance in a third thread");
+    session.record_call("FreeInstance in a third thread");
     let _ = std::thread::scope(|scope| scope.spawn(move || raw.free(handle)).join());
     Ok(())
 }
 
 #[cfg(not(unix))]
-fn copies(session: &Session) -> Result<(), Blocked> {
+fn copies(session: &Session) -> Result<(), NotDetermined> {
     session.not_applicable("libraries do not share symbols on this system")
 }
 
 #[cfg(unix)]
-fn copies(session: &Session) -> Result<(), Blocked> {
+fn copies(session: &Session) -> Result<(), NotDetermined> {
     if only_once(session) {
         return session.not_applicable(ONLY_ONCE);
     }
     let alone = trajectory(&session.stepping()?, 20)?;
-    let folder = session.binary.parent().ok_or_else(|| Blocked("the binary has no folder".into()))?;
-    let failed = |e: std::io::Error| Blocked(e.to_string());
+    let folder = session.binary.parent().ok_or_else(|| NotDetermined("the binary has no folder".into()))?;
+    let failed = |e: std::io::Error| NotDetermined(e.to_string());
     let mut duplicates = Vec::new();
     for k in 0..2 {
-        // Below the working directory of the probe, which is thrown away.
+        // Below the working directory of the probe, which is temporary.
         let target = std::env::current_dir().map_err(failed)?.join(format!("copy {k} %23 \u{e4}"));
         std::fs::create_dir_all(&target).map_err(failed)?;
         for file in std::fs::read_dir(folder).map_err(failed)?.flatten() {
@@ -131,8 +133,8 @@ fn copies(session: &Session) -> Result<(), Blocked> {
             }
         }
         let binary = target.join(session.binary.file_name().unwrap_or_default());
-        session.calling("dlopen(RTLD_NOW | RTLD_GLOBAL)");
-        let raw = Raw::open_global(&binary, session.description.version).map_err(Blocked)?;
+        session.record_call("dlopen(RTLD_NOW | RTLD_GLOBAL)");
+        let raw = Raw::open_global(&binary, session.description.version).map_err(NotDetermined)?;
         duplicates.push(session.duplicate_with(raw, 10 + k)?);
     }
     let instances: Vec<Instance<'_>> = duplicates.iter().map(Session::stepping).collect::<Result<_, _>>()?;
@@ -162,15 +164,15 @@ fn resident() -> Option<u64> {
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
 }
 
-fn leaks(session: &Session) -> Result<(), Blocked> {
+fn leaks(session: &Session) -> Result<(), NotDetermined> {
     if resident().is_none() {
-        return Err(Blocked("this system does not report the memory of a process".into()));
+        return Err(NotDetermined("this system does not report the memory of a process".into()));
     }
     let cycle = |n: usize| {
-        session.many(&format!("{n} instances: created, stepped and freed"), || {
+        session.record_calls(&format!("{n} instances: created, stepped and freed"), || {
             for _ in 0..n {
                 let Some(instance) = session.instantiate(&session.arguments("probe"))? else {
-                    return Err(Blocked("no instance".into()));
+                    return Err(NotDetermined("no instance".into()));
                 };
                 instance.enter()?;
                 instance.exit()?;
@@ -194,28 +196,28 @@ fn leaks(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn reloads(session: &Session) -> Result<(), Blocked> {
+fn reloads(session: &Session) -> Result<(), NotDetermined> {
     let name = session.binary.file_name().unwrap_or_default();
-    // Another path, so that what the bench has loaded does not keep it.
-    let working_directory = std::env::current_dir().map_err(|e| Blocked(e.to_string()))?;
+    // Another path, so that the session's own copy does not keep it loaded.
+    let working_directory = std::env::current_dir().map_err(|e| NotDetermined(e.to_string()))?;
     let target = working_directory.join("reloaded");
     let folder = session.binary.parent().unwrap_or(&working_directory);
-    std::fs::create_dir_all(&target).map_err(|e| Blocked(e.to_string()))?;
+    std::fs::create_dir_all(&target).map_err(|e| NotDetermined(e.to_string()))?;
     for file in std::fs::read_dir(folder).into_iter().flatten().flatten().filter(|f| f.path().is_file()) {
-        std::fs::copy(file.path(), target.join(file.file_name())).map_err(|e| Blocked(e.to_string()))?;
+        std::fs::copy(file.path(), target.join(file.file_name())).map_err(|e| NotDetermined(e.to_string()))?;
     }
     let binary = target.join(name);
     for k in 0..20 {
-        session.calling(&format!("loading the binary, round {}", k + 1));
-        let raw = Raw::open(&binary, session.description.version).map_err(Blocked)?;
+        session.record_call(&format!("loading the binary, round {}", k + 1));
+        let raw = Raw::open(&binary, session.description.version).map_err(NotDetermined)?;
         let duplicate = session.duplicate_with(raw, 20 + k)?;
         {
             let instance = duplicate.stepping()?;
             instance.steps(3, session.h())?;
             instance.free()?;
         }
-        session.calling(&format!("unloading the binary, round {}", k + 1));
-        duplicate.raw.close().map_err(Blocked)?;
+        session.record_call(&format!("unloading the binary, round {}", k + 1));
+        duplicate.raw.close().map_err(NotDetermined)?;
         if session.half_time_used() {
             break;
         }

@@ -6,7 +6,7 @@ use super::lifecycle_states::in_state;
 use super::state_table::{allowed, configuration, null_instance, refused, unsupported};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use crate::trajectory::difference;
 use fmu_import::raw::{Handle, Interface, Simple};
 use model_description::{Causality, FmiVersion};
@@ -36,7 +36,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "L12", requirement: "A step beyond the stop time returns Error.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Probe(past_stop_time) },
 ];
 
-fn minimal_run(session: &Session) -> Result<(), Blocked> {
+fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.stepping()?;
     instance.steps(10, session.h())?;
     let _ = instance.snapshot(&session.watched())?;
@@ -45,7 +45,7 @@ fn minimal_run(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn token(session: &Session) -> Result<(), Blocked> {
+fn token(session: &Session) -> Result<(), NotDetermined> {
     let mut arguments = session.arguments("probe");
     arguments.token = CString::new("{00000000-wrong-token}").ok();
     let created = session.instantiate(&arguments)?;
@@ -54,7 +54,7 @@ fn token(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn null_arguments(session: &Session) -> Result<(), Blocked> {
+fn null_arguments(session: &Session) -> Result<(), NotDetermined> {
     let empty = Some(CString::default());
     let cases =
         [("instanceName = NULL", None, true), ("instanceName = \"\"", empty, true), ("token = NULL", None, false)];
@@ -76,7 +76,7 @@ fn null_arguments(session: &Session) -> Result<(), Blocked> {
 }
 
 /// Instantiates with the arguments, initializes, makes two steps and an invalid one.
-fn short_run(session: &Session, arguments: &fmu_import::raw::Arguments, what: &str) -> Result<(), Blocked> {
+fn short_run(session: &Session, arguments: &fmu_import::raw::Arguments, what: &str) -> Result<(), NotDetermined> {
     let Some(instance) = session.instantiate(arguments)? else {
         session.violated(format!("{} with {what} returned NULL", session.instantiation()));
         return Ok(());
@@ -90,7 +90,7 @@ fn short_run(session: &Session, arguments: &fmu_import::raw::Arguments, what: &s
     instance.free()
 }
 
-fn without_logger(session: &Session) -> Result<(), Blocked> {
+fn without_logger(session: &Session) -> Result<(), NotDetermined> {
     let v2 = session.description.version == FmiVersion::V2;
     session.case(|| {
         let mut arguments = session.arguments("probe");
@@ -101,7 +101,7 @@ fn without_logger(session: &Session) -> Result<(), Blocked> {
         session.case(|| {
             let mut arguments = session.arguments("probe");
             (arguments.callbacks, arguments.logging) = (false, true);
-            // NULL is not allowed here, so NULL is a good answer.
+            // The standard does not allow NULL here, so the FMU may return NULL.
             if let Some(instance) = session.instantiate(&arguments)? {
                 instance.free()?;
             }
@@ -111,7 +111,7 @@ fn without_logger(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn without_resources(session: &Session) -> Result<(), Blocked> {
+fn without_resources(session: &Session) -> Result<(), NotDetermined> {
     if session.has_resources() {
         return session.not_applicable("the archive has resources");
     }
@@ -127,7 +127,7 @@ fn without_resources(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn callbacks(session: &Session) -> Result<(), Blocked> {
+fn callbacks(session: &Session) -> Result<(), NotDetermined> {
     let mut arguments = session.arguments("probe");
     (arguments.lasting, arguments.logging) = (false, true);
     short_run(session, &arguments, "valid arguments")?;
@@ -136,7 +136,7 @@ fn callbacks(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn interfaces(session: &Session) -> Result<(), Blocked> {
+fn interfaces(session: &Session) -> Result<(), NotDetermined> {
     let v3 = session.description.version == FmiVersion::V3;
     let mut cases = Vec::new();
     if session.description.model_exchange.is_none() {
@@ -160,16 +160,16 @@ fn interfaces(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn free(session: &Session) -> Result<(), Blocked> {
+fn free(session: &Session) -> Result<(), NotDetermined> {
     session.case(|| {
-        session.calling(&format!("{}(NULL)", session.raw.name("FreeInstance")));
-        session.raw.free(Handle::NULL).ok_or_else(|| Blocked("FreeInstance is missing".into()))
+        session.record_call(&format!("{}(NULL)", session.raw.name("FreeInstance")));
+        session.raw.free(Handle::NULL).ok_or_else(|| NotDetermined("FreeInstance is missing".into()))
     });
     for state in [Instantiated, Initialization, Step, Terminated, Error] {
         session.case(|| match in_state(session, state) {
             Ok(instance) => instance.free(),
-            // Some FMUs return no Error; that is told elsewhere.
-            Err(Blocked(why)) => {
+            // Some FMUs return no Error; another check reports that.
+            Err(NotDetermined(why)) => {
                 session.note(format!("{state:?}: {why}"));
                 Ok(())
             }
@@ -178,7 +178,7 @@ fn free(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn reset(session: &Session) -> Result<(), Blocked> {
+fn reset(session: &Session) -> Result<(), NotDetermined> {
     let run = |instance: &Instance<'_>| {
         instance.enter()?;
         instance.exit()?;
@@ -189,7 +189,7 @@ fn reset(session: &Session) -> Result<(), Blocked> {
     for state in [Instantiated, Initialization, Step, Terminated, Error] {
         session.case(|| {
             let Ok(instance) = in_state(session, state) else { return Ok(()) };
-            // What was set must be forgotten.
+            // Reset must discard what was set.
             if matches!(state, Step) {
                 instance.change_inputs(1)?;
                 instance.steps(3, session.h())?;
@@ -231,7 +231,7 @@ fn reset(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn after_error(session: &Session) -> Result<(), Blocked> {
+fn after_error(session: &Session) -> Result<(), NotDetermined> {
     let instance = in_state(session, Step)?;
     let how = instance.provoke()?;
     let status = instance.step_at(instance.time.get(), session.h())?;
@@ -239,7 +239,7 @@ fn after_error(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn recovery(session: &Session) -> Result<(), Blocked> {
+fn recovery(session: &Session) -> Result<(), NotDetermined> {
     let instance = in_state(session, Step)?;
     let how = instance.provoke()?;
     let status = instance.simple(Simple::Reset)?;
@@ -248,7 +248,7 @@ fn recovery(session: &Session) -> Result<(), Blocked> {
         return Ok(());
     }
     instance.experiment(session.start(), None);
-    if let Err(Blocked(why)) =
+    if let Err(NotDetermined(why)) =
         instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(5, session.h()))
     {
         session.violated(format!("after {how} had returned Error and Reset had succeeded: {why}"));
@@ -256,13 +256,13 @@ fn recovery(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn terminated(session: &Session) -> Result<(), Blocked> {
+fn terminated(session: &Session) -> Result<(), NotDetermined> {
     let instance = in_state(session, Step)?;
     let watched = session.watched();
     let before = instance.snapshot(&watched)?;
     let status = instance.simple(Simple::Terminate)?;
     if !status.is_ok() {
-        return Err(Blocked(format!("Terminate returned {status}")));
+        return Err(NotDetermined(format!("Terminate returned {status}")));
     }
     for (v, old) in watched.iter().zip(before) {
         let (status, now) = instance.get(v)?;
@@ -272,14 +272,14 @@ fn terminated(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn past_stop_time(session: &Session) -> Result<(), Blocked> {
+fn past_stop_time(session: &Session) -> Result<(), NotDetermined> {
     let (h, start) = (session.h(), session.start());
     let instance = session.fresh()?;
     instance.experiment(start, Some(start + 4.0 * h));
     instance.enter()?;
     instance.exit()?;
     instance.steps(3, h)?;
-    // The last step may be a hair late, by rounding.
+    // Rounding may make the last step end slightly late.
     let t = instance.time.get();
     let last = instance.step_at(t, start + 4.0 * h - t)?;
     session.require(last.is_ok(), || format!("the step that ends at the stop time returned {last}"));

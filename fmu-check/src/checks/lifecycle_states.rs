@@ -1,7 +1,7 @@
 //! Brings an instance to a state of the life cycle.
 
 use crate::instance::Instance;
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use State::{Error, Initialization, Instantiated, Step, Terminated};
 use fmu_import::Status;
 use fmu_import::raw::Simple;
@@ -17,7 +17,7 @@ pub(super) enum State {
 }
 
 /// An instance in a state.
-pub(super) fn in_state(session: &Session, state: State) -> Result<Instance<'_>, Blocked> {
+pub(super) fn in_state(session: &Session, state: State) -> Result<Instance<'_>, NotDetermined> {
     match state {
         Instantiated => session.fresh(),
         Initialization => session.initializing(),
@@ -29,7 +29,7 @@ pub(super) fn in_state(session: &Session, state: State) -> Result<Instance<'_>, 
         Terminated => {
             let instance = in_state(session, Step)?;
             let status = instance.simple(Simple::Terminate)?;
-            if status.is_ok() { Ok(instance) } else { Err(Blocked(format!("Terminate returned {status}"))) }
+            if status.is_ok() { Ok(instance) } else { Err(NotDetermined(format!("Terminate returned {status}"))) }
         }
         Error => {
             let instance = in_state(session, Step)?;
@@ -41,7 +41,7 @@ pub(super) fn in_state(session: &Session, state: State) -> Result<Instance<'_>, 
 
 impl Instance<'_> {
     /// Makes the FMU return Error with one of two wrong calls; returns the call that succeeded in doing so.
-    pub(super) fn provoke(&self) -> Result<String, Blocked> {
+    pub(super) fn provoke(&self) -> Result<String, NotDetermined> {
         let (t, h) = (self.time.get(), self.session.h());
         if self.step_at(t, -h)? == Status::ERROR {
             return Ok(format!("DoStep(h={})", -h));
@@ -49,6 +49,6 @@ impl Instance<'_> {
         if self.simple(Simple::ExitInitializationMode)? == Status::ERROR {
             return Ok("ExitInitializationMode in step mode".into());
         }
-        Err(Blocked("neither a negative step nor a call in the wrong state returned Error".into()))
+        Err(NotDetermined("neither a negative step nor a call in the wrong state returned Error".into()))
     }
 }

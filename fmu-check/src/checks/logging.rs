@@ -1,7 +1,7 @@
 //! Logging and memory (FMI 2.0.5, 2.1.5; FMI 3.0.2, 2.3.1).
 
 use crate::check::{Check, Level, Levels, Run};
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::{Event, allocations, take_events};
 use model_description::FmiVersion;
@@ -22,18 +22,18 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 /// The log of a run with an error, and the environment and name of its instance.
-fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<Event>, usize, String), Blocked> {
+fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<Event>, usize, String), NotDetermined> {
     let _ = take_events();
     let mut arguments = session.arguments("a probe's name");
     arguments.logging = logging;
     let environment = arguments.environment;
-    let instance = session.instantiate(&arguments)?.ok_or_else(|| Blocked("no instance".into()))?;
+    let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
     // The FMU keeps its own copy of the name.
     drop(arguments);
     instance.enter()?;
     instance.exit()?;
     instance.steps(5, session.h())?;
-    if let Err(Blocked(why)) = instance.provoke() {
+    if let Err(NotDetermined(why)) = instance.provoke() {
         session.note(why);
     }
     instance.free()?;
@@ -45,7 +45,7 @@ fn show(event: &Event) -> String {
     format!("{} [{category}] {:?}", Status(event.status), event.text.as_deref().unwrap_or("(none, or not UTF-8)"))
 }
 
-fn categories(session: &Session) -> Result<(), Blocked> {
+fn categories(session: &Session) -> Result<(), NotDetermined> {
     let known: Vec<&str> = session.description.log_categories.iter().map(|c| c.name.as_str()).collect();
     let (events, ..) = log_of_a_run(session, true)?;
     for event in &events {
@@ -56,7 +56,7 @@ fn categories(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn switch(session: &Session) -> Result<(), Blocked> {
+fn switch(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.fresh()?;
     for on in [true, false] {
         let status = instance
@@ -72,7 +72,7 @@ fn switch(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn unknown(session: &Session) -> Result<(), Blocked> {
+fn unknown(session: &Session) -> Result<(), NotDetermined> {
     for (what, name) in [("no such category", CString::new("no such category").ok()), ("NULL", None)] {
         session.case(|| {
             let instance = session.fresh()?;
@@ -86,11 +86,11 @@ fn unknown(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn errors(session: &Session) -> Result<(), Blocked> {
+fn errors(session: &Session) -> Result<(), NotDetermined> {
     let _ = take_events();
     let mut arguments = session.arguments("probe");
     arguments.logging = true;
-    let instance = session.instantiate(&arguments)?.ok_or_else(|| Blocked("no instance".into()))?;
+    let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
     instance.enter()?;
     instance.exit()?;
     instance.steps(2, session.h())?;
@@ -104,7 +104,7 @@ fn errors(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn texts(session: &Session) -> Result<(), Blocked> {
+fn texts(session: &Session) -> Result<(), NotDetermined> {
     let (events, ..) = log_of_a_run(session, true)?;
     for event in &events {
         let good = event.text.as_deref().is_some_and(|t| !t.trim().is_empty() && !t.ends_with(['\n', '\r']));
@@ -114,7 +114,7 @@ fn texts(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn identity(session: &Session) -> Result<(), Blocked> {
+fn identity(session: &Session) -> Result<(), NotDetermined> {
     let (events, environment, name) = log_of_a_run(session, true)?;
     for event in &events {
         session.require(event.environment == environment, || format!("{} has another environment", show(event)));
@@ -126,12 +126,12 @@ fn identity(session: &Session) -> Result<(), Blocked> {
         }
     }
     if events.is_empty() {
-        return Err(Blocked("the FMU logged no message".into()));
+        return Err(NotDetermined("the FMU logged no message".into()));
     }
     Ok(())
 }
 
-fn silence(session: &Session) -> Result<(), Blocked> {
+fn silence(session: &Session) -> Result<(), NotDetermined> {
     let (events, ..) = log_of_a_run(session, false)?;
     for event in events.iter().filter(|e| e.status < Status::ERROR.0) {
         session.violated(format!("with loggingOn = false: {}", show(event)));
@@ -139,7 +139,7 @@ fn silence(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn memory(session: &Session) -> Result<(), Blocked> {
+fn memory(session: &Session) -> Result<(), NotDetermined> {
     if !session.flag("canNotUseMemoryManagementFunctions") {
         return session.not_applicable("canNotUseMemoryManagementFunctions is false");
     }

@@ -42,5 +42,5 @@ pub const GROUPS: &[Group] = &[
     Group { name: "state", title: "FMU state", checks: state::CHECKS },
     Group { name: "logging", title: "Logging", checks: logging::CHECKS },
     Group { name: "instances", title: "Instances, threads, loading", checks: instances::CHECKS },
-    Group { name: "host", title: "A guest in the importer's process", checks: host::CHECKS },
+    Group { name: "host", title: "Side effects on the importer's process", checks: host::CHECKS },
 ];

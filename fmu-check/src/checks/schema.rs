@@ -12,7 +12,7 @@ pub(super) fn deviations(root: &Element, version: FmiVersion) -> Vec<String> {
     along(root, "fmiModelDescription", rules)
 }
 
-/// The same for terminalsAndIcons.xml, which both standards have alike.
+/// The same for terminalsAndIcons.xml, which is the same in both standards.
 pub(super) fn deviations_of_terminals(root: &Element) -> Vec<String> {
     along(root, "fmiTerminalsAndIcons", TERMINALS)
 }
@@ -68,7 +68,7 @@ fn attributes(element: &Element, rule: &Rule, findings: &mut Vec<String>) {
         }
     }
     for (name, _) in &element.attributes {
-        // Names with a prefix are of other standards.
+        // Names with a prefix belong to other standards.
         let known = name.contains(':') || name == "xmlns" || all.iter().any(|w| w.split(':').next() == Some(name));
         if !known {
             findings.push(format!("{at} has an attribute {name} that the standard does not know"));
@@ -108,7 +108,7 @@ fn say(form: &str) -> &'static str {
     }
 }
 
-/// Unknown children, missing ones, more than one of one, and children in another order than the standard's.
+/// Children that are unknown, missing, repeated, or not in the order of the standard.
 fn children(element: &Element, rule: &Rule, findings: &mut Vec<String>) {
     let free = rule.children.starts_with('~');
     let places: Vec<&str> = rule.children.trim_start_matches('~').split_whitespace().collect();
@@ -140,7 +140,7 @@ fn children(element: &Element, rule: &Rule, findings: &mut Vec<String>) {
         if count == 0 && (place.ends_with('!') || name.contains('|')) {
             findings.push(format!("{} has no <{}>", at(element), name.replace('|', "> or <")));
         }
-        // Two of one kind: an interface of each kind is fine in FMI 2.0.
+        // Two of the same kind; FMI 2.0 allows one interface of each kind.
         if count > 1 && place.ends_with('?') {
             findings.push(format!("{} has {count} <{name}>", at(element)));
         }

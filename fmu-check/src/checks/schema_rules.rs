@@ -1,6 +1,6 @@
 //! What the standards allow in modelDescription.xml and terminalsAndIcons.xml: elements, attributes, and the order of children.
 //!
-//! One line an element: its path from the root, its attributes with their forms (`!` required), its children in order.
+//! One line per element: its path from the root, its attributes with their forms (`!` required), its children in order.
 //! Forms: `s` text, `b` boolean, `i` integer, `u` unsigned integer, `d` number, `t` date and time, `l` list of unsigned
 //! integers, `w` words, `c` color, `*` anything.
 //! `~` before the children: their order is free. Facts of FMI 2.0.5, 2.2 and FMI 3.0.2, 2.4 in our own words.

@@ -3,7 +3,7 @@
 use super::lifecycle_states::{State, in_state};
 use crate::check::{Check, Levels, Run};
 use crate::instance::Instance;
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use crate::trajectory::difference;
 use fmu_import::Status;
 use fmu_import::raw::SavedState;
@@ -30,7 +30,7 @@ fn can(session: &Session, flag: fn(&CoSimulation) -> bool) -> bool {
     session.description.co_simulation.as_ref().is_some_and(flag)
 }
 
-/// Ends a probe of states where there are none.
+/// Ends a probe if the FMU does not have the capability.
 macro_rules! needs {
     ($session:ident, $flag:ident) => {
         if !can($session, CoSimulation::$flag) {
@@ -39,7 +39,7 @@ macro_rules! needs {
     };
 }
 
-fn in_every_state(session: &Session) -> Result<(), Blocked> {
+fn in_every_state(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     for state in [State::Instantiated, State::Initialization, State::Step, State::Terminated] {
         session.case(|| {
@@ -67,7 +67,7 @@ fn in_every_state(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn overwrite(session: &Session) -> Result<(), Blocked> {
+fn overwrite(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     session.case(|| {
         let (instance, h) = (session.stepping()?, session.h());
@@ -92,8 +92,8 @@ fn overwrite(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-/// An instance under way, with inputs moved.
-fn running_instance(session: &Session) -> Result<Instance<'_>, Blocked> {
+/// An instance after steps with changed inputs.
+fn running_instance(session: &Session) -> Result<Instance<'_>, NotDetermined> {
     let instance = session.stepping()?;
     for k in 0..12 {
         instance.change_inputs(k)?;
@@ -102,11 +102,11 @@ fn running_instance(session: &Session) -> Result<Instance<'_>, Blocked> {
     Ok(instance)
 }
 
-/// Runs again from where a state was restored; a step that fails now, and did not before, is a difference.
+/// Repeats the run from a restored state; a step that fails now, but did not before, counts as a difference.
 fn rerun(instance: &Instance<'_>, first: &[Vec<Vec<u64>>], what: &str) {
     match instance.run(first.len(), instance.session.h()) {
         Ok(second) => report_difference(instance.session, first, &second, what),
-        Err(Blocked(why)) => instance.session.violated(format!("{what}: {why}")),
+        Err(NotDetermined(why)) => instance.session.violated(format!("{what}: {why}")),
     }
 }
 
@@ -117,7 +117,7 @@ fn report_difference(session: &Session, first: &[Vec<Vec<u64>>], second: &[Vec<V
     }
 }
 
-fn rerun_from_state(session: &Session) -> Result<(), Blocked> {
+fn rerun_from_state(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     let (instance, h) = (running_instance(session)?, session.h());
     let (state, time) = (instance.save()?, instance.time.get());
@@ -132,7 +132,7 @@ fn rerun_from_state(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn variables(session: &Session) -> Result<(), Blocked> {
+fn variables(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     let (instance, h) = (running_instance(session)?, session.h());
     let all: Vec<&ModelVariable> = session.numeric().filter(|v| v.clocks.is_empty()).collect();
@@ -152,7 +152,7 @@ fn variables(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn after_error(session: &Session) -> Result<(), Blocked> {
+fn after_error(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     let (instance, h) = (running_instance(session)?, session.h());
     let (state, time) = (instance.save()?, instance.time.get());
@@ -168,7 +168,7 @@ fn after_error(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn other_instance(session: &Session) -> Result<(), Blocked> {
+fn other_instance(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     let (instance, h) = (running_instance(session)?, session.h());
     let (state, time) = (instance.save()?, instance.time.get());
@@ -185,9 +185,9 @@ fn other_instance(session: &Session) -> Result<(), Blocked> {
 }
 
 /// A call that ought to be refused.
-type Call = fn(&Instance<'_>) -> Result<Status, Blocked>;
+type Call = fn(&Instance<'_>) -> Result<Status, NotDetermined>;
 
-fn null_states(session: &Session) -> Result<(), Blocked> {
+fn null_states(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     let cases: [(&str, Call); 2] = [
         ("SetFMUState(NULL)", |instance| {
@@ -207,7 +207,7 @@ fn null_states(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn serialized(session: &Session) -> Result<(), Blocked> {
+fn serialized(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_serialize_state);
     let (instance, h) = (running_instance(session)?, session.h());
     let (state, time) = (instance.save()?, instance.time.get());
@@ -230,7 +230,7 @@ fn serialized(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn equal_bytes(session: &Session) -> Result<(), Blocked> {
+fn equal_bytes(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_serialize_state);
     let make = || {
         let instance = running_instance(session)?;
@@ -250,7 +250,7 @@ fn equal_bytes(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn corrupted(session: &Session) -> Result<(), Blocked> {
+fn corrupted(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_serialize_state);
     let instance = running_instance(session)?;
     let state = instance.save()?;
@@ -286,7 +286,7 @@ fn corrupted(session: &Session) -> Result<(), Blocked> {
             })?;
             session.require(!status.is_ok(), || format!("DeserializeFMUState of {what} returned {status}"));
             if status.is_ok() && back != SavedState::NULL {
-                // What the FMU takes, it must be able to live with.
+                // If the FMU accepts the bytes, it must keep working.
                 let status =
                     instance.call(&format!("SetFMUState({what})"), |raw| raw.set_state(instance.handle, back))?;
                 if status.is_ok() {
@@ -299,7 +299,7 @@ fn corrupted(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn wrong_size(session: &Session) -> Result<(), Blocked> {
+fn wrong_size(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_serialize_state);
     let instance = running_instance(session)?;
     let state = instance.save()?;

@@ -5,13 +5,13 @@ use super::lifecycle_states::State::{Error, Initialization, Instantiated, Step, 
 use super::lifecycle_states::{State, in_state};
 use crate::encoding::bits;
 use crate::instance::Instance;
-use crate::session::{Blocked, Session, settable};
+use crate::session::{NotDetermined, Session, settable};
 use fmu_import::Status;
 use fmu_import::raw::{Buffer, Handle, Optional, Raw, SavedState, Simple, StepStatus};
 use model_description::{BaseType, Causality, CoSimulation, FmiVersion, ModelVariable};
 
 /// Makes the call on an instance.
-type Make<'b> = Box<dyn Fn(&Instance<'_>) -> Result<Status, Blocked> + 'b>;
+type Make<'b> = Box<dyn Fn(&Instance<'_>) -> Result<Status, NotDetermined> + 'b>;
 
 /// A call that can be made in any state.
 struct Call<'b> {
@@ -52,7 +52,7 @@ fn calls<'b>(session: &'b Session) -> Vec<Call<'b>> {
             "EnterInitializationMode",
             &[Instantiated],
             Box::new(|instance| {
-                // SetupExperiment belongs to it; where it is not allowed its refusal does not matter.
+                // FMI 2.0 requires SetupExperiment first; in a state that does not allow it, its refusal does not matter.
                 let _ = instance
                     .call("SetupExperiment", |raw| raw.experiment(instance.handle, None, session.start(), None))?;
                 instance.simple(Simple::EnterInitializationMode)
@@ -91,7 +91,7 @@ fn calls<'b>(session: &'b Session) -> Vec<Call<'b>> {
     if let Some((v, values)) = scalar(session, |v| v.causality == Causality::Input && v.base.is_float())
         .and_then(|v| Some((v, session.different_value(v, 1.0)?)))
     {
-        // Whether FMI 2.0 allows inputs before initialization its text leaves open; both is fine.
+        // FMI 2.0 does not say whether inputs may be set before initialization; both answers are accepted.
         let states: &[State] = if v2 { &[Initialization, Step] } else { &[Instantiated, Initialization, Step] };
         add("Set(input)", states, Box::new(move |instance| instance.set(v, &values)));
     }
@@ -114,7 +114,7 @@ fn calls<'b>(session: &'b Session) -> Vec<Call<'b>> {
     list
 }
 
-pub(super) fn allowed(session: &Session) -> Result<(), Blocked> {
+pub(super) fn allowed(session: &Session) -> Result<(), NotDetermined> {
     for call in calls(session) {
         for &state in call.states.iter().filter(|s| **s != Error) {
             session.case(|| {
@@ -139,7 +139,7 @@ fn is_ambiguous(session: &Session, call: &str, state: State) -> bool {
     }
 }
 
-pub(super) fn refused(session: &Session) -> Result<(), Blocked> {
+pub(super) fn refused(session: &Session) -> Result<(), NotDetermined> {
     for call in calls(session) {
         for state in [Instantiated, Initialization, Step, Terminated] {
             if call.states.contains(&state) || is_ambiguous(session, &call.name, state) {
@@ -206,7 +206,7 @@ fn call_by_name(raw: &Raw, name: &str, handle: Handle, reference: u32) -> Option
     }
 }
 
-pub(super) fn unsupported(session: &Session) -> Result<(), Blocked> {
+pub(super) fn unsupported(session: &Session) -> Result<(), NotDetermined> {
     let reference = session.watched().first().map_or(0, |v| v.value_reference);
     for name in unsupported_functions(session) {
         if !session.raw.has(name) {
@@ -234,7 +234,7 @@ pub(super) fn unsupported(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-pub(super) fn configuration(session: &Session) -> Result<(), Blocked> {
+pub(super) fn configuration(session: &Session) -> Result<(), NotDetermined> {
     if session.description.variables.iter().any(|v| v.causality == Causality::StructuralParameter) {
         return session.not_applicable("there are structural parameters");
     }
@@ -244,14 +244,14 @@ pub(super) fn configuration(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-pub(super) fn null_instance(session: &Session) -> Result<(), Blocked> {
+pub(super) fn null_instance(session: &Session) -> Result<(), NotDetermined> {
     let skip = ["GetVersion", "GetTypesPlatform", "FreeInstance"];
     for name in functions(session.description.version) {
         if skip.contains(&name) || name.starts_with("Instantiate") || !session.raw.has(name) {
             continue;
         }
         session.case(|| {
-            session.calling(&format!("{}(NULL)", session.raw.name(name)));
+            session.record_call(&format!("{}(NULL)", session.raw.name(name)));
             let raw = &session.raw;
             let null = Handle::NULL;
             let base = |n: &str| {
@@ -291,7 +291,7 @@ pub(super) fn null_instance(session: &Session) -> Result<(), Blocked> {
                     None => call_by_name(raw, n, null, 0),
                 },
             };
-            let status = status.ok_or_else(|| Blocked(format!("{name} is missing")))?;
+            let status = status.ok_or_else(|| NotDetermined(format!("{name} is missing")))?;
             session.require(status == Status::ERROR, || format!("{}(NULL) returned {status}", raw.name(name)));
             Ok(())
         });

@@ -3,7 +3,7 @@
 use super::schema;
 use crate::check::{Check, Levels, Run, Verdict};
 use crate::fmu_file::FmuFile;
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use crate::trajectory::{difference, trajectory};
 use crate::zip_headers;
 use fmu_import::raw::Raw;
@@ -14,7 +14,7 @@ const CLAUSE: &str = "2.0.5, 2.3; 3.0.2, 2.4.9";
 const FOLDER: &str = "terminalsAndIcons";
 const FILE: &str = "terminalsAndIcons/terminalsAndIcons.xml";
 
-/// Most bytes of the XML.
+/// Maximum size of the XML in bytes.
 const LIMIT: u64 = 64 << 20;
 
 #[rustfmt::skip]
@@ -138,7 +138,7 @@ fn kinds(fmu: &FmuFile) -> Verdict {
             for m in &t.members {
                 let variable = description.variable(&m.variable);
                 let flow = ["inflow", "outflow"].contains(&&*m.kind);
-                // That a kind of others is a reverse domain name is only recommended.
+                // A vendor-specific kind need not be a reverse domain name; this is only recommended.
                 if !flow && m.kind != "signal" {
                     continue;
                 }
@@ -191,21 +191,21 @@ fn pictures(fmu: &FmuFile) -> Verdict {
     })
 }
 
-fn stripped(session: &Session) -> Result<(), Blocked> {
+fn stripped(session: &Session) -> Result<(), NotDetermined> {
     const EXTRAS: [&str; 2] = [FOLDER, "extra"];
     if !EXTRAS.iter().any(|folder| session.dir.join(folder).is_dir()) {
         return session.not_applicable("the FMU has neither terminalsAndIcons/ nor extra/");
     }
     let whole = trajectory(&session.stepping()?, 20)?;
-    let failed = |e: std::io::Error| Blocked(e.to_string());
-    // Below the working directory of the probe, which is thrown away.
+    let failed = |e: std::io::Error| NotDetermined(e.to_string());
+    // Below the working directory of the probe, which is temporary.
     let target = std::env::current_dir().map_err(failed)?.join("stripped");
     copy(&session.dir, &target, &EXTRAS).map_err(failed)?;
-    let inside = session.binary.strip_prefix(&session.dir).map_err(|e| Blocked(e.to_string()))?;
-    let raw = Raw::open(&target.join(inside), session.description.version).map_err(Blocked)?;
+    let inside = session.binary.strip_prefix(&session.dir).map_err(|e| NotDetermined(e.to_string()))?;
+    let raw = Raw::open(&target.join(inside), session.description.version).map_err(NotDetermined)?;
     let duplicate = session.duplicate_at(&target, raw, 30)?;
     match duplicate.stepping().and_then(|instance| trajectory(&instance, 20)) {
-        Err(Blocked(why)) => session.violated(format!("without {}: {why}", EXTRAS.join("/ and "))),
+        Err(NotDetermined(why)) => session.violated(format!("without {}: {why}", EXTRAS.join("/ and "))),
         Ok(rows) => {
             if let Some((step, i)) = difference(&whole, &rows) {
                 session.violated(format!("{} differs after {} steps", session.watched()[i].name, step + 1));

@@ -3,7 +3,7 @@
 use super::derivatives::output_derivatives;
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
-use crate::session::{Blocked, Session};
+use crate::session::{NotDetermined, Session};
 use crate::trajectory::difference;
 use fmu_import::Status;
 use fmu_import::raw::StepStatus;
@@ -30,13 +30,13 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "T10p", requirement: "Two processes with different addresses give the same results bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes) },
 ];
 
-fn start_times(session: &Session) -> Result<(), Blocked> {
+fn start_times(session: &Session) -> Result<(), NotDetermined> {
     for start in [0.0, -1.0, 1000.0, 1e6] {
         session.case(|| {
             let instance = session.fresh()?;
             instance.experiment(start, None);
             let life = instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(20, session.h()));
-            if let Err(Blocked(why)) = life {
+            if let Err(NotDetermined(why)) = life {
                 session.violated(format!("startTime={start}: {why}"));
             }
             Ok(())
@@ -45,7 +45,7 @@ fn start_times(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn gap(session: &Session) -> Result<(), Blocked> {
+fn gap(session: &Session) -> Result<(), NotDetermined> {
     for shift in [0.5, -0.5, 2.0] {
         session.case(|| {
             let (instance, h) = (session.stepping()?, session.h());
@@ -61,11 +61,11 @@ fn gap(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn accumulated(session: &Session) -> Result<(), Blocked> {
+fn accumulated(session: &Session) -> Result<(), NotDetermined> {
     let (instance, h) = (session.stepping()?, session.h());
-    // Beyond its default experiment an FMU may have no data; what happens there is no finding.
+    // Beyond its default experiment, an FMU may lack data; a failure there is not a violation.
     let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
-    session.many(&format!("up to 100000 steps of {h}, t = t + h"), || {
+    session.record_calls(&format!("up to 100000 steps of {h}, t = t + h"), || {
         for k in 0..100_000 {
             let inside = instance.time.get() + h <= stop;
             let status = instance.step(h)?;
@@ -83,7 +83,7 @@ fn accumulated(session: &Session) -> Result<(), Blocked> {
     })
 }
 
-fn non_positive_step(session: &Session) -> Result<(), Blocked> {
+fn non_positive_step(session: &Session) -> Result<(), NotDetermined> {
     for h in [0.0, -session.h()] {
         session.case(|| {
             let instance = session.stepping()?;
@@ -98,7 +98,7 @@ fn non_positive_step(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn non_finite_step(session: &Session) -> Result<(), Blocked> {
+fn non_finite_step(session: &Session) -> Result<(), NotDetermined> {
     let h = session.h();
     for (t, h) in
         [(None, f64::NAN), (None, f64::INFINITY), (Some(f64::NAN), h), (Some(f64::INFINITY), h), (None, 1e300)]
@@ -108,7 +108,7 @@ fn non_finite_step(session: &Session) -> Result<(), Blocked> {
             instance.steps(2, session.h())?;
             let t = t.unwrap_or(instance.time.get());
             let status = instance.step_at(t, h)?;
-            // A step of 1e300 is a number after all; only a hang counts.
+            // A step of 1e300 is finite and may succeed; only a hang is a violation.
             session.require(!status.is_ok() || (1e300..f64::INFINITY).contains(&h), || {
                 format!("DoStep(t={t}, h={h}) returned {status}")
             });
@@ -118,7 +118,7 @@ fn non_finite_step(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn halves(session: &Session) -> Result<(), Blocked> {
+fn halves(session: &Session) -> Result<(), NotDetermined> {
     if !session.flag("canHandleVariableCommunicationStepSize") {
         return session.not_applicable("the communication step may not change");
     }
@@ -154,7 +154,7 @@ fn halves(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn variable(session: &Session) -> Result<(), Blocked> {
+fn variable(session: &Session) -> Result<(), NotDetermined> {
     if !session.flag("canHandleVariableCommunicationStepSize") {
         return session.not_applicable("canHandleVariableCommunicationStepSize is false");
     }
@@ -173,7 +173,7 @@ fn variable(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn step_results(session: &Session) -> Result<(), Blocked> {
+fn step_results(session: &Session) -> Result<(), NotDetermined> {
     let (instance, h) = (session.stepping()?, session.h());
     if session.flag("hasEventMode") && session.description.variables.iter().any(|v| v.base == BaseType::Clock) {
         return session.not_applicable("the FMU has clocks and needs event mode");
@@ -187,7 +187,7 @@ fn step_results(session: &Session) -> Result<(), Blocked> {
             Some(status)
         })?;
         let Some(step_results) = result.filter(|_| status.is_ok()) else {
-            return Err(Blocked(format!("DoStep returned {status}")));
+            return Err(NotDetermined(format!("DoStep returned {status}")));
         };
         session
             .require([step_results.event, step_results.terminate, step_results.early].iter().all(|b| *b <= 1), || {
@@ -206,7 +206,7 @@ fn step_results(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn independent(session: &Session) -> Result<(), Blocked> {
+fn independent(session: &Session) -> Result<(), NotDetermined> {
     let time = session
         .description
         .variables
@@ -228,7 +228,7 @@ fn independent(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn null_results(session: &Session) -> Result<(), Blocked> {
+fn null_results(session: &Session) -> Result<(), NotDetermined> {
     for missing in 0..4 {
         session.case(|| {
             let instance = session.stepping()?;
@@ -245,7 +245,7 @@ fn null_results(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn statuses(session: &Session) -> Result<(), Blocked> {
+fn statuses(session: &Session) -> Result<(), NotDetermined> {
     use StepStatus::{GetBooleanStatus, GetIntegerStatus, GetRealStatus, GetStatus, GetStringStatus};
     for name in [GetStatus, GetRealStatus, GetIntegerStatus, GetBooleanStatus, GetStringStatus] {
         for kind in [0, 1, 2, 3, 99] {
@@ -256,7 +256,7 @@ fn statuses(session: &Session) -> Result<(), Blocked> {
                     raw.step_status(name, instance.handle, kind).map(|(s, _)| s)
                 })?;
                 let known = [Status::OK, Status::WARNING, Status::DISCARD].contains(&status) || kind == 99;
-                // A number of a status that this function does not tell at all may be an error.
+                // A kind of status that this function never returns may be an Error.
                 let fits = matches!(
                     (name, kind),
                     (GetStatus, 0) | (GetRealStatus, 2) | (GetBooleanStatus, 3) | (GetStringStatus, 1)
@@ -269,7 +269,7 @@ fn statuses(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn determinism(session: &Session) -> Result<(), Blocked> {
+fn determinism(session: &Session) -> Result<(), NotDetermined> {
     let run = || {
         let instance = session.stepping()?;
         (0..30)
@@ -288,7 +288,7 @@ fn determinism(session: &Session) -> Result<(), Blocked> {
 }
 
 /// Notes a hash of all outputs, which the parent process compares.
-fn two_processes(session: &Session) -> Result<(), Blocked> {
+fn two_processes(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.stepping()?;
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for k in 0..30 {
@@ -302,7 +302,7 @@ fn two_processes(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-fn no_set_state_before(session: &Session) -> Result<(), Blocked> {
+fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
     let saves = session.description.co_simulation.as_ref().is_some_and(CoSimulation::can_get_and_set_state);
     let run = |instance: &Instance<'_>, from: u32, no_prior: bool| {
         let mut rows = Vec::new();
@@ -319,7 +319,7 @@ fn no_set_state_before(session: &Session) -> Result<(), Blocked> {
             instance.time.set(t + h);
             rows.push(instance.snapshot(&session.watched())?);
         }
-        Ok::<_, Blocked>(rows)
+        Ok::<_, NotDetermined>(rows)
     };
     if session.description.variables.iter().any(|v| v.base == BaseType::Clock) {
         return session.not_applicable("the FMU has clocks and needs event mode");
@@ -339,7 +339,7 @@ fn no_set_state_before(session: &Session) -> Result<(), Blocked> {
     }
     let (here, time) = (restricted.save()?, restricted.time.get());
     let first = run(&restricted, 10, false)?;
-    if let Err(Blocked(why)) = restricted.restore(here, time) {
+    if let Err(NotDetermined(why)) = restricted.restore(here, time) {
         session
             .violated(format!("restoring the current point after a step with noSetFMUStatePriorToCurrentPoint: {why}"));
         return Ok(());

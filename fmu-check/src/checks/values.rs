@@ -1,22 +1,22 @@
-//! Values that are set: that they come back, take effect, and do no harm when they make no sense.
+//! Setting values: they read back, take effect, and do no harm if they are invalid.
 
 use crate::encoding::{bits, same, show};
-use crate::session::{Blocked, Session, settable};
+use crate::session::{NotDetermined, Session, settable};
 use crate::trajectory::difference;
 use fmu_import::Status;
 use fmu_import::raw::Simple;
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 use std::ffi::CString;
 
-pub(super) fn round_trip(session: &Session) -> Result<(), Blocked> {
+pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.initializing()?;
     for v in session.numeric().filter(|v| settable(v)) {
         let Some(values) = session.different_value(v, 1.0) else { continue };
         let status = instance.set(v, &values)?;
         if !status.is_ok() {
-            // A value that the model does not like is its good right; what is said of it is a check of its own.
+            // The model may refuse a value; other checks judge refusals.
             if status == Status::ERROR {
-                return Err(Blocked(format!(
+                return Err(NotDetermined(format!(
                     "Set({} = {}) returned {status}",
                     v.name,
                     show(v, session.description.version, &values)
@@ -37,7 +37,7 @@ pub(super) fn round_trip(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-pub(super) fn strings(session: &Session) -> Result<(), Blocked> {
+pub(super) fn strings(session: &Session) -> Result<(), NotDetermined> {
     let fits = |v: &&ModelVariable| v.base == BaseType::String && settable(v) && !v.is_array();
     let Some(v) = session.description.variables.iter().find(fits) else {
         return session.not_applicable("no string can be set");
@@ -50,13 +50,13 @@ pub(super) fn strings(session: &Session) -> Result<(), Blocked> {
                 raw.set_strings(instance.handle, &[v.value_reference], &[Some(&c_text)])
             })?;
             if !status.is_ok() {
-                return Err(Blocked(format!("SetString({}) returned {status}", v.name)));
+                return Err(NotDetermined(format!("SetString({}) returned {status}", v.name)));
             }
-            session.calling(&format!("GetString({})", v.name));
+            session.record_call(&format!("GetString({})", v.name));
             let (_, back) = session
                 .raw
                 .get_strings(instance.handle, &[v.value_reference], 1)
-                .ok_or_else(|| Blocked("GetString is missing".into()))?;
+                .ok_or_else(|| NotDetermined("GetString is missing".into()))?;
             session.require(back.first().is_some_and(|b| b.as_deref() == Some(text)), || {
                 format!("{}: a string of {} bytes did not read back", v.name, text.len())
             });
@@ -66,7 +66,7 @@ pub(super) fn strings(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-pub(super) fn not_a_number(session: &Session) -> Result<(), Blocked> {
+pub(super) fn not_a_number(session: &Session) -> Result<(), NotDetermined> {
     let inputs = session.float_inputs();
     if inputs.is_empty() {
         return session.not_applicable("there is no floating-point input");
@@ -98,7 +98,7 @@ pub(super) fn not_a_number(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-pub(super) fn out_of_range(session: &Session) -> Result<(), Blocked> {
+pub(super) fn out_of_range(session: &Session) -> Result<(), NotDetermined> {
     let fits = |v: &&ModelVariable| {
         v.causality == Causality::Parameter && settable(v) && v.base.is_float() && (v.min.is_some() || v.max.is_some())
     };
@@ -122,7 +122,7 @@ pub(super) fn out_of_range(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-pub(super) fn booleans(session: &Session) -> Result<(), Blocked> {
+pub(super) fn booleans(session: &Session) -> Result<(), NotDetermined> {
     let fits = |v: &&ModelVariable| v.base == BaseType::Boolean && settable(v) && !v.is_array();
     let Some(v) = session.description.variables.iter().find(fits) else {
         return session.not_applicable("no Boolean can be set");
@@ -144,7 +144,7 @@ pub(super) fn booleans(session: &Session) -> Result<(), Blocked> {
     Ok(())
 }
 
-pub(super) fn tunable(session: &Session) -> Result<(), Blocked> {
+pub(super) fn tunable(session: &Session) -> Result<(), NotDetermined> {
     let fits = |v: &&ModelVariable| {
         v.causality == Causality::Parameter && v.variability == Variability::Tunable && v.clocks.is_empty()
     };
@@ -164,8 +164,8 @@ pub(super) fn tunable(session: &Session) -> Result<(), Blocked> {
             if !status.is_ok() {
                 return Ok(());
             }
-            if let Err(Blocked(why)) = instance.steps(2, session.h()) {
-                // The model may have rules that the description cannot tell.
+            if let Err(NotDetermined(why)) = instance.steps(2, session.h()) {
+                // The model may have rules that the description cannot express.
                 session.note(format!("{} = {}: {why}", v.name, show(v, session.description.version, &values)));
                 return Ok(());
             }
@@ -182,7 +182,7 @@ pub(super) fn tunable(session: &Session) -> Result<(), Blocked> {
 }
 
 /// Sets values in one instance directly; in another, sets other values, reads the outputs, then sets the same values.
-pub(super) fn iterated_initialization(session: &Session) -> Result<(), Blocked> {
+pub(super) fn iterated_initialization(session: &Session) -> Result<(), NotDetermined> {
     let watched = session.watched();
     let settable: Vec<_> = session.numeric().filter(|v| settable(v) && v.base.is_float()).collect();
     let (plain, iterated) = (session.initializing()?, session.initializing()?);
@@ -190,23 +190,23 @@ pub(super) fn iterated_initialization(session: &Session) -> Result<(), Blocked> 
         let (Some(first), Some(last)) = (session.different_value(v, 3.0), session.different_value(v, 1.0)) else {
             continue;
         };
-        // What one of them refuses is not what is asked here.
+        // This check does not judge refusals.
         if iterated.set(v, &first)?.is_ok() && iterated.set(v, &last)?.is_ok() {
             let _ = iterated.snapshot(&watched)?;
             let _ = plain.set(v, &last)?;
         } else {
-            return Err(Blocked(format!("{} cannot be set", v.name)));
+            return Err(NotDetermined(format!("{} cannot be set", v.name)));
         }
     }
     let alike = plain.snapshot(&watched)? == iterated.snapshot(&watched)?;
     session.require(alike, || "in initialization mode the outputs depend on values set and read earlier".into());
     match (plain.exit(), iterated.exit()) {
         (Ok(()), Ok(())) => {}
-        (Err(Blocked(why)), Err(_)) => {
+        (Err(NotDetermined(why)), Err(_)) => {
             session.note(format!("these values are inconsistent: {why}"));
             return Ok(());
         }
-        (Err(Blocked(why)), _) | (_, Err(Blocked(why))) => {
+        (Err(NotDetermined(why)), _) | (_, Err(NotDetermined(why))) => {
             session.violated(format!("only one of two instances with the same values fails: {why}"));
             return Ok(());
         }

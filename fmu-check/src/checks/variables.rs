@@ -36,7 +36,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "V14", requirement: "Start values have the type of the variable and lie within the range of that type.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(start_value_types) },
 ];
 
-/// A finding for each variable that the rule refuses.
+/// A finding for each variable that violates the rule.
 fn each(fmu: &FmuFile, rule: impl Fn(&ModelDescription, &ModelVariable) -> Option<String>) -> Verdict {
     with_description(fmu, |d| {
         let say = |v| rule(d, v).map(|why| format!("line {}: variable {}: {why}", v.line, v.name));
@@ -193,8 +193,8 @@ fn independent(fmu: &FmuFile) -> Verdict {
     })
 }
 
-/// Whether the file leaves the variability to the default. FMI 2.0's is continuous whatever the type; for what is no
-/// Real that would never be legal, and everybody reads it as discrete.
+/// Whether the file omits the variability. The default of FMI 2.0 is continuous for every type; except for Real this
+/// would be illegal, and importers read it as discrete.
 fn by_default(fmu: &FmuFile, v: &ModelVariable) -> bool {
     let element = fmu
         .root()

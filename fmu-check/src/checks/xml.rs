@@ -64,9 +64,9 @@ fn well_formed(fmu: &FmuFile) -> Verdict {
 fn valid(fmu: &FmuFile) -> Verdict {
     with_root(fmu, |root| {
         let mut findings = schema::deviations(root, fmu.version);
-        // What an importer cannot read at all, and the rules do not know of.
+        // Errors that prevent reading the file and that the rules do not cover.
         if let (true, Err(cause)) = (findings.is_empty(), &fmu.description) {
-            // Another version is what X02a is about.
+            // X02a reports another version.
             findings.extend((!cause.contains("fmiVersion")).then(|| cause.clone()));
         }
         findings

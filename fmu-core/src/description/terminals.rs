@@ -51,12 +51,12 @@ pub(super) fn describe(terminals: &[terminal::Terminal], variables: &[Variable])
     for terminal::Terminal { name, description, rule, members, picture } in terminals {
         let wrong = |what: String| Fault::new(format!("the terminal {name} {what}"));
         if described.iter().any(|other| other.name == *name) {
-            return Err(wrong("is there twice".into()));
+            return Err(wrong("occurs twice".into()));
         }
         for terminal::Member { variable, .. } in *members {
             match variables.iter().find(|v| v.name == *variable) {
-                None => return Err(wrong(format!("names a variable {variable} that is not there"))),
-                // FMI 3.0.2, 2.4.9.2.3; and in FMI 2.0 an array is no variable.
+                None => return Err(wrong(format!("names the variable {variable}, which does not exist"))),
+                // FMI 3.0.2, 2.4.9.2.3; in FMI 2.0 an array is not a variable.
                 Some(v) if v.causality == Causality::Local || v.dimension.is_some() => {
                     return Err(wrong(format!(
                         "has {variable}: only a scalar input, output or parameter can be a member"
@@ -70,12 +70,12 @@ pub(super) fn describe(terminals: &[terminal::Terminal], variables: &[Variable])
             let letters = icon.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
             if icon.is_empty() || icon == "icon" || !letters {
                 return Err(wrong(format!(
-                    "has an icon {icon:?}: letters, digits and _ make its name, and not \"icon\""
+                    "has an icon {icon:?}: a name of letters, digits and _ is allowed, other than \"icon\""
                 )));
             }
             let others = described.iter().filter_map(|t| t.picture.as_ref());
             if others.into_iter().any(|p| p.icon == *icon && p.svg != *svg) {
-                return Err(wrong(format!("has another icon {icon} than a terminal before it")));
+                return Err(wrong(format!("draws its icon {icon} differently from an earlier terminal")));
             }
         }
         let member = |m: &terminal::Member| Member { name: m.name.into(), variable: m.variable.into(), kind: m.kind };

@@ -10,10 +10,10 @@ use fmu_core::{Fault, Model};
 use std::ffi::{c_char, c_int};
 
 /// # Safety
-/// Of every function here: what the standard demands of the importer. The instance is NULL, or one that this binary
-/// made and has not freed, used by one thread at a time; a pointer to an array is NULL or leads to as many elements as
-/// the call says.
-#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the safety is above for all")]
+/// For every function here, the importer follows the standard: the instance is NULL, or one that this binary created and
+/// has not freed, used by one thread at a time; a pointer to an array is NULL or points to as many elements as the call
+/// states.
+#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
 impl<M: Model> Abi<M> {
     pub unsafe fn get<T: Value>(
         entry: Entry,
@@ -25,9 +25,9 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<M>(entry, instance, |it| {
+            enter::<M>(entry, instance, |instance| {
                 let out = room(values, room_for, "values")?;
-                Ok(it.get(array(references, n, "value references")?, out)?)
+                Ok(instance.get(array(references, n, "value references")?, out)?)
             })
         }
     }
@@ -42,14 +42,14 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<M>(entry, instance, |it| {
+            enter::<M>(entry, instance, |instance| {
                 let values = array(values, n_values, "values")?;
-                Ok(it.set(array(references, n, "value references")?, values)?)
+                Ok(instance.set(array(references, n, "value references")?, values)?)
             })
         }
     }
 
-    /// A getter or setter of a type that no variable has: fine for no variable.
+    /// A getter or setter of a type that no variable has: succeeds only for zero variables.
     pub unsafe fn none(
         entry: Entry,
         instance: Instance,
@@ -60,8 +60,8 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe {
-            enter::<M>(entry, instance, |it| {
-                it.refuse(array(references, n, "value references")?, carries)?;
+            enter::<M>(entry, instance, |instance| {
+                instance.refuse(array(references, n, "value references")?, carries)?;
                 if n_values == 0 { Ok(()) } else { Err(Fault::value("nValues", n_values, "0 for no reference").into()) }
             })
         }
@@ -76,27 +76,27 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's array of C strings.
         unsafe {
-            enter::<M>(entry, instance, |it| {
+            enter::<M>(entry, instance, |instance| {
                 let mut names = Vec::new();
                 for &category in array(categories, n, "categories")? {
                     let category = text(category).ok_or_else(|| Fault::new("a log category is NULL"))?;
                     names.push(category.to_str().map_err(|_| Fault::new("a log category is not UTF-8"))?);
                 }
-                Ok(it.log.switch(entry.standard, on, &names)?)
+                Ok(instance.log.switch(entry.standard, on, &names)?)
             })
         }
     }
 
     pub unsafe fn exit_initialization(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |it| Ok(it.exit_initialization()?)) }
+        unsafe { enter::<M>(entry, instance, |instance| Ok(instance.exit_initialization()?)) }
     }
 
     pub unsafe fn terminate(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<M>(entry, instance, |it| {
-                it.terminate();
+            enter::<M>(entry, instance, |instance| {
+                instance.terminate();
                 Ok(())
             })
         }
@@ -105,28 +105,28 @@ impl<M: Model> Abi<M> {
     pub unsafe fn reset(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<M>(entry, instance, |it| {
-                it.reset();
+            enter::<M>(entry, instance, |instance| {
+                instance.reset();
                 Ok(())
             })
         }
     }
 
-    /// `state` leads to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.6.4).
+    /// `state` points to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.6.4).
     pub unsafe fn save_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
-            enter::<M>(entry, instance, |it| {
+            enter::<M>(entry, instance, |instance| {
                 let state = place(state, "FMUState")?.assume_init_mut();
-                *state = handle(it.save(state.addr())?);
+                *state = handle(instance.save(state.addr())?);
                 Ok(())
             })
         }
     }
 
     pub unsafe fn restore_state(entry: Entry, instance: Instance, state: FmuState) -> c_int {
-        // SAFETY: the importer's instance; the state is a number to us.
-        unsafe { enter::<M>(entry, instance, |it| Ok(it.restore(state.addr())?)) }
+        // SAFETY: the importer's instance; the state is only a number.
+        unsafe { enter::<M>(entry, instance, |instance| Ok(instance.restore(state.addr())?)) }
     }
 
     /// Ignores NULL and a variable that holds NULL.
@@ -146,7 +146,7 @@ impl<M: Model> Abi<M> {
     }
 
     pub unsafe fn serialized_size(entry: Entry, instance: Instance, state: FmuState, size: *mut usize) -> c_int {
-        // SAFETY: the importer's variable; the state is a number to us.
+        // SAFETY: the importer's variable; the state is only a number.
         unsafe {
             enter::<M>(entry, instance, |_| {
                 let size = place(size, "size")?;
@@ -157,7 +157,7 @@ impl<M: Model> Abi<M> {
     }
 
     pub unsafe fn serialize(entry: Entry, instance: Instance, state: FmuState, bytes: *mut u8, size: usize) -> c_int {
-        // SAFETY: the importer's array of this size; the state is a number to us.
+        // SAFETY: the importer's array of this size; the state is only a number.
         unsafe {
             enter::<M>(entry, instance, |_| {
                 let out = room(bytes, size, "serializedState")?;
@@ -183,9 +183,9 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's array of this size, and its variable.
         unsafe {
-            enter::<M>(entry, instance, |it| {
+            enter::<M>(entry, instance, |instance| {
                 let state = place(state, "FMUState")?;
-                state.write(handle(it.deserialize(array(bytes, size, "serializedState")?)?));
+                state.write(handle(instance.deserialize(array(bytes, size, "serializedState")?)?));
                 Ok(())
             })
         }
@@ -198,7 +198,7 @@ impl<M: Model> Abi<M> {
     }
 }
 
-/// A handle as C carries it: a number in a pointer's place.
+/// A handle in C: a number stored in a pointer.
 fn handle(number: usize) -> FmuState {
     std::ptr::without_provenance_mut(number)
 }

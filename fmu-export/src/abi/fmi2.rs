@@ -1,4 +1,4 @@
-//! FMI 2.0.5: what it has of its own, and the table of its functions.
+//! FMI 2.0.5: its own calls, and the table of its functions.
 
 use super::gate::{Entry, Refusal, enter, open};
 use super::logger::Fmi2Sink;
@@ -18,9 +18,9 @@ const TERMINATED: c_int = 3;
 
 /// # Safety
 /// As in `calls.rs`.
-#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the safety is above for all")]
+#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
 impl<M: Model> Abi<M> {
-    /// FMI 2.0.5, 2.1.5. The callbacks' struct is copied: its pointer is valid only now.
+    /// FMI 2.0.5, 2.1.5. The callbacks' struct is copied: its pointer is valid only during this call.
     pub unsafe fn fmi2_instantiate(
         entry: Entry,
         name: Text,
@@ -51,29 +51,31 @@ impl<M: Model> Abi<M> {
         stop: f64,
     ) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |it| Ok(it.set_up(start, (stop_defined.0 != 0).then_some(stop))?)) }
+        unsafe {
+            enter::<M>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
+        }
     }
 
     pub unsafe fn fmi2_enter_initialization(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |it| Ok(it.enter_initialization()?)) }
+        unsafe { enter::<M>(entry, instance, |instance| Ok(instance.enter_initialization()?)) }
     }
 
     pub unsafe fn fmi2_do_step(entry: Entry, instance: Instance, t: f64, h: f64) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |it| Ok(it.do_step(t, h)?)) }
+        unsafe { enter::<M>(entry, instance, |instance| Ok(instance.do_step(t, h)?)) }
     }
 
-    /// `fmi2LastSuccessfulTime`; the rest is of asynchronous steps (FMI 2.0.5, 4.2.3).
+    /// `fmi2LastSuccessfulTime`; the other kinds belong to asynchronous steps (FMI 2.0.5, 4.2.3).
     pub unsafe fn fmi2_real_status(entry: Entry, instance: Instance, kind: c_int, value: *mut f64) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
-            enter::<M>(entry, instance, |it| {
+            enter::<M>(entry, instance, |instance| {
                 let value = place(value, "value")?;
                 if kind != LAST_SUCCESSFUL_TIME {
                     return no_status(kind);
                 }
-                value.write(it.current.end);
+                value.write(instance.current.end);
                 Ok(())
             })
         }
@@ -108,7 +110,7 @@ fn no_status(kind: c_int) -> Result<(), Refusal> {
     Err(Refusal::Discard(Fault::new(format!("{kind} is not available: every step ends before fmi2DoStep returns"))))
 }
 
-/// The functions of `fmi2Functions.h`: name, arguments, row of the lifecycle table, what does it with which arguments.
+/// The functions of `fmi2Functions.h`: name, arguments, row of the lifecycle table, and the function that does the work.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! export_fmi2 {

@@ -1,4 +1,4 @@
-//! FMI 3.0.2: what it has of its own, and the table of its functions.
+//! FMI 3.0.2: its own calls, and the table of its functions.
 
 use super::gate::{Entry, enter, open};
 use super::logger::{Fmi3Logger, Fmi3Sink};
@@ -11,9 +11,9 @@ use std::ffi::{c_int, c_void};
 
 /// # Safety
 /// As in `calls.rs`.
-#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the safety is above for all")]
+#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
 impl<M: Model> Abi<M> {
-    /// FMI 3.0.2, 2.3.1. `refused` says what of the importer's wishes this FMU cannot fulfil.
+    /// FMI 3.0.2, 2.3.1. `refused` names a requested feature that this FMU lacks.
     pub unsafe fn fmi3_instantiate(
         entry: Entry,
         name: Text,
@@ -38,11 +38,13 @@ impl<M: Model> Abi<M> {
         stop: f64,
     ) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |it| Ok(it.set_up(start, (stop_defined.0 != 0).then_some(stop))?)) }
+        unsafe {
+            enter::<M>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
+        }
     }
 
-    /// FMI 3.0.2, 4.2.1.1. Without event mode and early return only the time has something to tell.
-    #[expect(clippy::too_many_arguments, reason = "as the standard has it")]
+    /// FMI 3.0.2, 4.2.1.1. Without event mode and early return, only the time carries information.
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_do_step(
         entry: Entry,
         instance: Instance,
@@ -55,21 +57,21 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's variables.
         unsafe {
-            enter::<M>(entry, instance, |it| {
+            enter::<M>(entry, instance, |instance| {
                 let time = place(last_successful_time, "lastSuccessfulTime")?;
                 place(event_handling_needed, "eventHandlingNeeded")?.write(Fmi3Boolean(0));
                 place(terminate_simulation, "terminateSimulation")?.write(Fmi3Boolean(0));
                 place(early_return, "earlyReturn")?.write(Fmi3Boolean(0));
-                time.write(it.current.end);
-                it.do_step(t, h)?;
-                time.write(it.current.end);
+                time.write(instance.current.end);
+                instance.do_step(t, h)?;
+                time.write(instance.current.end);
                 Ok(())
             })
         }
     }
 }
 
-/// The functions of `fmi3Functions.h`, as the table of FMI 2.0.
+/// The functions of `fmi3Functions.h`, in the form of the table of FMI 2.0.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! export_fmi3 {

@@ -21,7 +21,7 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// Looks the row up, while compiling.
+    /// Looks up the row at compile time.
     pub const fn new(standard: Standard, call: Call, name: &'static str) -> Self {
         Self { name, standard, states: call.states(standard), next: call.next() }
     }
@@ -65,7 +65,7 @@ pub(crate) unsafe fn enter<M: Model>(
     if handle.busy.replace(true) {
         return Status::Error as c_int;
     }
-    // SAFETY: `busy` was false, so no other call of this thread holds the instance, and other threads keep away.
+    // SAFETY: `busy` was false, so no other call of this thread holds the instance, and no other thread uses it.
     let instance = unsafe { &mut *handle.instance.get() };
     let status = pass(entry, instance, body);
     handle.busy.set(false);
@@ -81,7 +81,7 @@ fn pass<M: Model>(
     if instance.standard != entry.standard || !entry.states.contains(instance.current.life.state()) {
         return fail(entry, instance, Refusal::Error(misplaced(entry, instance)));
     }
-    // A panic can leave a half-done step; the instance then only leads to Reset, SetFMUState and Free.
+    // A panic can leave a half-done step; from the Error state, only Reset, SetFMUState and Free lead out.
     match catch_unwind(AssertUnwindSafe(|| body(instance))) {
         Ok(Ok(())) => {
             instance.current.life.after(true, entry.next);

@@ -17,14 +17,14 @@ pub type Fmi2Logger = unsafe extern "C" fn(
 pub type Fmi3Logger =
     unsafe extern "C" fn(environment: *mut c_void, status: c_int, category: *const c_char, message: *const c_char);
 
-/// What FMI 2.0 gives to log with: copied at instantiation, since the importer may free its struct then.
+/// The logging callback of FMI 2.0: copied at instantiation, since the importer may free its struct afterwards.
 pub(crate) struct Fmi2Sink {
     pub(crate) logger: Option<Fmi2Logger>,
     pub(crate) environment: *mut c_void,
     pub(crate) instance: CString,
 }
 
-/// What FMI 3.0 gives to log with.
+/// The logging callback of FMI 3.0.
 pub(crate) struct Fmi3Sink {
     pub(crate) logger: Option<Fmi3Logger>,
     pub(crate) environment: *mut c_void,
@@ -52,7 +52,7 @@ impl Sink for Fmi3Sink {
     }
 }
 
-/// A text for C; what C cannot hold, a zero, is left out.
+/// A text for C, without null bytes, which a C string cannot hold.
 fn c_text(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }

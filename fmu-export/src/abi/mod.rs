@@ -1,7 +1,7 @@
-//! The C interface: the only place with `unsafe`. Pointers become Rust values here, and nothing is decided here.
+//! The C interface: the only place with `unsafe`. It turns pointers into Rust values and decides nothing.
 //!
-//! `gate.rs` is what every call passes, `calls.rs` what both standards share, [`fmi2`] and [`fmi3`] the tables of their
-//! functions, of which [`export!`](crate::export) makes C functions.
+//! Every call passes `gate.rs`; `calls.rs` holds the calls that both standards share, [`fmi2`] and [`fmi3`] the tables of
+//! their functions, from which [`export!`](crate::export) makes C functions.
 
 mod calls;
 pub mod fmi2;
@@ -23,7 +23,7 @@ pub struct Abi<M>(PhantomData<M>);
 
 impl<M: Model> Abi<M> {
     /// # Safety
-    /// The instance is NULL, or one that this binary made and has not freed; nobody uses it now or later.
+    /// The instance is NULL, or one that this binary made and has not freed; it is not in use now and not used again.
     pub unsafe fn free_instance(instance: Instance) {
         // SAFETY: the caller's promise.
         unsafe { gate::close::<M>(instance) }
@@ -87,8 +87,8 @@ macro_rules! functions {
     )* };
 }
 
-/// Makes the crate the binary of an FMU: all C functions of FMI 2.0 and FMI 3.0 for one model, and one more,
-/// `fmu_description`, that hands out its description.
+/// Turns the crate into the binary of an FMU: it exports all C functions of FMI 2.0 and FMI 3.0 for one model, and
+/// `fmu_description`, which passes its description to `fmu build`.
 ///
 /// ```ignore
 /// fmu_export::export!(drive::PmsmPlant);

@@ -8,7 +8,7 @@ use std::slice;
 /// An array of `n` elements. NULL is an array of none.
 ///
 /// # Safety
-/// A non-NULL aligned `pointer` is readable for `n` elements, and nobody writes there during `'a`.
+/// A non-NULL aligned `pointer` is readable for `n` elements, and is not written during `'a`.
 #[inline]
 pub(crate) unsafe fn array<'a, T>(pointer: *const T, n: usize, name: &str) -> Result<&'a [T], Fault> {
     if n == 0 {
@@ -24,7 +24,7 @@ pub(crate) unsafe fn array<'a, T>(pointer: *const T, n: usize, name: &str) -> Re
 /// Room for `n` elements that the importer need not have initialized. NULL is room for none.
 ///
 /// # Safety
-/// A non-NULL aligned `pointer` is writable for `n` elements, and nobody else uses it during `'a`.
+/// A non-NULL aligned `pointer` is writable for `n` elements, and is not used elsewhere during `'a`.
 #[inline]
 pub(crate) unsafe fn room<'a, T>(pointer: *mut T, n: usize, name: &str) -> Result<&'a mut [MaybeUninit<T>], Fault> {
     if n == 0 {
@@ -33,7 +33,7 @@ pub(crate) unsafe fn room<'a, T>(pointer: *mut T, n: usize, name: &str) -> Resul
     if !fits(pointer, n) {
         return Err(refuse(pointer.is_null(), n, name));
     }
-    // SAFETY: not NULL, aligned, no larger than an allocation can be; ours by the caller's promise; uninitialized is fine.
+    // SAFETY: not NULL, aligned, no larger than an allocation can be; ours by the caller's promise; it may be uninitialized.
     Ok(unsafe { slice::from_raw_parts_mut(pointer.cast(), n) })
 }
 
@@ -46,14 +46,14 @@ pub(crate) unsafe fn place<'a, T>(pointer: *mut T, name: &str) -> Result<&'a mut
     if !fits(pointer, 1) {
         return Err(refuse(pointer.is_null(), 1, name));
     }
-    // SAFETY: not NULL, aligned; ours by the caller's promise; uninitialized is fine.
+    // SAFETY: not NULL, aligned; ours by the caller's promise; it may be uninitialized.
     Ok(unsafe { &mut *pointer.cast() })
 }
 
 /// A C string, `None` for NULL.
 ///
 /// # Safety
-/// A non-NULL `pointer` leads to bytes that end with a zero and stay as they are during `'a`.
+/// A non-NULL `pointer` points to bytes that end with a null byte and do not change during `'a`.
 pub(crate) unsafe fn text<'a>(pointer: *const c_char) -> Option<&'a CStr> {
     // SAFETY: not NULL; terminated by the caller's promise.
     (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) })

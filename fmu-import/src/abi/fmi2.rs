@@ -1,4 +1,4 @@
-//! FMI 2.0 for co-simulation, called (FMI 2.0.5, chapters 2.1 and 4.2).
+//! Calls of FMI 2.0 for co-simulation (FMI 2.0.5, chapters 2.1 and 4.2).
 
 use super::Loaded;
 use super::library::symbols;
@@ -8,14 +8,14 @@ use super::signatures::OfInstance;
 use super::signatures::v2::{
     Callbacks, DoStep, Get, GetStatus, Instantiate, Set, SetDebugLogging, SetupExperiment, calloc, free,
 };
-use crate::standard::{Experiment, Outcome, Refusal, Standard, judge, misfit, narrow};
+use crate::standard::{Experiment, Outcome, Standard, judge, misfit, narrow};
 use crate::value::Values;
 use model_description::BaseType;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::ops::ControlFlow;
-use std::ptr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicPtr;
+use std::{ptr, slice};
 
 symbols! {
     /// The functions of FMI 2.0 that this importer calls.
@@ -44,8 +44,8 @@ const CO_SIMULATION: c_int = 1;
 /// `fmi2Terminated`, a status kind.
 const TERMINATED: c_int = 3;
 
-/// A [`Logger`](super::signatures::v2::Logger). Keeps the message unformatted except for the two forms that need no formatter: `%%`, and `%s` alone with its
-/// text.
+/// A [`Logger`](super::signatures::v2::Logger). Keeps the message unformatted except for the two forms that need no
+/// formatter: `%%`, and `%s` alone with its text.
 unsafe extern "C" fn logger(
     environment: *mut c_void,
     _instance: *const c_char,
@@ -65,7 +65,7 @@ unsafe extern "C" fn logger(
 
 /// An instance. Owns the data that the FMU may keep pointers to.
 pub(super) struct Instance {
-    // First, so that the instance is freed while the library and the callbacks are still there.
+    // First, so that the instance is freed before the library and the callbacks.
     shared: SharedInstance,
     functions: Arc<Loaded<Functions>>,
     // FMI 2.0 before its revision 5 let the FMU keep the pointer to the callbacks.
@@ -100,23 +100,27 @@ impl Instance {
                 c_int::from(logging),
             )
         };
-        if component.is_null() {
-            return Err(Refusal::Null("fmi2Instantiate"));
-        }
         // SAFETY: the instance is of this library, which `functions` keeps loaded.
-        let shared = unsafe { SharedInstance::new(&functions.shared, component) };
+        let shared = unsafe { SharedInstance::new("fmi2Instantiate", &functions.shared, component) }?;
         Ok(Self { shared, functions, _callbacks: callbacks })
     }
 
-    fn get_one<T: Copy>(&self, name: &'static str, function: Get<T>, reference: u32, mut value: T) -> Outcome<T> {
-        // SAFETY: the instance is alive; one reference, room for one value.
-        let status = unsafe { function(self.shared.pointer(), &raw const reference, 1, &raw mut value) };
-        judge(name, status).map(|()| value)
+    /// Reads scalars, as many as both slices have.
+    fn read<T>(&self, name: &'static str, function: Get<T>, references: &[u32], values: &mut [T]) -> Outcome {
+        let n = references.len().min(values.len());
+        // SAFETY: the instance is alive; both slices have at least n elements.
+        judge(name, unsafe { function(self.shared.pointer(), references.as_ptr(), n, values.as_mut_ptr()) })
     }
 
-    fn set_one<T: Copy>(&self, name: &'static str, function: Set<T>, reference: u32, value: T) -> Outcome {
-        // SAFETY: the instance is alive; one reference, one value.
-        judge(name, unsafe { function(self.shared.pointer(), &raw const reference, 1, &raw const value) })
+    /// Writes scalars, as many as both slices have.
+    fn write<T>(&self, name: &'static str, function: Set<T>, references: &[u32], values: &[T]) -> Outcome {
+        let n = references.len().min(values.len());
+        // SAFETY: the instance is alive; both slices have at least n elements.
+        judge(name, unsafe { function(self.shared.pointer(), references.as_ptr(), n, values.as_ptr()) })
+    }
+
+    fn get_one<T: Copy>(&self, name: &'static str, function: Get<T>, reference: u32, mut value: T) -> Outcome<T> {
+        self.read(name, function, &[reference], slice::from_mut(&mut value)).map(|()| value)
     }
 }
 
@@ -126,20 +130,11 @@ impl Standard for Instance {
     }
 
     fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
-        let n = references.len().min(values.len());
-        // SAFETY: the instance is alive; both slices have at least n elements.
-        let status = unsafe {
-            (self.functions.api.get_real)(self.shared.pointer(), references.as_ptr(), n, values.as_mut_ptr())
-        };
-        judge("fmi2GetReal", status)
+        self.read("fmi2GetReal", self.functions.api.get_real, references, values)
     }
 
     fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        let n = references.len().min(values.len());
-        // SAFETY: as above.
-        let status =
-            unsafe { (self.functions.api.set_real)(self.shared.pointer(), references.as_ptr(), n, values.as_ptr()) };
-        judge("fmi2SetReal", status)
+        self.write("fmi2SetReal", self.functions.api.set_real, references, values)
     }
 
     fn get(&mut self, base: BaseType, reference: u32, _count: usize) -> Outcome<Values> {
@@ -166,17 +161,17 @@ impl Standard for Instance {
         let api = &self.functions.api;
         match (base, values) {
             (BaseType::Float64, Values::Reals(x)) if x.len() == 1 => {
-                self.set_one("fmi2SetReal", api.set_real, reference, x[0])
+                self.write("fmi2SetReal", api.set_real, &[reference], x)
             }
             (BaseType::Int32 | BaseType::Enumeration, Values::Integers(x)) if x.len() == 1 => {
-                self.set_one("fmi2SetInteger", api.set_integer, reference, narrow::<c_int>(base, x)?[0])
+                self.write("fmi2SetInteger", api.set_integer, &[reference], &narrow(base, x)?)
             }
             (BaseType::Boolean, Values::Booleans(x)) if x.len() == 1 => {
-                self.set_one("fmi2SetBoolean", api.set_boolean, reference, c_int::from(x[0]))
+                self.write("fmi2SetBoolean", api.set_boolean, &[reference], &[c_int::from(x[0])])
             }
             (BaseType::String, Values::Strings(x)) if x.len() == 1 => {
                 let text = CString::new(x[0].as_str()).map_err(|_| misfit(base, values))?;
-                self.set_one("fmi2SetString", api.set_string, reference, text.as_ptr())
+                self.write("fmi2SetString", api.set_string, &[reference], &[text.as_ptr()])
             }
             _ => Err(misfit(base, values)),
         }

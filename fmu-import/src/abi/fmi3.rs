@@ -1,4 +1,4 @@
-//! FMI 3.0 for co-simulation, called without event mode and early return (FMI 3.0.2, chapters 2.2 and 4.2).
+//! Calls of FMI 3.0 for co-simulation, without event mode and early return (FMI 3.0.2, chapters 2.2 and 4.2).
 
 use super::Loaded;
 use super::library::symbols;
@@ -61,7 +61,7 @@ unsafe extern "C" fn log_message(
 
 /// An instance.
 pub(super) struct Instance {
-    // First, so that the instance is freed while the library is still there.
+    // First, so that the instance is freed before the library.
     shared: SharedInstance,
     functions: Arc<Loaded<Functions>>,
     /// FMI 3.0 receives the times on entering initialization mode.
@@ -101,23 +101,25 @@ impl Instance {
                 ptr::null(),
             )
         };
-        if component.is_null() {
-            return Err(Refusal::Null("fmi3InstantiateCoSimulation"));
-        }
         // SAFETY: the instance is of this library, which `functions` keeps loaded.
-        let shared = unsafe { SharedInstance::new(&functions.shared, component) };
+        let shared = unsafe { SharedInstance::new("fmi3InstantiateCoSimulation", &functions.shared, component) }?;
         Ok(Self { shared, functions, experiment: Experiment { start: 0.0, stop: None, tolerance: None } })
     }
 
-    fn get_all<T: Clone>(&self, name: &'static str, f: Get<T>, reference: u32, mut values: Vec<T>) -> Outcome<Vec<T>> {
-        // SAFETY: the instance is alive; one reference, and room for as many values as said.
-        let status = unsafe { f(self.shared.pointer(), &raw const reference, 1, values.as_mut_ptr(), values.len()) };
-        judge(name, status).map(|()| values)
+    fn read<T>(&self, name: &'static str, f: Get<T>, references: &[u32], values: &mut [T]) -> Outcome {
+        let (n, count) = (references.len(), values.len());
+        // SAFETY: the instance is alive; both arrays have the lengths that are passed.
+        judge(name, unsafe { f(self.shared.pointer(), references.as_ptr(), n, values.as_mut_ptr(), count) })
     }
 
-    fn set_all<T>(&self, name: &'static str, f: Set<T>, reference: u32, values: &[T]) -> Outcome {
-        // SAFETY: the instance is alive; one reference, as many values as said.
-        judge(name, unsafe { f(self.shared.pointer(), &raw const reference, 1, values.as_ptr(), values.len()) })
+    fn write<T>(&self, name: &'static str, f: Set<T>, references: &[u32], values: &[T]) -> Outcome {
+        let (n, count) = (references.len(), values.len());
+        // SAFETY: the instance is alive; both arrays have the lengths that are passed.
+        judge(name, unsafe { f(self.shared.pointer(), references.as_ptr(), n, values.as_ptr(), count) })
+    }
+
+    fn get_all<T>(&self, name: &'static str, f: Get<T>, reference: u32, mut values: Vec<T>) -> Outcome<Vec<T>> {
+        self.read(name, f, &[reference], &mut values).map(|()| values)
     }
 }
 
@@ -153,18 +155,13 @@ impl Standard for Instance {
     }
 
     fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
-        let (n, api) = (references.len().min(values.len()), &self.functions.api);
-        // SAFETY: the instance is alive; both slices have at least n elements.
-        let status =
-            unsafe { (api.get_float64)(self.shared.pointer(), references.as_ptr(), n, values.as_mut_ptr(), n) };
-        judge("fmi3GetFloat64", status)
+        let n = references.len().min(values.len());
+        self.read("fmi3GetFloat64", self.functions.api.get_float64, &references[..n], &mut values[..n])
     }
 
     fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        let (n, api) = (references.len().min(values.len()), &self.functions.api);
-        // SAFETY: as above.
-        let status = unsafe { (api.set_float64)(self.shared.pointer(), references.as_ptr(), n, values.as_ptr(), n) };
-        judge("fmi3SetFloat64", status)
+        let n = references.len().min(values.len());
+        self.write("fmi3SetFloat64", self.functions.api.set_float64, &references[..n], &values[..n])
     }
 
     fn get(&mut self, base: BaseType, reference: u32, count: usize) -> Outcome<Values> {
@@ -200,26 +197,26 @@ impl Standard for Instance {
     fn set(&mut self, base: BaseType, reference: u32, values: &Values) -> Outcome {
         match (base, values) {
             (BaseType::Float64, Values::Reals(x)) => {
-                self.set_all("fmi3SetFloat64", self.functions.api.set_float64, reference, x)
+                self.write("fmi3SetFloat64", self.functions.api.set_float64, &[reference], x)
             }
             (BaseType::Float32, Values::Reals(x)) => {
-                #[expect(clippy::cast_possible_truncation, reason = "single precision is what the FMU takes")]
+                #[expect(clippy::cast_possible_truncation, reason = "the FMU takes single precision")]
                 let x: Vec<f32> = x.iter().map(|&x| x as f32).collect();
-                self.set_all("fmi3SetFloat32", function!(self.set_float32, "fmi3SetFloat32"), reference, &x)
+                self.write("fmi3SetFloat32", function!(self.set_float32, "fmi3SetFloat32"), &[reference], &x)
             }
             (BaseType::Boolean, Values::Booleans(x)) => {
                 let x: Vec<u8> = x.iter().map(|&x| u8::from(x)).collect();
-                self.set_all("fmi3SetBoolean", function!(self.set_boolean, "fmi3SetBoolean"), reference, &x)
+                self.write("fmi3SetBoolean", function!(self.set_boolean, "fmi3SetBoolean"), &[reference], &x)
             }
             (BaseType::String, Values::Strings(x)) => {
                 let texts: Result<Vec<CString>, _> = x.iter().map(|x| CString::new(x.as_str())).collect();
                 let texts = texts.map_err(|_| misfit(base, values))?;
                 let pointers: Vec<_> = texts.iter().map(|t| t.as_ptr()).collect();
-                self.set_all("fmi3SetString", function!(self.set_string, "fmi3SetString"), reference, &pointers)
+                self.write("fmi3SetString", function!(self.set_string, "fmi3SetString"), &[reference], &pointers)
             }
             (_, Values::Integers(x)) => by_integer_type!(
                 self, base, set_int8, set_uint8, set_int16, set_uint16, set_int32, set_uint32, set_int64, set_uint64,
-                "Set", |name, function| self.set_all(name, function, reference, &narrow(base, x)?),
+                "Set", |name, function| self.write(name, function, &[reference], &narrow(base, x)?),
                 else Err(misfit(base, values))
             ),
             _ => Err(misfit(base, values)),

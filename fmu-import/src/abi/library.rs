@@ -47,7 +47,7 @@ pub(super) fn load(path: &Path) -> Result<Library, Error> {
     unsafe { Library::new(path) }.map_err(|e| Error::file(path, reason(&e)))
 }
 
-/// The system's words; libloading keeps them one level down.
+/// The system's error message, which libloading wraps.
 fn reason(error: &libloading::Error) -> String {
     std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }
@@ -55,16 +55,16 @@ fn reason(error: &libloading::Error) -> String {
 type Sink = extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize);
 type Describe = unsafe extern "C" fn(sink: Sink, context: *mut c_void) -> c_int;
 
-/// The description that a library made with `fmu_export::export!` hands out.
+/// The description that a library made with `fmu_export::export!` returns.
 ///
 /// # Errors
-/// The file is no library for this platform, was not made by this exporter, or by another version of it.
+/// The file is not a library for this platform, or was not made by this version of the exporter.
 pub fn describe(path: &Path) -> Result<fmu_core::Description, Error> {
     extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {
         if context.is_null() || bytes.is_null() {
             return;
         }
-        // SAFETY: the context is the vector below, borrowed by nobody else during the call; the library promises `len`
+        // SAFETY: the context is the vector below, not borrowed elsewhere during the call; the library promises `len`
         // bytes.
         let (text, bytes) = unsafe { (&mut *context.cast::<Vec<u8>>(), std::slice::from_raw_parts(bytes, len)) };
         text.extend_from_slice(bytes);

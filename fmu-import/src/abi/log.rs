@@ -95,7 +95,7 @@ impl Log {
     }
 
     fn messages(&self) -> std::sync::MutexGuard<'_, Messages> {
-        // A callback never panics while it holds the lock; if it did, the messages would still be whole.
+        // A callback never panics while it holds the lock; if it did, the messages would still be intact.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -139,7 +139,7 @@ mod tests {
             unsafe { Log::receive(log.environment(), status, String::new(), text.into()) };
         }
         assert_eq!(log.reason().as_deref(), Some("h is negative"));
-        assert_eq!(log.reason(), None, "told once");
+        assert_eq!(log.reason(), None, "reported once");
         assert_eq!(log.take().len(), 3);
     }
 

@@ -1,4 +1,4 @@
-//! What both standards share: functions with one C type, and an instance that calls them.
+//! The part that both standards share: functions with one C type, and an instance that calls them.
 
 use super::signatures::{
     Deserialize, FreeInstance, InstancePointer, OfInstance, Serialize, SetState, StatePlace, StateSize,
@@ -97,10 +97,21 @@ pub(crate) struct SharedInstance {
 }
 
 impl SharedInstance {
+    /// The instance that the function `name` returned, or the refusal if it returned NULL.
+    ///
     /// # Safety
-    /// `pointer` is an instance of the library of these functions. The library stays loaded as long as this lives.
-    pub(super) unsafe fn new(functions: &Arc<SharedFunctions>, pointer: InstancePointer) -> Self {
-        Self { functions: functions.clone(), instance: Handle(pointer) }
+    /// `pointer` is an instance of the library of these functions, or NULL. The library stays loaded as long as this
+    /// lives.
+    pub(super) unsafe fn new(
+        name: &'static str,
+        functions: &Arc<SharedFunctions>,
+        pointer: InstancePointer,
+    ) -> Outcome<Self> {
+        if pointer.is_null() {
+            Err(Refusal::Null(name))
+        } else {
+            Ok(Self { functions: functions.clone(), instance: Handle(pointer) })
+        }
     }
 
     /// For a call while this is borrowed mutably.

@@ -333,7 +333,7 @@ pub fn name_and_path(text: &str) -> Result<(String, &Path)> {
         return Ok((name.into(), Path::new(path)));
     }
     let path = Path::new(text);
-    let stem = path.file_stem().ok_or_else(|| anyhow!("{text}: is no file"))?;
+    let stem = path.file_stem().ok_or_else(|| anyhow!("{text}: is not a file"))?;
     Ok((stem.to_string_lossy().into_owned(), path))
 }
 

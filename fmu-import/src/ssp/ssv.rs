@@ -18,7 +18,7 @@ pub struct Parameter {
 /// The values of a file.
 ///
 /// # Errors
-/// Says what is no parameter set.
+/// The text is not XML or not a parameter set.
 pub fn read(text: &str) -> Result<Vec<Parameter>, String> {
     parameters(&Element::parse(text).map_err(|e| e.to_string())?)
 }
@@ -26,11 +26,11 @@ pub fn read(text: &str) -> Result<Vec<Parameter>, String> {
 /// The values of a parameter set.
 ///
 /// # Errors
-/// The element is none, or a parameter has no name or no value.
+/// The element is not a parameter set, or a parameter has no name or no value.
 pub fn parameters(root: &Element) -> Result<Vec<Parameter>, String> {
     let local = |element: &Element| element.name.rsplit(':').next().unwrap_or_default().to_owned();
     if local(root) != "ParameterSet" {
-        return Err(format!("line {}: is no ParameterSet of SSP but {}", root.line, root.name));
+        return Err(format!("line {}: <{}> is not a ParameterSet of SSP", root.line, root.name));
     }
     let sets = root.children.iter().filter(|c| local(c) == "Parameters");
     sets.flat_map(|set| &set.children)
@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn what_is_no_parameter_set_is_refused() {
-        assert!(read("<a/>").unwrap_err().contains("no ParameterSet"));
+        assert!(read("<a/>").unwrap_err().contains("is not a ParameterSet"));
         assert!(
             read("<ParameterSet><Parameters>\n<Parameter/></Parameters></ParameterSet>")
                 .unwrap_err()

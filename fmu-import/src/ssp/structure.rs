@@ -1,5 +1,5 @@
-//! SystemStructure.ssd, read (SSP 1.0, 4). What it has that our co-simulation cannot do is an error with its line, so that
-//! nothing is left out in silence.
+//! SystemStructure.ssd, read (SSP 1.0, 4). A feature that our co-simulation does not support is an error with
+//! its line, so that nothing is ignored silently.
 
 use super::FMU_TYPE;
 use super::ssv::{self, Parameter};
@@ -16,9 +16,9 @@ pub struct Structure {
     pub stop: Option<f64>,
     /// Its FMUs.
     pub components: Vec<Component>,
-    /// What it has to the outside.
+    /// Connectors of the system itself.
     pub connectors: Vec<Connector>,
-    /// Who is connected to whom.
+    /// Connections between connectors.
     pub connections: Vec<Connection>,
     /// Values by names `component.variable`, and of the system's own connectors.
     pub bindings: Vec<Binding>,
@@ -59,7 +59,7 @@ pub struct Connection {
     pub start: End,
     /// The other.
     pub end: End,
-    /// Whether values are taken as they are whatever the units.
+    /// Whether values pass without conversion, whatever the units.
     pub no_conversion: bool,
     /// Line of the element.
     pub line: usize,
@@ -88,11 +88,11 @@ impl std::fmt::Display for End {
 pub struct Binding {
     /// File within the SSP, or the values themselves.
     pub values: Values,
-    /// Put before every name.
+    /// Prefix of every name.
     pub prefix: String,
 }
 
-/// Where values are.
+/// Location of values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
     /// In a file of the archive.
@@ -123,7 +123,7 @@ fn required(e: &Element, name: &str) -> Result<String, String> {
     e.get(name).map(str::to_owned).ok_or_else(|| at(e, format!("<{}> has no attribute {name}", e.name)))
 }
 
-/// What is there and not supported, with what to do.
+/// An unsupported feature, and the remedy.
 fn unsupported(e: &Element, what: &str) -> String {
     at(e, format!("<{}>: {what}", e.name))
 }
@@ -148,7 +148,7 @@ impl Structure {
         }
         let experiment = child(&root, "DefaultExperiment");
         let time = |name: &str| {
-            let read = |text: &str| parse_number(text).ok_or_else(|| format!("{name}={text:?} is no number"));
+            let read = |text: &str| parse_number(text).ok_or_else(|| format!("{name}={text:?} is not a number"));
             experiment
                 .and_then(|e| Some((e, e.get(name)?)))
                 .map(|(e, text)| read(text).map_err(|w| at(e, w)))
@@ -203,7 +203,7 @@ fn component(e: &Element) -> Result<Component, String> {
 /// A relative URI as a path within the archive.
 fn path(e: &Element, uri: &str) -> Result<String, String> {
     let bad =
-        || at(e, format!("source={uri:?} is no file within the archive, expected for example resources/plant.fmu"));
+        || at(e, format!("source={uri:?} is not a file within the archive, expected for example resources/plant.fmu"));
     let mut bytes = Vec::new();
     let mut rest = uri.strip_prefix("./").unwrap_or(uri).bytes();
     while let Some(byte) = rest.next() {
@@ -309,9 +309,9 @@ mod tests {
             ),
             (system("<SignalDictionaries/>"), "signal dictionaries"),
             (component(""), "line 2: <Component> has no attribute source"),
-            (component("source='../a.fmu'"), "is no file within the archive"),
-            (component("source='http://a/b.fmu'"), "is no file within the archive"),
-            (component("source='a%zz.fmu'"), "is no file within the archive"),
+            (component("source='../a.fmu'"), "is not a file within the archive"),
+            (component("source='http://a/b.fmu'"), "is not a file within the archive"),
+            (component("source='a%zz.fmu'"), "is not a file within the archive"),
             (component("source='a.fmu' implementation='ModelExchange'"), "expected CoSimulation"),
             (component("source='a.ssp' type='application/x-ssp-package'"), "type=\"application/x-ssp-package\""),
             (

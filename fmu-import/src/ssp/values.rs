@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 /// Sets the values on an instance, each judged by its FMU; `file` is named where one is wrong.
 ///
 /// # Errors
-/// File and line: there is no such variable, its unit is another, the value is none of its type, or the FMU refuses it.
+/// File and line: there is no such variable, its unit is another, the value is not of its type, or the FMU refuses it.
 pub fn set(system: &mut System, instance: &str, file: &str, parameters: &[Parameter]) -> Result<()> {
     for p in parameters {
         one(system, instance, p).with_context(|| format!("{file}: line {}", p.line))?;

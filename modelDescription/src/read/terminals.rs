@@ -11,7 +11,7 @@ use crate::xml::Element;
 /// Like [`read`](crate::read()), it does not judge: it accepts a variable that the FMU does not have.
 ///
 /// # Errors
-/// Names the line, what is there and what was expected.
+/// Gives the line, what was found and what was expected.
 pub fn read_terminals(xml: impl AsRef<[u8]>) -> Result<TerminalsAndIcons, Error> {
     let root = tree(xml.as_ref(), "fmiTerminalsAndIcons")?;
     let picture = root.child("GraphicalRepresentation");
@@ -84,6 +84,6 @@ fn area(e: &Element) -> Result<Area, Error> {
 
 fn coordinate(e: &Element, name: &str) -> Result<f64, Error> {
     required(e, name)?;
-    // `required` has answered for a missing one.
+    // `required` has already reported a missing one.
     number(e, name).map(Option::unwrap_or_default)
 }

@@ -44,7 +44,7 @@ pub(super) fn definitions(root: &Element, version: FmiVersion) -> Result<Vec<Typ
     let list = root.child("TypeDefinitions").map_or(&[][..], |list| &list.children);
     let mut definitions = Vec::new();
     for element in list {
-        // FMI 2.0 puts the base type inside the name, FMI 3.0 puts them into one element.
+        // In FMI 2.0 the base type is a child element; in FMI 3.0 it is the element's own name.
         let typed = match version {
             FmiVersion::V2 => base_type_2(element),
             FmiVersion::V3 => element.name.strip_suffix("Type").and_then(BaseType::from_word).map(|b| (b, element)),

@@ -36,7 +36,7 @@ pub(super) fn variables(
     Ok(variables)
 }
 
-/// A variable: its identity stands in `element`, what depends on its base type in `typed` (the same one in FMI 3.0).
+/// A variable: `element` has its identity, `typed` what depends on its base type (the same element in FMI 3.0).
 fn variable(
     element: &Element,
     base: BaseType,
@@ -49,7 +49,7 @@ fn variable(
     let declared_type = owned(typed, "declaredType");
     let declared = types.iter().find(|t| Some(&t.name) == declared_type.as_ref());
     let unit = owned(typed, "unit");
-    // A display unit belongs to a unit: the type's is of no use to a variable that has another unit.
+    // A display unit belongs to a unit: the type's does not suit a variable that has another unit.
     let same_unit = unit.is_none() || unit.as_ref() == declared.and_then(|t| t.unit.as_ref());
     let inherited = |of: fn(&TypeDefinition) -> &Option<String>| declared.and_then(|t| of(t).clone());
     let start_texts: Vec<String> = element.all("Start").filter_map(|e| owned(e, "value")).collect();

@@ -18,7 +18,7 @@ pub(super) fn structure(description: &Description, version: FmiVersion) -> Eleme
     for (v, numbers) in &numbering.variables {
         let output = v.causality == Causality::Output;
         if output {
-            // At a communication point no set changes an output, only fmi2DoStep and fmi3DoStep do: no dependencies.
+            // No dependencies: only fmi2DoStep and fmi3DoStep change outputs; setting an input does not.
             outputs.extend(numbers.iter().map(|&number| (number, Some(Vec::new()))));
         }
         // Every output is initial="calculated", hence an initial unknown, and so is a calculated parameter. FMI 2.0 wants

@@ -42,7 +42,7 @@ fn unit(name: &str, exponents: Exponents, factor: f64) -> Element {
     Element::new("Unit").with("name", name).children([base])
 }
 
-/// `shown = factor * value + offset`, in both standards: the other way round than the base unit's factor.
+/// `shown = factor * value + offset`, in both standards: the inverse direction of the base unit's factor.
 fn display_unit(name: &str, factor: f64, offset: f64) -> Element {
     Element::new("DisplayUnit")
         .with("name", name)

@@ -1,9 +1,9 @@
 //! `ModelVariables`: the variables in the order of their value references, and time: first in FMI 2.0, last in FMI 3.0.
-//! OMSimulator takes value references of FMI 3.0 for places in the list, counted from 1 (ComponentFMU3CS.cpp,
-//! `initializeDependencyGraph_outputs`): with time, whose value reference is 0, at the end they are.
+//! OMSimulator treats value references of FMI 3.0 as positions in the list, counted from 1 (ComponentFMU3CS.cpp,
+//! `initializeDependencyGraph_outputs`). With time, whose value reference is 0, at the end, the two agree.
 //!
-//! FMI 2.0.5, 2.2.7; FMI 3.0.2, 2.4.7. Unit and display unit stand on the variable as well as in its type definition:
-//! both standards allow it, and importers that do not look type definitions up find them there.
+//! FMI 2.0.5, 2.2.7; FMI 3.0.2, 2.4.7. Unit and display unit are written on the variable as well as in its type
+//! definition: both standards allow it, and importers that ignore type definitions need it.
 
 use crate::number;
 use crate::version::FmiVersion;
@@ -82,7 +82,7 @@ fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> El
     let (causality, initial) = match v.causality {
         Causality::Parameter => ("parameter", Some("exact")),
         Causality::CalculatedParameter => ("calculatedParameter", Some("calculated")),
-        // FMI 2.0 forbids `initial` on an input, FMI 3.0 allows only the value it has without.
+        // FMI 2.0 forbids `initial` on an input, FMI 3.0 allows only the default.
         Causality::Input => ("input", None),
         Causality::Output => ("output", Some("calculated")),
         Causality::Local => ("local", Some("calculated")),
@@ -120,7 +120,7 @@ fn type_attributes(v: &Variable) -> Vec<(String, String)> {
                 .with_some("unbounded", v.unbounded.then(|| "true".to_owned()))
         }
         VariableKind::Integer => {
-            // xs:int: rounded inwards, and left out where every integer is inside.
+            // xs:int: rounded inwards, and omitted if every integer is inside.
             let representable = |x: &f64| x.abs() <= f64::from(i32::MAX);
             element
                 .with_some("min", v.min.map(f64::ceil).filter(representable).map(number::format))

@@ -2,7 +2,7 @@
 
 use model_description::{BaseType, FmiVersion};
 
-/// The values of a call, as the bytes that cross the interface; a few more follow, to see whether they are touched.
+/// The values of a call, as the bytes that cross the interface; extra bytes follow, which show whether the FMU writes past the values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Buffer {
     pub(super) words: Vec<u64>,
@@ -40,7 +40,7 @@ impl Buffer {
         (0..self.count).map(|i| (0..self.width).map(|k| byte(i * self.width + k) << (8 * k)).sum()).collect()
     }
 
-    /// Whether nothing was written behind the values.
+    /// Whether nothing was written past the values.
     pub fn intact(&self) -> bool {
         self.words[(self.count * self.width).div_ceil(8)..].iter().all(|w| *w == CANARY)
     }

@@ -20,7 +20,7 @@ pub enum Interface {
 
 /// The arguments of an instantiation.
 #[derive(Clone, Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "the arguments of the standards are")]
+#[expect(clippy::struct_excessive_bools, reason = "the arguments of the standards")]
 pub struct Arguments {
     /// Instance name.
     pub name: Option<CString>,
@@ -36,18 +36,18 @@ pub struct Arguments {
     pub callbacks: bool,
     /// Whether there are memory functions (FMI 2.0 only).
     pub memory: bool,
-    /// Whether the struct of callbacks stays as it is after the call (FMI 2.0 only).
+    /// Whether the struct of callbacks stays valid after the call (FMI 2.0 only).
     pub lasting: bool,
-    /// Logging on.
+    /// Whether logging is on.
     pub logging: bool,
-    /// Event mode used (FMI 3.0 only).
+    /// Whether event mode is used (FMI 3.0 only).
     pub event_mode: bool,
-    /// The environment, which only comes back.
+    /// The environment, which the callbacks receive unchanged.
     pub environment: usize,
 }
 
 impl Raw {
-    /// Makes an instance; `None` for NULL.
+    /// Creates an instance; `None` for NULL.
     ///
     /// # Errors
     /// The function is missing.
@@ -73,7 +73,7 @@ impl Raw {
         environment: *mut c_void,
     ) -> Result<*mut c_void, String> {
         let f: v2::Instantiate = self.function("Instantiate").ok_or("the function fmi2Instantiate is missing")?;
-        // Kept for ever: an FMU made before FMI 2.0.5 may keep the pointer.
+        // Leaked on purpose: an FMU made before FMI 2.0.5 may keep the pointer.
         let callbacks = Box::leak(Box::new(v2::Callbacks {
             logger: b.logger.then_some(logger2::<false>),
             allocate: b.memory.then_some(allocate),
@@ -86,8 +86,8 @@ impl Raw {
         // SAFETY: texts are NULL or C strings that outlive the call; the struct lives on.
         let made = unsafe { f(texts[0], kind, texts[1], texts[2], given, 0, c_int::from(b.logging)) };
         if !b.lasting {
-            // Still a struct of good functions: an FMU that looks again is found out and not crashed.
-            // SAFETY: ours, and nobody else's while no call is under way.
+            // The struct still has valid functions: an FMU that reads it again is detected and does not crash.
+            // SAFETY: ours, and not in use, since no call is in progress.
             unsafe { (*ptr::from_mut(callbacks)).logger = Some(logger2::<true>) };
         }
         Ok(made)

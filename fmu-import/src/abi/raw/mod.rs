@@ -1,9 +1,9 @@
 //! Raw calls of an FMU's binary, for the checker: every function of both standards, with arguments that a well-behaved
 //! importer would never pass.
 //!
-//! Arrays are as long as the count that goes with them, or NULL, and a function is named by a type whose values all have one C
-//! signature, so no call from here passes memory or arguments that the standard's function cannot take. What the FMU does with
-//! NULL, a freed instance or a call in the wrong state is what the checker wants to know; it calls from a process of its own.
+//! Arrays are as long as the count that goes with them, or NULL, and a function is named by a type whose values all have
+//! one C signature, so no call from here passes memory or arguments that the standard's function cannot take. The checker
+//! tests how the FMU reacts to NULL, a freed instance or a call in the wrong state; it calls from a process of its own.
 
 mod buffer;
 mod callbacks;
@@ -87,7 +87,7 @@ impl Raw {
         crate::abi::library::load(path).map(|library| Self { library, version }).map_err(|e| e.cause())
     }
 
-    /// Loads a binary with its symbols visible to all that are loaded later, and resolved at once.
+    /// Loads a binary with its symbols visible to all libraries loaded later, and resolved at once.
     ///
     /// # Errors
     /// The error message of the system.
@@ -99,7 +99,7 @@ impl Raw {
         library.map(|library| Self { library: library.into(), version }).map_err(|e| e.to_string())
     }
 
-    /// Unloads it.
+    /// Unloads the binary.
     ///
     /// # Errors
     /// The error message of the system.
@@ -125,7 +125,7 @@ impl Raw {
         self.function::<OfInstance>(name).is_some()
     }
 
-    /// A function by its name without prefix. The type must be that of the standard, which every caller below sees to.
+    /// A function by its name without prefix. The type must be that of the standard, which every caller below ensures.
     fn function<T: Copy>(&self, name: &str) -> Option<T> {
         // SAFETY: only copied here; called below under the type that the standard gives this name.
         unsafe { self.library.get::<T>(self.name(name)) }.ok().map(|f| *f)
@@ -182,8 +182,10 @@ impl Raw {
         })
     }
 
-    /// A getter: `references` and `values` may be NULL, and `n` and `n_values` be other numbers than theirs, as long as
-    /// there is room. `n_values` is FMI 3.0's.
+    /// A getter: `references` and `values` may be NULL; `n` and `n_values` (FMI 3.0 only) may be less than their lengths.
+    ///
+    /// # Panics
+    /// An array is shorter than its count.
     pub fn get(
         &self,
         instance: Handle,
@@ -193,11 +195,13 @@ impl Raw {
         values: Option<&mut Buffer>,
         n_values: usize,
     ) -> Option<Status> {
-        let (references, values) = checked(references, n, values, n_values.max(n));
         self.transfer(&format!("Get{}", type_name(base, self.version)), instance, references, n, values, n_values)
     }
 
     /// A setter, as [`get`](Self::get).
+    ///
+    /// # Panics
+    /// As [`get`](Self::get).
     pub fn set(
         &self,
         instance: Handle,
@@ -207,7 +211,6 @@ impl Raw {
         values: Option<&mut Buffer>,
         n_values: usize,
     ) -> Option<Status> {
-        let (references, values) = checked(references, n, values, n_values.max(n));
         self.transfer(&format!("Set{}", type_name(base, self.version)), instance, references, n, values, n_values)
     }
 
@@ -215,12 +218,19 @@ impl Raw {
         &self,
         name: &str,
         instance: Handle,
-        references: *const u32,
+        references: Option<&[u32]>,
         n: usize,
-        values: *mut c_void,
+        values: Option<&mut Buffer>,
         n_values: usize,
     ) -> Option<Status> {
-        // SAFETY: the standards' types, whatever the values are: they only differ in what the pointer leads to.
+        assert!(references.is_none_or(|r| n <= r.len()), "there are fewer references than n");
+        let references = references.map_or(ptr::null(), <[u32]>::as_ptr);
+        let values = values.map_or(ptr::null_mut(), |buffer| {
+            assert!(n_values.max(n) <= buffer.capacity(), "there are fewer values than n_values");
+            buffer.words.as_mut_ptr().cast::<c_void>()
+        });
+        // SAFETY: the standards' types, whatever the values are: they only differ in what the pointer points to. The
+        // arrays are NULL or have the lengths that are passed.
         Some(unsafe {
             match self.version {
                 FmiVersion::V2 => self.function::<v2::Get<c_void>>(name)?(instance.pointer(), references, n, values),
@@ -307,7 +317,7 @@ impl Raw {
     /// `SetDebugLogging`; `categories` may be NULL, and an element of it.
     ///
     /// # Panics
-    /// The categories are fewer than said.
+    /// There are fewer than `n` categories.
     pub fn debug_logging(
         &self,
         instance: Handle,
@@ -318,7 +328,7 @@ impl Raw {
         let list: Vec<*const c_char> =
             categories.unwrap_or_default().iter().map(|c| c.map_or(ptr::null(), CStr::as_ptr)).collect();
         let pointer = if categories.is_some() { list.as_ptr() } else { ptr::null() };
-        assert!(categories.is_none() || n <= list.len(), "the array is shorter than said");
+        assert!(categories.is_none() || n <= list.len(), "the array has fewer than n elements");
         // SAFETY: the standards' types; as many strings as said, or NULL.
         Some(unsafe {
             match self.version {
@@ -352,20 +362,4 @@ impl Raw {
         let status = unsafe { f(instance.pointer(), a, b, c, d, e, &raw mut next) };
         Some((status, flags[0] != 0, flags[1] != 0))
     }
-}
-
-/// Pointers to arrays that are at least as long as the counts.
-fn checked(
-    references: Option<&[u32]>,
-    n: usize,
-    values: Option<&mut Buffer>,
-    count: usize,
-) -> (*const u32, *mut c_void) {
-    assert!(references.is_none_or(|r| n <= r.len()), "the references are fewer than said");
-    let references = references.map_or(ptr::null(), <[u32]>::as_ptr);
-    let values = values.map_or(ptr::null_mut(), |buffer| {
-        assert!(count <= buffer.capacity(), "the values are fewer than said");
-        buffer.words.as_mut_ptr().cast()
-    });
-    (references, values)
 }

@@ -36,12 +36,12 @@ names! {
 }
 
 names! {
-    /// Functions that tell a constant text.
+    /// Functions that return a constant text.
     Text { GetVersion GetTypesPlatform }
 }
 
 names! {
-    /// Functions that tell how an asynchronous step goes (FMI 2.0).
+    /// Functions that report on an asynchronous step (FMI 2.0).
     StepStatus { GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus GetStringStatus }
 }
 

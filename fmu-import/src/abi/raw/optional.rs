@@ -1,4 +1,4 @@
-//! Functions of optional capabilities, which the checker calls to see them refused where an FMU has no such capability.
+//! Functions of optional capabilities: the checker tests that an FMU without the capability refuses them.
 
 use super::super::log::Status;
 use super::super::signatures::{v2, v3};
@@ -26,7 +26,7 @@ impl Raw {
         Some((status, values))
     }
 
-    /// A function of an optional capability, with arguments that are good as far as the instance allows: one variable, numbers
+    /// A function of an optional capability, with arguments that are as valid as the instance allows: one variable, numbers
     /// of 0, room for results.
     pub fn optional(&self, function: Optional, instance: Handle, reference: u32) -> Option<Status> {
         use Optional as O;

@@ -7,7 +7,7 @@ use model_description::FmiVersion;
 use std::ptr;
 
 impl Raw {
-    /// The names of the functions of FMU states, which the standards spell apart.
+    /// The names of the functions of FMU states, which the standards spell differently.
     pub fn state_name(&self, name: &str) -> String {
         match (self.version, name) {
             (FmiVersion::V2, "Deserialize") => "DeSerializeFMUstate".into(),
@@ -57,7 +57,7 @@ impl Raw {
         Some((unsafe { f(instance.pointer(), state.pointer(), &raw mut size) }, size))
     }
 
-    /// `SerializeFMUState` into a buffer of this many bytes; the bytes behind it must stay as they are.
+    /// `SerializeFMUState` into a buffer of this many bytes; the bytes past it must not change.
     pub fn serialize(&self, instance: Handle, state: SavedState, size: usize) -> Option<(Status, Vec<u8>, bool)> {
         let f: Serialize = self.function(&self.state_name("Serialize"))?;
         let mut bytes = vec![0xc5_u8; size + 256];
@@ -71,11 +71,11 @@ impl Raw {
     /// `DeserializeFMUState`; `None` passes NULL with this size.
     ///
     /// # Panics
-    /// The bytes are fewer than said.
+    /// There are fewer than `size` bytes.
     pub fn deserialize(&self, instance: Handle, bytes: Option<&[u8]>, size: usize) -> Option<(Status, SavedState)> {
         let (f, mut state): (Deserialize, StatePointer) =
             (self.function(&self.state_name("Deserialize"))?, ptr::null_mut());
-        assert!(bytes.is_none_or(|b| size <= b.len()), "the bytes are fewer than said");
+        assert!(bytes.is_none_or(|b| size <= b.len()), "there are fewer bytes than the size");
         let pointer = bytes.map_or(ptr::null(), <[u8]>::as_ptr);
         // SAFETY: the standards' type; as many bytes as said, or NULL.
         let status = unsafe { f(instance.pointer(), pointer, size, &raw mut state) };

@@ -73,7 +73,7 @@ impl Entry {
 
 /// An estimator and its drive.
 #[derive(Clone)]
-pub struct Subject {
+pub struct Candidate {
     /// The row.
     pub entry: Entry,
     /// The signal from which it finds the rotor.
@@ -84,8 +84,8 @@ pub struct Subject {
     pub torque: f64,
 }
 
-impl Subject {
-    /// The subject of a row.
+impl Candidate {
+    /// The candidate of a row.
     pub fn new(entry: Entry) -> Self {
         let class = entry.kind.class();
         let (mut pair, torque) = match class {

@@ -1,0 +1,125 @@
+//! Parameters that do not fit together are refused before the start: with names from the table, values and the reason.
+#![allow(missing_docs, non_snake_case)]
+
+use drive::SensorlessController;
+use drive::control::start::StartMode;
+use drive::control::tables::{ControllerParameters, PARAMETERS};
+use drive::estimator::Kind;
+use drive::estimator::tracker::TrackerKind;
+use drive::motor::Motor;
+use fmu_core::Model;
+use std::f64::consts::TAU;
+
+/// A controller that starts with the 2.2 kW machine.
+fn controller(kind: Kind) -> SensorlessController {
+    let mut controller = SensorlessController::default();
+    let par = &mut controller.parameters;
+    (par.estimator, par.motor, par.s_2) = (kind, Motor::IPMSM_2_2_KW, 40.0);
+    (par.limit.i, par.limit.i_q) = (15.0, 15.0);
+    par.current.reference_feed_forward = kind == Kind::VoltageFeedback;
+    controller.validate().unwrap();
+    controller
+}
+
+/// What `set` makes of a working controller is refused; the message holds all `parts`, and names variables only by
+/// their names in the table.
+fn refused(kind: Kind, set: impl FnOnce(&mut ControllerParameters), parts: &[&str]) {
+    let mut controller = controller(kind);
+    set(&mut controller.parameters);
+    let fault = controller.validate().expect_err("must be refused");
+    let message = fault.message();
+    for part in parts {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    let words: Vec<&str> = message.split_whitespace().map(|word| word.trim_end_matches([':', ',', ';', '.'])).collect();
+    let names: Vec<String> = (0..PARAMETERS.len()).filter_map(|i| PARAMETERS.locate(i)).map(|found| found.0).collect();
+    for (word, next) in words.iter().zip(words.iter().skip(1).chain(&[""])) {
+        let dotted = word.contains('.') && word.starts_with(|first: char| first.is_alphabetic()) && *word != "kg.m2";
+        assert!(!(dotted || *next == "=") || names.iter().any(|name| name == word), "{word} is no variable: {message}");
+    }
+}
+
+#[test]
+fn injection_without_saliency() {
+    for &kind in Kind::ALL.iter().filter(|kind| kind.class().injects()) {
+        refused(kind, |p| p.motor.L_q = p.motor.L_d, &["motor.L_d = 0.036 H", "motor.L_q = 0.036 H", "differ"]);
+    }
+}
+
+#[test]
+fn a_carrier_off_the_sample_grid() {
+    for kind in [Kind::RotatingInjection, Kind::PulsatingInjection] {
+        for frequency in [1100.0, 2500.0, 200.0, 1e9, 1e-9] {
+            let parts = ["carrier.frequency = ", "T_s = 0.0001 s", "whole number from 6 to 32"];
+            refused(kind, |p| p.estimators.carrier.frequency = TAU * frequency, &parts);
+        }
+    }
+    refused(
+        Kind::SquareWaveInjection,
+        |p| p.estimators.square_wave.samples = 3,
+        &["square_wave.samples = 3", "2 or 4"],
+    );
+}
+
+#[test]
+fn bandwidths_and_speeds_in_the_wrong_order() {
+    let same = |p: &mut ControllerParameters| p.estimators.hybrid.w_high = p.estimators.hybrid.w_low;
+    refused(Kind::Hybrid, same, &["hybrid.w_high = ", "above hybrid.w_low = "]);
+    let fast = |p: &mut ControllerParameters| p.estimators.tracker.bandwidth = 400.0;
+    refused(Kind::ExtendedEmf, fast, &["tracker.bandwidth = 400 rad/s", "a third of emf.bandwidth = "]);
+}
+
+#[test]
+fn a_load_observer_without_inertia() {
+    for &kind in Kind::ALL {
+        let weightless = |p: &mut ControllerParameters| {
+            (p.estimators.tracker.kind, p.J) = (TrackerKind::MechanicalObserver, 0.0);
+        };
+        refused(kind, weightless, &["mechanics.J = 0 kg.m2", "tracker.kind = 2 (MechanicalObserver)"]);
+    }
+}
+
+#[test]
+fn voltage_feedback_in_another_current_loop() {
+    let parts = |forward, active| {
+        [
+            format!("current.reference_feed_forward = {forward}"),
+            format!("current.active_resistance = {active}"),
+            "estimator = 7 (VoltageFeedback)".into(),
+        ]
+    };
+    for (forward, active) in [(false, false), (true, true), (false, true)] {
+        let set = |p: &mut ControllerParameters| {
+            (p.current.reference_feed_forward, p.current.active_resistance) = (forward, active);
+        };
+        refused(Kind::VoltageFeedback, set, &parts(forward, active).each_ref().map(String::as_str));
+    }
+}
+
+#[test]
+fn starts_that_cannot_work() {
+    for &kind in Kind::ALL.iter().filter(|kind| !kind.class().injects()) {
+        let estimator = format!("estimator = {} ({})", kind as i32, kind.name());
+        refused(kind, |p| p.start.mode = StartMode::Injection, &["start.mode = 3 (Injection)", &estimator]);
+    }
+    let injection = |set: fn(&mut ControllerParameters), parts: &[&str]| {
+        let set = |p: &mut ControllerParameters| {
+            p.start.mode = StartMode::Injection;
+            set(p);
+        };
+        refused(Kind::SquareWaveInjection, set, parts);
+    };
+    let pulses = ["saturation.s_2 = 0 A/Wb2", "polarity.voltage = 150 V", "polarity.samples = 8", "T_s = 0.0001 s"];
+    injection(|p| p.s_2 = 0.0, &pulses);
+    injection(|p| p.polarity.voltage = 5.0, &["saturation.s_2 = 40 A/Wb2", "polarity.voltage = 5 V"]);
+    injection(|p| p.polarity.samples = 80, &["polarity.samples = 80", "above limit.i = 15 A"]);
+}
+
+#[test]
+fn currents_above_the_limit() {
+    for &kind in Kind::ALL {
+        refused(kind, |p| p.zero_speed.i_0 = 16.0, &["zero_speed.i_0 = 16 A", "at most limit.i = 15 A"]);
+        let strong = |p: &mut ControllerParameters| (p.start.mode, p.start.i) = (StartMode::CurrentFrequency, 16.0);
+        refused(kind, strong, &["start.i = 16 A", "at most limit.i = 15 A"]);
+    }
+}
