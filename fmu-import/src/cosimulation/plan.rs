@@ -155,9 +155,9 @@ impl Plan {
 
     /// The name of an FMU of which a process can have one instance only, if there is one: then there is one worker.
     pub fn only_one_instance(&self) -> Option<&str> {
-        let interface = |part: &Part| part.description().co_simulation.as_ref();
-        let only_one = |interface: &CoSimulation| interface.flag("canBeInstantiatedOnlyOncePerProcess");
-        self.parts.0.iter().find(|part| interface(part).is_some_and(only_one)).map(|part| part.name.as_str())
+        let flag = |interface: &CoSimulation| interface.flag("canBeInstantiatedOnlyOncePerProcess");
+        let only_one = |part: &&Part| part.description().co_simulation.iter().any(flag);
+        self.parts.0.iter().find(only_one).map(|part| part.name.as_str())
     }
 
     /// Someone who runs this plan, for one thread.
