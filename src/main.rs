@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 use clap::{Parser, Subcommand};
-use fmu::commands::{build, compare, merge, reproduce, simulate, ssp, tune};
+use fmu::commands::{build, compare, merge, reproduce, simulate, ssp, sweep, tune};
 use fmu_check::{command as check, probe};
 use std::process::ExitCode;
 
@@ -22,6 +22,7 @@ enum Command {
     Build(build::Build),
     Merge(merge::Merge),
     Simulate(simulate::Simulate),
+    Sweep(sweep::Sweep),
     Check(check::Check),
     Reproduce(reproduce::Reproduce),
     Compare(compare::Compare),
@@ -29,6 +30,8 @@ enum Command {
     Ssp(ssp::Ssp),
     #[command(hide = true)]
     Probe(probe::ProbeArguments),
+    #[command(hide = true)]
+    SweepWorker,
 }
 
 fn main() -> ExitCode {
@@ -41,6 +44,8 @@ fn main() -> ExitCode {
         }),
         Command::Merge(args) => merge::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Simulate(args) => simulate::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Sweep(args) => sweep::run(&args).map(|good| ExitCode::from(u8::from(!good))),
+        Command::SweepWorker => fmu_sweep::isolate::serve().map(|()| ExitCode::SUCCESS).map_err(Into::into),
         Command::Check(args) => check::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),

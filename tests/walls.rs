@@ -11,13 +11,14 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-export", &["fmu-core"]),
     ("model-description", &["fmu-core"]),
     ("fmu-import", &["fmu-core", "model-description"]),
+    ("fmu-sweep", &["fmu-import", "model-description"]),
     ("fmu-check", &["fmu-import", "model-description"]),
     ("drive", &["fmu-core"]),
     ("drive-study", &["drive", "fmu-core", "fmu-import"]),
     ("pmsm-plant", &["drive", "fmu-export"]),
     ("sensorless-controller", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
-    ("fmu", &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "model-description"]),
+    ("fmu", &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "fmu-sweep", "model-description"]),
 ];
 
 fn root() -> &'static Path {
@@ -63,13 +64,27 @@ fn every_arrow_goes_one_way() {
     assert_eq!(others, ["faulty-fmu", "own-fmu"], "a new crate needs its row");
 }
 
+fn known_to(name: &str) -> BTreeSet<String> {
+    let tree = cargo(&["tree", "--offline", "-p", name, "-e", "normal", "--prefix", "none"]);
+    tree.lines().filter_map(|line| line.split(' ').next()).map(str::to_owned).collect()
+}
+
 #[test]
 fn the_checker_knows_no_motor_and_no_plotter() {
-    let tree = cargo(&["tree", "--offline", "-p", "fmu-check", "-e", "normal", "--prefix", "none"]);
-    let known: BTreeSet<&str> = tree.lines().filter_map(|line| line.split(' ').next()).collect();
+    let known = known_to("fmu-check");
     assert!(known.contains("fmu-import") && known.contains("quick-xml"), "{known:?}");
     for foreign in ["drive", "drive-study", "plotters", "nalgebra", "resvg", "libm"] {
         assert!(!known.contains(foreign), "fmu-check depends on {foreign}");
+    }
+}
+
+/// A thread pool that outlives a call does not survive a fork, and random numbers come from the row.
+#[test]
+fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
+    let known = known_to("fmu-sweep");
+    assert!(known.contains("fmu-import") && known.contains("libm"), "{known:?}");
+    for foreign in ["drive", "drive-study", "plotters", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
+        assert!(!known.contains(foreign), "fmu-sweep depends on {foreign}");
     }
 }
 

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use zip::ZipArchive;
 
 /// Maximum number of unpacked bytes, also for an archive whose headers claim less.
@@ -17,11 +18,12 @@ const ENTRIES: usize = 100_000;
 
 /// An FMU's archive, checked, with its description read.
 pub(super) struct Archive {
-    path: PathBuf,
+    /// Path of the `.fmu` file.
+    pub(super) path: PathBuf,
     zip: ZipArchive<File>,
     names: Vec<String>,
     /// Its modelDescription.xml.
-    pub(super) description: ModelDescription,
+    pub(super) description: Arc<ModelDescription>,
 }
 
 impl Archive {
@@ -37,7 +39,7 @@ impl Archive {
         let xml = xml.ok_or_else(|| wrong(&"has no modelDescription.xml"))?;
         let xml = String::from_utf8(xml).map_err(|_| wrong(&"modelDescription.xml is not UTF-8"))?;
         let description = model_description::read(&xml).map_err(|e| wrong(&format!("modelDescription.xml: {e}")))?;
-        Ok(Self { path: path.into(), zip, names, description })
+        Ok(Self { path: path.into(), zip, names, description: Arc::new(description) })
     }
 
     /// Terminals and icons, if there are any.

@@ -44,6 +44,18 @@ impl Error {
         Self::Usage { instance: instance.into(), cause: one_line(&cause.to_string()) }
     }
 
+    /// The same error with what was tried when it happened.
+    pub(crate) fn during(self, what: &str) -> Self {
+        match self {
+            Self::Call { instance, function, status, message } => {
+                let message = Some(message.map_or_else(|| what.to_owned(), |said| format!("{what}: {said}")));
+                Self::Call { instance, function, status, message }
+            }
+            Self::Usage { instance, cause } => Self::usage(&instance, format!("{what}: {cause}")),
+            Self::File { .. } => self,
+        }
+    }
+
     /// The cause without file, instance or function.
     pub(crate) fn cause(&self) -> String {
         match self {

@@ -63,7 +63,7 @@ impl Instance {
     /// There is none of this name, or the FMU refuses.
     pub fn get(&mut self, name: &str) -> Result<Values, Error> {
         let (base, reference, count) = self.place(name)?;
-        self.call(|s| s.get(base, reference, count))
+        self.read(base, reference, count)
     }
 
     /// Writes a variable.
@@ -75,6 +75,16 @@ impl Instance {
         if values.len() != count {
             return Err(Error::usage(&self.name, format!("{name} has {count} elements, not {}", values.len())));
         }
+        self.write(base, reference, values)
+    }
+
+    /// Reads a variable whose place is known.
+    pub(super) fn read(&mut self, base: BaseType, reference: u32, count: usize) -> Result<Values, Error> {
+        self.call(|s| s.get(base, reference, count))
+    }
+
+    /// Writes a variable whose place and size are known.
+    pub(super) fn write(&mut self, base: BaseType, reference: u32, values: &Values) -> Result<(), Error> {
         self.call(|s| s.set(base, reference, values))
     }
 
@@ -83,12 +93,16 @@ impl Instance {
     /// # Errors
     /// As [`set`](Self::set), or the text is no value of the variable's type.
     pub fn set_text(&mut self, name: &str, text: &str) -> Result<(), Error> {
-        let variable = self.variable(name)?;
-        let definition = variable.declared_type.as_ref().and_then(|t| self.description.type_definition(t));
-        let items: Vec<_> =
-            definition.map(|d| d.items.iter().map(|i| (i.name.clone(), i.value)).collect()).unwrap_or_default();
-        let values = Values::parse(text, variable, &items).map_err(|cause| Error::usage(&self.name, cause))?;
+        let values = self.parse(name, text)?;
         self.set(name, &values)
+    }
+
+    /// The value of a variable that a user writes as in [`set_text`](Self::set_text).
+    ///
+    /// # Errors
+    /// There is no variable of this name, or the text is no value of its type.
+    pub fn parse(&self, name: &str, text: &str) -> Result<Values, Error> {
+        Values::read(text, self.variable(name)?, &self.description).map_err(|cause| Error::usage(&self.name, cause))
     }
 
     /// Reads real scalars by value reference: the fast way.
@@ -238,6 +252,17 @@ impl Instance {
         count.ok_or_else(|| Error::usage(&self.name, format!("the size of {} is not known", variable.name)))
     }
 
+    /// Whether a call has returned the status Fatal.
+    pub(super) fn is_dead(&self) -> bool {
+        self.dead
+    }
+
+    /// Forgets the instance without freeing it: another one of its binary has returned the status Fatal.
+    pub(super) fn abandon(&mut self) {
+        self.standard.shared().abandon();
+        self.dead = true;
+    }
+
     /// The one way to the FMU.
     #[inline]
     fn call<T>(&mut self, call: impl FnOnce(&mut dyn Standard) -> Outcome<T>) -> Result<T, Error> {
@@ -246,8 +271,7 @@ impl Instance {
         }
         call(&mut *self.standard).map_err(|refusal| {
             if matches!(refusal, Refusal::Status(_, Status::FATAL)) {
-                self.standard.shared().abandon();
-                self.dead = true;
+                self.abandon();
             }
             explain(&self.name, refusal, self.log.reason())
         })

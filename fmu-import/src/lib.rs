@@ -49,7 +49,7 @@ use standard::Refusal;
 use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The description of an `.fmu` file, and all its files.
 ///
@@ -58,7 +58,7 @@ use std::sync::Arc;
 pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u8>>), Error> {
     let mut archive = Archive::open(path)?;
     let files = archive.files()?;
-    Ok((archive.description, files))
+    Ok((Arc::unwrap_or_clone(archive.description), files))
 }
 
 /// An FMU with its description and its loaded binary. Every opening loads a copy of the binary of its own; clones share it.
@@ -68,6 +68,7 @@ pub struct Fmu {
     description: Arc<ModelDescription>,
     terminals: Arc<Result<Option<TerminalsAndIcons>, Error>>,
     functions: Functions,
+    archive: Arc<Mutex<Archive>>,
     /// Path of the unpacked folder `resources`, which is only there if the archive has one.
     resources: PathBuf,
 }
@@ -79,17 +80,29 @@ impl Fmu {
     /// The file is missing, no archive, has no readable description, no co-simulation interface, no binary for this
     /// platform, or a binary that lacks a function.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
-        let path = path.as_ref();
-        let mut archive = Archive::open(path)?;
+        Self::load(&Arc::new(Mutex::new(Archive::open(path.as_ref())?)))
+    }
+
+    /// The same FMU with another copy of its binary, from the archive that this one was opened from, whatever its path leads to
+    /// by now. After the status Fatal no instance of a binary can be used (FMI 2.0.5, 2.1.3; FMI 3.0.2, 2.2.4).
+    ///
+    /// # Errors
+    /// The archive cannot be read or unpacked.
+    pub fn open_again(&self) -> Result<Self, Error> {
+        Self::load(&self.archive)
+    }
+
+    fn load(shared: &Arc<Mutex<Archive>>) -> Result<Self, Error> {
+        let mut archive = shared.lock().unwrap_or_else(PoisonError::into_inner);
         let (folder, binary, alone) = archive.extract()?;
         let folder = Arc::new(folder);
-        let (terminals, description) = (Arc::new(archive.terminals()), Arc::new(archive.description));
-        let resources = folder.path().join("resources");
+        let (terminals, description) = (Arc::new(archive.terminals()), archive.description.clone());
+        let (path, resources) = (archive.path.clone(), folder.path().join("resources"));
         // A binary that is loaded needs its file no more, except on Windows: then a kill leaves nothing behind.
         let kept = (cfg!(windows) || !alone).then(|| folder.clone());
         let functions =
-            Functions::load(&binary, description.version, kept).map_err(|e| Error::file(path, e.cause()))?;
-        Ok(Self { path: path.into(), description, terminals, functions, resources })
+            Functions::load(&binary, description.version, kept).map_err(|e| Error::file(&path, e.cause()))?;
+        Ok(Self { path, description, terminals, functions, archive: shared.clone(), resources })
     }
 
     /// The contents of modelDescription.xml.

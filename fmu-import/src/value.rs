@@ -1,6 +1,6 @@
 //! Values that cross the interface, whatever the standard calls their type.
 
-use model_description::{BaseType, ModelVariable};
+use model_description::{BaseType, ModelDescription, ModelVariable};
 use std::fmt;
 
 /// The elements of a variable: one of a scalar, all in row-major order of an array.
@@ -56,6 +56,13 @@ impl Values {
                 .collect::<Result<_, _>>()
                 .map(Self::Integers),
         }
+    }
+
+    /// As [`parse`](Self::parse), with the names that the description has for an enumeration.
+    pub(crate) fn read(text: &str, variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
+        let definition = variable.declared_type.as_ref().and_then(|t| description.type_definition(t));
+        let items = definition.map(|d| d.items.iter().map(|i| (i.name.clone(), i.value)).collect::<Vec<_>>());
+        Self::parse(text, variable, &items.unwrap_or_default())
     }
 
     /// A number as a value of this base type: rounded for an integer, not 0 for true.

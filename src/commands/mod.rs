@@ -6,4 +6,5 @@ pub mod merge;
 pub mod reproduce;
 pub mod simulate;
 pub mod ssp;
+pub mod sweep;
 pub mod tune;

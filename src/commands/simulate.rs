@@ -2,15 +2,15 @@
 
 use crate::Failed;
 use crate::pack;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use drive_study::plot;
+use fmu_import::Message;
 use fmu_import::cosimulation::{Point, Recording, Schedule, Settings, System};
 use fmu_import::ssp::load::Loaded;
 use fmu_import::ssp::{ssv, values};
-use fmu_import::{Fmu, Message};
 use indicatif::{ProgressBar, ProgressStyle};
-use model_description::{Experiment, ModelVariable};
+use model_description::ModelVariable;
 use std::io::{self, BufWriter, IsTerminal};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -95,7 +95,8 @@ pub struct Simulate {
 /// # Errors
 /// A file is not an FMU that runs here, a name is wrong, or an FMU fails.
 pub fn run(args: &Simulate) -> Result<()> {
-    let mut loaded = open(args)?;
+    let mut loaded = Loaded::open_files(&args.fmus, Path::new(""), args.logging)?;
+    loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let settings = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
     let mut progress = Progress::new(settings);
@@ -146,26 +147,6 @@ fn warnings(system: &System, settings: &Settings) -> Vec<String> {
     found
 }
 
-/// The FMUs, or those of an SSP file.
-fn open(args: &Simulate) -> Result<Loaded> {
-    let mut loaded = Loaded::default();
-    for text in &args.fmus {
-        let (name, path) = name_and_path(text)?;
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
-            if args.fmus.len() > 1 {
-                bail!("{}: an SSP is simulated alone: its FMUs are inside", path.display());
-            }
-            loaded = Loaded::open(path, args.logging)?;
-            loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
-            break;
-        }
-        let fmu = Fmu::open(path)?;
-        loaded.experiments.push(fmu.description().default_experiment);
-        loaded.system.add(&name, &fmu, args.logging)?;
-    }
-    Ok(loaded)
-}
-
 /// Everything before the run.
 fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
     let Loaded { system, .. } = loaded;
@@ -213,17 +194,7 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
         loaded.record_outputs()?;
     }
     args.record.iter().try_for_each(|port| loaded.record(port))?;
-    Ok(settings(args, &loaded.experiments))
-}
-
-/// Takes times that are not given from the FMUs.
-fn settings(args: &Simulate, experiments: &[Experiment]) -> Settings {
-    let start = args.start.or_else(|| experiments.iter().find_map(|x| x.start)).unwrap_or(0.0);
-    let latest = experiments.iter().filter_map(|x| x.stop).reduce(f64::max);
-    let stop = args.stop.or(latest).unwrap_or(start + 1.0);
-    let shortest = experiments.iter().filter_map(|x| x.step).reduce(f64::min);
-    let step = args.step.or(shortest).unwrap_or((stop - start) / 1000.0);
-    Settings { start, stop, step, sequential: args.sequential }
+    Ok(loaded.settings(args.start, args.stop, args.step, args.sequential))
 }
 
 fn write(recording: &Recording, args: &Simulate) -> Result<()> {
@@ -261,20 +232,6 @@ fn write(recording: &Recording, args: &Simulate) -> Result<()> {
         Some(column) => Err(Failed(format!("{} is not finite at the end", column.name)).into()),
         None => Ok(()),
     }
-}
-
-/// `plant=a/b.fmu`, or `a/b.fmu` with the name `b`.
-fn name_and_path(text: &str) -> Result<(String, &Path)> {
-    // A path may have an equals sign; a name has no separator.
-    if let Some((name, path)) = text.split_once('=').filter(|(name, _)| !name.contains(['/', '\\'])) {
-        if name.is_empty() {
-            bail!("{text}: the name before = is empty");
-        }
-        return Ok((name.into(), Path::new(path)));
-    }
-    let path = Path::new(text);
-    let stem = path.file_stem().ok_or_else(|| anyhow!("{text}: is not a file"))?;
-    Ok((stem.to_string_lossy().into_owned(), path))
 }
 
 fn halves<'a>(text: &'a str, form: &str) -> Result<(&'a str, &'a str)> {
@@ -319,29 +276,5 @@ impl Progress {
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_instances() {
-        let name = |text| name_and_path(text).map(|(name, path)| (name, path.to_owned())).unwrap();
-        assert_eq!(name("a/PmsmPlant.fmu"), ("PmsmPlant".into(), "a/PmsmPlant.fmu".into()));
-        assert_eq!(name("p=a/x=y.fmu"), ("p".into(), "a/x=y.fmu".into()));
-        assert_eq!(name("a=b/c.fmu"), ("a".into(), "b/c.fmu".into()));
-        assert_eq!(name("./a=b/c.fmu"), ("c".into(), "./a=b/c.fmu".into()));
-        assert!(name_and_path("=x.fmu").is_err());
-    }
-
-    #[test]
-    fn what_is_not_said_comes_from_the_fmus() {
-        let experiment = |stop, step| Experiment { start: None, stop, step, tolerance: None };
-        let s = settings(&Simulate::default(), &[experiment(Some(2.0), Some(1e-4)), experiment(Some(3.0), Some(2e-4))]);
-        assert_eq!((s.start, s.stop, s.step), (0.0, 3.0, 1e-4));
-        let s = settings(&Simulate { stop: Some(4.0), ..Simulate::default() }, &[experiment(None, None)]);
-        assert_eq!((s.stop, s.step), (4.0, 0.004));
     }
 }

@@ -1,4 +1,5 @@
-/* A small FMU for co-simulation, FMI 2.0, that breaks no rule; and with -DFAULT_<name> exactly one. fmu3.c makes FMI 3.0 of it.
+/* A small FMU for co-simulation, FMI 2.0, that breaks no rule; and with -DFAULT_<name> exactly one, or it is allowed and rude.
+   fmu3.c makes FMI 3.0 of it.
    y' = gain u + bias; n counts steps. Integers: 0 n. Booleans: 0 flag. Strings: 0 label.
    Reals: 0 time, 1 gain, 2 u, 3 y, 4 bias. */
 #include <math.h>
@@ -95,6 +96,10 @@ static int fail(Fmu *f, const char *text) {
     if (!f) return ERROR; \
     if (!(f->data.state & (allowed))) return fail(f, "not allowed in this state")
 
+#ifdef FAULT_ONCE
+static int alive;
+#endif
+
 static void fresh(Data *d) {
     memset(d, 0, sizeof *d);
     d->gain = 2;
@@ -140,6 +145,10 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 #ifdef FAULT_HANG
     for (volatile int spin = 1; spin;) {}
 #endif
+#ifdef FAULT_ONCE
+    if (alive) return NULL;
+    alive = 1;
+#endif
 #ifdef FAULT_M01
     Fmu *f = callbacks->allocate(1, sizeof *f);
 #else
@@ -166,6 +175,9 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 }
 
 EXPORT void fmi2FreeInstance(void *c) {
+#ifdef FAULT_ONCE
+    alive = 0;
+#endif
 #ifdef FAULT_L05
     ((Fmu *)c)->logging = 0;
 #endif
@@ -507,6 +519,15 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     ENTER(STEP);
     (void)no_prior;
     Data *d = &f->data;
+#ifdef FAULT_FATAL
+    static int dead;
+    dead |= d->bias == 9;
+    if (dead) return FATAL;
+#endif
+#ifdef FAULT_PRINT
+    printf("half a line, ");
+    fflush(stdout);
+#endif
 #ifdef FAULT_T02b
     while (h > 1e307) {}
 #endif

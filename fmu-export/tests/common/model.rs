@@ -47,6 +47,8 @@ pub const UNKNOWN: u32 = 16;
 /// Values of `mode`.
 pub const FAULTY: i32 = Mode::Faulty as i32;
 pub const PANICKY: i32 = Mode::Panicky as i32;
+/// Value of `n` with which a step ends the process.
+pub const ABORTING: i32 = 1_234_567;
 
 enumeration! {
     #[derive(Serialize, Deserialize)]
@@ -131,6 +133,9 @@ impl Model for Probe {
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        if self.n == ABORTING {
+            std::process::abort();
+        }
         match self.mode {
             Mode::Faulty => return Err(Fault::new("x left the finite numbers by 50 %, see #4")),
             Mode::Panicky => panic!("the model panicked"),

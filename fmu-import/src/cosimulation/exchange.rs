@@ -1,10 +1,12 @@
 //! Moving values between FMUs: what is read from each, and where what is set comes from.
 
-use super::{Port, Schedule};
+use super::Schedule;
+use super::parts::Port;
 use crate::{Error, Instance, Values};
 use model_description::BaseType;
 
 /// Source of an input.
+#[derive(Clone)]
 pub(super) enum Source {
     /// A variable of another instance.
     Port(Port),
@@ -13,7 +15,7 @@ pub(super) enum Source {
 }
 
 /// Who feeds whom.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Wiring {
     feeds: Vec<(Port, Source)>,
 }
@@ -36,7 +38,7 @@ enum Place {
 }
 
 /// What crosses the interface of one instance. Double-precision numbers go in one call, the rest one by one.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Traffic {
     read: Vec<u32>,
     read_singly: Vec<Port>,
@@ -49,6 +51,7 @@ struct Traffic {
 }
 
 /// All traffic of a run.
+#[derive(Clone)]
 pub(super) struct Exchange {
     traffic: Vec<Traffic>,
     row: Vec<Place>,
@@ -114,7 +117,7 @@ impl Exchange {
             instance.get_reals(read, fast)?;
         }
         for (port, value) in read_singly.iter().zip(slow) {
-            *value = instance.get(&port.name)?.number().unwrap_or(f64::NAN);
+            *value = instance.read(port.base, port.reference, 1)?.number().unwrap_or(f64::NAN);
         }
         Ok(())
     }
@@ -130,7 +133,8 @@ impl Exchange {
         }
         for (port, place) in &traffic.write_singly {
             let value = Values::from_number(self.value(place, t), port.base);
-            instance.set(&port.name, &value.map_err(|cause| Error::usage(instance.name(), cause))?)?;
+            let value = value.map_err(|cause| Error::usage(instance.name(), cause))?;
+            instance.write(port.base, port.reference, &value)?;
         }
         self.traffic[index].buffer = buffer;
         Ok(())

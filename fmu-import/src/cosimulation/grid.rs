@@ -46,6 +46,10 @@ impl Settings {
 }
 
 impl Grid {
+    pub(super) fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     pub(super) fn steps(&self) -> u32 {
         self.steps
     }

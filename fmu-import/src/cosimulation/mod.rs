@@ -20,44 +20,41 @@
 //! println!("{:?}", recording.column("plant.speed").unwrap().values.last());
 //! # Ok(()) }
 //! ```
+//!
+//! For many runs of one system there is [`Plan`].
 
 mod exchange;
 mod grid;
+mod parts;
+mod plan;
 mod recording;
 mod run;
 mod schedule;
 mod terminals;
 
 pub use grid::Settings;
+pub use plan::{Plan, Target, Worker};
 pub use recording::{Column, Recording};
-pub use run::Point;
+pub use run::{Ended, Point};
 pub use schedule::Schedule;
 
-use crate::{Error, Fmu, Instance, Message};
+use crate::{Error, Fmu, Instance, Message, Values};
 use exchange::{Source, Wiring};
-use model_description::{BaseType, Causality, ModelVariable, TerminalsAndIcons};
+use model_description::{BaseType, Causality, ModelVariable};
+use parts::{Part, Parts, Port, kind};
 
 /// FMUs and how they belong together.
 #[derive(Default)]
 pub struct System {
+    parts: Parts,
+    /// One of each part.
     instances: Vec<Instance>,
-    /// Of each instance; what is wrong with them only matters to who asks for them.
-    terminals: Vec<Result<Option<TerminalsAndIcons>, Error>>,
     wiring: Wiring,
-    /// Variables that were set from outside.
-    set: Vec<Port>,
+    /// Values that were set from outside.
+    set: Vec<(Port, Values)>,
     records: Vec<Port>,
     /// Names of the recorded columns.
     columns: Vec<String>,
-}
-
-/// A variable of one of the instances.
-#[derive(Clone, Debug, PartialEq)]
-struct Port {
-    instance: usize,
-    name: String,
-    reference: u32,
-    base: BaseType,
 }
 
 impl System {
@@ -70,7 +67,7 @@ impl System {
             return Err(Error::usage(name, "two instances have this name; NAME=FILE gives another"));
         }
         self.instances.push(fmu.instantiate(name, logging)?);
-        self.terminals.push(fmu.terminals().map(Option::<&_>::cloned));
+        self.parts.0.push(Part { name: name.into(), fmu: fmu.clone(), logging });
         Ok(())
     }
 
@@ -89,9 +86,10 @@ impl System {
     /// # Errors
     /// There is no such variable, the text is no value of its type, or the FMU refuses.
     pub fn set(&mut self, port: &str, text: &str) -> Result<(), Error> {
-        let port = self.port(port)?;
-        self.instances[port.instance].set_text(&port.name, text)?;
-        self.set.push(port);
+        let port = self.parts.port(port)?;
+        let values = self.instances[port.instance].parse(&port.name, text)?;
+        self.instances[port.instance].set(&port.name, &values)?;
+        self.set.push((port, values));
         Ok(())
     }
 
@@ -100,8 +98,8 @@ impl System {
     /// # Errors
     /// There is no such variable, the causalities or types do not fit, or the input is fed already.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), Error> {
-        let (source, target) = (self.scalar(from)?, self.scalar(to)?);
-        if !matches!(self.causality(&source), Causality::Output | Causality::Local) {
+        let (source, target) = (self.parts.scalar(from)?, self.parts.scalar(to)?);
+        if !matches!(self.parts.causality(&source), Causality::Output | Causality::Local) {
             return Err(Error::usage(from, "is no output"));
         }
         if kind(source.base) != kind(target.base) {
@@ -148,7 +146,7 @@ impl System {
     /// # Errors
     /// There is no such variable, it is no number, or it is fed already.
     pub fn input(&mut self, port: &str, schedule: Schedule) -> Result<(), Error> {
-        let target = self.scalar(port)?;
+        let target = self.parts.scalar(port)?;
         self.feed(target, port, Source::Schedule(schedule))
     }
 
@@ -165,7 +163,7 @@ impl System {
     /// # Errors
     /// As [`record`](Self::record).
     pub fn record_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
-        let port = self.scalar(port)?;
+        let port = self.parts.scalar(port)?;
         self.records.push(port);
         self.columns.push(name.into());
         Ok(())
@@ -176,14 +174,14 @@ impl System {
     /// # Errors
     /// There is no such variable.
     pub fn is_fed(&self, port: &str) -> Result<bool, Error> {
-        let port = self.port(port)?;
+        let port = self.parts.port(port)?;
         Ok(self.wiring.feeds(port.instance, &port.name))
     }
 
     /// The inputs of an instance that nothing feeds and nobody has set: they keep their start values.
     pub fn untouched(&self, instance: usize) -> Vec<&ModelVariable> {
         let touched = |name: &str| {
-            self.wiring.feeds(instance, name) || self.set.iter().any(|p| p.instance == instance && p.name == name)
+            self.wiring.feeds(instance, name) || self.set.iter().any(|(p, _)| p.instance == instance && p.name == name)
         };
         let is_free =
             |v: &&ModelVariable| v.causality == Causality::Input && v.base != BaseType::Clock && !touched(&v.name);
@@ -193,20 +191,24 @@ impl System {
     /// Records all outputs of all instances.
     ///
     /// # Errors
-    /// None that is known: outputs that are no numbers are left out.
+    /// None that is known.
     pub fn record_outputs(&mut self) -> Result<(), Error> {
+        self.outputs().iter().try_for_each(|port| self.record(port))
+    }
+
+    /// All outputs of all instances but those that are no numbers, written `instance.variable`.
+    pub fn outputs(&self) -> Vec<String> {
         let outputs = |i: &Instance| {
             let is_scalar =
                 |v: &&ModelVariable| v.causality == Causality::Output && !v.is_array() && kind(v.base).is_some();
             let name = |v: &ModelVariable| format!("{}.{}", i.name(), v.name);
             i.description().variables.iter().filter(is_scalar).map(name).collect::<Vec<_>>()
         };
-        let all: Vec<String> = self.instances.iter().flat_map(outputs).collect();
-        all.iter().try_for_each(|port| self.record(port))
+        self.instances.iter().flat_map(outputs).collect()
     }
 
     fn feed(&mut self, target: Port, written: &str, source: Source) -> Result<(), Error> {
-        if self.causality(&target) != Causality::Input {
+        if self.parts.causality(&target) != Causality::Input {
             return Err(Error::usage(written, "is no input"));
         }
         if self.wiring.feeds(target.instance, &target.name) {
@@ -215,57 +217,9 @@ impl System {
         self.wiring.add(target, source);
         Ok(())
     }
-
-    fn causality(&self, port: &Port) -> Causality {
-        let variable = self.instances[port.instance].description().variable(&port.name);
-        variable.map_or(Causality::Local, |v| v.causality)
-    }
-
-    /// `instance.variable`.
-    fn port(&self, text: &str) -> Result<Port, Error> {
-        let (instance, name) = self.instance_and_rest(text, "VARIABLE")?;
-        let variable = self.instances[instance].variable(name)?;
-        Ok(Port { instance, reference: variable.value_reference, base: variable.base, name: name.to_owned() })
-    }
-
-    /// The instance and what follows its name and a dot; an instance's name may itself have dots.
-    fn instance_and_rest<'a>(&self, text: &'a str, what: &str) -> Result<(usize, &'a str), Error> {
-        let split = |(index, i): (usize, &Instance)| {
-            Some((index, i.name().len(), text.strip_prefix(i.name())?.strip_prefix('.')?))
-        };
-        let best = self.instances.iter().enumerate().filter_map(split).max_by_key(|(_, length, _)| *length);
-        let names = || self.instances.iter().map(Instance::name).collect::<Vec<_>>().join(", ");
-        let wrong = || Error::usage(text, format!("is not INSTANCE.{what}; the instances are {}", names()));
-        best.map(|(index, _, rest)| (index, rest)).ok_or_else(wrong)
-    }
-
-    /// A port that is one number.
-    fn scalar(&self, text: &str) -> Result<Port, Error> {
-        let port = self.port(text)?;
-        if self.instances[port.instance].variable(&port.name)?.is_array() {
-            return Err(Error::usage(text, "is an array; only scalars can be connected, fed and recorded"));
-        }
-        if kind(port.base).is_none() {
-            return Err(Error::usage(
-                text,
-                format!("is a {}; only numbers can be connected, fed and recorded", port.base),
-            ));
-        }
-        Ok(port)
-    }
 }
 
 fn take_messages(instances: &[Instance]) -> Vec<(String, Message)> {
     let of = |i: &Instance| i.take_messages().into_iter().map(|m| (i.name().to_owned(), m)).collect::<Vec<_>>();
     instances.iter().flat_map(of).collect()
-}
-
-/// Types between which a value may travel have the same letter.
-fn kind(base: BaseType) -> Option<char> {
-    match base {
-        BaseType::Float32 | BaseType::Float64 => Some('r'),
-        BaseType::Boolean => Some('b'),
-        BaseType::String | BaseType::Binary | BaseType::Clock => None,
-        _ => Some('i'),
-    }
 }

@@ -1,7 +1,8 @@
 //! The run itself.
 
 use super::exchange::Exchange;
-use super::{Column, Port, Recording, Settings, System, take_messages};
+use super::grid::Grid;
+use super::{Recording, Settings, System, take_messages};
 use crate::{Error, Instance, Message};
 use std::ops::ControlFlow;
 
@@ -28,6 +29,71 @@ impl Point<'_> {
     }
 }
 
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ended {
+    /// Time of the last communication point in s.
+    pub time: f64,
+    /// The instance that asked to end the simulation, if one did.
+    pub by: Option<String>,
+}
+
+/// Simulates instances that have their values, from start to stop. `hook` sees every communication point, the last one
+/// included, and may end the run. The one algorithm of all runs.
+pub(super) fn simulate(
+    instances: &mut [Instance],
+    exchange: &mut Exchange,
+    grid: &Grid,
+    row: &mut Vec<f64>,
+    mut hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+) -> Result<Ended, Error> {
+    let settings = grid.settings();
+    for instance in instances.iter_mut() {
+        instance.setup(settings.start, Some(settings.stop))?;
+        instance.enter_initialization()?;
+    }
+    // An initial output may depend on an input, through as many FMUs as there are.
+    for _ in 0..instances.len() {
+        exchange.read_all(instances)?;
+        exchange.write_all(instances, settings.start)?;
+    }
+    for instance in instances.iter_mut() {
+        instance.exit_initialization()?;
+    }
+    let mut ended = Ended { time: settings.start, by: None };
+    for index in 0..=grid.steps() {
+        let time = grid.time(index);
+        ended.time = time;
+        exchange.read_all(instances)?;
+        exchange.row(time, row);
+        if index < grid.steps() {
+            exchange.write_all(instances, time)?;
+        }
+        let flow = hook(&mut Point { index, time, values: row, instances })?;
+        if flow.is_break() || index == grid.steps() {
+            break;
+        }
+        for (i, instance) in instances.iter_mut().enumerate() {
+            if settings.sequential {
+                exchange.write(i, instance, time)?;
+            }
+            if instance.do_step(time, grid.size(index))?.is_break() {
+                ended.by = Some(instance.name().into());
+            }
+            if settings.sequential {
+                exchange.read(i, instance)?;
+            }
+        }
+        if ended.by.is_some() {
+            break;
+        }
+    }
+    for instance in instances.iter_mut() {
+        instance.terminate()?;
+    }
+    Ok(ended)
+}
+
 impl System {
     /// Simulates from start to stop. `hook` sees every communication point, the last one included, and may end the run.
     ///
@@ -40,64 +106,12 @@ impl System {
     ) -> Result<Recording, Error> {
         let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
         let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
-        let mut recording =
-            Recording::new(self.records.iter().zip(&self.columns).map(|(p, name)| self.column(p, name)));
-        let Self { instances, .. } = self;
-        for instance in instances.iter_mut() {
-            instance.setup(settings.start, Some(settings.stop))?;
-            instance.enter_initialization()?;
-        }
-        // An initial output may depend on an input, through as many FMUs as there are.
-        for _ in 0..instances.len() {
-            exchange.read_all(instances)?;
-            exchange.write_all(instances, settings.start)?;
-        }
-        for instance in instances.iter_mut() {
-            instance.exit_initialization()?;
-        }
-        let mut row = Vec::new();
-        for index in 0..=grid.steps() {
-            let time = grid.time(index);
-            exchange.read_all(instances)?;
-            exchange.row(time, &mut row);
-            recording.push(time, &row);
-            if index < grid.steps() {
-                exchange.write_all(instances, time)?;
-            }
-            let mut flow = hook(&mut Point { index, time, values: &row, instances: instances.as_mut_slice() })?;
-            if flow.is_break() || index == grid.steps() {
-                break;
-            }
-            for (i, instance) in instances.iter_mut().enumerate() {
-                if settings.sequential {
-                    exchange.write(i, instance, time)?;
-                }
-                if instance.do_step(time, grid.size(index))?.is_break() {
-                    recording.ended_by = Some(instance.name().into());
-                    flow = ControlFlow::Break(());
-                }
-                if settings.sequential {
-                    exchange.read(i, instance)?;
-                }
-            }
-            if flow.is_break() {
-                break;
-            }
-        }
-        for instance in instances.iter_mut() {
-            instance.terminate()?;
-        }
+        let mut recording = Recording::new(self.columns());
+        let ended = simulate(&mut self.instances, &mut exchange, &grid, &mut Vec::new(), |point| {
+            recording.push(point.time, point.values);
+            hook(point)
+        })?;
+        recording.ended_by = ended.by;
         Ok(recording)
-    }
-
-    fn column(&self, port: &Port, name: &str) -> Column {
-        let instance = &self.instances[port.instance];
-        let description = instance.description();
-        let variable = description.variable(&port.name);
-        let unit = variable.and_then(|v| v.unit.clone());
-        let shown = variable.and_then(|v| v.display_unit.as_ref());
-        let definition = unit.as_ref().and_then(|u| description.unit(u));
-        let display = definition.zip(shown).and_then(|(unit, name)| unit.display_unit(name));
-        Column { name: name.into(), unit: unit.unwrap_or_default(), display: display.cloned(), values: Vec::new() }
     }
 }

@@ -4,6 +4,7 @@
 //! same value, and one output to one input is all that it takes. Two inflows would need the opposite sign and are refused.
 
 use super::System;
+use super::parts::Part;
 use crate::Error;
 use model_description::{Causality, Member, Terminal};
 
@@ -18,7 +19,7 @@ impl System {
         for (m, n) in pairs(&one, &other).map_err(|cause| Error::usage(a, format!("does not fit {b}: {cause}")))? {
             let full = |instance: usize, m: &Member| format!("{}.{}", self.instances[instance].name(), m.variable);
             let (left, right) = (full(i, &m), full(k, &n));
-            let causality = |port: &str| self.port(port).map(|p| self.causality(&p));
+            let causality = |port: &str| self.parts.port(port).map(|p| self.parts.causality(&p));
             let member = m.name.as_deref().unwrap_or(&m.variable);
             match (causality(&left)?, causality(&right)?) {
                 (Causality::Output, Causality::Input) => found.push((left, right)),
@@ -40,10 +41,10 @@ impl System {
 
     /// `instance.terminal`, and `instance.outer.inner` for one inside another.
     fn terminal(&self, text: &str) -> Result<(usize, Terminal), Error> {
-        let (index, path) = self.instance_and_rest(text, "TERMINAL")?;
-        let name = self.instances[index].name();
+        let (index, path) = self.parts.instance_and_rest(text, "TERMINAL")?;
+        let Part { name, fmu, .. } = &self.parts.0[index];
         let missing = |has: String| Error::usage(name, format!("has no terminal {path}; {has}"));
-        let Some(file) = self.terminals[index].as_ref().map_err(Clone::clone)? else {
+        let Some(file) = fmu.terminals()? else {
             return Err(missing("its FMU has no terminals: connect its variables with --connect".into()));
         };
         let names: Vec<&str> = file.terminals.iter().map(|t| t.name.as_str()).collect();

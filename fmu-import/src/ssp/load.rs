@@ -4,7 +4,7 @@ use super::ssv::{self, Parameter};
 use super::structure::{Binding, Connection, Connector, End, Structure, Values};
 use super::{DESCRIPTION, values};
 use crate::Fmu;
-use crate::cosimulation::{Schedule, System};
+use crate::cosimulation::{Schedule, Settings, System};
 use anyhow::{Context, Result, anyhow, bail};
 use model_description::Experiment;
 use std::fs::File;
@@ -15,19 +15,56 @@ use zip::ZipArchive;
 /// Most bytes of one file of the archive.
 const LIMIT: u64 = 2 << 30;
 
-/// A system, ready to run.
+/// A system from files, ready to run.
 #[derive(Default)]
 pub struct Loaded {
     /// Its FMUs, connected and with their values.
     pub system: System,
     /// Default experiments: its own times, the FMUs' steps.
     pub experiments: Vec<Experiment>,
-    /// Names of the system's inputs, each with the inputs `component.variable` that it feeds.
-    pub inputs: Vec<(String, Vec<String>)>,
-    /// Names of the system's outputs, each with the output `component.variable` that it is.
-    pub outputs: Vec<(String, String)>,
+    /// What an SSP's system has to the outside.
+    pub connectors: Connectors,
     /// Values for names that the system does not have, which SSP 1.0 lets pass (4.4, ParameterBindings).
     pub notes: Vec<String>,
+}
+
+/// Connectors of a system, none for FMUs without an SSP.
+#[derive(Clone, Debug, Default)]
+pub struct Connectors {
+    /// Names of the inputs, each with the inputs `component.variable` that it feeds.
+    pub inputs: Vec<(String, Vec<String>)>,
+    /// Names of the outputs, each with the output `component.variable` that it is.
+    pub outputs: Vec<(String, String)>,
+}
+
+impl Connectors {
+    /// What is behind a name to set: the inputs that one of the system feeds, or the name itself.
+    ///
+    /// # Errors
+    /// The system has no input of this name, which has no dot.
+    pub fn ports(&self, name: &str) -> Result<Vec<String>> {
+        if let Some((_, targets)) = self.inputs.iter().find(|(n, _)| n == name) {
+            return Ok(targets.clone());
+        }
+        let of_system = !(self.inputs.is_empty() && self.outputs.is_empty());
+        if of_system && !name.contains('.') {
+            let names: Vec<&str> = self.inputs.iter().map(|(n, _)| n.as_str()).collect();
+            bail!("{name}: is no input of the system; it has {}", names.join(", "));
+        }
+        Ok(vec![name.to_owned()])
+    }
+
+    /// What is behind a name to record: an output of the system, one of the inputs that one of the system feeds, or the name
+    /// itself.
+    ///
+    /// # Errors
+    /// As for [`ports`](Self::ports).
+    pub fn source(&self, name: &str) -> Result<String> {
+        match self.outputs.iter().find(|(n, _)| n == name) {
+            Some((_, source)) => Ok(source.clone()),
+            None => Ok(self.ports(name)?.swap_remove(0)),
+        }
+    }
 }
 
 /// The archive, with its path for errors.
@@ -54,6 +91,37 @@ impl Package<'_> {
 }
 
 impl Loaded {
+    /// Opens FMUs written `FILE` or `NAME=FILE`, or one SSP file. Paths that are relative begin in `folder`.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), or an SSP file is not alone.
+    pub fn open_files(files: &[String], folder: &Path, logging: bool) -> Result<Self> {
+        let mut loaded = Self::default();
+        for text in files {
+            let (name, path) = name_and_path(text)?;
+            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
+                if files.len() > 1 {
+                    bail!("{}: an SSP is simulated alone: its FMUs are inside", path.display());
+                }
+                return Self::open(&folder.join(path), logging);
+            }
+            let fmu = Fmu::open(folder.join(path))?;
+            loaded.experiments.push(fmu.description().default_experiment);
+            loaded.system.add(&name, &fmu, logging)?;
+        }
+        Ok(loaded)
+    }
+
+    /// Times that are not given come from the files: the latest stop, the shortest step.
+    pub fn settings(&self, start: Option<f64>, stop: Option<f64>, step: Option<f64>, sequential: bool) -> Settings {
+        let start = start.or_else(|| self.experiments.iter().find_map(|x| x.start)).unwrap_or(0.0);
+        let latest = self.experiments.iter().filter_map(|x| x.stop).reduce(f64::max);
+        let stop = stop.or(latest).unwrap_or(start + 1.0);
+        let shortest = self.experiments.iter().filter_map(|x| x.step).reduce(f64::min);
+        let step = step.or(shortest).unwrap_or((stop - start) / 1000.0);
+        Settings { start, stop, step, sequential }
+    }
+
     /// Opens an SSP file.
     ///
     /// # Errors
@@ -104,7 +172,7 @@ impl Loaded {
     /// # Errors
     /// There is none of this name, or it is fed already.
     pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<()> {
-        for port in self.targets(name)? {
+        for port in self.connectors.ports(name)? {
             self.system.input(&port, schedule.clone())?;
         }
         Ok(())
@@ -115,7 +183,7 @@ impl Loaded {
     /// # Errors
     /// There is none of this name, or the FMU refuses the value.
     pub fn set(&mut self, name: &str, value: &str) -> Result<()> {
-        for port in self.targets(name)? {
+        for port in self.connectors.ports(name)? {
             self.system.set(&port, value)?;
         }
         Ok(())
@@ -126,12 +194,7 @@ impl Loaded {
     /// # Errors
     /// There is none of this name, or it is no number.
     pub fn record(&mut self, name: &str) -> Result<()> {
-        let output = self.outputs.iter().find(|(n, _)| n == name).map(|(_, source)| source.clone());
-        let port = match output {
-            Some(source) => source,
-            None => self.targets(name)?.swap_remove(0),
-        };
-        Ok(self.system.record_as(&port, name)?)
+        Ok(self.system.record_as(&self.connectors.source(name)?, name)?)
     }
 
     /// Records all outputs of the system, or those of all FMUs where it has none.
@@ -139,23 +202,10 @@ impl Loaded {
     /// # Errors
     /// As [`record`](Self::record).
     pub fn record_outputs(&mut self) -> Result<()> {
-        if self.outputs.is_empty() {
+        if self.connectors.outputs.is_empty() {
             return Ok(self.system.record_outputs()?);
         }
-        self.outputs.clone().iter().try_for_each(|(name, _)| self.record(name))
-    }
-
-    /// What is behind a name: the inputs that one of the system feeds, or the name itself.
-    fn targets(&self, name: &str) -> Result<Vec<String>> {
-        if let Some((_, targets)) = self.inputs.iter().find(|(n, _)| n == name) {
-            return Ok(targets.clone());
-        }
-        let of_system = !(self.inputs.is_empty() && self.outputs.is_empty());
-        if of_system && !name.contains('.') {
-            let names: Vec<&str> = self.inputs.iter().map(|(n, _)| n.as_str()).collect();
-            bail!("{name}: is no input of the system; it has {}", names.join(", "));
-        }
-        Ok(vec![name.to_owned()])
+        self.connectors.outputs.clone().iter().try_for_each(|(name, _)| self.record(name))
     }
 
     /// Every connector of a component is a variable of its FMU, of that causality.
@@ -218,20 +268,20 @@ impl Loaded {
             }
             (Some(source), Some(target)) => self.system.connect(&source, &target).map_err(|e| e.to_string()),
             (None, Some(target)) => {
-                match self.inputs.iter_mut().find(|(name, _)| *name == from.connector) {
+                match self.connectors.inputs.iter_mut().find(|(name, _)| *name == from.connector) {
                     Some((_, targets)) => targets.push(target),
-                    None => self.inputs.push((from.connector.clone(), vec![target])),
+                    None => self.connectors.inputs.push((from.connector.clone(), vec![target])),
                 }
                 Ok(())
             }
             (Some(source), None) => {
-                if self.outputs.iter().any(|(name, _)| *name == to.connector) {
+                if self.connectors.outputs.iter().any(|(name, _)| *name == to.connector) {
                     return Err(format!(
                         "the output {} is connected twice: remove one of the connections",
                         to.connector
                     ));
                 }
-                self.outputs.push((to.connector.clone(), source));
+                self.connectors.outputs.push((to.connector.clone(), source));
                 Ok(())
             }
             (None, None) => Err("connects the system with itself, which is not supported: remove it".into()),
@@ -239,7 +289,7 @@ impl Loaded {
     }
 
     fn is_fed(&self, target: &str) -> Result<bool, String> {
-        let outside = self.inputs.iter().any(|(_, targets)| targets.iter().any(|t| t == target));
+        let outside = self.connectors.inputs.iter().any(|(_, targets)| targets.iter().any(|t| t == target));
         Ok(outside || self.system.is_fed(target).map_err(|e| e.to_string())?)
     }
 
@@ -247,7 +297,7 @@ impl Loaded {
     fn bind(&mut self, file: &str, parameters: &[Parameter], prefix: &str) -> Result<()> {
         for p in parameters {
             let full = format!("{prefix}{}", p.name);
-            let ports = match self.inputs.iter().find(|(name, _)| prefix.is_empty() && *name == p.name) {
+            let ports = match self.connectors.inputs.iter().find(|(name, _)| prefix.is_empty() && *name == p.name) {
                 Some((_, targets)) => targets.clone(),
                 None => vec![full],
             };
@@ -268,6 +318,23 @@ impl Loaded {
         }
         Ok(())
     }
+}
+
+/// `plant=a/b.fmu`, or `a/b.fmu` with the name `b`.
+///
+/// # Errors
+/// The name is empty, or there is no file name.
+pub fn name_and_path(text: &str) -> Result<(String, &Path)> {
+    // A path may have an equals sign; a name has no separator.
+    if let Some((name, path)) = text.split_once('=').filter(|(name, _)| !name.contains(['/', '\\'])) {
+        if name.is_empty() {
+            bail!("{text}: the name before = is empty");
+        }
+        return Ok((name.into(), Path::new(path)));
+    }
+    let path = Path::new(text);
+    let stem = path.file_stem().ok_or_else(|| anyhow!("{text}: is not a file"))?;
+    Ok((stem.to_string_lossy().into_owned(), path))
 }
 
 /// The connector at an end of a connection.
@@ -299,5 +366,31 @@ impl Package<'_> {
         };
         let named = |p: Parameter| Parameter { name: format!("{}{}", binding.prefix, p.name), ..p };
         Ok((file, parameters.into_iter().map(named).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_instances() {
+        let name = |text| name_and_path(text).map(|(name, path)| (name, path.to_owned())).unwrap();
+        assert_eq!(name("a/PmsmPlant.fmu"), ("PmsmPlant".into(), "a/PmsmPlant.fmu".into()));
+        assert_eq!(name("p=a/x=y.fmu"), ("p".into(), "a/x=y.fmu".into()));
+        assert_eq!(name("a=b/c.fmu"), ("a".into(), "b/c.fmu".into()));
+        assert_eq!(name("./a=b/c.fmu"), ("c".into(), "./a=b/c.fmu".into()));
+        assert!(name_and_path("=x.fmu").is_err());
+    }
+
+    #[test]
+    fn what_is_not_said_comes_from_the_fmus() {
+        let experiment = |stop, step| Experiment { start: None, stop, step, tolerance: None };
+        let of = |experiments: &[Experiment]| Loaded { experiments: experiments.to_vec(), ..Loaded::default() };
+        let two = of(&[experiment(Some(2.0), Some(1e-4)), experiment(Some(3.0), Some(2e-4))]);
+        let s = two.settings(None, None, None, true);
+        assert_eq!((s.start, s.stop, s.step, s.sequential), (0.0, 3.0, 1e-4, true));
+        let s = of(&[experiment(None, None)]).settings(None, Some(4.0), None, false);
+        assert_eq!((s.stop, s.step), (4.0, 0.004));
     }
 }

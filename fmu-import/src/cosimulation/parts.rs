@@ -1,0 +1,110 @@
+//! The FMUs of a system with their names, and what is found in them by `instance.variable`.
+
+use super::Column;
+use crate::{Error, Fmu};
+use model_description::{BaseType, Causality, Initial, ModelDescription, ModelVariable, Variability};
+
+/// A variable of one of the instances.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Port {
+    pub(super) instance: usize,
+    pub(super) name: String,
+    pub(super) reference: u32,
+    pub(super) base: BaseType,
+}
+
+/// An FMU with the name of its instance.
+#[derive(Clone)]
+pub(super) struct Part {
+    pub(super) name: String,
+    pub(super) fmu: Fmu,
+    pub(super) logging: bool,
+}
+
+impl Part {
+    pub(super) fn description(&self) -> &ModelDescription {
+        self.fmu.description()
+    }
+}
+
+/// All of them, in the order they were added.
+#[derive(Clone, Default)]
+pub(super) struct Parts(pub(super) Vec<Part>);
+
+impl Parts {
+    /// `instance.variable`.
+    pub(super) fn port(&self, text: &str) -> Result<Port, Error> {
+        let (instance, name) = self.instance_and_rest(text, "VARIABLE")?;
+        let variable = self.variable(instance, name)?;
+        Ok(Port { instance, reference: variable.value_reference, base: variable.base, name: name.to_owned() })
+    }
+
+    /// A port that is one number.
+    pub(super) fn scalar(&self, text: &str) -> Result<Port, Error> {
+        let port = self.port(text)?;
+        if self.variable(port.instance, &port.name)?.is_array() {
+            return Err(Error::usage(text, "is an array; only scalars can be connected, fed, varied and recorded"));
+        }
+        if kind(port.base).is_none() {
+            return Err(Error::usage(
+                text,
+                format!("is a {}; only numbers can be connected, fed, varied and recorded", port.base),
+            ));
+        }
+        Ok(port)
+    }
+
+    /// A port that is one number and takes a value before the initialization.
+    pub(super) fn settable(&self, text: &str) -> Result<Port, Error> {
+        let port = self.scalar(text)?;
+        let variable = self.variable(port.instance, &port.name)?;
+        let starts = matches!(variable.initial_or_default(), Some(Initial::Exact | Initial::Approx));
+        if variable.variability == Variability::Constant || !(starts || variable.causality == Causality::Input) {
+            let cause = format!("is {} {} and takes no value", variable.variability, variable.causality);
+            return Err(Error::usage(text, format!("{cause}: vary a parameter, an input or a start value")));
+        }
+        Ok(port)
+    }
+
+    pub(super) fn variable(&self, instance: usize, name: &str) -> Result<&ModelVariable, Error> {
+        let Part { name: of, fmu, .. } = &self.0[instance];
+        let none = || Error::usage(of, format!("{} has no variable {name}", fmu.description().model_name));
+        fmu.description().variable(name).ok_or_else(none)
+    }
+
+    pub(super) fn causality(&self, port: &Port) -> Causality {
+        self.variable(port.instance, &port.name).map_or(Causality::Local, |v| v.causality)
+    }
+
+    /// The instance and what follows its name and a dot; an instance's name may itself have dots.
+    pub(super) fn instance_and_rest<'a>(&self, text: &'a str, what: &str) -> Result<(usize, &'a str), Error> {
+        let split = |(index, part): (usize, &Part)| {
+            Some((index, part.name.len(), text.strip_prefix(&part.name)?.strip_prefix('.')?))
+        };
+        let best = self.0.iter().enumerate().filter_map(split).max_by_key(|(_, length, _)| *length);
+        let names = || self.0.iter().map(|part| part.name.as_str()).collect::<Vec<_>>().join(", ");
+        let wrong = || Error::usage(text, format!("is not INSTANCE.{what}; the instances are {}", names()));
+        best.map(|(index, _, rest)| (index, rest)).ok_or_else(wrong)
+    }
+
+    /// A column for the values of a port, with the units of its variable.
+    pub(super) fn column(&self, port: &Port, name: &str) -> Column {
+        let description = self.0[port.instance].description();
+        let variable = description.variable(&port.name);
+        let unit = variable.and_then(|v| v.unit.clone());
+        let shown = variable.and_then(|v| v.display_unit.as_ref());
+        let definition = unit.as_ref().and_then(|u| description.unit(u));
+        let display = definition.zip(shown).and_then(|(unit, name)| unit.display_unit(name));
+        Column { name: name.into(), unit: unit.unwrap_or_default(), display: display.cloned(), values: Vec::new() }
+    }
+}
+
+/// Types between which a value may travel have the same letter.
+pub(super) fn kind(base: BaseType) -> Option<char> {
+    match base {
+        BaseType::Float32 | BaseType::Float64 => Some('r'),
+        BaseType::Boolean => Some('b'),
+        BaseType::String | BaseType::Binary | BaseType::Clock => None,
+        _ => Some('i'),
+    }
+}

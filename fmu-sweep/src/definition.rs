@@ -1,0 +1,307 @@
+//! The definition of a sweep: what a TOML file says, as it says it.
+
+use crate::Error;
+use serde::de::{MapAccess, Visitor};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+use std::marker::PhantomData;
+use std::path::Path;
+
+/// A sweep: the system, its runs, what is varied and what is measured. A program fills in the fields that a file would have.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Definition {
+    /// FMUs written `FILE` or `NAME=FILE`, or one SSP file; paths from the folder of the definition.
+    pub fmus: Vec<String>,
+    /// Connect every unconnected input to the output of the same name of another FMU.
+    pub auto_connect: bool,
+    /// Pairs of an output and an input.
+    pub connect: Vec<[String; 2]>,
+    /// Pairs of terminals.
+    pub terminal: Vec<[String; 2]>,
+    /// Step the FMUs one after another; each receives the new outputs of those before it.
+    pub sequential: bool,
+    /// Start time in s; otherwise from the FMUs.
+    pub start: Option<f64>,
+    /// Stop time in s; otherwise from the FMUs.
+    pub stop: Option<f64>,
+    /// Communication step in s; otherwise from the FMUs.
+    pub step: Option<f64>,
+    /// Reuse instances from run to run by resetting them; otherwise found out by comparing two rows.
+    pub reuse: Option<bool>,
+    /// Parameters and unconnected inputs, the same in all runs.
+    pub set: Ordered<Scalar>,
+    /// Inputs over time, written as for `fmu simulate --input`.
+    pub input: Ordered<String>,
+    /// How rows are made.
+    pub design: Option<Design>,
+    /// The varied variables; their order is that of the columns.
+    pub vary: Ordered<Vary>,
+    /// What is measured in each run.
+    pub measure: Ordered<Measure>,
+    /// Which runs are recorded.
+    pub trace: Option<Trace>,
+}
+
+/// How rows are made.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Design {
+    /// The kind of design.
+    pub kind: Kind,
+    /// Number of rows, of a random, LHS or Sobol design.
+    pub runs: Option<u64>,
+    /// Another seed gives other rows, of a random, LHS or Sobol design.
+    pub seed: Option<u64>,
+    /// CSV file of a list; its header names the variables.
+    pub file: Option<String>,
+    /// Rows of a part; otherwise about 5 s of work.
+    pub part: Option<u64>,
+}
+
+/// Kinds of designs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Every combination; the last variable changes from row to row.
+    Grid,
+    /// Independent random numbers.
+    Random,
+    /// Latin hypercube sampling: of each variable one number in each of as many strata as there are rows.
+    Lhs,
+    /// Sobol's sequence, shifted by the seed.
+    Sobol,
+    /// The rows of a file.
+    List,
+}
+
+/// How a variable varies: one of `uniform`, `log`, `normal`, `values`, `from` with `to` and `count`, `same`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Vary {
+    /// Uniform between two numbers.
+    pub uniform: Option<[f64; 2]>,
+    /// Uniform in the logarithm, between two positive numbers.
+    pub log: Option<[f64; 2]>,
+    /// Normal, with mean and standard deviation.
+    pub normal: Option<[f64; 2]>,
+    /// Truncates the normal distribution.
+    pub within: Option<[f64; 2]>,
+    /// One of these.
+    pub values: Option<Vec<Scalar>>,
+    /// One of `count` evenly spaced numbers: the first.
+    pub from: Option<f64>,
+    /// The last of them.
+    pub to: Option<f64>,
+    /// How many there are.
+    pub count: Option<u32>,
+    /// Equal to another column ...
+    pub same: Option<String>,
+    /// ... times this; otherwise 1.
+    pub times: Option<f64>,
+}
+
+/// A number for each run.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measure {
+    /// A sum of variables, each optionally after a number and `*`.
+    pub of: String,
+    /// What is computed from it.
+    pub is: Function,
+    /// Wraps the sum into half of this on both sides of 0: a number, or one before `pi`.
+    pub wrap: Option<Scalar>,
+    /// Time in s from which on it counts; otherwise the start.
+    pub after: Option<f64>,
+    /// Time in s, of `at`.
+    pub time: Option<f64>,
+    /// Level at which a rise begins.
+    pub from: Option<f64>,
+    /// Level at which a rise ends.
+    pub to: Option<f64>,
+    /// Where it settles.
+    pub target: Option<f64>,
+    /// How far from the target it may be when it has settled.
+    pub band: Option<f64>,
+}
+
+/// What a measure computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Function {
+    /// The last value.
+    Final,
+    /// The least value.
+    Min,
+    /// The greatest value.
+    Max,
+    /// The greatest magnitude.
+    MaxAbs,
+    /// The mean of the communication points.
+    Mean,
+    /// The root of the mean square of the communication points.
+    Rms,
+    /// The integral over time, by trapezoids.
+    Integral,
+    /// The value at a time: that of the first communication point at or after it.
+    At,
+    /// Time in s from the first passage of `from` to the next passage of `to`, interpolated; infinite without them.
+    Rise,
+    /// Time in s until it stays within `band` of `target`; infinite if it never does.
+    Settling,
+}
+
+/// Recordings of runs, as files in the folder `traces`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Trace {
+    /// Variables to record.
+    pub of: Vec<String>,
+    /// Every how many communication points; otherwise each.
+    pub every: Option<u32>,
+    /// Which runs.
+    pub runs: Runs,
+}
+
+/// Which runs are recorded.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(untagged)]
+pub enum Runs {
+    /// `"failed"` or `"all"`.
+    Word(Which),
+    /// These rows.
+    Rows(Vec<u64>),
+}
+
+/// Words for runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Which {
+    /// Those that end with an error.
+    Failed,
+    /// All of them.
+    All,
+}
+
+/// A number, a Boolean or a text.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(untagged, expecting = "expected a number, true, false or a text; put a name with dots in quotes")]
+pub enum Scalar {
+    /// `true` or `false`.
+    Boolean(bool),
+    /// An integer.
+    Integer(i64),
+    /// A number.
+    Number(f64),
+    /// A text, such as a name of an enumeration.
+    Text(String),
+}
+
+impl fmt::Display for Scalar {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Boolean(x) => x.fmt(f),
+            Self::Integer(x) => x.fmt(f),
+            Self::Number(x) => x.fmt(f),
+            Self::Text(x) => x.fmt(f),
+        }
+    }
+}
+
+/// A table whose order counts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ordered<T>(pub Vec<(String, T)>);
+
+impl<T> Default for Ordered<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T: Serialize> Serialize for Ordered<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        self.0.iter().try_for_each(|(key, value)| map.serialize_entry(key, value))?;
+        map.end()
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Ordered<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Entries<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Entries<T> {
+            type Value = Ordered<T>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+                let mut all = Vec::new();
+                while let Some(entry) = map.next_entry()? {
+                    all.push(entry);
+                }
+                Ok(Ordered(all))
+            }
+        }
+        deserializer.deserialize_map(Entries(PhantomData))
+    }
+}
+
+impl Definition {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or says something else than a sweep: the line and what is wrong there.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
+        Self::parse(&text).map_err(|cause| Error::file(path, cause))
+    }
+
+    /// Reads the text of a file.
+    ///
+    /// # Errors
+    /// The line and what is wrong there.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        toml::from_str(text).map_err(|error| {
+            let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
+            let place = line.map(|line| format!("line {line}: ")).unwrap_or_default();
+            format!("{place}{}", error.message().split_whitespace().collect::<Vec<_>>().join(" "))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_of_the_file_is_kept() {
+        let d = Definition::parse(
+            "fmus = ['z=a.fmu']\n[vary]\n'z.b' = { uniform = [0, 1] }\n'z.a' = { values = [1, 2.5, true, 'Off'] }\n\
+             [measure]\nend = { of = 'z.x', is = 'max_abs', after = 1 }",
+        )
+        .unwrap();
+        assert_eq!(d.vary.0.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["z.b", "z.a"]);
+        let values: Vec<_> = d.vary.0[1].1.values.as_ref().unwrap().iter().map(ToString::to_string).collect();
+        assert_eq!(values, ["1", "2.5", "true", "Off"]);
+        assert_eq!((d.measure.0[0].1.is, d.measure.0[0].1.after), (Function::MaxAbs, Some(1.0)));
+    }
+
+    #[test]
+    fn what_is_no_definition_is_told_with_its_line() {
+        for (text, part) in [
+            ("fmus = 3", "line 1"),
+            ("fmus = []\nfmu = 1", "line 2: unknown field `fmu`"),
+            ("[set]\np.R = 2", "line 2: expected a number, true, false or a text; put a name with dots in quotes"),
+            ("[vary]\n'a' = { unifrom = [0, 1] }", "line 2: unknown field `unifrom`, expected one of `uniform`"),
+            ("[design]\nkind = 'gird'", "line 2: unknown variant `gird`, expected one of `grid`"),
+            ("[measure]\nm = { of = 'x', is = 'maximum' }", "line 2: unknown variant `maximum`"),
+            ("a = ", "line 1"),
+        ] {
+            let error = Definition::parse(text).unwrap_err();
+            assert!(error.contains(part) && error.lines().count() == 1, "{text}: {error}");
+        }
+    }
+}

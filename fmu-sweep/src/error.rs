@@ -1,0 +1,45 @@
+//! What can be wrong before a run, and with files. What is wrong in a run is an [`Outcome`](crate::Outcome) of its row.
+
+use std::path::{Path, PathBuf};
+
+/// One line that names the thing, its value and what was expected.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// An FMU, or what it does not have.
+    #[error(transparent)]
+    Fmu(#[from] fmu_import::Error),
+    /// A definition or a table that makes no sense.
+    #[error("{0}")]
+    Invalid(String),
+    /// The caller broke off.
+    #[error("interrupted")]
+    Interrupted,
+    /// A file that cannot be read or written, or does not fit.
+    #[error("{}: {cause}", path.display())]
+    File {
+        /// Path of the file.
+        path: PathBuf,
+        /// What is wrong with it.
+        cause: String,
+    },
+}
+
+impl Error {
+    pub(crate) fn file(path: &Path, cause: impl std::fmt::Display) -> Self {
+        Self::File { path: path.into(), cause: cause.to_string() }
+    }
+}
+
+impl From<anyhow::Error> for Error {
+    fn from(error: anyhow::Error) -> Self {
+        match error.downcast_ref::<fmu_import::Error>() {
+            Some(of_fmu) if error.chain().len() == 1 => Self::Fmu(of_fmu.clone()),
+            _ => Self::Invalid(format!("{error:#}")),
+        }
+    }
+}
+
+/// An error of a definition.
+pub(crate) fn invalid<T>(text: impl Into<String>) -> Result<T, Error> {
+    Err(Error::Invalid(text.into()))
+}

@@ -1,0 +1,247 @@
+//! Rows in processes of their own: an FMU that crashes ends one process and one row.
+//!
+//! The parent sends what the sweep is, then ranges of rows, on standard input. The worker answers on standard output, where an
+//! FMU may print as well: each answer begins a new line with a mark, and other lines are passed over.
+
+use crate::sweep::Writer;
+use crate::{Definition, Error, Outcome, Sweep};
+use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
+use std::io::{self, BufRead, BufReader, Write};
+use std::ops::Range;
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+
+const MARK: &str = "@fmu-sweep ";
+
+/// A command whose process calls [`serve`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Isolation {
+    /// The program.
+    pub program: PathBuf,
+    /// Its arguments.
+    pub arguments: Vec<OsString>,
+}
+
+#[derive(Deserialize, Serialize)]
+struct Job {
+    definition: Definition,
+    folder: PathBuf,
+    reuse: bool,
+    traces: Option<PathBuf>,
+}
+
+/// A worker process, started when it is needed and again after it has died.
+pub(crate) struct Process<'a> {
+    sweep: &'a Sweep,
+    command: &'a Isolation,
+    job: String,
+    running: Option<Running>,
+}
+
+struct Running {
+    child: Child,
+    input: ChildStdin,
+    output: BufReader<ChildStdout>,
+}
+
+/// How a process ended instead of answering.
+struct Died(String);
+
+impl<'a> Process<'a> {
+    pub(crate) fn new(
+        sweep: &'a Sweep,
+        command: &'a Isolation,
+        reuse: bool,
+        traces: Option<PathBuf>,
+    ) -> Result<Self, Error> {
+        let (definition, folder) = (sweep.definition().clone(), sweep.folder().to_owned());
+        let job = serde_json::to_string(&Job { definition, folder, reuse, traces });
+        Ok(Self { sweep, command, job: job.map_err(|e| Error::Invalid(e.to_string()))?, running: None })
+    }
+
+    /// [`Sweep::probe`] in the process; `None` if it dies.
+    pub(crate) fn probe(&mut self) -> Result<Option<(f64, bool)>, Error> {
+        let answered = self.started()?.ask("probe").and_then(Running::answer);
+        if let Ok(answer) = answered {
+            return Ok(serde_json::from_str(&answer).ok());
+        }
+        self.running = None;
+        Ok(None)
+    }
+
+    /// The lines of rows.
+    pub(crate) fn run(&mut self, mut rows: Range<u64>, lines: &mut String) -> Result<(), Error> {
+        let mut idle = 0;
+        while !rows.is_empty() {
+            // Only the row that it has announced is its own fault.
+            let mut announced = None;
+            let died = match self.started()?.ask(&format!("{} {}", rows.start, rows.end)) {
+                Ok(running) => loop {
+                    match running.answer() {
+                        Err(died) => break Some(died),
+                        Ok(answer) => match answer.split_once(' ') {
+                            Some(("row", row)) => announced = row.parse::<u64>().ok(),
+                            Some(("line", line)) => {
+                                lines.push_str(line);
+                                lines.push('\n');
+                                rows.start += 1;
+                                announced = None;
+                            }
+                            Some(("error", cause)) => return Err(Error::Invalid(cause.into())),
+                            _ => break None,
+                        },
+                    }
+                },
+                Err(died) => Some(died),
+            };
+            let Some(Died(how)) = died else { continue };
+            self.running = None;
+            if announced == Some(rows.start) {
+                let (mut values, outcome) = (Vec::new(), Outcome { result: Err(how), end: f64::NAN });
+                self.sweep.rows().row(rows.start, &mut values);
+                lines.push_str(&self.sweep.line(rows.start, &values, &outcome));
+                rows.start += 1;
+                idle = 0;
+            } else {
+                idle += 1;
+                if idle > 3 {
+                    return Err(Error::Invalid(format!("the process for row {} is {how} before it runs", rows.start)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn started(&mut self) -> Result<&mut Running, Error> {
+        if self.running.is_none() {
+            let Isolation { program, arguments } = self.command;
+            let mut child = Command::new(program)
+                .args(arguments)
+                .stdin(Stdio::piped())
+                .stdout(Stdio::piped())
+                .spawn()
+                .map_err(|e| Error::file(program, e))?;
+            let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
+                return Err(Error::file(program, "has no standard input or output"));
+            };
+            let mut running = Running { child, input, output: BufReader::new(output) };
+            match running.ask(&self.job).and_then(Running::answer) {
+                Ok(ready) if ready == "ready" => {}
+                Ok(cause) => return Err(Error::Invalid(cause.trim_start_matches("error ").into())),
+                Err(Died(how)) => {
+                    return Err(Error::Invalid(format!("a worker process is {how} when it loads the FMUs")));
+                }
+            }
+            self.running = Some(running);
+        }
+        self.running.as_mut().ok_or(Error::Interrupted)
+    }
+}
+
+impl Running {
+    fn ask(&mut self, text: &str) -> Result<&mut Self, Died> {
+        match self.input.write_all(format!("{text}\n").as_bytes()) {
+            Ok(()) => Ok(self),
+            Err(_) => Err(self.died()),
+        }
+    }
+
+    /// The next line with the mark, without it.
+    fn answer(&mut self) -> Result<String, Died> {
+        let mut line = Vec::new();
+        loop {
+            line.clear();
+            match self.output.read_until(b'\n', &mut line) {
+                Ok(1..) => {}
+                Ok(0) | Err(_) => return Err(self.died()),
+            }
+            if let Some(answer) = line.strip_prefix(MARK.as_bytes()) {
+                return Ok(String::from_utf8_lossy(answer).trim_end_matches('\n').to_owned());
+            }
+        }
+    }
+
+    fn died(&mut self) -> Died {
+        Died(self.child.wait().map_or_else(|e| e.to_string(), how))
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // One that waits for rows ends when its input does; one that runs a row nobody needs must not.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// `killed by SIGSEGV`, or `ended with exit status 3`.
+fn how(status: ExitStatus) -> String {
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        let name = match signal {
+            4 => "SIGILL",
+            5 => "SIGTRAP",
+            6 => "SIGABRT",
+            8 => "SIGFPE",
+            9 => "SIGKILL",
+            11 => "SIGSEGV",
+            15 => "SIGTERM",
+            // The one number of these that systems disagree on.
+            7 if cfg!(target_os = "linux") => "SIGBUS",
+            10 if cfg!(target_os = "macos") => "SIGBUS",
+            _ => return format!("killed by signal {signal}"),
+        };
+        return format!("killed by {name}");
+    }
+    status.code().map_or_else(|| "ended".into(), |code| format!("ended with exit status {code}"))
+}
+
+/// What a worker process does until its standard input ends.
+///
+/// # Errors
+/// The input is none of a parent, or cannot be read.
+pub fn serve() -> Result<(), Error> {
+    let wrong = |e: io::Error| Error::Invalid(format!("standard input: {e}"));
+    let mut requests = io::stdin().lock().lines();
+    let Some(job) = requests.next().transpose().map_err(wrong)? else { return Ok(()) };
+    let job: Job = serde_json::from_str(&job).map_err(|e| Error::Invalid(format!("standard input: {e}")))?;
+    let sweep = Sweep::new(job.definition, job.folder);
+    let mut writer = match sweep.as_ref().map_err(Clone::clone).and_then(|sweep| sweep.writer(job.reuse, job.traces)) {
+        Ok(writer) => Some(writer),
+        Err(error) => return say(&format!("error {error}")),
+    };
+    say("ready")?;
+    for request in requests {
+        let request = request.map_err(wrong)?;
+        if request == "probe" {
+            // Of some FMUs there can be one instance only.
+            writer = None;
+            let probed = sweep.as_ref().map_err(Clone::clone).and_then(Sweep::probe)?;
+            say(&serde_json::to_string(&probed).map_err(|e| Error::Invalid(e.to_string()))?)?;
+        } else if let (Some(writer), Some((first, end))) = (&mut writer, request.split_once(' '))
+            && let (Ok(first), Ok(end)) = (first.parse(), end.parse())
+        {
+            answer(writer, first..end)?;
+        }
+    }
+    Ok(())
+}
+
+fn answer(writer: &mut Writer<'_>, rows: Range<u64>) -> Result<(), Error> {
+    for row in rows {
+        say(&format!("row {row}"))?;
+        match writer.run(row) {
+            Ok(line) => say(&format!("line {}", line.trim_end()))?,
+            Err(error) => return say(&format!("error {error}")),
+        }
+    }
+    say("done")
+}
+
+/// On a line of its own, in one piece, whatever the FMU has printed before.
+fn say(text: &str) -> Result<(), Error> {
+    let mut out = io::stdout().lock();
+    let all = out.write_all(format!("\n{MARK}{text}\n").as_bytes()).and_then(|()| out.flush());
+    all.map_err(|e| Error::Invalid(format!("standard output: {e}")))
+}

@@ -1,0 +1,45 @@
+//! Many runs of FMUs, of any tool: designs, measures, threads, parts that a killed sweep resumes from.
+//!
+//! - [`Definition`]: what a sweep is, from a TOML file or from a program.
+//! - [`Plan`]: the system with its measures; runs rows on threads. [`Rows`]: the rows of a design.
+//! - [`Sweep`]: both, from a file. [`run`]: a sweep into a folder; [`isolate`]: in processes of their own.
+//!
+//! A row is a function of the definition, the seed and its number, and its results have the same bits whichever thread, process
+//! or machine computes it.
+//!
+//! ```no_run
+//! # fn main() -> Result<(), fmu_sweep::Error> {
+//! use fmu_sweep::{Definition, Plan};
+//!
+//! let definition = Definition::read("sweep.toml".as_ref())?;
+//! let plan = Plan::new(&definition, "".as_ref())?;
+//! let variables = plan.bind(["p.motor.R_s"])?;
+//! let go_on = |_| std::ops::ControlFlow::Continue(());
+//! let outcomes = plan.run_many(&variables, &[&[2.9, 3.0, 3.1]], 2, &go_on)?;
+//! println!("{:?}", outcomes.measures[0]);
+//! # Ok(()) }
+//! ```
+
+#![forbid(unsafe_code)]
+
+pub mod definition;
+mod design;
+mod error;
+mod files;
+pub mod isolate;
+mod measure;
+mod output;
+mod plan;
+mod pool;
+mod run;
+mod signal;
+mod sweep;
+
+pub use definition::Definition;
+pub use design::Rows;
+pub use error::Error;
+pub use output::Failures;
+pub use plan::{Column, Outcome, Outcomes, Plan, Runner, Variable};
+pub use pool::threads_here;
+pub use run::{Options, Report, Watch, missing, run};
+pub use sweep::Sweep;

@@ -1,0 +1,371 @@
+//! A system with its measures, ready for many runs.
+
+use crate::Error;
+use crate::definition::{Definition, Measure as Measured};
+use crate::error::invalid;
+use crate::measure::{Measure, State};
+use crate::pool::{self, BLOCK};
+use crate::signal::{Signal, Sum, period};
+use fmu_import::cosimulation::{self, Recording, Schedule, Settings, Target, Worker};
+use fmu_import::ssp::load::{Connectors, Loaded};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What all runs share. Clones share it too; any thread may use it.
+#[derive(Clone)]
+pub struct Plan(Arc<Shared>);
+
+struct Shared {
+    /// Records the variables of the measures, then those of the trace.
+    system: Arc<cosimulation::Plan>,
+    connectors: Connectors,
+    measures: Vec<Measure>,
+    columns: Vec<Column>,
+    trace: Vec<usize>,
+    /// `instance.variable` of all that the definition sets.
+    set: Vec<String>,
+    outputs: Vec<String>,
+    reuse: bool,
+    notes: Vec<String>,
+}
+
+/// Name and unit of a column of results.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Name.
+    pub name: String,
+    /// Unit; empty for none.
+    pub unit: String,
+}
+
+/// A variable that runs set, found by [`Plan::bind`]: one of an FMU, or an input of an SSP's system, which may feed several.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Name and unit.
+    pub column: Column,
+    targets: Vec<Target>,
+}
+
+/// What came of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// The measures, or one line with what went wrong.
+    pub result: Result<Vec<f64>, String>,
+    /// Time in s that was reached; NaN if the run never began.
+    pub end: f64,
+}
+
+/// What came of many runs, a value per run in each column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcomes {
+    /// A column for each measure; NaN where the run failed.
+    pub measures: Vec<Vec<f64>>,
+    /// Time in s that was reached; NaN if the run never began.
+    pub end: Vec<f64>,
+    /// What went wrong.
+    pub errors: Vec<Option<String>>,
+}
+
+impl Plan {
+    /// Opens the FMUs of a definition, connects them and sets what is the same in all runs. Relative paths begin in `folder`.
+    ///
+    /// # Errors
+    /// A file is no FMU that runs here, a name or a value is wrong, or a measure makes no sense.
+    pub fn new(definition: &Definition, folder: &Path) -> Result<Self, Error> {
+        if definition.fmus.is_empty() {
+            return invalid("fmus: expected at least one FMU, or an SSP file");
+        }
+        let mut loaded = Loaded::open_files(&definition.fmus, folder, false)?;
+        for [from, to] in &definition.connect {
+            loaded.system.connect(from, to)?;
+        }
+        for [one, other] in &definition.terminal {
+            loaded.system.connect_terminals(one, other)?;
+        }
+        for (name, points) in &definition.input.0 {
+            let schedule =
+                Schedule::parse(points).map_err(|cause| Error::Invalid(format!("input: {name}: {cause}")))?;
+            loaded.input(name, &schedule)?;
+        }
+        if definition.auto_connect {
+            loaded.system.connect_by_name()?;
+        }
+        let mut set = Vec::new();
+        for (name, value) in &definition.set.0 {
+            loaded.set(name, &value.to_string())?;
+            set.extend(loaded.connectors.ports(name)?);
+        }
+        let Definition { start, stop, step, .. } = *definition;
+        let settings = loaded.settings(start, stop, step, definition.sequential);
+        let mut recorded: Vec<String> = Vec::new();
+        let mut measures = Vec::new();
+        for (name, measure) in &definition.measure.0 {
+            let wrong = |cause: String| Error::Invalid(format!("measure: {name}: {cause}"));
+            measures.push(of(measure, &settings, &mut recorded).map_err(wrong)?);
+        }
+        let traced = definition.trace.iter().flat_map(|trace| &trace.of);
+        let trace = traced.map(|name| place(&mut recorded, name)).collect();
+        for name in &recorded {
+            loaded.record(name)?;
+        }
+        let outputs = if loaded.connectors.outputs.is_empty() {
+            loaded.system.outputs()
+        } else {
+            loaded.connectors.outputs.iter().map(|(name, _)| name.clone()).collect()
+        };
+        let Loaded { system, connectors, notes, .. } = loaded;
+        let system = Arc::new(system.into_plan(&settings)?);
+        let unit = |name: &str| {
+            let column = system.columns().iter().find(|c| c.name == name);
+            column.map(|c| c.unit.clone()).unwrap_or_default()
+        };
+        let columns = measures.iter().zip(&definition.measure.0).map(|((measure, sum), (name, _))| {
+            // Of a sum of several units, or with factors, nobody knows the unit.
+            let units: Vec<String> = sum.terms.iter().map(|(_, name)| unit(name)).collect();
+            let plain = sum.terms.iter().all(|(factor, _)| factor.abs().to_bits() == 1.0_f64.to_bits());
+            let same = plain && units.iter().all(|other| *other == units[0]);
+            Column { name: name.clone(), unit: measure.unit(if same { &units[0] } else { "" }) }
+        });
+        let columns = columns.collect();
+        let measures = measures.into_iter().map(|(measure, _)| measure).collect();
+        let reuse = definition.reuse.unwrap_or(true);
+        Ok(Self(Arc::new(Shared { system, connectors, measures, columns, trace, set, outputs, reuse, notes })))
+    }
+
+    /// Names and units of the measures.
+    pub fn measures(&self) -> &[Column] {
+        &self.0.columns
+    }
+
+    /// Start, stop and step.
+    pub fn settings(&self) -> &Settings {
+        self.0.system.settings()
+    }
+
+    /// What an SSP file has that is not used.
+    pub fn notes(&self) -> &[String] {
+        &self.0.notes
+    }
+
+    /// Names of all outputs.
+    pub fn outputs(&self) -> &[String] {
+        &self.0.outputs
+    }
+
+    /// The name of an FMU of which a process can have one instance only, if there is one: then runs are on one thread.
+    pub fn only_one_instance(&self) -> Option<&str> {
+        self.0.system.only_one_instance()
+    }
+
+    /// Finds variables to set in runs.
+    ///
+    /// # Errors
+    /// A variable does not exist, is no number, takes no value, is fed or set for all runs, or is there twice.
+    pub fn bind<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Vec<Variable>, Error> {
+        let mut all: Vec<Variable> = Vec::new();
+        for name in names {
+            let system = &self.0.system;
+            let mut targets = Vec::new();
+            for port in self.0.connectors.ports(name)? {
+                // Values in an SSP file are what a run may replace; those of the definition are for all runs.
+                if self.0.set.contains(&port) {
+                    return invalid(format!("{name} is set for all runs and varied: remove one of them"));
+                }
+                targets.push(system.target(&port)?);
+            }
+            if all.iter().any(|other| other.column.name == name) {
+                return invalid(format!("{name} is varied twice"));
+            }
+            let unit = targets.first().map(|target| system.unit(target)).unwrap_or_default();
+            all.push(Variable { column: Column { name: name.into(), unit }, targets });
+        }
+        Ok(all)
+    }
+
+    /// What a user writes for a variable, as the number that stands for it: `3.3`, `true`, or a name of an enumeration.
+    ///
+    /// # Errors
+    /// The text is no value of the variable's type.
+    pub fn number(&self, variable: &Variable, text: &str) -> Result<f64, Error> {
+        let number = |target: &Target| self.0.system.number(target, text);
+        Ok(variable.targets.first().map_or(Ok(f64::NAN), number)?)
+    }
+
+    /// Simulates once and records variables: `outputs`, or all outputs.
+    ///
+    /// # Errors
+    /// There is no such variable, or an FMU refuses.
+    pub fn simulate(&self, values: &[(Variable, f64)], outputs: Option<&[String]>) -> Result<Recording, Error> {
+        let outputs = outputs.unwrap_or(&self.0.outputs);
+        let source = |name: &String| Ok((self.0.connectors.source(name)?, name.clone()));
+        let variables = outputs.iter().map(source).collect::<Result<Vec<_>, Error>>()?;
+        let mut worker = Arc::new(self.0.system.recording(&variables)?).worker()?;
+        Ok(worker.record(values.iter().flat_map(|(v, x)| v.targets.iter().map(|target| (target, *x))))?)
+    }
+
+    /// Someone who runs one row after another, for one thread.
+    ///
+    /// # Errors
+    /// An FMU refuses to make an instance.
+    pub fn runner(&self, variables: &[Variable]) -> Result<Runner, Error> {
+        Ok(Runner {
+            plan: self.clone(),
+            worker: self.0.system.worker()?,
+            variables: variables.to_vec(),
+            states: Vec::new(),
+            reuse: self.0.reuse,
+            fresh: true,
+        })
+    }
+
+    /// Runs many rows: `columns` has the values of each variable. `progress` hears the number of rows done, on any of the
+    /// threads, and may break off.
+    ///
+    /// # Errors
+    /// The columns are not of one length, an FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run
+    /// is in its row.
+    pub fn run_many(
+        &self,
+        variables: &[Variable],
+        columns: &[&[f64]],
+        threads: usize,
+        progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
+    ) -> Result<Outcomes, Error> {
+        if variables.len() != columns.len() {
+            return invalid(format!("{} columns of values for {} variables", columns.len(), variables.len()));
+        }
+        let length = columns.first().map_or(0, |column| column.len());
+        if let Some(k) = columns.iter().position(|column| column.len() != length) {
+            let name = &variables[k].column.name;
+            return invalid(format!(
+                "{name} has {} values, expected {length} as in the first column",
+                columns[k].len()
+            ));
+        }
+        let row = |index: u64, values: &mut Vec<f64>| {
+            values.clear();
+            let index = usize::try_from(index).unwrap_or(usize::MAX);
+            values.extend(columns.iter().map(|column| column[index]));
+        };
+        self.run_rows(variables, u64::try_from(length).unwrap_or(u64::MAX), &row, threads, progress)
+    }
+
+    /// Runs `count` rows that a function makes: it gets the number of a row, from 0, and fills in the values.
+    ///
+    /// # Errors
+    /// As for [`run_many`](Self::run_many).
+    pub fn run_rows(
+        &self,
+        variables: &[Variable],
+        count: u64,
+        row: &(dyn Fn(u64, &mut Vec<f64>) + Sync),
+        threads: usize,
+        progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
+    ) -> Result<Outcomes, Error> {
+        let rows =
+            usize::try_from(count).map_err(|_| Error::Invalid(format!("{count} rows are too many for the memory")))?;
+        let all = Mutex::new((Outcomes::empty(self.0.measures.len(), rows), 0));
+        let threads = if self.only_one_instance().is_some() { 1 } else { threads };
+        pool::run(
+            count.div_ceil(BLOCK),
+            threads,
+            |_| Ok((self.runner(variables)?, Vec::new())),
+            |(runner, values), block| {
+                let range = pool::rows_of(block, count);
+                let outcomes: Vec<Outcome> = range
+                    .clone()
+                    .map(|index| {
+                        row(index, values);
+                        runner.run(values, &mut |_, _| {})
+                    })
+                    .collect();
+                let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
+                for (index, outcome) in range.clone().zip(outcomes) {
+                    all.0.put(usize::try_from(index).unwrap_or(usize::MAX), outcome);
+                }
+                all.1 += range.end - range.start;
+                let done = all.1;
+                drop(all);
+                if progress(done).is_break() { Err(Error::Interrupted) } else { Ok(()) }
+            },
+        )?;
+        Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner).0)
+    }
+}
+
+impl Outcomes {
+    fn empty(measures: usize, rows: usize) -> Self {
+        Self { measures: vec![vec![f64::NAN; rows]; measures], end: vec![f64::NAN; rows], errors: vec![None; rows] }
+    }
+
+    fn put(&mut self, row: usize, outcome: Outcome) {
+        self.end[row] = outcome.end;
+        match outcome.result {
+            Ok(values) => self.measures.iter_mut().zip(values).for_each(|(column, x)| column[row] = x),
+            Err(error) => self.errors[row] = Some(error),
+        }
+    }
+}
+
+/// The place of a name in a list, added if it is new.
+fn place(names: &mut Vec<String>, name: &str) -> usize {
+    names.iter().position(|n| n == name).unwrap_or_else(|| {
+        names.push(name.to_owned());
+        names.len() - 1
+    })
+}
+
+fn of(measure: &Measured, settings: &Settings, recorded: &mut Vec<String>) -> Result<(Measure, Sum), String> {
+    let sum = Sum::parse(&measure.of).map_err(|cause| format!("of = {cause}"))?;
+    let wrap = measure.wrap.as_ref().map(period).transpose()?;
+    let signal = Signal::new(&sum, wrap, |name| place(recorded, name));
+    Ok((Measure::new(measure, signal, settings)?, sum))
+}
+
+/// Runs one row after another.
+pub struct Runner {
+    plan: Plan,
+    worker: Worker,
+    variables: Vec<Variable>,
+    states: Vec<State>,
+    reuse: bool,
+    /// No run yet.
+    fresh: bool,
+}
+
+impl Runner {
+    /// Whether the instances of a run are reset for the next; otherwise each run has new ones.
+    pub fn reuse(&mut self, reuse: bool) {
+        self.reuse = reuse;
+    }
+
+    /// Runs with a value for each variable. `trace` sees the time and the traced variables of every communication point.
+    pub fn run(&mut self, values: &[f64], trace: &mut dyn FnMut(f64, &mut dyn Iterator<Item = f64>)) -> Outcome {
+        let Self { plan, worker, variables, states, .. } = self;
+        let Shared { measures, trace: traced, .. } = &*plan.0;
+        let mut end = f64::NAN;
+        states.clear();
+        states.resize_with(measures.len(), Measure::begin);
+        let set = variables.iter().zip(values).flat_map(|(v, x)| v.targets.iter().map(|target| (target, *x)));
+        let renewed = if self.reuse || self.fresh { Ok(()) } else { worker.renew() };
+        self.fresh = false;
+        let ended = renewed.and_then(|()| {
+            worker.run(set, |t, row| {
+                end = t;
+                measures.iter().zip(states.iter_mut()).for_each(|(measure, state)| measure.take(state, t, row));
+                if !traced.is_empty() {
+                    trace(t, &mut traced.iter().map(|column| row[*column]));
+                }
+                ControlFlow::Continue(())
+            })
+        });
+        let measured = |_| {
+            let of = |((measure, state), column): ((&Measure, &State), &Column)| {
+                measure.end(state).map_err(|cause| format!("{}: {cause}", column.name))
+            };
+            measures.iter().zip(&*states).zip(&plan.0.columns).map(of).collect()
+        };
+        Outcome { result: ended.map_err(|error| error.to_string()).and_then(measured), end }
+    }
+}

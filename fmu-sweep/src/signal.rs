@@ -1,0 +1,124 @@
+//! What a measure is taken of: a sum of variables.
+
+use crate::definition::Scalar;
+use std::f64::consts::PI;
+
+/// A sum as it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Sum {
+    /// Factors and names.
+    pub(crate) terms: Vec<(f64, String)>,
+}
+
+impl Sum {
+    /// Reads `[number *] variable` with ` + ` and ` - ` between them: the spaces, because names may have signs.
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        let mut terms = Vec::new();
+        let mut sign = Some(1.0);
+        let mut factor = None;
+        let mut words = text.split_whitespace().peekable();
+        while let Some(word) = words.next() {
+            let wrong = || format!("{text:?}: {word:?} is not expected; write [number *] variable + ..., with spaces");
+            let Some(of_term) = sign else {
+                sign = Some(match word {
+                    "+" => 1.0,
+                    "-" => -1.0,
+                    _ => return Err(wrong()),
+                });
+                continue;
+            };
+            if factor.is_none() && terms.is_empty() && word == "-" {
+                sign = Some(-of_term);
+            } else if words.peek() == Some(&"*") {
+                if factor.is_some() {
+                    return Err(wrong());
+                }
+                factor = Some(word.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(wrong)?);
+                words.next();
+            } else if ["+", "-", "*"].contains(&word) {
+                return Err(wrong());
+            } else {
+                terms.push((of_term * factor.take().unwrap_or(1.0), word.to_owned()));
+                sign = None;
+            }
+        }
+        if sign.is_some() {
+            return Err(format!("{text:?} ends before a variable"));
+        }
+        Ok(Self { terms })
+    }
+}
+
+/// A sum of recorded values.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Signal {
+    /// Factors and columns.
+    terms: Vec<(f64, usize)>,
+    /// Period that it is wrapped by.
+    wrap: Option<f64>,
+}
+
+impl Signal {
+    /// `column` finds the place of a variable among the recorded values.
+    pub(crate) fn new(sum: &Sum, wrap: Option<f64>, mut column: impl FnMut(&str) -> usize) -> Self {
+        Self { terms: sum.terms.iter().map(|(factor, name)| (*factor, column(name))).collect(), wrap }
+    }
+
+    /// The value at a communication point.
+    pub(crate) fn at(&self, values: &[f64]) -> f64 {
+        let sum = self.terms.iter().fold(0.0, |sum, (factor, column)| sum + factor * values[*column]);
+        self.wrap.map_or(sum, |period| sum - period * (sum / period).round())
+    }
+}
+
+/// A period: `6.28`, `"2pi"`, `"pi"`.
+pub(crate) fn period(wrap: &Scalar) -> Result<f64, String> {
+    let text = wrap.to_string();
+    let number = match text.trim().strip_suffix("pi").map(str::trim) {
+        Some("") => Some(PI),
+        Some(factor) => factor.trim_end_matches('*').trim_end().parse::<f64>().ok().map(|x| x * PI),
+        None => text.trim().parse().ok(),
+    };
+    number
+        .filter(|x| x.is_finite() && *x > 0.0)
+        .ok_or_else(|| format!("wrap = {text:?}, expected a period like \"2pi\" or 360"))
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_are_read() {
+        let terms = |text| Sum::parse(text).unwrap().terms;
+        let term = |factor, name: &str| (factor, name.to_owned());
+        assert_eq!(terms("p.x-1[2]"), [term(1.0, "p.x-1[2]")]);
+        assert_eq!(terms("c.theta_est - p.theta_e"), [term(1.0, "c.theta_est"), term(-1.0, "p.theta_e")]);
+        assert_eq!(terms("- 9.5 * a + b - 2e-1 * c"), [term(-9.5, "a"), term(1.0, "b"), term(-0.2, "c")]);
+        for text in ["", "a b", "a +", "2 * ", "a * b", "* a", "a + - b", "2 * 3 * a", "a - - b", "NaN * a"] {
+            assert!(Sum::parse(text).is_err(), "{text}: {:?}", Sum::parse(text));
+        }
+    }
+
+    #[test]
+    fn a_signal_is_wrapped_around_zero() {
+        let sum = Sum::parse("a - 2 * b").unwrap();
+        let signal = Signal::new(&sum, Some(360.0), |name| usize::from(name == "b"));
+        assert_eq!(
+            [[10.0, 0.0], [350.0, 0.0], [0.0, 90.5], [730.0, 0.0]].map(|v| signal.at(&v)),
+            [10.0, -10.0, 179.0, 10.0]
+        );
+    }
+
+    #[test]
+    fn periods_are_numbers_or_have_pi() {
+        let text = |text: &str| period(&Scalar::Text(text.into()));
+        assert_eq!(
+            (text("2pi"), text("pi"), text("0.5 pi"), text("360")),
+            (Ok(2.0 * PI), Ok(PI), Ok(0.5 * PI), Ok(360.0))
+        );
+        assert_eq!(period(&Scalar::Integer(360)), Ok(360.0));
+        assert!(text("0").is_err() && text("x").is_err() && text("-2pi").is_err() && text("").is_err());
+    }
+}

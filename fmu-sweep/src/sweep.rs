@@ -1,0 +1,297 @@
+//! A sweep from its file: rows and what comes of them, as lines of CSV.
+
+use crate::definition::{Runs, Trace, Which};
+use crate::error::invalid;
+use crate::{Column, Definition, Error, Outcome, Outcomes, Plan, Rows, Runner, Variable};
+use sha2::{Digest, Sha256};
+use std::fmt::Write;
+use std::fs::File;
+use std::io;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// A sweep, ready to run: the file that defines it has been read, its FMUs are open, its names are found.
+#[derive(Clone)]
+pub struct Sweep {
+    definition: Definition,
+    folder: PathBuf,
+    plan: Plan,
+    rows: Rows,
+    variables: Vec<Variable>,
+}
+
+impl Sweep {
+    /// Opens a sweep from its TOML file.
+    ///
+    /// # Errors
+    /// The file, one that it names, or something in it is wrong; nothing has run.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let definition = Definition::read(path)?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        Self::new(definition, folder).map_err(|error| match error {
+            Error::Invalid(cause) => Error::file(path, cause),
+            other => other,
+        })
+    }
+
+    /// Opens a sweep; its relative paths begin in `folder`.
+    ///
+    /// # Errors
+    /// As for [`open`](Self::open).
+    pub fn new(definition: Definition, folder: PathBuf) -> Result<Self, Error> {
+        let plan = Plan::new(&definition, &folder)?;
+        let Some(design) = &definition.design else {
+            return invalid("expected a table [design] with kind = grid, random, lhs, sobol or list");
+        };
+        let number = |name: &str, text: &str| {
+            let variable = plan.bind([name]).map_err(|e| e.to_string())?;
+            plan.number(&variable[0], text).map_err(|e| e.to_string())
+        };
+        let rows = Rows::new(design, &definition.vary, &folder, &number)?;
+        let variables = plan.bind(rows.names())?;
+        if definition.measure.0.is_empty() && definition.trace.is_none() {
+            return invalid("expected a table [measure]: nothing is measured");
+        }
+        for (name, _) in &definition.measure.0 {
+            if rows.names().any(|other| other == name) {
+                return invalid(format!("measure: {name} is the name of a varied variable: rename it"));
+            }
+            if name.contains([',', '"', '\n']) {
+                return invalid(format!("measure: {name:?} has a comma, a quote or a line break: rename it"));
+            }
+        }
+        if let Some(Trace { every: Some(0), .. }) = definition.trace {
+            return invalid("trace: every = 0, expected at least 1");
+        }
+        if design.part == Some(0) {
+            return invalid("design: part = 0, expected at least 1");
+        }
+        Ok(Self { definition, folder, plan, rows, variables })
+    }
+
+    /// Where relative paths begin.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What the file says.
+    pub fn definition(&self) -> &Definition {
+        &self.definition
+    }
+
+    /// The system and its measures.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The rows of the design.
+    pub fn rows(&self) -> &Rows {
+        &self.rows
+    }
+
+    /// The varied variables, in the order of the columns of a row.
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// Runs rows `first..first + count`, which must be rows of the design.
+    ///
+    /// # Errors
+    /// There are fewer rows, an FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run is in its
+    /// row.
+    pub fn run(
+        &self,
+        first: u64,
+        count: u64,
+        threads: usize,
+        progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
+    ) -> Result<Outcomes, Error> {
+        if first.checked_add(count).is_none_or(|end| end > self.rows.count()) {
+            let all = self.rows.count();
+            return invalid(format!("rows from {first}, {count} of them, of a design with {all} rows"));
+        }
+        let row = |k: u64, values: &mut Vec<f64>| self.rows.row(first + k, values);
+        self.plan.run_rows(&self.variables, count, &row, threads, progress)
+    }
+
+    /// All columns of the results: `run`, the varied variables, the measures, `end`, `error`. Where a measure has one of these
+    /// names, an underscore follows it.
+    pub fn columns(&self) -> Vec<Column> {
+        let varied = self.variables.iter().map(|variable| variable.column.clone());
+        let named: Vec<Column> = varied.chain(self.plan.measures().iter().cloned()).collect();
+        let plain = |name: &str, unit: &str| {
+            let mut name = name.to_owned();
+            while named.iter().any(|column| column.name == name) {
+                name.push('_');
+            }
+            Column { name, unit: unit.into() }
+        };
+        let (run, last) = (plain("run", ""), [plain("end", "s"), plain("error", "")]);
+        std::iter::once(run).chain(named).chain(last).collect()
+    }
+
+    /// The header of the results, with its line break.
+    pub(crate) fn header(&self) -> String {
+        let names: Vec<String> = self.columns().iter().map(|column| cell(&column.name)).collect();
+        names.join(",") + "\n"
+    }
+
+    /// Everything that an FMU or another file of the sweep is read from, with the SHA-256 of its bytes.
+    pub(crate) fn files(&self) -> Result<Vec<(String, String)>, Error> {
+        let list = self.definition.design.iter().filter_map(|design| design.file.as_deref());
+        let fmus = self.definition.fmus.iter().map(|text| fmu_import::ssp::load::name_and_path(text));
+        let fmus: Vec<_> = fmus.map(|found| Ok(found?.1)).collect::<Result<_, Error>>()?;
+        fmus.into_iter()
+            .chain(list.map(Path::new))
+            .map(|path| {
+                let full = self.folder.join(path);
+                let read = || {
+                    let mut hash = Sha256::new();
+                    io::copy(&mut File::open(&full)?, &mut HashWriter(&mut hash))?;
+                    Ok(hex(&hash.finalize()))
+                };
+                let hash = read().map_err(|e: io::Error| Error::file(&full, e))?;
+                Ok((path.to_string_lossy().into_owned(), hash))
+            })
+            .collect()
+    }
+
+    /// Someone who runs rows and writes them down.
+    pub(crate) fn writer(&self, reuse: bool, traces: Option<PathBuf>) -> Result<Writer<'_>, Error> {
+        let mut runner = self.plan.runner(&self.variables)?;
+        runner.reuse(reuse);
+        Ok(Writer { sweep: self, runner, values: Vec::new(), traces, trace: String::new() })
+    }
+
+    /// The line of a row, with its line break.
+    pub(crate) fn line(&self, row: u64, values: &[f64], outcome: &Outcome) -> String {
+        let mut line = row.to_string();
+        let mut number = |x: f64| {
+            line.push(',');
+            push_number(&mut line, x);
+        };
+        values.iter().copied().for_each(&mut number);
+        match &outcome.result {
+            Ok(measures) => measures.iter().copied().for_each(number),
+            Err(_) => line.extend(std::iter::repeat_n(',', self.plan.measures().len())),
+        }
+        line.push(',');
+        if !outcome.end.is_nan() {
+            push_number(&mut line, outcome.end);
+        }
+        line.push(',');
+        if let Err(error) = &outcome.result {
+            line.push_str(&cell(&error.split_whitespace().collect::<Vec<_>>().join(" ")));
+        }
+        line.push('\n');
+        line
+    }
+
+    /// The error of a line, if it has one.
+    pub(crate) fn error_of<'a>(&self, line: &'a str) -> Option<&'a str> {
+        // Only the last cell may have commas.
+        let columns = 1 + self.variables.len() + self.plan.measures().len() + 1;
+        line.trim_end().splitn(columns + 1, ',').nth(columns).filter(|error| !error.is_empty())
+    }
+
+    /// How long a run takes in s, and whether instances are reused: whether the last row has the same line after a reset as with
+    /// new instances.
+    pub(crate) fn probe(&self) -> Result<(f64, bool), Error> {
+        let (first, last) = (0, self.rows.count() - 1);
+        let mut writer = self.writer(true, None)?;
+        let mut longest = 0.0_f64;
+        let mut line = |writer: &mut Writer<'_>, row| {
+            let begun = Instant::now();
+            let line = writer.run(row);
+            longest = longest.max(begun.elapsed().as_secs_f64());
+            line
+        };
+        line(&mut writer, first)?;
+        let after_reset = line(&mut writer, last)?;
+        writer.runner.reuse(false);
+        let of_new = line(&mut writer, last)?;
+        Ok((longest, self.definition.reuse.unwrap_or(after_reset == of_new)))
+    }
+}
+
+/// Runs rows of a sweep, and writes each as a line.
+pub(crate) struct Writer<'a> {
+    sweep: &'a Sweep,
+    runner: Runner,
+    values: Vec<f64>,
+    /// Folder for traces.
+    traces: Option<PathBuf>,
+    trace: String,
+}
+
+impl Writer<'_> {
+    /// Runs a row; returns its line.
+    pub(crate) fn run(&mut self, row: u64) -> Result<String, Error> {
+        let Self { sweep, runner, values, traces, trace } = self;
+        sweep.rows.row(row, values);
+        let wanted = sweep.definition.trace.as_ref().filter(|wanted| match &wanted.runs {
+            Runs::Rows(rows) => rows.contains(&row),
+            Runs::Word(_) => true,
+        });
+        let every = wanted.and_then(|wanted| wanted.every).unwrap_or(1);
+        let mut point = 0;
+        trace.clear();
+        let outcome = runner.run(values, &mut |t, traced| {
+            if wanted.is_some() && point % every == 0 {
+                push_number(trace, t);
+                traced.for_each(|x| {
+                    trace.push(',');
+                    push_number(trace, x);
+                });
+                trace.push('\n');
+            }
+            point += 1;
+        });
+        if let (Some(wanted), Some(folder)) = (wanted, traces)
+            && (wanted.runs != Runs::Word(Which::Failed) || outcome.result.is_err())
+        {
+            let names: Vec<String> = wanted.of.iter().map(|name| cell(name)).collect();
+            let text = format!("time,{}\n{trace}", names.join(","));
+            crate::files::write(&folder.join(format!("run-{row:08}.csv")), text.as_bytes())?;
+        }
+        Ok(sweep.line(row, values, &outcome))
+    }
+}
+
+/// A number that reads back to the same double, in few characters.
+fn push_number(text: &mut String, x: f64) {
+    let plain = x == 0.0 || (1e-5..1e16).contains(&x.abs()) || !x.is_finite();
+    // A String takes everything.
+    let _ = if plain { write!(text, "{x}") } else { write!(text, "{x:e}") };
+}
+
+/// A cell of CSV.
+fn cell(text: &str) -> String {
+    if text.contains([',', '"']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+struct HashWriter<'a>(&'a mut Sha256);
+
+impl io::Write for HashWriter<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// SHA-256 of a text.
+pub(crate) fn hash(text: &str) -> String {
+    hex(&Sha256::digest(text.as_bytes()))
+}
