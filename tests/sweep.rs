@@ -273,7 +273,7 @@ fn what_can_be_known_before_the_first_run_is_told_before_it() {
         (measure.into(), "expected a table [design]"),
         (vary(good).replace("[vary]", "[varied]"), "line 4: unknown field `varied`"),
         (vary(good).replace("random", "list").replace("runs = 4", "file = 'no.csv'"), "no.csv: No such file"),
-        (vary(good).replace("stop =", "connect = [['d.speed', 'd.angle']]\nstop ="), "d.angle: is no input"),
+        (vary(good).replace("stop =", "connect = [['d.speed', 'd.angle']]\nstop ="), "d.angle: is not an input"),
     ] {
         let file = folder.define("bad.toml", &text);
         let said = ends(folder.sweep(&file, "bad").env("RUST_BACKTRACE", "1"), 2);

@@ -88,7 +88,7 @@ impl Archive {
             let size = u64::try_from(bytes.len()).unwrap_or(u64::MAX);
             left = left.checked_sub(size).ok_or_else(|| wrong(&format!("unpacks to more than {LIMIT} bytes")))?;
             if files.insert(name.clone(), bytes).is_some() {
-                return Err(wrong(&"is there twice"));
+                return Err(wrong(&"occurs twice in the archive"));
             }
         }
         Ok(files)
@@ -127,8 +127,7 @@ impl Archive {
         let mut there: Vec<&str> = self.names.iter().filter_map(folder_of).collect();
         there.sort_unstable();
         there.dedup();
-        let there =
-            if there.is_empty() { "no binaries at all".into() } else { format!("binaries for {}", there.join(", ")) };
+        let there = if there.is_empty() { "no binaries".into() } else { format!("binaries for {}", there.join(", ")) };
         let standard = if self.description.version == FmiVersion::V2 { "FMI 2.0" } else { "FMI 3.0" };
         format!("has no binaries/{folder}/{name} for this platform ({standard}); it has {there}")
     }

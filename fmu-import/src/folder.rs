@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process;
 
 const PREFIX: &str = "fmu-";
-/// Locked as long as a process uses the folder. The system unlocks it when the process ends, however it ends, so nobody has
+/// Locked as long as a process uses the folder. The system unlocks it when the process ends, however it ends, so no process has
 /// to guess from the number in the name whether that process lives, perhaps in another container or on another machine.
 const LOCK: &str = ".lock";
 
@@ -28,7 +28,7 @@ impl Folder {
             match lock.try_lock() {
                 // Another process took the new folder for an abandoned one, and removes it.
                 Err(TryLockError::WouldBlock) => {}
-                // Without locks in this file system the folder works all the same; only nobody cleans up after a kill.
+                // On a file system without locks, the folder works too, but stays behind after a kill.
                 Ok(()) | Err(TryLockError::Error(_)) => return Ok(Self { path: dir.keep(), owner, lock: Some(lock) }),
             }
         }
@@ -49,7 +49,7 @@ impl Drop for Folder {
     }
 }
 
-/// Removes the folders whose lock nobody holds. What cannot be read or removed is not ours.
+/// Removes the folders whose lock no process holds. Skips those that this user cannot read or remove.
 fn remove_abandoned() {
     let Ok(entries) = fs::read_dir(std::env::temp_dir()) else { return };
     for entry in entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX)) {
@@ -68,7 +68,7 @@ mod tests {
 
     // Another process that opens an FMU meanwhile removes what is abandoned, too.
     #[test]
-    fn only_what_nobody_uses_is_removed() {
+    fn only_unused_folders_are_removed() {
         let used = Folder::new().unwrap();
         let mut abandoned = Folder::new().unwrap();
         let path = abandoned.path().to_owned();

@@ -51,7 +51,7 @@ impl Instance {
     /// A variable by its name.
     ///
     /// # Errors
-    /// There is none of this name.
+    /// The variable does not exist.
     pub fn variable(&self, name: &str) -> Result<&ModelVariable, Error> {
         let none = || Error::usage(&self.name, format!("{} has no variable {name}", self.description.model_name));
         self.description.variable(name).ok_or_else(none)
@@ -60,7 +60,7 @@ impl Instance {
     /// Reads a variable.
     ///
     /// # Errors
-    /// There is none of this name, or the FMU refuses.
+    /// The variable does not exist, or the FMU refuses.
     pub fn get(&mut self, name: &str) -> Result<Values, Error> {
         let (base, reference, count) = self.place(name)?;
         self.read(base, reference, count)
@@ -69,7 +69,7 @@ impl Instance {
     /// Writes a variable.
     ///
     /// # Errors
-    /// There is none of this name, the values do not fit, or the FMU refuses.
+    /// The variable does not exist, the values do not fit, or the FMU refuses.
     pub fn set(&mut self, name: &str, values: &Values) -> Result<(), Error> {
         let (base, reference, count) = self.place(name)?;
         if values.len() != count {
@@ -91,7 +91,7 @@ impl Instance {
     /// Writes a variable as a user writes it: `3.3`, `true`, `Rasmussen`, or elements with commas between them.
     ///
     /// # Errors
-    /// As [`set`](Self::set), or the text is no value of the variable's type.
+    /// As [`set`](Self::set), or the text is not a value of the variable's type.
     pub fn set_text(&mut self, name: &str, text: &str) -> Result<(), Error> {
         let values = self.parse(name, text)?;
         self.set(name, &values)
@@ -100,7 +100,7 @@ impl Instance {
     /// The value of a variable that a user writes as in [`set_text`](Self::set_text).
     ///
     /// # Errors
-    /// There is no variable of this name, or the text is no value of its type.
+    /// The variable does not exist, or the text is not a value of its type.
     pub fn parse(&self, name: &str, text: &str) -> Result<Values, Error> {
         Values::read(text, self.variable(name)?, &self.description).map_err(|cause| Error::usage(&self.name, cause))
     }

@@ -68,7 +68,7 @@ impl Values {
     /// A number as a value of this base type: rounded for an integer, not 0 for true.
     ///
     /// # Errors
-    /// A text is no number.
+    /// A text is not a number.
     pub fn from_number(x: f64, base: BaseType) -> Result<Self, String> {
         match base {
             BaseType::Float32 | BaseType::Float64 => Ok(Self::Reals(vec![x])),
@@ -105,7 +105,7 @@ impl Values {
         }
     }
 
-    /// Whether there is no element.
+    /// Whether it has no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

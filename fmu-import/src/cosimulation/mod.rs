@@ -43,7 +43,7 @@ use exchange::{Source, Wiring};
 use model_description::{BaseType, Causality, ModelVariable};
 use parts::{Part, Parts, Port, kind};
 
-/// FMUs and how they belong together.
+/// FMUs and their connections.
 #[derive(Default)]
 pub struct System {
     parts: Parts,
@@ -84,7 +84,7 @@ impl System {
     /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text.
     ///
     /// # Errors
-    /// There is no such variable, the text is no value of its type, or the FMU refuses.
+    /// The variable does not exist, the text is not a value of its type, or the FMU refuses.
     pub fn set(&mut self, port: &str, text: &str) -> Result<(), Error> {
         let port = self.parts.port(port)?;
         let values = self.instances[port.instance].parse(&port.name, text)?;
@@ -96,11 +96,11 @@ impl System {
     /// Connects an output to an input, both written `instance.variable`.
     ///
     /// # Errors
-    /// There is no such variable, the causalities or types do not fit, or the input is fed already.
+    /// A variable does not exist, causalities or types do not fit, or the input is fed already.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), Error> {
         let (source, target) = (self.parts.scalar(from)?, self.parts.scalar(to)?);
         if !matches!(self.parts.causality(&source), Causality::Output | Causality::Local) {
-            return Err(Error::usage(from, "is no output"));
+            return Err(Error::usage(from, "is not an output"));
         }
         if kind(source.base) != kind(target.base) {
             return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
@@ -144,7 +144,7 @@ impl System {
     /// Feeds an input over time.
     ///
     /// # Errors
-    /// There is no such variable, it is no number, or it is fed already.
+    /// The variable does not exist, is not a number, or is fed already.
     pub fn input(&mut self, port: &str, schedule: Schedule) -> Result<(), Error> {
         let target = self.parts.scalar(port)?;
         self.feed(target, port, Source::Schedule(schedule))
@@ -153,7 +153,7 @@ impl System {
     /// Records a variable at every communication point. A connected input is recorded as what it is connected to.
     ///
     /// # Errors
-    /// There is no such variable, or it is no number.
+    /// The variable does not exist or is not a number.
     pub fn record(&mut self, port: &str) -> Result<(), Error> {
         self.record_as(port, port)
     }
@@ -172,13 +172,13 @@ impl System {
     /// Whether a connection or a schedule feeds an input, written `instance.variable`.
     ///
     /// # Errors
-    /// There is no such variable.
+    /// The variable does not exist.
     pub fn is_fed(&self, port: &str) -> Result<bool, Error> {
         let port = self.parts.port(port)?;
         Ok(self.wiring.feeds(port.instance, &port.name))
     }
 
-    /// The inputs of an instance that nothing feeds and nobody has set: they keep their start values.
+    /// The inputs of an instance that are neither fed nor set: they keep their start values.
     pub fn untouched(&self, instance: usize) -> Vec<&ModelVariable> {
         let touched = |name: &str| {
             self.wiring.feeds(instance, name) || self.set.iter().any(|(p, _)| p.instance == instance && p.name == name)
@@ -209,7 +209,7 @@ impl System {
 
     fn feed(&mut self, target: Port, written: &str, source: Source) -> Result<(), Error> {
         if self.parts.causality(&target) != Causality::Input {
-            return Err(Error::usage(written, "is no input"));
+            return Err(Error::usage(written, "is not an input"));
         }
         if self.wiring.feeds(target.instance, &target.name) {
             return Err(Error::usage(written, "is fed twice"));

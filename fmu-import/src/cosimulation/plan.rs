@@ -99,7 +99,7 @@ impl Plan {
     /// A variable to set in runs, written `instance.variable`.
     ///
     /// # Errors
-    /// There is no such variable, it is no number, takes no value, or something feeds it.
+    /// The variable does not exist, is not a number, cannot be set, or is fed.
     pub fn target(&self, written: &str) -> Result<Target, Error> {
         let port = self.parts.settable(written)?;
         if self.wiring.feeds(port.instance, &port.name) {
@@ -116,7 +116,7 @@ impl Plan {
     /// What a user writes for a target as the number that stands for it: `3.3`, `true`, or a name of an enumeration.
     ///
     /// # Errors
-    /// The text is no value of the target's type.
+    /// The text is not a value of the target's type.
     pub fn number(&self, target: &Target, text: &str) -> Result<f64, Error> {
         let Port { instance, name, .. } = &target.port;
         let part = &self.parts.0[*instance];
@@ -133,7 +133,7 @@ impl Plan {
     /// The same system and times with other variables recorded, each a pair of `instance.variable` and the name of its column.
     ///
     /// # Errors
-    /// There is no such variable, or it is no number.
+    /// The variable does not exist or is not a number.
     pub fn recording(&self, variables: &[(String, String)]) -> Result<Self, Error> {
         let ports = variables.iter().map(|(port, _)| self.parts.scalar(port)).collect::<Result<Vec<_>, _>>()?;
         let columns = ports.iter().zip(variables).map(|(port, (_, name))| self.parts.column(port, name)).collect();
@@ -258,7 +258,7 @@ impl Worker {
                 instance.abandon();
                 lost = true;
             }
-            // Of messages of earlier runs nobody wants to know.
+            // Drops the messages of earlier runs.
             drop(instance.take_messages());
         }
         // An FMU that cannot be reset runs all the same.
@@ -286,7 +286,7 @@ impl Worker {
         Ok(())
     }
 
-    /// After an error: no instance is used again, and after the status Fatal no instance of that binary, whoever has it.
+    /// After an error, no instance is used again; after the status Fatal, no instance of that binary in any worker.
     fn give_up(&mut self) {
         for ((live, generation), instance) in self.plan.live.iter().zip(&self.generations).zip(&self.instances) {
             let mut fmu = live.fmu();

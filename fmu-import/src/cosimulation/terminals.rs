@@ -1,4 +1,4 @@
-//! Which variables belong together when two terminals are connected (FMI 3.0.2, 2.4.9.2).
+//! Which variables are connected when two terminals are (FMI 3.0.2, 2.4.9.2).
 //!
 //! Each side's matching rule must be content. A signal belongs to a signal, an inflow to an outflow: then both sides have the
 //! same value, and one output to one input is all that it takes. Two inflows would need the opposite sign and are refused.
@@ -53,7 +53,7 @@ impl System {
     }
 }
 
-/// The members that belong together.
+/// The pairs of members to connect.
 fn pairs(a: &Terminal, b: &Terminal) -> Result<Vec<(Member, Member)>, String> {
     for t in [a, b] {
         if !t.streams.is_empty() {

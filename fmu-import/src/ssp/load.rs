@@ -49,7 +49,7 @@ impl Connectors {
         let of_system = !(self.inputs.is_empty() && self.outputs.is_empty());
         if of_system && !name.contains('.') {
             let names: Vec<&str> = self.inputs.iter().map(|(n, _)| n.as_str()).collect();
-            bail!("{name}: is no input of the system; it has {}", names.join(", "));
+            bail!("{name}: is not an input of the system; it has {}", names.join(", "));
         }
         Ok(vec![name.to_owned()])
     }
@@ -192,7 +192,7 @@ impl Loaded {
     /// Records a connector of the system, or `component.variable`.
     ///
     /// # Errors
-    /// There is none of this name, or it is no number.
+    /// The variable does not exist or is not a number.
     pub fn record(&mut self, name: &str) -> Result<()> {
         Ok(self.system.record_as(&self.connectors.source(name)?, name)?)
     }

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 /// Sets the values on an instance, each judged by its FMU; `file` is named where one is wrong.
 ///
 /// # Errors
-/// File and line: there is no such variable, its unit is another, the value is not of its type, or the FMU refuses it.
+/// Names file and line: the variable does not exist, has another unit or type, or the FMU refuses the value.
 pub fn set(system: &mut System, instance: &str, file: &str, parameters: &[Parameter]) -> Result<()> {
     for p in parameters {
         one(system, instance, p).with_context(|| format!("{file}: line {}", p.line))?;
