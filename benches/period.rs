@@ -140,7 +140,9 @@ fn whole_drive(point: Point, folder: &Path, name: String) -> Candidate {
 fn measure(candidates: &mut [Candidate]) {
     // The first turns start the drive and warm the caches.
     for _ in 0..3 {
-        candidates.iter_mut().for_each(|candidate| (candidate.turn)());
+        for candidate in &mut *candidates {
+            (candidate.turn)();
+        }
     }
     for _ in 0..TURNS {
         for candidate in &mut *candidates {
