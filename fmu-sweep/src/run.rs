@@ -55,6 +55,8 @@ pub struct Report {
 /// # Errors
 /// The folder is of another sweep, a file cannot be written, or an FMU cannot be instantiated. Parts that are complete stay.
 pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -> Result<Report, Error> {
+    // An FMU may change the working directory.
+    let folder = &std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
     if options.restart {
         restart(folder)?;
     }
