@@ -229,6 +229,12 @@ impl<F: Rotating> Axis<F> {
         Self { direction: self.direction * turn.0, frame: PhantomData }
     }
 
+    /// The stator vector of this `length` along the d-axis.
+    #[inline]
+    pub fn along(self, length: f64) -> AlphaBeta {
+        Vector::of(self.direction * length)
+    }
+
     /// Transforms a stator vector to the rotating frame: v e^{-j theta}.
     #[inline]
     pub fn from_stator(self, v: AlphaBeta) -> Vector<F> {

@@ -4,7 +4,7 @@
 //! i_q, tau_e = 1.5 n_p (psi_d i_q - psi_q i_d); [`saturation`](crate::plant::saturation) adds to the current. The flux
 //! linkages are the state, so the equations remain valid when the inductances saturate.
 
-use crate::frame::{AlphaBeta, Dq};
+use crate::frame::{AlphaBeta, Axis, Dq, Rotor};
 use crate::motor::Motor;
 use crate::plant::saturation::Saturation;
 
@@ -57,6 +57,19 @@ impl<'a> Machine<'a> {
         self.saturation.map_or(linear, |saturation| linear + saturation.current(self.motor, psi))
     }
 
+    /// Flux linkage (Wb) in stator axes with the magnet on `axis`. The part of the magnet is transformed separately, both
+    /// ways, so that a machine without current has none after a transformation either.
+    #[inline]
+    pub fn to_stator(&self, axis: Axis<Rotor>, psi: Dq) -> AlphaBeta {
+        axis.to_stator(psi - Dq::new(self.psi_M, 0.0)) + axis.along(self.psi_M)
+    }
+
+    /// The inverse of [`to_stator`](Self::to_stator).
+    #[inline]
+    pub fn from_stator(&self, axis: Axis<Rotor>, psi: AlphaBeta) -> Dq {
+        axis.from_stator(psi - axis.along(self.psi_M)) + Dq::new(self.psi_M, 0.0)
+    }
+
     /// Derivative of the flux linkage (V) in stator axes at the voltage `u` (V) and the current `i` (A).
     #[inline]
     pub fn flux_derivative(&self, u: AlphaBeta, i: AlphaBeta) -> AlphaBeta {
@@ -79,7 +92,6 @@ impl<'a> Machine<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::{Axis, Rotor};
 
     #[test]
     fn torque_of_magnet_and_reluctance() {

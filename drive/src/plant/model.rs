@@ -84,7 +84,7 @@ impl Held<'_> {
     // Inlined at its four calls: half of the time of a step is spent here.
     #[inline(always)]
     fn rates(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> Rates {
-        let psi = axis.from_stator(psi);
+        let psi = self.machine.from_stator(axis, psi);
         let i = self.machine.current(psi);
         let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
         let i = axis.to_stator(i);
@@ -135,7 +135,8 @@ impl PmsmPlant {
             return (self.state, Energy::default());
         }
         let axis = axis_at(motor, angle_shaft);
-        let psi = axis.from_stator(self.state.axis.to_stator(self.state.psi));
+        let machine = Machine::new(motor, saturation);
+        let psi = machine.from_stator(axis, machine.to_stator(self.state.axis, self.state.psi));
         let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
         let energy = Energy { mech: stored(self.state.psi) - stored(psi), ..Energy::default() };
         (State { psi, speed: speed_shaft, angle: angle_shaft, axis }, energy)
@@ -174,7 +175,7 @@ impl PmsmPlant {
             shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
         };
         let (n_p, half, speed) = (f64::from(motor.n_p), 0.5 * h, start.speed);
-        let psi = start.axis.to_stator(start.psi);
+        let psi = held.machine.to_stator(start.axis, start.psi);
         let turn = Turn::new(n_p * half * speed);
         let middle = start.axis.ahead(turn);
 
@@ -195,7 +196,7 @@ impl PmsmPlant {
         };
         let energy = Energy { r#in: over(|p| p.r#in), mech: over(|p| p.mech), loss: over(|p| p.loss) };
         let axis = axis_at(motor, angle);
-        (State { psi: axis.from_stator(psi), speed, angle, axis }, energy)
+        (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, energy)
     }
 
     /// One integration step of `h` (s) with the gates off.
