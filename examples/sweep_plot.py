@@ -4,6 +4,7 @@ import sys
 import matplotlib
 
 matplotlib.use("svg")
+matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "lost"})
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -22,7 +23,7 @@ for axis, x, name in [(axes[0], np.degrees(angle), "start angle (deg)"), (axes[1
     axis.set(xlabel=name, ylabel="lost (%)")
 grid = [np.linspace(1.4, 2.6, 25), np.linspace(0, 3, 25)]
 count, share = np.histogram2d(resistance, load, grid)[0], np.histogram2d(resistance, load, grid, weights=lost)[0]
-image = axes[2].pcolormesh(*grid, 100 * (share / np.maximum(count, 1)).T, cmap="magma_r")
+image = axes[2].pcolormesh(*grid, 100 * (share / np.maximum(count, 1)).T, cmap="magma_r", rasterized=True)
 axes[2].set(xlabel="stator resistance (Ω)", ylabel="load (N.m)")
 figure.colorbar(image, label="lost (%)")
 figure.savefig(picture, metadata={"Date": None})
