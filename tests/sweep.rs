@@ -132,6 +132,11 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
     }
     println!("{there} parts at the first kill, {kills} more kills");
     assert_eq!(folder.results("killed"), whole);
+    assert!(
+        !names(&folder.path("killed")).iter().any(|name| name.starts_with('.')),
+        "{:?}",
+        names(&folder.path("killed"))
+    );
     let said = ends(&mut folder.sweep(&file, "killed"), 0);
     assert!(said.contains("note: 40 of 40 parts are there already"), "{said}");
 
