@@ -132,6 +132,11 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
     }
     println!("{there} parts at the first kill, {kills} more kills");
     assert_eq!(folder.results("killed"), whole);
+    assert!(
+        !names(&folder.path("killed")).iter().any(|name| name.starts_with('.')),
+        "{:?}",
+        names(&folder.path("killed"))
+    );
     let said = ends(&mut folder.sweep(&file, "killed"), 0);
     assert!(said.contains("note: 40 of 40 parts are there already"), "{said}");
 
@@ -485,6 +490,31 @@ fn rude_fmus_run_as_well_as_polite_ones() {
     assert_eq!(rows, polite);
     fs::remove_dir_all(folder.path("ONCE")).unwrap();
     assert_eq!(sweep("ONCE", &["--jobs", "1"], 0), (String::new(), polite));
+}
+
+/// What the documentation shows: the file of docs/sweeps.md and examples/sweep.toml, with fewer runs.
+#[test]
+fn the_files_of_the_documentation_run() {
+    let folder = Folder::new();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["PmsmPlant.fmu", "SensorlessController.fmu", "PmsmDrive.fmu"] {
+        fs::copy(common::archives().join("fmi3").join(name), folder.path(name)).unwrap();
+    }
+    let page = fs::read_to_string(root.join("docs/sweeps.md")).unwrap();
+    let file = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    fs::write(folder.path("page.toml"), file.replace("runs = 4096", "runs = 4")).unwrap();
+    assert_eq!(ends(&mut folder.sweep(&folder.path("page.toml"), "page"), 0), "");
+    let settled = folder.rows("page").iter().filter(|row| row.split(',').nth(4).unwrap().starts_with("0.")).count();
+    assert_eq!(settled, 4, "{:?}", folder.rows("page"));
+
+    let file = fs::read_to_string(root.join("examples/sweep.toml")).unwrap();
+    let fewer = file.replace("runs = 100000", "runs = 256").replace("../target/fmu/fmi3/", "");
+    fs::write(folder.path("example.toml"), fewer).unwrap();
+    assert_eq!(ends(&mut folder.sweep(&folder.path("example.toml"), "example"), 0), "");
+    let error = |row: &String| row.split(',').nth(6).unwrap().parse::<f64>().unwrap();
+    let lost = folder.rows("example").iter().filter(|row| error(row).abs() > std::f64::consts::FRAC_PI_2).count();
+    println!("{lost} of 256 starts lost");
+    assert!((1..20).contains(&lost), "{lost} of 256 starts lost");
 }
 
 /// A run of one period beside the model: reset, two values, initialization, end.

@@ -3,6 +3,7 @@
 use crate::Error;
 use std::ffi::OsString;
 use std::fs::{self, File};
+use std::hash::{BuildHasher, RandomState};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process;
@@ -19,8 +20,11 @@ pub(crate) fn write_with(path: &Path, content: impl FnOnce(&mut File) -> io::Res
         let mut file = File::create(&partial)?;
         content(&mut file)?;
         file.sync_all()?;
-        fs::rename(&partial, path)?;
-        sync_folder(path)
+        match fs::rename(&partial, path) {
+            // Another process has written the same file, and cleaned up.
+            Err(e) if e.kind() == io::ErrorKind::NotFound && path.exists() => Ok(()),
+            renamed => renamed.and_then(|()| sync_folder(path)),
+        }
     };
     whole().map_err(|e| {
         let _ = fs::remove_file(&partial);
@@ -56,12 +60,28 @@ pub(crate) fn create(path: &Path, bytes: &[u8]) -> Result<bool, Error> {
     })
 }
 
-/// `.NAME-PID` beside the file.
+/// `.NAME-PID-RANDOM` beside the file.
 fn partial(path: &Path) -> PathBuf {
     let mut name = OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
-    name.push(format!("-{}", process::id()));
+    name.push(format!("-{}", own()));
     path.with_file_name(name)
+}
+
+/// `PID-RANDOM`: in containers that share a folder, processes have the same numbers.
+pub(crate) fn own() -> String {
+    format!("{}-{:016x}", process::id(), RandomState::new().hash_one(0))
+}
+
+/// Removes what killed processes have left of files that are complete by now.
+pub(crate) fn clean_up(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if [".part-", ".results.csv-", ".sweep.json-"].iter().any(|start| name.starts_with(start)) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Makes a new name last, where a folder can be opened.

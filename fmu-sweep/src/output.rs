@@ -170,8 +170,11 @@ impl Output {
     }
 }
 
-/// Removes the results of a sweep, and nothing else.
+/// Removes the results of a sweep, and nothing else; of a folder without `sweep.json` nothing at all.
 pub(crate) fn restart(folder: &Path) -> Result<(), Error> {
+    if !folder.join("sweep.json").exists() {
+        return Ok(());
+    }
     let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();

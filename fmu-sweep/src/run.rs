@@ -55,6 +55,8 @@ pub struct Report {
 /// # Errors
 /// The folder is of another sweep, a file cannot be written, or an FMU cannot be instantiated. Parts that are complete stay.
 pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -> Result<Report, Error> {
+    // An FMU may change the working directory.
+    let folder = &std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
     if options.restart {
         restart(folder)?;
     }
@@ -121,6 +123,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -
     let mut results = None;
     if missing == 0 {
         failures = output.join(sweep)?;
+        files::clean_up(folder);
         results = Some(folder.join("results.csv"));
     }
     log.write(&format!("{rows} rows done, {} failed, {missing} parts missing", failures.count))?;
@@ -261,7 +264,7 @@ impl Marker {
         if killed {
             watch.note("an earlier process ended in the middle; if an FMU crashes, --isolate makes its row an error");
         }
-        let path = folder.join(format!(".running-{}", process::id()));
+        let path = folder.join(format!(".running-{}", files::own()));
         let lock = File::create(&path).map_err(|e| Error::file(&path, e))?;
         // Without locks in this file system the note is missing, nothing else.
         let _ = lock.try_lock();

@@ -40,6 +40,9 @@ impl Sweep {
     /// # Errors
     /// As for [`open`](Self::open).
     pub fn new(definition: Definition, folder: PathBuf) -> Result<Self, Error> {
+        // An FMU may change the working directory.
+        let folder = if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder };
+        let folder = std::path::absolute(&folder).map_err(|e| Error::file(&folder, e))?;
         let plan = Plan::new(&definition, &folder)?;
         let Some(design) = &definition.design else {
             return invalid("expected a table [design] with kind = grid, random, lhs, sobol or list");

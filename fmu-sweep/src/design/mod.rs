@@ -292,6 +292,28 @@ mod tests {
         assert!(stratified(6, 1.0 - 1e-16, 7) < 1.0);
     }
 
+    /// The same bits on every platform: only exact operations, and functions of the crate `libm`.
+    #[test]
+    fn rows_have_these_bits() {
+        #[rustfmt::skip]
+        let bits = [
+            ("random", [0x2478_fc01_4ab5_ef8b, 0xc3fc_6b62_3361_bd24, 0x6e40_d8cf_aecd_5150, 0x5212_92da_c2e7_165e]),
+            ("lhs", [0xaae5_a6ca_eb32_f056, 0x728b_5cc8_b444_4d4a, 0x9592_df04_fa80_39dc, 0x6099_abad_b578_d5ed]),
+            ("sobol", [0xfb31_394d_abe8_1611, 0xaa0e_bc08_2efa_626e, 0x7438_5626_91d1_30d1, 0xe356_f717_4a1d_dc11]),
+        ];
+        for (kind, expected) in bits {
+            let rows = rows(&format!(
+                "[design]\nkind = '{kind}'\nruns = 1000\nseed = 5\n[vary]\na = {{ uniform = [-3, 7] }}\n\
+                 b = {{ log = [0.01, 30] }}\nc = {{ normal = [3, 0.15] }}\nd = {{ normal = [3, 0.15], within = [2.5, 3.1] }}"
+            ));
+            let sum = |column: usize| {
+                all(rows.as_ref().unwrap()).iter().fold(0_u64, |sum, row| sum.rotate_left(1) ^ row[column].to_bits())
+            };
+            let found = [0, 1, 2, 3].map(sum);
+            assert_eq!(found, expected, "{kind}: {found:#018x?}");
+        }
+    }
+
     #[test]
     fn nonsense_is_told() {
         let vary = "[vary]\na = { uniform = [0, 1] }";
