@@ -134,7 +134,6 @@ fn false_lock() {
         speed.abs() < 1.0 && PAGE.contains(&format!("stands at 0 rpm with {} for more than 8 s", degrees(angle))),
         "{speed} rpm, {angle} deg"
     );
-    assert!((after(16.0, R).0 - 500.0).abs() < 1.0);
     assert!((after(0.5, 0.9 * R).0 - 500.0).abs() < 1.0);
 }
 
