@@ -6,7 +6,7 @@ use crate::platform::Platform;
 use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zip::ZipArchive;
@@ -16,11 +16,16 @@ const LIMIT: u64 = 4 << 30;
 /// Maximum number of entries.
 const ENTRIES: usize = 100_000;
 
+/// Where an archive is read from: a file, or memory.
+trait Source: Read + Seek + Send {}
+impl<T: Read + Seek + Send> Source for T {}
+type Zip = ZipArchive<Box<dyn Source>>;
+
 /// An FMU's archive, checked, with its description read.
 pub(super) struct Archive {
     /// Path of the `.fmu` file.
     pub(super) path: PathBuf,
-    zip: ZipArchive<File>,
+    zip: Zip,
     names: Vec<String>,
     /// Its modelDescription.xml.
     pub(super) description: Arc<ModelDescription>,
@@ -33,7 +38,17 @@ impl Archive {
             return Err(wrong(&"is a directory, expected an .fmu file"));
         }
         let file = File::open(path).map_err(|e| wrong(&e))?;
-        let mut zip = ZipArchive::new(file).map_err(|e| wrong(&format!("not a ZIP archive, or cut short: {e}")))?;
+        Self::read(path, Box::new(file))
+    }
+
+    /// An archive in memory; errors name it `path`.
+    pub(super) fn from_bytes(path: &Path, bytes: Arc<[u8]>) -> Result<Self, Error> {
+        Self::read(path, Box::new(io::Cursor::new(bytes)))
+    }
+
+    fn read(path: &Path, source: Box<dyn Source>) -> Result<Self, Error> {
+        let wrong = |cause: &dyn std::fmt::Display| Error::file(path, cause);
+        let mut zip = ZipArchive::new(source).map_err(|e| wrong(&format!("not a ZIP archive, or cut short: {e}")))?;
         let names = check_entries(&mut zip).map_err(|cause| wrong(&cause))?;
         let xml = contents(&mut zip, "modelDescription.xml").map_err(|cause| wrong(&cause))?;
         let xml = xml.ok_or_else(|| wrong(&"has no modelDescription.xml"))?;
@@ -134,7 +149,7 @@ impl Archive {
 }
 
 /// The contents of an entry; `None` if no entry has this name.
-fn contents(zip: &mut ZipArchive<File>, name: &str) -> Result<Option<Vec<u8>>, String> {
+fn contents(zip: &mut Zip, name: &str) -> Result<Option<Vec<u8>>, String> {
     let mut bytes = Vec::new();
     match zip.by_name(name) {
         Ok(entry) => entry.take(LIMIT).read_to_end(&mut bytes).map_err(|e| format!("{name}: {e}"))?,
@@ -145,7 +160,7 @@ fn contents(zip: &mut ZipArchive<File>, name: &str) -> Result<Option<Vec<u8>>, S
 }
 
 /// The names of the entries; refuses names that lead outside, links, and sizes that no FMU has.
-fn check_entries(zip: &mut ZipArchive<File>) -> Result<Vec<String>, String> {
+fn check_entries(zip: &mut Zip) -> Result<Vec<String>, String> {
     if zip.len() > ENTRIES {
         return Err(format!("has {} entries, more than {ENTRIES}", zip.len()));
     }

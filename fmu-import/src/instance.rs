@@ -123,6 +123,22 @@ impl Instance {
         self.call(|s| s.set_reals(references, values))
     }
 
+    /// Reads `count` elements of the variable with this base type and value reference.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn get_at(&mut self, base: BaseType, reference: u32, count: usize) -> Result<Values, Error> {
+        self.call(|s| s.get(base, reference, count))
+    }
+
+    /// Writes the variable with this base type and value reference.
+    ///
+    /// # Errors
+    /// The values do not fit, or the FMU refuses.
+    pub fn set_at(&mut self, base: BaseType, reference: u32, values: &Values) -> Result<(), Error> {
+        self.call(|s| s.set(base, reference, values))
+    }
+
     /// Switches logging on or off; errors are always logged.
     ///
     /// # Errors
@@ -136,7 +152,15 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn setup(&mut self, start: f64, stop: Option<f64>) -> Result<(), Error> {
-        self.call(|s| s.setup(Experiment { start, stop, tolerance: None }))
+        self.setup_with(start, stop, None)
+    }
+
+    /// As [`setup`](Self::setup), with the relative tolerance of a solver inside the FMU.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn setup_with(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result<(), Error> {
+        self.call(|s| s.setup(Experiment { start, stop, tolerance }))
     }
 
     /// Initialization begins: parameters and inputs are set, outputs may be read.
@@ -162,6 +186,14 @@ impl Instance {
     #[inline]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<ControlFlow<()>, Error> {
         self.call(|s| s.do_step(t, h))
+    }
+
+    /// Time (s) that the last step reached; it differs from its end when the FMU asked to end the simulation.
+    ///
+    /// # Errors
+    /// The FMU refuses, or does not tell.
+    pub fn last_successful_time(&mut self) -> Result<f64, Error> {
+        self.call(|s| s.last_successful_time())
     }
 
     /// Ends the simulation; variables can still be read.
@@ -239,8 +271,12 @@ impl Instance {
         Ok((variable.base, variable.value_reference, self.elements(variable)?))
     }
 
-    /// The extents of an array as the file has them: sizes that structural parameters give are their start values.
-    fn elements(&self, variable: &ModelVariable) -> Result<usize, Error> {
+    /// Number of elements of a variable: the extents of an array as the file has them: sizes that structural parameters give are their start
+    /// values.
+    ///
+    /// # Errors
+    /// A size is not known.
+    pub fn elements(&self, variable: &ModelVariable) -> Result<usize, Error> {
         let extent = |dimension: &Dimension| match dimension {
             Dimension::Fixed(n) => usize::try_from(*n).ok(),
             Dimension::Variable(reference) => {

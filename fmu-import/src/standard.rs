@@ -45,6 +45,7 @@ pub(super) trait Standard {
     fn enter_initialization(&mut self) -> Outcome;
     /// Breaks when the FMU asks to end the simulation.
     fn do_step(&mut self, t: f64, h: f64) -> Outcome<ControlFlow<()>>;
+    fn last_successful_time(&mut self) -> Outcome<f64>;
 }
 
 /// A value that does not fit the type that crosses the interface.

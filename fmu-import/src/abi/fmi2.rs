@@ -36,11 +36,14 @@ symbols! {
         // Some exporters omit these; a call reports it.
         set_debug_logging: "fmi2SetDebugLogging" = SetDebugLogging,
         get_boolean_status: "fmi2GetBooleanStatus" = GetStatus<c_int>,
+        get_real_status: "fmi2GetRealStatus" = GetStatus<f64>,
     }
 }
 
 /// `fmi2CoSimulation`.
 const CO_SIMULATION: c_int = 1;
+/// `fmi2LastSuccessfulTime`, a status kind.
+const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Terminated`, a status kind.
 const TERMINATED: c_int = 3;
 
@@ -209,5 +212,12 @@ impl Standard for Instance {
             }
         }
         judge("fmi2DoStep", status).map(ControlFlow::Continue)
+    }
+    fn last_successful_time(&mut self) -> Outcome<f64> {
+        let function = self.functions.api.get_real_status.ok_or_else(|| missing("fmi2GetRealStatus"))?;
+        let mut time = 0.0;
+        // SAFETY: the instance is alive, there is room for one value.
+        let status = unsafe { function(self.shared.pointer, LAST_SUCCESSFUL_TIME, &raw mut time) };
+        judge("fmi2GetRealStatus", status).map(|()| time)
     }
 }

@@ -66,6 +66,8 @@ pub(super) struct Instance {
     functions: Arc<Loaded<Functions>>,
     /// FMI 3.0 receives the times on entering initialization mode.
     experiment: Experiment,
+    /// `lastSuccessfulTime` of the last step.
+    last_successful_time: f64,
 }
 
 /// Borrows a function that may be missing.
@@ -103,7 +105,8 @@ impl Instance {
         };
         // SAFETY: the instance is of this library, which `functions` keeps loaded.
         let shared = unsafe { SharedInstance::new("fmi3InstantiateCoSimulation", &functions.shared, component) }?;
-        Ok(Self { shared, functions, experiment: Experiment { start: 0.0, stop: None, tolerance: None } })
+        let experiment = Experiment { start: 0.0, stop: None, tolerance: None };
+        Ok(Self { shared, functions, experiment, last_successful_time: 0.0 })
     }
 
     fn read<T>(&self, name: &'static str, f: Get<T>, references: &[u32], values: &mut [T]) -> Outcome {
@@ -260,6 +263,10 @@ impl Standard for Instance {
             )
         };
         judge("fmi3DoStep", status)?;
+        self.last_successful_time = last;
         Ok(if terminate == 0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) })
+    }
+    fn last_successful_time(&mut self) -> Outcome<f64> {
+        Ok(self.last_successful_time)
     }
 }
