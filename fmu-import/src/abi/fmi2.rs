@@ -217,7 +217,7 @@ impl Standard for Instance {
         let function = self.functions.api.get_real_status.ok_or_else(|| missing("fmi2GetRealStatus"))?;
         let mut time = 0.0;
         // SAFETY: the instance is alive, there is room for one value.
-        let status = unsafe { function(self.shared.pointer, LAST_SUCCESSFUL_TIME, &raw mut time) };
+        let status = unsafe { function(self.shared.pointer(), LAST_SUCCESSFUL_TIME, &raw mut time) };
         judge("fmi2GetRealStatus", status).map(|()| time)
     }
 }
