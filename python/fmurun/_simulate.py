@@ -1,0 +1,343 @@
+"""FMPy's `simulate_fmu` for co-simulation: its arguments, its result, its bits."""
+
+from math import prod
+
+import numpy as np
+
+from . import _core
+from .fmpy import _described, _instance, _open, _refuse
+
+# Columns are grouped by type, in this order.
+_COLUMNS = {
+    "Real": np.float64, "Integer": np.int32, "Float32": np.float32, "Float64": np.float64, "Int8": np.int8, "UInt8": np.uint8,
+    "Int16": np.int16, "UInt16": np.uint16, "Int32": np.int32, "UInt32": np.uint32, "Int64": np.int64, "UInt64": np.uint64,
+    "Boolean": np.bool_,
+}  # fmt: skip
+_FLOATS = ("Real", "Float32", "Float64")
+
+
+class SimulationResult(np.ndarray):
+    """A structured array with the column `time` first, and the attribute `modelDescription`."""
+
+    def __array_finalize__(self, made_from):
+        self.modelDescription = getattr(made_from, "modelDescription", None)
+
+
+class Recorder:
+    """What `step_finished(time, recorder)` sees: the instance `fmu`, `modelDescription`, and the rows so far."""
+
+    def __init__(self, fmu, model_description, simulation, dtype):
+        self.fmu, self.modelDescription, self._simulation, self._dtype = fmu, model_description, simulation, dtype
+
+    @property
+    def rows(self):
+        """The rows so far, as tuples."""
+        return self.result().tolist()
+
+    @property
+    def lastSampleTime(self):
+        """Time (s) of the last row."""
+        return float(self.result()["time"][-1])
+
+    def sample(self, time, force=False):
+        """Record a row now."""
+        self._simulation.sample(time)
+
+    def result(self):
+        """The rows so far, as `simulate_fmu` returns them."""
+        return self._result(False)
+
+    def _result(self, take):
+        result = self._simulation.bytes(take).view(self._dtype).view(SimulationResult)
+        result.modelDescription = self.modelDescription
+        return result
+
+
+def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solver="CVode", step_size=None,
+                 relative_tolerance=None, output_interval=None, record_events=True, fmi_type=None, start_values={},
+                 apply_default_start_values=False, input=None, output=None, timeout=None, debug_logging=False, visible=False,
+                 logger=None, fmi_call_logger=None, step_finished=None, model_description=None, fmu_instance=None,
+                 set_input_derivatives=False, remote_platform="auto", early_return_allowed=False, use_event_mode=False,
+                 initialize=True, terminate=True, fmu_state=None, set_stop_time=True):  # fmt: skip
+    """Simulate an FMU by co-simulation, as FMPy 0.3.32 does: same arguments, same communication points, same bits.
+
+    FMUs stay open: another simulation of the same file reads it, compares its bytes and does not unpack it again.
+
+    Args:
+        filename: an .fmu file, or the folder that it was extracted to
+        validate: refuse start values that could not be set
+        start_time, stop_time: of the simulation (s); by default the FMU's default experiment, else 0 and one second more
+        relative_tolerance: of a solver inside the FMU
+        output_interval: communication step (s); by default the FMU's, doubled until there are at most 1000 steps
+        fmi_type: None or "CoSimulation"
+        start_values: name -> value, or (value, unit); inputs that `input` does not have keep theirs
+        input: structured array, its first column is time (s), the others are inputs and tunable parameters
+        output: names to record; by default the outputs
+        timeout: end after this much time of the clock (s)
+        debug_logging: the FMU logs; its messages are printed at the end
+        step_finished: called with (time, recorder) after each step; False ends the simulation
+        model_description, fmu_instance: read and instantiated before; a given instance is not freed
+        initialize, terminate: False leaves the given instance as it is before and after
+        fmu_state: state of `fmu_instance`, or bytes of a serialized one: begin there instead of with an initialization
+        set_stop_time: tell the FMU the stop time
+
+    `solver`, `step_size` and `record_events` belong to model exchange and have no effect, as in FMPy. The others are refused
+    with NotImplementedError, as is model exchange.
+
+    Returns:
+        a structured array, one row per communication point, `time` (s) first, then the variables by type
+
+    Raises:
+        FmuError: the FMU refuses; the message names variable, value and range
+        ValueError: a variable does not exist, or a value does not fit
+
+    >>> import numpy as np
+    >>> signals = np.array([(0.0, 0.0), (0.01, 0.0), (0.01, 1.0)], dtype=[("time", float), ("tau_load", float)])
+    >>> result = simulate_fmu(PLANT, stop_time=0.1, output_interval=1e-3, input=signals, output=["speed"])
+    >>> result.dtype.names, len(result), bool(result["speed"][-1] < 0)
+    (('time', 'speed'), 101, True)
+    """
+    _refuse(visible=visible, logger=logger, fmi_call_logger=fmi_call_logger, set_input_derivatives=set_input_derivatives,
+            early_return_allowed=early_return_allowed, use_event_mode=use_event_mode)  # fmt: skip
+    if remote_platform not in ("auto", None):
+        raise NotImplementedError(f"remote_platform = {remote_platform!r}: fmurun runs binaries of this platform only")
+    if fmi_type not in (None, "CoSimulation"):
+        raise NotImplementedError(f"fmi_type = {fmi_type!r}: fmurun runs co-simulation only; FMPy does the rest")
+    fmu = fmu_instance.fmu if fmu_instance is not None else _open(filename)
+    description = model_description or _described(fmu)
+    if not initialize and fmu_instance is None and fmu_state is None:
+        raise ValueError("initialize = False needs fmu_instance or fmu_state")
+
+    times, tolerance = _times(description, start_time, stop_time, output_interval, relative_tolerance)
+    variables = {v.name: v for v in description.modelVariables}
+    before, during = _start_values(variables, description, start_values, validate)
+    dtype, columns = _columns(description, variables, output)
+    samples = None if input is None else _samples(description, variables, input)
+
+    instance = fmu_instance if fmu_instance is not None else _instance(fmu, debug_logging, filename)
+    try:
+        if fmu_state is not None:
+            state = instance.deserializeFMUState(fmu_state) if isinstance(fmu_state, bytes) else fmu_state
+            instance.setFMUState(state)
+            if isinstance(fmu_state, bytes):
+                instance.freeFMUState(state)
+        variable_step = description.coSimulation.canHandleVariableCommunicationStepSize
+        simulation = _core.Simulation(instance, times, variable_step, columns, samples)
+        if initialize and fmu_state is None:
+            start, stop, _ = times
+            instance._setup(tolerance, start, stop if set_stop_time else None)
+            _apply(instance, before)
+            instance._enter()
+            _apply(instance, during)
+            simulation.apply()
+            instance.exitInitializationMode()
+        simulation.sample(times[0])
+        recorder = Recorder(instance, description, simulation, dtype)
+        if step_finished is None:
+            simulation.finish(None if timeout is None else float(timeout))
+        else:
+            _follow(simulation, recorder, step_finished, timeout)
+        if terminate:
+            instance.terminate()
+        return recorder._result(True)
+    finally:
+        if debug_logging:
+            for status, category, text in instance.messages():
+                print(f"[{status}] [{instance.instanceName}] {category}: {text}")
+        if fmu_instance is None:
+            instance.freeInstance()
+
+
+def _follow(simulation, recorder, step_finished, timeout):
+    """Step by step with a callback."""
+    from time import time as clock
+
+    begin = clock()
+    while (timeout is None or clock() - begin <= float(timeout)) and simulation.step():
+        if not step_finished(simulation.time, recorder):
+            break
+
+
+def _times(description, start, stop, interval, tolerance):
+    """(start, stop, interval) in s, and the tolerance, where not given from the default experiment."""
+    experiment = description.defaultExperiment
+    of = lambda name: None if experiment is None else getattr(experiment, name)
+    first = lambda *candidates: next((float(x) for x in candidates if x is not None), None)
+    start = first(start, of("startTime"), 0.0)
+    stop = first(stop, of("stopTime"), start + 1.0)
+    if not (np.isfinite(start) and np.isfinite(stop)):
+        raise ValueError(f"start_time {start} and stop_time {stop} must be finite")
+    if interval is None:
+        interval = first(description.coSimulation.fixedInternalStepSize, of("stepSize"))
+        if interval is not None and not interval > 0.0:
+            raise ValueError(f"the step size of the FMU's default experiment is {interval}; give output_interval")
+        while interval is not None and (stop - start) / interval > 1000:
+            interval *= 2
+        if interval is None:
+            interval = _auto_interval(stop - start)
+    interval = float(interval)
+    if not (interval > 0.0 and np.isfinite(interval)):
+        raise ValueError(f"output_interval must be positive and finite, not {interval}")
+    return (start, stop, interval), first(tolerance, of("tolerance"))
+
+
+def _auto_interval(t):
+    """FMPy's interval for a simulation of length t: 200 to 1000 steps."""
+    if t <= 0.0:
+        return 1.0
+    h = 10 ** (np.round(np.log10(t)) - 3)
+    n = t / h
+    for limit, factor in ((2500, 5.0), (2000, 4.0), (1000, 2.0)):
+        if n >= limit:
+            return h * factor
+    for limit, divisor in ((200, 5.0), (250, 4.0), (500, 2.0)):
+        if n <= limit:
+            return h / divisor
+    return h
+
+
+def _start_values(variables, description, given, validate):
+    """(variable, values) to set before and during initialization mode, in the order of the description."""
+    missing = [name for name in given if name not in variables]
+    if missing and validate:
+        raise ValueError(f"{description.modelName} has no variable {', '.join(map(str, missing))}; see start_values")
+    before, during, never = [], [], []
+    ordered = [variables[n] for n in given if n in variables] if len(given) < 2 else [v for v in variables.values() if v.name in given]
+    for v in ordered:
+        entry = (v, _value(v, description, given[v.name]))
+        if v.causality == "input" or v.variability != "constant" and v.initial in ("approx", "exact"):
+            before.append(entry)
+        elif v.causality != "parameter" and v.variability == "tunable":
+            during.append(entry)
+        else:
+            never.append(v.name)
+    if never and validate:
+        raise ValueError("The start values for the following variables could not be set: " + ", ".join(never))
+    return before, during
+
+
+def _value(v, description, value):
+    """A start value as a list of what the setter takes."""
+    if type(value) is tuple:
+        if len(value) != 2:
+            raise ValueError(f"the start value of {v.name} must be a value or (value, unit), not {value!r}")
+        value = _without_unit(v, description, *value)
+    try:
+        if v.type == "Boolean" and isinstance(value, str):
+            value = {"true": True, "false": False}[value.lower()]
+        if v.type == "Enumeration" and isinstance(value, str) and v.declaredType:
+            value = {item.name: item.value for item in v.declaredType.items}.get(value, value)
+        convert = float if v.type in _FLOATS else {"Boolean": bool, "String": str}.get(v.type, int)
+        if not v.shape:
+            return [convert(value)]
+        elements = value.split() if isinstance(value, str) else np.ravel(value)
+        values = [convert(x) for x in elements]
+    except (TypeError, ValueError, KeyError):
+        raise ValueError(f"the start value {value!r} of {v.name} is not of the type {v.type}") from None
+    if len(values) != prod(v.shape):
+        raise ValueError(f"the start value of {v.name} must have {prod(v.shape)} elements, not {len(values)}")
+    return values
+
+
+def _without_unit(v, description, value, unit):
+    """The value in the variable's unit, from one in a display unit."""
+    own = v.unit or (v.declaredType and v.declaredType.unit)
+    if unit is None or unit == own:
+        return value
+    if own is None:
+        raise ValueError(f"{v.name} has no unit, and its start value has {unit!r}")
+    known = {u.name: {d.name: d for d in u.displayUnits} for u in description.unitDefinitions}.get(own, {})
+    if unit not in known:
+        raise ValueError(f"the unit {unit!r} of the start value of {v.name} is not one of {', '.join([own, *known])}")
+    shown = known[unit]
+    relative = v.relativeQuantity or (v.declaredType is not None and v.declaredType.relativeQuantity)
+    return value / shown.factor if relative else (value - shown.offset) / shown.factor
+
+
+def _base(v, description):
+    """The type by its name of FMI 3.0."""
+    return {"Real": "Float64", "Integer": "Int32"}.get(v.type, v.type)
+
+
+def _apply(instance, entries):
+    for v, values in entries:
+        if v.type in ("Real", "Float64"):
+            instance._set_reals([v.valueReference], values)
+        else:
+            instance._set(v.type, [v.valueReference], values)
+
+
+def _columns(description, variables, output):
+    """The dtype of the result, and for each type (name of FMI 3.0, value references, sizes)."""
+    if output is None:
+        names = {v.name for v in _default_output(description)}
+    else:
+        names = {output} if isinstance(output, str) else set(output)
+        missing = [name for name in names if name not in variables and name != "time"]
+        if missing:
+            raise ValueError(f"{description.modelName} has no variable {', '.join(sorted(map(str, missing)))}; see output")
+    fields, groups = [("time", np.float64)], {}
+    enumeration = "Integer" if description.fmiVersion == "2.0" else "Int64"
+    for v in [variables[n] for n in names if n in variables] if len(names) < 2 else variables.values():
+        if v.name in names and v.name != "time":
+            groups.setdefault(enumeration if v.type == "Enumeration" else v.type, []).append(v)
+    columns = []
+    for type_, dtype in _COLUMNS.items():
+        group = groups.pop(type_, [])
+        fields += [(v.name, dtype, v.shape) if v.shape else (v.name, dtype) for v in group]
+        if group:
+            references, sizes = [v.valueReference for v in group], [prod(v.shape) for v in group]
+            columns.append((_base(group[0], description) if group[0].type != "Enumeration" else
+                            {"Integer": "Int32"}.get(type_, type_), references, sizes))  # fmt: skip
+    if groups and output is not None:
+        (type_, group), *_ = groups.items()
+        raise ValueError(f"{group[0].name} has the type {type_}, which has no column; see output")
+    return np.dtype(fields), columns
+
+
+def _default_output(description):
+    """The outputs; if there are none, five states, else the first five variables."""
+    outputs = [v for v in description.modelVariables if v.causality == "output"]
+    states = [u.variable.derivative for u in description.derivatives if u.variable and u.variable.derivative]
+    return outputs or states[:5] or description.modelVariables[:5]
+
+
+def _samples(description, variables, signals):
+    """(times, events, groups) of the input: see `input.rs`."""
+    if getattr(signals, "dtype", None) is None or signals.dtype.names is None:
+        raise TypeError(f"input must be a structured numpy array with a column for time, not {type(signals).__name__}")
+    signals = np.atleast_1d(signals)
+    first, *names = signals.dtype.names
+    t = np.ascontiguousarray(signals[first], dtype=np.float64)
+    if not t.size:
+        raise ValueError("input has no row")
+    if not np.isfinite(t).all() or (np.diff(t) < 0).any():
+        raise ValueError("the times of input must be finite and must not fall")
+    unknown = [name for name in names if name not in variables]
+    if unknown:
+        raise ValueError(f"{description.modelName} has no variable {', '.join(unknown)}; see input")
+    wrong = [n for n in names if variables[n].causality != "input" and variables[n].variability != "tunable"]
+    if wrong:
+        raise ValueError(f"{', '.join(wrong)}: neither an input nor a tunable parameter; see input")
+    events = {np.inf} | set(t[:-1][np.diff(t) == 0])
+    groups = {}
+    for v in variables.values() if len(names) > 1 else map(variables.get, names):
+        if v.name not in names:
+            continue
+        if v.shape or signals[v.name].ndim > 1:
+            raise NotImplementedError(f"input: {v.name} is an array; fmurun feeds scalars only")
+        table = signals[v.name].astype(np.float64)
+        if v.type == "Float32":
+            table = table.astype(np.float32).astype(np.float64)
+        elif v.type not in _FLOATS and not (np.isfinite(table).all() and (np.abs(table) <= 2.0**53).all()):
+            raise ValueError(f"input: {v.name} has the type {v.type}; a value is no number or beyond 2^53")
+        elif v.type not in _FLOATS:
+            table = np.trunc(table)
+        if v.variability in ("discrete", "tunable") and t.size > 1:
+            events |= set(t[1:][np.diff(table) != 0])
+        continuous = v.type in _FLOATS and v.variability not in ("discrete", "tunable")
+        groups.setdefault((not continuous, _base(v, description)), []).append((v.valueReference, table))
+    # A stable order: continuous variables before discrete ones, types as they come.
+    ordered = sorted(groups.items(), key=lambda item: item[0][0])
+    tables = [(base, not discrete, [r for r, _ in g], np.stack([x for _, x in g])) for (discrete, base), g in ordered]
+    return t, np.array(sorted(events)), tables

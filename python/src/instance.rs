@@ -1,0 +1,335 @@
+//! One instance, called from Python: the base of `FMU2Slave` and `FMU3Slave` in `fmurun/fmpy.py`.
+
+use crate::cache::{self, Opened};
+use crate::error::{gate, raise, usage};
+use fmu_import::{Error, State, Values};
+use model_description::BaseType;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyList, PyTuple};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// An instance. Calls from several threads wait for each other.
+#[pyclass(frozen, subclass, module = "fmurun._core")]
+pub(crate) struct Instance {
+    opened: Arc<Opened>,
+    name: String,
+    id: u64,
+    fmi2: bool,
+    /// `None` when it was freed.
+    inner: Mutex<Option<fmu_import::Instance>>,
+}
+
+/// A saved state of one instance.
+#[pyclass(frozen, name = "FmuState", module = "fmurun._core")]
+pub(crate) struct FmuState {
+    state: State,
+    owner: u64,
+}
+
+impl Instance {
+    pub(crate) fn new(py: Python<'_>, opened: &Arc<Opened>, name: &str, logging: bool) -> PyResult<Self> {
+        static IDS: AtomicU64 = AtomicU64::new(0);
+        let inner = py.detach(|| opened.fmu.instantiate(name, logging)).map_err(raise)?;
+        let (id, fmi2) = (IDS.fetch_add(1, Ordering::Relaxed), opened.is_fmi2());
+        Ok(Self { opened: opened.clone(), name: name.into(), id, fmi2, inner: Mutex::new(Some(inner)) })
+    }
+
+    /// One call on the living instance, with Python's lock held: for calls of less than a microsecond.
+    #[inline]
+    fn call<T>(
+        &self,
+        py: Python<'_>,
+        call: impl FnOnce(&mut fmu_import::Instance) -> Result<T, Error> + Send,
+    ) -> PyResult<T>
+    where
+        T: Send,
+    {
+        gate(|| match self.inner.try_lock() {
+            Ok(mut inner) => self.on(inner.as_mut(), call),
+            // Another thread calls, and may want Python's lock before it is ready.
+            Err(_) => py.detach(|| self.with(call)),
+        })
+    }
+
+    /// One call on the living instance, for who has released Python's lock.
+    pub(crate) fn with<T>(&self, call: impl FnOnce(&mut fmu_import::Instance) -> Result<T, Error>) -> PyResult<T> {
+        self.on(self.inner.lock().unwrap_or_else(PoisonError::into_inner).as_mut(), call)
+    }
+
+    #[inline]
+    fn on<T>(
+        &self,
+        instance: Option<&mut fmu_import::Instance>,
+        call: impl FnOnce(&mut fmu_import::Instance) -> Result<T, Error>,
+    ) -> PyResult<T> {
+        let instance = instance.ok_or_else(|| usage(&self.name, "was freed"))?;
+        call(instance).map_err(|error| {
+            if matches!(&error, Error::Call { status, .. } if status == "Fatal") {
+                cache::forget(&self.opened);
+            }
+            raise(error)
+        })
+    }
+
+    /// Number of elements of the variable with a value reference.
+    fn elements(&self, reference: u32) -> usize {
+        if self.opened.arrays.is_empty() { 1 } else { self.opened.arrays.get(&reference).copied().unwrap_or(1) }
+    }
+
+    /// The description of the FMU.
+    pub(crate) fn opened(&self) -> &Arc<Opened> {
+        &self.opened
+    }
+
+    fn state<'a>(&self, state: &'a FmuState) -> PyResult<&'a State> {
+        let own = state.owner == self.id;
+        own.then_some(&state.state).ok_or_else(|| usage(&self.name, "the state is of another instance"))
+    }
+}
+
+/// Value references: a list in the fast way, else anything that can be iterated.
+fn references(vr: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
+    if let Ok(list) = vr.cast::<PyList>() {
+        list.iter().map(|x| x.extract()).collect()
+    } else {
+        vr.try_iter()?.map(|x| x?.extract()).collect()
+    }
+}
+
+fn base(name: &str) -> PyResult<BaseType> {
+    let name = match name {
+        "Real" => "Float64",
+        "Integer" => "Int32",
+        other => other,
+    };
+    BaseType::from_word(name).ok_or_else(|| PyValueError::new_err(format!("{name} is no type of FMI")))
+}
+
+/// Values from Python, for a variable of this type.
+fn values(base: BaseType, items: &Bound<'_, PyAny>) -> PyResult<Values> {
+    Ok(match base {
+        BaseType::Float32 | BaseType::Float64 => Values::Reals(items.extract()?),
+        BaseType::Boolean | BaseType::Clock => {
+            Values::Booleans(items.try_iter()?.map(|x| x?.is_truthy()).collect::<PyResult<_>>()?)
+        }
+        BaseType::String => Values::Strings(items.extract()?),
+        BaseType::Binary => return Err(PyTypeError::new_err("values of the type Binary are not supported")),
+        _ => Values::Integers(items.extract()?),
+    })
+}
+
+#[pymethods]
+impl Instance {
+    #[new]
+    fn create(py: Python<'_>, fmu: &Bound<'_, crate::cache::Fmu>, name: &str, logging: bool) -> PyResult<Self> {
+        gate(|| Self::new(py, &fmu.get().0, name, logging))
+    }
+
+    /// Name that errors and messages give it.
+    #[getter]
+    #[pyo3(name = "instanceName")]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Read double-precision numbers by their value references: all elements of arrays, whatever `nValues` says.
+    #[pyo3(name = "_get_reals", signature = (vr, nValues = None))]
+    #[allow(non_snake_case, unused_variables, reason = "FMPy's name")]
+    fn get_reals(&self, py: Python<'_>, vr: &Bound<'_, PyAny>, nValues: Option<usize>) -> PyResult<Vec<f64>> {
+        let references = references(vr)?;
+        if self.opened.arrays.is_empty() {
+            let mut values = vec![0.0; references.len()];
+            return self.call(py, |i| i.get_reals(&references, &mut values).map(|()| values));
+        }
+        let mut all = Vec::new();
+        for reference in references {
+            let count = self.elements(reference);
+            if let Values::Reals(x) = self.call(py, |i| i.get_at(BaseType::Float64, reference, count))? {
+                all.extend(x);
+            }
+        }
+        Ok(all)
+    }
+
+    /// Write double-precision numbers by their value references.
+    #[pyo3(name = "_set_reals")]
+    fn set_reals(&self, py: Python<'_>, vr: &Bound<'_, PyAny>, values: &Bound<'_, PyAny>) -> PyResult<()> {
+        let (references, values): (_, Vec<f64>) = (references(vr)?, values.extract()?);
+        let expected: usize = references.iter().map(|&r| self.elements(r)).sum();
+        if expected != values.len() {
+            let cause = format!("{} values for {expected} elements of {} variables", values.len(), references.len());
+            return Err(PyValueError::new_err(cause));
+        }
+        if self.opened.arrays.is_empty() {
+            return self.call(py, |i| i.set_reals(&references, &values));
+        }
+        let mut rest = values.as_slice();
+        for reference in references {
+            let (one, more) = rest.split_at(self.elements(reference));
+            rest = more;
+            self.call(py, |i| i.set_at(BaseType::Float64, reference, &Values::Reals(one.to_vec())))?;
+        }
+        Ok(())
+    }
+
+    /// Read variables of any type by their value references.
+    #[pyo3(name = "_get")]
+    fn get<'py>(&self, py: Python<'py>, kind: &str, vr: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyList>> {
+        let (base, all) = (base(kind)?, PyList::empty(py));
+        for reference in references(vr)? {
+            let count = self.elements(reference);
+            match self.call(py, |i| i.get_at(base, reference, count))? {
+                Values::Reals(x) => x.into_iter().try_for_each(|x| all.append(x))?,
+                Values::Integers(x) => x.into_iter().try_for_each(|x| all.append(x))?,
+                Values::Booleans(x) => x.into_iter().try_for_each(|x| all.append(x))?,
+                Values::Strings(x) => x.into_iter().try_for_each(|x| all.append(x))?,
+                Values::Binaries(x) => x.into_iter().try_for_each(|x| all.append(PyBytes::new(py, &x)))?,
+            }
+        }
+        Ok(all)
+    }
+
+    /// Write variables of any type by their value references.
+    #[pyo3(name = "_set")]
+    fn set(&self, py: Python<'_>, kind: &str, vr: &Bound<'_, PyAny>, items: &Bound<'_, PyAny>) -> PyResult<()> {
+        let (base, references) = (base(kind)?, references(vr)?);
+        let items: Vec<Bound<'_, PyAny>> = items.try_iter()?.collect::<PyResult<_>>()?;
+        let expected: usize = references.iter().map(|&r| self.elements(r)).sum();
+        if expected != items.len() {
+            let cause = format!("{} values for {expected} elements of {} variables", items.len(), references.len());
+            return Err(PyValueError::new_err(cause));
+        }
+        let mut rest = items.as_slice();
+        for reference in references {
+            let (one, more) = rest.split_at(self.elements(reference));
+            rest = more;
+            let one = values(base, PyList::new(py, one)?.as_any())?;
+            self.call(py, |i| i.set_at(base, reference, &one))?;
+        }
+        Ok(())
+    }
+
+    /// Times of the experiment (s).
+    #[pyo3(name = "_setup", signature = (tolerance, start, stop))]
+    fn setup(&self, py: Python<'_>, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> PyResult<()> {
+        self.call(py, |i| i.setup_with(start, stop, tolerance))
+    }
+
+    /// Begin the initialization.
+    #[pyo3(name = "_enter")]
+    fn enter(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, fmu_import::Instance::enter_initialization)
+    }
+
+    /// End the initialization.
+    #[pyo3(name = "exitInitializationMode")]
+    fn exit(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, fmu_import::Instance::exit_initialization)
+    }
+
+    /// Step from a time by a step size (s). FMI 3.0 returns (event encountered, end asked for, early return, time reached).
+    #[pyo3(name = "doStep", signature = (currentCommunicationPoint, communicationStepSize, noSetFMUStatePriorToCurrentPoint = true))]
+    #[allow(
+        non_snake_case,
+        unused_variables,
+        reason = "FMPy's names; a state may be set at any time, whatever is promised"
+    )]
+    fn do_step<'py>(
+        &self,
+        py: Python<'py>,
+        currentCommunicationPoint: f64,
+        communicationStepSize: f64,
+        noSetFMUStatePriorToCurrentPoint: bool,
+    ) -> PyResult<Option<Bound<'py, PyTuple>>> {
+        let (t, h) = (currentCommunicationPoint, communicationStepSize);
+        // A step may take long: other threads run meanwhile.
+        let step = |i: &mut fmu_import::Instance| {
+            let ended = i.do_step(t, h)?.is_break();
+            Ok((ended, if self.fmi2 { t } else { i.last_successful_time()? }))
+        };
+        let (ended, last) = gate(|| py.detach(|| self.with(step)))?;
+        if self.fmi2 {
+            return if ended {
+                Err(raise(Error::Call {
+                    instance: self.name.clone(),
+                    function: "fmi2DoStep",
+                    status: "Discard".into(),
+                    message: Some("the FMU asks to end the simulation".into()),
+                }))
+            } else {
+                Ok(None)
+            };
+        }
+        (false, ended, false, last).into_pyobject(py).map(Some)
+    }
+
+    /// End the simulation; variables can still be read.
+    fn terminate(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, fmu_import::Instance::terminate)
+    }
+
+    /// Return to the state after instantiation.
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, fmu_import::Instance::reset)
+    }
+
+    /// Free the instance; it takes no more calls.
+    #[pyo3(name = "freeInstance")]
+    fn free(&self, py: Python<'_>) -> PyResult<()> {
+        gate(|| {
+            py.detach(|| drop(self.inner.lock().unwrap_or_else(PoisonError::into_inner).take()));
+            Ok(())
+        })
+    }
+
+    /// Switch logging on or off.
+    #[pyo3(name = "_set_debug_logging")]
+    fn set_debug_logging(&self, py: Python<'_>, on: bool) -> PyResult<()> {
+        self.call(py, |i| i.set_debug_logging(on))
+    }
+
+    /// Take the messages since the last time: (status, category, text).
+    #[pyo3(name = "_take_messages")]
+    fn take_messages(&self, py: Python<'_>) -> PyResult<Vec<(String, String, String)>> {
+        let all = self.call(py, |i| Ok(i.take_messages()))?;
+        Ok(all.into_iter().map(|m| (m.status.to_string(), m.category, m.text)).collect())
+    }
+
+    /// Save the state.
+    #[pyo3(name = "getFMUState")]
+    fn get_state(&self, py: Python<'_>) -> PyResult<FmuState> {
+        let state = self.call(py, fmu_import::Instance::get_state)?;
+        Ok(FmuState { state, owner: self.id })
+    }
+
+    /// Go back to a saved state of this instance.
+    #[pyo3(name = "setFMUState")]
+    fn set_state(&self, py: Python<'_>, state: &FmuState) -> PyResult<()> {
+        let state = *self.state(state)?;
+        self.call(py, |i| i.set_state(state))
+    }
+
+    /// Free a saved state; those that remain are freed with the instance.
+    #[pyo3(name = "freeFMUState")]
+    fn free_state(&self, py: Python<'_>, state: &FmuState) -> PyResult<()> {
+        let state = *self.state(state)?;
+        self.call(py, |i| i.free_state(state))
+    }
+
+    /// A saved state as bytes, for any instance of the same FMU.
+    #[pyo3(name = "serializeFMUState")]
+    fn serialize<'py>(&self, py: Python<'py>, state: &FmuState) -> PyResult<Bound<'py, PyBytes>> {
+        let state = *self.state(state)?;
+        Ok(PyBytes::new(py, &self.call(py, |i| i.serialize_state(state))?))
+    }
+
+    /// A state of this instance from bytes; it is not yet set.
+    #[pyo3(name = "deserializeFMUState", signature = (serializedState, state = None))]
+    #[allow(non_snake_case, unused_variables, reason = "FMPy's names; a state is never used again")]
+    fn deserialize(&self, py: Python<'_>, serializedState: &[u8], state: Option<&FmuState>) -> PyResult<FmuState> {
+        let state = self.call(py, |i| i.deserialize_state(serializedState))?;
+        Ok(FmuState { state, owner: self.id })
+    }
+}

@@ -1,0 +1,32 @@
+//! The compiled part of the Python package `fmurun`: FMUs and runs; `fmurun/*.py` is what users import.
+//!
+//! Every function that Python calls goes through [`error::gate`]: a panic becomes an `FmuError`.
+
+#![deny(unsafe_code)]
+
+mod batch;
+mod cache;
+mod describe;
+mod error;
+mod input;
+mod instance;
+mod lane;
+mod record;
+mod simulation;
+
+use pyo3::prelude::*;
+
+/// The module `fmurun._core`.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use super::batch::Batch;
+    #[pymodule_export]
+    use super::cache::{Fmu, open};
+    #[pymodule_export]
+    use super::error::panic;
+    #[pymodule_export]
+    use super::instance::{FmuState, Instance};
+    #[pymodule_export]
+    use super::simulation::Simulation;
+}
