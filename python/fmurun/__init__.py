@@ -10,7 +10,6 @@ Every error of an FMU is an `FmuError`.
 from . import _core  # noqa: F401
 from ._batch import Batch
 from ._error import FmuError
-
-from .fmpy import simulate_fmu
+from ._simulate import simulate_fmu
 
 __all__ = ["Batch", "FmuError", "simulate_fmu"]

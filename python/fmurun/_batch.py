@@ -6,7 +6,7 @@ import numpy as np
 
 from . import _core
 from ._simulate import _value
-from .fmpy import _described, _open
+from ._instance import _described, _open
 
 
 class Batch(_core.Batch):

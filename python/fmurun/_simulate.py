@@ -5,7 +5,7 @@ from math import prod
 import numpy as np
 
 from . import _core
-from .fmpy import _described, _instance, _open, _refuse
+from ._instance import _described, _instance, _open, _refuse
 
 # Columns are grouped by type, in this order.
 _COLUMNS = {
