@@ -81,7 +81,7 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
         fmu_state: state of `fmu_instance`, or bytes of a serialized one: begin there instead of with an initialization
         set_stop_time: tell the FMU the stop time
 
-    `solver`, `step_size` and `record_events` belong to model exchange and have no effect, as in FMPy. The others are refused
+    Where FMPy passes over a name that is no variable, this raises. `solver`, `step_size` and `record_events` belong to model exchange and have no effect, as in FMPy. The others are refused
     with NotImplementedError, as is model exchange.
 
     Returns:
@@ -98,13 +98,15 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
     (('time', 'speed'), 101, True)
     """
     _refuse(visible=visible, logger=logger, fmi_call_logger=fmi_call_logger, set_input_derivatives=set_input_derivatives,
-            early_return_allowed=early_return_allowed, use_event_mode=use_event_mode)  # fmt: skip
+            use_event_mode=use_event_mode)  # fmt: skip
     if remote_platform not in ("auto", None):
         raise NotImplementedError(f"remote_platform = {remote_platform!r}: fmurun runs binaries of this platform only")
     if fmi_type not in (None, "CoSimulation"):
         raise NotImplementedError(f"fmi_type = {fmi_type!r}: fmurun runs co-simulation only; FMPy does the rest")
     fmu = fmu_instance.fmu if fmu_instance is not None else _open(filename)
     description = model_description or _described(fmu)
+    if early_return_allowed and description.coSimulation.mightReturnEarlyFromDoStep:
+        raise NotImplementedError("early_return_allowed = True: this FMU may return early, which fmurun never lets it; FMPy does")
     if not initialize and fmu_instance is None and fmu_state is None:
         raise ValueError("initialize = False needs fmu_instance or fmu_state")
 
