@@ -11,6 +11,7 @@ mod error;
 mod input;
 mod instance;
 mod lane;
+mod plan;
 mod record;
 mod simulation;
 
@@ -27,6 +28,8 @@ mod _core {
     use super::error::panic;
     #[pymodule_export]
     use super::instance::{FmuState, Instance};
+    #[pymodule_export]
+    use super::plan::{Plan, paths, read_definition};
     #[pymodule_export]
     use super::simulation::Simulation;
 }

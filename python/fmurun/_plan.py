@@ -1,0 +1,320 @@
+"""Many runs of one system."""
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+import threading
+from collections import OrderedDict
+
+import numpy as np
+
+from . import _core
+from ._error import FmuError
+from ._simulate import SimulationResult
+
+_LOCK = threading.Lock()
+# Plans of this process, by what they are made of: a task of Dask unpickles its plan, and finds it here.
+_MADE = OrderedDict()
+_KEPT = 16
+
+
+class Plan:
+    """A system of FMUs with its connections, values, times and measures, for one run or for millions.
+
+    A plan can be pickled: it travels as its arguments with a hash of each file, and is opened once a process. Workers
+    elsewhere need the files at the same paths, or `embed=True`. Any thread may use it, also after `os.fork`.
+
+    Args:
+        fmus: an .fmu file, whose variables go by their names; a dictionary name -> file or a list of files, whose variables
+            go by "name.variable"; or an .ssp file
+        connections: "by_name" connects each free input to the output of this name, or a list of ("p.i_a", "c.i_a")
+        terminals: pairs of terminals to connect, ("p.phases", "c.phases")
+        start_values: name -> value, the same in all runs
+        input: name -> a number, a list of (time, value) that hold from their time (s) on, or a text as `fmu simulate --input`
+        start_time, stop_time, step_size: in s; by default those of the FMUs' default experiments
+        output: names that `simulate` records; by default all outputs
+        measures: name -> {"of": "p.speed", "is": "min", "after": 0.2}, or a text ("speed" is its final value), or
+            (text, function): functions are final, min, max, max_abs, mean, rms, integral, at, rise, settling; see docs/sweeps.md
+        sequential: step the FMUs one after another, each with the new outputs of those before it
+        embed: pickle the files, too
+
+    >>> plan = Plan(PLANT, start_values={"u_a": 10.0, "u_b": -5.0, "u_c": -5.0}, stop_time=0.01, step_size=1e-4,
+    ...             output=["i_a"], measures={"last": "i_a", "peak": ("i_a", "max_abs")})
+    >>> float(plan.simulate({"motor.R_s": 2.0})["i_a"][-1].round(2))
+    4.82
+    >>> runs = plan.run_many({"motor.R_s": [2.0, 3.0, -1.0]})
+    >>> list(runs), [float(x.round(2)) for x in runs["last"]]
+    (['run', 'motor.R_s', 'last', 'peak', 'end', 'error'], [4.82, 3.31, nan])
+    >>> "motor.R_s = -1 is not allowed: greater than 0" in runs["error"][2]
+    True
+    """
+
+    def __init__(self, fmus, *, connections="by_name", terminals=(), start_values=None, input=None, start_time=None,
+                 stop_time=None, step_size=None, output=None, measures=None, sequential=False, embed=False):  # fmt: skip
+        files, self._prefix = _files(fmus)
+        name = self._name if self._prefix else lambda name: name
+        if isinstance(connections, str) and connections != "by_name":
+            raise ValueError(f"connections must be 'by_name' or a list of pairs, not {connections!r}")
+        by_name = connections == "by_name" and not _is_ssp(files)
+        definition = {
+            "fmus": [path if _is_ssp(files) else f"{key}={path}" for key, path in files],
+            "auto_connect": by_name and len(files) > 1,
+            "connect": [] if connections == "by_name" else [list(pair) for pair in connections],
+            "terminal": [list(pair) for pair in terminals],
+            "sequential": bool(sequential),
+            "start": _number("start_time", start_time),
+            "stop": _number("stop_time", stop_time),
+            "step": _number("step_size", step_size),
+            "set": {name(key): _scalar(key, value) for key, value in (start_values or {}).items()},
+            "input": {name(key): _schedule(key, value) for key, value in (input or {}).items()},
+            "measure": {key: _measure(key, value, name) for key, value in (measures or {}).items()},
+        }
+        if step_size is not None and not float(step_size) > 0.0:
+            raise ValueError(f"step_size must be positive, not {step_size}")
+        self._make(definition, "", list(output) if output is not None else None, embed)
+
+    @staticmethod
+    def from_toml(path, *, output=None, embed=False):
+        """The plan of a file of `fmu sweep`, with its design: `rows` are those of the command."""
+        path = os.path.abspath(os.fspath(path))
+        plan = Plan.__new__(Plan)
+        plan._prefix = ""
+        plan._make(json.loads(_core.read_definition(path)), os.path.dirname(path), output, embed)
+        return plan
+
+    def _make(self, definition, folder, output, embed):
+        folder = os.path.abspath(folder)
+        paths = [os.path.join(folder, path) for path in _core.paths(json.dumps(definition))]
+        contents = [_read(path) for path in paths]
+        self._definition, self._folder, self._output, self._embed = definition, folder, output, embed
+        self._hashes = [hashlib.sha256(content).hexdigest() for content in contents]
+        self._contents = contents if embed else None
+        self._core = self._opened()
+
+    def _opened(self):
+        key = json.dumps([self._definition, self._hashes, None if self._embed else self._folder], sort_keys=False)
+        with _LOCK:
+            if key not in _MADE:
+                _MADE[key] = self._open()
+                if len(_MADE) > _KEPT:
+                    _MADE.popitem(last=False)
+            _MADE.move_to_end(key)
+            return _MADE[key]
+
+    def _open(self):
+        if not self._embed:
+            return _core.Plan(json.dumps(self._definition), self._folder)
+        # The archives as files for as long as it takes to open them.
+        folder = tempfile.mkdtemp(prefix="fmurun-")
+        try:
+            paths, copies = _core.paths(json.dumps(self._definition)), []
+            for k, (path, content) in enumerate(zip(paths, self._contents)):
+                copies.append(os.path.join(folder, f"{k}{os.path.splitext(path)[1]}"))
+                with open(copies[-1], "wb") as file:
+                    file.write(content)
+            return _core.Plan(json.dumps(_elsewhere(self._definition, paths, copies)), self._folder)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def __getstate__(self):
+        return {key: value for key, value in self.__dict__.items() if key != "_core"}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        if not self._embed:
+            for path, expected in zip(_core.paths(json.dumps(self._definition)), self._hashes):
+                path = os.path.join(self._folder, path)
+                if hashlib.sha256(_read(path)).hexdigest() != expected:
+                    raise FmuError(None, None, None, f"{path}: is another file than the one that the plan was made of")
+        self._core = self._opened()
+
+    def _name(self, name):
+        return self._prefix + name
+
+    def simulate(self, start_values=None):
+        """Run once; `start_values` beside those of the plan. Returns a structured array with `time` (s) first.
+
+        >>> Plan(PLANT, stop_time=0.01, step_size=1e-3, output=["speed", "i_a"]).simulate().dtype.names
+        ('time', 'speed', 'i_a')
+        """
+        names, values = [], []
+        for name, value in (start_values or {}).items():
+            names.append(self._name(name))
+            values.append(str(_scalar(name, value)) if not isinstance(value, bool) else str(value).lower())
+        output = None if self._output is None else [self._name(name) for name in self._output]
+        time, columns = self._core.simulate(names, values, output)
+        result = np.empty(len(time), [("time", float)] + [(name.removeprefix(self._prefix), float) for name, _ in columns])
+        result["time"] = time
+        for name, values in columns:
+            result[name.removeprefix(self._prefix)] = values
+        return result.view(SimulationResult)
+
+    def run_many(self, table, *, threads=None, first_run=0):
+        """Run every row of a table on `threads` threads (all processors by default) with Python's lock released.
+
+        Args:
+            table: the values of variables by their names: a dictionary of columns, a structured array, a DataFrame of pandas or
+                polars, a Table or RecordBatch of pyarrow; a column `run` numbers the rows
+            first_run: number of the first row, if there is no column `run`
+
+        Returns:
+            a dictionary of arrays: `run`, the columns of the table, the measures, `end` (time reached, s) and `error`. A run
+            that fails has NaN for its measures and one line as its error, otherwise "". Same bits for any number of threads.
+        """
+        columns = {str(name): column for name, column in _columns(table).items()}
+        runs = columns.pop("run", None)
+        values = [_values(name, column, self._core, self._name(name)) for name, column in columns.items()]
+        if not values:
+            raise ValueError("the table has no column; expected one with the values of each varied variable")
+        lengths = {name: len(column) for name, column in zip(columns, values)}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"the columns are not of one length: {', '.join(f'{k} {n}' for k, n in lengths.items())}")
+        n = len(values[0])
+        runs = first_run + np.arange(n) if runs is None else np.asarray(runs, dtype=np.int64)
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads must be at least 1, not {threads}")
+        measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0)
+        result = {"run": runs, **dict(zip(columns, values))}
+        result |= dict(zip(self.measures, measures))
+        return result | {"end": end, "error": np.array(errors, dtype=object)}
+
+    def rows(self, first, count):
+        """Rows of the design of a file: as many of the `count` rows from number `first` on as there are, with their `run`."""
+        start, columns = self._core.rows(first, count)
+        n = len(next(iter(columns.values()), []))
+        return {"run": start + np.arange(n), **columns}
+
+    def __len__(self):
+        """Number of rows of the design."""
+        return self._core.count
+
+    @property
+    def measures(self):
+        """Names of the measures."""
+        return list(self._definition["measure"])
+
+    def meta(self, columns=None):
+        """What `run_many` returns for no rows: the columns and their types. `columns` are the varied, by default the design's."""
+        columns = self._core.varied if columns is None else columns
+        empty = {name: np.empty(0) for name in [*columns, *self.measures, "end"]}
+        return {"run": np.empty(0, dtype=np.int64), **empty, "error": np.empty(0, dtype=object)}
+
+
+def _files(fmus):
+    """(name, path) of each file, and the prefix of names that users leave out."""
+    if isinstance(fmus, (str, os.PathLike)):
+        path = os.path.abspath(os.fspath(fmus))
+        if path.lower().endswith(".ssp"):
+            return [("", path)], ""
+        name = os.path.splitext(os.path.basename(path))[0]
+        return [(name, path)], f"{name}."
+    items = fmus.items() if hasattr(fmus, "items") else [(os.path.splitext(os.path.basename(os.fspath(f)))[0], f) for f in fmus]
+    files = [(str(name), os.path.abspath(os.fspath(path))) for name, path in items]
+    if not files:
+        raise ValueError("fmus is empty; expected an .fmu file, a dictionary name -> file, or an .ssp file")
+    return files, ""
+
+
+def _is_ssp(files):
+    return files[0][1].lower().endswith(".ssp")
+
+
+def _read(path):
+    try:
+        with open(path, "rb") as file:
+            return file.read()
+    except OSError as error:
+        raise FmuError(None, None, None, f"{path}: {error.strerror or error}") from None
+
+
+def _elsewhere(definition, paths, copies):
+    """The definition with copies of its files: those of the FMUs, then that of the design."""
+    fmus = [text.removesuffix(path) + copy for text, path, copy in zip(definition["fmus"], paths, copies)]
+    changed = {**definition, "fmus": fmus}
+    if len(copies) > len(fmus):
+        changed["design"] = {**definition["design"], "file": copies[-1]}
+    return changed
+
+
+def _number(what, value):
+    if value is None:
+        return None
+    try:
+        value = float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{what} must be a number in s, not {value!r}") from None
+    if not np.isfinite(value):
+        raise ValueError(f"{what} must be finite, not {value}")
+    return value
+
+
+def _scalar(name, value):
+    """A start value as a definition has it."""
+    value = value.item() if isinstance(value, (np.generic, np.ndarray)) and np.ndim(value) == 0 else value
+    if isinstance(value, float) and not np.isfinite(value):
+        raise ValueError(f"the start value of {name} must be finite, not {value}")
+    if not isinstance(value, (bool, int, float, str)):
+        raise TypeError(f"the start value of {name} must be a number, a Boolean or a text, not {value!r}")
+    return value
+
+
+def _schedule(name, value):
+    """An input as `fmu simulate --input` has it."""
+    if isinstance(value, str):
+        return value
+    try:
+        if np.ndim(value) == 0:
+            return repr(float(value))
+        return ",".join(f"{float(t)!r}:{float(x)!r}" for t, x in value)
+    except (TypeError, ValueError):
+        raise TypeError(f"the input {name} must be a number, a list of (time, value) or a text, not {value!r}") from None
+
+
+def _measure(key, value, name):
+    """A measure as a definition has it."""
+    if isinstance(value, str):
+        value = {"of": value, "is": "final"}
+    elif isinstance(value, (tuple, list)) and len(value) == 2:
+        value = {"of": value[0], "is": value[1]}
+    if not isinstance(value, dict) or not isinstance(value.get("of"), str):
+        raise TypeError(f"the measure {key} must be a text, (text, function) or a dictionary with 'of' and 'is', not {value!r}")
+    words = [word if word in "+-*" or _is_float(word) else name(word) for word in value["of"].split()]
+    return {**value, "of": " ".join(words)}
+
+
+def _is_float(word):
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _columns(table):
+    """Columns by name, of anything tabular."""
+    if isinstance(table, dict):
+        return table
+    if isinstance(table, np.ndarray) and table.dtype.names:
+        return {name: table[name] for name in table.dtype.names}
+    names = getattr(table, "column_names", None) or getattr(getattr(table, "schema", None), "names", None)
+    names = list(table.columns) if names is None and hasattr(table, "columns") else names
+    if callable(names) or names is None:
+        kind = type(table).__name__
+        raise TypeError(f"the table must be a dictionary of columns, a structured array or a DataFrame, not {kind}")
+    return {name: table[name] for name in names}
+
+
+def _values(name, column, core, full):
+    """A column as numbers; texts are names of an enumeration."""
+    array = np.atleast_1d(np.asarray(column))
+    if array.ndim != 1:
+        raise ValueError(f"the column {name} has {array.ndim} dimensions; expected one")
+    if array.dtype.kind in "OUS" and all(isinstance(x, str) for x in array.tolist()):
+        return np.array([core.number(full, x) for x in array.tolist()])
+    # Of other kinds NumPy makes numbers, too: of None it makes NaN.
+    bad = [] if array.dtype.kind in "biuf" else [x for x in array.tolist() if not isinstance(x, (int, float))]
+    if bad:
+        raise TypeError(f"the column {name} must have numbers, not {bad[0]!r}")
+    return np.ascontiguousarray(array, dtype=np.float64)

@@ -1,0 +1,201 @@
+//! Many runs of one system: `fmurun.Plan` in `fmurun/_plan.py` has one of these.
+
+use crate::error::{gate, plain, raise};
+use fmu_sweep::{Definition, Outcomes, Sweep, Variable};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// How often Python's signals are looked at while runs go on.
+const SIGNALS: Duration = Duration::from_millis(100);
+
+fn failed(error: fmu_sweep::Error) -> PyErr {
+    match error {
+        fmu_sweep::Error::Fmu(error) => raise(error),
+        other => plain(&other.to_string()),
+    }
+}
+
+fn parsed(definition: &str) -> PyResult<Definition> {
+    serde_json::from_str(definition).map_err(|e| PyValueError::new_err(format!("{e}")))
+}
+
+/// The definition of a TOML file, as JSON.
+#[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
+pub(crate) fn read_definition(path: PathBuf) -> PyResult<String> {
+    gate(|| {
+        let definition = Definition::read(&path).map_err(failed)?;
+        serde_json::to_string(&definition).map_err(|e| plain(&e.to_string()))
+    })
+}
+
+/// Paths of the files of a definition: those of the FMUs, then that of the design, as they are written.
+#[pyfunction]
+pub(crate) fn paths(definition: &str) -> PyResult<Vec<String>> {
+    gate(|| {
+        let definition = parsed(definition)?;
+        let path = |text: &String| Ok(fmu_import::ssp::load::name_and_path(text)?.1.to_string_lossy().into_owned());
+        let fmus: Result<Vec<String>, fmu_sweep::Error> = definition.fmus.iter().map(path).collect();
+        let mut all = fmus.map_err(failed)?;
+        all.extend(definition.design.and_then(|design| design.file));
+        Ok(all)
+    })
+}
+
+/// A system with its measures, and its design if it has one.
+#[pyclass(frozen, module = "fmurun._core")]
+pub(crate) struct Plan {
+    plan: fmu_sweep::Plan,
+    sweep: Option<Sweep>,
+}
+
+#[pymethods]
+impl Plan {
+    #[new]
+    fn new(py: Python<'_>, definition: &str, folder: PathBuf) -> PyResult<Self> {
+        gate(|| {
+            let definition = parsed(definition)?;
+            py.detach(|| open(definition, folder)).map_err(failed)
+        })
+    }
+
+    /// Run once: time, and (name, values) of each recorded variable.
+    #[expect(clippy::type_complexity, reason = "Python's")]
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        names: Vec<String>,
+        values: Vec<String>,
+        outputs: Option<Vec<String>>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<(String, Bound<'py, PyArray1<f64>>)>)> {
+        gate(|| {
+            let run = || {
+                let set = self.plan.bind(names.iter().map(String::as_str))?;
+                let number = |(v, text): (Variable, &String)| Ok((v.clone(), self.plan.number(&v, text)?));
+                let set: Vec<_> = set.into_iter().zip(&values).map(number).collect::<Result<_, fmu_sweep::Error>>()?;
+                self.plan.simulate(&set, outputs.as_deref())
+            };
+            let recording = py.detach(run).map_err(failed)?;
+            let columns = recording.columns.into_iter().map(|c| (c.name, c.values.into_pyarray(py)));
+            Ok((recording.time.into_pyarray(py), columns.collect()))
+        })
+    }
+
+    /// Run rows: columns of the measures, times reached, errors. 0 threads are as many as the machine has.
+    #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
+    fn run_many<'py>(
+        &self,
+        py: Python<'py>,
+        names: Vec<String>,
+        columns: Vec<PyReadonlyArray1<'py, f64>>,
+        threads: usize,
+    ) -> PyResult<(Vec<Bound<'py, PyArray1<f64>>>, Bound<'py, PyArray1<f64>>, Vec<String>)> {
+        gate(|| {
+            // Copies: another thread may write the arrays once Python's lock is released.
+            let columns: Vec<Vec<f64>> = columns.iter().map(|column| column.as_array().to_vec()).collect();
+            let variables = self.plan.bind(names.iter().map(String::as_str)).map_err(failed)?;
+            let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
+            let Outcomes { measures, end, errors } = py.detach(|| self.run(&variables, &columns, threads))?;
+            let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
+            Ok((measures, end.into_pyarray(py), errors.into_iter().map(Option::unwrap_or_default).collect()))
+        })
+    }
+
+    /// Rows of the design from number `first` on: `first`, and a column for each varied variable.
+    fn rows<'py>(&self, py: Python<'py>, first: u64, count: u64) -> PyResult<(u64, Bound<'py, PyDict>)> {
+        gate(|| {
+            let rows = self.sweep()?.rows();
+            let (first, mut row) = (first.min(rows.count()), Vec::new());
+            let end = first.saturating_add(count).min(rows.count());
+            let mut columns = vec![Vec::new(); rows.names().count()];
+            for index in first..end {
+                rows.row(index, &mut row);
+                columns.iter_mut().zip(&row).for_each(|(column, x)| column.push(*x));
+            }
+            let dict = PyDict::new(py);
+            for (name, column) in rows.names().zip(columns) {
+                dict.set_item(name, column.into_pyarray(py))?;
+            }
+            Ok((first, dict))
+        })
+    }
+
+    /// Number of rows of the design.
+    #[getter]
+    fn count(&self) -> PyResult<u64> {
+        gate(|| Ok(self.sweep()?.rows().count()))
+    }
+
+    /// Names of the variables that the design varies.
+    #[getter]
+    fn varied(&self) -> PyResult<Vec<String>> {
+        gate(|| Ok(self.sweep()?.rows().names().map(str::to_owned).collect()))
+    }
+
+    /// Names of all outputs.
+    #[getter]
+    fn outputs(&self) -> Vec<String> {
+        self.plan.outputs().to_vec()
+    }
+
+    /// The number that a text stands for as the value of a variable.
+    fn number(&self, name: &str, text: &str) -> PyResult<f64> {
+        gate(|| {
+            let variable = self.plan.bind([name]).map_err(failed)?;
+            self.plan.number(&variable[0], text).map_err(failed)
+        })
+    }
+}
+
+impl Plan {
+    fn sweep(&self) -> PyResult<&Sweep> {
+        let none = || plain("the plan has no design: Plan.from_toml reads a file that has one; or give rows as a table");
+        self.sweep.as_ref().ok_or_else(none)
+    }
+
+    /// Runs on other threads, while this one looks at Python's signals: Ctrl-C ends it.
+    fn run(&self, variables: &[Variable], columns: &[Vec<f64>], threads: usize) -> PyResult<Outcomes> {
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let stop = AtomicBool::new(false);
+        let go_on = |_| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let (done, result) = channel();
+        std::thread::scope(|scope| {
+            let (plan, columns) = (&self.plan, &columns);
+            let work = scope.spawn(move || {
+                let outcomes = plan.run_many(variables, columns, threads, &go_on);
+                // The receiver is there as long as this thread.
+                let _ = done.send(outcomes);
+            });
+            let mut signal = Ok(());
+            loop {
+                match result.recv_timeout(SIGNALS) {
+                    Ok(outcomes) => return signal.and(outcomes.map_err(failed)),
+                    Err(RecvTimeoutError::Timeout) if signal.is_ok() => {
+                        signal = Python::attach(|py| py.check_signals());
+                        stop.store(signal.is_err(), Ordering::Relaxed);
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => {
+                        let panic = work.join().err().unwrap_or_else(|| Box::new("no result"));
+                        std::panic::resume_unwind(panic)
+                    }
+                }
+            }
+        })
+    }
+}
+
+fn open(definition: Definition, folder: PathBuf) -> Result<Plan, fmu_sweep::Error> {
+    if definition.design.is_some() {
+        let sweep = Sweep::new(definition, folder)?;
+        return Ok(Plan { plan: sweep.plan().clone(), sweep: Some(sweep) });
+    }
+    Ok(Plan { plan: fmu_sweep::Plan::new(&definition, Path::new(&folder))?, sweep: None })
+}
