@@ -123,7 +123,7 @@ def _cut(plan, table, count, chunk):
 
 def _agreed(fs, folder, cut):
     """The cut that `out` has, or this one: a resumed sweep cuts alike."""
-    path = f"{folder}/sweep.json"
+    path = f"{folder}/_sweep.json"
     if not fs.exists(path):
         _publish(fs, path, json.dumps(cut).encode())
         return cut

@@ -14,6 +14,7 @@ from gymnasium.vector import VectorEnv as _VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from ._batch import Batch
+from ._error import FmuError
 from ._instance import _described, _open
 
 __all__ = ["Env", "VectorEnv"]
@@ -29,30 +30,12 @@ class _Task:
         variables = {v.name: v for v in _described(_open(fmu)).modelVariables}
         self.action_space = _box(variables, actions, bounds or {}, "action")
         self.observation_space = _box(variables, observations, bounds or {}, None)
-        self.reward, self.terminated = reward, terminated or (lambda observations: np.zeros(len(observations), dtype=bool))
+        self.reward, self.terminated = reward, terminated
         self.repeat, self.max_steps, self.start_values, self.randomize = repeat, max_steps, dict(start_values or {}), randomize
-        self.steps = np.zeros(n, dtype=np.int64)
 
     def reset(self, generator, mask=None):
-        self.steps[slice(None) if mask is None else mask] = 0
         start = None if self.randomize is None else {**self.start_values, **self.randomize(generator, self.batch.n)}
         return self.batch.reset(mask, start)
-
-    def step(self, actions):
-        """Observations, rewards, terminated, truncated; an instance that fails has the observation 0 and has terminated."""
-        try:
-            observations = self.batch.step(actions, self.repeat)
-        except Exception:
-            if not self.batch.failed:
-                raise
-            observations = np.full((self.batch.n, len(self.batch.observations)), np.nan)
-        failed = np.isnan(observations).all(axis=1)
-        observations[failed] = 0.0
-        self.steps += 1
-        rewards = np.asarray(self.reward(observations, np.asarray(actions)), dtype=np.float64)
-        terminated = np.asarray(self.terminated(observations), dtype=bool) | failed
-        truncated = ~terminated & (self.steps >= self.max_steps) if self.max_steps else np.zeros(self.batch.n, dtype=bool)
-        return observations, rewards, terminated, truncated
 
 
 def _box(variables, names, bounds, what):
@@ -91,12 +74,22 @@ class Env(gymnasium.Env):
     def reset(self, *, seed=None, options=None):
         """Begin an episode."""
         super().reset(seed=seed)
+        self._steps = 0
         return self._task.reset(self.np_random)[0], {}
 
     def step(self, action):
         """Take one step."""
-        observations, rewards, terminated, truncated = self._task.step(np.asarray(action, dtype=np.float64)[None])
-        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), {}
+        task, failed = self._task, False
+        action = np.asarray(action, dtype=np.float64)
+        try:
+            seen = task.batch.step(action, task.repeat)
+        except FmuError:
+            seen, failed = np.zeros((1, len(task.batch.observations))), bool(task.batch.failed)
+            if not failed:
+                raise
+        self._steps += 1
+        ended = failed or (task.terminated is not None and bool(task.terminated(seen)[0]))
+        return seen[0], float(task.reward(seen, action[None])[0]), ended, not ended and self._steps == task.max_steps, {}
 
 
 class VectorEnv(_VectorEnv):
@@ -113,21 +106,32 @@ class VectorEnv(_VectorEnv):
         self.single_action_space, self.single_observation_space = self._task.action_space, self._task.observation_space
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._ended = np.zeros(num_envs, dtype=bool)
+        self._ended, self._steps = np.zeros(num_envs, dtype=bool), np.zeros(num_envs, dtype=np.int64)
 
     def reset(self, *, seed=None, options=None):
         """Begin an episode in each."""
         super().reset(seed=seed)
-        self._ended[:] = False
+        self._ended[:], self._steps[:] = False, 0
         return self._task.reset(self.np_random), {}
 
     def step(self, actions):
         """Take one step in each; those whose episode had ended begin a new one."""
+        task, ended = self._task, self._ended
         actions = np.asarray(actions, dtype=np.float64)
-        ended = self._ended
-        observations, rewards, terminated, truncated = self._task.step(actions)
+        try:
+            seen = task.batch.step(actions, task.repeat)
+        except FmuError:
+            if len(task.batch.failed) < self.num_envs:
+                raise
+            seen = np.full((self.num_envs, len(task.batch.observations)), np.nan)
+        failed = np.isnan(seen).all(axis=1)
+        seen[failed] = 0.0
+        self._steps += 1
+        rewards = np.asarray(task.reward(seen, actions), dtype=np.float64)
+        terminated = failed if task.terminated is None else failed | np.asarray(task.terminated(seen), dtype=bool)
+        truncated = ~terminated & (self._steps >= (task.max_steps or np.inf))
         if ended.any():
-            observations[ended] = self._task.reset(self.np_random, ended)[ended]
-            rewards[ended], terminated[ended], truncated[ended] = 0.0, False, False
+            seen[ended] = task.reset(self.np_random, ended)[ended]
+            rewards[ended], terminated[ended], truncated[ended], self._steps[ended] = 0.0, False, False, 0
         self._ended = terminated | truncated
-        return observations, rewards, terminated, truncated, {}
+        return seen, rewards, terminated, truncated, {}

@@ -14,7 +14,7 @@ for variable in ("FMU_ARCHIVES", "FMURUN"):
 FOLDER = Path(os.environ["FMU_ARCHIVES"]).absolute()
 # Processes of Dask and joblib import it, too.
 sys.path.insert(0, os.environ["FMURUN"])
-os.environ["PYTHONPATH"] = os.environ["FMURUN"]
+os.environ["PYTHONPATH"] = os.pathsep.join([os.environ["FMURUN"], os.path.dirname(__file__)])
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 

@@ -1,0 +1,16 @@
+"""A plan with a row that kills its process, as an FMU of someone else may: in a module that workers import."""
+
+import os
+import signal
+
+import fmurun
+import numpy as np
+
+
+class Poisoned(fmurun.Plan):
+    """Dies with SIGSEGV at the load of 0.666 N.m."""
+
+    def run_many(self, table, **more):
+        if (np.asarray(table["tau_load"]) == 0.666).any():
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return super().run_many(table, **more)

@@ -1,0 +1,120 @@
+"""Sweeps on a real cluster of processes: a worker killed, a row that kills, another plan in the same folder."""
+
+import os
+import signal
+import threading
+import time
+
+import dask
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from distributed import Client, LocalCluster
+from fmurun import FmuError, Plan
+from fmurun.dask import sweep
+from poison import Poisoned
+
+ROWS = 4000
+
+
+@pytest.fixture(scope="module")
+def client():
+    dask.config.set({"distributed.scheduler.allowed-failures": 1, "distributed.logging.distributed": "critical"})
+    with (
+        LocalCluster(2, processes=True, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+def drive(archives, make=Plan, **more):
+    measures = {"last": "speed", "peak": ("speed", "max_abs"), "rms": ("i_a", "rms")}
+    return make(archives / "fmi3" / "PmsmDrive.fmu", start_values={"speed_ref": 20.0}, stop_time=0.05, step_size=1e-3,
+                measures=measures, **more)  # fmt: skip
+
+
+def table(n):
+    k = np.arange(n)
+    return {"plant.motor.R_s": 2.9 + 0.2 * k / n, "tau_load": 0.1 + k % 7 / 10}
+
+
+def read(out):
+    """All parts together; pyarrow sorts them by their names."""
+    table = pq.read_table(out)
+    return {name: table[name].to_numpy() for name in table.column_names}
+
+
+def same(one, other):
+    assert list(one) == list(other)
+    for name in one:
+        assert np.array_equal(one[name], other[name], equal_nan=name != "error"), name
+
+
+def test_a_killed_worker_loses_no_row(archives, client, tmp_path):
+    """Every row once, equal to one process, and nothing left behind."""
+    plan, killed, pids = drive(archives), [], list(client.run(os.getpid).values())
+
+    def kill():
+        while (parts := sum(name.startswith("part-") for name in os.listdir(tmp_path))) < 5:
+            time.sleep(0.005)
+        os.kill(pids[0], signal.SIGKILL)
+        killed.append(parts)
+
+    thread = threading.Thread(target=kill)
+    thread.start()
+    report = sweep(plan, table(ROWS), tmp_path, client, chunk=50)
+    thread.join()
+    assert 5 <= killed[0] < ROWS // 50
+    assert report["rows"] == ROWS
+    assert report["failed"] == 0
+    results = read(tmp_path)
+    assert results["run"].tolist() == list(range(ROWS))
+    same(results, plan.run_many(table(ROWS), threads=2))
+    assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
+    again = sweep(plan, table(ROWS), tmp_path, client)
+    assert again["skipped"] == again["parts"] == ROWS // 50
+
+
+def test_a_poison_row_ends_as_a_row(archives, client, tmp_path):
+    rows = table(60)
+    rows["tau_load"][33] = 0.666
+    rows["plant.motor.R_s"][5] = -1.0
+    report = sweep(drive(archives, Poisoned), rows, tmp_path, client, chunk=20)
+    assert report["failed"] == 2
+    assert report["isolated"] >= 1
+    results = read(tmp_path)
+    assert results["run"].tolist() == list(range(60))
+    assert results["error"][33] == "killed by SIGSEGV"
+    assert "R_s = -1 is not allowed" in results["error"][5]
+    expected = drive(archives).run_many(rows)
+    good = np.isin(np.arange(60), [5, 33], invert=True)
+    for name in ("last", "peak", "rms"):
+        assert results[name][good].tobytes() == expected[name][good].tobytes()
+        assert np.isnan(results[name][~good]).all()
+
+
+def test_another_plan_or_table_is_refused(archives, client, tmp_path):
+    sweep(drive(archives), table(20), tmp_path, client)
+    with pytest.raises(FmuError, match="has the parts of another plan or table"):
+        sweep(drive(archives), table(21), tmp_path, client)
+    with pytest.raises(FmuError, match="has the parts of another plan or table"):
+        sweep(drive(archives, sequential=True), table(20), tmp_path, client)
+
+
+def test_bad_input_is_told_before_the_first_task(archives, client, tmp_path):
+    plan = drive(archives)
+    for rows, part in (({"R": [1.0]}, "has no variable R"), ({"tau_load": ["x"]}, "tau_load"), ({"tau_load": []}, "no row")):
+        with pytest.raises((FmuError, TypeError, ValueError), match=part):
+            sweep(plan, rows, tmp_path, client)
+    with pytest.raises(FmuError, match="has no design"):
+        sweep(plan, 3, tmp_path, client)
+    assert os.listdir(tmp_path) == []
+
+
+def test_map_partitions(archives):
+    """The recipe for a Dask DataFrame stands on `meta`."""
+    plan = drive(archives)
+    empty = plan.meta(["plant.motor.R_s", "tau_load"])
+    results = plan.run_many(table(3))
+    assert list(empty) == list(results)
+    assert {name: column.dtype for name, column in empty.items()} == {name: column.dtype for name, column in results.items()}

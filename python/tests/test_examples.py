@@ -1,0 +1,54 @@
+"""The examples for engines run as they stand; that of Gymnasium is in test_gym.py. Ray and OpenTURNS are opt-in."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import fmurun
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def run(name, *arguments):
+    command = [sys.executable, EXAMPLES / name, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_joblib_is_one_process(archives):
+    """Loky's processes are new ones that unpickle the plan: the same bits as here."""
+    sys.path.insert(0, str(EXAMPLES))
+    import sweep_joblib
+
+    results = sweep_joblib.main(archives / "fmi3", 200, 20)
+    plan = fmurun.Plan(archives / "fmi3" / "PmsmDrive.fmu", start_values={"speed_ref": 20.0}, stop_time=0.2, step_size=1e-3,
+                       measures={"dip": ("speed", "min"), "speed": "speed"})  # fmt: skip
+    here = plan.run_many({"plant.motor.R_s": np.random.default_rng(7).normal(3.0, 0.1, 200)})
+    for name in ("run", "dip", "speed", "end"):
+        assert results[name].tobytes() == here[name].tobytes()
+
+
+def test_dask_twice(archives, tmp_path):
+    out = tmp_path / "out"
+    first, second = (run("sweep_dask.py", archives / "fmi3", out) for _ in range(2))
+    assert "'skipped': 0" in first
+    assert "1000 rows" in first
+    assert first.splitlines()[-1] == second.splitlines()[-1]
+    assert "'failed': 0" in second
+
+
+@pytest.mark.skipif("FMU_ENGINES" not in os.environ, reason="opt-in: cargo test --test python engines -- --ignored")
+@pytest.mark.parametrize("name", ["sweep_ray.py", "openturns_drive.py"])
+def test_engines(archives, name):
+    said = run(name, archives / "fmi3")
+    print(said)
+    assert "equal to one process: True" in said or "speed {" in said
+
+
+def test_examples_are_short():
+    for name in ("sweep_dask.py", "sweep_ray.py", "sweep_joblib.py", "openturns_drive.py", "gym_drive.py", "sweep_slurm.sh"):
+        assert len((EXAMPLES / name).read_text().splitlines()) <= 30, name
