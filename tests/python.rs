@@ -6,45 +6,75 @@ mod common;
 use common::python::{environment, pytest_with, run, scratch};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
-use std::{env, fs, process};
+use std::{env, fs, iter, process};
 
 const TESTS: &str = "../python/tests";
 
-/// The folder that the package is installed in, once a test program.
-fn installed() -> &'static Path {
-    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| {
-        let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
-        let python = environment(&package.join("tests/requirements.txt"));
-        let folder = scratch().join(format!("fmurun-{}", process::id()));
-        let programs = python.parent().expect("python is in a folder").to_owned();
-        let path =
-            env::join_paths([programs].into_iter().chain(env::split_paths(&env::var_os("PATH").unwrap_or_default())));
-        let mut pip = Command::new(&python);
-        pip.args([
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--disable-pip-version-check",
-            "--no-deps",
-            "--no-build-isolation",
-        ]);
-        // maturin is in the environment; it builds in this workspace's target folder.
-        pip.arg("--target").arg(&folder).arg(&package).env("PATH", path.expect("a search path"));
-        run(&mut pip, "package fmurun").unwrap_or_else(|why| panic!("{why}"));
-        folder
-    })
+/// Installs the package into a folder of its own.
+fn installed() -> PathBuf {
+    let python = environment(&package().join("tests/requirements.txt"));
+    let folder = scratch().join(format!("fmurun-{}", process::id()));
+    let programs = python.parent().expect("python is in a folder").to_owned();
+    let path = env::join_paths(iter::once(programs).chain(env::split_paths(&env::var_os("PATH").unwrap_or_default())));
+    let mut pip = Command::new(&python);
+    pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation"]);
+    // maturin is in the environment; it builds in this workspace's target folder.
+    pip.arg("--target").arg(&folder).arg(package()).env("PATH", path.expect("a search path"));
+    run(&mut pip, "package fmurun").unwrap_or_else(|why| panic!("{why}"));
+    folder
 }
 
-fn tests(name: &str, files: &[&str]) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    pytest_with("requirements.txt", TESTS, name, files, &[("FMURUN", installed()), ("FMU_ROOT", root)]);
+fn package() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("python")
+}
+
+fn tests(name: &str, files: &[&str], variables: &[(&str, &Path)]) {
+    tests_with("requirements.txt", name, files, variables);
+}
+
+fn tests_with(requirements: &str, name: &str, files: &[&str], variables: &[(&str, &Path)]) {
+    let folder = installed();
+    pytest_with(requirements, TESTS, name, files, &[&[("FMURUN", folder.as_path())], variables].concat());
+    let _ = fs::remove_dir_all(&folder);
 }
 
 #[test]
 fn the_package() {
-    tests("fmurun", &["test_simulate.py", "test_fmpy.py", "test_batch.py"]);
-    let _ = fs::remove_dir_all(installed());
+    let files = ["simulate", "fmpy", "batch", "plan", "dask", "gym", "examples", "figures"];
+    let files = files.map(|name| format!("test_{name}.py"));
+    tests("fmurun", &files.each_ref().map(String::as_str), &[]);
+}
+
+/// The figures against FMPy, with their goals: half a minute on an idle machine.
+#[test]
+#[ignore = "opt-in: cargo test --release --test python figures -- --ignored --nocapture"]
+fn figures() {
+    tests("figures", &["test_figures.py", "-s"], &[("FMU_FIGURES", Path::new("1"))]);
+}
+
+/// The examples for Ray and OpenTURNS, which take a while to install.
+#[test]
+#[ignore = "opt-in: cargo test --test python engines -- --ignored --nocapture"]
+fn engines() {
+    tests_with("requirements-engines.txt", "engines", &["test_examples.py", "-s"], &[("FMU_ENGINES", Path::new("1"))]);
+}
+
+/// `pip install ./python` as a user calls it, from an empty target folder: what it takes, and the size of the wheel.
+#[test]
+#[ignore = "opt-in: cargo test --test python install -- --ignored --nocapture"]
+fn install() {
+    let folder = scratch().join(format!("install-{}", process::id()));
+    let python = environment(&package().join("tests/requirements.txt"));
+    let begun = std::time::Instant::now();
+    let mut pip = Command::new(&python);
+    pip.args(["-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps", "--wheel-dir"]);
+    pip.arg(&folder).arg(package()).env("CARGO_TARGET_DIR", folder.join("target"));
+    run(&mut pip, "wheel of fmurun").unwrap_or_else(|why| panic!("{why}"));
+    let seconds = begun.elapsed().as_secs();
+    let wheel = fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).find(|p| p.extension().is_some_and(|e| e == "whl"));
+    let wheel = wheel.expect("a wheel");
+    let bytes = fs::metadata(&wheel).unwrap().len();
+    println!("G8   {}: {bytes} bytes, {seconds} s of wall time", wheel.file_name().unwrap().display());
+    let _ = fs::remove_dir_all(&folder);
+    assert!(bytes <= 2_000_000, "{bytes} bytes");
 }

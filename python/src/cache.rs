@@ -78,6 +78,16 @@ pub(crate) struct Fmu(pub(crate) Arc<Opened>);
 
 #[pymethods]
 impl Fmu {
+    /// Two are equal if they are one open library.
+    fn __eq__(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
+    fn __hash__(&self) -> u64 {
+        // As Python does it with objects: their address, alive as long as this.
+        Arc::as_ptr(&self.0) as u64 >> 4
+    }
+
     /// The model description as plain values; see `describe` in Rust.
     fn describe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         gate(|| describe::dictionary(py, self.0.fmu.description()))
