@@ -71,7 +71,8 @@ fn install() {
     pip.arg(&folder).arg(package()).env("CARGO_TARGET_DIR", folder.join("target"));
     run(&mut pip, "wheel of fmurun").unwrap_or_else(|why| panic!("{why}"));
     let seconds = begun.elapsed().as_secs();
-    let wheel = fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).find(|p| p.extension().is_some_and(|e| e == "whl"));
+    let wheel =
+        fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).find(|p| p.extension().is_some_and(|e| e == "whl"));
     let wheel = wheel.expect("a wheel");
     let bytes = fs::metadata(&wheel).unwrap().len();
     println!("G8   {}: {bytes} bytes, {seconds} s of wall time", wheel.file_name().unwrap().display());

@@ -18,6 +18,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("pmsm-plant", &["drive", "fmu-export"]),
     ("sensorless-controller", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
+    ("fmurun", &["fmu-import", "fmu-sweep", "model-description"]),
     ("fmu", &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "fmu-sweep", "model-description"]),
 ];
 
@@ -115,6 +116,15 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
                 let allows = text.matches("allow(unsafe_code)").count();
                 let expected = usize::from(file.ends_with("lib.rs"));
                 assert_eq!(allows, expected, "{}", file.display());
+            }
+        } else if *name == "fmurun" {
+            // PyO3's macros expand to unsafe code that allows itself, which `forbid` does not let them.
+            assert!(lib.contains("#![deny(unsafe_code)]"), "{name}");
+            let mut files = Vec::new();
+            sources(&folder.join("src"), &mut files);
+            for file in files {
+                let text = std::fs::read_to_string(&file).unwrap();
+                assert!(!text.contains("allow(unsafe_code)") && !text.contains("unsafe {"), "{}", file.display());
             }
         } else if folder.starts_with(root().join("fmus")) {
             // One line each: export!, which expands to the functions of the C interface.

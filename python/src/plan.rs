@@ -67,7 +67,7 @@ impl Plan {
     }
 
     /// Run once: time, and (name, values) of each recorded variable.
-    #[expect(clippy::type_complexity, reason = "Python's")]
+    #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
     fn simulate<'py>(
         &self,
         py: Python<'py>,
@@ -156,7 +156,8 @@ impl Plan {
 
 impl Plan {
     fn sweep(&self) -> PyResult<&Sweep> {
-        let none = || plain("the plan has no design: Plan.from_toml reads a file that has one; or give rows as a table");
+        let none =
+            || plain("the plan has no design: Plan.from_toml reads a file that has one; or give rows as a table");
         self.sweep.as_ref().ok_or_else(none)
     }
 
@@ -178,7 +179,12 @@ impl Plan {
                 match result.recv_timeout(SIGNALS) {
                     Ok(outcomes) => return signal.and(outcomes.map_err(failed)),
                     Err(RecvTimeoutError::Timeout) if signal.is_ok() => {
-                        signal = Python::attach(|py| py.check_signals());
+                        #[expect(
+                            clippy::redundant_closure_for_method_calls,
+                            reason = "the method has a lifetime, attach has all"
+                        )]
+                        let heard = Python::attach(|py| py.check_signals());
+                        signal = heard;
                         stop.store(signal.is_err(), Ordering::Relaxed);
                     }
                     Err(RecvTimeoutError::Timeout) => {}

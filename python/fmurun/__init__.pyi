@@ -1,0 +1,111 @@
+"""Types of the public interface."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from os import PathLike
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import fmpy as fmpy
+
+__all__ = ["Batch", "FmuError", "Plan", "simulate_fmu"]
+
+_Path = str | PathLike[str]
+_Value = bool | int | float | str
+_Table = Any  # a dictionary of columns, a structured array, a DataFrame of pandas or polars, a Table of pyarrow
+
+class FmuError(Exception):
+    function: str | None
+    status: str | None
+    instance: str | None
+    message: str
+    def __init__(self, function: str | None, status: str | None, instance: str | None, message: str) -> None: ...
+
+def simulate_fmu(
+    filename: _Path,
+    validate: bool = True,
+    start_time: float | str | None = None,
+    stop_time: float | str | None = None,
+    solver: str = "CVode",
+    step_size: float | str | None = None,
+    relative_tolerance: float | str | None = None,
+    output_interval: float | str | None = None,
+    record_events: bool = True,
+    fmi_type: str | None = None,
+    start_values: Mapping[str, Any] = {},
+    apply_default_start_values: bool = False,
+    input: NDArray[Any] | None = None,
+    output: Sequence[str] | None = None,
+    timeout: float | str | None = None,
+    debug_logging: bool = False,
+    visible: bool = False,
+    logger: Callable[..., Any] | None = None,
+    fmi_call_logger: Callable[[str], None] | None = None,
+    step_finished: Callable[[float, Any], bool] | None = None,
+    model_description: fmpy.ModelDescription | None = None,
+    fmu_instance: fmpy.FMU2Slave | fmpy.FMU3Slave | None = None,
+    set_input_derivatives: bool = False,
+    remote_platform: str | None = "auto",
+    early_return_allowed: bool = False,
+    use_event_mode: bool = False,
+    initialize: bool = True,
+    terminate: bool = True,
+    fmu_state: Any = None,
+    set_stop_time: bool = True,
+) -> fmpy.SimulationResult: ...
+
+class Plan:
+    def __init__(
+        self,
+        fmus: _Path | Mapping[str, _Path] | Sequence[_Path],
+        *,
+        connections: Literal["by_name"] | Sequence[tuple[str, str]] = "by_name",
+        terminals: Sequence[tuple[str, str]] = (),
+        start_values: Mapping[str, _Value] | None = None,
+        input: Mapping[str, float | str | Sequence[tuple[float, float]]] | None = None,
+        start_time: float | None = None,
+        stop_time: float | None = None,
+        step_size: float | None = None,
+        output: Sequence[str] | None = None,
+        measures: Mapping[str, str | tuple[str, str] | Mapping[str, Any]] | None = None,
+        sequential: bool = False,
+        embed: bool = False,
+    ) -> None: ...
+    @staticmethod
+    def from_toml(path: _Path, *, output: Sequence[str] | None = None, embed: bool = False) -> Plan: ...
+    def simulate(self, start_values: Mapping[str, _Value] | None = None) -> fmpy.SimulationResult: ...
+    def run_many(self, table: _Table, *, threads: int | None = None, first_run: int = 0) -> dict[str, NDArray[Any]]: ...
+    def rows(self, first: int, count: int) -> dict[str, NDArray[Any]]: ...
+    def meta(self, columns: Iterable[str] | None = None) -> dict[str, NDArray[Any]]: ...
+    @property
+    def measures(self) -> list[str]: ...
+    def __len__(self) -> int: ...
+
+class Batch:
+    n: int
+    actions: tuple[str, ...]
+    observations: tuple[str, ...]
+    step_size: float
+    def __new__(
+        cls,
+        fmu: _Path,
+        n: int = 1,
+        *,
+        actions: Sequence[str],
+        observations: Sequence[str],
+        step_size: float,
+        start_values: Mapping[str, ArrayLike | str] | None = None,
+        threads: int = 1,
+    ) -> Batch: ...
+    def reset(
+        self, mask: ArrayLike | None = None, start_values: Mapping[str, ArrayLike | str] | None = None
+    ) -> NDArray[np.float64]: ...
+    def step(
+        self, actions: ArrayLike, repeat: int = 1, out: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]: ...
+    def observe(self) -> NDArray[np.float64]: ...
+    def save(self, k: int) -> tuple[int, bytes]: ...
+    def restore(self, k: int, state: tuple[int, bytes]) -> None: ...
+    @property
+    def failed(self) -> dict[int, FmuError]: ...
