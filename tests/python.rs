@@ -34,13 +34,13 @@ fn tests(name: &str, files: &[&str], variables: &[(&str, &Path)]) {
 
 fn tests_with(requirements: &str, name: &str, files: &[&str], variables: &[(&str, &Path)]) {
     let folder = installed();
-    pytest_with(requirements, TESTS, name, files, &[&[("FMURUN", folder.as_path())], variables].concat());
+    pytest_with(requirements, TESTS, name, files, &[&[("FMURUN", folder.as_path()), ("FMU_COMMAND", Path::new(env!("CARGO_BIN_EXE_fmu")))], variables].concat());
     let _ = fs::remove_dir_all(&folder);
 }
 
 #[test]
 fn the_package() {
-    let files = ["simulate", "fmpy", "batch", "plan", "dask", "gym", "examples", "figures"];
+    let files = ["simulate", "fmpy", "batch", "plan", "dask", "gym", "examples", "cli", "types", "figures"];
     let files = files.map(|name| format!("test_{name}.py"));
     tests("fmurun", &files.each_ref().map(String::as_str), &[]);
 }

@@ -160,8 +160,9 @@ class Plan:
             first_run: number of the first row, if there is no column `run`
 
         Returns:
-            a dictionary of arrays: `run`, the columns of the table, the measures, `end` (time reached, s) and `error`. A run
-            that fails has NaN for its measures and one line as its error, otherwise "". Same bits for any number of threads.
+            a dictionary of arrays: `run`, the columns of the table, the measures, `end` (time reached, s) and, as the last,
+            `error`. A run that fails has NaN for its measures and one line as its error, otherwise "". Same bits for any number
+            of threads. A variable or measure named `run`, `end` or `error` keeps its name, and that column gets `_` behind it.
         """
         columns = {str(name): column for name, column in _columns(table).items()}
         runs = columns.pop("run", None)
@@ -176,9 +177,13 @@ class Plan:
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, not {threads}")
         measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0)
-        result = {"run": runs, **dict(zip(columns, values))}
-        result |= dict(zip(self.measures, measures))
-        return result | {"end": end, "error": np.array(errors, dtype=object)}
+        return dict(zip(self._columns(columns), [runs, *values, *measures, end, np.array(errors, dtype=object)]))
+
+    def _columns(self, varied):
+        """Names of the columns of results; `run`, `end` and `error` give way to variables and measures of these names."""
+        named = [*varied, *self.measures]
+        run, end, error = (_free(name, named) for name in ("run", "end", "error"))
+        return [run, *named, end, error]
 
     def rows(self, first, count):
         """Rows of the design of a file: as many of the `count` rows from number `first` on as there are, with their `run`."""
@@ -198,8 +203,13 @@ class Plan:
     def meta(self, columns=None):
         """What `run_many` returns for no rows: the columns and their types. `columns` are the varied, by default the design's."""
         columns = self._core.varied if columns is None else columns
-        empty = {name: np.empty(0) for name in [*columns, *self.measures, "end"]}
-        return {"run": np.empty(0, dtype=np.int64), **empty, "error": np.empty(0, dtype=object)}
+        run, *numbers, error = self._columns(columns)
+        empty = {name: np.empty(0) for name in numbers}
+        return {run: np.empty(0, dtype=np.int64), **empty, error: np.empty(0, dtype=object)}
+
+
+def _free(name, taken):
+    return name if name not in taken else _free(name + "_", taken)
 
 
 def _files(fmus):

@@ -92,8 +92,13 @@ def sweep(plan, rows, out, client, chunk=None):
         results = _isolated(plan, take(first, n), first)
         _write(fs, folder, first, results)
         report["isolated"] += 1
-        report["failed"] += sum(bool(e) for e in results["error"])
+        report["failed"] += _failed(results)
     return report
+
+
+def _failed(results):
+    """Number of rows with an error: the last column."""
+    return sum(bool(error) for error in results[next(reversed(results))])
 
 
 def _rows_of(plan, table):
@@ -156,7 +161,7 @@ def _work(first, count, table, plan, out):
         return 0
     results = plan.run_many(plan.rows(first, count) if table is None else table, threads=1, first_run=first)
     _write(fs, folder, first, results)
-    return sum(bool(error) for error in results["error"])
+    return _failed(results)
 
 
 def _isolated(plan, table, first):
@@ -198,6 +203,6 @@ def _child(plan, pipe):
 def _dead(plan, row, number, code):
     """The result of a row that killed its process."""
     cause = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended the process with exit code {code}"
-    empty = {name: np.array([np.nan]) for name in [*plan.measures, "end"]}
-    return {"run": np.array([number]), **{k: np.asarray(v, dtype=float) for k, v in row.items()}, **empty,
-            "error": np.array([cause], dtype=object)}  # fmt: skip
+    run, *numbers, error = plan.meta(list(row))
+    values = {name: np.asarray(row[name], dtype=float) if name in row else np.array([np.nan]) for name in numbers}
+    return {run: np.array([number]), **values, error: np.array([cause], dtype=object)}
