@@ -34,7 +34,13 @@ fn tests(name: &str, files: &[&str], variables: &[(&str, &Path)]) {
 
 fn tests_with(requirements: &str, name: &str, files: &[&str], variables: &[(&str, &Path)]) {
     let folder = installed();
-    pytest_with(requirements, TESTS, name, files, &[&[("FMURUN", folder.as_path()), ("FMU_COMMAND", Path::new(env!("CARGO_BIN_EXE_fmu")))], variables].concat());
+    pytest_with(
+        requirements,
+        TESTS,
+        name,
+        files,
+        &[&[("FMURUN", folder.as_path()), ("FMU_COMMAND", Path::new(env!("CARGO_BIN_EXE_fmu")))], variables].concat(),
+    );
     let _ = fs::remove_dir_all(&folder);
 }
 
@@ -47,16 +53,21 @@ fn the_package() {
 
 /// The figures against FMPy, with their goals: half a minute on an idle machine.
 #[test]
-#[ignore = "opt-in: cargo test --release --test python figures -- --ignored --nocapture"]
+#[ignore = "opt-in: cargo test --test python figures -- --ignored --nocapture"]
 fn figures() {
     tests("figures", &["test_figures.py", "-s"], &[("FMU_FIGURES", Path::new("1"))]);
 }
 
-/// The examples for Ray and OpenTURNS, which take a while to install.
+/// The examples for Ray and OpenTURNS, and a step of gym-electric-motor against one of ours.
 #[test]
 #[ignore = "opt-in: cargo test --test python engines -- --ignored --nocapture"]
 fn engines() {
-    tests_with("requirements-engines.txt", "engines", &["test_examples.py", "-s"], &[("FMU_ENGINES", Path::new("1"))]);
+    tests_with(
+        "requirements-engines.txt",
+        "engines",
+        &["test_examples.py", "test_figures.py", "-s", "-k", "engines or g9"],
+        &[("FMU_ENGINES", Path::new("1")), ("FMU_FIGURES", Path::new("1"))],
+    );
 }
 
 /// `pip install ./python` as a user calls it, from an empty target folder: what it takes, and the size of the wheel.

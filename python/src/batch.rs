@@ -253,13 +253,17 @@ impl Batch {
         let wrong = |shape: &[usize]| {
             PyValueError::new_err(format!("actions have the shape {shape:?}, expected [{}, {}]", self.n, self.actions))
         };
-        if let Ok(array) = actions.extract::<PyReadonlyArray2<'_, f64>>() {
-            let right = array.shape() == [self.n, self.actions];
-            return if right { Ok(array.as_array().iter().copied().collect()) } else { Err(wrong(array.shape())) };
-        }
-        if let Ok(array) = actions.extract::<PyReadonlyArray1<'_, f64>>() {
+        if let Ok(array) = actions.cast::<PyArray1<f64>>() {
             let right = self.n == 1 && array.len() == self.actions;
-            return if right { Ok(array.as_array().to_vec()) } else { Err(wrong(array.shape())) };
+            return if right { Ok(array.readonly().as_array().to_vec()) } else { Err(wrong(array.shape())) };
+        }
+        if let Ok(array) = actions.cast::<PyArray2<f64>>() {
+            let right = array.shape() == [self.n, self.actions];
+            return if right {
+                Ok(array.readonly().as_array().iter().copied().collect())
+            } else {
+                Err(wrong(array.shape()))
+            };
         }
         let array = py.import("numpy")?.call_method1("asarray", (actions, "float64"))?;
         let flat: Bound<'_, PyArray1<f64>> = array.call_method1("reshape", (-1,))?.cast_into()?;
@@ -270,6 +274,7 @@ impl Batch {
     }
 
     fn shaped<'py>(&self, py: Python<'py>, values: Vec<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        values.into_pyarray(py).reshape([self.n, self.observations])
+        let shaped = Array2::from_shape_vec((self.n, self.observations), values);
+        Ok(shaped.map_err(|e| PyValueError::new_err(e.to_string()))?.into_pyarray(py))
     }
 }
