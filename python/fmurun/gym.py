@@ -68,8 +68,12 @@ class Env(gymnasium.Env):
     metadata = {"render_modes": []}
 
     def __init__(self, fmu, actions, observations, step_size, reward, terminated=None, **options):
-        self._task = _Task(fmu, 1, actions, observations, step_size, reward, terminated, **options)
+        self._task, self._steps = _Task(fmu, 1, actions, observations, step_size, reward, terminated, **options), 0
         self.action_space, self.observation_space = self._task.action_space, self._task.observation_space
+        # A step takes about a microsecond: what it needs is at hand.
+        task = self._task
+        self._advance, self._repeat, self._most = task.batch.step, task.repeat, task.max_steps
+        self._reward, self._terminated = task.reward, task.terminated
 
     def reset(self, *, seed=None, options=None):
         """Begin an episode."""
@@ -79,17 +83,18 @@ class Env(gymnasium.Env):
 
     def step(self, action):
         """Take one step."""
-        task, failed = self._task, False
         action = np.asarray(action, dtype=np.float64)
+        failed = False
         try:
-            seen = task.batch.step(action, task.repeat)
+            seen = self._advance(action, self._repeat)
         except FmuError:
-            seen, failed = np.zeros((1, len(task.batch.observations))), bool(task.batch.failed)
+            batch = self._task.batch
+            seen, failed = np.zeros((1, len(batch.observations))), bool(batch.failed)
             if not failed:
                 raise
         self._steps += 1
-        ended = failed or (task.terminated is not None and bool(task.terminated(seen)[0]))
-        return seen[0], float(task.reward(seen, action[None])[0]), ended, not ended and self._steps == task.max_steps, {}
+        ended = failed or (self._terminated is not None and bool(self._terminated(seen)[0]))
+        return seen[0], float(self._reward(seen, action[None])[0]), ended, not ended and self._steps == self._most, {}
 
 
 class VectorEnv(_VectorEnv):

@@ -181,27 +181,31 @@ def test_g1_g2_a_sweep_on_dask(archives):
             reused, [archive] * len(slices), [pairs[k : k + chunk] for k in range(0, n, chunk)], pure=False)), []),
         "FMPy by path": lambda client: client.gather(client.map(by_path, [archive] * n, *zip(*pairs), pure=False)),
     }  # fmt: skip
-    times, results = {name: [] for name in (*ways, "alone")}, {}
+    times, spent, results = {name: [] for name in (*ways, "alone")}, {name: [] for name in (*ways, "alone")}, {}
     with (
         LocalCluster(2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
         Client(cluster) as client,
     ):
         client.run(lambda: __import__("fmpy"))
+        ways["alone"] = lambda client: plan.run_many(rows, threads=2)["last"].tolist()
+        # Of the workers, and of this process with the scheduler.
+        all_cpu = lambda: time.process_time() + sum(client.run(time.process_time).values())
         for _ in range(3):
             for name, way in ways.items():
-                begin = time.perf_counter()
+                begin, before = time.perf_counter(), all_cpu()
                 results[name] = way(client)
                 times[name].append(time.perf_counter() - begin)
-            begin = time.perf_counter()
-            results["alone"] = plan.run_many(rows, threads=2)["last"].tolist()
-            times["alone"].append(time.perf_counter() - begin)
+                spent[name].append(all_cpu() - before)
     assert all(result == results["ours"] for result in results.values())
-    best = {name: min(all_of) for name, all_of in times.items()}
-    report("G1", ", ".join(f"{name} {n / seconds:.0f} runs/s" for name, seconds in best.items()))
-    over = lambda a, b: statistics.median(x / y for x, y in zip(times[a], times[b]))
-    first, second, third = over("FMPy by path", "ours"), over("FMPy reused", "ours"), over("FMPy reused", "alone")
-    report("G1", f"FMPy by path / ours: {first:.1f} (goal 10)")
-    report("G2", f"FMPy reused / ours: {second:.1f} (goal 3); / ours without Dask: {third:.1f} (goal 4)")
+    for name in times:
+        wall, used = min(times[name]), statistics.median(spent[name])
+        report("G1", f"{name}: {n / wall:.0f} runs/s of the clock, {used / n * 1e3:.2f} ms of CPU a run")
+    # Goals are for CPU time: what other programs take from the clock is not in it.
+    over = lambda a, b, of: statistics.median(x / y for x, y in zip(of[a], of[b]))
+    first, second, third = (over(*ab, spent) for ab in (("FMPy by path", "ours"), ("FMPy reused", "ours"), ("FMPy reused", "alone")))
+    report("G1", f"FMPy by path / ours: {first:.1f} (goal 10; clock {over('FMPy by path', 'ours', times):.1f})")
+    report("G2", f"FMPy reused / ours: {second:.1f} (goal 3; clock {over('FMPy reused', 'ours', times):.1f}); "
+                 f"/ ours without Dask: {third:.1f} (goal 4; clock {over('FMPy reused', 'alone', times):.1f})")  # fmt: skip
     assert first >= 10.0
     assert second >= 3.0
     assert third >= 4.0
@@ -210,13 +214,13 @@ def test_g1_g2_a_sweep_on_dask(archives):
 @pytest.mark.skipif(importlib.util.find_spec("gym_electric_motor") is None, reason="opt-in: gym-electric-motor is not installed")
 @pytest.mark.filterwarnings("ignore")
 def test_g9_against_gym_electric_motor(archives):
-    """A step of 0.1 ms of current control, each with its own machine and reward; as in their documentation."""
+    """A step of 0.1 ms of current control, each with its machine; both rewards are the magnitude of an error, as is their default."""
     import gym_electric_motor
     from fmurun.gym import Env
 
     bounds = {name: (-200.0, 200.0) for name in ("u_a", "u_b", "u_c")}
     ours = Env(archives / "fmi3" / "PmsmPlant.fmu", list(bounds), ["i_d", "i_q", "speed", "theta_e"], 1e-4, bounds=bounds,
-               reward=lambda seen, chosen: -((seen[:, 1] - 2.0) ** 2))  # fmt: skip
+               reward=lambda seen, chosen: (-abs(seen.item(1) - 2.0),))  # fmt: skip
     generator = np.random.default_rng(1)
 
     def steps(env, bound, n):
