@@ -22,6 +22,6 @@ def many(points):
 
 drive = ot.PythonFunction(len(names), len(measures), func_sample=many)
 inputs = ot.JointDistribution([ot.Normal(3.0, 0.1), ot.Uniform(0.0, 1.0)])
-indices = ot.SaltelliSensitivityAlgorithm(ot.SobolIndicesExperiment(inputs, 100).generate(), drive, 100)
+indices = ot.SaltelliSensitivityAlgorithm(inputs, 500, drive)
 for k, measure in enumerate(measures):
-    print(measure, dict(zip(names, np.round(indices.getFirstOrderIndices(k), 2))))
+    print(measure, ", ".join(f"{name} {index:.2f}" for name, index in zip(names, indices.getFirstOrderIndices(k))))
