@@ -308,9 +308,9 @@ def _columns(table):
         return table
     if isinstance(table, np.ndarray) and table.dtype.names:
         return {name: table[name] for name in table.dtype.names}
-    names = getattr(table, "column_names", None) or getattr(getattr(table, "schema", None), "names", None)
-    names = list(table.columns) if names is None and hasattr(table, "columns") else names
-    if callable(names) or names is None:
+    names = getattr(table, "column_names", None)  # pyarrow
+    names = getattr(table, "columns", None) if names is None else names  # pandas, polars
+    if names is None or callable(names):
         kind = type(table).__name__
         raise TypeError(f"the table must be a dictionary of columns, a structured array or a DataFrame, not {kind}")
     return {name: table[name] for name in names}

@@ -87,7 +87,8 @@ def sweep(plan, rows, out, client, chunk=None):
         error = future.exception()
         if type(error).__name__ != "KilledWorker":
             client.cancel(futures)
-            raise error
+            cause = f"{folder}/{_part(first)}: {type(error).__name__}: {error}; the other parts stay, and the sweep resumes"
+            raise error if isinstance(error, FmuError) else FmuError(None, None, None, cause) from error
         n = min(chunk, count - first)
         results = _isolated(plan, take(first, n), first)
         _write(fs, folder, first, results)

@@ -14,3 +14,13 @@ class Poisoned(fmurun.Plan):
         if (np.asarray(table["tau_load"]) == 0.666).any():
             os.kill(os.getpid(), signal.SIGSEGV)
         return super().run_many(table, **more)
+
+
+class Full(fmurun.Plan):
+    """Finds no space on the disk."""
+
+    def run_many(self, table, **more):
+        if more.get("first_run"):
+            with open("/dev/full", "wb") as file:
+                file.write(bytes(1 << 20))
+        return super().run_many(table, **more)

@@ -1,5 +1,6 @@
 """`Batch`: equal to single instances, resets, failures, threads."""
 
+import pickle
 import threading
 
 import numpy as np
@@ -120,6 +121,12 @@ def test_one_that_fails_does_not_stop_the_others(plant):
     assert np.isfinite(many.step(np.zeros((3, 3)))).all()
     with pytest.raises(FmuError):
         many.step(np.full((3, 3), np.nan))
+
+
+def test_no_pickle(plant):
+    """Instances stay in their process: one clear error, not a copy that shares them."""
+    with pytest.raises(TypeError, match="cannot pickle 'Batch'"):
+        pickle.dumps(batch(plant, 1))
 
 
 def test_in_another_thread(plant):

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import pickle
 import subprocess
 import textwrap
 
@@ -76,3 +77,19 @@ def test_simulate_is_simulate(standard, tmp_path):
             _, *lines = csv.reader(file)
         ours = plan.simulate({"d.plant.motor.R_s": r_s})
         assert [[float(x) for x in line] for line in lines] == [list(row) for row in ours.tolist()]
+
+
+def test_an_ssp_file(standard, tmp_path):
+    """Names without a dot are connectors of the system."""
+    ssp, out = tmp_path / "drive.ssp", tmp_path / "out.csv"
+    fmu("ssp", "--out", ssp, *(["--fmi", "3"] if standard.name == "fmi3" else []))
+    fmu("simulate", ssp, "--input", "speed_ref=0:0,0.01:50", "--input", "u_dc=325", "--stop", "0.05", "--step", "1e-4", "--csv", out)
+    with open(out, newline="") as file:
+        header, *lines = csv.reader(file)
+    inputs = {"speed_ref": [(0.0, 0.0), (0.01, 50.0)], "u_dc": 325.0}
+    plan = Plan(ssp, input=inputs, stop_time=0.05, step_size=1e-4, measures={"last": header[1]})
+    ours = plan.simulate()
+    assert list(ours.dtype.names) == header
+    assert [[float(x) for x in line] for line in lines] == [list(row) for row in ours.tolist()]
+    again = pickle.loads(pickle.dumps(Plan(ssp, input=inputs, stop_time=0.05, step_size=1e-4, embed=True)))
+    assert again.simulate().tobytes() == ours.tobytes()

@@ -12,7 +12,7 @@ import pytest
 from distributed import Client, LocalCluster
 from fmurun import FmuError, Plan
 from fmurun.dask import sweep
-from poison import Poisoned
+from poison import Full, Poisoned
 
 ROWS = 4000
 
@@ -109,6 +109,15 @@ def test_bad_input_is_told_before_the_first_task(archives, client, tmp_path):
     with pytest.raises(FmuError, match="has no design"):
         sweep(plan, 3, tmp_path, client)
     assert os.listdir(tmp_path) == []
+
+
+def test_a_full_disk_is_told_and_what_is_there_stays(archives, client, tmp_path):
+    rows = table(40)
+    sweep(drive(archives), rows, tmp_path, client, chunk=20)
+    (tmp_path / "part-000000000020.parquet").unlink()
+    with pytest.raises(FmuError, match=r"part-000000000020\.parquet: OSError: .*No space.*; the other parts stay"):
+        sweep(drive(archives, Full), rows, tmp_path, client)
+    assert sweep(drive(archives), rows, tmp_path, client)["skipped"] == 1
 
 
 def test_map_partitions(archives):

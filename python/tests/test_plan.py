@@ -84,7 +84,15 @@ def test_bits_of_threads_slices_pickles_and_tables(standard, resistances):
     structured = np.array([(x,) for x in resistances], dtype=[("p.motor.R_s", float)])
     same(plan.run_many(structured), whole)
     same(plan.run_many(pa.table({"p.motor.R_s": resistances})), whole)
+    same(plan.run_many(pa.record_batch({"p.motor.R_s": resistances})), whole)
     same(plan.run_many({"p.motor.R_s": resistances.tolist(), "run": np.arange(40)}), whole)
+
+    class Frame(dict):
+        """As a DataFrame of pandas or polars: columns are names, items are columns."""
+
+        columns = property(list)
+
+    same(plan.run_many(Frame({"p.motor.R_s": resistances})), whole)
     backwards = plan.run_many({"p.motor.R_s": resistances[::-1]})
     assert backwards["peak"][::-1].tobytes() == whole["peak"].tobytes()
 
