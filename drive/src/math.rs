@@ -1,4 +1,5 @@
-//! Elementary functions from the `libm` crate: identical bits on every platform; the C library does not guarantee this.
+//! Elementary functions, from the `libm` crate or, where a period needs them, by series of basic operations: identical
+//! bits on every platform; the C library does not guarantee this.
 
 /// Sine and cosine of `x` (rad).
 #[inline]
@@ -61,10 +62,10 @@ pub fn ln(x: f64) -> f64 {
     libm::log(x)
 }
 
-/// Hyperbolic tangent of `x`.
+/// Hyperbolic tangent of `x`: [`tanh_beside`] 0, or 1 - 2 / (e^2x + 1); to 4e-16, twice as fast as the library.
 #[inline]
 pub fn tanh(x: f64) -> f64 {
-    libm::tanh(x)
+    if x.abs() <= 0.5 { tanh_beside(0.0, x) } else { (1.0 - 2.0 / (exp(2.0 * x.abs()) + 1.0)).copysign(x) }
 }
 
 /// Sine and cosine of a small angle `d` (rad), by their series; of a larger one, [`sin_cos`].
@@ -146,8 +147,9 @@ mod tests {
                 assert!((sin - exact_sin).abs() < 1e-16 && (cos - exact_cos).abs() < 2.3e-16, "{angle}: {sin} {cos}");
             }
             for x in [-30.0, -2.0, -0.3, 0.0, 1e-3, 0.7, 19.0, 21.0] {
-                let (near, exact) = (tanh_beside(tanh(x), d), tanh(x + d));
+                let (near, exact) = (tanh_beside(tanh(x), d), libm::tanh(x + d));
                 assert!((near - exact).abs() < 5e-16, "tanh({x} + {d}): {near} {exact}");
+                assert!((tanh(x + d) - exact).abs() < 4e-16, "tanh({})", x + d);
             }
         }
     }
@@ -163,6 +165,7 @@ mod tests {
             );
         }
         assert!(exp(f64::NAN).is_nan() && exp(f64::NEG_INFINITY) == 0.0 && exp(f64::INFINITY) == f64::INFINITY);
+        assert!(tanh(f64::NAN).is_nan() && tanh(f64::NEG_INFINITY).to_bits() == (-1.0_f64).to_bits());
         assert!(exp(0.0).to_bits() == 1.0_f64.to_bits() && exp(-0.0).to_bits() == 1.0_f64.to_bits());
     }
 

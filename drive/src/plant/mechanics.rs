@@ -107,7 +107,7 @@ impl<'a> Shaft<'a> {
     #[inline(never)]
     fn coulomb(&self, speed: f64) -> f64 {
         let Mechanics { tau_coulomb, w_coulomb, .. } = *self.mechanics;
-        let d = (speed - self.speed) / w_coulomb;
+        let d = (speed - self.speed) * (1.0 / w_coulomb);
         tau_coulomb * if d.abs() <= 0.5 { tanh_beside(self.share, d) } else { tanh(speed / w_coulomb) }
     }
 }
