@@ -122,7 +122,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 4;
+    const STATE_VERSION: u16 = 5;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();

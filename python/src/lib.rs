@@ -1,6 +1,6 @@
 //! The compiled part of the Python package `fmurun`: FMUs and runs; `fmurun/*.py` is what users import.
 //!
-//! Every function that Python calls goes through [`error::gate`]: a panic becomes an `FmuError`.
+//! Every function that Python calls goes through `error::gate`: a panic becomes an `FmuError`.
 
 #![deny(unsafe_code)]
 

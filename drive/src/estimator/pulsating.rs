@@ -2,7 +2,7 @@
 //!
 //! A voltage u = V cos(phi k) along the estimated d-axis changes the current within one sample by x_d = T_s (S + D cos
 //! 2 theta~) u, x_q = T_s D sin(2 theta~) u, with theta~ = theta - theta^ and S, D from
-//! [`saliency`](crate::estimator::saliency).
+//! [`saliency`].
 //! - Heterodyne: band-pass, times 2 u, low-pass ([`carrier`]): eps = T_s D V^2 sin(2 theta~).
 //! - 45-degree measurement axes (Fig. 10): the magnitudes of (x_d + x_q) / sqrt 2 and (x_d - x_q) / sqrt 2 are equal where
 //!   theta~ = 0. Rectified, subtracted, low-pass: 2 sqrt 2 / pi T_s D V sin(2 theta~), whatever the phase of the carrier.

@@ -1,7 +1,7 @@
 //! Rotating injection in stator axes: method 7 of the review (Kim & Sul (38)-(40)).
 //!
 //! A voltage u = V e^{j phi k} in stator axes changes the current by T_s (S u + D e^{j 2 theta} conj(u)) per sample
-//! ([`saliency`](crate::estimator::saliency)): one part turns with the carrier, the other against it. A band-pass, a
+//! ([`saliency`]): one part turns with the carrier, the other against it. A band-pass, a
 //! multiplication by u e^{-j 2 theta^} (heterodyne) and a low-pass ([`carrier`]) give eps = T_s D V^2 sin(2 theta~) and
 //! e = eps / (2 T_s D V^2).
 //!

@@ -2,7 +2,7 @@
 //!
 //! The method injects u = +-V along the estimated d-axis, with a period of 2 samples (+-) or 4 (+--+). Let delta be the
 //! change from one half period to the next in the estimated frame, theta~ = theta - theta^, and x and D the response
-//! and D of [`saliency`](crate::estimator::saliency). Then delta x_q = T_s D sin(2 theta~) delta u_d, so e = delta
+//! and D of [`saliency`]. Then delta x_q = T_s D sin(2 theta~) delta u_d, so e = delta
 //! x_q / (2 T_s D delta u_d). The method uses no filter.
 //!
 //! x is the change of the current minus the share of the current controller's voltage. Without subtracting this share,
