@@ -114,6 +114,12 @@ pub fn tanh_beside(t: f64, d: f64) -> f64 {
     (t * below + above) / (below + t * above)
 }
 
+/// 1/x for x > 0; finite, so that a product with 0 is 0 for a subnormal `x` too.
+#[inline]
+pub fn reciprocal(x: f64) -> f64 {
+    (1.0 / x).min(f64::MAX)
+}
+
 /// Whether all values are numbers: 0 times any other is not 0.
 #[inline]
 pub fn all_finite<const N: usize>(values: [f64; N]) -> bool {

@@ -107,10 +107,10 @@ def test_both_standards_agree(run, name, h):
 
 @pytest.mark.parametrize("name", ["start", "step 500", "load 0", "load 1000"])
 def test_half_a_sample_per_step_changes_nothing(run, name):
-    """At the sample instants, but for the rounding of shorter integration steps."""
+    """At the sample instants, but for the error of an integration step of T_s: 1e-6 A, which the current controller makes 1e-5 V."""
     whole, half = run(2, name, T_S), run(2, name, T_S / 2)
     for column, values in whole.items():
         turn = 2 * np.pi if column.startswith("theta") else np.inf
         apart = np.abs(values - half[column])
         apart = np.minimum(apart, np.abs(turn - apart))
-        assert apart.max() < 1e-6, column
+        assert apart.max() < (1e-5 if column.startswith("u_") else 1e-6), column

@@ -5,6 +5,7 @@
 //! linkages are the state, so the equations remain valid when the inductances saturate.
 
 use crate::frame::{AlphaBeta, Axis, Dq, Rotor};
+use crate::math::reciprocal;
 use crate::motor::Motor;
 use crate::plant::saturation::Saturation;
 
@@ -47,7 +48,8 @@ impl<'a> Machine<'a> {
     pub fn new(motor: &'a Motor, saturation: &'a Saturation) -> Self {
         let Motor { n_p, R_s, L_d, L_q, psi_M } = *motor;
         let saturation = (!saturation.is_none()).then_some(saturation);
-        Self { motor, saturation, psi_M, R_s, by_L_d: 1.0 / L_d, by_L_q: 1.0 / L_q, torque: 1.5 * f64::from(n_p) }
+        let (by_L_d, by_L_q) = (reciprocal(L_d), reciprocal(L_q));
+        Self { motor, saturation, psi_M, R_s, by_L_d, by_L_q, torque: 1.5 * f64::from(n_p) }
     }
 
     /// Current (A) for the flux linkage `psi` (Wb).

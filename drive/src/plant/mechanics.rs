@@ -8,7 +8,7 @@
 //! Rasmussen 2006 gives the torque but not the load; the friction is that of the assumed machine. J in kg.m2, B in
 //! N.m.s/rad, torques in N.m, speeds in rad/s (mechanical).
 
-use crate::math::{tanh, tanh_beside};
+use crate::math::{reciprocal, tanh, tanh_beside};
 use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, SPEED};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
@@ -86,7 +86,7 @@ impl<'a> Shaft<'a> {
         // From here on, the nearest number to tanh is +-1.
         let full = 20.0 * mechanics.w_coulomb;
         let share = if speed.abs() > full { sign } else { tanh(speed / mechanics.w_coulomb) };
-        let (B, by_J, tau_full) = (mechanics.B, 1.0 / mechanics.J, sign * mechanics.tau_coulomb);
+        let (B, by_J, tau_full) = (mechanics.B, reciprocal(mechanics.J), sign * mechanics.tau_coulomb);
         Self { mechanics, B, by_J, tau_load, speed, share, sign, full, tau_full }
     }
 
@@ -107,7 +107,7 @@ impl<'a> Shaft<'a> {
     #[inline(never)]
     fn coulomb(&self, speed: f64) -> f64 {
         let Mechanics { tau_coulomb, w_coulomb, .. } = *self.mechanics;
-        let d = (speed - self.speed) * (1.0 / w_coulomb);
+        let d = (speed - self.speed) * reciprocal(w_coulomb);
         tau_coulomb * if d.abs() <= 0.5 { tanh_beside(self.share, d) } else { tanh(speed / w_coulomb) }
     }
 }
