@@ -178,7 +178,7 @@ fn a_wrong_file_is_told_with_place_and_remedy() {
     refused("R_s = 2.0", "R_s = -2.0", &["m.toml:7:7", "motor.R_s of PmsmPlant = -2", "greater than 0"]);
     refused("J = 1.5e-3", "J = nan", &["m.toml:13:5", "mechanics.J"]);
     refused("torque = 2.5", "torque = -1", &["m.toml:20:10", "rating.torque", "greater than 0"]);
-    refused("speed = 80.0", "speed = 180.0", &["m.toml:28:", "a third of bandwidth.observer", "lower it"]);
+    refused("speed = 80.0", "speed = 180.0", &["m.toml:28:", "a third of bandwidth.observer", "lower the former"]);
     refused("current = 7.5", "current = 4.0", &["rating.current", "raise it"]);
     refused("observer = 300.0", "observer = 100.0", &["bandwidth"]);
     refused("speed = 314.159265", "speed = 3141.59", &["rating.speed", "u_dc"]);

@@ -24,10 +24,12 @@ impl Folder {
         let owner = process::id();
         loop {
             let dir = tempfile::Builder::new().prefix(&format!("{PREFIX}{owner}-")).tempdir()?;
-            let lock = File::create_new(dir.path().join(LOCK))?;
+            let name = dir.path().join(LOCK);
+            let lock = File::create_new(&name)?;
             match lock.try_lock() {
-                // Another process took the new folder for an abandoned one, and removes it.
+                // Another thread or process took the new folder for an abandoned one: it removes it, or has removed it.
                 Err(TryLockError::WouldBlock) => {}
+                Ok(()) if !name.exists() => {}
                 // On a file system without locks, the folder works too, but stays behind after a kill.
                 Ok(()) | Err(TryLockError::Error(_)) => return Ok(Self { path: dir.keep(), owner, lock: Some(lock) }),
             }
