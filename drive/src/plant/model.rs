@@ -383,15 +383,42 @@ mod tests {
     fn a_step_of_a_sample_period_is_as_good_as_64() {
         // With two steps in rotor axes instead of one in stator axes, the errors are 8.5, 0.9 and 92 uA.
         let servo = Motor { n_p: 4, R_s: 0.2, L_d: 1.2e-3, L_q: 1.2e-3, psi_M: 0.09 };
-        for (motor, rpm, allowed) in
-            [(&Motor::default(), 4500.0, 2e-6), (&Motor::IPMSM_2_2_KW, 3000.0, 3e-7), (&servo, 4500.0, 1e-5)]
-        {
+        // At 20 000 rpm, the rotor turns 0.84 rad in a sample: four steps.
+        for (motor, rpm, allowed) in [
+            (&Motor::default(), 4500.0, 2e-6),
+            (&Motor::IPMSM_2_2_KW, 3000.0, 3e-7),
+            (&servo, 4500.0, 1e-5),
+            (&servo, 20_000.0, 1e-5),
+        ] {
             let speed = rpm * std::f64::consts::PI / 30.0;
             let (coarse, fine) = (currents(motor, speed, 1e-4), currents(motor, speed, 1e-4 / 64.0));
             let error = coarse.iter().zip(&fine).map(|(&a, &b)| (a - b).magnitude()).fold(0.0, f64::max);
             assert!(error < allowed && error > 0.0, "{error} A with {motor:?} at {rpm} rpm");
             assert!(fine[19].magnitude() > 0.1, "the current is not trivial: {:?}", fine[19]);
         }
+    }
+
+    #[test]
+    fn a_voltage_that_depends_on_the_currents_is_integrated_in_short_steps() {
+        // Within 2 ms, the phase currents pass the zone of the dead time, +-0.5 A.
+        let after = |h: f64, steps: u32| {
+            let mut block = Block::<PmsmPlant>::default();
+            let PlantParameters { inverter, initial, .. } = &mut block.model.parameters;
+            (inverter.dead_time, inverter.i_zero, initial.speed) = (4e-6, 0.5, 200.0);
+            block.model.inputs.u = Phases::from_stator(AlphaBeta::new(-80.0, 60.0));
+            block.initialize();
+            let mut now = Elapsed::ZERO;
+            for _ in 0..steps {
+                let step = Step { start: now, h };
+                block.step(&step).unwrap();
+                now = step.end();
+            }
+            Dq::new(block.out.i_d, block.out.i_q)
+        };
+        let (coarse, fine) = (after(2e-3, 1), after(1e-6, 2000));
+        let error = (coarse - fine).magnitude();
+        // The kinks at the edges of the zone cost the method its order: 0.6 mA; with substeps of 400 us, 4 mA.
+        assert!(error < 1e-3 && fine.magnitude() > 1.0, "{error} A, {fine:?}");
     }
 
     #[test]
