@@ -38,7 +38,7 @@ pub struct Definition {
     pub design: Option<Design>,
     /// The varied variables; their order is that of the columns.
     pub vary: Ordered<Vary>,
-    /// What is measured in each run.
+    /// The measures of each run.
     pub measure: Ordered<Measure>,
     /// Which runs are recorded.
     pub trace: Option<Trace>,
@@ -108,7 +108,7 @@ pub struct Vary {
 pub struct Measure {
     /// A sum of variables, each optionally after a number and `*`.
     pub of: String,
-    /// What is computed from it.
+    /// The function to compute from it.
     pub is: Function,
     /// Wraps the sum into half of this on both sides of 0: a number, or one before `pi`.
     pub wrap: Option<Scalar>,
@@ -120,13 +120,13 @@ pub struct Measure {
     pub from: Option<f64>,
     /// Level at which a rise ends.
     pub to: Option<f64>,
-    /// Where it settles.
+    /// The value at which it settles.
     pub target: Option<f64>,
     /// How far from the target it may be when it has settled.
     pub band: Option<f64>,
 }
 
-/// What a measure computes.
+/// The function that a measure computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Function {

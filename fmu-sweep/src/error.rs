@@ -1,4 +1,4 @@
-//! What can be wrong before a run, and with files. What is wrong in a run is an [`Outcome`](crate::Outcome) of its row.
+//! Errors before a run, and errors of files. An error within a run is part of its row: [`Outcome`](crate::Outcome).
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ pub enum Error {
     File {
         /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         cause: String,
     },
 }

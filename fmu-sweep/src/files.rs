@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all, whenever the process or the machine stops.
+//! Files that exist completely or not at all, even if the process or the machine stops.
 
 use crate::Error;
 use std::ffi::OsString;

@@ -169,7 +169,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // One that waits for rows ends when its input does; one that runs a row nobody needs must not.
+        // A worker that waits for rows ends with its input; one that still computes a row is no longer needed.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -197,7 +197,7 @@ fn how(status: ExitStatus) -> String {
     status.code().map_or_else(|| "ended".into(), |code| format!("ended with exit status {code}"))
 }
 
-/// What a worker process does until its standard input ends.
+/// The loop of a worker process, until its standard input ends.
 ///
 /// # Errors
 /// The input is none of a parent, or cannot be read.
@@ -215,7 +215,7 @@ pub fn serve() -> Result<(), Error> {
     for request in requests {
         let request = request.map_err(wrong)?;
         if request == "probe" {
-            // Of some FMUs there can be one instance only.
+            // Some FMUs allow only one instance.
             writer = None;
             let probed = sweep.as_ref().map_err(Clone::clone).and_then(Sweep::probe)?;
             say(&serde_json::to_string(&probed).map_err(|e| Error::Invalid(e.to_string()))?)?;
@@ -239,7 +239,7 @@ fn answer(writer: &mut Writer<'_>, rows: Range<u64>) -> Result<(), Error> {
     say("done")
 }
 
-/// On a line of its own, in one piece, whatever the FMU has printed before.
+/// Written in one piece on a line of its own, even if the FMU has printed half a line before.
 fn say(text: &str) -> Result<(), Error> {
     let mut out = io::stdout().lock();
     let all = out.write_all(format!("\n{MARK}{text}\n").as_bytes()).and_then(|()| out.flush());

@@ -1,6 +1,6 @@
 //! Measures: one number from a run, computed while it runs.
 //!
-//! Sums are taken in the order of time, so a measure has the same bits whoever computes it.
+//! Sums are taken in the order of time, so a measure has the same bits on every thread and machine.
 
 use crate::definition::{Function, Measure as Definition};
 use crate::signal::Signal;
@@ -33,7 +33,7 @@ enum Kind {
     Settling { target: f64, band: f64 },
 }
 
-/// What is known of a measure during a run.
+/// The state of a measure during a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State {
     /// Number of values.

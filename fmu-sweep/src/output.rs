@@ -26,7 +26,7 @@ pub(crate) struct Output {
     cut: Cut,
 }
 
-/// What the first process found out, and all others use.
+/// Values that the first process determines and all others use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub(crate) struct Cut {
     /// Rows of a part.
@@ -65,7 +65,7 @@ impl Failures {
     }
 }
 
-/// What identifies a sweep, in the order of `sweep.json`.
+/// The identity of a sweep, in the order of `sweep.json`.
 fn identity(sweep: &Sweep) -> Result<Value, Error> {
     let definition = serde_json::to_value(sweep.definition()).map_err(|e| Error::Invalid(e.to_string()))?;
     let files: Vec<Value> = sweep.files()?.iter().map(|(file, hash)| json!({ "file": file, "sha256": hash })).collect();

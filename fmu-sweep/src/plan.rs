@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What all runs share. Clones share it too; any thread may use it.
+/// The part that all runs share. A clone refers to the same data; any thread may use it.
 #[derive(Clone)]
 pub struct Plan(Arc<Shared>);
 
@@ -47,7 +47,7 @@ pub struct Variable {
     targets: Vec<Target>,
 }
 
-/// What came of a run.
+/// The result of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// The measures, or one line with what went wrong.
@@ -56,14 +56,14 @@ pub struct Outcome {
     pub end: f64,
 }
 
-/// What came of many runs, a value per run in each column.
+/// The results of many runs: columns with one value per run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcomes {
     /// A column for each measure; NaN where the run failed.
     pub measures: Vec<Vec<f64>>,
     /// Time in s that was reached; NaN if the run never began.
     pub end: Vec<f64>,
-    /// What went wrong.
+    /// The error.
     pub errors: Vec<Option<String>>,
 }
 
@@ -121,7 +121,7 @@ impl Plan {
             column.map(|c| c.unit.clone()).unwrap_or_default()
         };
         let columns = measures.iter().zip(&definition.measure.0).map(|((measure, sum), (name, _))| {
-            // Of a sum of several units, or with factors, nobody knows the unit.
+            // The unit of a sum of several units, or of a sum with factors, is unknown.
             let units: Vec<String> = sum.terms.iter().map(|(_, name)| unit(name)).collect();
             let plain = sum.terms.iter().all(|(factor, _)| factor.abs().to_bits() == 1.0_f64.to_bits());
             let same = plain && units.iter().all(|other| *other == units[0]);
@@ -143,7 +143,7 @@ impl Plan {
         self.0.system.settings()
     }
 
-    /// What an SSP file has that is not used.
+    /// The contents of an SSP file that are not used.
     pub fn notes(&self) -> &[String] {
         &self.0.notes
     }
@@ -161,7 +161,7 @@ impl Plan {
     /// Finds variables to set in runs.
     ///
     /// # Errors
-    /// A variable does not exist, is no number, takes no value, is fed or set for all runs, or is there twice.
+    /// A variable does not exist, is not a number, cannot be set, is fed or set for all runs, or occurs twice.
     pub fn bind<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Vec<Variable>, Error> {
         let mut all: Vec<Variable> = Vec::new();
         for name in names {
@@ -183,10 +183,10 @@ impl Plan {
         Ok(all)
     }
 
-    /// What a user writes for a variable, as the number that stands for it: `3.3`, `true`, or a name of an enumeration.
+    /// The number for a user's text: `3.3`, `true`, or a name of an enumeration.
     ///
     /// # Errors
-    /// The text is no value of the variable's type.
+    /// The text is not a value of the variable's type.
     pub fn number(&self, variable: &Variable, text: &str) -> Result<f64, Error> {
         let number = |target: &Target| self.0.system.number(target, text);
         Ok(variable.targets.first().map_or(Ok(f64::NAN), number)?)
@@ -195,7 +195,7 @@ impl Plan {
     /// Simulates once and records variables: `outputs`, or all outputs.
     ///
     /// # Errors
-    /// There is no such variable, or an FMU refuses.
+    /// The variable does not exist, or an FMU refuses.
     pub fn simulate(&self, values: &[(Variable, f64)], outputs: Option<&[String]>) -> Result<Recording, Error> {
         let outputs = outputs.unwrap_or(&self.0.outputs);
         let source = |name: &String| Ok((self.0.connectors.source(name)?, name.clone()));

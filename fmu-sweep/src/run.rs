@@ -19,7 +19,7 @@ use std::time::{Instant, SystemTime};
 pub struct Options {
     /// Threads or processes; otherwise as many as the machine runs at once.
     pub jobs: Option<usize>,
-    /// Of parts k, only those with k = I mod N.
+    /// Only the parts k with k = I mod N.
     pub part: Option<(u64, u64)>,
     /// Stop after so many rows, rounded up to whole parts.
     pub limit: Option<u64>,
@@ -37,7 +37,7 @@ pub trait Watch: Sync {
     fn progress(&self, done: u64, failed: u64, all: u64);
 }
 
-/// What a call has done.
+/// The work of one call.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Report {
     /// Rows that this call has run.
@@ -161,7 +161,7 @@ enum Executor<'a> {
 
 #[derive(Default)]
 struct State {
-    /// Of parts under way, by number: lines of blocks that are done.
+    /// The completed lines of unfinished parts, by part number.
     parts: HashMap<u64, HashMap<u64, String>>,
     begun: HashMap<u64, Instant>,
     done: u64,
@@ -180,7 +180,7 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Runs a block; whoever completes a part writes it.
+    /// Runs a block; the thread that completes a part writes it.
     fn block(&self, executor: &mut Executor<'_>, block: u64) -> Result<(), Error> {
         let index = self.jobs.partition_point(|job| job.first_block <= block) - 1;
         let Job { part, rows, first_block } = &self.jobs[index];
@@ -244,7 +244,7 @@ impl Log {
     }
 }
 
-/// A locked file that is there while a process works in the folder. One that nobody locks is of a process that was killed.
+/// A file that a process locks while it works in the folder. An unlocked file belongs to a process that was killed.
 struct Marker {
     path: PathBuf,
     _lock: File,

@@ -1,4 +1,4 @@
-//! What a measure is taken of: a sum of variables.
+//! The signal of a measure: a sum of variables.
 
 use crate::definition::Scalar;
 use std::f64::consts::PI;

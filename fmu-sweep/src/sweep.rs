@@ -73,12 +73,12 @@ impl Sweep {
         Ok(Self { definition, folder, plan, rows, variables })
     }
 
-    /// Where relative paths begin.
+    /// The folder that relative paths refer to.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// What the file says.
+    /// The contents of the file.
     pub fn definition(&self) -> &Definition {
         &self.definition
     }

@@ -23,9 +23,9 @@ pub struct Rows {
     count: u64,
     kind: Kind,
     seed: u64,
-    /// Of a Sobol design: of each column with a dimension of its own.
+    /// Direction numbers of a Sobol design, for each column with a dimension of its own.
     dimensions: Vec<Dimension>,
-    /// Of a list.
+    /// Rows of a list.
     list: Vec<Vec<f64>>,
 }
 
@@ -43,7 +43,7 @@ impl Rows {
     /// `number` reads a text as the number of a variable: names of enumerations, `true`.
     ///
     /// # Errors
-    /// The design or a varied variable makes no sense, or there is no row.
+    /// The design or a varied variable is invalid, or the design has no rows.
     pub(crate) fn new(
         design: &Design,
         vary: &Ordered<Vary>,
@@ -76,7 +76,7 @@ impl Rows {
         }
         rows.count = rows.counted(design)?;
         if rows.count == 0 {
-            return invalid("design: there is no row");
+            return invalid("design: it has no rows");
         }
         if kind == Kind::Sobol {
             if free > sobol::DIMENSIONS {
@@ -98,7 +98,7 @@ impl Rows {
         match Source::new(vary, number)? {
             Source::Same { of, times } => match self.columns.iter().position(|(name, _)| *name == of) {
                 Some(to) if !matches!(self.columns[to].1, Column::Tied { .. }) => Ok(Column::Tied { to, times }),
-                _ => Err(format!("same = {of:?} is no column before this one that varies by itself")),
+                _ => Err(format!("same = {of:?} is not an earlier column that varies by itself")),
             },
             _ if self.kind == Kind::List => Err("a list varies only its own columns; expected same".into()),
             source if self.kind == Kind::Grid && !matches!(source, Source::Levels(_)) => {
@@ -319,7 +319,7 @@ mod tests {
         let vary = "[vary]\na = { uniform = [0, 1] }";
         let many: Vec<String> = (0..65).map(|k| format!("v{k} = {{ uniform = [0, 1] }}")).collect();
         for (text, part) in [
-            (format!("[design]\nkind = 'random'\nruns = 0\n{vary}"), "there is no row"),
+            (format!("[design]\nkind = 'random'\nruns = 0\n{vary}"), "it has no rows"),
             (format!("[design]\nkind = 'lhs'\n{vary}"), "kind = \"lhs\" needs runs"),
             (format!("[design]\nkind = 'grid'\n{vary}"), "vary: a: a grid needs values"),
             ("[design]\nkind = 'grid'\nruns = 3\n[vary]\na = { values = [1] }".into(), "runs = 3 does not belong"),
@@ -330,7 +330,10 @@ mod tests {
                 format!("[design]\nkind = 'sobol'\nruns = 9\n[vary]\n{}", many.join("\n")),
                 "65 variables, expected at most 64",
             ),
-            (format!("[design]\nkind = 'random'\nruns = 9\n{vary}\nb = {{ same = 'c' }}"), "same = \"c\" is no column"),
+            (
+                format!("[design]\nkind = 'random'\nruns = 9\n{vary}\nb = {{ same = 'c' }}"),
+                "same = \"c\" is not an earlier column",
+            ),
             (format!("[design]\nkind = 'random'\nruns = 2000000000000\n{vary}"), "expected at most 1099511627776"),
         ] {
             let error = rows(&text).unwrap_err().to_string();

@@ -98,7 +98,7 @@ impl Source {
             return Ok(Self::Same { of: of.clone(), times });
         }
         let (Some(from), Some(to), Some(count)) = (*from, *to, *count) else {
-            return Err("from, to and count belong together".into());
+            return Err("give from, to and count together".into());
         };
         finite("from or to", &[from, to])?;
         if !(1..=MOST_LEVELS).contains(&count) || (count == 1 && from.to_bits() != to.to_bits()) {
@@ -179,7 +179,7 @@ mod tests {
             (Vary { values: Some(vec![]), ..v() }, "values is empty"),
             (Vary { values: Some(vec![Scalar::Text("x".into())]), ..v() }, "x is not a number"),
             (Vary { from: Some(0.0), to: Some(1.0), count: Some(0), ..v() }, "count = 0, expected 2 to"),
-            (Vary { from: Some(0.0), ..v() }, "from, to and count belong together"),
+            (Vary { from: Some(0.0), ..v() }, "give from, to and count together"),
             (Vary { uniform: Some([0.0, 1.0]), times: Some(2.0), ..v() }, "times belongs to same"),
         ] {
             let error = source(&vary).unwrap_err();
