@@ -4,12 +4,13 @@ mod terminals;
 
 pub use terminals::{Member, Terminal, TerminalPicture};
 
-use crate::Fault;
+use crate::capability::{Capabilities, Exported};
 use crate::model::{Block, Experiment, Model};
 use crate::probe;
-use crate::row::Slot;
-use crate::unit::{Exponents, Quantity};
+use crate::row::{Row, Slot};
+use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
+use crate::Fault;
 use serde::{Deserialize, Serialize};
 
 /// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
@@ -42,6 +43,21 @@ pub struct Description {
     pub terminals: Vec<Terminal>,
     /// Icon: an SVG document.
     pub icon: Option<String>,
+    /// What the model can do beyond co-simulation without events, if anything.
+    pub model_exchange: Option<ModelExchange>,
+}
+
+/// The interface for Model Exchange, and what goes with it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelExchange {
+    /// Value references of the states.
+    pub states: Vec<u32>,
+    /// Value references of their derivatives, in the same order.
+    pub derivatives: Vec<u32>,
+    /// Value references of the event indicators; variables in FMI 3.0 only.
+    pub indicators: Vec<u32>,
+    /// Co-simulation with Event Mode and early return (FMI 3.0).
+    pub event_mode: bool,
 }
 
 /// A variable of the description.
@@ -75,8 +91,14 @@ pub struct Variable {
     pub dimension: Option<usize>,
     /// Start values (one, or one per element) of variables that the importer may set; `None` for calculated ones.
     pub start: Option<Vec<Value>>,
-    /// Value references that the initial value depends on; `None` for variables that the importer sets.
+    /// Value references that the initial value depends on; `None` for variables that are no initial unknown.
     pub initial_dependencies: Option<Vec<u32>>,
+    /// Value references that the value depends on between two events: of outputs and derivatives.
+    pub dependencies: Option<Vec<u32>>,
+    /// Value reference of the state whose derivative this is.
+    pub derivative: Option<u32>,
+    /// A state that an event may change.
+    pub reinit: bool,
 }
 
 /// A base type with its type definition.
@@ -124,18 +146,33 @@ pub enum Value {
 }
 
 impl Description {
-    /// Describes model `M`; start values come from its `Default`, dependencies from probing it.
+    /// Describes model `M` for co-simulation only: see [`exported`](Self::exported).
+    ///
+    /// # Errors
+    /// As [`exported`](Self::exported).
+    pub fn of<M: Model>() -> Result<Self, Fault> {
+        Self::with(&Capabilities::<M>::NONE)
+    }
+
+    /// Describes a model as it is exported; start values come from its `Default`, dependencies from probing it.
     ///
     /// # Errors
     /// Reports problems that no compile-time check can find: a name shared by two parts, a start value outside its
-    /// range, a type definition named like a variable, a terminal with missing variables.
-    pub fn of<M: Model>() -> Result<Self, Fault> {
+    /// range, a type definition named like a variable, a terminal with missing variables, a state without a row.
+    pub fn exported<E: Exported>() -> Result<Self, Fault> {
+        Self::with(&E::CAN)
+    }
+
+    fn with<M: Model>(can: &Capabilities<M>) -> Result<Self, Fault> {
         let mut block = Block::<M>::default();
         block.initialize();
-        let dependencies = probe::initial_dependencies::<M>();
+        let states = can.rows()?;
+        let initial = probe::initial_dependencies(can, &states)?;
+        let between = probe::dependencies(can, &states)?;
+        let references = |of: &Option<Vec<usize>>| of.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
         let table = M::TABLE;
         let mut variables: Vec<Variable> = Vec::new();
-        for (index, dependencies) in dependencies.iter().enumerate() {
+        for index in 0..table.len() {
             let Some((name, meta, element)) = table.locate(index) else { continue };
             let Some((_, slot)) = table.entry(&mut block, index) else { continue };
             let start = meta.causality.is_settable().then(|| value(&slot));
@@ -148,14 +185,45 @@ impl Description {
                 }
                 continue;
             }
-            if variables.iter().any(|other| other.name == name) {
-                return Err(Fault::new(format!("two variables of {} have the name {name}", M::INFO.name)));
+            let state = states.iter().position(|&row| row == index);
+            variables.push(Variable {
+                initial_dependencies: references(&initial[index]),
+                dependencies: references(&between[index]),
+                reinit: state.is_some_and(|i| can.states()[i].reinit),
+                ..variable(name, meta, reference(index), start)
+            });
+        }
+        for (i, state) in can.states().iter().enumerate() {
+            let index = table.len() + i;
+            let (name, of) = (format!("der({})", state.name), format!("Derivative of {}", state.name));
+            let meta = *V::state("", state.rate, "", |m| m).meta();
+            variables.push(Variable {
+                description: of,
+                initial_dependencies: references(&initial[index]),
+                dependencies: references(&between[index]),
+                derivative: Some(reference(states[i])),
+                ..variable(name, &meta, reference(index), None)
+            });
+        }
+        for (i, indicator) in can.indicators().iter().enumerate() {
+            let meta = *V::state("", &ONE, indicator.description, |m| m).meta();
+            let index = table.len() + can.states().len() + i;
+            variables.push(variable(indicator.name.into(), &meta, reference(index), None));
+        }
+        for (i, v) in variables.iter().enumerate() {
+            if variables[..i].iter().any(|other| other.name == v.name) {
+                return Err(Fault::new(format!("two variables of {} have the name {}", M::INFO.name, v.name)));
             }
-            let initial_dependencies = dependencies.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
-            variables.push(variable(name, meta, reference(index), start, initial_dependencies));
         }
         check_types(&variables)?;
         let terminals = terminals::describe(M::TERMINALS, &variables)?;
+        let after = |i: usize| reference(table.len() + i);
+        let model_exchange = can.model_exchange().then(|| ModelExchange {
+            states: states.iter().map(|&row| reference(row)).collect(),
+            derivatives: (0..states.len()).map(after).collect(),
+            indicators: (0..can.indicators().len()).map(|i| after(states.len() + i)).collect(),
+            event_mode: can.samples.is_some(),
+        });
         let info = M::INFO;
         Ok(Self {
             name: info.name.into(),
@@ -164,12 +232,13 @@ impl Description {
             author: info.author.into(),
             license: info.license.into(),
             copyright: info.copyright.into(),
-            token: M::TOKEN.as_str().into(),
+            token: can.hash().guid().as_str().into(),
             experiment: info.experiment,
             documentation: info.documentation.into(),
             variables,
             terminals,
             icon: M::ICON.map(Into::into),
+            model_exchange,
         })
     }
 
@@ -192,7 +261,6 @@ fn variable(
     meta: &Meta,
     value_reference: u32,
     start: Option<Value>,
-    initial_dependencies: Option<Vec<u32>>,
 ) -> Variable {
     Variable {
         name,
@@ -209,14 +277,20 @@ fn variable(
         unbounded: meta.unbounded,
         dimension: meta.dimension,
         start: start.map(|x| vec![x]),
-        initial_dependencies,
+        initial_dependencies: None,
+        dependencies: None,
+        derivative: None,
+        reinit: false,
     }
 }
 
-/// Value reference of the table's variable `index`.
+/// Value reference of the table's variable `index`; of `time` for [`probe::NOW`].
 fn reference(index: usize) -> u32 {
-    u32::try_from(index + 1).unwrap_or(u32::MAX)
+    if index == probe::NOW { TIME } else { u32::try_from(index + 1).unwrap_or(u32::MAX) }
 }
+
+/// Rows of variables that no model holds: derivatives and indicators.
+type V = Row<f64>;
 
 fn value(slot: &Slot<'_>) -> Value {
     match slot {

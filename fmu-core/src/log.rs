@@ -22,3 +22,18 @@ pub const CATEGORIES: &[(&str, &str)] = &[
 
 /// In FMI 2.0 only: all categories at once.
 pub const ALL: &str = "logAll";
+
+/// Where a model puts its warnings.
+pub struct Warnings<'a>(&'a mut dyn FnMut(&'static str, &dyn Fn() -> String));
+
+impl<'a> Warnings<'a> {
+    /// Warnings that `sink` receives: a key that tells messages apart, and what makes the text.
+    pub fn to(sink: &'a mut dyn FnMut(&'static str, &dyn Fn() -> String)) -> Self {
+        Self(sink)
+    }
+
+    /// Warns with the text that `message` makes; warnings with one `key` appear at most once in a second.
+    pub fn warn(&mut self, key: &'static str, message: impl Fn() -> String) {
+        (self.0)(key, &message);
+    }
+}

@@ -1,6 +1,6 @@
 //! The trait that a model implements, and the life cycle of an instance.
 
-use crate::{Elapsed, Fault, Hash, Step, Table, Terminal, Token};
+use crate::{Elapsed, Fault, Hash, Step, Table, Terminal};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// General information about a model, besides its variables.
@@ -49,6 +49,17 @@ pub struct Experiment {
     pub step: f64,
 }
 
+/// How an importer uses a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Interface {
+    /// Co-simulation without events: communication points only.
+    CoSimulation,
+    /// Co-simulation with Event Mode (FMI 3.0).
+    EventMode,
+    /// Model Exchange: the importer integrates.
+    ModelExchange,
+}
+
 /// A model of one block in a block diagram, sampled or continuous.
 ///
 /// The life of an instance:
@@ -79,10 +90,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// Layout of the serialized state; a change of a field changes it.
     const STATE_VERSION: u16 = 1;
 
-    /// The instantiation token: a hash of name, version and table.
-    const TOKEN: Token = Self::HASH.guid();
-
-    /// The data that the token hashes.
+    /// Hash of name, version and table.
     const HASH: Hash = Hash::START.text(Self::INFO.name).text(Self::INFO.version).join(&Self::TABLE.hash());
 
     /// Calculated parameters from the parameters; runs again when a tunable parameter was set.
@@ -94,6 +102,14 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// # Errors
     /// Names the inconsistent parameters, their values and the reason.
     fn validate(&self) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    /// Rules that hold beside [`validate`](Model::validate) if the model is used through this interface.
+    ///
+    /// # Errors
+    /// Names the parameter, its value and the reason.
+    fn validate_for(&self, _interface: Interface) -> Result<(), Fault> {
         Ok(())
     }
 

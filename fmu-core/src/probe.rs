@@ -1,56 +1,164 @@
-//! Finds the dependencies of initial values by running the model itself.
-//!
-//! At several operating points, each input and parameter is changed alone; every output and calculated parameter whose
-//! bits change depends on it (`InitialUnknowns` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
+//! Finds dependencies by running the model itself: each known is changed alone, at several operating points; every
+//! unknown whose bits change depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
 
+use crate::capability::Capabilities;
 use crate::model::{Block, Model};
 use crate::row::Slot;
-use crate::variable::{Causality, Kind, Meta};
+use crate::variable::{Causality, Kind, Meta, Variability};
+use crate::{Elapsed, Fault};
 
 /// Operating points tried, the start values among them.
 const POINTS: u32 = 16;
+/// The same for dependencies between events, which differ with the values of parameters.
+const POINTS_BETWEEN_EVENTS: u32 = 64;
 
-/// For each index of the table that is an output or a calculated parameter, the indices that it depends on.
-pub(crate) fn initial_dependencies<M: Model>() -> Vec<Option<Vec<usize>>> {
-    let table = M::TABLE;
-    let mut block = Block::<M>::default();
-    let causality: Vec<Causality> =
-        (0..table.len()).filter_map(|i| table.entry(&mut block, i).map(|(meta, _)| meta.causality)).collect();
-    let mut found = vec![vec![false; table.len()]; table.len()];
+/// The index that stands for `time`.
+pub(crate) const NOW: usize = usize::MAX;
+
+/// For each variable, the indices that it depends on; derivatives follow the table. `None` if it is no unknown.
+type Dependencies = Vec<Option<Vec<usize>>>;
+
+/// What initial values depend on: outputs, calculated parameters, states and derivatives on inputs and parameters.
+pub(crate) fn initial_dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Result<Dependencies, Fault> {
+    let causality = causalities::<M>();
+    let knowns: Vec<usize> = (0..causality.len()).filter(|&i| causality[i].0.is_settable()).collect();
+    let mut found = Found::new(causality.len() + states.len());
     let mut draw = Draw(1);
     for point in 0..POINTS {
         let mut base = Block::<M>::default();
         if point > 0 {
-            for i in (0..table.len()).filter(|&i| causality[i].is_settable()) {
+            knowns.iter().for_each(|&i| change::<M>(&mut base, i, &mut draw));
+        }
+        let start = |mut block: Block<M>| {
+            block.initialize();
+            values(can, block, Elapsed::ZERO)
+        };
+        let before = start(base.clone());
+        for &known in &knowns {
+            let mut changed = base.clone();
+            change::<M>(&mut changed, known, &mut draw);
+            found.compare(known, &before, &start(changed));
+        }
+    }
+    let unknown = |i: usize| {
+        let calculated = |&(c, _): &(Causality, _)| matches!(c, Causality::Output | Causality::CalculatedParameter);
+        states.contains(&i) || causality.get(i).is_none_or(calculated)
+    };
+    Ok(found.list(unknown))
+}
+
+/// What values depend on between two events: outputs and derivatives on states, inputs, tunable parameters and time,
+/// for any values of the parameters.
+pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Result<Dependencies, Fault> {
+    let causality = causalities::<M>();
+    let known = |&(c, v): &(Causality, Variability)| c == Causality::Input || v == Variability::Tunable;
+    let mut found = Found::new(causality.len() + states.len());
+    let mut draw = Draw(2);
+    let points = if can.model_exchange() { POINTS_BETWEEN_EVENTS } else { 0 };
+    for point in 0..points {
+        let mut base = Block::<M>::default();
+        for i in (0..causality.len()).filter(|&i| causality[i].0.is_settable()) {
+            if point > 0 && draw.below(2) == 0 {
                 change::<M>(&mut base, i, &mut draw);
             }
         }
-        let before = values(&mut base);
-        for known in (0..table.len()).filter(|&i| causality[i].is_settable()) {
+        base.initialize();
+        let mut now = Elapsed::ZERO.plus(draw.between(0.0, 1.0));
+        if let Some(events) = &can.events {
+            (events.begin)(&mut base.model, now);
+            // A point that the model refuses is no operating point.
+            if (events.event)(&mut base.model, now).is_err() {
+                continue;
+            }
+        }
+        for i in 0..states.len() {
+            shift(can, &mut base, states, i, &mut draw);
+        }
+        let before = observed(can, base.clone(), now);
+        for known in (0..causality.len()).filter(|&i| known(&causality[i])) {
             let mut changed = base.clone();
             change::<M>(&mut changed, known, &mut draw);
-            for (unknown, after) in values(&mut changed).into_iter().enumerate() {
-                found[unknown][known] |= after != before[unknown];
+            if causality[known].0 == Causality::Parameter {
+                changed.model.derive();
+            }
+            found.compare(known, &before, &observed(can, changed, now));
+        }
+        for (i, &known) in states.iter().enumerate() {
+            let mut changed = base.clone();
+            shift(can, &mut changed, states, i, &mut draw);
+            found.compare(known, &before, &observed(can, changed, now));
+        }
+        now = now.plus(draw.between(0.1, 1.0));
+        found.compare(NOW, &before, &observed(can, base, now));
+    }
+    Ok(found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output)))
+}
+
+/// Which unknown depends on which known.
+struct Found(Vec<Vec<usize>>);
+
+impl Found {
+    fn new(unknowns: usize) -> Self {
+        Self(vec![Vec::new(); unknowns])
+    }
+
+    fn compare(&mut self, known: usize, before: &[u64], after: &[u64]) {
+        for (list, (before, after)) in self.0.iter_mut().zip(before.iter().zip(after)) {
+            if before != after && !list.contains(&known) {
+                list.push(known);
             }
         }
     }
-    let unknown = |c: Causality| matches!(c, Causality::Output | Causality::CalculatedParameter);
-    let list = |of: &[bool]| (0..of.len()).filter(|&i| of[i]).collect();
-    found.iter().zip(&causality).map(|(of, &c)| unknown(c).then(|| list(of))).collect()
+
+    fn list(self, unknown: impl Fn(usize) -> bool) -> Dependencies {
+        let sorted = |mut list: Vec<usize>| {
+            list.sort_unstable();
+            list
+        };
+        self.0.into_iter().enumerate().map(|(i, list)| unknown(i).then(|| sorted(list))).collect()
+    }
 }
 
-/// The bits of every value after initialization.
-fn values<M: Model>(block: &mut Block<M>) -> Vec<u64> {
-    block.initialize();
-    (0..M::TABLE.len())
-        .map(|i| match M::TABLE.entry(block, i) {
-            Some((_, Slot::Real(x))) => x.to_bits(),
-            Some((_, Slot::Integer(x))) => u64::from(x.cast_unsigned()),
-            Some((_, Slot::Boolean(x))) => u64::from(*x),
-            Some((_, Slot::Enumeration(x))) => u64::from(x.get().cast_unsigned()),
-            None => 0,
-        })
-        .collect()
+fn causalities<M: Model>() -> Vec<(Causality, Variability)> {
+    let mut block = Block::<M>::default();
+    let one = |i| M::TABLE.entry(&mut block, i).map(|(meta, _)| (meta.causality, meta.variability));
+    (0..M::TABLE.len()).map_while(one).collect()
+}
+
+/// The same after the outputs at `now` were computed.
+fn observed<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) -> Vec<u64> {
+    let observe = can.continuous.as_ref().map_or(M::output as fn(&M, _, &mut _), |continuous| continuous.observe);
+    observe(&block.model, now, &mut block.out);
+    values(can, block, now)
+}
+
+/// The bits of every variable, then of every derivative.
+fn values<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) -> Vec<u64> {
+    let mut dx = vec![f64::NAN; can.states().len()];
+    if let Some(continuous) = &can.continuous
+        && (continuous.derivatives)(&block.model, now, &mut dx).is_err()
+    {
+        dx.fill(f64::NAN);
+    }
+    let mut value = |i| match M::TABLE.entry(&mut block, i) {
+        Some((_, Slot::Real(x))) => x.to_bits(),
+        Some((_, Slot::Integer(x))) => u64::from(x.cast_unsigned()),
+        Some((_, Slot::Boolean(x))) => u64::from(*x),
+        Some((_, Slot::Enumeration(x))) => u64::from(x.get().cast_unsigned()),
+        None => 0,
+    };
+    let mut all: Vec<u64> = (0..M::TABLE.len()).map(&mut value).collect();
+    all.extend(dx.iter().map(|x| x.to_bits()));
+    all
+}
+
+/// Moves state `i` by about its nominal value.
+fn shift<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], i: usize, draw: &mut Draw) {
+    let nominal = M::TABLE.entry(block, states[i]).and_then(|(meta, _)| meta.nominal).unwrap_or(1.0);
+    *(can.states()[i].at)(&mut block.model) += nominal * draw.between(0.3, 1.0) * if draw.below(2) == 0 { 1.0 } else { -1.0 };
+    if let Some(continuous) = &can.continuous {
+        (continuous.settle)(&mut block.model);
+    }
 }
 
 /// Sets variable `index` to another value that is allowed.

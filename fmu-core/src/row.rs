@@ -68,6 +68,11 @@ impl<W: 'static> Row<W> {
         Self { meta, access }
     }
 
+    /// What the row says about its variable.
+    pub(crate) const fn meta(&self) -> &Meta {
+        &self.meta
+    }
+
     const fn real(
         (causality, variability): (Causality, Variability),
         name: &'static str,
@@ -112,6 +117,16 @@ impl<W: 'static> Row<W> {
         get: fn(&mut W) -> &mut f64,
     ) -> Self {
         Self::real((Causality::Output, Variability::Continuous), name, quantity, description, get)
+    }
+
+    /// A continuous real variable that is no output: a state that importers may look at.
+    pub const fn state(
+        name: &'static str,
+        quantity: &'static Quantity,
+        description: &'static str,
+        get: fn(&mut W) -> &mut f64,
+    ) -> Self {
+        Self::real((Causality::Local, Variability::Continuous), name, quantity, description, get)
     }
 
     /// A real output that changes at sample instants.

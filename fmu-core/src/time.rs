@@ -21,6 +21,19 @@ impl Elapsed {
     /// The start.
     pub const ZERO: Self = Self { high: 0.0, low: 0.0 };
 
+    /// The time from `start` to `time`, both in s.
+    pub fn between(start: f64, time: f64) -> Self {
+        let (high, low) = two_sum(time, -start);
+        Self { high, low }
+    }
+
+    /// `k` periods, without rounding.
+    pub fn periods(k: u64, period: f64) -> Self {
+        let k = count(k);
+        let high = k * period;
+        Self { high, low: f64::mul_add(k, period, -high) }
+    }
+
     /// This instant and `h` seconds.
     pub fn plus(self, h: f64) -> Self {
         let (high, error) = two_sum(self.high, h);
@@ -89,6 +102,11 @@ impl SampleGrid {
     /// Instants closer than this many seconds are the same instant.
     pub fn width(&self) -> f64 {
         SAME_INSTANT * self.period
+    }
+
+    /// Instant `k` of a simulation that began at `start` (s), rounded once.
+    pub fn instant(&self, k: u64, start: f64) -> f64 {
+        f64::mul_add(count(k), self.period, start)
     }
 
     /// Whether instant `k` is at `now` or before it.

@@ -74,7 +74,7 @@ impl Hash {
         }
     }
 
-    const fn quantity(self, quantity: &Quantity) -> Self {
+    pub(crate) const fn quantity(self, quantity: &Quantity) -> Self {
         let hash = self.text(quantity.name).text(quantity.unit.name);
         match quantity.display {
             Some(display) => hash.text(display.name),

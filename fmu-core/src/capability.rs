@@ -1,0 +1,218 @@
+//! What a model can do beyond co-simulation: a table of its functions, made while compiling.
+//!
+//! A capability is a trait of its own, named in the line that exports the model. What a model does not name costs it
+//! nothing: its entry is `None`, known to the compiler.
+
+use crate::continuous::{ContinuousTime, Differentiable, State};
+use crate::events::{Events, Indicator, Next, Outcome, Sampled};
+use crate::log::Warnings;
+use crate::variable::{Causality, Kind, Meta, Variability};
+use crate::{Elapsed, Fault, Hash, Model};
+
+/// A model with warnings for the importer's log.
+pub trait Warns: Model {
+    /// Passes what the user should know now to `log`; called after every step and event while the importer wants to
+    /// hear warnings. Each message appears at most once in a second of simulated time.
+    fn warn(&self, log: &mut Warnings<'_>);
+}
+
+/// The functions of [`ContinuousTime`].
+pub struct Continuous<M: Model> {
+    /// [`ContinuousTime::STATES`].
+    pub states: &'static [State<M>],
+    /// [`ContinuousTime::derivatives`].
+    pub derivatives: fn(&M, Elapsed, &mut [f64]) -> Result<(), Fault>,
+    /// [`ContinuousTime::settle`].
+    pub settle: fn(&mut M),
+    /// [`ContinuousTime::observe`].
+    pub observe: fn(&M, Elapsed, &mut M::Outputs),
+}
+
+/// The functions of [`Events`].
+pub struct Eventful<M: Model> {
+    /// [`Events::INDICATORS`].
+    pub list: &'static [Indicator],
+    /// [`Events::indicators`].
+    pub indicators: fn(&M, Elapsed, &mut [f64]),
+    /// [`Events::begin`].
+    pub begin: fn(&mut M, Elapsed),
+    /// [`Events::event`].
+    pub event: fn(&mut M, Elapsed) -> Result<Outcome, Fault>,
+    /// [`Events::next`].
+    pub next: fn(&M, Elapsed) -> Next,
+}
+
+/// The functions of [`Sampled`].
+pub struct Samples<M: Model> {
+    /// [`Sampled::period`].
+    pub period: fn(&M) -> f64,
+    /// [`Sampled::samples`].
+    pub samples: fn(&M) -> u64,
+    /// [`Sampled::show`].
+    pub show: fn(&mut M),
+    /// [`Sampled::sample`].
+    pub sample: fn(&mut M) -> Result<(), Fault>,
+    /// [`bounded`](crate::events::bounded).
+    pub bounded: fn(&M, Elapsed) -> Result<(), Fault>,
+}
+
+/// [`Differentiable::tangent`].
+pub type Tangent<M> = fn(&M, Elapsed, &M, &mut [f64], &mut <M as Model>::Outputs) -> Result<(), Fault>;
+
+/// The capabilities of the model `M`: `Capabilities::NONE.ContinuousTime().Events()`. A method exists only if the model
+/// implements the trait of its name.
+pub struct Capabilities<M: Model> {
+    /// Of a [`ContinuousTime`] model.
+    pub continuous: Option<Continuous<M>>,
+    /// Of a model with [`Events`].
+    pub events: Option<Eventful<M>>,
+    /// Of a [`Sampled`] model.
+    pub samples: Option<Samples<M>>,
+    /// Of a [`Differentiable`] model.
+    pub tangent: Option<Tangent<M>>,
+    /// Of a model that [`Warns`].
+    pub warn: Option<fn(&M, &mut Warnings<'_>)>,
+}
+
+#[allow(non_snake_case, reason = "each method bears the name of its trait, as the line that exports a model has it")]
+impl<M: Model> Capabilities<M> {
+    /// Co-simulation only.
+    pub const NONE: Self = Self { continuous: None, events: None, samples: None, tangent: None, warn: None };
+
+    /// Adds [`ContinuousTime`].
+    pub const fn ContinuousTime(self) -> Self
+    where
+        M: ContinuousTime,
+    {
+        let continuous = Continuous {
+            states: M::STATES,
+            derivatives: M::derivatives,
+            settle: M::settle,
+            observe: M::observe,
+        };
+        Self { continuous: Some(continuous), ..self }
+    }
+
+    /// Adds [`Events`].
+    pub const fn Events(self) -> Self
+    where
+        M: Events,
+    {
+        let events = Eventful {
+            list: M::INDICATORS,
+            indicators: M::indicators,
+            begin: M::begin,
+            event: M::event,
+            next: M::next,
+        };
+        Self { events: Some(events), ..self }
+    }
+
+    /// Adds [`Sampled`], and with it [`Events`].
+    pub const fn Sampled(self) -> Self
+    where
+        M: Sampled,
+    {
+        let samples = Samples {
+            period: M::period,
+            samples: M::samples,
+            show: M::show,
+            sample: M::sample,
+            bounded: crate::events::bounded::<M>,
+        };
+        Self { samples: Some(samples), ..self.Events() }
+    }
+
+    /// Adds [`Differentiable`].
+    pub const fn Differentiable(self) -> Self
+    where
+        M: Differentiable,
+    {
+        Self { tangent: Some(M::tangent), ..self }
+    }
+
+    /// Adds [`Warns`].
+    pub const fn Warns(self) -> Self
+    where
+        M: Warns,
+    {
+        Self { warn: Some(M::warn), ..self }
+    }
+}
+
+impl<M: Model> Capabilities<M> {
+    /// The model can be exported for Model Exchange.
+    pub const fn model_exchange(&self) -> bool {
+        self.continuous.is_some() || self.events.is_some()
+    }
+
+    /// The states; none for a model without [`ContinuousTime`].
+    pub const fn states(&self) -> &'static [State<M>] {
+        match &self.continuous {
+            Some(continuous) => continuous.states,
+            None => &[],
+        }
+    }
+
+    /// The event indicators; none for a model without [`Events`].
+    pub const fn indicators(&self) -> &'static [Indicator] {
+        match &self.events {
+            Some(events) => events.list,
+            None => &[],
+        }
+    }
+
+    /// The indices of the states' rows in the table.
+    ///
+    /// # Errors
+    /// Names a state without a continuous real row that is an output or local.
+    pub fn rows(&self) -> Result<Vec<usize>, Fault> {
+        let row = |state: &State<M>| {
+            let fits = |meta: &Meta| {
+                meta.variability == Variability::Continuous
+                    && meta.dimension.is_none()
+                    && matches!(meta.kind, Kind::Real(_))
+                    && matches!(meta.causality, Causality::Output | Causality::Local)
+            };
+            let named = |index: &usize| {
+                M::TABLE.locate(*index).is_some_and(|(name, meta, _)| name == state.name && fits(meta))
+            };
+            let none = || Fault::new(format!("the state {} has no continuous real output or state in the table", state.name));
+            (0..M::TABLE.len()).find(named).ok_or_else(none)
+        };
+        self.states().iter().map(row).collect()
+    }
+
+    /// Hash of the model's table and of all that the capabilities add to its interface.
+    pub const fn hash(&self) -> Hash {
+        let mut hash = M::HASH;
+        if !self.model_exchange() {
+            return hash;
+        }
+        hash = hash.bytes(&[self.continuous.is_some() as u8, self.events.is_some() as u8, self.samples.is_some() as u8]);
+        let mut i = 0;
+        while i < self.states().len() {
+            let state = &self.states()[i];
+            hash = hash.text(state.name).quantity(state.rate).bytes(&[state.reinit as u8]);
+            i += 1;
+        }
+        i = 0;
+        while i < self.indicators().len() {
+            hash = hash.text(self.indicators()[i].name);
+            i += 1;
+        }
+        hash
+    }
+}
+
+/// A model as it is exported: with its capabilities. The line that exports a model implements it.
+pub trait Exported: Sized + 'static {
+    /// The model.
+    type Model: Model;
+
+    /// What it can do.
+    const CAN: Capabilities<Self::Model>;
+
+    /// The instantiation token: a hash of name, version, table and capabilities.
+    const TOKEN: crate::Token = Self::CAN.hash().guid();
+}

@@ -1,0 +1,65 @@
+//! Capabilities of a model with differential equations: its states and derivatives, and their tangent.
+
+use crate::{Elapsed, Fault, Model, unit::Quantity};
+
+/// A continuous state of the model `M`.
+pub struct State<M: 'static> {
+    /// Name of a continuous real row of the table: an output, or a row made by [`Row::state`](crate::Row::state). The
+    /// row's nominal value scales the solver's error.
+    pub name: &'static str,
+    /// Quantity of the derivative, `der(name)`.
+    pub rate: &'static Quantity,
+    /// An event may change it.
+    pub reinit: bool,
+    /// Where the model keeps it.
+    pub at: fn(&mut M) -> &mut f64,
+}
+
+impl<M: 'static> State<M> {
+    /// A state that no event changes.
+    pub const fn new(name: &'static str, rate: &'static Quantity, at: fn(&mut M) -> &mut f64) -> Self {
+        Self { name, rate, reinit: false, at }
+    }
+
+    /// The same for a state that an event may change.
+    pub const fn reinit(mut self) -> Self {
+        self.reinit = true;
+        self
+    }
+}
+
+/// A model with continuous states: dx/dt = f(x, u, t). It can be exported for Model Exchange, and gives derivatives of
+/// its outputs.
+///
+/// Between two events, f is continuous: a relation that switches an equation is a discrete variable that only
+/// [`Events::event`](crate::Events::event) changes.
+pub trait ContinuousTime: Model {
+    /// The states, in the order of all calls.
+    const STATES: &'static [State<Self>];
+
+    /// Writes the derivatives dx/dt for the present states and inputs to `dx`, in the order of [`STATES`](Self::STATES).
+    /// It allocates nothing and depends on nothing that a step leaves behind.
+    ///
+    /// # Errors
+    /// The derivatives do not exist here: the solver tries a shorter step.
+    fn derivatives(&self, now: Elapsed, dx: &mut [f64]) -> Result<(), Fault>;
+
+    /// The importer wrote states: recomputes what the model keeps beside them.
+    fn settle(&mut self) {}
+
+    /// The outputs at an instant, in Model Exchange: a mean over a step becomes the instantaneous value.
+    fn observe(&self, now: Elapsed, outputs: &mut Self::Outputs) {
+        self.output(now, outputs);
+    }
+}
+
+/// A continuous model that knows its own tangent, for example with [`Dual`](crate::Dual) numbers. For a model that
+/// does not, the exporter takes a central difference.
+pub trait Differentiable: ContinuousTime {
+    /// The change of the derivatives (to `dx`) and of the continuous outputs (to `outputs`) per unit of a change of
+    /// states and continuous inputs by `along`, which holds the change of each in its own place.
+    ///
+    /// # Errors
+    /// The derivatives do not exist here.
+    fn tangent(&self, now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut Self::Outputs) -> Result<(), Fault>;
+}

@@ -1,0 +1,125 @@
+//! Capabilities of a model with events: instants at which the importer stops, exchanges values and lets the model act.
+
+use crate::{Elapsed, Fault, Model, SampleGrid};
+
+/// Maximum number of samples in one event or communication step: bounds its duration for any time and any period.
+const MAX_SAMPLES: f64 = 1e7;
+
+/// When a model needs the next event.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Next {
+    /// At no known time.
+    Never,
+    /// At `k` times `period` (s) after the start.
+    Grid {
+        /// Number of the instant.
+        k: u64,
+        /// Period in s.
+        period: f64,
+    },
+    /// At this time.
+    At(Elapsed),
+}
+
+/// What an event did, besides changing discrete variables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Outcome {
+    /// Another call of [`Events::event`] follows before time goes on.
+    pub again: bool,
+    /// A continuous state has another value than before.
+    pub states_changed: bool,
+    /// The simulation is to end.
+    pub terminate: bool,
+}
+
+/// A quantity whose change of sign is an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Indicator {
+    /// Name of the variable that shows it in FMI 3.0.
+    pub name: &'static str,
+    /// One sentence.
+    pub description: &'static str,
+}
+
+/// A model with events. The importer enters Event Mode at the time that [`next`](Self::next) gave, where an indicator
+/// changes its sign, or for reasons of its own; there it exchanges inputs and outputs.
+pub trait Events: Model {
+    /// The event indicators, in the order of all calls.
+    const INDICATORS: &'static [Indicator] = &[];
+
+    /// Writes the indicators to `z`. After an event none is 0, and the sign says on which side the model is.
+    fn indicators(&self, _now: Elapsed, _z: &mut [f64]) {}
+
+    /// Event Mode begins, before the importer exchanges values: discrete outputs take the values that they have from
+    /// this instant on, as far as the inputs of this instant do not matter.
+    fn begin(&mut self, _now: Elapsed) {}
+
+    /// Acts on the inputs of this instant. If nothing is due, it changes nothing.
+    ///
+    /// # Errors
+    /// Gives the reason why the model cannot go on.
+    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault>;
+
+    /// When the next event is due, after everything that is due at `now` was done.
+    fn next(&self, now: Elapsed) -> Next;
+}
+
+/// A model that acts at the instants k T only, like a digital controller: it reads its inputs at an instant, and shows
+/// what it computed from them at the next one. An importer that handles events gives it the inputs of every instant,
+/// whatever its communication step is.
+pub trait Sampled: Model {
+    /// The sample period T in s.
+    fn period(&self) -> f64;
+
+    /// Number of samples taken: the next one is at this number times the period.
+    fn samples(&self) -> u64;
+
+    /// An instant has come: the outputs computed by the last sample become visible. A second call has no effect.
+    fn show(&mut self);
+
+    /// Takes one sample: reads the inputs and computes the outputs of the next instant.
+    ///
+    /// # Errors
+    /// Gives the reason why the sample is impossible.
+    fn sample(&mut self) -> Result<(), Fault>;
+}
+
+/// The instants of a sampled model.
+pub fn grid<M: Sampled>(model: &M) -> SampleGrid {
+    SampleGrid { period: model.period() }
+}
+
+/// Refuses more samples than anyone can wait for.
+///
+/// # Errors
+/// More than 1e7 samples are due at `now`.
+pub fn bounded<M: Sampled>(model: &M, now: Elapsed) -> Result<(), Fault> {
+    let period = model.period();
+    if now.minus_periods(model.samples(), period) <= MAX_SAMPLES * period {
+        return Ok(());
+    }
+    let longest = format!("at most {MAX_SAMPLES} sample periods of {period} s after the last sample");
+    Err(Fault::value("the time", format!("{} s after the start", now.seconds()), longest))
+}
+
+impl<M: Sampled> Events for M {
+    fn begin(&mut self, now: Elapsed) {
+        if grid(self).reached(self.samples(), now) {
+            self.show();
+        }
+    }
+
+    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault> {
+        bounded(self, now)?;
+        let grid = grid(self);
+        while grid.reached(self.samples(), now) {
+            self.show();
+            self.sample()?;
+        }
+        Ok(Outcome::default())
+    }
+
+    fn next(&self, _now: Elapsed) -> Next {
+        Next::Grid { k: self.samples(), period: self.period() }
+    }
+}

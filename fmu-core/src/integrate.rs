@@ -1,0 +1,205 @@
+//! Co-simulation of a model that is given by its derivatives, its events or its samples: the whole of its
+//! [`advance`](crate::Model::advance) in one line.
+//!
+//! The classical Runge-Kutta method with equal substeps; an indicator's change of sign is located by regula
+//! falsi and bisection in turn, each trial being a substep of its own, as exact as the integration itself.
+
+use crate::events::{bounded, grid};
+use crate::{ContinuousTime, Elapsed, Events, Fault, Next, Sampled, Step};
+
+/// Maximum number of substeps in one communication step.
+const MAX_SUBSTEPS: f64 = 1e8;
+/// Maximum number of calls of [`Events::event`] at one instant.
+const MAX_ITERATIONS: usize = 100;
+/// Maximum number of event indicators.
+const MAX_INDICATORS: usize = 16;
+/// An event is located to this fraction of a substep.
+const WIDTH: f64 = 1e-9;
+
+/// Advances a model without events: `N` is the number of its states, `longest` the longest substep in s.
+///
+/// ```ignore
+/// fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+///     integrate::smooth::<Self, 2>(self, step, 1e-4)
+/// }
+/// ```
+///
+/// # Errors
+/// Those of [`ContinuousTime::derivatives`], a state that is not finite, or more substeps than anyone can wait for.
+pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, longest: f64) -> Result<(), Fault> {
+    const { assert!(N == M::STATES.len(), "N is the number of the states") };
+    let count = substeps(step.h, longest)?;
+    let h = step.h / count;
+    let (mut now, mut left) = (step.start, count);
+    while left > 0.0 {
+        rk4::<M, N>(model, now, h)?;
+        now = now.plus(h);
+        left -= 1.0;
+    }
+    Ok(())
+}
+
+/// The same for a model with events, which happen where they are due: time events exactly, others where an indicator
+/// changes its sign. Every communication point is an event too, because inputs may have changed.
+///
+/// # Errors
+/// Those of [`smooth`] and of [`Events::event`]; events without end.
+pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
+    model: &mut M,
+    step: &Step,
+    longest: f64,
+) -> Result<(), Fault> {
+    const { assert!(N == M::STATES.len(), "N is the number of the states") };
+    const { assert!(M::INDICATORS.len() <= MAX_INDICATORS, "more event indicators than the integrator has room for") };
+    let (mut now, end) = (step.start, step.end());
+    let mut budget = substeps(step.h, longest)? + MAX_SUBSTEPS;
+    handle(model, now)?;
+    loop {
+        let left = match until(model, now) {
+            Some(next) if next <= 0.0 => return Err(standstill(now)),
+            Some(next) if next < end.since(now) => next,
+            _ => end.since(now),
+        };
+        if left <= 0.0 {
+            break;
+        }
+        let h = left / substeps(left, longest)?;
+        budget -= 1.0;
+        if budget < 0.0 {
+            return Err(standstill(now));
+        }
+        let passed = substep::<M, N>(model, now, h)?;
+        now = now.plus(passed.unwrap_or(h));
+        let due = until(model, now).is_some_and(|next| next <= 0.0);
+        if passed.is_some() || (due && end.since(now) > 0.0) {
+            handle(model, now)?;
+        }
+    }
+    model.begin(end);
+    Ok(())
+}
+
+/// Advances a model that acts at its sample instants only, with the inputs held.
+///
+/// # Errors
+/// Those of [`Sampled::sample`]; more than 1e7 samples in the step.
+pub fn sampled<M: Sampled>(model: &mut M, step: &Step) -> Result<(), Fault> {
+    let (grid, end) = (grid(model), step.end());
+    bounded(model, end)?;
+    while grid.passed(model.samples(), end) {
+        model.show();
+        model.sample()?;
+    }
+    model.begin(end);
+    Ok(())
+}
+
+/// Seconds from `now` to the next event; at most 0 if it is due.
+fn until<M: Events>(model: &M, now: Elapsed) -> Option<f64> {
+    let (left, width) = match model.next(now) {
+        Next::Never => return None,
+        Next::Grid { k, period } => {
+            (-now.minus_periods(k, period), crate::SampleGrid { period }.width())
+        }
+        Next::At(time) => (time.since(now), 4.0 * f64::EPSILON * now.seconds().abs()),
+    };
+    Some(if left <= width { 0.0 } else { left })
+}
+
+/// All of an event at `now`.
+fn handle<M: Events>(model: &mut M, now: Elapsed) -> Result<(), Fault> {
+    model.begin(now);
+    for _ in 0..MAX_ITERATIONS {
+        if !model.event(now)?.again {
+            return Ok(());
+        }
+    }
+    Err(Fault::new(format!("the event at {} s after the start does not settle", now.seconds())))
+}
+
+/// One substep of `h` (s), or a part of it that ends just after an indicator has changed its sign: its length.
+fn substep<M: ContinuousTime + Events, const N: usize>(
+    model: &mut M,
+    now: Elapsed,
+    h: f64,
+) -> Result<Option<f64>, Fault> {
+    let count = M::INDICATORS.len();
+    let start = states::<M, N>(model);
+    let (mut before, mut after) = ([0.0; MAX_INDICATORS], [0.0; MAX_INDICATORS]);
+    model.indicators(now, &mut before[..count]);
+    rk4::<M, N>(model, now, h)?;
+    model.indicators(now.plus(h), &mut after[..count]);
+    let crossed = |z: &[f64; MAX_INDICATORS]| (0..count).any(|i| (before[i] > 0.0) != (z[i] > 0.0));
+    if !crossed(&after) {
+        return Ok(None);
+    }
+    // The bracket, with the indicators at its ends; the sign at its lower end is that of the start.
+    let (mut low, mut high, mut at_low, mut at_high, mut halve) = (0.0, h, before, after, false);
+    while high - low > WIDTH * h {
+        let line = |i: usize| at_low[i].abs() / (at_low[i].abs() + at_high[i].abs());
+        let changed = (0..count).filter(|&i| (at_low[i] > 0.0) != (at_high[i] > 0.0));
+        let share = if halve { 0.5 } else { changed.map(line).fold(1.0, f64::min).clamp(0.01, 0.99) };
+        let middle = low + (high - low) * share;
+        write::<M, N>(model, &start);
+        rk4::<M, N>(model, now, middle)?;
+        let mut z = [0.0; MAX_INDICATORS];
+        model.indicators(now.plus(middle), &mut z[..count]);
+        if crossed(&z) {
+            (high, at_high) = (middle, z);
+        } else {
+            (low, at_low) = (middle, z);
+        }
+        halve = !halve;
+    }
+    write::<M, N>(model, &start);
+    rk4::<M, N>(model, now, high)?;
+    Ok(Some(high))
+}
+
+fn states<M: ContinuousTime, const N: usize>(model: &mut M) -> [f64; N] {
+    std::array::from_fn(|i| *(M::STATES[i].at)(model))
+}
+
+fn write<M: ContinuousTime, const N: usize>(model: &mut M, x: &[f64; N]) {
+    for (state, x) in M::STATES.iter().zip(x) {
+        *(state.at)(model) = *x;
+    }
+    model.settle();
+}
+
+/// One step of `h` (s) of the classical Runge-Kutta method.
+fn rk4<M: ContinuousTime, const N: usize>(model: &mut M, now: Elapsed, h: f64) -> Result<(), Fault> {
+    let start = states::<M, N>(model);
+    let (mut sum, mut k) = ([0.0; N], [0.0; N]);
+    for (at, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+        if at > 0.0 {
+            let x = std::array::from_fn(|i| start[i] + at * h * k[i]);
+            write::<M, N>(model, &x);
+        }
+        model.derivatives(if at > 0.0 { now.plus(at * h) } else { now }, &mut k)?;
+        for i in 0..N {
+            sum[i] += weight * k[i];
+        }
+    }
+    let end: [f64; N] = std::array::from_fn(|i| start[i] + h / 6.0 * sum[i]);
+    if let Some(i) = (0..N).find(|&i| !end[i].is_finite()) {
+        write::<M, N>(model, &start);
+        let at = now.seconds();
+        return Err(Fault::value(M::STATES[i].name, end[i], format_args!("a finite number, {at} s after the start")));
+    }
+    write::<M, N>(model, &end);
+    Ok(())
+}
+
+fn substeps(h: f64, longest: f64) -> Result<f64, Fault> {
+    let count = (h / longest - 1e-9).ceil().max(1.0);
+    if count <= MAX_SUBSTEPS {
+        return Ok(count);
+    }
+    Err(Fault::value("the step size", format!("{h} s"), format_args!("at most {} s", MAX_SUBSTEPS * longest)))
+}
+
+#[cold]
+fn standstill(now: Elapsed) -> Fault {
+    Fault::new(format!("{} s after the start, events follow each other without time between them", now.seconds()))
+}
