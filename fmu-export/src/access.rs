@@ -1,11 +1,12 @@
-//! Getting and setting variables by value reference: 0 is `time`, `i + 1` the variable `i` of the table.
+//! Getting and setting variables by value reference: 0 is `time`, `i + 1` the variable `i` of the table, of the states'
+//! derivatives after it, or of the event indicators after them.
 
-use crate::instance::Instance;
+use crate::instance::{Instance, Refusal};
 use crate::lifecycle::State;
 use crate::message;
 use crate::value::Value;
 use fmu_core::description::TIME;
-use fmu_core::{Causality, Fault, Meta, Model, Slot, Variability};
+use fmu_core::{Causality, Exported, Fault, Meta, Model, Slot, Table, Variability};
 use std::mem::MaybeUninit;
 
 /// Number of previous values that a set call keeps to undo a partial set.
@@ -13,16 +14,20 @@ const SHORT: usize = 8;
 
 /// The table's index of a value reference; [`TIME`] becomes an index past every table.
 #[inline]
-const fn index(reference: u32) -> usize {
+pub(crate) const fn index(reference: u32) -> usize {
     (reference as usize).wrapping_sub(1)
 }
 
-/// Whether a variable may be set in this state (FMI 2.0.5, 2.2.7 and 4.2.4; FMI 3.0.2, 2.4.7.4).
+/// Whether a variable may be set in this state (FMI 2.0.5, 2.2.7, 3.2.3 and 4.2.4; FMI 3.0.2, 2.4.7.4).
 #[inline]
 fn open(meta: &Meta, state: State) -> bool {
     match meta.causality {
-        Causality::Input => true,
-        Causality::Parameter => state != State::Step || meta.variability == Variability::Tunable,
+        Causality::Input => state != State::Continuous || meta.variability == Variability::Continuous,
+        Causality::Parameter => match state {
+            State::Step | State::Event => meta.variability == Variability::Tunable,
+            State::Continuous => false,
+            _ => true,
+        },
         _ => false,
     }
 }
@@ -37,14 +42,19 @@ fn settable<'a, T: Value>(
     found.filter(|(meta, _)| open(meta, state) && value.judge(meta) == Some(true))
 }
 
-impl<M: Model> Instance<M> {
+/// The table of the model.
+const fn table<E: Exported>() -> &'static Table<fmu_core::Block<E::Model>> {
+    E::Model::TABLE
+}
+
+impl<E: Exported> Instance<E> {
     /// The variables' values, one after the other. In initialization they fit what was set; later they are those of the
     /// last step, inputs and tunable parameters as set.
     ///
     /// # Errors
     /// Unknown reference, another type, or another number of values than `out` has room for.
     #[inline]
-    pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Fault> {
+    pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         self.check_count(references, out.len())?;
         self.refresh();
         if self.arrays { self.get_each::<T, true>(references, out) } else { self.get_each::<T, false>(references, out) }
@@ -54,18 +64,18 @@ impl<M: Model> Instance<M> {
         &mut self,
         references: &[u32],
         out: &mut [MaybeUninit<T>],
-    ) -> Result<(), Fault> {
+    ) -> Result<(), Refusal> {
         let mut places = out.iter_mut();
         for &reference in references {
             let first = index(reference);
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, place) in (0..count).zip(&mut places) {
                 let index = first.wrapping_add(offset);
-                if let Some((_, value)) = T::find(M::TABLE, &mut self.current.block, index) {
+                if let Some((_, value)) = T::find(table::<E>(), &mut self.current.block, index) {
                     place.write(*value);
                     continue;
                 }
-                match M::TABLE.entry(&mut self.current.block, index).and_then(|(meta, slot)| T::read(meta, &slot)) {
+                match table::<E>().entry(&mut self.current.block, index).and_then(|(meta, slot)| T::read(meta, &slot)) {
                     Some(value) => place.write(value),
                     None => place.write(self.read_other(reference, index)?),
                 };
@@ -74,14 +84,36 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// The value of `time`, or an error: no variable of this type has the reference.
+    /// The value of `time`, of a derivative or of an indicator, or an error: no variable of this type has the reference.
     #[cold]
-    fn read_other<T: Value>(&mut self, reference: u32, index: usize) -> Result<T, Fault> {
-        match M::TABLE.entry(&mut self.current.block, index) {
-            Some((meta, _)) => Err(message::type_of::<M>(index, meta, T::CARRIES)),
-            None if reference == TIME => T::time(self.current.end).ok_or_else(|| message::time(T::CARRIES)),
-            None => Err(message::unknown::<M>(reference)),
+    fn read_other<T: Value>(&mut self, reference: u32, index: usize) -> Result<T, Refusal> {
+        if let Some((meta, _)) = table::<E>().entry(&mut self.current.block, index) {
+            return Err(message::type_of::<E::Model>(index, meta, T::CARRIES).into());
         }
+        let time = reference == TIME;
+        let x = if time { Some(self.current.end) } else { self.calculated(index)? };
+        match x {
+            Some(x) => T::from_real(x).ok_or_else(|| message::real(time, T::CARRIES).into()),
+            None => Err(message::unknown::<E>(reference).into()),
+        }
+    }
+
+    /// A derivative or an indicator, by its index after the table.
+    fn calculated(&mut self, index: usize) -> Result<Option<f64>, Refusal> {
+        let (states, indicators) = (E::CAN.states().len(), E::CAN.indicators().len());
+        let after = index.wrapping_sub(table::<E>().len());
+        if after >= states + indicators {
+            return Ok(None);
+        }
+        let mut values = std::mem::take(&mut self.values);
+        let read = if after < states {
+            self.derivatives(&mut values[..states])
+        } else {
+            self.indicators(&mut values[states..]).map_err(Refusal::from)
+        };
+        let x = values[after];
+        self.values = values;
+        read.map(|()| Some(x))
     }
 
     /// Sets variables: all of them or, on an error, none.
@@ -89,13 +121,62 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// Unknown reference, another type, not settable in this state, value out of range, another number of values.
     #[inline]
-    pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Fault> {
+    pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         self.check_count(references, values.len())?;
         let Some(&any) = values.first() else { return Ok(()) };
-        if self.arrays {
+        if self.exchanges() {
+            return self.set_in_exchange(references, values);
+        }
+        Ok(if self.arrays {
             self.set_each::<T, true>(references, values, any)
         } else {
             self.set_each::<T, false>(references, values, any)
+        }?)
+    }
+
+    /// Sets in Model Exchange: judges all values, then writes them. In Continuous-Time Mode, a solver tries values: one
+    /// that is out of range is discarded, the states can be set too, and a discrete input to the value that it has.
+    fn set_in_exchange<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+        let state = self.current.life.state();
+        for write in [false, true] {
+            let mut next = values.iter();
+            for &reference in references {
+                let count = self.elements(reference)?;
+                for (offset, &value) in (0..count).zip(&mut next) {
+                    let index = index(reference).wrapping_add(offset);
+                    if write { self.write(index, value) } else { self.try_value(state, reference, index, value)? }
+                }
+            }
+        }
+        self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);
+        self.stale |= matches!(state, State::Event | State::Continuous);
+        Ok(())
+    }
+
+    /// Whether the value can be written in this state.
+    fn try_value<T: Value>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
+        let found = table::<E>().entry(&mut self.current.block, index);
+        if let Some((meta, slot)) = found {
+            let allowed = value.judge(meta);
+            let held = meta.causality == Causality::Input && T::read(meta, &slot) == Some(value);
+            let of_state = self.states.contains(&index) && matches!(state, State::Event | State::Continuous);
+            if allowed == Some(true) && (open(meta, state) || of_state || held) {
+                return Ok(());
+            }
+            if allowed == Some(false) && state == State::Continuous {
+                return Err(Refusal::Discard(message::range::<E::Model>(index, meta, value)));
+            }
+        }
+        Err(self.refusal(reference, index, value).into())
+    }
+
+    /// Writes a value that was judged before.
+    fn write<T: Value>(&mut self, index: usize, value: T) {
+        if let (Some(i), Some(x)) = (self.states.iter().position(|&row| row == index), value.real()) {
+            self.set_state(i, x);
+        } else if let Some((meta, slot)) = table::<E>().entry(&mut self.current.block, index) {
+            value.write(slot);
+            self.current.dirty |= meta.causality == Causality::Parameter;
         }
     }
 
@@ -117,7 +198,7 @@ impl<M: Model> Instance<M> {
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, &value) in (0..count).zip(&mut next) {
                 let index = first.wrapping_add(offset);
-                if let Some((meta, place)) = T::find(M::TABLE, &mut self.current.block, index)
+                if let Some((meta, place)) = T::find(table::<E>(), &mut self.current.block, index)
                     && open(meta, state)
                     && value.judge(meta) == Some(true)
                 {
@@ -129,7 +210,7 @@ impl<M: Model> Instance<M> {
                     dirty |= meta.causality == Causality::Parameter;
                     continue;
                 }
-                let Some((meta, slot)) = settable(M::TABLE.entry(&mut self.current.block, index), state, value) else {
+                let Some((meta, slot)) = settable(table::<E>().entry(&mut self.current.block, index), state, value) else {
                     self.take_back(&old[..done]);
                     return Err(self.refusal(reference, index, value));
                 };
@@ -153,7 +234,7 @@ impl<M: Model> Instance<M> {
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, &value) in (0..count).zip(&mut next) {
                 let index = index(reference).wrapping_add(offset);
-                if settable(M::TABLE.entry(&mut self.current.block, index), state, value).is_none() {
+                if settable(table::<E>().entry(&mut self.current.block, index), state, value).is_none() {
                     return Err(self.refusal(reference, index, value));
                 }
             }
@@ -164,7 +245,7 @@ impl<M: Model> Instance<M> {
     #[cold]
     fn take_back<T: Value>(&mut self, old: &[(usize, T)]) {
         for &(index, before) in old.iter().rev() {
-            if let Some((_, slot)) = M::TABLE.entry(&mut self.current.block, index) {
+            if let Some((_, slot)) = table::<E>().entry(&mut self.current.block, index) {
                 before.write(slot);
             }
         }
@@ -173,16 +254,16 @@ impl<M: Model> Instance<M> {
     /// Why a value cannot be set.
     #[cold]
     fn refusal<T: Value>(&mut self, reference: u32, index: usize, value: T) -> Fault {
-        match M::TABLE.entry(&mut self.current.block, index) {
+        match table::<E>().entry(&mut self.current.block, index) {
             Some((meta, _)) => match value.judge(meta) {
-                None => message::type_of::<M>(index, meta, T::CARRIES),
+                None => message::type_of::<E::Model>(index, meta, T::CARRIES),
                 Some(_) if !open(meta, self.current.life.state()) => {
-                    message::fixed::<M>(index, meta, self.current.life.state())
+                    message::fixed::<E::Model>(index, meta, self.current.life.state())
                 }
-                Some(_) => message::range::<M>(index, meta, value),
+                Some(_) => message::range::<E::Model>(index, meta, value),
             },
-            None if reference == TIME => message::time(T::CARRIES),
-            None => message::unknown::<M>(reference),
+            None if reference == TIME => message::real(true, T::CARRIES),
+            None => message::unknown::<E>(reference),
         }
     }
 
@@ -192,10 +273,10 @@ impl<M: Model> Instance<M> {
     /// The list of references is not empty.
     pub fn refuse(&mut self, references: &[u32], carries: &str) -> Result<(), Fault> {
         let Some(&reference) = references.first() else { return Ok(()) };
-        match M::TABLE.entry(&mut self.current.block, index(reference)) {
-            Some((meta, _)) => Err(message::type_of::<M>(index(reference), meta, carries)),
-            None if reference == TIME => Err(message::time(carries)),
-            None => Err(message::unknown::<M>(reference)),
+        match table::<E>().entry(&mut self.current.block, index(reference)) {
+            Some((meta, _)) => Err(message::type_of::<E::Model>(index(reference), meta, carries)),
+            None if reference == TIME => Err(message::real(true, carries)),
+            None => Err(message::unknown::<E>(reference)),
         }
     }
 
@@ -215,9 +296,9 @@ impl<M: Model> Instance<M> {
     /// How many values a reference of FMI 3.0 stands for: one, or all elements of an array.
     fn elements(&mut self, reference: u32) -> Result<usize, Fault> {
         let index = index(reference);
-        match M::TABLE.element(index) {
-            Some(element) if element > 0 => Err(message::element::<M>(reference, index, element)),
-            _ => Ok(M::TABLE.entry(&mut self.current.block, index).and_then(|(meta, _)| meta.dimension).unwrap_or(1)),
+        match table::<E>().element(index) {
+            Some(element) if element > 0 => Err(message::element::<E::Model>(reference, index, element)),
+            _ => Ok(table::<E>().entry(&mut self.current.block, index).and_then(|(meta, _)| meta.dimension).unwrap_or(1)),
         }
     }
 }

@@ -17,7 +17,7 @@ use fmu_core::{Fault, Model};
 
 const MAGIC: &[u8; 8] = b"FMUstate";
 /// Version of this layout.
-const FORMAT: u16 = 1;
+const FORMAT: u16 = 2;
 const HEADER: usize = 8 + 2 + 2 + 16 + 4;
 const CHECKSUM: usize = 4;
 
@@ -77,10 +77,15 @@ pub fn read<M: Model>(bytes: &[u8]) -> Result<Snapshot<M>, Fault> {
     if !rest.is_empty() {
         return Err(refuse("content".into()));
     }
+    if !state.fits_its_interface() {
+        return Err(refuse("content".into()));
+    }
     state.check().and_then(|()| state.check_time()).map_err(|fault| refuse(fault.to_string()))?;
     // Tunable parameters that no step has seen are judged by the next one.
-    if matches!(state.life.state(), State::Step | State::Terminated) && !state.dirty {
-        state.block.model.validate().map_err(|fault| refuse(fault.to_string()))?;
+    if !matches!(state.life.state(), State::Instantiated | State::Initialization | State::Error) && !state.dirty {
+        let model = &state.block.model;
+        let judged = model.validate().and_then(|()| model.validate_for(state.life.interface()));
+        judged.map_err(|fault| refuse(fault.to_string()))?;
     }
     Ok(state)
 }

@@ -2,12 +2,38 @@
 
 use crate::lifecycle::{Standard, State};
 use crate::log::Log;
+use crate::sensitivity::Scratch;
 use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
-use fmu_core::{Fault, Model, Step};
+use fmu_core::log::Warnings;
+use fmu_core::{Exported, Fault, Interface, Model, SampleGrid, Step};
+
+/// Why a call failed.
+#[derive(Debug)]
+pub enum Refusal {
+    /// Status Error: the instance goes to the Error state.
+    Error(Fault),
+    /// Status Discard: nothing changes.
+    Discard(Fault),
+}
+
+impl From<Fault> for Refusal {
+    fn from(fault: Fault) -> Self {
+        Self::Error(fault)
+    }
+}
+
+/// What a communication step says besides its status (FMI 3.0).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stepped {
+    /// The importer is to enter Event Mode.
+    pub event: bool,
+    /// The step ended before the next communication point.
+    pub early: bool,
+}
 
 /// One instance. Its functions assume that the lifecycle admits them: that is judged at the gate.
-pub struct Instance<M: Model> {
+pub struct Instance<E: Exported> {
     /// The standard that it was instantiated with.
     pub standard: Standard,
     /// Name given by the importer.
@@ -15,19 +41,46 @@ pub struct Instance<M: Model> {
     /// The logger.
     pub log: Log,
     /// Everything that a step, a set or a reset changes.
-    pub current: Snapshot<M>,
+    pub current: Snapshot<E::Model>,
+    /// The importer takes steps that end early (FMI 3.0).
+    pub early_return: bool,
     /// A reference can stand for several values: only in FMI 3.0, and only if the model has an array.
     pub(crate) arrays: bool,
+    /// Indices of the states' rows.
+    pub(crate) states: Vec<usize>,
+    /// Room for the derivatives and the indicators.
+    pub(crate) values: Vec<f64>,
+    /// The outputs are of another instant; in Model Exchange only.
+    pub(crate) stale: bool,
+    /// Memory for derivatives of the equations.
+    pub(crate) scratch: Option<Box<Scratch<E::Model>>>,
+    /// Keys of the warnings of the last second, and the times of their messages.
+    warned: Vec<(&'static str, f64)>,
 }
 
-impl<M: Model> Instance<M> {
+impl<E: Exported> Instance<E> {
     /// A fresh instance of the model `current`.
-    pub fn new(standard: Standard, name: String, log: Log, current: Snapshot<M>) -> Self {
-        let table = M::TABLE;
+    pub fn new(standard: Standard, name: String, log: Log, current: Snapshot<E::Model>) -> Self {
+        let table = E::Model::TABLE;
         let arrays = standard == Standard::Fmi3
             && (0..table.len()).any(|i| table.locate(i).is_some_and(|(_, meta, _)| meta.dimension.is_some()));
-        log.event(|| format!("{name}: instance of {} {}", M::INFO.name, M::INFO.version));
-        Self { standard, name, log, current, arrays }
+        let info = E::Model::INFO;
+        log.event(|| format!("{name}: instance of {} {}", info.name, info.version));
+        // A state without a row has no reference; `fmu build` refuses such a model.
+        let states = E::CAN.rows().unwrap_or_default();
+        Self {
+            standard,
+            name,
+            log,
+            current,
+            early_return: false,
+            arrays,
+            states,
+            values: vec![0.0; E::CAN.states().len() + E::CAN.indicators().len()],
+            stale: false,
+            scratch: None,
+            warned: Vec::new(),
+        }
     }
 
     /// Stores start and stop time.
@@ -36,7 +89,7 @@ impl<M: Model> Instance<M> {
     /// As [`Experiment::new`].
     pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
         self.current.experiment = Some(Experiment::new(start, stop)?);
-        self.current.end = start;
+        (self.current.end, self.current.settled) = (start, start);
         Ok(())
     }
 
@@ -48,7 +101,8 @@ impl<M: Model> Instance<M> {
         self.current.experiment.map(|_| ()).ok_or_else(|| Fault::new("fmi2SetupExperiment must be called before it"))
     }
 
-    /// Ends initialization: parameters are judged together, state and outputs computed.
+    /// Ends initialization: parameters are judged together, state and outputs computed. Where the importer handles
+    /// events, the first one begins.
     ///
     /// # Errors
     /// As [`Snapshot::check`] and [`Model::validate`].
@@ -58,6 +112,9 @@ impl<M: Model> Instance<M> {
         self.current.block.initialize();
         self.current.dirty = false;
         self.log.event(|| message::start(&self.name, &mut self.current));
+        if self.current.life.handles_events() {
+            self.enter_event();
+        }
         Ok(())
     }
 
@@ -68,7 +125,8 @@ impl<M: Model> Instance<M> {
 
     /// Restores the state after instantiation; name and logger stay.
     pub fn reset(&mut self) {
-        self.current = Snapshot::default();
+        self.current = Snapshot::new(self.current.life.interface());
+        self.warned.clear();
         self.log.event(|| format!("{}: reset", self.name));
     }
 
@@ -78,7 +136,7 @@ impl<M: Model> Instance<M> {
     /// Times that do not continue the simulation, tunable parameters that do not fit together: then nothing has changed.
     /// Or what the model reports.
     #[inline]
-    pub fn do_step(&mut self, t: f64, h: f64) -> Result<(), Fault> {
+    pub fn do_step(&mut self, t: f64, h: f64) -> Result<Stepped, Fault> {
         let current = &mut self.current;
         let next = current.elapsed.plus(h);
         current.check_step(t, h, next)?;
@@ -86,17 +144,94 @@ impl<M: Model> Instance<M> {
             current.block.model = current.judged()?;
             current.dirty = false;
         }
-        current.block.step(&Step { start: current.elapsed, h })?;
-        current.elapsed = next;
-        current.end = t + h;
-        Ok(())
+        let handles_events = current.life.handles_events();
+        if E::CAN.samples.is_some() && (handles_events || self.early_return) {
+            return self.step_to_event(t, h);
+        }
+        if E::CAN.continuous.is_some() && !current.slopes.is_empty() {
+            self.step_on_slopes(h)?;
+        } else {
+            current.block.step(&Step { start: current.elapsed, h })?;
+        }
+        self.current.elapsed = next;
+        self.current.end = t + h;
+        self.warn();
+        Ok(Stepped::default())
     }
 
-    /// Before the first step, recomputes the outputs if variables were set; afterwards a get returns the values of the last step.
+    /// A step of a sampled model for an importer that handles its events, or takes steps that end early. Every sample
+    /// reads what the importer set at its instant, or else what it set last.
+    fn step_to_event(&mut self, t: f64, h: f64) -> Result<Stepped, Fault> {
+        let Some(samples) = &E::CAN.samples else { return Ok(Stepped::default()) };
+        let event_mode = self.current.life.handles_events();
+        let (start, end) = (self.current.elapsed, self.current.elapsed.plus(h));
+        let model = &mut self.current.block.model;
+        (samples.bounded)(model, end)?;
+        let grid = SampleGrid { period: (samples.period)(model) };
+        let mut stepped = Stepped::default();
+        loop {
+            let k = (samples.samples)(model);
+            if !grid.reached(k, end) {
+                break;
+            }
+            let inside = grid.passed(k, end);
+            if inside && (grid.reached(k, start) || !self.early_return) {
+                (samples.show)(model);
+                (samples.sample)(model)?;
+                continue;
+            }
+            if !event_mode {
+                (samples.show)(model);
+            }
+            (stepped.event, stepped.early) = (event_mode, inside);
+            break;
+        }
+        let current = &mut self.current;
+        if stepped.early {
+            let k = (samples.samples)(&current.block.model);
+            current.elapsed = fmu_core::Elapsed::periods(k, grid.period);
+            current.end = grid.instant(k, current.experiment.map_or(0.0, |e| e.start));
+        } else {
+            (current.elapsed, current.end) = (end, t + h);
+        }
+        current.block.model.output(current.elapsed, &mut current.block.out);
+        self.warn();
+        Ok(stepped)
+    }
+
+    /// Lets the model warn, if anyone listens.
+    #[inline]
+    pub(crate) fn warn(&mut self) {
+        let Some(warn) = E::CAN.warn else { return };
+        if !self.log.hears_warnings() {
+            return;
+        }
+        let Self { current, log, warned, name, .. } = self;
+        let now = current.elapsed.seconds();
+        warned.retain(|&(_, at)| (now - 1.0..=now).contains(&at));
+        let mut sink = |key: &'static str, message: &dyn Fn() -> String| {
+            if !warned.iter().any(|&(other, _)| other == key) {
+                warned.push((key, now));
+                log.warning(&format!("{name}: at {} s: {}", current.end, message()));
+            }
+        };
+        warn(&current.block.model, &mut Warnings::to(&mut sink));
+    }
+
+    /// Makes the outputs fit what was set: before the first step or event by a new initialization; later a get returns the
+    /// values of the last step, and in Model Exchange those of the present states, inputs and time.
+    #[inline]
     pub(crate) fn refresh(&mut self) {
         if self.current.dirty && matches!(self.current.life.state(), State::Instantiated | State::Initialization) {
             self.current.block.initialize();
             self.current.dirty = false;
+        }
+        if self.stale
+            && let Some(continuous) = &E::CAN.continuous
+        {
+            let block = &mut self.current.block;
+            (continuous.observe)(&block.model, self.current.elapsed, &mut block.out);
+            self.stale = false;
         }
     }
 
@@ -117,12 +252,18 @@ impl<M: Model> Instance<M> {
     /// Restores a saved state of this or another instance of the model.
     ///
     /// # Errors
-    /// The handle is unknown.
+    /// The handle is unknown, or the state is of an instance for another interface.
     pub fn restore(&mut self, handle: usize) -> Result<(), Fault> {
         registry::with(handle, |state| {
+            let (theirs, ours) = (state.life.interface(), self.current.life.interface());
+            if theirs != ours {
+                return Err(message::interface(theirs, ours));
+            }
             self.current.clone_from(state);
             Ok(())
-        })
+        })?;
+        self.stale = self.exchanges();
+        Ok(())
     }
 
     /// Makes a state from bytes and returns its handle.
@@ -130,6 +271,12 @@ impl<M: Model> Instance<M> {
     /// # Errors
     /// As [`blob::read`].
     pub fn deserialize(&self, bytes: &[u8]) -> Result<usize, Fault> {
-        blob::read::<M>(bytes).map(registry::keep)
+        blob::read::<E::Model>(bytes).map(registry::keep)
+    }
+
+    /// Whether the importer integrates.
+    #[inline]
+    pub(crate) fn exchanges(&self) -> bool {
+        E::CAN.model_exchange() && self.current.life.interface() == Interface::ModelExchange
     }
 }

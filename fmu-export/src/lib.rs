@@ -1,8 +1,8 @@
-//! The C interfaces of FMI 2.0 and FMI 3.0 co-simulation for any [`fmu_core::Model`], from one line: [`export!`].
+//! The C interfaces of FMI 2.0 and FMI 3.0, Co-Simulation and Model Exchange, for any [`fmu_core::Model`], from one line: [`export!`].
 //!
 //! Layers, from the bottom: [`lifecycle`] (which call is allowed in which state), [`value`] (C types and base types), [`snapshot`]
-//! (everything that changes), [`blob`] and [`registry`] (states as bytes and as handles), [`log`], [`instance`] (the calls without
-//! C), and [`abi`] (pointers). The crate knows neither motors nor XML; only [`abi`] contains `unsafe`.
+//! (everything that changes), [`blob`] and [`registry`] (states as bytes and as handles), [`log`], [`instance`], [`exchange`]
+//! and [`sensitivity`] (the calls without C), and [`abi`] (pointers). The crate knows neither motors nor XML; only [`abi`] contains `unsafe`.
 
 #![deny(unsafe_code)]
 
@@ -10,11 +10,16 @@
 pub mod abi;
 mod access;
 pub mod blob;
+pub mod exchange;
 pub mod instance;
 pub mod lifecycle;
 pub mod log;
 mod message;
 pub mod registry;
+pub mod sensitivity;
 pub mod snapshot;
 mod step;
 pub mod value;
+
+#[doc(hidden)]
+pub use fmu_core::{Capabilities, Exported};

@@ -1,9 +1,11 @@
-//! The one lifecycle table: which call is allowed in which state, for both standards, and where it leads.
+//! The one lifecycle table: which call is allowed in which state, for both standards and all interfaces, and where it
+//! leads.
 //!
-//! FMI 2.0.5, 4.2.4 (state machine of co-simulation) and FMI 3.0.2, 4.2.1. The states that are not here (configuration,
-//! event and intermediate-update mode, step in progress) do not exist in an FMU without structural parameters, clocks
+//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2.1 and 4.2.1. The states that are not here (configuration and
+//! intermediate-update mode, step in progress) do not exist in an FMU without structural parameters, intermediate update
 //! and asynchronous steps: the calls that would lead to them are [`Call::Unsupported`].
 
+use fmu_core::Interface;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -29,12 +31,24 @@ pub enum State {
     Step = 4,
     /// After a termination.
     Terminated = 8,
-    /// After an error; values can be read, Reset and SetFMUState lead out.
+    /// After an error; Reset and SetFMUState lead out.
     Error = 16,
+    /// Event Mode of Model Exchange, and of co-simulation in FMI 3.0.
+    Event = 32,
+    /// Continuous-Time Mode of Model Exchange.
+    Continuous = 64,
 }
 
 impl State {
-    const ALL: [Self; 5] = [Self::Instantiated, Self::Initialization, Self::Step, Self::Terminated, Self::Error];
+    const ALL: [Self; 7] = [
+        Self::Instantiated,
+        Self::Initialization,
+        Self::Step,
+        Self::Event,
+        Self::Continuous,
+        Self::Terminated,
+        Self::Error,
+    ];
 }
 
 impl fmt::Display for State {
@@ -45,6 +59,8 @@ impl fmt::Display for State {
             Self::Step => "Step Mode",
             Self::Terminated => "Terminated",
             Self::Error => "Error",
+            Self::Event => "Event Mode",
+            Self::Continuous => "Continuous-Time Mode",
         })
     }
 }
@@ -61,6 +77,11 @@ impl States {
             i += 1;
         }
         Self(bits)
+    }
+
+    /// Whether there is none.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
     }
 
     /// Whether `state` is one of them.
@@ -105,6 +126,32 @@ pub enum Call {
     Set,
     /// `DoStep`.
     DoStep,
+    /// `EnterEventMode`.
+    EnterEvent,
+    /// `fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`.
+    UpdateDiscrete,
+    /// `fmi3EvaluateDiscreteStates`, which has nothing to evaluate.
+    EvaluateDiscrete,
+    /// `EnterContinuousTimeMode`.
+    EnterContinuous,
+    /// `fmi3EnterStepMode`.
+    EnterStep,
+    /// `SetTime`.
+    SetTime,
+    /// `SetContinuousStates` and `CompletedIntegratorStep`.
+    Integrate,
+    /// `GetContinuousStates`, `fmi2GetDerivatives`, `fmi3GetContinuousStateDerivatives`, `GetEventIndicators`.
+    GetContinuous,
+    /// `GetNominalsOfContinuousStates`.
+    GetNominals,
+    /// `fmi3GetNumberOfContinuousStates`, `fmi3GetNumberOfEventIndicators`.
+    Count,
+    /// `GetDirectionalDerivative`, `fmi3GetAdjointDerivative`.
+    Sensitivity,
+    /// `fmi2GetRealOutputDerivatives`, `fmi3GetOutputDerivatives`.
+    OutputDerivatives,
+    /// `fmi2SetRealInputDerivatives`.
+    InputDerivatives,
     /// `GetFMUState`.
     SaveState,
     /// `SetFMUState`: the restored snapshot brings the next state.
@@ -117,75 +164,208 @@ pub enum Call {
     Unsupported,
 }
 
-/// A row of the table.
+/// The state that a successful call leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// As before.
+    Stay,
+    /// This one.
+    To(State),
+    /// That after initialization: Step Mode, or Event Mode where the importer handles events.
+    Start,
+}
+
+/// A row of the table: the states that allow a call, for FMI 2.0 and FMI 3.0.
 #[derive(Clone, Copy, Debug)]
 struct Row {
-    fmi2: States,
-    fmi3: States,
-    next: Option<State>,
+    /// In co-simulation.
+    step: [States; 2],
+    /// In co-simulation with Event Mode, in addition.
+    event: States,
+    /// In Model Exchange.
+    exchange: [States; 2],
+    next: Next,
 }
 
-const fn both(states: &[State], next: Option<State>) -> Row {
-    Row { fmi2: States::of(states), fmi3: States::of(states), next }
+const NONE: [States; 2] = [States(0); 2];
+
+const fn both(states: &[State]) -> [States; 2] {
+    [States::of(states), States::of(states)]
 }
 
-const fn each(fmi2: &[State], fmi3: &[State]) -> Row {
-    Row { fmi2: States::of(fmi2), fmi3: States::of(fmi3), next: None }
+const fn each(fmi2: &[State], fmi3: &[State]) -> [States; 2] {
+    [States::of(fmi2), States::of(fmi3)]
+}
+
+/// A call of every interface.
+const fn any(states: [States; 2], next: Next) -> Row {
+    Row { step: states, event: states[1], exchange: states, next }
+}
+
+/// A call of co-simulation only; Event Mode does not allow it.
+const fn stepping(states: [States; 2], next: Next) -> Row {
+    Row { step: states, event: states[1], exchange: NONE, next }
+}
+
+/// A call of Model Exchange only.
+const fn exchange(states: [States; 2], next: Next) -> Row {
+    Row { step: NONE, event: States(0), exchange: states, next }
 }
 
 impl Call {
     const fn row(self) -> Row {
-        use State::{Error, Initialization, Instantiated, Step, Terminated};
+        use Next::{Start, Stay, To};
+        use State::{Continuous, Error, Event, Initialization, Instantiated, Step, Terminated};
         match self {
-            Self::SetDebugLogging | Self::RestoreState | Self::UseState | Self::Unsupported => both(&State::ALL, None),
-            Self::Instantiate => both(&[], None),
-            Self::SetupExperiment => each(&[Instantiated], &[]),
-            Self::EnterInitialization => both(&[Instantiated], Some(Initialization)),
-            Self::ExitInitialization => both(&[Initialization], Some(Step)),
-            Self::Terminate => both(&[Step], Some(Terminated)),
-            Self::Reset => both(&State::ALL, Some(Instantiated)),
+            Self::SetDebugLogging | Self::RestoreState | Self::UseState | Self::Unsupported => {
+                any(both(&State::ALL), Stay)
+            }
+            Self::Instantiate => any(NONE, Stay),
+            Self::SetupExperiment => any(each(&[Instantiated], &[]), Stay),
+            Self::EnterInitialization => any(both(&[Instantiated]), To(Initialization)),
+            Self::ExitInitialization => any(both(&[Initialization]), Start),
+            Self::Terminate => any(both(&[Step, Event, Continuous]), To(Terminated)),
+            Self::Reset => any(both(&State::ALL), To(Instantiated)),
             // FMI 3.0.2, 2.3.3 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
             // In Error: for debugging (2.0.5, table in 4.2.4).
-            Self::Get => each(&[Initialization, Step, Terminated, Error], &State::ALL),
-            Self::Set => both(&[Instantiated, Initialization, Step], None),
-            Self::DoStep => both(&[Step], None),
+            Self::Get => any(
+                each(&[Initialization, Step, Event, Continuous, Terminated, Error], &State::ALL),
+                Stay,
+            ),
+            Self::Set => any(both(&[Instantiated, Initialization, Step, Event, Continuous]), Stay),
+            Self::DoStep => stepping(both(&[Step]), Stay),
             // A state that an error left behind is of no use.
-            Self::SaveState => both(&[Instantiated, Initialization, Step, Terminated], None),
-            Self::Status => each(&[Step, Terminated], &[]),
+            Self::SaveState => {
+                any(both(&[Instantiated, Initialization, Step, Event, Continuous, Terminated]), Stay)
+            }
+            Self::Status => stepping(each(&[Step, Terminated], &[]), Stay),
+            // An FMU of FMI 2.0 without states may never leave Event Mode (2.0.5, note 8 in 3.2.3).
+            Self::EnterEvent => Row {
+                event: States::of(&[Step]),
+                ..exchange(each(&[Event, Continuous], &[Continuous]), To(Event))
+            },
+            Self::UpdateDiscrete => Row { event: States::of(&[Event]), ..exchange(both(&[Event]), Stay) },
+            Self::EvaluateDiscrete => Row { event: States::of(&[Event]), ..exchange(each(&[], &[Event]), Stay) },
+            Self::EnterContinuous => exchange(both(&[Event]), To(Continuous)),
+            Self::EnterStep => Row { event: States::of(&[Event]), ..exchange(NONE, To(Step)) },
+            Self::SetTime => exchange(each(&[Event, Continuous], &[Continuous]), Stay),
+            Self::Integrate => exchange(both(&[Continuous]), Stay),
+            Self::GetContinuous => exchange(
+                each(
+                    &[Initialization, Event, Continuous, Terminated, Error],
+                    &[Initialization, Event, Continuous, Terminated],
+                ),
+                Stay,
+            ),
+            Self::GetNominals => exchange(
+                each(
+                    &[Instantiated, Initialization, Event, Continuous, Terminated, Error],
+                    &[Initialization, Event, Continuous, Terminated],
+                ),
+                Stay,
+            ),
+            Self::Count => exchange(
+                each(&[], &[Instantiated, Initialization, Event, Continuous, Terminated]),
+                Stay,
+            ),
+            Self::Sensitivity => any(
+                each(
+                    &[Initialization, Step, Event, Continuous, Terminated, Error],
+                    &[Initialization, Step, Event, Continuous, Terminated],
+                ),
+                Stay,
+            ),
+            Self::OutputDerivatives => stepping(each(&[Step, Terminated, Error], &[Step, Terminated]), Stay),
+            Self::InputDerivatives => stepping(each(&[Instantiated, Initialization, Step], &[]), Stay),
         }
     }
 
-    /// The state that it leads to, `None` if it stays.
-    pub const fn next(self) -> Option<State> {
+    /// The state that it leads to.
+    pub const fn next(self) -> Next {
         self.row().next
     }
 
     /// The states that allow this call.
-    pub const fn states(self, standard: Standard) -> States {
-        match standard {
-            Standard::Fmi2 => self.row().fmi2,
-            Standard::Fmi3 => self.row().fmi3,
+    pub const fn states(self, standard: Standard, interface: Interface) -> States {
+        let row = self.row();
+        match interface {
+            Interface::CoSimulation => row.step[standard as usize],
+            Interface::EventMode => row.event,
+            Interface::ModelExchange => row.exchange[standard as usize],
         }
     }
 }
 
-/// The state of one instance. It changes in [`Life::after`] and nowhere else; a restored FMU state brings its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Life(State);
+/// The states that allow a call: for each interface.
+#[derive(Clone, Copy, Debug)]
+pub struct Allowed([States; 3]);
+
+impl Allowed {
+    /// Of `call`.
+    pub const fn of(call: Call, standard: Standard) -> Self {
+        Self([
+            call.states(standard, Interface::CoSimulation),
+            call.states(standard, Interface::EventMode),
+            call.states(standard, Interface::ModelExchange),
+        ])
+    }
+
+    /// Those of one interface.
+    #[inline]
+    pub const fn of_interface(&self, interface: Interface) -> States {
+        self.0[interface as usize]
+    }
+}
+
+/// The state of one instance and the interface that it was made for. It changes in [`Life::after`] and nowhere else; a
+/// restored FMU state brings its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Life {
+    state: State,
+    interface: Interface,
+}
+
+impl Default for Life {
+    fn default() -> Self {
+        Self::new(Interface::CoSimulation)
+    }
+}
 
 impl Life {
+    /// After instantiation.
+    pub const fn new(interface: Interface) -> Self {
+        Self { state: State::Instantiated, interface }
+    }
+
     /// The state.
+    #[inline]
     pub const fn state(self) -> State {
-        self.0
+        self.state
+    }
+
+    /// The interface.
+    #[inline]
+    pub const fn interface(self) -> Interface {
+        self.interface
+    }
+
+    /// Whether the importer handles events.
+    pub const fn handles_events(self) -> bool {
+        !matches!(self.interface, Interface::CoSimulation)
     }
 
     /// Records that a call succeeded, with the [next](Call::next) state, or failed.
     #[inline]
-    pub const fn after(&mut self, succeeded: bool, next: Option<State>) {
+    pub const fn after(&mut self, succeeded: bool, next: Next) {
         if !succeeded {
-            self.0 = State::Error;
-        } else if let Some(next) = next {
-            self.0 = next;
+            self.state = State::Error;
+            return;
+        }
+        match next {
+            Next::Stay => {}
+            Next::To(state) => self.state = state,
+            Next::Start if self.handles_events() => self.state = State::Event,
+            Next::Start => self.state = State::Step,
         }
     }
 }

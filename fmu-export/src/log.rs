@@ -2,7 +2,7 @@
 
 use crate::lifecycle::Standard;
 use fmu_core::Fault;
-use fmu_core::log::{ALL, CATEGORIES, DISCARD, ERROR, EVENTS};
+use fmu_core::log::{ALL, CATEGORIES, DISCARD, ERROR, EVENTS, WARNING};
 
 /// A status as both standards number it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,13 +10,17 @@ use fmu_core::log::{ALL, CATEGORIES, DISCARD, ERROR, EVENTS};
 pub enum Status {
     /// The call succeeded.
     Ok = 0,
-    /// Not used by this library.
+    /// Of a message only: no call returns it.
     Warning = 1,
     /// The call could not be fulfilled; nothing changed and the instance remains usable.
     Discard = 2,
     /// The call failed; see [`State::Error`](crate::lifecycle::State::Error).
     Error = 3,
 }
+
+/// Position of [`WARNING`] in [`CATEGORIES`].
+const WARNINGS: usize = 1;
+const _: () = assert!(matches!(CATEGORIES[WARNINGS].0.as_bytes(), b"logStatusWarning"));
 
 /// The importer's logger.
 pub trait Sink {
@@ -49,6 +53,18 @@ impl Log {
         if self.is_on(DISCARD) {
             self.sink.write(Status::Discard, DISCARD, message);
         }
+    }
+
+    /// Whether anyone hears warnings.
+    #[inline]
+    pub fn hears_warnings(&self) -> bool {
+        self.enabled[WARNINGS]
+    }
+
+    /// Logs a warning that comes from a call that succeeded.
+    #[cold]
+    pub fn warning(&self, message: &str) {
+        self.sink.write(Status::Warning, WARNING, message);
     }
 
     /// Logs an event; the message is built only if its category is enabled.

@@ -1,9 +1,9 @@
 //! Texts of messages. Variable names are looked up only here, when a call fails or logging is on.
 
-use crate::lifecycle::State;
+use crate::lifecycle;
 use crate::snapshot::Snapshot;
 use fmu_core::description::TIME;
-use fmu_core::{Causality, Fault, Kind, Meta, Model, Slot, Variability};
+use fmu_core::{Block, Causality, Exported, Fault, Interface, Kind, Meta, Model, Slot, State, Variability};
 use std::fmt::Display;
 
 /// Full name of variable `index`, an element of an array as `name[1]`.
@@ -43,8 +43,9 @@ fn kind(kind: &Kind) -> &'static str {
 
 /// No variable has this value reference.
 #[cold]
-pub(crate) fn unknown<M: Model>(reference: u32) -> Fault {
-    Fault::new(format!("value reference {reference} does not exist; 0 to {} do", M::TABLE.len()))
+pub(crate) fn unknown<E: Exported>(reference: u32) -> Fault {
+    let last = E::Model::TABLE.len() + E::CAN.states().len() + E::CAN.indicators().len();
+    Fault::new(format!("value reference {reference} does not exist; 0 to {last} do"))
 }
 
 /// The reference belongs to an element that has no reference of its own in FMI 3.0.
@@ -65,11 +66,14 @@ pub(crate) fn type_of<M: Model>(index: usize, meta: &Meta, carries: &str) -> Fau
 
 /// The variable cannot be set, or not now.
 #[cold]
-pub(crate) fn fixed<M: Model>(index: usize, meta: &Meta, state: State) -> Fault {
+pub(crate) fn fixed<M: Model>(index: usize, meta: &Meta, state: lifecycle::State) -> Fault {
     let name = name::<M>(index);
     Fault::new(match (meta.causality, meta.variability) {
         (Causality::Parameter, Variability::Fixed) => {
             format!("{name} is a fixed parameter: it can be set before and in Initialization Mode, and this is {state}")
+        }
+        (Causality::Parameter | Causality::Input, _) => {
+            format!("{name} changes at events only: it can be set in Event Mode, and this is {state}")
         }
         (Causality::CalculatedParameter, _) => format!("{name} is a calculated parameter and cannot be set"),
         (Causality::Output, _) => format!("{name} is an output and cannot be set"),
@@ -107,10 +111,37 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>) -> Stri
     format!("{instance}: initialized at {} s with {changes}", current.end)
 }
 
-/// Value reference 0.
+/// A real number that no setter changes, asked for with another type.
 #[cold]
-pub(crate) fn time(carries: &str) -> Fault {
-    Fault::new(format!(
-        "time (value reference {TIME}) is a real number that only a step changes; this call carries {carries}"
-    ))
+pub(crate) fn real(time: bool, carries: &str) -> Fault {
+    Fault::new(if time {
+        format!("time (value reference {TIME}) is a real number that only a step or SetTime changes; this call carries {carries}")
+    } else {
+        format!("a derivative or an event indicator is a real number; this call carries {carries}")
+    })
+}
+
+/// Name of the derivative of a state.
+pub(crate) fn derivative<M>(state: &State<M>) -> String {
+    format!("der({})", state.name)
+}
+
+/// Nominal value of a variable: that of its row, 1 without one.
+pub(crate) fn nominal<M: Model>(block: &mut Block<M>, index: usize) -> f64 {
+    M::TABLE.entry(block, index).and_then(|(meta, _)| meta.nominal).map_or(1.0, f64::abs)
+}
+
+/// An FMU state of an instance for another interface.
+#[cold]
+pub(crate) fn interface(theirs: Interface, ours: Interface) -> Fault {
+    Fault::new(format!("the FMU state is of an instance {}, and this is one {}", made_for(theirs), made_for(ours)))
+}
+
+/// What an instance was made for.
+pub(crate) fn made_for(interface: Interface) -> &'static str {
+    match interface {
+        Interface::CoSimulation => "for Co-Simulation without Event Mode",
+        Interface::EventMode => "for Co-Simulation with Event Mode",
+        Interface::ModelExchange => "for Model Exchange",
+    }
 }

@@ -3,7 +3,7 @@
 use crate::lifecycle::{Life, State};
 use crate::message;
 use crate::value::Value;
-use fmu_core::{Block, Causality, Elapsed, Fault, Model, Slot};
+use fmu_core::{Block, Causality, Elapsed, Fault, Interface, Kind, Meta, Model, Slot, Variability};
 use serde::{Deserialize, Serialize};
 
 /// Start and stop time of the importer's experiment in s.
@@ -33,6 +33,13 @@ impl Experiment {
     }
 }
 
+/// Whether a derivative of this variable can be set: it is a continuous real input.
+pub(crate) fn ramps(meta: &Meta) -> bool {
+    meta.causality == Causality::Input
+        && meta.variability == Variability::Continuous
+        && matches!(meta.kind, Kind::Real(_))
+}
+
 /// Model, outputs, time and state of the lifecycle.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
@@ -43,8 +50,15 @@ pub struct Snapshot<M: Model> {
     pub experiment: Option<Experiment>,
     /// Time since the start, summed here.
     pub elapsed: Elapsed,
-    /// End of the last step as the importer computes it, `t + h`; before the first step the start time.
+    /// Time as the importer computes it: the end of the last step, `t + h`, or what it set in Model Exchange; before
+    /// the first step the start time.
     pub end: f64,
+    /// In Model Exchange, time of the last event or completed step: no earlier time can be set.
+    pub settled: f64,
+    /// Event Mode was entered, and the event has not been done.
+    pub pending: bool,
+    /// Derivatives of inputs, by index in the table: they hold for the next step (FMI 2.0).
+    pub slopes: Vec<(u32, f64)>,
     /// A set call awaits processing by the model: before the start for any variable, afterwards for a tunable parameter.
     pub dirty: bool,
     /// The model and its outputs.
@@ -53,11 +67,21 @@ pub struct Snapshot<M: Model> {
 
 impl<M: Model> Default for Snapshot<M> {
     fn default() -> Self {
+        Self::new(Interface::CoSimulation)
+    }
+}
+
+impl<M: Model> Snapshot<M> {
+    /// After instantiation for this interface.
+    pub fn new(interface: Interface) -> Self {
         Self {
-            life: Life::default(),
+            life: Life::new(interface),
             experiment: None,
             elapsed: Elapsed::ZERO,
             end: M::INFO.experiment.start,
+            settled: M::INFO.experiment.start,
+            pending: false,
+            slopes: Vec::new(),
             dirty: true,
             block: Block::default(),
         }
@@ -66,14 +90,15 @@ impl<M: Model> Default for Snapshot<M> {
 
 impl<M: Model> Clone for Snapshot<M> {
     fn clone(&self) -> Self {
-        Self { block: self.block.clone(), ..*self }
+        Self { block: self.block.clone(), slopes: self.slopes.clone(), ..*self }
     }
 
     /// Reuses what `self` holds: for a plain model, and one with a `clone_from` of its own, nothing is allocated.
     fn clone_from(&mut self, source: &Self) {
-        let Self { life, experiment, elapsed, end, dirty, block } = source;
+        let Self { life, experiment, elapsed, end, settled, pending, slopes, dirty, block } = source;
         (self.life, self.experiment, self.elapsed) = (*life, *experiment, *elapsed);
-        (self.end, self.dirty) = (*end, *dirty);
+        (self.end, self.settled, self.pending, self.dirty) = (*end, *settled, *pending, *dirty);
+        self.slopes.clone_from(slopes);
         self.block.model.clone_from(&block.model);
         self.block.out.clone_from(&block.out);
     }
@@ -99,7 +124,11 @@ impl<M: Model> Snapshot<M> {
                 return Err(Fault::value(&message::name::<M>(index), message::value(&slot), allowed));
             }
         }
-        Ok(())
+        let ramps = |&(index, slope): &(u32, f64)| {
+            let entry = M::TABLE.entry(&mut self.block, index as usize);
+            slope.is_finite() && entry.is_some_and(|(meta, _)| ramps(meta))
+        };
+        if self.slopes.iter().all(ramps) { Ok(()) } else { Err(Fault::new("derivatives of inputs")) }
     }
 
     /// The model with its calculated parameters, if its parameters fit together; this one stays as it is.
@@ -110,7 +139,18 @@ impl<M: Model> Snapshot<M> {
         let mut model = self.block.model.clone();
         model.derive();
         model.validate()?;
+        model.validate_for(self.life.interface())?;
         Ok(model)
+    }
+
+    /// Whether an instance that was made for this interface can be in this state.
+    pub(crate) fn fits_its_interface(&self) -> bool {
+        match (self.life.state(), self.life.interface()) {
+            (State::Step, interface) => interface != Interface::ModelExchange,
+            (State::Event, interface) => interface != Interface::CoSimulation,
+            (State::Continuous, interface) => interface == Interface::ModelExchange,
+            _ => true,
+        }
     }
 
     /// Checks that a simulation can reach this time: the sum of the steps matches the importer's own time, which rounding can at
@@ -125,9 +165,12 @@ impl<M: Model> Snapshot<M> {
         // A sum that is not in its normal form hides numbers that cancel.
         let fits = self.elapsed == self.elapsed.plus(0.0)
             && match (self.life.state(), self.experiment) {
-                (State::Instantiated, _) | (State::Initialization, Some(_)) => since == 0.0 && elapsed == 0.0,
-                (State::Step | State::Terminated, Some(_)) => {
+                (State::Instantiated, _) | (State::Initialization, Some(_)) => {
+                    since == 0.0 && elapsed == 0.0
+                }
+                (State::Step | State::Event | State::Continuous | State::Terminated, Some(_)) => {
                     self.end.is_finite()
+                        && (start..=self.end + rounding).contains(&self.settled)
                         && elapsed >= 0.0
                         && elapsed <= 2.0 * since + rounding
                         && since <= 2.0 * elapsed + rounding

@@ -5,7 +5,7 @@ use std::ffi::c_int;
 use std::fmt::{self, Display};
 
 /// A C type of one of the standards, in the layout of C.
-pub trait Value: Copy + Display {
+pub trait Value: Copy + Display + PartialEq {
     /// Name of the type in messages.
     const CARRIES: &'static str;
 
@@ -23,8 +23,13 @@ pub trait Value: Copy + Display {
         None
     }
 
-    /// The independent variable as a value, for the one type that can carry it.
-    fn time(_seconds: f64) -> Option<Self> {
+    /// A real number as a value, for the one type that carries it.
+    fn from_real(_x: f64) -> Option<Self> {
+        None
+    }
+
+    /// The real number that it is, for the one type that carries it.
+    fn real(self) -> Option<f64> {
         None
     }
 }
@@ -43,6 +48,18 @@ pub struct Fmi2Boolean(pub c_int);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct Fmi3Boolean(pub u8);
+
+impl From<bool> for Fmi2Boolean {
+    fn from(value: bool) -> Self {
+        Self(c_int::from(value))
+    }
+}
+
+impl From<bool> for Fmi3Boolean {
+    fn from(value: bool) -> Self {
+        Self(u8::from(value))
+    }
+}
 
 impl Display for Fmi2Integer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -87,8 +104,12 @@ impl Value for f64 {
         table.real(whole, index)
     }
 
-    fn time(seconds: f64) -> Option<Self> {
-        Some(seconds)
+    fn from_real(x: f64) -> Option<Self> {
+        Some(x)
+    }
+
+    fn real(self) -> Option<f64> {
+        Some(self)
     }
 }
 

@@ -11,6 +11,7 @@ use crate::number;
 use crate::version::FmiVersion;
 use crate::xml::{Element, print};
 use fmu_core::Description;
+use fmu_core::description::ModelExchange;
 
 /// The tool and the time of generation: the only content that does not follow from the description.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,13 +22,14 @@ pub struct Generation {
     pub date_and_time: String,
 }
 
-/// modelDescription.xml of a co-simulation FMU; the same arguments give the same text.
+/// modelDescription.xml of an FMU; the same arguments give the same text.
 pub fn write(description: &Description, version: FmiVersion, generation: &Generation) -> String {
     let units = types::units(description);
     let definitions = types::definitions(description, version);
     let root = header(description, version, generation).children(
         // The order of the schemas.
         [
+            description.model_exchange.as_ref().map(|exchange| model_exchange(description, exchange, version)),
             Some(co_simulation(description, version)),
             Some(units),
             definitions,
@@ -60,23 +62,69 @@ fn header(description: &Description, version: FmiVersion, generation: &Generatio
         .with_text("generationTool", &generation.tool)
         .with_text("generationDateAndTime", &generation.date_and_time)
         .with("variableNamingConvention", "structured")
+        .with_some("numberOfEventIndicators", number_of_indicators(description, version))
 }
 
-/// FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2 and 4.4. What is not written is `false` in both.
-fn co_simulation(description: &Description, version: FmiVersion) -> Element {
-    let element = Element::new("CoSimulation")
+/// FMI 2.0 counts the event indicators, FMI 3.0 lists them.
+fn number_of_indicators(description: &Description, version: FmiVersion) -> Option<String> {
+    let exchange = description.model_exchange.as_ref().filter(|_| version == FmiVersion::V2)?;
+    Some(exchange.indicators.len().to_string())
+}
+
+/// FMI 2.0.5, 3.3.1; FMI 3.0.2, 2.4.2 and 3.4.
+fn model_exchange(description: &Description, exchange: &ModelExchange, version: FmiVersion) -> Element {
+    let element = Element::new("ModelExchange")
         .with("modelIdentifier", &*description.name)
         .with("needsExecutionTool", "false")
-        .with("canHandleVariableCommunicationStepSize", "true")
+        .with_some("completedIntegratorStepNotNeeded", (version == FmiVersion::V2).then_some("true"))
         .with("canBeInstantiatedOnlyOncePerProcess", "false");
+    derivatives(states_and_memory(element, version), exchange, version)
+}
+
+/// The state can be read, set and serialized; memory.
+fn states_and_memory(element: Element, version: FmiVersion) -> Element {
     match version {
         FmiVersion::V2 => element
-            .with("canInterpolateInputs", "false")
             // A Rust library has its own allocator; using it without this flag violates the standard.
             .with("canNotUseMemoryManagementFunctions", "true")
             .with("canGetAndSetFMUstate", "true")
             .with("canSerializeFMUstate", "true"),
         FmiVersion::V3 => element.with("canGetAndSetFMUState", "true").with("canSerializeFMUState", "true"),
+    }
+}
+
+/// Directional and adjoint derivatives of a model with states.
+fn derivatives(element: Element, exchange: &ModelExchange, version: FmiVersion) -> Element {
+    if exchange.states.is_empty() {
+        return element;
+    }
+    match version {
+        FmiVersion::V2 => element.with("providesDirectionalDerivative", "true"),
+        FmiVersion::V3 => {
+            element.with("providesDirectionalDerivatives", "true").with("providesAdjointDerivatives", "true")
+        }
+    }
+}
+
+/// FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2 and 4.4. What is not written is `false` in both.
+fn co_simulation(description: &Description, version: FmiVersion) -> Element {
+    let exchange = description.model_exchange.as_ref();
+    let continuous = exchange.is_some_and(|exchange| !exchange.states.is_empty());
+    let event_mode = version == FmiVersion::V3 && exchange.is_some_and(|exchange| exchange.event_mode);
+    let interpolates = if continuous { "true" } else { "false" };
+    let element = Element::new("CoSimulation")
+        .with("modelIdentifier", &*description.name)
+        .with("needsExecutionTool", "false")
+        .with("canHandleVariableCommunicationStepSize", "true")
+        .with("canBeInstantiatedOnlyOncePerProcess", "false")
+        .with_some("canInterpolateInputs", (version == FmiVersion::V2).then_some(interpolates))
+        .with_some("maxOutputDerivativeOrder", continuous.then_some("1"))
+        .with_some("hasEventMode", event_mode.then_some("true"))
+        .with_some("mightReturnEarlyFromDoStep", event_mode.then_some("true"));
+    let element = states_and_memory(element, version);
+    match exchange {
+        Some(exchange) => derivatives(element, exchange, version),
+        None => element,
     }
 }
 

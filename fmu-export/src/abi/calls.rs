@@ -2,11 +2,11 @@
 
 use super::Abi;
 use super::gate::{Entry, enter};
-use super::pointer::{array, place, room, text};
+use super::pointer::{array, numbers, place, room, text};
 use super::types::{FmuState, Instance, References};
 use crate::value::Value;
 use crate::{blob, registry};
-use fmu_core::{Fault, Model};
+use fmu_core::{Exported, Fault};
 use std::ffi::{c_char, c_int};
 
 /// # Safety
@@ -14,7 +14,7 @@ use std::ffi::{c_char, c_int};
 /// has not freed, used by one thread at a time; a pointer to an array is NULL or points to as many elements as the call
 /// states.
 #[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
-impl<M: Model> Abi<M> {
+impl<E: Exported> Abi<E> {
     pub unsafe fn get<T: Value>(
         entry: Entry,
         instance: Instance,
@@ -25,9 +25,9 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 let out = room(values, room_for, "values")?;
-                Ok(instance.get(array(references, n, "value references")?, out)?)
+                instance.get(array(references, n, "value references")?, out)
             })
         }
     }
@@ -42,9 +42,9 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 let values = array(values, n_values, "values")?;
-                Ok(instance.set(array(references, n, "value references")?, values)?)
+                instance.set(array(references, n, "value references")?, values)
             })
         }
     }
@@ -60,7 +60,7 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 instance.refuse(array(references, n, "value references")?, carries)?;
                 if n_values == 0 { Ok(()) } else { Err(Fault::value("nValues", n_values, "0 for no reference").into()) }
             })
@@ -76,7 +76,7 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's array of C strings.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 let mut names = Vec::new();
                 for &category in array(categories, n, "categories")? {
                     let category = text(category).ok_or_else(|| Fault::new("a log category is NULL"))?;
@@ -89,13 +89,13 @@ impl<M: Model> Abi<M> {
 
     pub unsafe fn exit_initialization(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |instance| Ok(instance.exit_initialization()?)) }
+        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.exit_initialization()?)) }
     }
 
     pub unsafe fn terminate(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 instance.terminate();
                 Ok(())
             })
@@ -105,7 +105,7 @@ impl<M: Model> Abi<M> {
     pub unsafe fn reset(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 instance.reset();
                 Ok(())
             })
@@ -116,7 +116,7 @@ impl<M: Model> Abi<M> {
     pub unsafe fn save_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 let state = place(state, "FMUState")?.assume_init_mut();
                 *state = handle(instance.save(state.addr())?);
                 Ok(())
@@ -126,19 +126,19 @@ impl<M: Model> Abi<M> {
 
     pub unsafe fn restore_state(entry: Entry, instance: Instance, state: FmuState) -> c_int {
         // SAFETY: the importer's instance; the state is only a number.
-        unsafe { enter::<M>(entry, instance, |instance| Ok(instance.restore(state.addr())?)) }
+        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.restore(state.addr())?)) }
     }
 
     /// Ignores NULL and a variable that holds NULL.
     pub unsafe fn free_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
-            enter::<M>(entry, instance, |_| {
+            enter::<E>(entry, instance, |_| {
                 if state.is_null() {
                     return Ok(());
                 }
                 let state = place(state, "FMUState")?.assume_init_mut();
-                registry::free::<M>(state.addr())?;
+                registry::free::<E::Model>(state.addr())?;
                 *state = handle(0);
                 Ok(())
             })
@@ -148,9 +148,9 @@ impl<M: Model> Abi<M> {
     pub unsafe fn serialized_size(entry: Entry, instance: Instance, state: FmuState, size: *mut usize) -> c_int {
         // SAFETY: the importer's variable; the state is only a number.
         unsafe {
-            enter::<M>(entry, instance, |_| {
+            enter::<E>(entry, instance, |_| {
                 let size = place(size, "size")?;
-                size.write(registry::with::<M, _>(state.addr(), |state| blob::size(state))?);
+                size.write(registry::with::<E::Model, _>(state.addr(), |state| blob::size(state))?);
                 Ok(())
             })
         }
@@ -159,9 +159,9 @@ impl<M: Model> Abi<M> {
     pub unsafe fn serialize(entry: Entry, instance: Instance, state: FmuState, bytes: *mut u8, size: usize) -> c_int {
         // SAFETY: the importer's array of this size; the state is only a number.
         unsafe {
-            enter::<M>(entry, instance, |_| {
+            enter::<E>(entry, instance, |_| {
                 let out = room(bytes, size, "serializedState")?;
-                let bytes = registry::with::<M, _>(state.addr(), |state| blob::write(state))?;
+                let bytes = registry::with::<E::Model, _>(state.addr(), |state| blob::write(state))?;
                 if bytes.len() != size {
                     return Err(Fault::value("size", size, format_args!("{} for this state", bytes.len())).into());
                 }
@@ -183,7 +183,7 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's array of this size, and its variable.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 let state = place(state, "FMUState")?;
                 state.write(handle(instance.deserialize(array(bytes, size, "serializedState")?)?));
                 Ok(())
@@ -191,10 +191,134 @@ impl<M: Model> Abi<M> {
         }
     }
 
+    pub unsafe fn enter_event(entry: Entry, instance: Instance) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                instance.enter_event();
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn enter_continuous(entry: Entry, instance: Instance) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.leave_event()?)) }
+    }
+
+    pub unsafe fn set_time(entry: Entry, instance: Instance, time: f64) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.set_time(time)?)) }
+    }
+
+    pub unsafe fn set_states(entry: Entry, instance: Instance, x: *const f64, n: usize) -> c_int {
+        // SAFETY: the importer's array, of this length.
+        unsafe { enter::<E>(entry, instance, |instance| instance.set_states(array(x, n, "continuous states")?)) }
+    }
+
+    pub unsafe fn get_states(entry: Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {
+        // SAFETY: the importer's array, of this length.
+        unsafe {
+            enter::<E>(entry, instance, |instance| Ok(instance.get_states(numbers(x, n, "continuous states")?)?))
+        }
+    }
+
+    pub unsafe fn derivatives(entry: Entry, instance: Instance, dx: *mut f64, n: usize) -> c_int {
+        // SAFETY: the importer's array, of this length.
+        unsafe { enter::<E>(entry, instance, |instance| instance.derivatives(numbers(dx, n, "derivatives")?)) }
+    }
+
+    pub unsafe fn indicators(entry: Entry, instance: Instance, z: *mut f64, n: usize) -> c_int {
+        // SAFETY: the importer's array, of this length.
+        unsafe {
+            enter::<E>(entry, instance, |instance| Ok(instance.indicators(numbers(z, n, "event indicators")?)?))
+        }
+    }
+
+    pub unsafe fn nominals(entry: Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {
+        // SAFETY: the importer's array, of this length.
+        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.nominals(numbers(x, n, "nominals")?)?)) }
+    }
+
+    /// No step of the integrator is an event, and none ends the simulation: both flags are 0.
+    pub unsafe fn completed_step<B>(entry: Entry, instance: Instance, event: *mut B, end: *mut B) -> c_int
+    where
+        B: From<bool>,
+    {
+        // SAFETY: the importer's variables.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let end = place(end, "terminateSimulation")?;
+                place(event, "enterEventMode")?.write(false.into());
+                end.write(false.into());
+                instance.completed_step();
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn directional(
+        entry: Entry,
+        instance: Instance,
+        (unknowns, n_unknowns): (References, usize),
+        (knowns, n_knowns): (References, usize),
+        (seed, n_seed): (*const f64, usize),
+        (sensitivity, n_sensitivity): (*mut f64, usize),
+        adjoint: bool,
+    ) -> c_int {
+        // SAFETY: the importer's arrays, of these lengths.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let (unknowns, knowns) = (array(unknowns, n_unknowns, "unknowns")?, array(knowns, n_knowns, "knowns")?);
+                let (seed, out) = (array(seed, n_seed, "seed")?, numbers(sensitivity, n_sensitivity, "sensitivity")?);
+                if adjoint {
+                    instance.adjoint(unknowns, knowns, seed, out)
+                } else {
+                    instance.directional(unknowns, knowns, seed, out)
+                }
+            })
+        }
+    }
+
+    pub unsafe fn output_derivatives(
+        entry: Entry,
+        instance: Instance,
+        references: References,
+        n: usize,
+        orders: *const i32,
+        values: *mut f64,
+        n_values: usize,
+    ) -> c_int {
+        // SAFETY: the importer's arrays, of these lengths.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let (references, orders) = (array(references, n, "value references")?, array(orders, n, "orders")?);
+                instance.output_derivatives(references, orders, numbers(values, n_values, "values")?)
+            })
+        }
+    }
+
+    pub unsafe fn input_derivatives(
+        entry: Entry,
+        instance: Instance,
+        references: References,
+        n: usize,
+        orders: *const i32,
+        values: *const f64,
+    ) -> c_int {
+        // SAFETY: the importer's arrays, of this length.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let (references, orders) = (array(references, n, "value references")?, array(orders, n, "orders")?);
+                Ok(instance.input_derivatives(references, orders, array(values, n, "values")?)?)
+            })
+        }
+    }
+
     /// A function of a capability that this FMU does not have.
     pub unsafe fn unsupported(entry: Entry, instance: Instance, why: &str) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |_| Err(Fault::new(format!("not supported: {why}")).into())) }
+        unsafe { enter::<E>(entry, instance, |_| Err(Fault::new(format!("not supported: {why}")).into())) }
     }
 }
 

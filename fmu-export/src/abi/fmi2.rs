@@ -1,14 +1,17 @@
 //! FMI 2.0.5: its own calls, and the table of its functions.
 
-use super::gate::{Entry, Refusal, enter, open};
+use super::gate::{Entry, enter, open};
 use super::logger::Fmi2Sink;
 use super::pointer::{place, text};
-use super::types::{Fmi2Boolean, Fmi2Callbacks, Instance, Text};
+use super::types::{Fmi2Boolean, Fmi2Callbacks, Fmi2EventInfo, Instance, Text};
 use super::{Abi, credentials};
+use crate::instance::Refusal;
 use crate::log::Log;
-use fmu_core::{Fault, Model};
+use fmu_core::{Exported, Fault, Interface};
 use std::ffi::c_int;
 
+/// `fmi2ModelExchange` of `fmi2Type`.
+const MODEL_EXCHANGE: c_int = 0;
 /// `fmi2CoSimulation` of `fmi2Type`.
 const CO_SIMULATION: c_int = 1;
 /// `fmi2LastSuccessfulTime` of `fmi2StatusKind`.
@@ -19,7 +22,7 @@ const TERMINATED: c_int = 3;
 /// # Safety
 /// As in `calls.rs`.
 #[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
-impl<M: Model> Abi<M> {
+impl<E: Exported> Abi<E> {
     /// FMI 2.0.5, 2.1.5. The callbacks' struct is copied: its pointer is valid only during this call.
     pub unsafe fn fmi2_instantiate(
         entry: Entry,
@@ -36,11 +39,16 @@ impl<M: Model> Abi<M> {
             environment: callbacks.map_or(std::ptr::null_mut(), |c| c.environment),
             instance: name.unwrap_or_default().to_owned(),
         };
-        let judged = credentials::<M>(name, token).and_then(|name| {
-            let fits = fmu_type == CO_SIMULATION;
-            if fits { Ok(name) } else { Err(Fault::value("fmuType", fmu_type, "fmi2CoSimulation (1)")) }
+        let judged = credentials::<E>(name, token).and_then(|name| {
+            let exchange = E::CAN.model_exchange();
+            let fits = fmu_type == CO_SIMULATION || (exchange && fmu_type == MODEL_EXCHANGE);
+            let or = if exchange { " or fmi2ModelExchange (0)" } else { ": the FMU has no Model Exchange" };
+            let allowed = || Fault::value("fmuType", fmu_type, format_args!("fmi2CoSimulation (1){or}"));
+            if fits { Ok(name) } else { Err(allowed()) }
         });
-        open::<M>(entry, Log::new(Box::new(sink), logging_on), judged)
+        let interface =
+            if fmu_type == MODEL_EXCHANGE { Interface::ModelExchange } else { Interface::CoSimulation };
+        open::<E>(entry, Log::new(Box::new(sink), logging_on), judged, interface, false)
     }
 
     pub unsafe fn fmi2_setup_experiment(
@@ -52,25 +60,49 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<M>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
+            enter::<E>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
         }
     }
 
     pub unsafe fn fmi2_enter_initialization(entry: Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |instance| Ok(instance.enter_initialization()?)) }
+        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.enter_initialization()?)) }
     }
 
     pub unsafe fn fmi2_do_step(entry: Entry, instance: Instance, t: f64, h: f64) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |instance| Ok(instance.do_step(t, h)?)) }
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                instance.do_step(t, h)?;
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn fmi2_new_discrete_states(entry: Entry, instance: Instance, info: *mut Fmi2EventInfo) -> c_int {
+        // SAFETY: the importer's struct.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let info = place(info, "fmi2EventInfo")?;
+                let update = instance.update_discrete()?;
+                info.write(Fmi2EventInfo {
+                    new_discrete_states_needed: update.outcome.again.into(),
+                    terminate_simulation: update.outcome.terminate.into(),
+                    nominals_of_continuous_states_changed: false.into(),
+                    values_of_continuous_states_changed: update.outcome.states_changed.into(),
+                    next_event_time_defined: update.next.is_some().into(),
+                    next_event_time: update.next.unwrap_or(0.0),
+                });
+                Ok(())
+            })
+        }
     }
 
     /// `fmi2LastSuccessfulTime`; the other kinds belong to asynchronous steps (FMI 2.0.5, 4.2.3).
     pub unsafe fn fmi2_real_status(entry: Entry, instance: Instance, kind: c_int, value: *mut f64) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 let value = place(value, "value")?;
                 if kind != LAST_SUCCESSFUL_TIME {
                     return no_status(kind);
@@ -85,7 +117,7 @@ impl<M: Model> Abi<M> {
     pub unsafe fn fmi2_boolean_status(entry: Entry, instance: Instance, kind: c_int, value: *mut Fmi2Boolean) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
-            enter::<M>(entry, instance, |_| {
+            enter::<E>(entry, instance, |_| {
                 let value = place(value, "value")?;
                 if kind != TERMINATED {
                     return no_status(kind);
@@ -98,7 +130,7 @@ impl<M: Model> Abi<M> {
 
     pub unsafe fn fmi2_no_status(entry: Entry, instance: Instance, kind: c_int) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<M>(entry, instance, |_| no_status(kind)) }
+        unsafe { enter::<E>(entry, instance, |_| no_status(kind)) }
     }
 }
 
@@ -114,7 +146,7 @@ fn no_status(kind: c_int) -> Result<(), Refusal> {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! export_fmi2 {
-    ($model:ty) => {
+    ($exported:ty) => {
         #[unsafe(no_mangle)]
         pub(crate) extern "C" fn fmi2GetTypesPlatform() -> Text {
             c"default".as_ptr()
@@ -139,17 +171,17 @@ macro_rules! export_fmi2 {
             const ENTRY: Entry = Entry::new(Standard::Fmi2, Call::Instantiate, "fmi2Instantiate");
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$model>::fmi2_instantiate(ENTRY, name, fmu_type, guid, callbacks, logging_on.0 != 0)
+                $crate::abi::Abi::<$exported>::fmi2_instantiate(ENTRY, name, fmu_type, guid, callbacks, logging_on.0 != 0)
             }
         }
 
         #[unsafe(no_mangle)]
         pub(crate) unsafe extern "C" fn fmi2FreeInstance(instance: Instance) {
             // SAFETY: what the standard demands of the importer.
-            unsafe { $crate::abi::Abi::<$model>::free_instance(instance) }
+            unsafe { $crate::abi::Abi::<$exported>::free_instance(instance) }
         }
 
-        $crate::functions! { Fmi2 $model;
+        $crate::functions! { Fmi2 $exported;
             fmi2SetDebugLogging(on: Fmi2Boolean, n: usize, categories: *const Text)
                 => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
             fmi2SetupExperiment(_tolerance_defined: Fmi2Boolean, _tolerance: f64, start: f64, stop_defined: Fmi2Boolean, stop: f64)
@@ -183,26 +215,28 @@ macro_rules! export_fmi2 {
             fmi2GetIntegerStatus(kind: c_int, _value: *mut Fmi2Integer) => Status: fmi2_no_status(kind);
             fmi2GetBooleanStatus(kind: c_int, value: *mut Fmi2Boolean) => Status: fmi2_boolean_status(kind, value);
             fmi2GetStringStatus(kind: c_int, _value: *mut Text) => Status: fmi2_no_status(kind);
-            fmi2SetRealInputDerivatives(_vr: References, _n: usize, _order: *const c_int, _values: *const f64)
-                => Unsupported: unsupported("canInterpolateInputs = false");
-            fmi2GetRealOutputDerivatives(_vr: References, _n: usize, _order: *const c_int, _values: *mut f64)
-                => Unsupported: unsupported("maxOutputDerivativeOrder = 0");
+            fmi2SetRealInputDerivatives(vr: References, n: usize, orders: *const c_int, values: *const f64)
+                => InputDerivatives: input_derivatives(vr, n, orders, values);
+            fmi2GetRealOutputDerivatives(vr: References, n: usize, orders: *const c_int, values: *mut f64)
+                => OutputDerivatives: output_derivatives(vr, n, orders, values, n);
             fmi2GetDirectionalDerivative(
-                _unknowns: References, _n_unknowns: usize, _knowns: References, _n_knowns: usize,
-                _seed: *const f64, _sensitivity: *mut f64
-            ) => Unsupported: unsupported("providesDirectionalDerivative = false");
+                unknowns: References, n_unknowns: usize, knowns: References, n_knowns: usize,
+                seed: *const f64, sensitivity: *mut f64
+            ) => Sensitivity: directional(
+                (unknowns, n_unknowns), (knowns, n_knowns), (seed, n_knowns), (sensitivity, n_unknowns), false
+            );
 
-            fmi2EnterEventMode() => Unsupported: unsupported("Model Exchange");
-            fmi2NewDiscreteStates(_info: *mut c_void) => Unsupported: unsupported("Model Exchange");
-            fmi2EnterContinuousTimeMode() => Unsupported: unsupported("Model Exchange");
-            fmi2CompletedIntegratorStep(_no_set_state_prior: Fmi2Boolean, _event: *mut Fmi2Boolean, _end: *mut Fmi2Boolean)
-                => Unsupported: unsupported("Model Exchange");
-            fmi2SetTime(_time: f64) => Unsupported: unsupported("Model Exchange");
-            fmi2SetContinuousStates(_x: *const f64, _n: usize) => Unsupported: unsupported("Model Exchange");
-            fmi2GetDerivatives(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
-            fmi2GetEventIndicators(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
-            fmi2GetContinuousStates(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
-            fmi2GetNominalsOfContinuousStates(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
+            fmi2EnterEventMode() => EnterEvent: enter_event();
+            fmi2NewDiscreteStates(info: *mut Fmi2EventInfo) => UpdateDiscrete: fmi2_new_discrete_states(info);
+            fmi2EnterContinuousTimeMode() => EnterContinuous: enter_continuous();
+            fmi2CompletedIntegratorStep(_no_set_state_prior: Fmi2Boolean, event: *mut Fmi2Boolean, end: *mut Fmi2Boolean)
+                => Integrate: completed_step(event, end);
+            fmi2SetTime(time: f64) => SetTime: set_time(time);
+            fmi2SetContinuousStates(x: *const f64, n: usize) => Integrate: set_states(x, n);
+            fmi2GetDerivatives(dx: *mut f64, n: usize) => GetContinuous: derivatives(dx, n);
+            fmi2GetEventIndicators(z: *mut f64, n: usize) => GetContinuous: indicators(z, n);
+            fmi2GetContinuousStates(x: *mut f64, n: usize) => GetContinuous: get_states(x, n);
+            fmi2GetNominalsOfContinuousStates(x: *mut f64, n: usize) => GetNominals: nominals(x, n);
         }
     };
 }

@@ -6,14 +6,15 @@ use super::pointer::{place, text};
 use super::types::{Fmi3Boolean, Instance, Text};
 use super::{Abi, credentials};
 use crate::log::Log;
-use fmu_core::{Fault, Model};
+use fmu_core::{Exported, Fault, Interface};
 use std::ffi::{c_int, c_void};
 
 /// # Safety
 /// As in `calls.rs`.
 #[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
-impl<M: Model> Abi<M> {
+impl<E: Exported> Abi<E> {
     /// FMI 3.0.2, 2.3.1. `refused` names a requested feature that this FMU lacks.
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_instantiate(
         entry: Entry,
         name: Text,
@@ -21,13 +22,25 @@ impl<M: Model> Abi<M> {
         logging_on: Fmi3Boolean,
         environment: *mut c_void,
         logger: Option<Fmi3Logger>,
+        interface: Interface,
+        early_return: bool,
         refused: Option<&str>,
     ) -> Instance {
         // SAFETY: the importer's texts, valid during this call.
         let (name, token) = unsafe { (text(name), text(token)) };
-        let judged = credentials::<M>(name, token);
+        let refused = refused.or(match interface {
+            Interface::ModelExchange if !E::CAN.model_exchange() => {
+                Some("not supported: Model Exchange; this FMU is for Co-Simulation")
+            }
+            Interface::EventMode if E::CAN.samples.is_none() => {
+                Some("eventModeUsed = true is not allowed: hasEventMode = false")
+            }
+            _ => None,
+        });
+        let judged = credentials::<E>(name, token);
         let judged = judged.and_then(|name| refused.map_or(Ok(name), |why| Err(Fault::new(why))));
-        open::<M>(entry, Log::new(Box::new(Fmi3Sink { logger, environment }), logging_on.0 != 0), judged)
+        let log = Log::new(Box::new(Fmi3Sink { logger, environment }), logging_on.0 != 0);
+        open::<E>(entry, log, judged, interface, early_return)
     }
 
     pub unsafe fn fmi3_enter_initialization(
@@ -39,11 +52,11 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<M>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
+            enter::<E>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
         }
     }
 
-    /// FMI 3.0.2, 4.2.1.1. Without event mode and early return, only the time carries information.
+    /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_do_step(
         entry: Entry,
@@ -57,13 +70,17 @@ impl<M: Model> Abi<M> {
     ) -> c_int {
         // SAFETY: the importer's variables.
         unsafe {
-            enter::<M>(entry, instance, |instance| {
+            enter::<E>(entry, instance, |instance| {
                 let time = place(last_successful_time, "lastSuccessfulTime")?;
-                place(event_handling_needed, "eventHandlingNeeded")?.write(Fmi3Boolean(0));
-                place(terminate_simulation, "terminateSimulation")?.write(Fmi3Boolean(0));
-                place(early_return, "earlyReturn")?.write(Fmi3Boolean(0));
+                let event = place(event_handling_needed, "eventHandlingNeeded")?;
+                let early = place(early_return, "earlyReturn")?;
+                place(terminate_simulation, "terminateSimulation")?.write(false.into());
+                event.write(false.into());
+                early.write(false.into());
                 time.write(instance.current.end);
-                instance.do_step(t, h)?;
+                let stepped = instance.do_step(t, h)?;
+                event.write(stepped.event.into());
+                early.write(stepped.early.into());
                 time.write(instance.current.end);
                 Ok(())
             })
@@ -75,7 +92,7 @@ impl<M: Model> Abi<M> {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! export_fmi3 {
-    ($model:ty) => {
+    ($exported:ty) => {
         #[unsafe(no_mangle)]
         pub(crate) extern "C" fn fmi3GetVersion() -> Text {
             c"3.0".as_ptr()
@@ -89,7 +106,7 @@ macro_rules! export_fmi3 {
             _visible: Fmi3Boolean,
             logging_on: Fmi3Boolean,
             event_mode_used: Fmi3Boolean,
-            _early_return_allowed: Fmi3Boolean,
+            early_return_allowed: Fmi3Boolean,
             _intermediate: References,
             n_intermediate: usize,
             environment: *mut c_void,
@@ -98,15 +115,15 @@ macro_rules! export_fmi3 {
         ) -> Instance {
             $crate::abi::quiet();
             const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateCoSimulation");
-            let refused = match (event_mode_used.0 != 0, n_intermediate) {
-                (true, _) => Some("eventModeUsed = true is not allowed: hasEventMode = false"),
-                (_, 1..) => Some("nRequiredIntermediateVariables must be 0: providesIntermediateUpdate = false"),
-                _ => None,
-            };
+            let refused = (n_intermediate > 0)
+                .then_some("nRequiredIntermediateVariables must be 0: providesIntermediateUpdate = false");
+            let interface =
+                if event_mode_used.0 != 0 { Interface::EventMode } else { Interface::CoSimulation };
+            let early = early_return_allowed.0 != 0;
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$model>::fmi3_instantiate(
-                    ENTRY, name, token, logging_on, environment, logger, refused,
+                $crate::abi::Abi::<$exported>::fmi3_instantiate(
+                    ENTRY, name, token, logging_on, environment, logger, interface, early, refused,
                 )
             }
         }
@@ -123,11 +140,11 @@ macro_rules! export_fmi3 {
         ) -> Instance {
             $crate::abi::quiet();
             const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateModelExchange");
-            let refused = Some("not supported: Model Exchange; this FMU is for Co-Simulation");
+            let interface = Interface::ModelExchange;
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$model>::fmi3_instantiate(
-                    ENTRY, name, token, logging_on, environment, logger, refused,
+                $crate::abi::Abi::<$exported>::fmi3_instantiate(
+                    ENTRY, name, token, logging_on, environment, logger, interface, false, None,
                 )
             }
         }
@@ -147,11 +164,11 @@ macro_rules! export_fmi3 {
         ) -> Instance {
             $crate::abi::quiet();
             const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateScheduledExecution");
-            let refused = Some("not supported: Scheduled Execution; this FMU is for Co-Simulation");
+            let refused = Some("not supported: Scheduled Execution");
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$model>::fmi3_instantiate(
-                    ENTRY, name, token, logging_on, environment, logger, refused,
+                $crate::abi::Abi::<$exported>::fmi3_instantiate(
+                    ENTRY, name, token, logging_on, environment, logger, Interface::CoSimulation, false, refused,
                 )
             }
         }
@@ -159,10 +176,10 @@ macro_rules! export_fmi3 {
         #[unsafe(no_mangle)]
         pub(crate) unsafe extern "C" fn fmi3FreeInstance(instance: Instance) {
             // SAFETY: what the standard demands of the importer.
-            unsafe { $crate::abi::Abi::<$model>::free_instance(instance) }
+            unsafe { $crate::abi::Abi::<$exported>::free_instance(instance) }
         }
 
-        $crate::functions! { Fmi3 $model;
+        $crate::functions! { Fmi3 $exported;
             fmi3SetDebugLogging(on: Fmi3Boolean, n: usize, categories: *const Text)
                 => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
             fmi3EnterInitializationMode(_tolerance_defined: Fmi3Boolean, _tolerance: f64, start: f64, stop_defined: Fmi3Boolean, stop: f64)
@@ -215,23 +232,27 @@ macro_rules! export_fmi3 {
                 t: f64, h: f64, _no_set_state_prior: Fmi3Boolean, event_handling_needed: *mut Fmi3Boolean,
                 terminate_simulation: *mut Fmi3Boolean, early_return: *mut Fmi3Boolean, last_successful_time: *mut f64
             ) => DoStep: fmi3_do_step(t, h, event_handling_needed, terminate_simulation, early_return, last_successful_time);
-            fmi3EnterStepMode() => Unsupported: unsupported("hasEventMode = false");
-            fmi3EnterEventMode() => Unsupported: unsupported("hasEventMode = false");
-            fmi3EvaluateDiscreteStates() => Unsupported: unsupported("hasEventMode = false");
+            fmi3EnterStepMode() => EnterStep: fmi3_enter_step();
+            fmi3EnterEventMode() => EnterEvent: enter_event();
+            fmi3EvaluateDiscreteStates() => EvaluateDiscrete: fmi3_evaluate();
             fmi3UpdateDiscreteStates(
-                _update: *mut Fmi3Boolean, _end: *mut Fmi3Boolean, _nominals: *mut Fmi3Boolean,
-                _values: *mut Fmi3Boolean, _next_defined: *mut Fmi3Boolean, _next: *mut f64
-            ) => Unsupported: unsupported("hasEventMode = false");
-            fmi3GetOutputDerivatives(_vr: References, _n: usize, _orders: *const i32, _v: *mut f64, _m: usize)
-                => Unsupported: unsupported("maxOutputDerivativeOrder = 0");
+                again: *mut Fmi3Boolean, terminate: *mut Fmi3Boolean, nominals: *mut Fmi3Boolean,
+                values: *mut Fmi3Boolean, next_defined: *mut Fmi3Boolean, next: *mut f64
+            ) => UpdateDiscrete: fmi3_update_discrete_states(again, terminate, nominals, values, next_defined, next);
+            fmi3GetOutputDerivatives(vr: References, n: usize, orders: *const i32, values: *mut f64, m: usize)
+                => OutputDerivatives: output_derivatives(vr, n, orders, values, m);
             fmi3GetDirectionalDerivative(
-                _unknowns: References, _n_unknowns: usize, _knowns: References, _n_knowns: usize,
-                _seed: *const f64, _n_seed: usize, _sensitivity: *mut f64, _n_sensitivity: usize
-            ) => Unsupported: unsupported("providesDirectionalDerivatives = false");
+                unknowns: References, n_unknowns: usize, knowns: References, n_knowns: usize,
+                seed: *const f64, n_seed: usize, sensitivity: *mut f64, n_sensitivity: usize
+            ) => Sensitivity: directional(
+                (unknowns, n_unknowns), (knowns, n_knowns), (seed, n_seed), (sensitivity, n_sensitivity), false
+            );
             fmi3GetAdjointDerivative(
-                _unknowns: References, _n_unknowns: usize, _knowns: References, _n_knowns: usize,
-                _seed: *const f64, _n_seed: usize, _sensitivity: *mut f64, _n_sensitivity: usize
-            ) => Unsupported: unsupported("providesAdjointDerivatives = false");
+                unknowns: References, n_unknowns: usize, knowns: References, n_knowns: usize,
+                seed: *const f64, n_seed: usize, sensitivity: *mut f64, n_sensitivity: usize
+            ) => Sensitivity: directional(
+                (unknowns, n_unknowns), (knowns, n_knowns), (seed, n_seed), (sensitivity, n_sensitivity), true
+            );
             fmi3GetNumberOfVariableDependencies(_vr: u32, _n: *mut usize)
                 => Unsupported: unsupported("providesPerElementDependencies = false");
             fmi3GetVariableDependencies(
@@ -257,17 +278,17 @@ macro_rules! export_fmi3 {
                 => Unsupported: unsupported("clocks");
             fmi3ActivateModelPartition(_clock: u32, _time: f64) => Unsupported: unsupported("Scheduled Execution");
 
-            fmi3EnterContinuousTimeMode() => Unsupported: unsupported("Model Exchange");
-            fmi3CompletedIntegratorStep(_no_set_state_prior: Fmi3Boolean, _event: *mut Fmi3Boolean, _end: *mut Fmi3Boolean)
-                => Unsupported: unsupported("Model Exchange");
-            fmi3SetTime(_time: f64) => Unsupported: unsupported("Model Exchange");
-            fmi3SetContinuousStates(_x: *const f64, _n: usize) => Unsupported: unsupported("Model Exchange");
-            fmi3GetContinuousStateDerivatives(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
-            fmi3GetEventIndicators(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
-            fmi3GetContinuousStates(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
-            fmi3GetNominalsOfContinuousStates(_x: *mut f64, _n: usize) => Unsupported: unsupported("Model Exchange");
-            fmi3GetNumberOfEventIndicators(_n: *mut usize) => Unsupported: unsupported("Model Exchange");
-            fmi3GetNumberOfContinuousStates(_n: *mut usize) => Unsupported: unsupported("Model Exchange");
+            fmi3EnterContinuousTimeMode() => EnterContinuous: enter_continuous();
+            fmi3CompletedIntegratorStep(_no_set_state_prior: Fmi3Boolean, event: *mut Fmi3Boolean, end: *mut Fmi3Boolean)
+                => Integrate: completed_step(event, end);
+            fmi3SetTime(time: f64) => SetTime: set_time(time);
+            fmi3SetContinuousStates(x: *const f64, n: usize) => Integrate: set_states(x, n);
+            fmi3GetContinuousStateDerivatives(dx: *mut f64, n: usize) => GetContinuous: derivatives(dx, n);
+            fmi3GetEventIndicators(z: *mut f64, n: usize) => GetContinuous: indicators(z, n);
+            fmi3GetContinuousStates(x: *mut f64, n: usize) => GetContinuous: get_states(x, n);
+            fmi3GetNominalsOfContinuousStates(x: *mut f64, n: usize) => GetNominals: nominals(x, n);
+            fmi3GetNumberOfEventIndicators(n: *mut usize) => Count: fmi3_count(n, true);
+            fmi3GetNumberOfContinuousStates(n: *mut usize) => Count: fmi3_count(n, false);
         }
     };
 }

@@ -1,11 +1,12 @@
 //! The gate: every call on an instance passes here. NULL, re-entry, standard and lifecycle are checked, panics caught,
 //! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
 
-use crate::instance::Instance;
-use crate::lifecycle::{Call, Standard, State, States};
+use crate::instance::{Instance, Refusal};
+use crate::lifecycle::{Allowed, Call, Next, Standard};
 use crate::log::{Log, Status};
+use crate::message;
 use crate::snapshot::Snapshot;
-use fmu_core::{Fault, Model};
+use fmu_core::{Exported, Fault, Interface};
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
 use std::ffi::{c_int, c_void};
@@ -16,52 +17,38 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 pub struct Entry {
     name: &'static str,
     pub(crate) standard: Standard,
-    states: States,
-    next: Option<State>,
+    allowed: Allowed,
+    next: Next,
 }
 
 impl Entry {
     /// Looks up the row at compile time.
     pub const fn new(standard: Standard, call: Call, name: &'static str) -> Self {
-        Self { name, standard, states: call.states(standard), next: call.next() }
-    }
-}
-
-/// Why a call failed.
-pub(crate) enum Refusal {
-    /// Status Error: the instance goes to the Error state.
-    Error(Fault),
-    /// Status Discard: nothing changes.
-    Discard(Fault),
-}
-
-impl From<Fault> for Refusal {
-    fn from(fault: Fault) -> Self {
-        Self::Error(fault)
+        Self { name, standard, allowed: Allowed::of(call, standard), next: call.next() }
     }
 }
 
 /// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused.
-struct Handle<M: Model> {
+struct Handle<E: Exported> {
     busy: Cell<bool>,
-    instance: UnsafeCell<Instance<M>>,
+    instance: UnsafeCell<Instance<E>>,
 }
 
 /// Passes a call to the instance.
 ///
 /// # Safety
-/// `pointer` is NULL, or comes from [`open`] for the same `M` and was not closed; no other thread uses it now.
+/// `pointer` is NULL, or comes from [`open`] for the same `E` and was not closed; no other thread uses it now.
 #[inline]
-pub(crate) unsafe fn enter<M: Model>(
+pub(crate) unsafe fn enter<E: Exported>(
     entry: Entry,
     pointer: *mut c_void,
-    body: impl FnOnce(&mut Instance<M>) -> Result<(), Refusal>,
+    body: impl FnOnce(&mut Instance<E>) -> Result<(), Refusal>,
 ) -> c_int {
     if pointer.is_null() {
         return Status::Error as c_int;
     }
     // SAFETY: the caller's promise.
-    let handle = unsafe { &*pointer.cast::<Handle<M>>() };
+    let handle = unsafe { &*pointer.cast::<Handle<E>>() };
     if handle.busy.replace(true) {
         return Status::Error as c_int;
     }
@@ -73,12 +60,13 @@ pub(crate) unsafe fn enter<M: Model>(
 }
 
 #[inline]
-fn pass<M: Model>(
+fn pass<E: Exported>(
     entry: Entry,
-    instance: &mut Instance<M>,
-    body: impl FnOnce(&mut Instance<M>) -> Result<(), Refusal>,
+    instance: &mut Instance<E>,
+    body: impl FnOnce(&mut Instance<E>) -> Result<(), Refusal>,
 ) -> Status {
-    if instance.standard != entry.standard || !entry.states.contains(instance.current.life.state()) {
+    let life = instance.current.life;
+    if instance.standard != entry.standard || !entry.allowed.of_interface(life.interface()).contains(life.state()) {
         return fail(entry, instance, Refusal::Error(misplaced(entry, instance)));
     }
     // A panic can leave a half-done step; from the Error state, only Reset, SetFMUState and Free lead out.
@@ -93,10 +81,10 @@ fn pass<M: Model>(
 }
 
 #[cold]
-fn fail<M: Model>(entry: Entry, instance: &mut Instance<M>, refusal: Refusal) -> Status {
+fn fail<E: Exported>(entry: Entry, instance: &mut Instance<E>, refusal: Refusal) -> Status {
     match refusal {
         Refusal::Error(fault) => {
-            instance.current.life.after(false, None);
+            instance.current.life.after(false, Next::Stay);
             instance.log.error(&format!("{}: {fault}", entry.name));
             Status::Error
         }
@@ -108,12 +96,16 @@ fn fail<M: Model>(entry: Entry, instance: &mut Instance<M>, refusal: Refusal) ->
 }
 
 #[cold]
-fn misplaced<M: Model>(entry: Entry, instance: &Instance<M>) -> Fault {
+fn misplaced<E: Exported>(entry: Entry, instance: &Instance<E>) -> Fault {
     if instance.standard != entry.standard {
         return Fault::new("the instance was made by the other standard's function");
     }
-    let state = instance.current.life.state();
-    Fault::new(format!("not allowed in the state {state}; allowed in: {}", entry.states))
+    let (state, interface) = (instance.current.life.state(), instance.current.life.interface());
+    let allowed = entry.allowed.of_interface(interface);
+    if allowed.is_empty() {
+        return Fault::new(format!("not allowed: the instance is one {}", message::made_for(interface)));
+    }
+    Fault::new(format!("not allowed in the state {state}; allowed in: {allowed}"))
 }
 
 fn panicked(payload: &(dyn Any + Send)) -> Fault {
@@ -123,12 +115,19 @@ fn panicked(payload: &(dyn Any + Send)) -> Fault {
 }
 
 /// A new instance for the importer, or NULL and a message.
-pub(crate) fn open<M: Model>(entry: Entry, log: Log, name: Result<String, Fault>) -> *mut c_void {
-    let model = || catch_unwind(Snapshot::<M>::default).map_err(|payload| panicked(payload.as_ref()));
+pub(crate) fn open<E: Exported>(
+    entry: Entry,
+    log: Log,
+    name: Result<String, Fault>,
+    interface: Interface,
+    early_return: bool,
+) -> *mut c_void {
+    let model = || catch_unwind(|| Snapshot::new(interface)).map_err(|payload| panicked(payload.as_ref()));
     match name.and_then(|name| Ok((name, model()?))) {
         Ok((name, current)) => {
-            let instance = UnsafeCell::new(Instance::new(entry.standard, name, log, current));
-            Box::into_raw(Box::new(Handle { busy: Cell::new(false), instance })).cast()
+            let mut instance = Instance::<E>::new(entry.standard, name, log, current);
+            instance.early_return = early_return;
+            Box::into_raw(Box::new(Handle { busy: Cell::new(false), instance: UnsafeCell::new(instance) })).cast()
         }
         Err(fault) => {
             log.error(&format!("{}: {fault}", entry.name));
@@ -141,14 +140,14 @@ pub(crate) fn open<M: Model>(entry: Entry, log: Log, name: Result<String, Fault>
 ///
 /// # Safety
 /// As [`enter`]; the pointer is not used again.
-pub(crate) unsafe fn close<M: Model>(pointer: *mut c_void) {
+pub(crate) unsafe fn close<E: Exported>(pointer: *mut c_void) {
     if pointer.is_null() {
         return;
     }
     // SAFETY: the caller's promise.
-    let busy = unsafe { &*pointer.cast::<Handle<M>>() }.busy.get();
+    let busy = unsafe { &*pointer.cast::<Handle<E>>() }.busy.get();
     if !busy {
         // SAFETY: from `open`, closed once by the caller's promise, not in use. A panic in a model's drop stops here.
-        let _ = catch_unwind(AssertUnwindSafe(|| drop(unsafe { Box::from_raw(pointer.cast::<Handle<M>>()) })));
+        let _ = catch_unwind(AssertUnwindSafe(|| drop(unsafe { Box::from_raw(pointer.cast::<Handle<E>>()) })));
     }
 }

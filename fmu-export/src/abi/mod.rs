@@ -11,22 +11,22 @@ mod logger;
 mod pointer;
 pub mod types;
 
-use fmu_core::{Description, Fault, Model};
+use fmu_core::{Description, Exported, Fault};
 use std::ffi::{CStr, c_int, c_void};
 use std::marker::PhantomData;
 use std::panic::{catch_unwind, set_hook};
 use std::sync::Once;
 use types::Instance;
 
-/// The functions for one model.
-pub struct Abi<M>(PhantomData<M>);
+/// The functions for one exported model.
+pub struct Abi<E>(PhantomData<E>);
 
-impl<M: Model> Abi<M> {
+impl<E: Exported> Abi<E> {
     /// # Safety
     /// The instance is NULL, or one that this binary made and has not freed; it is not in use now and not used again.
     pub unsafe fn free_instance(instance: Instance) {
         // SAFETY: the caller's promise.
-        unsafe { gate::close::<M>(instance) }
+        unsafe { gate::close::<E>(instance) }
     }
 
     /// Passes the model's description to `sink` as JSON and returns 0, or a message and 1.
@@ -35,7 +35,7 @@ impl<M: Model> Abi<M> {
         context: *mut c_void,
     ) -> c_int {
         let json = catch_unwind(|| {
-            let description = Description::of::<M>()?;
+            let description = Description::exported::<E>()?;
             serde_json::to_string(&description).map_err(|e| Fault::new(e.to_string()))
         });
         let json = json.unwrap_or_else(|_| Err(Fault::new("a fault in the model's code (panic)")));
@@ -56,10 +56,10 @@ pub fn quiet() {
 }
 
 /// The instance's name, if name and token are right.
-fn credentials<M: Model>(name: Option<&CStr>, token: Option<&CStr>) -> Result<String, Fault> {
+fn credentials<E: Exported>(name: Option<&CStr>, token: Option<&CStr>) -> Result<String, Fault> {
     let name = name.map(CStr::to_string_lossy).filter(|name| !name.trim().is_empty());
     let Some(name) = name else { return Err(Fault::new("the instance name is missing: NULL, empty or blank")) };
-    let expected = M::TOKEN;
+    let expected = E::TOKEN;
     match token.map(CStr::to_string_lossy) {
         Some(token) if token == expected.as_str() => Ok(name.into_owned()),
         token => Err(Fault::new(format!(
@@ -75,14 +75,14 @@ fn credentials<M: Model>(name: Option<&CStr>, token: Option<&CStr>) -> Result<St
 #[doc(hidden)]
 #[macro_export]
 macro_rules! functions {
-    ($standard:ident $model:ty; $(
+    ($standard:ident $exported:ty; $(
         $name:ident($($argument:ident: $type:ty),*) => $call:ident: $function:ident($($passed:expr),*);
     )*) => { $(
         #[unsafe(no_mangle)]
         pub(crate) unsafe extern "C" fn $name(instance: Instance $(, $argument: $type)*) -> c_int {
             const ENTRY: Entry = Entry::new(Standard::$standard, Call::$call, stringify!($name));
             // SAFETY: what the standard demands of the importer.
-            unsafe { $crate::abi::Abi::<$model>::$function(ENTRY, instance $(, $passed)*) }
+            unsafe { $crate::abi::Abi::<$exported>::$function(ENTRY, instance $(, $passed)*) }
         }
     )* };
 }
@@ -90,19 +90,29 @@ macro_rules! functions {
 /// Turns the crate into the binary of an FMU: it exports all C functions of FMI 2.0 and FMI 3.0 for one model, and
 /// `fmu_description`, which passes its description to `fmu build`.
 ///
+/// After the model come its [capabilities](fmu_core::capability), each of which it must implement; without any, the FMU
+/// is for co-simulation.
+///
 /// ```ignore
-/// fmu_export::export!(drive::PmsmPlant);
+/// fmu_export::export!(drive::PmsmPlant: ContinuousTime + Events + Differentiable);
 /// ```
 #[macro_export]
 macro_rules! export {
-    ($model:ty) => {
+    ($model:ty $(: $($capability:ident)+*)?) => {
         #[allow(non_snake_case, unused_imports, clippy::wildcard_imports, clippy::too_many_arguments)]
         mod fmi {
             use super::*;
             use $crate::abi::types::*;
 
-            $crate::export_fmi2!($model);
-            $crate::export_fmi3!($model);
+            pub(crate) struct This;
+
+            impl $crate::Exported for This {
+                type Model = $model;
+                const CAN: $crate::Capabilities<$model> = $crate::Capabilities::<$model>::NONE$($(.$capability())+)?;
+            }
+
+            $crate::export_fmi2!(This);
+            $crate::export_fmi3!(This);
 
             #[unsafe(no_mangle)]
             pub(crate) extern "C" fn fmu_description(
@@ -110,7 +120,7 @@ macro_rules! export {
                 context: *mut c_void,
             ) -> c_int {
                 $crate::abi::quiet();
-                $crate::abi::Abi::<$model>::describe(sink, context)
+                $crate::abi::Abi::<This>::describe(sink, context)
             }
         }
     };

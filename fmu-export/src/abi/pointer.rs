@@ -37,6 +37,21 @@ pub(crate) unsafe fn room<'a, T>(pointer: *mut T, n: usize, name: &str) -> Resul
     Ok(unsafe { slice::from_raw_parts_mut(pointer.cast(), n) })
 }
 
+/// The importer's array of `n` numbers to be written; they become 0 first.
+///
+/// # Safety
+/// As [`room`].
+#[inline]
+pub(crate) unsafe fn numbers<'a>(pointer: *mut f64, n: usize, name: &str) -> Result<&'a mut [f64], Fault> {
+    // SAFETY: the caller's promise.
+    let room = unsafe { room(pointer, n, name)? };
+    for place in room.iter_mut() {
+        place.write(0.0);
+    }
+    // SAFETY: every element was just written, and `MaybeUninit<f64>` has the layout of `f64`.
+    Ok(unsafe { slice::from_raw_parts_mut(room.as_mut_ptr().cast(), room.len()) })
+}
+
 /// A place for one value of the importer.
 ///
 /// # Safety

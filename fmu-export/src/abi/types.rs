@@ -4,6 +4,7 @@ pub use super::gate::Entry;
 pub use super::logger::{Fmi2Logger, Fmi3Logger};
 pub use crate::lifecycle::{Call, Standard};
 pub use crate::value::{Fmi2Boolean, Fmi2Integer, Fmi3Boolean};
+pub use fmu_core::Interface;
 pub use std::ffi::{c_char, c_int, c_void};
 
 /// `fmi2Component`, `fmi3Instance`.
@@ -30,4 +31,22 @@ pub struct Fmi2Callbacks {
     pub step_finished: *const c_void,
     /// Passed back to the logger.
     pub environment: *mut c_void,
+}
+
+/// `fmi2EventInfo`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Fmi2EventInfo {
+    /// Another update is needed before time goes on.
+    pub new_discrete_states_needed: Fmi2Boolean,
+    /// The simulation is to end.
+    pub terminate_simulation: Fmi2Boolean,
+    /// The nominal values changed: never.
+    pub nominals_of_continuous_states_changed: Fmi2Boolean,
+    /// A state has another value.
+    pub values_of_continuous_states_changed: Fmi2Boolean,
+    /// There is a next time event.
+    pub next_event_time_defined: Fmi2Boolean,
+    /// Its time in s.
+    pub next_event_time: f64,
 }

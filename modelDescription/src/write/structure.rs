@@ -11,22 +11,28 @@ use std::collections::{BTreeMap, BTreeSet};
 /// An entry: the number of the variable and those of its dependencies, `None` if they are unknown.
 type Unknown = (u32, Option<Vec<u32>>);
 
-/// The model structure of a model whose outputs change only in steps.
+/// The model structure: outputs, derivatives of the states, initial unknowns, event indicators.
 pub(super) fn structure(description: &Description, version: FmiVersion) -> Element {
     let numbering = Numbering::of(description, version);
+    let exchange = description.model_exchange.as_ref();
     let (mut outputs, mut initial) = (Vec::new(), Vec::new());
     for (v, numbers) in &numbering.variables {
-        let output = v.causality == Causality::Output;
-        if output {
-            // No dependencies: only fmi2DoStep and fmi3DoStep change outputs; setting an input does not.
-            outputs.extend(numbers.iter().map(|&number| (number, Some(Vec::new()))));
+        if v.causality == Causality::Output {
+            // A model for co-simulation only has none: only DoStep changes its outputs, and setting an input does not.
+            let known = numbering.between(v);
+            outputs.extend(numbers.iter().map(|&number| (number, known.clone())));
         }
-        // Every output is initial="calculated", hence an initial unknown, and so is a calculated parameter. FMI 2.0 wants
-        // them in the order of the variables.
-        if output || v.causality == Causality::CalculatedParameter {
-            initial.extend(numbers.iter().map(|&number| (number, numbering.known(v))));
+        // All of them are initial="calculated". FMI 2.0 wants them in the order of the variables.
+        if v.initial_dependencies.is_some() {
+            initial.extend(numbers.iter().map(|&number| (number, numbering.at_start(v))));
         }
     }
+    // The order of the states in every call.
+    let derivatives: Vec<Unknown> = exchange.map_or(Vec::new(), |exchange| {
+        let one = |reference: &u32| numbering.variables.iter().find(|(v, _)| v.value_reference == *reference);
+        let found = exchange.derivatives.iter().filter_map(one);
+        found.flat_map(|(v, numbers)| numbers.iter().map(|&number| (number, numbering.between(v)))).collect()
+    });
     let root = Element::new("ModelStructure");
     match version {
         FmiVersion::V2 => {
@@ -34,12 +40,19 @@ pub(super) fn structure(description: &Description, version: FmiVersion) -> Eleme
                 Element::new(name).children(unknowns.iter().map(|u| unknown("Unknown", "index", u)))
             };
             // A list must not be empty.
-            let lists = [list("Outputs", outputs), list("InitialUnknowns", initial)];
+            let lists = [list("Outputs", outputs), list("Derivatives", derivatives), list("InitialUnknowns", initial)];
             root.children(lists.into_iter().filter(|list| !list.children.is_empty()))
         }
-        FmiVersion::V3 => root
-            .children(outputs.iter().map(|u| unknown("Output", "valueReference", u)))
-            .children(initial.iter().map(|u| unknown("InitialUnknown", "valueReference", u))),
+        FmiVersion::V3 => {
+            let list = |name: &'static str, unknowns: Vec<Unknown>| {
+                unknowns.into_iter().map(move |u| unknown(name, "valueReference", &u))
+            };
+            let indicators = exchange.map_or(Vec::new(), |exchange| exchange.indicators.clone());
+            root.children(list("Output", outputs))
+                .children(list("ContinuousStateDerivative", derivatives))
+                .children(list("InitialUnknown", initial))
+                .children(list("EventIndicator", indicators.into_iter().map(|reference| (reference, None)).collect()))
+        }
     }
 }
 
@@ -57,12 +70,15 @@ fn unknown(element: &str, attribute: &str, (number, dependencies): &Unknown) -> 
 struct Numbering<'a> {
     /// Every variable with its numbers: one, or one per element of an array in FMI 2.0.
     variables: Vec<(&'a Variable, Vec<u32>)>,
-    /// From the value reference of what an unknown may depend on (inputs, parameters, time), array elements too.
+    /// From the value reference of what an unknown may depend on (inputs, parameters, states, time), array elements too.
     known: BTreeMap<u32, u32>,
+    /// Parameters may be knowns between events (FMI 3.0).
+    parameters: bool,
 }
 
 impl<'a> Numbering<'a> {
     fn of(description: &'a Description, version: FmiVersion) -> Self {
+        let states = description.model_exchange.as_ref().map_or(&[][..], |exchange| &exchange.states);
         let mut index = 1; // time is the first
         let mut known = BTreeMap::from([(TIME, if version == FmiVersion::V2 { index } else { TIME })]);
         let mut variables = Vec::new();
@@ -72,20 +88,32 @@ impl<'a> Numbering<'a> {
                 index += 1;
                 let number = if version == FmiVersion::V2 { index } else { v.value_reference };
                 numbers.push(number);
-                if v.causality.is_settable() {
+                if v.causality.is_settable() || states.contains(&reference) {
                     known.insert(reference, number);
                 }
             }
             numbers.dedup(); // FMI 3.0 has one variable, whatever its size
             variables.push((v, numbers));
         }
-        Self { variables, known }
+        Self { variables, known, parameters: version == FmiVersion::V3 }
     }
 
-    /// Numbers of the variables that the initial value depends on, ascending and without duplicates.
-    fn known(&self, v: &Variable) -> Option<Vec<u32>> {
-        let references = v.initial_dependencies.as_ref()?;
-        let numbers: BTreeSet<u32> = references.iter().filter_map(|r| self.known.get(r).copied()).collect();
-        Some(numbers.into_iter().collect())
+    /// Numbers of the variables that the initial value depends on.
+    fn at_start(&self, v: &Variable) -> Option<Vec<u32>> {
+        Some(self.numbers(v.initial_dependencies.as_ref()?.iter().copied()))
+    }
+
+    /// Numbers of the variables that the value depends on between events. FMI 2.0 knows no parameters there.
+    fn between(&self, v: &Variable) -> Option<Vec<u32>> {
+        let parameter = |reference: &u32| {
+            self.variables.iter().any(|(v, _)| v.value_reference == *reference && v.causality == Causality::Parameter)
+        };
+        let references = v.dependencies.as_ref()?.iter().copied();
+        Some(self.numbers(references.filter(|reference| self.parameters || !parameter(reference))))
+    }
+
+    /// Ascending and without duplicates.
+    fn numbers(&self, references: impl Iterator<Item = u32>) -> Vec<u32> {
+        references.filter_map(|r| self.known.get(&r).copied()).collect::<BTreeSet<u32>>().into_iter().collect()
     }
 }

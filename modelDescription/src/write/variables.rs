@@ -15,8 +15,11 @@ use fmu_core::{Causality, Variability};
 
 /// All variables.
 pub(super) fn variables(description: &Description, version: FmiVersion) -> Element {
-    let variables = description.variables.iter().flat_map(|v| match version {
-        FmiVersion::V2 => scalars(v),
+    let indicators = description.model_exchange.as_ref().map_or(&[][..], |exchange| &exchange.indicators);
+    // FMI 2.0 has no variables for event indicators.
+    let shown = |v: &&Variable| version == FmiVersion::V3 || !indicators.contains(&v.value_reference);
+    let variables = description.variables.iter().filter(shown).flat_map(|v| match version {
+        FmiVersion::V2 => scalars(v, description),
         FmiVersion::V3 => vec![variable(v)],
     });
     let all = Element::new("ModelVariables");
@@ -43,7 +46,8 @@ fn time(version: FmiVersion) -> Element {
 }
 
 /// FMI 2.0 has no arrays: one scalar per element, `name[1]` the first (2.2.9).
-fn scalars(v: &Variable) -> Vec<Element> {
+fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
+    let state = v.derivative.map(|reference| index(description, reference).to_string());
     let element = |name: &str, offset: u32, start: Option<&Value>| {
         let mut typed = Element::new(match v.kind {
             VariableKind::Real { .. } => "Real",
@@ -52,7 +56,7 @@ fn scalars(v: &Variable) -> Vec<Element> {
             VariableKind::Enumeration { .. } => "Enumeration",
         });
         typed.attributes = type_attributes(v);
-        typed = typed.with_some("start", start.map(text));
+        typed = typed.with_some("derivative", state.clone()).with_some("start", start.map(text));
         identity("ScalarVariable", v, name, v.value_reference.saturating_add(offset)).children([typed])
     };
     let start = |i: usize| v.start.as_ref().and_then(|all| all.get(i));
@@ -60,6 +64,12 @@ fn scalars(v: &Variable) -> Vec<Element> {
         None => vec![element(&v.name, 0, start(0))],
         Some(n) => (0..n).zip(0..).map(|(i, k)| element(&format!("{}[{}]", v.name, i + 1), k, start(i))).collect(),
     }
+}
+
+/// Position in the list of FMI 2.0, from 1; time is the first.
+fn index(description: &Description, reference: u32) -> usize {
+    let before = description.variables.iter().take_while(|v| v.value_reference != reference);
+    2 + before.map(|v| v.dimension.unwrap_or(1)).sum::<usize>()
 }
 
 /// One variable of FMI 3.0, scalar or array.
@@ -74,7 +84,8 @@ fn variable(v: &Variable) -> Element {
     element.attributes.extend(type_attributes(v));
     let start = v.start.as_ref().map(|all| all.iter().map(text).collect::<Vec<_>>().join(" "));
     let dimension = v.dimension.map(|n| Element::new("Dimension").with("start", n.to_string()));
-    element.with_some("start", start).children(dimension)
+    let state = v.derivative.map(|reference| reference.to_string());
+    element.with_some("derivative", state).with_some("start", start).children(dimension)
 }
 
 /// The properties of the variable that do not depend on its base type.
@@ -118,6 +129,7 @@ fn type_attributes(v: &Variable) -> Vec<(String, String)> {
                 // A magnitude, greater than 0 in both standards.
                 .with_some("nominal", v.nominal.map(|x| number::format(x.abs())))
                 .with_some("unbounded", v.unbounded.then(|| "true".to_owned()))
+                .with_some("reinit", v.reinit.then(|| "true".to_owned()))
         }
         VariableKind::Integer => {
             // xs:int: rounded inwards, and omitted if every integer is inside.

@@ -1,0 +1,204 @@
+//! Model Exchange and Event Mode: the importer integrates the states and handles the events (FMI 2.0.5, chapter 3;
+//! FMI 3.0.2, chapter 3 and 2.3.5).
+
+use crate::instance::{Instance, Refusal};
+use crate::lifecycle::State;
+use crate::message;
+use fmu_core::{Elapsed, Exported, Fault, Model, Next, Outcome, SampleGrid};
+
+/// Maximum number of updates of one event that an instance does by itself.
+const MAX_ITERATIONS: usize = 100;
+
+/// What an update of the discrete states says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Update {
+    /// What the event did.
+    pub outcome: Outcome,
+    /// Time in s of the next time event, if there is one.
+    pub next: Option<f64>,
+}
+
+impl<E: Exported> Instance<E> {
+    /// Event Mode begins.
+    pub fn enter_event(&mut self) {
+        let current = &mut self.current;
+        current.settled = current.settled.max(current.end);
+        current.pending = true;
+        if let Some(events) = &E::CAN.events {
+            (events.begin)(&mut current.block.model, current.elapsed);
+        }
+        self.observe();
+    }
+
+    /// Updates the discrete states with the inputs as they are set. Tunable parameters take effect here, all together.
+    ///
+    /// # Errors
+    /// Tunable parameters that do not fit together, or what the model reports.
+    pub fn update_discrete(&mut self) -> Result<Update, Fault> {
+        let current = &mut self.current;
+        if current.dirty {
+            current.block.model = current.judged()?;
+            current.dirty = false;
+        }
+        let mut update = Update::default();
+        if let Some(events) = &E::CAN.events {
+            let (model, now) = (&mut current.block.model, current.elapsed);
+            update.outcome = (events.event)(model, now)?;
+            let start = current.experiment.map_or(0.0, |e| e.start);
+            update.next = match (events.next)(model, now) {
+                Next::Never => None,
+                Next::Grid { k, period } => Some(SampleGrid { period }.instant(k, start)),
+                Next::At(time) => Some(start + time.seconds()),
+            };
+        }
+        self.current.pending = update.outcome.again;
+        self.observe();
+        self.warn();
+        Ok(update)
+    }
+
+    /// Leaves Event Mode; an event that the importer did not update is done now.
+    ///
+    /// # Errors
+    /// As [`update_discrete`](Self::update_discrete); an event that does not settle.
+    pub fn leave_event(&mut self) -> Result<(), Fault> {
+        for _ in 0..MAX_ITERATIONS {
+            if !self.current.pending {
+                return Ok(());
+            }
+            self.update_discrete()?;
+        }
+        Err(Fault::new(format!("the event at {} s does not settle", self.current.end)))
+    }
+
+    /// The outputs are to be computed anew: at once for a model without states, for others when they are read.
+    fn observe(&mut self) {
+        if self.exchanges() && E::CAN.continuous.is_some() {
+            self.stale = true;
+        } else {
+            let current = &mut self.current;
+            current.block.model.output(current.elapsed, &mut current.block.out);
+        }
+    }
+
+    /// Sets the time (s).
+    ///
+    /// # Errors
+    /// Not a finite number, or before the last event or completed step. There is no check against the stop time: solvers
+    /// try times beyond it.
+    pub fn set_time(&mut self, t: f64) -> Result<(), Fault> {
+        let current = &mut self.current;
+        let rounding = 4.0 * f64::EPSILON * current.settled.abs();
+        if !(t.is_finite() && t >= current.settled - rounding) {
+            let allowed = format_args!("finite and not before {}, the last event or completed step", current.settled);
+            return Err(Fault::value("time", t, allowed));
+        }
+        let start = current.experiment.map_or(0.0, |e| e.start);
+        (current.elapsed, current.end) = (Elapsed::between(start, t.max(start)), t.max(start));
+        self.stale = true;
+        Ok(())
+    }
+
+    /// An integrator step is complete: no earlier time will be set.
+    pub fn completed_step(&mut self) {
+        self.current.settled = self.current.settled.max(self.current.end);
+    }
+
+    /// Sets all states.
+    ///
+    /// # Errors
+    /// Another number than there are states (Error); a state that is not finite (Discard): nothing has changed.
+    pub fn set_states(&mut self, x: &[f64]) -> Result<(), Refusal> {
+        let states = E::CAN.states();
+        count("nContinuousStates", x.len(), states.len())?;
+        if let Some(i) = x.iter().position(|x| !x.is_finite()) {
+            return Err(Refusal::Discard(Fault::value(states[i].name, x[i], "a finite number")));
+        }
+        for (state, x) in states.iter().zip(x) {
+            *(state.at)(&mut self.current.block.model) = *x;
+        }
+        self.settle();
+        Ok(())
+    }
+
+    /// Sets one state of a model with several.
+    pub(crate) fn set_state(&mut self, i: usize, x: f64) {
+        *(E::CAN.states()[i].at)(&mut self.current.block.model) = x;
+        self.settle();
+    }
+
+    fn settle(&mut self) {
+        if let Some(continuous) = &E::CAN.continuous {
+            (continuous.settle)(&mut self.current.block.model);
+        }
+        self.stale = true;
+    }
+
+    /// Reads all states.
+    ///
+    /// # Errors
+    /// Room for another number than there are states.
+    pub fn get_states(&mut self, out: &mut [f64]) -> Result<(), Fault> {
+        let states = E::CAN.states();
+        count("nContinuousStates", out.len(), states.len())?;
+        self.refresh();
+        for (x, state) in out.iter_mut().zip(states) {
+            *x = *(state.at)(&mut self.current.block.model);
+        }
+        Ok(())
+    }
+
+    /// Reads the derivatives of all states.
+    ///
+    /// # Errors
+    /// Room for another number than there are states (Error); derivatives that do not exist or are not finite (Discard).
+    #[inline]
+    pub fn derivatives(&mut self, dx: &mut [f64]) -> Result<(), Refusal> {
+        let states = E::CAN.states();
+        count("nContinuousStates", dx.len(), states.len())?;
+        self.refresh_initial();
+        let Some(continuous) = &E::CAN.continuous else { return Ok(()) };
+        (continuous.derivatives)(&self.current.block.model, self.current.elapsed, dx).map_err(Refusal::Discard)?;
+        match dx.iter().position(|x| !x.is_finite()) {
+            None => Ok(()),
+            Some(i) => Err(Refusal::Discard(Fault::value(&message::derivative(&states[i]), dx[i], "a finite number"))),
+        }
+    }
+
+    /// In Initialization Mode, lets parameters and inputs take effect.
+    #[inline]
+    fn refresh_initial(&mut self) {
+        if self.current.life.state() == State::Initialization {
+            self.refresh();
+        }
+    }
+
+    /// Reads the event indicators.
+    ///
+    /// # Errors
+    /// Room for another number than there are.
+    pub fn indicators(&mut self, z: &mut [f64]) -> Result<(), Fault> {
+        count("nEventIndicators", z.len(), E::CAN.indicators().len())?;
+        self.refresh_initial();
+        if let Some(events) = &E::CAN.events {
+            (events.indicators)(&self.current.block.model, self.current.elapsed, z);
+        }
+        Ok(())
+    }
+
+    /// Reads the nominal values of the states.
+    ///
+    /// # Errors
+    /// Room for another number than there are states.
+    pub fn nominals(&mut self, out: &mut [f64]) -> Result<(), Fault> {
+        count("nContinuousStates", out.len(), E::CAN.states().len())?;
+        for (nominal, &row) in out.iter_mut().zip(&self.states) {
+            *nominal = message::nominal::<E::Model>(&mut self.current.block, row);
+        }
+        Ok(())
+    }
+}
+
+fn count(name: &str, given: usize, needed: usize) -> Result<(), Fault> {
+    if given == needed { Ok(()) } else { Err(Fault::value(name, given, format_args!("{needed} for this model"))) }
+}

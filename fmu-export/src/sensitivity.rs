@@ -1,0 +1,412 @@
+//! Derivatives of a model's equations: directional and adjoint derivatives, derivatives of outputs with respect to time, and
+//! steps with inputs that change at a given rate.
+//!
+//! A model with a [tangent](fmu_core::Differentiable) gives exact values. For another one, and in Initialization Mode, a
+//! central difference along the whole direction is taken on a copy; its step makes the errors of rounding and of the
+//! third derivative about equal, 1e-10 of a value of nominal size. FMI 2.0.5, 2.1.9; FMI 3.0.2, 2.2.11.
+
+use crate::access::index;
+use crate::instance::{Instance, Refusal};
+use crate::lifecycle::{Standard, State};
+use crate::message;
+use crate::snapshot::ramps;
+use fmu_core::{Block, Causality, Elapsed, Exported, Fault, Kind, Model, Slot, Step, Variability};
+
+/// Parts into which a step with changing inputs is divided: each has the inputs of its middle.
+const PARTS: u32 = 32;
+
+/// Memory for the derivatives.
+pub struct Scratch<M: Model> {
+    /// A copy of the model, or the direction.
+    block: Block<M>,
+    /// The derivatives there, or along the direction.
+    rates: Vec<f64>,
+    seed: Vec<f64>,
+    column: Vec<f64>,
+}
+
+impl<E: Exported> Instance<E> {
+    /// Directional derivative: the change of `unknowns` per unit of a change of `knowns` by `seed`.
+    ///
+    /// # Errors
+    /// A variable that is no known or unknown in this state, one named twice, a seed of another length (Error); derivatives
+    /// that do not exist here (Discard). Nothing changes.
+    pub fn directional(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), Refusal> {
+        supported::<E>(match self.standard {
+            Standard::Fmi2 => "providesDirectionalDerivative = false",
+            Standard::Fmi3 => "providesDirectionalDerivatives = false",
+        })?;
+        self.check_sides(unknowns, knowns)?;
+        self.check_sizes((seed.len(), knowns.len()), (out.len(), unknowns.len()))?;
+        self.column(unknowns, knowns, seed, out)
+    }
+
+    /// Adjoint derivative: for each of `knowns`, the change of the sum of `unknowns` weighted with `seed`.
+    ///
+    /// # Errors
+    /// As [`directional`](Self::directional).
+    pub fn adjoint(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), Refusal> {
+        supported::<E>("providesAdjointDerivatives = false")?;
+        self.check_sides(unknowns, knowns)?;
+        self.check_sizes((seed.len(), unknowns.len()), (out.len(), knowns.len()))?;
+        let mut column = std::mem::take(&mut self.scratch().column);
+        column.clear();
+        column.resize(unknowns.len(), 0.0);
+        for (known, out) in knowns.iter().zip(out) {
+            self.column(unknowns, std::slice::from_ref(known), &[1.0], &mut column)?;
+            *out = column.iter().zip(seed).map(|(x, w)| x * w).sum();
+        }
+        self.scratch().column = column;
+        Ok(())
+    }
+
+    /// First derivatives of continuous outputs with respect to time, with the inputs held.
+    ///
+    /// # Errors
+    /// A variable that is no continuous output, or an order other than 1 (Error); derivatives that do not exist (Discard).
+    pub fn output_derivatives(&mut self, unknowns: &[u32], orders: &[i32], out: &mut [f64]) -> Result<(), Refusal> {
+        supported::<E>("maxOutputDerivativeOrder = 0")?;
+        if let Some(order) = orders.iter().find(|&&order| order != 1) {
+            return Err(Fault::value("order", order, "1: maxOutputDerivativeOrder = 1").into());
+        }
+        self.check_sizes((orders.len(), unknowns.len()), (out.len(), unknowns.len()))?;
+        for &unknown in unknowns {
+            if !self.is_output(unknown, false) {
+                return Err(self.no_side(unknown, "a continuous output").into());
+            }
+        }
+        let mut rates = std::mem::take(&mut self.scratch().seed);
+        rates.clear();
+        rates.resize(E::CAN.states().len(), 0.0);
+        let done = self.derivatives(&mut rates).and_then(|()| self.along(unknowns, &[], &rates, 1.0, out));
+        self.scratch().seed = rates;
+        done
+    }
+
+    /// Sets first derivatives of continuous inputs; they hold for the next step (FMI 2.0.5, 4.2.1).
+    ///
+    /// # Errors
+    /// A variable that is no continuous real input, an order other than 1, a value that is not finite: nothing changes.
+    pub fn input_derivatives(&mut self, knowns: &[u32], orders: &[i32], values: &[f64]) -> Result<(), Fault> {
+        supported::<E>("canInterpolateInputs = false")?;
+        for ((&known, order), value) in knowns.iter().zip(orders).zip(values) {
+            let input = E::Model::TABLE.entry(&mut self.current.block, index(known)).is_some_and(|(meta, _)| ramps(meta));
+            if !input {
+                return Err(self.no_side(known, "a continuous real input"));
+            }
+            if *order != 1 {
+                return Err(Fault::value("order", order, "1"));
+            }
+            if !value.is_finite() {
+                let name = format!("the derivative of {}", message::name::<E::Model>(index(known)));
+                return Err(Fault::value(&name, value, "a finite number"));
+            }
+        }
+        for (&known, &value) in knowns.iter().zip(values) {
+            let row = known - 1;
+            self.current.slopes.retain(|(other, _)| *other != row);
+            self.current.slopes.push((row, value));
+        }
+        Ok(())
+    }
+
+    /// One step of `h` (s) with inputs that change at the rates that were set. Afterwards the inputs are as they were set.
+    pub(crate) fn step_on_slopes(&mut self, h: f64) -> Result<(), Fault> {
+        let current = &mut self.current;
+        let slopes = std::mem::take(&mut current.slopes);
+        let mut block = current.block.clone();
+        let (mut now, part) = (current.elapsed, h / f64::from(PARTS));
+        for k in 0..PARTS {
+            let middle = part * (f64::from(k) + 0.5);
+            for &(row, slope) in &slopes {
+                let held = real(&mut current.block, row as usize);
+                let changed = held + slope * middle;
+                match E::Model::TABLE.entry(&mut block, row as usize) {
+                    Some((meta, Slot::Real(x))) if meta.range.contains(changed) => *x = changed,
+                    _ => {
+                        let what = format!("{} + {slope} t", message::name::<E::Model>(row as usize));
+                        return Err(Fault::value(&what, changed, "inside the range of the input"));
+                    }
+                }
+            }
+            block.model.advance(&Step { start: now, h: part })?;
+            now = now.plus(part);
+        }
+        for &(row, _) in &slopes {
+            let held = real(&mut current.block, row as usize);
+            if let Some((_, Slot::Real(x))) = E::Model::TABLE.entry(&mut block, row as usize) {
+                *x = held;
+            }
+        }
+        block.model.output(current.elapsed.plus(h), &mut block.out);
+        current.block = block;
+        Ok(())
+    }
+
+    fn scratch(&mut self) -> &mut Scratch<E::Model> {
+        self.scratch.get_or_insert_with(|| {
+            Box::new(Scratch {
+                block: self.current.block.clone(),
+                rates: vec![0.0; E::CAN.states().len()],
+                seed: Vec::new(),
+                column: Vec::new(),
+            })
+        })
+    }
+
+    /// Divides the knowns into states and others, and takes the derivative.
+    fn column(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
+        let mut rates = std::mem::take(&mut self.scratch().seed);
+        rates.clear();
+        rates.resize(E::CAN.states().len(), 0.0);
+        let others = knowns.iter().zip(seed).filter(|(known, _)| {
+            // A state is not known in Initialization Mode, where the importer cannot set it.
+            self.current.life.state() == State::Initialization || !self.states.contains(&index(**known))
+        });
+        let others: Vec<(u32, f64)> = others.map(|(&known, &seed)| (known, seed)).collect();
+        for (&known, &seed) in knowns.iter().zip(seed) {
+            if let Some(i) = self.states.iter().position(|&row| row == index(known)) {
+                rates[i] = seed;
+            }
+        }
+        let done = self.along(unknowns, &others, &rates, 0.0, out);
+        self.scratch().seed = rates;
+        done
+    }
+
+    /// The change of `unknowns` along a direction: the states by `rates`, the inputs and parameters `others`, and time.
+    fn along(
+        &mut self,
+        unknowns: &[u32],
+        others: &[(u32, f64)],
+        rates: &[f64],
+        time: f64,
+        out: &mut [f64],
+    ) -> Result<(), Refusal> {
+        out.fill(0.0);
+        let initial = self.current.life.state() == State::Initialization;
+        self.refresh();
+        let inputs_only = others.iter().all(|&(known, _)| self.is_continuous_input(known));
+        if let (Some(tangent), true, false) = (E::CAN.tangent, inputs_only, initial) {
+            let now = self.current.elapsed;
+            self.scratch();
+            let Self { current, scratch, .. } = self;
+            let Some(scratch) = scratch else { return Ok(()) };
+            let direction = &mut scratch.block;
+            clear::<E>(direction);
+            for &(known, seed) in others {
+                put(direction, index(known), seed);
+            }
+            for (state, rate) in E::CAN.states().iter().zip(rates) {
+                *(state.at)(&mut direction.model) = *rate;
+            }
+            let (along, change) = (&direction.model, &mut direction.out);
+            tangent(&current.block.model, now, along, &mut scratch.rates, change).map_err(Refusal::Discard)?;
+            for (&unknown, out) in unknowns.iter().zip(out) {
+                *out = pick::<E>(&mut scratch.block, &scratch.rates, index(unknown));
+            }
+            return Ok(());
+        }
+        self.difference(unknowns, others, rates, time, initial, out)
+    }
+
+    /// The same by a central difference.
+    fn difference(
+        &mut self,
+        unknowns: &[u32],
+        others: &[(u32, f64)],
+        rates: &[f64],
+        time: f64,
+        initial: bool,
+        out: &mut [f64],
+    ) -> Result<(), Refusal> {
+        // cbrt(2^-52)
+        const SHARE: f64 = 6.055_454_452_393_343e-6;
+        let mut largest = 0.0_f64;
+        for &(known, seed) in others {
+            let block = &mut self.current.block;
+            let size = message::nominal::<E::Model>(block, index(known)).max(real(block, index(known)).abs());
+            largest = largest.max(seed.abs() / size);
+        }
+        for (i, rate) in rates.iter().enumerate() {
+            let block = &mut self.current.block;
+            let size = message::nominal::<E::Model>(block, self.states[i]);
+            largest = largest.max(rate.abs() / size);
+        }
+        if largest == 0.0 && time == 0.0 {
+            return Ok(());
+        }
+        let eps = if largest > 0.0 { SHARE / largest } else { SHARE };
+        let mut parameters = false;
+        for &(known, _) in others {
+            let row = E::Model::TABLE.entry(&mut self.current.block, index(known));
+            parameters |= row.is_some_and(|(meta, _)| meta.causality == Causality::Parameter);
+        }
+        self.scratch();
+        let Self { current, scratch, .. } = self;
+        let Some(scratch) = scratch else { return Ok(()) };
+        for side in [1.0, -1.0] {
+            let block = &mut scratch.block;
+            block.model.clone_from(&current.block.model);
+            for &(known, seed) in others {
+                let x = real(block, index(known)) + side * eps * seed;
+                put(block, index(known), x);
+            }
+            for (state, rate) in E::CAN.states().iter().zip(rates) {
+                *(state.at)(&mut block.model) += side * eps * rate;
+            }
+            let now = if time == 0.0 { current.elapsed } else { current.elapsed.plus(side * eps * time) };
+            if initial {
+                block.initialize();
+            } else if parameters {
+                block.model.derive();
+            }
+            let dx = &mut scratch.rates;
+            evaluate::<E>(block, now, initial, dx).map_err(Refusal::Discard)?;
+            for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
+                *out += side * pick::<E>(block, dx, index(unknown)) / (2.0 * eps);
+            }
+        }
+        Ok(())
+    }
+
+    fn is_continuous_input(&mut self, known: u32) -> bool {
+        E::Model::TABLE.entry(&mut self.current.block, index(known)).is_some_and(|(meta, _)| ramps(meta))
+    }
+
+    /// A continuous real output, or in Event Mode any real output.
+    fn is_output(&mut self, unknown: u32, discrete: bool) -> bool {
+        E::Model::TABLE.entry(&mut self.current.block, index(unknown)).is_some_and(|(meta, _)| {
+            meta.causality == Causality::Output
+                && matches!(meta.kind, Kind::Real(_))
+                && (discrete || meta.variability == Variability::Continuous)
+        })
+    }
+
+    /// Knowns and unknowns are what they may be in this state, each once.
+    fn check_sides(&mut self, unknowns: &[u32], knowns: &[u32]) -> Result<(), Fault> {
+        let state = self.current.life.state();
+        let initial = state == State::Initialization;
+        for (i, &unknown) in unknowns.iter().enumerate() {
+            let derivative = (0..E::CAN.states().len()).contains(&index(unknown).wrapping_sub(E::Model::TABLE.len()));
+            let entry = E::Model::TABLE.entry(&mut self.current.block, index(unknown));
+            let calculated = entry.is_some_and(|(meta, _)| {
+                meta.causality == Causality::CalculatedParameter && matches!(meta.kind, Kind::Real(_))
+            });
+            let of_start = initial && (calculated || self.states.contains(&index(unknown)));
+            if !(derivative || of_start || self.is_output(unknown, state == State::Event || initial)) {
+                return Err(self.no_side(unknown, "an unknown of derivatives in this state"));
+            }
+            if unknowns[..i].contains(&unknown) {
+                return Err(self.no_side(unknown, "named once among the unknowns"));
+            }
+        }
+        for (i, &known) in knowns.iter().enumerate() {
+            let state_row = self.states.contains(&index(known)) && !initial;
+            let parameters = self.standard == Standard::Fmi3;
+            let entry = E::Model::TABLE.entry(&mut self.current.block, index(known));
+            let input = entry.is_some_and(|(meta, _)| {
+                let fits = match meta.causality {
+                    Causality::Input => meta.variability == Variability::Continuous || state == State::Event || initial,
+                    Causality::Parameter => initial || (parameters && meta.variability == Variability::Tunable),
+                    _ => false,
+                };
+                fits && matches!(meta.kind, Kind::Real(_)) && meta.dimension.is_none()
+            });
+            if !(state_row || input) {
+                return Err(self.no_side(known, "a known of derivatives in this state"));
+            }
+            if knowns[..i].contains(&known) {
+                return Err(self.no_side(known, "named once among the knowns"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_sizes(&self, seed: (usize, usize), out: (usize, usize)) -> Result<(), Fault> {
+        match (seed, out) {
+            ((given, needed), _) if given != needed => Err(Fault::value("nSeed", given, format_args!("{needed}"))),
+            (_, (given, needed)) if given != needed => {
+                Err(Fault::value("nSensitivity", given, format_args!("{needed}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    #[cold]
+    fn no_side(&self, reference: u32, wanted: &str) -> Fault {
+        let exists = E::Model::TABLE.locate(index(reference)).is_some();
+        let name = if exists { message::name::<E::Model>(index(reference)) } else { format!("reference {reference}") };
+        Fault::new(format!("{name} is not {wanted}"))
+    }
+}
+
+/// Refuses what a model without states lacks.
+fn supported<E: Exported>(lacks: &str) -> Result<(), Fault> {
+    if E::CAN.continuous.is_some() { Ok(()) } else { Err(Fault::new(format!("not supported: {lacks}"))) }
+}
+
+/// The derivatives and outputs of a block.
+fn evaluate<E: Exported>(
+    block: &mut Block<E::Model>,
+    now: Elapsed,
+    initial: bool,
+    dx: &mut [f64],
+) -> Result<(), Fault> {
+    let Some(continuous) = &E::CAN.continuous else {
+        block.model.output(now, &mut block.out);
+        return Ok(());
+    };
+    if !initial {
+        (continuous.settle)(&mut block.model);
+        (continuous.observe)(&block.model, now, &mut block.out);
+    }
+    (continuous.derivatives)(&block.model, now, dx)
+}
+
+/// An unknown's value: a derivative, or a row of the table.
+fn pick<E: Exported>(block: &mut Block<E::Model>, dx: &[f64], index: usize) -> f64 {
+    match dx.get(index.wrapping_sub(E::Model::TABLE.len())) {
+        Some(x) => *x,
+        None => real(block, index),
+    }
+}
+
+/// Makes a direction: no continuous input and no state changes.
+fn clear<E: Exported>(direction: &mut Block<E::Model>) {
+    for index in 0..E::Model::TABLE.len() {
+        if let Some((meta, Slot::Real(x))) = E::Model::TABLE.entry(direction, index)
+            && ramps(meta)
+        {
+            *x = 0.0;
+        }
+    }
+    for state in E::CAN.states() {
+        *(state.at)(&mut direction.model) = 0.0;
+    }
+}
+
+fn real<M: Model>(block: &mut Block<M>, index: usize) -> f64 {
+    match M::TABLE.entry(block, index) {
+        Some((_, Slot::Real(x))) => *x,
+        _ => f64::NAN,
+    }
+}
+
+fn put<M: Model>(block: &mut Block<M>, index: usize, value: f64) {
+    if let Some((_, Slot::Real(x))) = M::TABLE.entry(block, index) {
+        *x = value;
+    }
+}
