@@ -1,8 +1,8 @@
 //! The one lifecycle table: which call is allowed in which state, for both standards, and where it leads.
 //!
-//! FMI 2.0.5, 4.2.4 (state machine of co-simulation) and FMI 3.0.2, 4.2.1. The states that are not here (configuration,
-//! event and intermediate-update mode, step in progress) do not exist in an FMU without structural parameters, clocks
-//! and asynchronous steps: the calls that would lead to them are [`Call::Unsupported`].
+//! FMI 2.0.5, 4.2.4 (state machine of co-simulation) and FMI 3.0.2, 2.3 and 4.2. The states that are not here
+//! (configuration, event and intermediate-update mode, step in progress) do not exist in an FMU without structural
+//! parameters, clocks and asynchronous steps: the calls that would lead to them are [`Call::Unsupported`].
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -144,8 +144,8 @@ impl Call {
             Self::ExitInitialization => both(&[Initialization], Some(Step)),
             Self::Terminate => both(&[Step], Some(Terminated)),
             Self::Reset => both(&State::ALL, Some(Instantiated)),
-            // FMI 3.0.2, 2.3.3 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
-            // In Error: for debugging (2.0.5, table in 4.2.4).
+            // FMI 3.0.2, 2.3.2 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
+            // In Error: for debugging (table of FMI 2.0.5, 4.2.4).
             Self::Get => each(&[Initialization, Step, Terminated, Error], &State::ALL),
             Self::Set => both(&[Instantiated, Initialization, Step], None),
             Self::DoStep => both(&[Step], None),

@@ -43,7 +43,7 @@ impl<M: Model> Abi<M> {
         }
     }
 
-    /// FMI 3.0.2, 4.2.1.1. Without event mode and early return, only the time carries information.
+    /// FMI 3.0.2, 4.2.1. Without event mode and early return, only the time carries information.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_do_step(
         entry: Entry,

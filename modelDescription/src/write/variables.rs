@@ -42,7 +42,7 @@ fn time(version: FmiVersion) -> Element {
     }
 }
 
-/// FMI 2.0 has no arrays: one scalar per element, `name[1]` the first (2.2.9).
+/// FMI 2.0 has no arrays: one scalar per element, `name[1]` the first (2.0.5, 2.2.9).
 fn scalars(v: &Variable) -> Vec<Element> {
     let element = |name: &str, offset: u32, start: Option<&Value>| {
         let mut typed = Element::new(match v.kind {
