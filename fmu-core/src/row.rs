@@ -1,6 +1,6 @@
 //! One row of a variable table: what the variable is and the closure that finds its value, or a part with its own table.
 //!
-//! Only causality/variability pairs that FMI 2.0.5 (2.2.7) and FMI 3.0.2 (2.4.7.4) allow have a constructor. Start
+//! Only causality/variability pairs that FMI 2.0.5, 2.2.7 and FMI 3.0.2, 2.4.7.4 allow have a constructor. Start
 //! values are not written here: they come from the model's `Default`.
 
 use crate::enumeration::{Choice, Enumerated, Field, Place};
@@ -247,7 +247,7 @@ impl<W: 'static> Row<W> {
         self
     }
 
-    /// The variable is unbounded, like an angle that is not wrapped (FMI 3.0.2, 2.4.7.5 `unbounded`).
+    /// The variable is unbounded, like an angle that is not wrapped (FMI 3.0.2, 2.4.4 `unbounded`).
     pub const fn unbounded(mut self) -> Self {
         self.meta.unbounded = true;
         self

@@ -280,7 +280,7 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// As many values as references, or in FMI 3.0 as many as the variables have elements (3.0.2, 2.2.6.2).
+    /// As many values as references, or in FMI 3.0 as many as the variables have elements (3.0.2, 2.2.7.2).
     #[inline]
     fn check_count(&mut self, references: &[u32], given: usize) -> Result<(), Fault> {
         let mut needed = references.len();

@@ -1,7 +1,7 @@
 //! The one lifecycle table: which call is allowed in which state, for both standards and all interfaces, and where it
 //! leads.
 //!
-//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2.1 and 4.2.1. The states that are not here (configuration and
+//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2 and 4.2. The states that are not here (configuration and
 //! intermediate-update mode, step in progress) do not exist in an FMU without structural parameters, intermediate update
 //! and asynchronous steps: the calls that would lead to them are [`Call::Unsupported`].
 
@@ -226,7 +226,7 @@ impl Call {
             Self::ExitInitialization => any(both(&[Initialization]), Start),
             Self::Terminate => any(both(&[Step, Event, Continuous]), To(Terminated)),
             Self::Reset => any(both(&State::ALL), To(Instantiated)),
-            // FMI 3.0.2, 2.3.3 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
+            // FMI 3.0.2, 2.3.2 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
             // In Error: for debugging (2.0.5, table in 4.2.4).
             Self::Get => any(
                 each(&[Initialization, Step, Event, Continuous, Terminated, Error], &State::ALL),
@@ -239,7 +239,7 @@ impl Call {
                 any(both(&[Instantiated, Initialization, Step, Event, Continuous, Terminated]), Stay)
             }
             Self::Status => stepping(each(&[Step, Terminated], &[]), Stay),
-            // An FMU of FMI 2.0 without states may never leave Event Mode (2.0.5, note 8 in 3.2.3).
+            // An FMU of FMI 2.0 without states may never leave Event Mode (FMI 2.0.5, 3.2.3).
             Self::EnterEvent => Row {
                 event: States::of(&[Step]),
                 ..exchange(each(&[Event, Continuous], &[Continuous]), To(Event))

@@ -1,4 +1,4 @@
-//! Whether a communication step continues the simulation (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1.1).
+//! Whether a communication step continues the simulation (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1).
 
 use crate::snapshot::Snapshot;
 use fmu_core::{Elapsed, Fault, Model};

@@ -34,7 +34,7 @@ pub trait Value: Copy + Display + PartialEq {
     }
 }
 
-/// `fmi2Integer`: carries enumerations too (FMI 2.0.5, 2.1.7).
+/// `fmi2Integer`: carries enumerations too (FMI 2.0.5, 2.2.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct Fmi2Integer(pub c_int);
@@ -132,7 +132,7 @@ impl Value for i32 {
     }
 }
 
-/// `fmi3Int64`, the type of an enumeration (FMI 3.0.2, 2.4.7.8).
+/// `fmi3Int64`, the type of an enumeration (FMI 3.0.2, 2.2.7.2).
 impl Value for i64 {
     const CARRIES: &'static str = "an enumeration";
 

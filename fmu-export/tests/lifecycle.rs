@@ -1,4 +1,4 @@
-//! Every function in every state, against tables written by hand from FMI 2.0.5, 4.2.4 and FMI 3.0.2, 4.2.1.
+//! Every function in every state, against tables written by hand from FMI 2.0.5, 4.2.4 and FMI 3.0.2, 2.3 and 4.2.
 //!
 //! States: i instantiated, n initialization, s step, t terminated, e error. After a success the state is the one named
 //! (`.`: as before), after a failure it is e, and there is one message that names the function.

@@ -118,7 +118,8 @@ pub fn newest_glibc(file: &ElfFile64<'_>) -> Result<Option<Glibc>, object::Error
     Ok(newest)
 }
 
-/// The version that a symbol's version names: 2.2.5 is 2.2 here, PRIVATE is none, relative relocations came with 2.36.
+/// The version that a symbol's version names: GLIBC_2.2.5 is 2.2 here, GLIBC_PRIVATE is none, relative relocations came
+/// with 2.36.
 fn version_of(name: &str) -> Option<Glibc> {
     let number = name.strip_prefix("GLIBC_")?;
     let mut parts = number.split('.').map(str::parse);

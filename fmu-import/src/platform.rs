@@ -63,7 +63,7 @@ impl Platform {
         }
     }
 
-    /// The folders under `binaries/` to look in, the one to write to first. FMI 2.0.5 (2.3) names three of 64 bits and
+    /// The folders under `binaries/` to look in, the one to write to first. FMI 2.0.5, 2.3 names three of 64 bits and
     /// lets others take the tuples of FMI 3.0.
     pub fn folders(self, version: FmiVersion) -> Vec<&'static str> {
         match (version, self) {

@@ -63,7 +63,7 @@ impl ModelDescription {
     }
 
     /// The variable that a number in the model structure refers to: its position in the list, from 1, in FMI 2.0
-    /// (2.2.8); its value reference in FMI 3.0 (2.4.8).
+    /// (2.0.5, 2.2.8); its value reference in FMI 3.0 (3.0.2, 2.4.8).
     pub fn referenced(&self, reference: u32) -> Option<&ModelVariable> {
         match self.version {
             FmiVersion::V2 => self.variables.get(usize::try_from(reference).ok()?.checked_sub(1)?),

@@ -71,7 +71,7 @@ fn tree(bytes: &[u8], expected: &'static str) -> Result<Element, Error> {
 /// The version, before anything else: FMI 1.0 has the same root element and other attributes.
 fn version(root: &Element) -> Result<FmiVersion, Error> {
     let found = required(root, "fmiVersion")?;
-    // FMI 3.0.2, 2.4.1 allows patch numbers and suffixes, 3.0.1 or 3.0-rc.2.
+    // The schema of FMI 3.0 allows patch numbers and suffixes, 3.0.1 or 3.0-rc.2; FMI 3.0.2, 2.4.1 has 3.0-alpha.2.
     let patch = found.strip_prefix("3.0").is_some_and(|rest| rest.starts_with(['.', '-']));
     match found {
         "2.0" => Ok(FmiVersion::V2),

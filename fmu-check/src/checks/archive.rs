@@ -6,13 +6,13 @@ use crate::fmu_file::FmuFile;
 use crate::zip_headers::{Entry, Header, is_inside};
 use model_description::FmiVersion;
 
-const ZIP: &str = "2.0.5, 2.3; 3.0.2, 2.5.1";
-const STRUCTURE: &str = "2.0.5, 2.3; 3.0.2, 2.5.1.4";
+const ZIP: &str = "2.0.5, 2.3; 3.0.2, 2.5";
+const STRUCTURE: &str = "2.0.5, 2.3; 3.0.2, 2.5.1";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "Z01a", requirement: "The file extension is .fmu.", clause: ZIP, levels: Levels::MUST, run: Run::File(extension) },
-    Check { id: "Z01b", requirement: "Entries have relative names with forward slashes and stay inside the archive.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1; APPNOTE 4.4.17", levels: Levels::MUST, run: Run::File(names) },
+    Check { id: "Z01b", requirement: "Entries have relative names with forward slashes and stay inside the archive.", clause: "2.0.5, 2.3; 3.0.2, 2.5; APPNOTE 4.4.17", levels: Levels::MUST, run: Run::File(names) },
     Check { id: "Z01c", requirement: "Entry names are ASCII.", clause: ZIP, levels: Levels::SHOULD, run: Run::File(ascii) },
     Check { id: "Z01d", requirement: "Entries are stored or deflated (method 0 or 8).", clause: ZIP, levels: Levels::MUST, run: Run::File(methods) },
     Check { id: "Z01e", requirement: "A data descriptor (general purpose bit 3) occurs only with deflate.", clause: ZIP, levels: Levels::MUST, run: Run::File(descriptors) },
@@ -31,8 +31,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "Z04c", requirement: "An FMU that needs an execution tool describes it in documentation/externalDependencies.txt or .html.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(dependencies) },
     Check { id: "Z05", requirement: "Every SVG icon or diagram is accompanied by a PNG.", clause: "3.0.2, 2.5.1", levels: Levels(None, Some(Level::Must)), run: Run::File(pictures) },
     Check { id: "Z06", requirement: "Folders below extra/ have reverse domain names.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.6", levels: Levels::SHOULD, run: Run::File(extra) },
-    Check { id: "Z07", requirement: "Sources include sources/buildDescription.xml and exclude the headers of the standard.", clause: "3.0.2, 2.5.1.2", levels: Levels(Some(Level::Should), Some(Level::Should)), run: Run::File(sources) },
-    Check { id: "I03", requirement: "A manifest of a layered standard (extra/*/fmi-ls-manifest.xml) is well-formed and gives name, version and description in its namespace.", clause: "3.0.2, 2.5.1.6; fmi3LayeredStandardManifest.xsd", levels: Levels::MUST, run: Run::File(manifests) },
+    Check { id: "Z07", requirement: "Sources include sources/buildDescription.xml and exclude the headers of the standard.", clause: "3.0.2, 2.5.1.3", levels: Levels(Some(Level::Should), Some(Level::Should)), run: Run::File(sources) },
+    Check { id: "I03", requirement: "A manifest of a layered standard (extra/*/fmi-ls-manifest.xml) is well-formed and gives name, version and description in its namespace.", clause: "3.0.2, 2.6; fmi3LayeredStandardManifest.xsd", levels: Levels::MUST, run: Run::File(manifests) },
 ];
 
 /// A finding for each entry that the rule refuses.

@@ -1,4 +1,4 @@
-//! Derivatives of outputs with respect to time (FMI 2.0.5, 4.2.1; FMI 3.0.2, 4.2.1.1).
+//! Derivatives of outputs with respect to time (FMI 2.0.5, 4.2.1; FMI 3.0.2, 4.1.2).
 
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;

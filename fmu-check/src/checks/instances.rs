@@ -6,7 +6,7 @@ use crate::session::{NotDetermined, Session};
 use crate::trajectory::{difference, trajectory};
 use fmu_import::raw::Raw;
 
-const ONCE: &str = "2.0.5, 2.1.1 and 4.3.1; 3.0.2, 2.2.1 and 2.4.5";
+const ONCE: &str = "2.0.5, 2.1 and 4.3.1; 3.0.2, 2.2.1 and 2.4.2";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[

@@ -1,4 +1,4 @@
-//! Manifests of layered standards (FMI 3.0.2, 2.5.1.6).
+//! Manifests of layered standards (FMI 3.0.2, 2.6).
 
 use crate::check::Verdict;
 use crate::fmu_file::FmuFile;

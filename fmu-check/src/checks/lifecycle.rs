@@ -1,5 +1,5 @@
 //! The life cycle: allowed calls succeed, others are refused, and none crashes the process
-//! (FMI 2.0.5, 2.1.5 and 4.2.4; FMI 3.0.2, 2.2.3, 2.3 and 4.2).
+//! (FMI 2.0.5, 2.1.5 and 4.2.4; FMI 3.0.2, 2.2.4, 2.3 and 4.2).
 
 use super::lifecycle_states::State::{Error, Initialization, Instantiated, Step, Terminated};
 use super::lifecycle_states::in_state;
@@ -26,14 +26,14 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "L05", requirement: "FreeInstance is allowed in every state and ignores NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(free) },
     Check { id: "L06", requirement: "Reset, in any state, restores a new instance: a second run equals the first bit for bit.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(reset) },
     Check { id: "L07", requirement: "Every call that the state allows succeeds.", clause: STATES, levels: Levels::MUST, run: Run::Probe(allowed) },
-    Check { id: "L08", requirement: "Every call that the state does not allow returns Error.", clause: "3.0.2, 2.2.3", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(refused) },
+    Check { id: "L08", requirement: "Every call that the state does not allow returns Error.", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(refused) },
     Check { id: "L08u", requirement: "A function of a capability that the FMU does not have returns Error in every state.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::HARD, run: Run::Probe(unsupported) },
-    Check { id: "C03", requirement: "Without structural parameters, configuration mode is refused.", clause: "3.0.2, 2.3.2", levels: Levels(None, Some(Level::Should)), run: Run::Probe(configuration) },
+    Check { id: "C03", requirement: "Without structural parameters, configuration mode is refused.", clause: "3.0.2, 2.3.6", levels: Levels(None, Some(Level::Should)), run: Run::Probe(configuration) },
     Check { id: "L08n", requirement: "Every call without an instance (NULL) returns Error.", clause: "3.0.2, 2.2.1", levels: Levels::HARD, run: Run::Probe(null_instance) },
     Check { id: "L09a", requirement: "After an Error, the next step is refused.", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(after_error) },
-    Check { id: "L09b", requirement: "After an Error, Reset restores a working instance.", clause: "2.0.5, 4.2.4; 3.0.2, 2.2.3", levels: Levels::MUST, run: Run::Probe(recovery) },
-    Check { id: "L10", requirement: "After Terminate, the last values can be read.", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.7", levels: Levels::MUST, run: Run::Probe(terminated) },
-    Check { id: "L12", requirement: "A step beyond the stop time returns Error.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Probe(past_stop_time) },
+    Check { id: "L09b", requirement: "After an Error, Reset restores a working instance.", clause: "2.0.5, 4.2.4; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(recovery) },
+    Check { id: "L10", requirement: "After Terminate, the last values can be read.", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.8", levels: Levels::MUST, run: Run::Probe(terminated) },
+    Check { id: "L12", requirement: "A step beyond the stop time returns Error.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.2", levels: Levels::MUST, run: Run::Probe(past_stop_time) },
 ];
 
 fn minimal_run(session: &Session) -> Result<(), NotDetermined> {

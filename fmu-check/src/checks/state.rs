@@ -1,4 +1,4 @@
-//! Saved states (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.6.4).
+//! Saved states (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
 
 use super::lifecycle_states::{State, in_state};
 use crate::check::{Check, Levels, Run};
@@ -9,7 +9,7 @@ use fmu_import::Status;
 use fmu_import::raw::SavedState;
 use model_description::{CoSimulation, ModelVariable};
 
-const STATE: &str = "2.0.5, 2.1.8; 3.0.2, 2.2.6.4";
+const STATE: &str = "2.0.5, 2.1.8; 3.0.2, 2.2.7.4";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
@@ -17,7 +17,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "F01b", requirement: "Reading a state into an existing one overwrites it, and freeing NULL is ignored.", clause: STATE, levels: Levels::MUST, run: Run::Probe(overwrite) },
     Check { id: "F02a", requirement: "A run from a restored state equals the run from the time of saving, bit for bit.", clause: STATE, levels: Levels::MUST, run: Run::Probe(rerun_from_state) },
     Check { id: "F02b", requirement: "A restored state restores all variables: parameters, inputs and outputs.", clause: STATE, levels: Levels::MUST, run: Run::Probe(variables) },
-    Check { id: "F02c", requirement: "After an Error, a state saved earlier restores a working instance.", clause: "2.0.5, 4.2.4; 3.0.2, 2.2.3", levels: Levels::MUST, run: Run::Probe(after_error) },
+    Check { id: "F02c", requirement: "After an Error, a state saved earlier restores a working instance.", clause: "2.0.5, 4.2.4; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(after_error) },
     Check { id: "F03a", requirement: "A state can be set into another instance of the FMU.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(other_instance) },
     Check { id: "F03b", requirement: "A NULL state and a NULL pointer to a state give Error.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(null_states) },
     Check { id: "F04a", requirement: "A serialized state can be restored in another instance: the run from it is equal bit for bit.", clause: STATE, levels: Levels::MUST, run: Run::Probe(serialized) },

@@ -21,8 +21,8 @@ const LIMIT: u64 = 64 << 20;
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "I01", requirement: "terminalsAndIcons.xml has the elements and version of the standard and names variables that exist.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(elements) },
     Check { id: "I01n", requirement: "Terminal names are present and unique, and so are member names wherever members are matched by name.", clause: "3.0.2, 2.4.9.2", levels: Levels::MUST, run: Run::File(names) },
-    Check { id: "I01k", requirement: "Members are inputs, outputs or parameters; inflows and outflows are scalar; vendor-specific matching rules have reverse domain names.", clause: "3.0.2, 2.4.9.2.3", levels: Levels::MUST, run: Run::File(kinds) },
-    Check { id: "I01p", requirement: "Pictures are available as PNG, and the corners of the coordinate system are in order.", clause: "3.0.2, 2.4.9.1", levels: Levels::MUST, run: Run::File(pictures) },
+    Check { id: "I01k", requirement: "Members are inputs, outputs or parameters; inflows and outflows are scalar; vendor-specific matching rules have reverse domain names.", clause: "3.0.2, 2.4.9.2", levels: Levels::MUST, run: Run::File(kinds) },
+    Check { id: "I01p", requirement: "Pictures are available as PNG, and the corners of the coordinate system are in order.", clause: "3.0.2, 2.4.9.1 and 2.4.9.2.5", levels: Levels::MUST, run: Run::File(pictures) },
     Check { id: "I02", requirement: "Without terminalsAndIcons/ and extra/ the FMU gives the same results, bit for bit.", clause: "3.0.2, 2.4.9 and 2.5.1.6", levels: Levels::MUST, run: Run::Probe(stripped) },
 ];
 

@@ -9,7 +9,7 @@ use fmu_import::Status;
 use fmu_import::raw::StepStatus;
 use model_description::{BaseType, Causality, CoSimulation};
 
-const STEP: &str = "2.0.5, 4.2.2; 3.0.2, 4.2.1.1";
+const STEP: &str = "2.0.5, 4.2.2; 3.0.2, 4.2.1";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
@@ -19,13 +19,13 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "T02a", requirement: "A step size of 0 or less gives Error.", clause: STEP, levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(non_positive_step) },
     Check { id: "T02b", requirement: "A step size or time that is NaN or infinite gives Error and returns promptly.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(non_finite_step) },
     Check { id: "T03", requirement: "Halving the communication step gives approximately the same results with inputs held.", clause: STEP, levels: Levels::HARD, run: Run::Probe(halves) },
-    Check { id: "T04", requirement: "With canHandleVariableCommunicationStepSize, steps of any size succeed.", clause: "2.0.5, 4.3.1; 3.0.2, 4.3", levels: Levels::MUST, run: Run::Probe(variable) },
-    Check { id: "T05", requirement: "noSetFMUStatePriorToCurrentPoint changes no result, and the state at the current point can still be saved and set.", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1.1", levels: Levels::MUST, run: Run::Probe(no_set_state_before) },
-    Check { id: "T06a", requirement: "After OK, lastSuccessfulTime is t + h unless the step returned early, which must be allowed; Booleans are 0 or 1.", clause: "3.0.2, 4.2.1.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results) },
+    Check { id: "T04", requirement: "With canHandleVariableCommunicationStepSize, steps of any size succeed.", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::MUST, run: Run::Probe(variable) },
+    Check { id: "T05", requirement: "noSetFMUStatePriorToCurrentPoint changes no result, and the state at the current point can still be saved and set.", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(no_set_state_before) },
+    Check { id: "T06a", requirement: "After OK, lastSuccessfulTime is t + h unless the step returned early, which must be allowed; Booleans are 0 or 1.", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results) },
     Check { id: "T06b", requirement: "The independent variable equals the time of the last communication point.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent) },
     Check { id: "T06c", requirement: "NULL pointers for results do no harm.", clause: "3.0.2, 2.2.1", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(null_results) },
     Check { id: "T07", requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), run: Run::Probe(statuses) },
-    Check { id: "T09", requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read and match their slopes; order 0 and orders above the maximum give Error.", clause: "2.0.5, 4.2.1; 3.0.2, 4.2.1.1", levels: Levels::MUST, run: Run::Probe(output_derivatives) },
+    Check { id: "T09", requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read and match their slopes; order 0 and orders above the maximum give Error.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::MUST, run: Run::Probe(output_derivatives) },
     Check { id: "T10", requirement: "Two consecutive runs with the same inputs are equal bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(determinism) },
     Check { id: "T10p", requirement: "Two processes with different addresses give the same results bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes) },
 ];

@@ -26,7 +26,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "V06a", requirement: "min <= start <= max, and nominal is not 0.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(ranges) },
     Check { id: "V08a", requirement: "declaredType names a type definition of the same base type; every enumeration has one.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::File(types) },
     Check { id: "V08b", requirement: "Type definitions have unique names; enumeration items have unique names and values.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(definitions) },
-    Check { id: "V09a", requirement: "Every unit is defined in UnitDefinitions, and every display unit belongs to its unit.", clause: "2.0.5, 2.2.2 and 2.2.7; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unit_names) },
+    Check { id: "V09a", requirement: "Every unit is defined in UnitDefinitions, and every display unit belongs to its unit.", clause: "2.0.5, 2.2.2 and 2.2.7; 3.0.2, 2.4.3 and 2.4.7.5", levels: Levels::MUST, run: Run::File(unit_names) },
     Check { id: "V09b", requirement: "Unit names are unique, and display unit names are unique within their unit.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unique_units) },
     Check { id: "V09c", requirement: "The base unit of a common unit has the exponents and factor that the name implies.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(bases) },
     Check { id: "V09d", requirement: "A common display unit has the factor that its name implies (display = factor * value + offset).", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(displays) },

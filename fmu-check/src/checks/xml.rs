@@ -1,4 +1,4 @@
-//! modelDescription.xml: syntax, header, interface (FMI 2.0.5, 2.2.1, 2.2.5, 4.3.1; FMI 3.0.2, 2.4.1, 2.4.5, 4.3).
+//! modelDescription.xml: syntax, header, interface (FMI 2.0.5, 2.2.1, 2.2.5, 4.3.1; FMI 3.0.2, 2.4.1, 2.4.2, 2.4.6, 4.4).
 
 use super::schema;
 use crate::check::{Check, Level, Levels, Run, Verdict};
@@ -12,11 +12,11 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "X02a", requirement: "fmiVersion is 2.0 or 3.0, without a patch release.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::MUST, run: Run::File(version) },
     Check { id: "X05", requirement: "generationDateAndTime has the form YYYY-MM-DDThh:mm:ssZ.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::SHOULD, run: Run::File(date) },
     Check { id: "X06", requirement: "The attributes description, author, version, copyright, license and generationTool are given.", clause: "fmi-guides, 3", levels: Levels::SHOULD, run: Run::File(metadata) },
-    Check { id: "X08", requirement: "Every capability flag that requires another flag is accompanied by it.", clause: "2.0.5, 4.3.1; 3.0.2, 2.4.5 and 4.3", levels: Levels::MUST, run: Run::File(flags) },
+    Check { id: "X08", requirement: "Every capability flag that requires another flag is accompanied by it.", clause: "2.0.5, 4.3.1; 3.0.2, 2.4.2 and 4.4", levels: Levels::MUST, run: Run::File(flags) },
     Check { id: "X10", requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, and the tolerance is not negative.", clause: "2.0.5, 2.2.5; 3.0.2, 2.4.6", levels: Levels::SHOULD, run: Run::File(experiment) },
     Check { id: "X11", requirement: "An FMU without model exchange does not use the attribute reinit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(reinit) },
-    Check { id: "X12", requirement: "Numbers are finite and spelled as xs:double.", clause: "2.0.5, 2.1.3", levels: Levels(Some(Level::Must), None), run: Run::File(numbers) },
-    Check { id: "G-L1a", requirement: "Log categories have unique names.", clause: "2.0.5, 2.2.4; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(categories) },
+    Check { id: "X12", requirement: "Numbers are finite and spelled as xs:double.", clause: "2.0.5, 2.2", levels: Levels(Some(Level::Must), None), run: Run::File(numbers) },
+    Check { id: "G-L1a", requirement: "Log categories have unique names.", clause: "2.0.5, 2.2.4; 3.0.2, 2.4.5", levels: Levels::MUST, run: Run::File(categories) },
 ];
 
 /// A check of the elements.

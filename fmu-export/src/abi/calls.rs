@@ -112,7 +112,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    /// `state` points to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.6.4).
+    /// `state` points to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
     pub unsafe fn save_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {

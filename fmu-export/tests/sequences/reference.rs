@@ -1,4 +1,5 @@
-//! What must come out: FMI 2.0.5, 4.2.4 and FMI 3.0.2, 4.2.1 written down once more, by hand, and the model run natively.
+//! What must come out: FMI 2.0.5, 4.2.4 and FMI 3.0.2, 2.3 and 4.2 written down once more, by hand, and the model run
+//! natively.
 
 use crate::common::model::*;
 use crate::common::{DISCARD, ERROR, OK};

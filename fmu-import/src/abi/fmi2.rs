@@ -1,4 +1,4 @@
-//! Calls of FMI 2.0 for co-simulation (FMI 2.0.5, chapters 2.1 and 4.2).
+//! Calls of FMI 2.0 for co-simulation (FMI 2.0.5, 2.1 and 4.2).
 
 use super::Loaded;
 use super::library::symbols;

@@ -1,4 +1,4 @@
-//! Calls of FMI 3.0 for co-simulation, without event mode and early return (FMI 3.0.2, chapters 2.2 and 4.2).
+//! Calls of FMI 3.0 for co-simulation, without event mode and early return (FMI 3.0.2, 2.2, 2.3 and 4.2).
 
 use super::Loaded;
 use super::library::symbols;

@@ -45,7 +45,7 @@ fn time(version: FmiVersion) -> Element {
     }
 }
 
-/// FMI 2.0 has no arrays: one scalar per element, `name[1]` the first (2.2.9).
+/// FMI 2.0 has no arrays: one scalar per element, `name[1]` the first (2.0.5, 2.2.9).
 fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
     let state = v.derivative.map(|reference| index(description, reference).to_string());
     let element = |name: &str, offset: u32, start: Option<&Value>| {

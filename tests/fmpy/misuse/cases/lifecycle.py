@@ -9,7 +9,7 @@ from ..signatures import FUNCTIONS, UNSUPPORTED
 
 STATES = "INSTE"  # instantiated, initialization, step, terminated, error
 
-# Where each call is allowed (FMI 2.0.5, table in 4.2.4; FMI 3.0.2, 4.2.1). After an error: get, reset, states, free.
+# Where each call is allowed (tables of FMI 2.0.5, 4.2.4 and FMI 3.0.2, 2.3 and 4.2). After an error: get, reset, states, free.
 ALLOWED = {
     "SetDebugLogging": "INSTE",
     "EnterInitializationMode": "I",
