@@ -6,7 +6,7 @@
 mod timing;
 
 use drive::SensorlessController;
-use fmu_core::Model;
+use fmu_core::Exported;
 use fmu_export::abi::types::{Fmi2Boolean, FmuState, Instance, c_int};
 use fmu_export::snapshot::Snapshot;
 use std::ffi::CString;
@@ -18,7 +18,7 @@ fmu_export::export!(SensorlessController);
 
 fn main() {
     let (no, h) = (Fmi2Boolean(0), 1e-4);
-    let token = CString::new(SensorlessController::TOKEN.as_str()).unwrap_or_default();
+    let token = CString::new(fmi::This::TOKEN.as_str()).unwrap_or_default();
     // An importer calls through pointers that the compiler does not know.
     let save: unsafe extern "C" fn(Instance, *mut FmuState) -> c_int = black_box(fmi::fmi2GetFMUstate);
     let restore: unsafe extern "C" fn(Instance, FmuState) -> c_int = black_box(fmi::fmi2SetFMUstate);

@@ -8,7 +8,7 @@ mod counting;
 use counting::{calls, neighbor};
 use drive::estimator::Kind;
 use drive_study::runner::{self, RATED_SPEED};
-use fmu_core::{Block, Model};
+use fmu_core::{Block, Model, Plain};
 use fmu_export::instance::Instance;
 use fmu_export::lifecycle::Standard;
 use fmu_export::log::{Log, Sink, Status};
@@ -18,7 +18,7 @@ use fmu_export::snapshot::Snapshot;
 /// Saves and restores a block's state.
 fn again_and_again<M: Model>(block: Block<M>, what: &str) {
     let log = Log::new(Box::new(Silent), false);
-    let mut instance = Instance::new(Standard::Fmi3, what.into(), log, Snapshot { block, ..Snapshot::default() });
+    let mut instance = Instance::<Plain<M>>::new(Standard::Fmi3, what.into(), log, Snapshot { block, ..Snapshot::default() });
     let handle = instance.save(0).unwrap();
     let before = calls();
     for _ in 0..100 {

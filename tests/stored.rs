@@ -6,9 +6,9 @@
 use drive::estimator::Kind;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController};
 use drive_study::runner;
-use fmu_core::{Block, Model};
+use fmu_core::{Block, Model, Plain};
 use fmu_export::instance::Instance;
-use fmu_export::lifecycle::{Standard, State};
+use fmu_export::lifecycle::{Next, Standard, State};
 use fmu_export::log::{Log, Sink, Status};
 use fmu_export::snapshot::Snapshot;
 use fmu_export::{blob, registry};
@@ -78,7 +78,7 @@ fn watch(name: &'static str) -> Arc<AtomicU64> {
     trial
 }
 
-fn instance<M: Model>(current: Snapshot<M>) -> Instance<M> {
+fn instance<M: Model>(current: Snapshot<M>) -> Instance<Plain<M>> {
     Instance::new(Standard::Fmi3, "stored".into(), Log::new(Box::new(Silent), false), current)
 }
 
@@ -91,9 +91,9 @@ fn put<M: Model>(current: &mut Snapshot<M>, name: &str, value: f64) {
 }
 
 /// Ends initialization as the gate would.
-fn exit<M: Model>(instance: &mut Instance<M>) -> bool {
+fn exit<M: Model>(instance: &mut Instance<Plain<M>>) -> bool {
     let done = instance.exit_initialization().is_ok();
-    instance.current.life.after(done, Some(State::Step));
+    instance.current.life.after(done, Next::Start);
     done
 }
 
@@ -102,7 +102,7 @@ fn seeds<M: Model>(block: Block<M>) -> Vec<Vec<u8>> {
     let mut instance = instance(Snapshot { block, ..Snapshot::default() });
     let mut seeds = vec![blob::write(&instance.current).unwrap()];
     instance.set_up(0.5, Some(1e3)).unwrap();
-    instance.current.life.after(true, Some(State::Initialization));
+    instance.current.life.after(true, Next::To(State::Initialization));
     seeds.push(blob::write(&instance.current).unwrap());
     assert!(exit(&mut instance));
     for k in 0..400 {
@@ -116,7 +116,7 @@ fn seeds<M: Model>(block: Block<M>) -> Vec<Vec<u8>> {
         instance.do_step(instance.current.end, H).unwrap();
     }
     seeds.push(blob::write(&instance.current).unwrap());
-    instance.current.life.after(true, Some(State::Terminated));
+    instance.current.life.after(true, Next::To(State::Terminated));
     seeds.push(blob::write(&instance.current).unwrap());
     seeds
 }
@@ -195,7 +195,7 @@ fn trial<M: Model>(bytes: &[u8]) -> Option<Duration> {
     QUIET.set(true);
     let _ = catch_unwind(AssertUnwindSafe(|| {
         if instance.current.life.state() == State::Instantiated && instance.set_up(0.0, None).is_ok() {
-            instance.current.life.after(true, Some(State::Initialization));
+            instance.current.life.after(true, Next::To(State::Initialization));
         }
         if instance.current.life.state() == State::Initialization && !exit(&mut instance) {
             return;

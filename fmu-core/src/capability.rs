@@ -8,6 +8,7 @@ use crate::events::{Events, Indicator, Next, Outcome, Sampled};
 use crate::log::Warnings;
 use crate::variable::{Causality, Kind, Meta, Variability};
 use crate::{Elapsed, Fault, Hash, Model};
+use std::marker::PhantomData;
 
 /// A model with warnings for the importer's log.
 pub trait Warns: Model {
@@ -215,4 +216,12 @@ pub trait Exported: Sized + 'static {
 
     /// The instantiation token: a hash of name, version, table and capabilities.
     const TOKEN: crate::Token = Self::CAN.hash().guid();
+}
+
+/// A model without capabilities: as `export!(M)` exports it.
+pub struct Plain<M>(PhantomData<M>);
+
+impl<M: Model> Exported for Plain<M> {
+    type Model = M;
+    const CAN: Capabilities<M> = Capabilities::NONE;
 }

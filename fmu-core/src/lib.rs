@@ -25,7 +25,7 @@ pub mod token;
 pub mod unit;
 pub mod variable;
 
-pub use capability::{Capabilities, Exported, Warns};
+pub use capability::{Capabilities, Exported, Plain, Warns};
 pub use continuous::{ContinuousTime, Differentiable, State};
 pub use description::Description;
 pub use dual::{Dual, Scalar};

@@ -124,7 +124,7 @@ fn description_says_what_depends_on_what() {
     assert_eq!(d.variable("gain").unwrap().initial_dependencies, Some(vec![3]));
     assert_eq!(d.variable("load.map").unwrap().start.as_ref().unwrap().len(), 3);
     assert_eq!(d.variable("i").unwrap().start, None);
-    assert_eq!(d.token, Small::TOKEN.as_str());
+    assert_eq!(d.token, Small::HASH.guid().as_str());
 }
 
 /// A terminal's variables are looked up in the table; a wrong one is told when the model is described.

@@ -5,7 +5,7 @@
 mod timing;
 
 use fmu_core::unit::VOLT;
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table};
+use fmu_core::{Block, Exported, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table};
 use fmu_export::abi::types::{Fmi2Boolean, Instance, References, c_int};
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;
@@ -62,7 +62,7 @@ fmu_export::export!(Empty);
 
 fn main() {
     let no = Fmi2Boolean(0);
-    let token = CString::new(Empty::TOKEN.as_str()).unwrap_or_default();
+    let token = CString::new(fmi::This::TOKEN.as_str()).unwrap_or_default();
     // An importer calls through pointers that the compiler does not know.
     let set: unsafe extern "C" fn(Instance, References, usize, *const f64) -> c_int = black_box(fmi::fmi2SetReal);
     let step: unsafe extern "C" fn(Instance, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);

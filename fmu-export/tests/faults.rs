@@ -10,7 +10,7 @@ mod common;
 
 use common::model::*;
 use common::*;
-use fmu_core::{Description, Model};
+use fmu_core::Description;
 use fmu_export::abi::types::*;
 use std::process::Command;
 use std::ptr::{null, null_mut};
@@ -142,7 +142,7 @@ fn the_description_is_handed_out() {
     assert_eq!(fmu_description(collect, (&raw mut bytes).cast()), 0);
     let description: Description = serde_json::from_slice(&bytes).unwrap();
     assert_eq!(description, Description::of::<Probe>().unwrap());
-    assert_eq!(description.token, Probe::TOKEN.as_str());
+    assert_eq!(description.token, token().to_str().unwrap());
 }
 
 #[test]

@@ -11,7 +11,7 @@
 )]
 
 use fmu_core::unit::SECOND;
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Row, SampleGrid, Step, Table};
+use fmu_core::{Block, Exported, Elapsed, Experiment, Fault, Info, Model, Row, SampleGrid, Step, Table};
 use fmu_export::abi::types::*;
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;
@@ -86,7 +86,7 @@ impl Fmu {
         // The library silences panics; a test wants to see its own.
         fmu_export::abi::quiet();
         drop(std::panic::take_hook());
-        let token = CString::new(Sampler::TOKEN.as_str()).unwrap();
+        let token = CString::new(fmi::This::TOKEN.as_str()).unwrap();
         let (name, token) = (c"sampler".as_ptr(), token.as_ptr());
         let (no, no3) = (Fmi2Boolean(0), Fmi3Boolean(0));
         unsafe {

@@ -86,6 +86,65 @@ impl<E: Exported> Abi<E> {
             })
         }
     }
+
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
+    pub unsafe fn fmi3_update_discrete_states(
+        entry: Entry,
+        instance: Instance,
+        again: *mut Fmi3Boolean,
+        terminate: *mut Fmi3Boolean,
+        nominals: *mut Fmi3Boolean,
+        values: *mut Fmi3Boolean,
+        next_defined: *mut Fmi3Boolean,
+        next: *mut f64,
+    ) -> c_int {
+        // SAFETY: the importer's variables.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let again = place(again, "discreteStatesNeedUpdate")?;
+                let terminate = place(terminate, "terminateSimulation")?;
+                let nominals = place(nominals, "nominalsOfContinuousStatesChanged")?;
+                let values = place(values, "valuesOfContinuousStatesChanged")?;
+                let next_defined = place(next_defined, "nextEventTimeDefined")?;
+                let next = place(next, "nextEventTime")?;
+                let update = instance.update_discrete()?;
+                again.write(update.outcome.again.into());
+                terminate.write(update.outcome.terminate.into());
+                nominals.write(false.into());
+                values.write(update.outcome.states_changed.into());
+                next_defined.write(update.next.is_some().into());
+                next.write(update.next.unwrap_or(0.0));
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn fmi3_enter_step(entry: Entry, instance: Instance) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                // A sample that the importer did not ask for is taken by the next step.
+                instance.current.pending = false;
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn fmi3_evaluate(entry: Entry, instance: Instance) -> c_int {
+        // SAFETY: the importer's instance.
+        unsafe { enter::<E>(entry, instance, |_| Ok(())) }
+    }
+
+    pub unsafe fn fmi3_count(entry: Entry, instance: Instance, count: *mut usize, of_indicators: bool) -> c_int {
+        // SAFETY: the importer's variable.
+        unsafe {
+            enter::<E>(entry, instance, |_| {
+                let number = if of_indicators { E::CAN.indicators().len() } else { E::CAN.states().len() };
+                place(count, "the number")?.write(number);
+                Ok(())
+            })
+        }
+    }
 }
 
 /// The functions of `fmi3Functions.h`, in the form of the table of FMI 2.0.

@@ -5,7 +5,7 @@ pub mod model;
 pub mod unsupported;
 
 pub(crate) use fmi::*;
-use fmu_core::Model;
+use fmu_core::Exported;
 use fmu_export::abi::types::*;
 use model::Probe;
 use std::cell::RefCell;
@@ -59,7 +59,7 @@ pub fn variadic(f: extern "C" fn(*mut c_void, Text, c_int, Text, Text)) -> Fmi2L
 }
 
 pub fn token() -> CString {
-    CString::new(Probe::TOKEN.as_str()).unwrap()
+    CString::new(fmi::This::TOKEN.as_str()).unwrap()
 }
 
 /// Set in a process that leaves the library's panic hook in place.

@@ -74,6 +74,8 @@ struct Numbering<'a> {
     known: BTreeMap<u32, u32>,
     /// Parameters may be knowns between events (FMI 3.0).
     parameters: bool,
+    /// There are no values between events: the model is for co-simulation only.
+    steps_only: bool,
 }
 
 impl<'a> Numbering<'a> {
@@ -95,7 +97,8 @@ impl<'a> Numbering<'a> {
             numbers.dedup(); // FMI 3.0 has one variable, whatever its size
             variables.push((v, numbers));
         }
-        Self { variables, known, parameters: version == FmiVersion::V3 }
+        let steps_only = description.model_exchange.is_none();
+        Self { variables, known, parameters: version == FmiVersion::V3, steps_only }
     }
 
     /// Numbers of the variables that the initial value depends on.
@@ -105,6 +108,9 @@ impl<'a> Numbering<'a> {
 
     /// Numbers of the variables that the value depends on between events. FMI 2.0 knows no parameters there.
     fn between(&self, v: &Variable) -> Option<Vec<u32>> {
+        if self.steps_only {
+            return Some(Vec::new());
+        }
         let parameter = |reference: &u32| {
             self.variables.iter().any(|(v, _)| v.value_reference == *reference && v.causality == Causality::Parameter)
         };

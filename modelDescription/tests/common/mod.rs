@@ -54,6 +54,9 @@ pub(crate) fn variable(
         dimension: None,
         start: None,
         initial_dependencies: None,
+        dependencies: None,
+        derivative: None,
+        reinit: false,
     }
 }
 
@@ -129,6 +132,7 @@ pub(crate) fn sample() -> Description {
         variables,
         terminals: terminals(),
         icon: Some(SVG.into()),
+        model_exchange: None,
     }
 }
 
