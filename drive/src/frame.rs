@@ -2,9 +2,11 @@
 //!
 //! `Vector<Stator>` has components alpha and beta; `Vector<Rotor>` and `Vector<Estimated>` have d and q. An [`Axis`] is
 //! the direction of a rotating frame's d-axis; only an axis transforms vectors from one frame to another.
+//!
+//! Components are numbers, or with `S` = [`Dual`](fmu_core::Dual) numbers with their change.
 
 use crate::math::{sin_cos, sin_cos_small, sin_cos_tiny};
-use nalgebra::Complex;
+use fmu_core::Scalar;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
@@ -28,9 +30,10 @@ impl Rotating for Estimated {}
 
 /// A peak-valued space vector in frame `F`, in the unit of its quantity.
 #[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub struct Vector<F> {
-    z: Complex<f64>,
+#[serde(bound(serialize = "S: Serialize", deserialize = "S: Deserialize<'de>"))]
+pub struct Vector<F, S = f64> {
+    re: S,
+    im: S,
     #[serde(skip)]
     frame: PhantomData<F>,
 }
@@ -42,13 +45,13 @@ pub type Dq = Vector<Rotor>;
 /// A vector in the estimated rotor frame.
 pub type DqHat = Vector<Estimated>;
 
-impl<F> Clone for Vector<F> {
+impl<F, S: Copy> Clone for Vector<F, S> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<F> Copy for Vector<F> {}
+impl<F, S: Copy> Copy for Vector<F, S> {}
 
 impl<F> Default for Vector<F> {
     fn default() -> Self {
@@ -56,251 +59,288 @@ impl<F> Default for Vector<F> {
     }
 }
 
-impl<F> PartialEq for Vector<F> {
+impl<F, S: PartialEq> PartialEq for Vector<F, S> {
     fn eq(&self, other: &Self) -> bool {
-        self.z == other.z
+        self.re == other.re && self.im == other.im
     }
 }
 
-impl<F> std::fmt::Debug for Vector<F> {
+impl<F, S: std::fmt::Display> std::fmt::Debug for Vector<F, S> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "({}, {})", self.z.re, self.z.im)
+        write!(f, "({}, {})", self.re, self.im)
     }
 }
 
 impl<F> Vector<F> {
     /// The zero vector.
-    pub const ZERO: Self = Self { z: Complex::new(0.0, 0.0), frame: PhantomData };
-
-    /// Creates a vector from its components along the frame's two axes.
-    #[inline]
-    pub const fn new(first: f64, second: f64) -> Self {
-        Self { z: Complex::new(first, second), frame: PhantomData }
-    }
-
-    #[inline]
-    const fn of(z: Complex<f64>) -> Self {
-        Self { z, frame: PhantomData }
-    }
+    pub const ZERO: Self = Self::new(0.0, 0.0);
 
     /// Length.
     #[inline]
     pub fn magnitude(self) -> f64 {
-        (self.z.re * self.z.re + self.z.im * self.z.im).sqrt()
+        (self.re * self.re + self.im * self.im).sqrt()
+    }
+
+    /// Whether both components are finite.
+    pub fn is_finite(self) -> bool {
+        self.re.is_finite() && self.im.is_finite()
+    }
+}
+
+impl<F, S> Vector<F, S> {
+    /// Creates a vector from its components along the frame's two axes.
+    #[inline]
+    pub const fn new(first: S, second: S) -> Self {
+        Self { re: first, im: second, frame: PhantomData }
+    }
+}
+
+impl<F, S: Scalar> Vector<F, S> {
+    /// The vector `v` of fixed length and direction.
+    #[inline]
+    pub fn fixed(v: Vector<F>) -> Self {
+        Self::new(v.re.into(), v.im.into())
     }
 
     /// Scalar product.
     #[inline]
-    pub fn dot(self, other: Self) -> f64 {
-        self.z.re * other.z.re + self.z.im * other.z.im
+    pub fn dot(self, other: Self) -> S {
+        self.re * other.re + self.im * other.im
     }
 
     /// Cross product `Im(conj(self) other)`: positive when `other` leads.
     #[inline]
-    pub fn cross(self, other: Self) -> f64 {
-        self.z.re * other.z.im - self.z.im * other.z.re
+    pub fn cross(self, other: Self) -> S {
+        self.re * other.im - self.im * other.re
     }
 
     /// The vector rotated by +90 degrees (multiplied by j).
     #[inline]
     pub fn turned(self) -> Self {
-        Self::new(-self.z.im, self.z.re)
+        Self::new(-self.im, self.re)
     }
 
-    /// Whether both components are finite.
-    pub fn is_finite(self) -> bool {
-        self.z.re.is_finite() && self.z.im.is_finite()
+    /// The vector `k` times as long.
+    #[inline]
+    pub fn scaled(self, k: S) -> Self {
+        Self::new(self.re * k, self.im * k)
     }
 }
 
-impl AlphaBeta {
+impl<S: Copy> Vector<Stator, S> {
     /// Component along phase a.
     #[inline]
-    pub fn alpha(self) -> f64 {
-        self.z.re
+    pub fn alpha(self) -> S {
+        self.re
     }
 
     /// Component 90 degrees ahead of phase a.
     #[inline]
-    pub fn beta(self) -> f64 {
-        self.z.im
+    pub fn beta(self) -> S {
+        self.im
     }
 }
 
-impl<F: Rotating> Vector<F> {
+impl<F: Rotating, S: Copy> Vector<F, S> {
     /// Component along the magnet flux.
     #[inline]
-    pub fn d(self) -> f64 {
-        self.z.re
+    pub fn d(self) -> S {
+        self.re
     }
 
     /// Component 90 degrees ahead of the magnet flux.
     #[inline]
-    pub fn q(self) -> f64 {
-        self.z.im
+    pub fn q(self) -> S {
+        self.im
+    }
+
+    /// Both components, to be changed.
+    pub fn parts_mut(&mut self) -> (&mut S, &mut S) {
+        (&mut self.re, &mut self.im)
     }
 }
 
-impl<F> Add for Vector<F> {
+impl<F, S: Scalar> Add for Vector<F, S> {
     type Output = Self;
     #[inline]
     fn add(self, other: Self) -> Self {
-        Self::of(self.z + other.z)
+        Self::new(self.re + other.re, self.im + other.im)
     }
 }
 
-impl<F> AddAssign for Vector<F> {
+impl<F, S: Scalar> AddAssign for Vector<F, S> {
     #[inline]
     fn add_assign(&mut self, other: Self) {
-        self.z += other.z;
+        *self = *self + other;
     }
 }
 
-impl<F> Sub for Vector<F> {
+impl<F, S: Scalar> Sub for Vector<F, S> {
     type Output = Self;
     #[inline]
     fn sub(self, other: Self) -> Self {
-        Self::of(self.z - other.z)
+        Self::new(self.re - other.re, self.im - other.im)
     }
 }
 
-impl<F> Neg for Vector<F> {
+impl<F, S: Scalar> Neg for Vector<F, S> {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
-        Self::of(-self.z)
+        Self::new(-self.re, -self.im)
     }
 }
 
-impl<F> Mul<f64> for Vector<F> {
+impl<F, S: Scalar> Mul<f64> for Vector<F, S> {
     type Output = Self;
     #[inline]
     fn mul(self, k: f64) -> Self {
-        Self::of(self.z * k)
+        Self::new(self.re * k, self.im * k)
     }
 }
 
 /// Direction of the d-axis of the rotating frame `F`, seen from the stator.
 #[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub struct Axis<F: Rotating> {
-    direction: Complex<f64>,
+#[serde(bound(serialize = "S: Serialize", deserialize = "S: Deserialize<'de>"))]
+pub struct Axis<F: Rotating, S = f64> {
+    cos: S,
+    sin: S,
     #[serde(skip)]
     frame: PhantomData<F>,
 }
 
 impl<F: Rotating> Default for Axis<F> {
     fn default() -> Self {
-        Self { direction: Complex::new(1.0, 0.0), frame: PhantomData }
+        Self::new(1.0, 0.0)
     }
 }
 
 impl<F: Rotating> PartialEq for Axis<F> {
     fn eq(&self, other: &Self) -> bool {
-        self.direction == other.direction
+        self.cos == other.cos && self.sin == other.sin
     }
 }
 
 impl<F: Rotating> std::fmt::Debug for Axis<F> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "({}, {})", self.direction.re, self.direction.im)
+        write!(f, "({}, {})", self.cos, self.sin)
     }
 }
 
-impl<F: Rotating> Clone for Axis<F> {
+impl<F: Rotating, S: Copy> Clone for Axis<F, S> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<F: Rotating> Copy for Axis<F> {}
+impl<F: Rotating, S: Copy> Copy for Axis<F, S> {}
 
 impl<F: Rotating> Axis<F> {
-    /// The frame at the electrical angle `theta` (rad).
-    #[inline]
-    pub fn at(theta: f64) -> Self {
-        let (sin, cos) = sin_cos(theta);
-        Self { direction: Complex::new(cos, sin), frame: PhantomData }
-    }
-
     /// The frame further on by `turn`.
     #[inline]
     pub fn ahead(self, turn: Turn) -> Self {
-        Self { direction: self.direction * turn.0, frame: PhantomData }
+        let Turn { cos, sin } = turn;
+        Self::new(self.cos * cos - self.sin * sin, self.cos * sin + self.sin * cos)
+    }
+
+    /// This frame, whose electrical angle is `theta` (rad), with the change that `theta` has.
+    #[inline]
+    pub fn with<S: Scalar>(self, theta: S) -> Axis<F, S> {
+        Axis::new(theta.chain(self.cos, -self.sin), theta.chain(self.sin, self.cos))
+    }
+}
+
+impl<F: Rotating, S> Axis<F, S> {
+    #[inline]
+    const fn new(cos: S, sin: S) -> Self {
+        Self { cos, sin, frame: PhantomData }
+    }
+}
+
+impl<F: Rotating, S: Scalar> Axis<F, S> {
+    /// The frame at the electrical angle `theta` (rad).
+    #[inline]
+    pub fn at(theta: S) -> Self {
+        let (sin, cos) = sin_cos(theta.value());
+        Axis::<F>::new(cos, sin).with(theta)
     }
 
     /// The stator vector of this `length` along the d-axis.
     #[inline]
-    pub fn along(self, length: f64) -> AlphaBeta {
-        Vector::of(self.direction * length)
+    pub fn along(self, length: f64) -> Vector<Stator, S> {
+        Vector::new(self.cos * length, self.sin * length)
     }
 
     /// Transforms a stator vector to the rotating frame: v e^{-j theta}.
     #[inline]
-    pub fn from_stator(self, v: AlphaBeta) -> Vector<F> {
-        Vector::of(v.z * self.direction.conj())
+    pub fn from_stator(self, v: Vector<Stator, S>) -> Vector<F, S> {
+        Vector::new(v.re * self.cos + v.im * self.sin, v.im * self.cos - v.re * self.sin)
     }
 
     /// Transforms a vector of the rotating frame to the stator frame: v e^{j theta}.
     #[inline]
-    pub fn to_stator(self, v: Vector<F>) -> AlphaBeta {
-        Vector::of(v.z * self.direction)
+    pub fn to_stator(self, v: Vector<F, S>) -> Vector<Stator, S> {
+        Vector::new(v.re * self.cos - v.im * self.sin, v.re * self.sin + v.im * self.cos)
     }
 }
 
 /// A rotation by an angle that is usually small: [`Axis::ahead`].
 #[derive(Clone, Copy, Debug)]
-pub struct Turn(Complex<f64>);
+pub struct Turn {
+    cos: f64,
+    sin: f64,
+}
 
 impl Turn {
     /// By `angle` (rad); quick for less than 0.3 rad.
     #[inline]
     pub fn new(angle: f64) -> Self {
         let (sin, cos) = sin_cos_small(angle);
-        Self(Complex::new(cos, sin))
+        Self { cos, sin }
     }
 
     /// By `angle` (rad); quicker still for less than 0.004 rad.
     #[inline]
     pub fn tiny(angle: f64) -> Self {
         let (sin, cos) = sin_cos_tiny(angle);
-        Self(Complex::new(cos, sin))
+        Self { cos, sin }
     }
 }
 
 /// Three phase quantities a, b, c.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Phases {
+pub struct Phases<S = f64> {
     /// Phase a.
-    pub a: f64,
+    pub a: S,
     /// Phase b.
-    pub b: f64,
+    pub b: S,
     /// Phase c.
-    pub c: f64,
+    pub c: S,
 }
 
-impl Phases {
+impl<S: Scalar> Phases<S> {
     /// Amplitude-invariant Clarke transform; a common part of the three phases has no effect.
     #[inline]
-    pub fn to_stator(self) -> AlphaBeta {
+    pub fn to_stator(self) -> Vector<Stator, S> {
         const SQRT_3: f64 = 1.732_050_807_568_877_2;
-        Vector::new((2.0 * self.a - self.b - self.c) / 3.0, (self.b - self.c) / SQRT_3)
+        let Self { a, b, c } = self;
+        Vector::new((a * 2.0 - b - c) / S::from(3.0), (b - c) / S::from(SQRT_3))
     }
 
     /// Inverse Clarke transform, without a zero sequence.
     #[inline]
-    pub fn from_stator(v: AlphaBeta) -> Self {
+    pub fn from_stator(v: Vector<Stator, S>) -> Self {
         const HALF_SQRT_3: f64 = 0.866_025_403_784_438_6;
         let (alpha, beta) = (v.alpha(), v.beta());
-        Self { a: alpha, b: -0.5 * alpha + HALF_SQRT_3 * beta, c: -0.5 * alpha - HALF_SQRT_3 * beta }
+        Self { a: alpha, b: alpha * -0.5 + beta * HALF_SQRT_3, c: alpha * -0.5 - beta * HALF_SQRT_3 }
     }
 
     /// Largest difference between two phases.
     #[inline]
-    pub fn span(self) -> f64 {
+    pub fn span(self) -> S {
         // One instruction each, unlike `f64::max`, which also orders NaN.
-        let max = |a: f64, b: f64| if a > b { a } else { b };
-        let min = |a: f64, b: f64| if a < b { a } else { b };
+        let max = |a: S, b: S| if a.value() > b.value() { a } else { b };
+        let min = |a: S, b: S| if a.value() < b.value() { a } else { b };
         max(max(self.a, self.b), self.c) - min(min(self.a, self.b), self.c)
     }
 }

@@ -5,34 +5,48 @@
 //! The hexagon is derived here from three legs between the rails. Dead time: a leg loses u_dead sign(i), or u_dead i /
 //! i_zero below i_zero. This is the field's usual mean-value model; neither paper contains it. u in V, i in A.
 
-use crate::frame::{AlphaBeta, Phases};
+use crate::frame::{Phases, Stator, Vector};
+use fmu_core::Scalar;
 
 /// Stator voltage (V) that an inverter on `u_dc` (V, >= 0) applies for the references `u` (V).
 ///
 /// Only differences of the references matter; the inverter chooses the zero sequence. It reproduces every vector inside
 /// the hexagon (no line-to-line voltage above `u_dc`) and scales any other vector back radially to the edge.
 #[inline]
-pub fn limit_to_hexagon(u: Phases, u_dc: f64) -> AlphaBeta {
+pub fn limit_to_hexagon<S: Scalar>(u: Phases<S>, u_dc: S) -> Vector<Stator, S> {
     limit_span(u.to_stator(), u.span(), u_dc)
 }
 
 /// The voltage `u` (V), whose largest line-to-line voltage is `span` (V), scaled back to the hexagon of `u_dc` (V).
 #[inline]
-pub fn limit_span(u: AlphaBeta, span: f64, u_dc: f64) -> AlphaBeta {
-    if span > u_dc { u * (u_dc.max(0.0) / span) } else { u }
+pub fn limit_span<S: Scalar>(u: Vector<Stator, S>, span: S, u_dc: S) -> Vector<Stator, S> {
+    if span.value() > u_dc.value() { u.scaled(positive(u_dc) / span) } else { u }
+}
+
+/// `x`, or 0 for a negative one.
+#[inline]
+fn positive<S: Scalar>(x: S) -> S {
+    x.chain(x.value().max(0.0), f64::from(u8::from(x.value() >= 0.0)))
 }
 
 /// Stator voltage (V) lost to dead time at the phase currents `i` (A): up to `u_dead` (V) per leg, linear within
 /// +-`i_zero` (A).
 #[inline]
-pub fn dead_time_loss(u_dead: f64, i_zero: f64, i: Phases) -> AlphaBeta {
-    let leg = |i: f64| u_dead * (i / i_zero).clamp(-1.0, 1.0);
+pub fn dead_time_loss<S: Scalar>(u_dead: S, i_zero: S, i: Phases<S>) -> Vector<Stator, S> {
+    let leg = |i: S| u_dead * clamp_unit(i / i_zero);
     Phases { a: leg(i.a), b: leg(i.b), c: leg(i.c) }.to_stator()
+}
+
+/// `x`, limited to +-1.
+#[inline]
+pub fn clamp_unit<S: Scalar>(x: S) -> S {
+    x.chain(x.value().clamp(-1.0, 1.0), f64::from(u8::from(x.value().abs() <= 1.0)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::AlphaBeta;
 
     #[test]
     fn the_limit_is_a_hexagon() {

@@ -132,6 +132,9 @@ pub const RADIAN: Quantity = Quantity::new("Angle", Unit::si("rad", Exponents::N
 pub const SPEED: Quantity = Quantity::new("Speed", RAD_PER_S_UNIT).shown_in(RPM);
 /// Angular frequency in rad/s: bandwidths and poles, shown as they are.
 pub const RAD_PER_S: Quantity = Quantity::new("AngularFrequency", RAD_PER_S_UNIT);
+/// Angular acceleration in rad/s2.
+pub const RAD_PER_S2: Quantity =
+    Quantity::new("AngularAcceleration", Unit::si("rad/s2", Exponents::mechanical(0, 0, -2, 0).with_rad(1)));
 /// Rate in 1/s.
 pub const PER_SECOND: Quantity = Quantity::new("Rate", Unit::si("1/s", Exponents::mechanical(0, 0, -1, 0)));
 /// Time in s.

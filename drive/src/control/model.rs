@@ -11,14 +11,14 @@ use crate::control::state::{Gains, InUse, State, context};
 use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::estimator::{Class, Estimator, Sample};
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
+use fmu_core::log::Warnings;
+use fmu_core::{
+    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns, integrate,
+};
 use serde::{Deserialize, Serialize};
 
 /// Maximum rotation of the estimate in one sample in rad: faster rotation means that the estimator is lost.
 const MAX_TURN: f64 = 20.0 * std::f64::consts::PI;
-
-/// Maximum number of samples in one communication step: bounds its duration for any step size and `T_s`.
-const MAX_SAMPLES: f64 = 1e7;
 
 /// Sensorless speed control of a permanent-magnet synchronous machine (Rasmussen, Fig. 2).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -39,7 +39,7 @@ pub struct SensorlessController {
 impl SensorlessController {
     /// One sample of the controller: currents in, voltage references out. If a lost estimator makes the state
     /// non-finite, the controller restarts at rest from its last angle and reports the loss.
-    fn sample(&mut self) -> ControllerOutputs {
+    fn compute(&mut self) -> ControllerOutputs {
         if !self.inputs.enable {
             return self.rest();
         }
@@ -47,6 +47,15 @@ impl SensorlessController {
         self.state.k += 1;
         let sane = (out.speed_est * f64::from(self.parameters.motor.n_p) * self.parameters.T_s).abs() < MAX_TURN;
         if sane && out.is_finite() { out } else { self.start_again() }
+    }
+
+    /// Refuses inputs that are no numbers.
+    #[inline]
+    fn finite(&self) -> Result<(), Fault> {
+        if self.inputs.is_finite() {
+            return Ok(());
+        }
+        Err(Fault::new("an input of the controller is not a finite number"))
     }
 
     /// Not enabled: resets everything except the sample grid and the displayed outputs.
@@ -147,6 +156,15 @@ impl Model for SensorlessController {
         Ok(())
     }
 
+    fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
+        // An importer that handles events exchanges values at the instant, before the sample is taken.
+        if interface != Interface::CoSimulation && self.parameters.delay == 0 {
+            let allowed = "1 or 2: at an event, the voltages of the last sample act, and the currents are sampled after that";
+            return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.delay, allowed));
+        }
+        Ok(())
+    }
+
     fn initialize(&mut self) {
         self.state = State::new(&self.parameters, self.inputs.enable);
         self.tuned = false;
@@ -157,27 +175,63 @@ impl Model for SensorlessController {
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        let grid = SampleGrid { period: self.parameters.T_s };
-        let end = step.end();
-        if !self.inputs.is_finite() {
-            return Err(Fault::new("an input of the controller is not a finite number"));
-        }
-        if end.minus_periods(self.state.samples, grid.period) > MAX_SAMPLES * grid.period {
-            let longest = format!("at most {MAX_SAMPLES} sample periods of {} s", grid.period);
-            return Err(Fault::value("the step size", format!("{} s", step.h), longest));
-        }
-        while grid.passed(self.state.samples, end) {
-            let new = self.sample();
-            self.state.samples += 1;
-            let last = std::mem::replace(&mut self.state.computed, new);
-            if !grid.reached(self.state.samples, end) {
-                self.state.shown = last;
-            }
-        }
-        if grid.reached(self.state.samples, end) {
-            self.state.shown = self.state.computed.clone();
-        }
+        // A step without a sample is refused too.
+        self.finite()?;
+        integrate::sampled(self, step)
+    }
+}
+
+impl Sampled for SensorlessController {
+    fn period(&self) -> f64 {
+        self.parameters.T_s
+    }
+
+    fn samples(&self) -> u64 {
+        self.state.samples
+    }
+
+    fn show(&mut self) {
+        self.state.shown.clone_from(&self.state.computed);
+    }
+
+    fn sample(&mut self) -> Result<(), Fault> {
+        self.finite()?;
+        self.state.computed = self.compute();
+        self.state.samples += 1;
         Ok(())
+    }
+}
+
+impl Warns for SensorlessController {
+    fn warn(&self, log: &mut Warnings<'_>) {
+        let out = &self.state.shown;
+        if out.lock_lost < 1.0 {
+            return;
+        }
+        let restarted = ControllerOutputs {
+            theta_est: out.theta_est,
+            lock_lost: LOST,
+            enabled: true,
+            ..ControllerOutputs::default()
+        };
+        if *out == restarted {
+            log.warn("restarted", || {
+                format!(
+                    "the estimate left the finite numbers or turned by more than {MAX_TURN} rad in a sample: the controller \
+                     starts again at rest, theta_est = {} rad",
+                    out.theta_est
+                )
+            });
+            return;
+        }
+        log.warn("lock_lost", || {
+            format!(
+                "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage; the estimator may have lost \
+                 the rotor (speed_est = {} rad/s, theta_est = {} rad), or motor.R_s, motor.L_d, motor.L_q and motor.psi_M \
+                 do not fit the machine",
+                out.lock_lost, out.speed_est, out.theta_est
+            )
+        });
     }
 }
 

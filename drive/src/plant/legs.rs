@@ -11,71 +11,88 @@
 //! Derived here from the ideal diode bridge; `drive-study/tests/gates_off.rs` compares it with such a bridge in stator axes.
 //! u in V, i in A.
 
-use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor};
-use crate::modulation::dead_time_loss;
+use crate::frame::{Axis, Dq, Phases, Rotor, Stator, Vector};
+use crate::modulation::{clamp_unit, dead_time_loss};
 use crate::motor::Motor;
 use crate::plant::inverter::Inverter;
+use fmu_core::Scalar;
 
 /// Shortest substep in s that the diodes require.
 const SHORTEST_SUBSTEP: f64 = 1e-6;
 
 /// Voltage drop of the legs at a given DC-link voltage.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Legs {
+pub struct Legs<S = f64> {
     /// The maximum voltage drop as a fraction of the DC-link voltage.
     share: f64,
     /// The same in V.
-    u: f64,
+    u: S,
     /// Current in A below which the drop falls linearly.
-    i_zone: f64,
+    i_zone: S,
 }
 
-impl Legs {
+impl<S: Scalar> Legs<S> {
     /// For switching legs.
     #[inline]
-    pub fn switching(inverter: &Inverter, u_dc: f64) -> Self {
+    pub fn switching(inverter: &Inverter, u_dc: S) -> Self {
         let share = if inverter.dead_time > 0.0 { inverter.dead_time / inverter.T_pwm } else { 0.0 };
-        Self { share, u: share * u_dc, i_zone: inverter.i_zero }
+        Self { share, u: u_dc * share, i_zone: inverter.i_zero.into() }
     }
 
     /// For legs with the gates off.
-    pub fn off(inverter: &Inverter, motor: &Motor, u_dc: f64) -> Self {
-        let narrowest = SHORTEST_SUBSTEP * u_dc / motor.L_d.min(motor.L_q);
-        Self { share: 0.5, u: 0.5 * u_dc, i_zone: inverter.i_zero.max(narrowest) }
+    pub fn off(inverter: &Inverter, motor: &Motor, u_dc: S) -> Self {
+        let narrowest = u_dc * SHORTEST_SUBSTEP / S::from(motor.L_d.min(motor.L_q));
+        let i_zone = if narrowest.value() > inverter.i_zero { narrowest } else { inverter.i_zero.into() };
+        Self { share: 0.5, u: u_dc * 0.5, i_zone }
     }
 
+    /// Whether the legs drop a voltage.
+    #[inline]
+    pub fn drop(&self) -> bool {
+        self.u.value() > 0.0
+    }
+
+    /// Voltage (V) lost at the stator with the current `i` (A).
+    #[inline(never)]
+    pub fn loss(&self, i: Vector<Stator, S>) -> Vector<Stator, S> {
+        dead_time_loss(self.u, self.i_zone, Phases::from_stator(i))
+    }
+
+    /// Current (A) that legs with the currents `i` (A) feed into the DC link through this voltage drop.
+    #[inline]
+    pub fn feed(&self, i: Phases<S>) -> S {
+        let leg = |i: S| clamp_unit(i / self.i_zone) * i;
+        let current = leg(i.a) + leg(i.b) + leg(i.c);
+        // Zero current for any dead time, however large.
+        if self.share > 0.0 && current.value() > 0.0 { current * self.share } else { 0.0.into() }
+    }
+}
+
+impl Legs {
     /// Time constant in s of a current within the zone, where the legs act as resistances; infinite without a voltage.
     #[inline]
     pub fn time(&self, motor: &Motor) -> f64 {
         self.i_zone * motor.L_d.min(motor.L_q) / self.u
     }
 
-    /// Whether the legs drop a voltage.
-    #[inline]
-    pub fn drop(&self) -> bool {
-        self.u > 0.0
-    }
-
-    /// Voltage (V) lost at the stator with the current `i` (A).
-    #[inline(never)]
-    pub fn loss(&self, i: AlphaBeta) -> AlphaBeta {
-        dead_time_loss(self.u, self.i_zone, Phases::from_stator(i))
-    }
-
-    /// Current (A) that legs with the currents `i` (A) feed into the DC link through this voltage drop.
-    #[inline]
-    pub fn feed(&self, i: Phases) -> f64 {
-        let leg = |i: f64| (i / self.i_zone).clamp(-1.0, 1.0) * i;
-        let current = leg(i.a) + leg(i.b) + leg(i.c);
-        // Zero current for any dead time, however large.
-        if self.share > 0.0 && current > 0.0 { self.share * current } else { 0.0 }
-    }
-
     /// Whether diodes block the current `i` (A) of a machine that turns at the electrical speed `w` (rad/s).
     pub fn block(&self, motor: &Motor, axis: Axis<Rotor>, i: Dq, w: f64) -> bool {
+        let (greatest, span) = Self::extent(motor, axis, i, w);
+        greatest <= self.i_zone && span < 2.0 * self.u
+    }
+
+    /// What opens blocking diodes, each above 0: the greatest current over the zone, and the line-to-line back EMF over
+    /// the DC-link voltage, both less 1.
+    pub fn excess(&self, motor: &Motor, axis: Axis<Rotor>, i: Dq, w: f64) -> [f64; 2] {
+        let (greatest, span) = Self::extent(motor, axis, i, w);
+        // Without a DC link the diodes never block.
+        [greatest / self.i_zone - 1.0, if self.drop() { (span / (2.0 * self.u) - 1.0).min(1.0) } else { 1.0 }]
+    }
+
+    /// The greatest phase current (A) and the greatest line-to-line back EMF (V).
+    fn extent(motor: &Motor, axis: Axis<Rotor>, i: Dq, w: f64) -> (f64, f64) {
         let phases = |v: Dq| Phases::from_stator(axis.to_stator(v));
         let Phases { a, b, c } = phases(i);
-        let greatest = a.abs().max(b.abs()).max(c.abs());
-        greatest <= self.i_zone && phases(Dq::new(0.0, w * motor.psi_M)).span() < 2.0 * self.u
+        (a.abs().max(b.abs()).max(c.abs()), phases(Dq::new(0.0, w * motor.psi_M)).span())
     }
 }

@@ -4,10 +4,11 @@
 //! i_q, tau_e = 1.5 n_p (psi_d i_q - psi_q i_d); [`saturation`](crate::plant::saturation) adds to the current. The flux
 //! linkages are the state, so the equations remain valid when the inductances saturate.
 
-use crate::frame::{AlphaBeta, Axis, Dq, Rotor};
+use crate::frame::{AlphaBeta, Axis, Dq, Rotor, Stator, Vector};
 use crate::math::reciprocal;
 use crate::motor::Motor;
 use crate::plant::saturation::Saturation;
+use fmu_core::Scalar;
 
 /// Flux linkage (Wb) for the current `i` (A) without saturation.
 #[inline]
@@ -54,8 +55,8 @@ impl<'a> Machine<'a> {
 
     /// Current (A) for the flux linkage `psi` (Wb).
     #[inline]
-    pub fn current(&self, psi: Dq) -> Dq {
-        let linear = Dq::new((psi.d() - self.psi_M) * self.by_L_d, psi.q() * self.by_L_q);
+    pub fn current<S: Scalar>(&self, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
+        let linear = Vector::new((psi.d() - S::from(self.psi_M)) * self.by_L_d, psi.q() * self.by_L_q);
         self.saturation.map_or(linear, |saturation| linear + saturation.current(self.motor, psi))
     }
 
@@ -74,20 +75,20 @@ impl<'a> Machine<'a> {
 
     /// Derivative of the flux linkage (V) in stator axes at the voltage `u` (V) and the current `i` (A).
     #[inline]
-    pub fn flux_derivative(&self, u: AlphaBeta, i: AlphaBeta) -> AlphaBeta {
+    pub fn flux_derivative<S: Scalar>(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Vector<Stator, S> {
         u - i * self.R_s
     }
 
     /// Copper loss in W at the current `i` (A).
     #[inline]
-    pub fn copper_loss(&self, i: AlphaBeta) -> f64 {
-        1.5 * self.R_s * i.dot(i)
+    pub fn copper_loss<S: Scalar>(&self, i: Vector<Stator, S>) -> S {
+        i.dot(i) * (1.5 * self.R_s)
     }
 
     /// Electromagnetic torque in N.m at the flux linkage `psi` (Wb) and the current `i` (A).
     #[inline]
-    pub fn torque(&self, psi: Dq, i: Dq) -> f64 {
-        self.torque * psi.cross(i)
+    pub fn torque<S: Scalar>(&self, psi: Vector<Rotor, S>, i: Vector<Rotor, S>) -> S {
+        psi.cross(i) * self.torque
     }
 }
 

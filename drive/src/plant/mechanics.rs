@@ -10,7 +10,7 @@
 
 use crate::math::{reciprocal, tanh, tanh_beside};
 use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, SPEED};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
 
 /// Inertia and friction.
@@ -37,26 +37,32 @@ impl Default for Mechanics {
 impl Mechanics {
     /// Friction torque in N.m at `speed` in rad/s, positive against positive speed.
     #[inline]
-    pub fn friction(&self, speed: f64) -> f64 {
-        self.B * speed + self.tau_coulomb * tanh(speed / self.w_coulomb)
+    pub fn friction<S: Scalar>(&self, speed: S) -> S {
+        speed * self.B + self.coulomb(speed, tanh(speed.value() / self.w_coulomb))
+    }
+
+    /// Coulomb torque in N.m at `speed` (rad/s), where tanh(speed / w_coulomb) is `share`.
+    #[inline]
+    fn coulomb<S: Scalar>(&self, speed: S, share: f64) -> S {
+        speed.chain(self.tau_coulomb * share, self.tau_coulomb * (1.0 - share * share) / self.w_coulomb)
     }
 
     /// Torque of the shaft on the load in N.m: `tau_load`, or `tau_e` minus `friction` (N.m) with an imposed speed.
     #[inline]
-    pub fn tau_shaft(&self, tau_e: f64, tau_load: f64, friction: f64) -> f64 {
+    pub fn tau_shaft<S: Scalar>(&self, tau_e: S, tau_load: S, friction: S) -> S {
         if self.imposed { tau_e - friction } else { tau_load }
     }
 }
 
 /// The shaft with constants for many evaluations at almost the same speed.
 #[derive(Clone, Copy, Debug)]
-pub struct Shaft<'a> {
+pub struct Shaft<'a, S = f64> {
     mechanics: &'a Mechanics,
     B: f64,
     /// 1/J in 1/(kg.m2).
     by_J: f64,
     /// Load torque in N.m.
-    tau_load: f64,
+    tau_load: S,
     /// Speed in rad/s, and the share of the Coulomb torque at it, tanh(speed / w_coulomb).
     speed: f64,
     share: f64,
@@ -69,19 +75,19 @@ pub struct Shaft<'a> {
 
 /// The motion of the shaft at an instant.
 #[derive(Clone, Copy, Debug)]
-pub struct Motion {
+pub struct Motion<S = f64> {
     /// Acceleration in rad/s2; 0 with an imposed speed.
-    pub acceleration: f64,
+    pub acceleration: S,
     /// Power to the load in W.
-    pub p_shaft: f64,
+    pub p_shaft: S,
     /// Friction loss in W.
-    pub p_friction: f64,
+    pub p_friction: S,
 }
 
-impl<'a> Shaft<'a> {
+impl<'a, S: Scalar> Shaft<'a, S> {
     /// With the load `tau_load` (N.m) at speeds close to `speed` (rad/s).
     #[inline]
-    pub fn new(mechanics: &'a Mechanics, tau_load: f64, speed: f64) -> Self {
+    pub fn new(mechanics: &'a Mechanics, tau_load: S, speed: f64) -> Self {
         let sign = 1.0_f64.copysign(speed);
         // From here on, the nearest number to tanh is +-1.
         let full = 20.0 * mechanics.w_coulomb;
@@ -92,12 +98,12 @@ impl<'a> Shaft<'a> {
 
     /// The motion at `speed` (rad/s) and the torque `tau_e` (N.m).
     #[inline]
-    pub fn motion(&self, speed: f64, tau_e: f64) -> Motion {
-        let coulomb = if speed * self.sign > self.full { self.tau_full } else { self.coulomb(speed) };
-        let friction = self.B * speed + coulomb;
+    pub fn motion(&self, speed: S, tau_e: S) -> Motion<S> {
+        let coulomb = if speed.value() * self.sign > self.full { self.tau_full.into() } else { self.coulomb(speed) };
+        let friction = speed * self.B + coulomb;
         let p_friction = friction * speed;
         if self.mechanics.imposed {
-            return Motion { acceleration: 0.0, p_shaft: (tau_e - friction) * speed, p_friction };
+            return Motion { acceleration: 0.0.into(), p_shaft: (tau_e - friction) * speed, p_friction };
         }
         let acceleration = (tau_e - self.tau_load - friction) * self.by_J;
         Motion { acceleration, p_shaft: self.tau_load * speed, p_friction }
@@ -105,10 +111,11 @@ impl<'a> Shaft<'a> {
 
     /// Coulomb torque (N.m) at a `speed` (rad/s) near standstill.
     #[inline(never)]
-    fn coulomb(&self, speed: f64) -> f64 {
-        let Mechanics { tau_coulomb, w_coulomb, .. } = *self.mechanics;
-        let d = (speed - self.speed) * reciprocal(w_coulomb);
-        tau_coulomb * if d.abs() <= 0.5 { tanh_beside(self.share, d) } else { tanh(speed / w_coulomb) }
+    fn coulomb(&self, speed: S) -> S {
+        let w_coulomb = self.mechanics.w_coulomb;
+        let d = (speed.value() - self.speed) * reciprocal(w_coulomb);
+        let share = if d.abs() <= 0.5 { tanh_beside(self.share, d) } else { tanh(speed.value() / w_coulomb) };
+        self.mechanics.coulomb(speed, share)
     }
 }
 

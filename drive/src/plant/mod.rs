@@ -1,5 +1,6 @@
 //! The plant: machine, mechanics and inverter, and the model `PmsmPlant` built from them.
 
+pub mod exchange;
 pub mod inverter;
 pub mod legs;
 pub mod machine;

@@ -1,6 +1,6 @@
 //! The model `PmsmPlant`: inverter, machine and mechanics, integrated with held inputs.
 
-use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Turn};
+use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Stator, Turn, Vector};
 use crate::integrate::rk4;
 use crate::math::{all_finite, wrap};
 use crate::modulation::limit_to_hexagon;
@@ -11,8 +11,8 @@ use crate::plant::mechanics::{Motion, Shaft};
 use crate::plant::power::{Energy, Powers};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::{OUTPUTS, PARAMETERS, PlantParameters};
-use fmu_core::unit::{NEWTON_METER, RADIAN, SPEED, VOLT};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Step, Table, Terminal};
+use fmu_core::unit::{NEWTON_METER, RADIAN, SPEED, VOLT, WEBER};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Scalar, Step, Table, Terminal};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -31,25 +31,31 @@ const MAX_SUBSTEPS: f64 = 1e7;
 
 /// The state of machine and shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct State {
+pub(super) struct State {
     /// Stator flux linkage in Wb.
-    psi: Dq,
+    pub(super) psi: Dq,
     /// Mechanical speed in rad/s.
-    speed: f64,
+    pub(super) speed: f64,
     /// Mechanical angle in rad, not wrapped.
-    angle: f64,
+    pub(super) angle: f64,
     /// The rotor's d-axis at this angle.
-    axis: Axis<Rotor>,
+    pub(super) axis: Axis<Rotor>,
 }
 
 impl State {
     #[inline]
-    fn new(motor: &Motor, psi: Dq, speed: f64, angle: f64) -> Self {
+    pub(super) fn new(motor: &Motor, psi: Dq, speed: f64, angle: f64) -> Self {
         Self { psi, speed, angle, axis: axis_at(motor, angle) }
     }
 
-    fn is_finite(&self) -> bool {
+    pub(super) fn is_finite(&self) -> bool {
         all_finite([self.psi.d(), self.psi.q(), self.speed, self.angle])
+    }
+
+    /// For messages.
+    pub(super) fn tell(&self) -> String {
+        let Self { psi, speed, angle, .. } = self;
+        format!("psi_d = {} Wb, psi_q = {} Wb, speed = {speed} rad/s, angle = {angle} rad", psi.d(), psi.q())
     }
 }
 
@@ -59,39 +65,70 @@ fn axis_at(motor: &Motor, angle: f64) -> Axis<Rotor> {
     Axis::at(f64::from(motor.n_p) * angle)
 }
 
+/// The state at an instant, with or without its change.
+pub(super) struct Instant<S = f64> {
+    /// Stator flux linkage in Wb.
+    pub(super) psi: Vector<Rotor, S>,
+    /// Its current in A.
+    pub(super) i: Vector<Rotor, S>,
+    /// Mechanical speed in rad/s.
+    pub(super) speed: S,
+    /// Mechanical angle in rad, not wrapped.
+    pub(super) angle: S,
+    /// The rotor's d-axis at this angle.
+    pub(super) axis: Axis<Rotor, S>,
+}
+
 /// What stays over an integration step.
-struct Held<'a> {
-    machine: Machine<'a>,
+pub(super) struct Held<'a, S = f64> {
+    pub(super) machine: Machine<'a>,
     /// Stator voltage without the drop of the legs, in V.
-    u: AlphaBeta,
+    pub(super) u: Vector<Stator, S>,
     /// Legs with a voltage drop.
-    legs: Option<&'a Legs>,
-    shaft: Shaft<'a>,
+    pub(super) legs: Option<&'a Legs<S>>,
+    pub(super) shaft: Shaft<'a, S>,
 }
 
 /// Derivatives and powers at an instant.
-struct Rates {
-    /// Induced voltage in V.
-    d_psi: AlphaBeta,
+pub(super) struct Rates<S = f64> {
+    /// Derivative of the flux linkage in stator axes, in V.
+    pub(super) d_psi: Vector<Stator, S>,
     /// Acceleration in rad/s2.
-    acceleration: f64,
+    pub(super) acceleration: S,
     /// Power from the DC link, to the load, lost, in W.
-    powers: Energy,
+    pub(super) p_in: S,
+    pub(super) p_mech: S,
+    pub(super) p_loss: S,
 }
 
-impl Held<'_> {
-    /// Derivatives and powers with the d-axis on `axis`, the flux linkage `psi` (Wb) and the `speed` (rad/s).
+impl<S: Scalar> Held<'_, S> {
+    /// Derivatives and powers with the d-axis on `axis`, the flux linkage `psi` (Wb), its current `i` (A) and the `speed`
+    /// (rad/s).
     #[expect(clippy::inline_always, reason = "its four calls take half of the time of a step")]
     #[inline(always)]
-    fn rates(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> Rates {
-        let psi = self.machine.from_stator(axis, psi);
-        let i = self.machine.current(psi);
+    pub(super) fn rates(
+        &self,
+        axis: Axis<Rotor, S>,
+        psi: Vector<Rotor, S>,
+        i: Vector<Rotor, S>,
+        speed: S,
+    ) -> Rates<S> {
         let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
         let i = axis.to_stator(i);
         let u = self.legs.map_or(self.u, |legs| self.u - legs.loss(i));
-        let loss = self.machine.copper_loss(i) + p_friction;
-        let powers = Energy { r#in: 1.5 * u.dot(i), mech: p_shaft, loss };
-        Rates { d_psi: self.machine.flux_derivative(u, i), acceleration, powers }
+        let p_loss = self.machine.copper_loss(i) + p_friction;
+        let d_psi = self.machine.flux_derivative(u, i);
+        Rates { d_psi, acceleration, p_in: u.dot(i) * 1.5, p_mech: p_shaft, p_loss }
+    }
+}
+
+impl Held<'_> {
+    /// The same with the flux linkage `psi` (Wb) in stator axes.
+    #[expect(clippy::inline_always, reason = "as for `rates`")]
+    #[inline(always)]
+    fn rates_in_stator(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> Rates {
+        let psi = self.machine.from_stator(axis, psi);
+        self.rates(axis, psi, self.machine.current(psi), speed)
     }
 }
 
@@ -102,20 +139,44 @@ pub struct PmsmPlant {
     pub inputs: PlantInputs,
     /// Parameters; a step never changes them.
     pub parameters: PlantParameters,
-    state: State,
+    pub(super) state: State,
+    /// The diodes block while the gates are off: decided by [`Events::event`](fmu_core::Events::event) and at the end of
+    /// a step.
+    pub(super) blocked: bool,
     /// Means over the last step.
     powers: Powers,
     /// Since the start.
-    energy: Energy,
+    pub(super) energy: Energy,
 }
 
 impl PmsmPlant {
     /// Voltage drop of the inverter legs.
     #[inline]
-    fn legs(&self) -> Legs {
+    pub(super) fn legs<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Legs<S> {
         let PlantParameters { motor, inverter, .. } = &self.parameters;
-        let PlantInputs { u_dc, enable, .. } = self.inputs;
-        if enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
+        let u_dc = inputs.u_dc;
+        if inputs.enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
+    }
+
+    /// The outputs with the load torque `tau_load` (N.m) and these `powers`.
+    #[inline]
+    pub(super) fn shown<S: Scalar>(&self, at: &Instant<S>, tau_load: S, powers: Powers<S>) -> PlantOutputs<S> {
+        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let &Instant { psi, i, speed, angle, axis } = at;
+        let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::new(motor, saturation).torque(psi, i));
+        let friction = if mechanics.imposed { mechanics.friction(speed) } else { 0.0.into() };
+        PlantOutputs {
+            i: Phases::from_stator(axis.to_stator(i)),
+            speed,
+            angle,
+            theta_e: theta.chain(wrap(theta.value()), 1.0),
+            tau_e,
+            i_d: i.d(),
+            i_q: i.q(),
+            powers,
+            tau_shaft: mechanics.tau_shaft(tau_e, tau_load, friction),
+            energy: self.energy,
+        }
     }
 
     /// Stator currents in A.
@@ -180,29 +241,29 @@ impl PmsmPlant {
         let turn = Turn::new(n_p * half * speed);
         let middle = start.axis.ahead(turn);
 
-        let k_1 = held.rates(start.axis, psi, speed);
-        let k_2 = held.rates(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
+        let k_1 = held.rates_in_stator(start.axis, psi, speed);
+        let k_2 = held.rates_in_stator(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
         let axis = middle.ahead(Turn::tiny(n_p * half * half * k_1.acceleration));
-        let k_3 = held.rates(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
+        let k_3 = held.rates_in_stator(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
         let axis = middle.ahead(turn).ahead(Turn::tiny(n_p * half * h * k_2.acceleration));
-        let k_4 = held.rates(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
+        let k_4 = held.rates_in_stator(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
 
         let sixth = h / 6.0;
         let psi = psi + (k_1.d_psi + (k_2.d_psi + k_3.d_psi) * 2.0 + k_4.d_psi) * sixth;
         let acceleration = k_2.acceleration + k_3.acceleration;
         let angle = start.angle + h * (speed + sixth * (k_1.acceleration + acceleration));
         let speed = speed + sixth * (k_1.acceleration + 2.0 * acceleration + k_4.acceleration);
-        let over = |power: fn(&Energy) -> f64| {
-            sixth * (power(&k_1.powers) + 2.0 * (power(&k_2.powers) + power(&k_3.powers)) + power(&k_4.powers))
+        let over = |power: fn(&Rates) -> f64| {
+            sixth * (power(&k_1) + 2.0 * (power(&k_2) + power(&k_3)) + power(&k_4))
         };
-        let energy = Energy { r#in: over(|p| p.r#in), mech: over(|p| p.mech), loss: over(|p| p.loss) };
+        let energy = Energy { r#in: over(|k| k.p_in), mech: over(|k| k.p_mech), loss: over(|k| k.p_loss) };
         let axis = axis_at(motor, angle);
         (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, energy)
     }
 
     /// One integration step of `h` (s) with the gates off.
     fn coast(&self, start: &State, h: f64, legs: &Legs) -> (State, Energy) {
-        let Some(lost) = self.blocked(start, legs) else {
+        let Some(lost) = self.remaining(start, legs) else {
             return self.drive(start, h, AlphaBeta::ZERO, legs);
         };
         let PlantParameters { motor, mechanics, .. } = &self.parameters;
@@ -216,11 +277,11 @@ impl PmsmPlant {
     }
 
     /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.
-    fn blocked(&self, state: &State, legs: &Legs) -> Option<f64> {
+    fn remaining(&self, state: &State, legs: &Legs) -> Option<f64> {
         let PlantParameters { motor, saturation, .. } = &self.parameters;
         let i = machine::current(motor, saturation, state.psi);
-        let blocks = legs.block(motor, state.axis, i, f64::from(motor.n_p) * state.speed);
-        blocks.then(|| machine::magnetic_energy(motor, saturation, state.psi))
+        let blocked = legs.block(motor, state.axis, i, f64::from(motor.n_p) * state.speed);
+        blocked.then(|| machine::magnetic_energy(motor, saturation, state.psi))
     }
 }
 
@@ -241,7 +302,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 5;
+    const STATE_VERSION: u16 = 6;
 
     fn initialize(&mut self) {
         let PlantParameters { motor, mechanics, initial, .. } = &self.parameters;
@@ -253,6 +314,7 @@ impl Model for PmsmPlant {
         };
         self.state = State::new(motor, machine::flux(motor, Dq::ZERO), speed, angle);
         self.energy = Energy::default();
+        self.blocked = self.blocks(&self.inputs);
         // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
         let tau_shaft = mechanics.tau_shaft(0.0, self.inputs.tau_load, friction);
@@ -260,30 +322,15 @@ impl Model for PmsmPlant {
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let PlantParameters { motor, saturation, .. } = &self.parameters;
         let State { psi, speed, angle, axis } = self.state;
-        let machine = Machine::new(motor, saturation);
-        let i = machine.current(psi);
-        let (phases, tau_e) = (Phases::from_stator(axis.to_stator(i)), machine.torque(psi, i));
-        let friction = if mechanics.imposed { mechanics.friction(speed) } else { 0.0 };
-        let tau_shaft = mechanics.tau_shaft(tau_e, self.inputs.tau_load, friction);
-        *out = PlantOutputs {
-            i: phases,
-            speed,
-            angle,
-            theta_e: wrap(f64::from(motor.n_p) * angle),
-            tau_e,
-            i_d: i.d(),
-            i_q: i.q(),
-            powers: self.powers,
-            tau_shaft,
-            energy: self.energy,
-        };
+        let i = machine::current(motor, saturation, psi);
+        *out = self.shown(&Instant { psi, i, speed, angle, axis }, self.inputs.tau_load, self.powers);
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         let motor = &self.parameters.motor;
-        let legs = self.legs();
+        let legs = self.legs(&self.inputs);
         let (mut state, mut energy) = self.at_the_shaft();
         let mut left = self.substeps(step.h, state.speed, &legs)?;
         let h = step.h / left;
@@ -295,39 +342,47 @@ impl Model for PmsmPlant {
             energy.add(&passed);
             left -= 1.0;
         }
-        if !self.inputs.enable
-            && let Some(lost) = self.blocked(&state, &legs)
-        {
+        let lost = if self.inputs.enable { None } else { self.remaining(&state, &legs) };
+        if let Some(lost) = lost {
             state.psi = machine::flux(motor, Dq::ZERO);
             energy.loss += lost;
         }
         if !(state.is_finite() && energy.is_finite()) {
             return Err(Fault::new(format!(
-                "the machine's state left the finite numbers within a step of {} s; the step before it ended with \
-                 psi_d = {} Wb, psi_q = {} Wb, speed = {} rad/s",
+                "the machine's state left the finite numbers within a step of {} s; the step before it ended with {}",
                 step.h,
-                self.state.psi.d(),
-                self.state.psi.q(),
-                self.state.speed
+                self.state.tell()
             )));
         }
-        self.state = state;
+        (self.state, self.blocked) = (state, lost.is_some());
         self.energy.add(&energy);
         self.powers = Powers::mean(&energy, step.h, &self.inputs, &legs, || self.currents());
         Ok(())
     }
 }
 
+type P = Row<PmsmPlant>;
+
+/// States that are no outputs; of the plant and of `PmsmDrive`.
+pub const STATES: &Table<PmsmPlant> = &Table::new(
+    const {
+        &[
+            P::state("psi_d", &WEBER, "d-axis stator flux linkage", |m| m.state.psi.parts_mut().0).nominal(0.1),
+            P::state("psi_q", &WEBER, "q-axis stator flux linkage", |m| m.state.psi.parts_mut().1).nominal(0.1),
+        ]
+    },
+);
+
 type V = Row<Block<PmsmPlant>>;
 
 const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
     const {
         &[
-            V::discrete_input("u_a", &VOLT, "Voltage reference of phase a, average over a PWM period", |m| {
+            V::input("u_a", &VOLT, "Voltage reference of phase a, average over a PWM period", |m| {
                 &mut m.model.inputs.u.a
             }),
-            V::discrete_input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
-            V::discrete_input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
+            V::input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
+            V::input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
             V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
             V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
                 &mut m.model.inputs.tau_load
@@ -344,6 +399,7 @@ const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             }),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+            V::part("", &Part { table: STATES, lens: |m| &mut m.model }),
         ]
     },
 );

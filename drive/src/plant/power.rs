@@ -14,7 +14,8 @@
 //! With a held voltage and a turning rotor, the power changes within the step, so an instantaneous value does not
 //! represent it. The outputs are therefore means over the plant's last step, integrated with the state by the same
 //! method, and `energy.in`, `energy.mech` and `energy.loss` are the time integrals of the powers. Before the first
-//! step, the powers are the initial values. i_dc is also defined for u_dc = 0 V: the link still carries the current of
+//! step, the powers are the initial values. In Model Exchange, where the importer integrates, the powers are those of the
+//! instant, and the energies stay 0: an importer that wants them integrates the powers too. i_dc is also defined for u_dc = 0 V: the link still carries the current of
 //! the legs connected to it; in this case it is the value at the end of the step.
 //!
 //! Two events transfer energy instantly and count in the step in which they occur: a jump of the imposed angle, where
@@ -28,20 +29,20 @@ use crate::math::all_finite;
 use crate::plant::legs::Legs;
 use crate::plant::signals::PlantInputs;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
 
 /// Powers; motor sign, from the DC link to the load.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Powers {
+pub struct Powers<S = f64> {
     /// Current that the inverter draws from the DC link in A.
-    pub i_dc: f64,
+    pub i_dc: S,
     /// Power from the DC link in W.
-    pub p_in: f64,
+    pub p_in: S,
     /// Power at the shaft to the load in W.
-    pub p_mech: f64,
+    pub p_mech: S,
     /// Copper loss and friction in W.
-    pub p_loss: f64,
+    pub p_loss: S,
 }
 
 impl Powers {
@@ -51,7 +52,7 @@ impl Powers {
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let rate = 1.0 / h;
         let p_in = energy.r#in * rate + 0.0;
-        let i_dc = if inputs.u_dc > 0.0 { p_in / inputs.u_dc } else { link_current(inputs, legs, i()) };
+        let i_dc = dc_current(p_in, inputs, legs, i);
         Self { i_dc, p_in, p_mech: energy.mech * rate, p_loss: energy.loss * rate }
     }
 
@@ -68,13 +69,20 @@ impl Powers {
     }
 }
 
-/// Current (A) that the inverter draws from the DC link at an instant with the stator currents `i` (A).
-fn link_current(inputs: &PlantInputs, legs: &Legs, i: Phases) -> f64 {
-    let u = &inputs.u;
-    let full = inputs.u_dc.max(u.span());
+/// Current (A) that the inverter draws from the DC link at the power `p_in` (W), or without a link voltage with the
+/// stator currents `i` (A).
+#[inline]
+pub fn dc_current<S: Scalar>(p_in: S, inputs: &PlantInputs<S>, legs: &Legs<S>, i: impl FnOnce() -> Phases<S>) -> S {
+    if inputs.u_dc.value() > 0.0 { p_in / inputs.u_dc } else { link_current(inputs, legs, i()) }
+}
+
+/// The same at an instant without a link voltage.
+fn link_current<S: Scalar>(inputs: &PlantInputs<S>, legs: &Legs<S>, i: Phases<S>) -> S {
+    let (u, span, zero) = (&inputs.u, inputs.u.span(), S::from(0.0));
+    let full = if inputs.u_dc.value() > span.value() { inputs.u_dc } else { span };
     // The currents sum to zero, so a common part of the voltages has no power.
-    let apparent = if inputs.enable { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { 0.0 };
-    if full > 0.0 { apparent / full - legs.feed(i) + 0.0 } else { 0.0 - legs.feed(i) }
+    let apparent = if inputs.enable { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { zero };
+    if full.value() > 0.0 { apparent / full - legs.feed(i) + zero } else { zero - legs.feed(i) }
 }
 
 /// Transferred energy in J; motor sign, from the DC link to the load.
@@ -112,25 +120,25 @@ pub const POWERS: &Table<Powers> = &Table::new(
             P::output(
                 "i_dc",
                 &AMPERE,
-                "Current that the inverter draws from the DC link, mean over the last step (PmsmDrive: over the last T_s)",
+                "Current that the inverter draws from the DC link, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.i_dc,
             ),
             P::output(
                 "p_in",
                 &WATT,
-                "Power from the DC link, u_dc i_dc, mean over the last step (PmsmDrive: over the last T_s)",
+                "Power from the DC link, u_dc i_dc, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_in,
             ),
             P::output(
                 "p_mech",
                 &WATT,
-                "Power delivered to the load at the shaft, tau_shaft speed, mean over the last step (PmsmDrive: over the last T_s)",
+                "Power delivered to the load at the shaft, tau_shaft speed, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_mech,
             ),
             P::output(
                 "p_loss",
                 &WATT,
-                "Copper loss of the stator and friction, mean over the last step (PmsmDrive: over the last T_s)",
+                "Copper loss of the stator and friction, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_loss,
             ),
         ]
@@ -143,11 +151,11 @@ type E = Row<Energy>;
 pub const ENERGY: &Table<Energy> = &Table::new(
     const {
         &[
-            E::output("in", &JOULE, "Energy from the DC link since the start, the integral of p_in", |e| &mut e.r#in),
-            E::output("mech", &JOULE, "Energy delivered to the load since the start, the integral of p_mech", |e| {
+            E::output("in", &JOULE, "Energy from the DC link since the start, the integral of p_in; 0 in Model Exchange", |e| &mut e.r#in),
+            E::output("mech", &JOULE, "Energy delivered to the load since the start, the integral of p_mech; 0 in Model Exchange", |e| {
                 &mut e.mech
             }),
-            E::output("loss", &JOULE, "Energy lost since the start, the integral of p_loss", |e| &mut e.loss),
+            E::output("loss", &JOULE, "Energy lost since the start, the integral of p_loss; 0 in Model Exchange", |e| &mut e.loss),
         ]
     },
 );

@@ -10,10 +10,10 @@
 //! Neither paper includes saturation: this polynomial is chosen here because it has an energy. Flux linkages in Wb, s_2
 //! and s_dq in A/Wb2, s_3 in A/Wb3.
 
-use crate::frame::Dq;
+use crate::frame::{Dq, Rotor, Vector};
 use crate::motor::Motor;
 use fmu_core::unit::{Exponents, Quantity, Unit};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
 
 /// Second-order coefficient in A/Wb2.
@@ -46,9 +46,9 @@ impl Saturation {
 
     /// The current (A) beyond the linear machine's at the flux linkage `psi` (Wb).
     #[inline]
-    pub fn current(&self, motor: &Motor, psi: Dq) -> Dq {
-        let (x, q) = (psi.d() - motor.psi_M, psi.q());
-        Dq::new((self.s_2 + self.s_3 * x) * x * x + 0.5 * self.s_dq * q * q, self.s_dq * x * q)
+    pub fn current<S: Scalar>(&self, motor: &Motor, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
+        let (x, q) = (psi.d() - S::from(motor.psi_M), psi.q());
+        Vector::new((x * self.s_3 + S::from(self.s_2)) * x * x + q * (0.5 * self.s_dq) * q, x * self.s_dq * q)
     }
 
     /// The smallest incremental inductance (H) of the machine at the flux linkage `psi` (Wb) over all directions: 1

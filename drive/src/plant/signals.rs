@@ -2,21 +2,22 @@
 
 use crate::frame::Phases;
 use crate::plant::power::{Energy, Powers};
+use fmu_core::Dual;
 use serde::{Deserialize, Serialize};
 
 /// Inputs, held over a communication step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PlantInputs {
+pub struct PlantInputs<S = f64> {
     /// Stator voltage references in V, averages over a PWM period.
-    pub u: Phases,
+    pub u: Phases<S>,
     /// DC-link voltage in V, >= 0.
-    pub u_dc: f64,
+    pub u_dc: S,
     /// Load torque in N.m, positive against positive speed; ignored with an imposed speed.
-    pub tau_load: f64,
+    pub tau_load: S,
     /// Imposed mechanical speed of the shaft in rad/s.
-    pub speed_shaft: f64,
+    pub speed_shaft: S,
     /// Imposed mechanical angle of the shaft in rad, at the beginning of the step.
-    pub angle_shaft: f64,
+    pub angle_shaft: S,
     /// Whether the gates switch; false: only the diodes conduct.
     pub enable: bool,
 }
@@ -28,27 +29,66 @@ impl Default for PlantInputs {
     }
 }
 
+impl PlantInputs {
+    /// These inputs with the change `along` of the continuous ones.
+    pub fn changing(&self, along: &Self) -> PlantInputs<Dual> {
+        let (u, v) = (&self.u, &along.u);
+        PlantInputs {
+            u: Phases { a: Dual::new(u.a, v.a), b: Dual::new(u.b, v.b), c: Dual::new(u.c, v.c) },
+            u_dc: Dual::new(self.u_dc, along.u_dc),
+            tau_load: Dual::new(self.tau_load, along.tau_load),
+            speed_shaft: Dual::new(self.speed_shaft, along.speed_shaft),
+            angle_shaft: Dual::new(self.angle_shaft, along.angle_shaft),
+            enable: self.enable,
+        }
+    }
+}
+
 /// Outputs, at the end of a communication step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PlantOutputs {
+pub struct PlantOutputs<S = f64> {
     /// Stator currents in A, positive into the machine.
-    pub i: Phases,
+    pub i: Phases<S>,
     /// Mechanical speed in rad/s.
-    pub speed: f64,
+    pub speed: S,
     /// Mechanical angle in rad, not wrapped.
-    pub angle: f64,
+    pub angle: S,
     /// Electrical angle in rad, in (-pi, pi].
-    pub theta_e: f64,
+    pub theta_e: S,
     /// Electromagnetic torque in N.m.
-    pub tau_e: f64,
+    pub tau_e: S,
     /// d-axis stator current in A.
-    pub i_d: f64,
+    pub i_d: S,
     /// q-axis stator current in A.
-    pub i_q: f64,
+    pub i_q: S,
     /// Power between DC link, machine and shaft, mean over the last step.
-    pub powers: Powers,
+    pub powers: Powers<S>,
     /// Torque of the shaft on the load in N.m.
-    pub tau_shaft: f64,
+    pub tau_shaft: S,
     /// Energy since the start.
     pub energy: Energy,
+}
+
+impl PlantOutputs<Dual> {
+    /// The change of the outputs; no energy changes.
+    pub fn change(&self) -> PlantOutputs {
+        let Self { i, powers, .. } = self;
+        PlantOutputs {
+            i: Phases { a: i.a.change, b: i.b.change, c: i.c.change },
+            speed: self.speed.change,
+            angle: self.angle.change,
+            theta_e: self.theta_e.change,
+            tau_e: self.tau_e.change,
+            i_d: self.i_d.change,
+            i_q: self.i_q.change,
+            powers: Powers {
+                i_dc: powers.i_dc.change,
+                p_in: powers.p_in.change,
+                p_mech: powers.p_mech.change,
+                p_loss: powers.p_loss.change,
+            },
+            tau_shaft: self.tau_shaft.change,
+            energy: Energy::default(),
+        }
+    }
 }

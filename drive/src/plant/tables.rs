@@ -43,8 +43,10 @@ pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
             O::output("i_a", &AMPERE, "Stator current of phase a, positive into the machine", |o| &mut o.i.a),
             O::output("i_b", &AMPERE, "Stator current of phase b", |o| &mut o.i.b),
             O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
-            O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed),
-            O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle).unbounded(),
+            O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed).nominal(100.0),
+            O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle)
+                .unbounded()
+                .nominal(1.0),
             O::output("theta_e", &RADIAN, "Electrical rotor angle from phase a to the d axis, in (-pi, pi]", |o| {
                 &mut o.theta_e
             }),
