@@ -98,7 +98,7 @@ macro_rules! functions {
 /// ```
 #[macro_export]
 macro_rules! export {
-    ($model:ty $(: $($capability:ident)+*)?) => {
+    ($model:ty $(: $first:ident $(+ $more:ident)*)?) => {
         #[allow(non_snake_case, unused_imports, clippy::wildcard_imports, clippy::too_many_arguments)]
         mod fmi {
             use super::*;
@@ -108,7 +108,8 @@ macro_rules! export {
 
             impl $crate::Exported for This {
                 type Model = $model;
-                const CAN: $crate::Capabilities<$model> = $crate::Capabilities::<$model>::NONE$($(.$capability())+)?;
+                const CAN: $crate::Capabilities<$model> =
+                    $crate::Capabilities::<$model>::NONE$(.$first()$(.$more())*)?;
             }
 
             $crate::export_fmi2!(This);
