@@ -8,9 +8,7 @@ use crate::variable::{Causality, Kind, Meta, Variability};
 use crate::{Elapsed, Fault};
 
 /// Operating points tried, the start values among them.
-const POINTS: u32 = 16;
-/// The same for dependencies between events, which differ with the values of parameters.
-const POINTS_BETWEEN_EVENTS: u32 = 64;
+const POINTS: u32 = 64;
 
 /// The index that stands for `time`.
 pub(crate) const NOW: usize = usize::MAX;
@@ -25,10 +23,7 @@ pub(crate) fn initial_dependencies<M: Model>(can: &Capabilities<M>, states: &[us
     let mut found = Found::new(causality.len() + states.len());
     let mut draw = Draw(1);
     for point in 0..POINTS {
-        let mut base = Block::<M>::default();
-        if point > 0 {
-            knowns.iter().for_each(|&i| change::<M>(&mut base, i, &mut draw));
-        }
+        let base = operating_point::<M>(point, &knowns, &mut draw);
         let start = |mut block: Block<M>| {
             block.initialize();
             values(can, block, Elapsed::ZERO)
@@ -54,14 +49,10 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) ->
     let known = |&(c, v): &(Causality, Variability)| c == Causality::Input || v == Variability::Tunable;
     let mut found = Found::new(causality.len() + states.len());
     let mut draw = Draw(2);
-    let points = if can.model_exchange() { POINTS_BETWEEN_EVENTS } else { 0 };
+    let settable: Vec<usize> = (0..causality.len()).filter(|&i| causality[i].0.is_settable()).collect();
+    let points = if can.model_exchange() { POINTS } else { 0 };
     for point in 0..points {
-        let mut base = Block::<M>::default();
-        for i in (0..causality.len()).filter(|&i| causality[i].0.is_settable()) {
-            if point > 0 && draw.below(2) == 0 {
-                change::<M>(&mut base, i, &mut draw);
-            }
-        }
+        let mut base = operating_point::<M>(point, &settable, &mut draw);
         base.initialize();
         let mut now = Elapsed::ZERO.plus(draw.between(0.0, 1.0));
         if let Some(events) = &can.events {
@@ -92,6 +83,17 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) ->
         found.compare(NOW, &before, &observed(can, base, now));
     }
     Ok(found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output)))
+}
+
+/// The start values first; then about half of the inputs and parameters have others.
+fn operating_point<M: Model>(point: u32, settable: &[usize], draw: &mut Draw) -> Block<M> {
+    let mut block = Block::<M>::default();
+    for &i in settable {
+        if point > 0 && draw.below(2) == 0 {
+            change::<M>(&mut block, i, draw);
+        }
+    }
+    block
 }
 
 /// Which unknown depends on which known.
@@ -166,7 +168,9 @@ fn change<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
     let Some((meta, slot)) = M::TABLE.entry(block, index) else { return };
     match slot {
         Slot::Real(x) => {
-            let scale = if *x == 0.0 { meta.nominal.unwrap_or(1.0) } else { *x };
+            // The magnitude of a value that is 0 at the start is not known: from 1 to 1000 times the nominal value.
+            let magnitude = [1.0, 10.0, 100.0, 1000.0][draw.below(4)];
+            let scale = if *x == 0.0 { magnitude * meta.nominal.unwrap_or(1.0) } else { *x };
             for _ in 0..20 {
                 let candidate =
                     if *x == 0.0 { scale * draw.between(-1.0, 1.0) } else { scale * draw.between(0.5, 1.5) };
