@@ -8,15 +8,15 @@
 //! In Model Exchange, the importer integrates the plant's states. At every sample instant, an event passes the voltages
 //! of the last sample to the plant and its currents to the controller, in the order of [`Pair::step`].
 
+use crate::PmsmPlant;
+#[cfg(doc)]
+use crate::SensorlessController;
 use crate::control::signals::ControllerOutputs;
 use crate::control::tables::{self, ENABLED, LIMITED, LOCK_LOST};
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::{model::STATES, power::Powers, tables as plant};
-use crate::PmsmPlant;
-#[cfg(doc)]
-use crate::SensorlessController;
 use fmu_core::events::{bounded, grid};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, RADIAN, SPEED, VOLT};
@@ -231,13 +231,7 @@ impl ContinuousTime for PmsmDrive {
 }
 
 impl Differentiable for PmsmDrive {
-    fn tangent(
-        &self,
-        _now: Elapsed,
-        along: &Self,
-        dx: &mut [f64],
-        outputs: &mut DriveOutputs,
-    ) -> Result<(), Fault> {
+    fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut DriveOutputs) -> Result<(), Fault> {
         // The controller's outputs are held.
         let change = PlantInputs { u: Phases::default(), ..along.plant_inputs() };
         let inputs = self.plant_inputs().changing(&change);
