@@ -155,12 +155,12 @@ impl Model for PmsmDrive {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        self.pair.plant.model.validate().map_err(|fault| in_part("plant", fault))?;
-        self.pair.controller.model.validate().map_err(|fault| in_part("controller", fault))
+        self.pair.plant.model.validate().map_err(|fault| in_part("plant", &fault))?;
+        self.pair.controller.model.validate().map_err(|fault| in_part("controller", &fault))
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
-        self.pair.controller.model.validate_for(interface).map_err(|fault| in_part("controller", fault))
+        self.pair.controller.model.validate_for(interface).map_err(|fault| in_part("controller", &fault))
     }
 
     fn initialize(&mut self) {
@@ -204,7 +204,7 @@ impl Model for PmsmDrive {
     }
 }
 
-fn in_part(part: &str, fault: Fault) -> Fault {
+fn in_part(part: &str, fault: &Fault) -> Fault {
     Fault::new(format!("{part}.{fault}"))
 }
 
