@@ -1,7 +1,6 @@
 //! Plant and controller side by side. They exchange values as an importer does: read all outputs, set all inputs, step
 //! both (Jacobi). The packed FMUs must match this native reference bit for bit.
 
-use crate::control::signals::ControllerInputs;
 use crate::{PmsmPlant, SensorlessController};
 use fmu_core::{Block, Elapsed, Fault, Model, Step};
 use serde::{Deserialize, Serialize};
@@ -51,10 +50,7 @@ impl Pair {
     pub fn step(&mut self, h: f64) -> Result<(), Fault> {
         self.plant.model.inputs.u = self.controller.out.u;
         self.plant.model.inputs.enable = self.controller.out.enabled;
-        let ControllerInputs { i, theta_meas, speed_meas, .. } = &mut self.controller.model.inputs;
-        *i = self.plant.out.i;
-        *theta_meas = self.plant.out.theta_e;
-        *speed_meas = self.plant.out.speed;
+        self.controller.model.inputs.measure(&self.plant.out);
         let step = Step { start: self.now, h };
         self.plant.step(&step)?;
         self.controller.step(&step)?;

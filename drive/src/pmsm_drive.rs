@@ -4,17 +4,27 @@
 //! It combines [`PmsmPlant`] and [`SensorlessController`], which exchange values at every sample instant. For a
 //! communication step that is a multiple of T_s, it gives the results of the pair bit for bit. With any other step,
 //! plant and controller also stop at the sample instants in between; an importer's exchange cannot do this.
+//!
+//! In Model Exchange, the importer integrates the plant's states. At every sample instant, an event passes the voltages
+//! of the last sample to the plant and its currents to the controller, in the order of [`Pair::step`].
 
+use crate::PmsmPlant;
+#[cfg(doc)]
+use crate::SensorlessController;
 use crate::control::signals::ControllerOutputs;
 use crate::control::tables::{self, ENABLED, LIMITED, LOCK_LOST};
+use crate::frame::Phases;
 use crate::pair::Pair;
-use crate::plant::{power::Powers, signals::PlantOutputs, tables as plant};
+use crate::plant::signals::{PlantInputs, PlantOutputs};
+use crate::plant::{model::STATES, power::Powers, tables as plant};
+use fmu_core::events::{bounded, grid};
+use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, RADIAN, SPEED, VOLT};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, SampleGrid, Step, Table, Terminal};
+use fmu_core::{
+    Block, ContinuousTime, Differentiable, Elapsed, Events, Experiment, Fault, Indicator, Info, Interface, Model, Next,
+    Outcome, Part, Row, SampleGrid, Sampled, State, Step, Table, Terminal, Warns,
+};
 use serde::{Deserialize, Serialize};
-
-#[cfg(doc)]
-use crate::{PmsmPlant, SensorlessController};
 
 /// Maximum number of samples in one communication step.
 const MAX_SAMPLES: f64 = 1e6;
@@ -103,6 +113,21 @@ impl PmsmDrive {
         let controller = &mut pair.controller.model.inputs;
         (controller.tau_ref, controller.enable) = (inputs.tau_ref, inputs.enable);
     }
+
+    /// The plant's inputs: those of the drive, and the voltages that the controller shows.
+    fn plant_inputs(&self) -> PlantInputs {
+        let DriveInputs { tau_load, u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
+        let PlantInputs { u, enable, .. } = self.pair.plant.model.inputs;
+        PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable }
+    }
+
+    /// The outputs of the controller's last sample become visible and act on the plant.
+    fn show(&mut self, now: Elapsed) {
+        let Pair { plant, controller, .. } = &mut self.pair;
+        controller.model.show();
+        controller.model.output(now, &mut controller.out);
+        (plant.model.inputs.u, plant.model.inputs.enable) = (controller.out.u, controller.out.enabled);
+    }
 }
 
 impl Model for PmsmDrive {
@@ -122,7 +147,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 5;
+    const STATE_VERSION: u16 = 6;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -130,9 +155,12 @@ impl Model for PmsmDrive {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        let in_part = |part: &str, fault: Fault| Fault::new(format!("{part}.{fault}"));
-        self.pair.plant.model.validate().map_err(|fault| in_part("plant", fault))?;
-        self.pair.controller.model.validate().map_err(|fault| in_part("controller", fault))
+        self.pair.plant.model.validate().map_err(|fault| in_part("plant", &fault))?;
+        self.pair.controller.model.validate().map_err(|fault| in_part("controller", &fault))
+    }
+
+    fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
+        self.pair.controller.model.validate_for(interface).map_err(|fault| in_part("controller", &fault))
     }
 
     fn initialize(&mut self) {
@@ -173,6 +201,82 @@ impl Model for PmsmDrive {
             }
         }
         Ok(())
+    }
+}
+
+fn in_part(part: &str, fault: &Fault) -> Fault {
+    Fault::new(format!("{part}.{fault}"))
+}
+
+impl ContinuousTime for PmsmDrive {
+    const STATES: &'static [State<Self>] = &[
+        State::of_part(&PmsmPlant::STATES[0], |m: &mut Self| (PmsmPlant::STATES[0].at)(&mut m.pair.plant.model)),
+        State::of_part(&PmsmPlant::STATES[1], |m: &mut Self| (PmsmPlant::STATES[1].at)(&mut m.pair.plant.model)),
+        State::of_part(&PmsmPlant::STATES[2], |m: &mut Self| (PmsmPlant::STATES[2].at)(&mut m.pair.plant.model)),
+        State::of_part(&PmsmPlant::STATES[3], |m: &mut Self| (PmsmPlant::STATES[3].at)(&mut m.pair.plant.model)),
+    ];
+
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        self.pair.plant.model.derivatives_under(&self.plant_inputs(), dx)
+    }
+
+    fn settle(&mut self) {
+        self.pair.plant.model.settle();
+    }
+
+    fn observe(&self, _now: Elapsed, outputs: &mut DriveOutputs) {
+        outputs.plant = self.pair.plant.model.outputs_under(&self.plant_inputs());
+        outputs.controller.clone_from(&self.pair.controller.out);
+    }
+}
+
+impl Differentiable for PmsmDrive {
+    fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut DriveOutputs) -> Result<(), Fault> {
+        // The controller's outputs are held.
+        let change = PlantInputs { u: Phases::default(), ..along.plant_inputs() };
+        let inputs = self.plant_inputs().changing(&change);
+        outputs.plant = self.pair.plant.model.tangent_under(&inputs, &along.pair.plant.model, dx);
+        outputs.controller = ControllerOutputs::default();
+        Ok(())
+    }
+}
+
+impl Events for PmsmDrive {
+    const INDICATORS: &'static [Indicator] = PmsmPlant::INDICATORS;
+
+    fn indicators(&self, _now: Elapsed, z: &mut [f64]) {
+        self.pair.plant.model.indicators_under(&self.plant_inputs(), z);
+    }
+
+    fn begin(&mut self, now: Elapsed) {
+        let controller = &self.pair.controller.model;
+        if grid(controller).reached(controller.samples(), now) {
+            self.show(now);
+        }
+    }
+
+    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault> {
+        self.set_inputs();
+        bounded(&self.pair.controller.model, now)?;
+        let grid = grid(&self.pair.controller.model);
+        while grid.reached(self.pair.controller.model.samples(), now) {
+            self.show(now);
+            let Pair { plant, controller, .. } = &mut self.pair;
+            plant.model.observe(now, &mut plant.out);
+            controller.model.inputs.measure(&plant.out);
+            controller.model.sample()?;
+        }
+        self.pair.plant.model.event(now)
+    }
+
+    fn next(&self, now: Elapsed) -> Next {
+        self.pair.controller.model.next(now)
+    }
+}
+
+impl Warns for PmsmDrive {
+    fn warn(&self, log: &mut Warnings<'_>) {
+        self.pair.controller.model.warn(log);
     }
 }
 
@@ -222,6 +326,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 "controller.",
                 &Part { table: tables::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
             ),
+            V::part("", &Part { table: STATES, lens: |m| &mut m.model.pair.plant.model }),
         ]
     },
 );

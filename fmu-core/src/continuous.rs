@@ -21,6 +21,11 @@ impl<M: 'static> State<M> {
         Self { name, rate, reinit: false, at }
     }
 
+    /// The state `of` a part of the model that has the rows of its table under the same names.
+    pub const fn of_part<P>(of: &State<P>, at: fn(&mut M) -> &mut f64) -> Self {
+        Self { name: of.name, rate: of.rate, reinit: of.reinit, at }
+    }
+
     /// The same for a state that an event may change.
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;

@@ -55,13 +55,17 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
     let mut budget = substeps(step.h, longest)? + MAX_SUBSTEPS;
     handle(model, now)?;
     loop {
+        let rest = end.since(now);
+        if rest <= f64::EPSILON * step.h {
+            break;
+        }
+        // An event at the end belongs to the next step, with its inputs.
         let left = match until(model, now) {
-            Some(next) if next <= 0.0 => return Err(standstill(now)),
-            Some(next) if next < end.since(now) => next,
-            _ => end.since(now),
+            Some((next, width)) if rest - next > width => next,
+            _ => rest,
         };
         if left <= 0.0 {
-            break;
+            return Err(standstill(now));
         }
         let h = left / substeps(left, longest)?;
         budget -= 1.0;
@@ -70,8 +74,8 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
         }
         let passed = substep::<M, N>(model, now, h)?;
         now = now.plus(passed.unwrap_or(h));
-        let due = until(model, now).is_some_and(|next| next <= 0.0);
-        if passed.is_some() || (due && end.since(now) > 0.0) {
+        let due = until(model, now).is_some_and(|(next, width)| next <= 0.0 && end.since(now) > width);
+        if passed.is_some() || due {
             handle(model, now)?;
         }
     }
@@ -94,16 +98,14 @@ pub fn sampled<M: Sampled>(model: &mut M, step: &Step) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Seconds from `now` to the next event; at most 0 if it is due.
-fn until<M: Events>(model: &M, now: Elapsed) -> Option<f64> {
+/// Seconds from `now` to the next event, 0 if it is due, and how close two instants are the same.
+fn until<M: Events>(model: &M, now: Elapsed) -> Option<(f64, f64)> {
     let (left, width) = match model.next(now) {
         Next::Never => return None,
-        Next::Grid { k, period } => {
-            (-now.minus_periods(k, period), crate::SampleGrid { period }.width())
-        }
+        Next::Grid { k, period } => (-now.minus_periods(k, period), crate::SampleGrid { period }.width()),
         Next::At(time) => (time.since(now), 4.0 * f64::EPSILON * now.seconds().abs()),
     };
-    Some(if left <= width { 0.0 } else { left })
+    Some((if left <= width { 0.0 } else { left }, width))
 }
 
 /// All of an event at `now`.

@@ -10,10 +10,12 @@ use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
 use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::estimator::{Class, Estimator, Sample};
-use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
+use crate::motor::Motor;
 use fmu_core::log::Warnings;
+use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
-    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns, integrate,
+    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns,
+    integrate,
 };
 use serde::{Deserialize, Serialize};
 
@@ -159,7 +161,8 @@ impl Model for SensorlessController {
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
         // An importer that handles events exchanges values at the instant, before the sample is taken.
         if interface != Interface::CoSimulation && self.parameters.delay == 0 {
-            let allowed = "1 or 2: at an event, the voltages of the last sample act, and the currents are sampled after that";
+            let allowed =
+                "1 or 2: at an event, the voltages of the last sample act, and the currents are sampled after that";
             return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.delay, allowed));
         }
         Ok(())
@@ -224,12 +227,13 @@ impl Warns for SensorlessController {
             });
             return;
         }
+        let Motor { R_s, L_d, L_q, psi_M, .. } = self.parameters.motor;
         log.warn("lock_lost", || {
             format!(
-                "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage; the estimator may have lost \
-                 the rotor (speed_est = {} rad/s, theta_est = {} rad), or motor.R_s, motor.L_d, motor.L_q and motor.psi_M \
-                 do not fit the machine",
-                out.lock_lost, out.speed_est, out.theta_est
+                "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage; the rotor is not where \
+                 theta_est = {} rad and speed_est = {} rad/s say, or the controller's R_s = {R_s} Ohm, L_d = {L_d} H, \
+                 L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine",
+                out.lock_lost, out.theta_est, out.speed_est
             )
         });
     }

@@ -2,6 +2,7 @@
 
 use crate::frame::{DqHat, Phases};
 use crate::math::all_finite;
+use crate::plant::signals::PlantOutputs;
 use serde::{Deserialize, Serialize};
 
 /// Inputs, read at the sample instants.
@@ -24,6 +25,12 @@ pub struct ControllerInputs {
 }
 
 impl ControllerInputs {
+    /// What the sensors at the plant measure.
+    #[inline]
+    pub fn measure(&mut self, plant: &PlantOutputs) {
+        (self.i, self.theta_meas, self.speed_meas) = (plant.i, plant.theta_e, plant.speed);
+    }
+
     /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
         let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _ } = self;
