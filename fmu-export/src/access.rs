@@ -163,8 +163,9 @@ impl<E: Exported> Instance<E> {
             if allowed == Some(true) && (open(meta, state) || of_state || held) {
                 return Ok(());
             }
-            if allowed == Some(false) && state == State::Continuous {
-                return Err(Refusal::Discard(message::range::<E::Model>(index, meta, value)));
+            // FMI 2.0.5, 2.1.3. CVode looks ahead of an event, where FMPy already sets the discrete inputs of after it.
+            if state == State::Continuous && meta.causality == Causality::Input && allowed.is_some() {
+                return Err(Refusal::Discard(self.refusal(reference, index, value)));
             }
         }
         Err(self.refusal(reference, index, value).into())

@@ -1,3 +1,3 @@
 //! The FMU SensorlessController.
 
-fmu_export::export!(drive::SensorlessController);
+fmu_export::export!(drive::SensorlessController: Sampled + Warns);

@@ -1,0 +1,196 @@
+"""Model Exchange in FMPy: its CVode and Euler integrate the plant and the whole drive, and run the controller's events.
+
+The reference is co-simulation at T_s. Both hold the voltages over a sample period, so they solve the same equations: what
+differs is the error of the integrators, 2e-7 A and 6e-7 rad/s with CVode at a relative tolerance of 1e-12. CVode starts
+anew at every event; a start from 180 deg amplifies its errors, at 1e-9 to 4e-5 A, at 1e-10 to 4e-6 A.
+"""
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+
+import exchange
+import pair
+from scenarios import RPM, Scenario, schedule
+
+STANDARDS = pytest.mark.parametrize("standard", [2, 3], ids=["fmi2", "fmi3"])
+CURRENTS = ("i_a", "i_b", "i_c", "i_d", "i_q")
+# From the worst angle to 1500 rpm; then half of the rated load.
+START = Scenario(
+    duration=0.6,
+    plant={"initial.theta_e": np.pi},
+    speed_ref=schedule((0.05, 1500 * RPM)),
+    load=schedule((0.45, 1.0)),
+)
+
+
+def steps(*columns, until):
+    """An input table of steps: each is a duplicate row, because FMPy interpolates continuous inputs."""
+    times = sorted({0.0, until, *(t for _, changes in columns for t, _ in changes)})
+    rows = []
+    for t in times:
+        for after in (False, True):
+            rows.append((t, *(value(changes, t, after) for _, changes in columns)))
+    names = [("time", float), *((name, float) for name, _ in columns)]
+    return np.array([row for k, row in enumerate(rows) if k == 0 or row != rows[k - 1]], dtype=names)
+
+
+def value(changes, t, after):
+    found = 0.0
+    for since, new in changes:
+        if since < t or (after and since == t):
+            found = new
+    return found
+
+
+DRIVE_INPUTS = steps(("speed_ref", [(0.05, 1500 * RPM)]), ("tau_load", [(0.45, 1.0)]), until=0.6)
+
+
+def drive(folder, **arguments):
+    return simulate_fmu(
+        folder / "PmsmDrive.fmu",
+        stop_time=START.duration,
+        input=DRIVE_INPUTS,
+        start_values={"plant.initial.theta_e": np.pi},
+        output=["speed", *CURRENTS],
+        record_events=False,
+        **arguments,
+    )
+
+
+def at_same_times(reference, result):
+    """The rows of the reference at the times of the result."""
+    rows = np.searchsorted(reference["time"], result["time"] - 1e-9)
+    assert np.abs(reference["time"][rows] - result["time"]).max() < 1e-9
+    return reference[rows]
+
+
+@STANDARDS
+@pytest.mark.parametrize("solver", ["CVode", "Euler"])
+def test_plant(archives, standard, solver):
+    """Voltages, a load step and the gates off at half of the time."""
+    stop, step = (0.1, 1e-3) if solver == "CVode" else (0.02, 1e-6)  # Euler's step is the output interval
+    inputs = np.array(
+        [
+            (0.0, 20.0, -10.0, -10.0, 0.0, True),
+            (0.3 * stop, 20.0, -10.0, -10.0, 0.0, True),
+            (0.3 * stop, -5.0, 20.0, -15.0, 1.0, True),
+            (stop, -5.0, 20.0, -15.0, 1.0, True),
+        ],
+        dtype=[*((name, float) for name in ("time", "u_a", "u_b", "u_c", "tau_load")), ("enable", bool)],
+    )
+    arguments = {"stop_time": stop, "input": inputs, "output": ["speed", "angle", *CURRENTS], "record_events": False}
+    archive = archives / f"fmi{standard}" / "PmsmPlant.fmu"
+    result = simulate_fmu(
+        archive,
+        fmi_type="ModelExchange",
+        solver=solver,
+        step_size=step,
+        output_interval=step,
+        relative_tolerance=1e-9,
+        **arguments,
+    )
+    result = result[:: round(1e-3 / step)]
+    reference = at_same_times(
+        simulate_fmu(archive, fmi_type="CoSimulation", step_size=1e-4, output_interval=1e-4, **arguments), result
+    )
+    # Euler's error is h/2 times the second derivative: at 1 us and 1e6 A/s2, 1e-2 A at most.
+    bound = 1e-5 if solver == "CVode" else 1e-2
+    assert np.abs(reference["i_q"]).max() > 1.0
+    for name in ("speed", "angle", *CURRENTS):
+        assert np.abs(result[name] - reference[name]).max() < bound, name
+
+
+@STANDARDS
+def test_plant_with_the_gates_off(archives, standard):
+    """The diodes block at an event that CVode locates: from there on there is no current."""
+    inputs = np.array(
+        [(0.0, 30.0, -15.0, -15.0, True), (0.02, 30.0, -15.0, -15.0, True), (0.02, 0.0, 0.0, 0.0, False)],
+        dtype=[*((name, float) for name in ("time", "u_a", "u_b", "u_c")), ("enable", bool)],
+    )
+    result = simulate_fmu(
+        archives / f"fmi{standard}" / "PmsmPlant.fmu",
+        fmi_type="ModelExchange",
+        relative_tolerance=1e-9,
+        stop_time=0.04,
+        output_interval=1e-4,
+        input=inputs,
+        output=["i_a", "i_b", "i_c", "speed"],
+    )
+    before, after = result["time"] < 0.02 - 1e-9, result["time"] > 0.021
+    assert np.abs(result["i_a"][before]).max() > 5.0
+    for name in ("i_a", "i_b", "i_c"):
+        assert np.abs(result[name][after]).max() == 0.0, name
+
+
+@STANDARDS
+def test_drive(archives, standard):
+    """The whole drive, without a step size to choose."""
+    folder = archives / f"fmi{standard}"
+    result = drive(folder, fmi_type="ModelExchange", output_interval=1e-3, relative_tolerance=1e-10)
+    reference = drive(folder, fmi_type="CoSimulation", output_interval=1e-4, step_size=1e-4)
+    reference = at_same_times(reference, result)
+    assert result["speed"][-1] == pytest.approx(1500 * RPM, rel=0.02)
+    assert np.abs(result["speed"] - reference["speed"]).max() < 1e-4
+    for name in CURRENTS:
+        assert np.abs(result[name] - reference[name]).max() < 1e-5, name
+
+
+@STANDARDS
+def test_pair(archives, standard):
+    """Plant and controller connected: the same."""
+    folder = archives / f"fmi{standard}"
+    result = exchange.simulate(folder, START, 1e-3, 1e-10)
+    reference = pair.simulate(folder, START, 1e-4)
+    rows = np.searchsorted(reference["t"], result["t"] - 1e-9)
+    assert np.abs(result["speed"] - reference["speed"][rows]).max() < 1e-4
+    whole = drive(folder, fmi_type="CoSimulation", output_interval=1e-4, step_size=1e-4)
+    rows = np.searchsorted(whole["time"], result["t"] - 1e-9)
+    for name in ("i_d", "i_q"):
+        assert np.abs(result[name] - whole[name][rows]).max() < 1e-5, name
+
+
+def controller(folder, **arguments):
+    """Alone, with inputs that change between its samples: powers of 2, which FMPy's interpolation keeps to the last bit."""
+    changes = [(k * 2.37e-3 + 5e-5, (-1.0) ** k * 2.0 ** (k % 3)) for k in range(40)]
+    opposite = [(t, -0.5 * i) for t, i in changes]
+    inputs = steps(("i_a", changes), ("i_b", opposite), ("speed_ref", [(5e-5, 16.0)]), until=0.1)
+    return simulate_fmu(
+        folder / "SensorlessController.fmu",
+        stop_time=0.1,
+        input=inputs,
+        output=["u_a", "u_b", "u_c", "theta_est", "speed_est", "i_q_ref"],
+        **arguments,
+    )
+
+
+def after_events(result):
+    """The last row of each time: what is visible once the event is over."""
+    time = result["time"]
+    return result[np.append(np.diff(time) > 1e-9, True)]
+
+
+@STANDARDS
+@pytest.mark.parametrize("solver", ["CVode", "Euler"])
+def test_controller(archives, standard, solver):
+    """It has no state, only events, which read the inputs of their instants: bit for bit co-simulation at T_s."""
+    folder = archives / f"fmi{standard}"
+    result = after_events(controller(folder, fmi_type="ModelExchange", solver=solver, output_interval=1e-4))
+    reference = controller(folder, fmi_type="CoSimulation", step_size=1e-4, output_interval=1e-4)
+    held = np.searchsorted(reference["time"], result["time"] + 1e-9) - 1
+    assert np.abs(result["u_a"]).max() > 1.0
+    for name in result.dtype.names[1:]:
+        assert np.array_equal(result[name], reference[name][held]), name
+
+
+@pytest.mark.parametrize("early", [False, True], ids=["whole", "early"])
+@pytest.mark.parametrize("h", [1e-4, 0.7e-4, 1e-3, 7.3e-3])
+def test_controller_with_event_mode(archives, early, h):
+    """Co-simulation with Event Mode. With early return every sample reads the inputs of its instant, whatever the step."""
+    folder = archives / "fmi3"
+    arguments = {"step_size": h, "output_interval": h, "use_event_mode": True, "early_return_allowed": early}
+    result = after_events(controller(folder, fmi_type="CoSimulation", **arguments))
+    reference = controller(folder, fmi_type="CoSimulation", step_size=1e-4, output_interval=1e-4)
+    held = np.searchsorted(reference["time"], result["time"] + 1e-9) - 1
+    same = all(np.array_equal(result[name], reference[name][held]) for name in result.dtype.names[1:])
+    assert same == (early or h == 1e-4)
