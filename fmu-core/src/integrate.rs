@@ -5,7 +5,7 @@
 //! falsi and bisection in turn, each trial being a substep of its own, as exact as the integration itself.
 
 use crate::events::{bounded, grid};
-use crate::{ContinuousTime, Elapsed, Events, Fault, Next, Sampled, Step};
+use crate::{ContinuousTime, Elapsed, Events, Fault, Sampled, Step};
 
 /// Maximum number of substeps in one communication step.
 const MAX_SUBSTEPS: f64 = 1e8;
@@ -55,8 +55,8 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
     let mut budget = substeps(step.h, longest)? + MAX_SUBSTEPS;
     handle(model, now)?;
     loop {
-        let left = match until(model, now) {
-            Some(next) if next <= 0.0 => return Err(standstill(now)),
+        let left = match model.next(now).left(now) {
+            Some(0.0) => return Err(standstill(now)),
             Some(next) if next < end.since(now) => next,
             _ => end.since(now),
         };
@@ -70,7 +70,7 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
         }
         let passed = substep::<M, N>(model, now, h)?;
         now = now.plus(passed.unwrap_or(h));
-        let due = until(model, now).is_some_and(|next| next <= 0.0);
+        let due = model.next(now).is_due(now);
         if passed.is_some() || (due && end.since(now) > 0.0) {
             handle(model, now)?;
         }
@@ -92,18 +92,6 @@ pub fn sampled<M: Sampled>(model: &mut M, step: &Step) -> Result<(), Fault> {
     }
     model.begin(end);
     Ok(())
-}
-
-/// Seconds from `now` to the next event; at most 0 if it is due.
-fn until<M: Events>(model: &M, now: Elapsed) -> Option<f64> {
-    let (left, width) = match model.next(now) {
-        Next::Never => return None,
-        Next::Grid { k, period } => {
-            (-now.minus_periods(k, period), crate::SampleGrid { period }.width())
-        }
-        Next::At(time) => (time.since(now), 4.0 * f64::EPSILON * now.seconds().abs()),
-    };
-    Some(if left <= width { 0.0 } else { left })
 }
 
 /// All of an event at `now`.

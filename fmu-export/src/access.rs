@@ -109,7 +109,7 @@ impl<E: Exported> Instance<E> {
         let read = if after < states {
             self.derivatives(&mut values[..states])
         } else {
-            self.indicators(&mut values[states..]).map_err(Refusal::from)
+            self.indicators(&mut values[states..])
         };
         let x = values[after];
         self.values = values;
@@ -141,7 +141,7 @@ impl<E: Exported> Instance<E> {
         for write in [false, true] {
             let mut next = values.iter();
             for &reference in references {
-                let count = self.elements(reference)?;
+                let count = if self.arrays { self.elements(reference)? } else { 1 };
                 for (offset, &value) in (0..count).zip(&mut next) {
                     let index = index(reference).wrapping_add(offset);
                     if write { self.write(index, value) } else { self.try_value(state, reference, index, value)? }
@@ -223,7 +223,7 @@ impl<E: Exported> Instance<E> {
                 dirty |= meta.causality == Causality::Parameter;
             }
         }
-        self.current.dirty |= dirty || state != State::Step;
+        self.current.dirty |= dirty || matches!(state, State::Instantiated | State::Initialization);
         Ok(())
     }
 

@@ -231,7 +231,7 @@ impl<E: Exported> Abi<E> {
     pub unsafe fn indicators(entry: Entry, instance: Instance, z: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe {
-            enter::<E>(entry, instance, |instance| Ok(instance.indicators(numbers(z, n, "event indicators")?)?))
+            enter::<E>(entry, instance, |instance| instance.indicators(numbers(z, n, "event indicators")?))
         }
     }
 
