@@ -85,12 +85,8 @@ impl<M: Model> Capabilities<M> {
     where
         M: ContinuousTime,
     {
-        let continuous = Continuous {
-            states: M::STATES,
-            derivatives: M::derivatives,
-            settle: M::settle,
-            observe: M::observe,
-        };
+        let continuous =
+            Continuous { states: M::STATES, derivatives: M::derivatives, settle: M::settle, observe: M::observe };
         Self { continuous: Some(continuous), ..self }
     }
 
@@ -180,10 +176,10 @@ impl<M: Model> Capabilities<M> {
                     && matches!(meta.kind, Kind::Real(_))
                     && matches!(meta.causality, Causality::Output | Causality::Local)
             };
-            let named = |index: &usize| {
-                M::TABLE.locate(*index).is_some_and(|(name, meta, _)| name == state.name && fits(meta))
-            };
-            let none = || Fault::new(format!("the state {} has no continuous real output or state in the table", state.name));
+            let named =
+                |index: &usize| M::TABLE.locate(*index).is_some_and(|(name, meta, _)| name == state.name && fits(meta));
+            let none =
+                || Fault::new(format!("the state {} has no continuous real output or state in the table", state.name));
             (0..M::TABLE.len()).find(named).ok_or_else(none)
         };
         self.states().iter().map(row).collect()
@@ -195,7 +191,8 @@ impl<M: Model> Capabilities<M> {
         if !self.model_exchange() {
             return hash;
         }
-        hash = hash.bytes(&[self.continuous.is_some() as u8, self.events.is_some() as u8, self.samples.is_some() as u8]);
+        hash =
+            hash.bytes(&[self.continuous.is_some() as u8, self.events.is_some() as u8, self.samples.is_some() as u8]);
         let mut i = 0;
         while i < self.states().len() {
             let state = &self.states()[i];

@@ -4,13 +4,13 @@ mod terminals;
 
 pub use terminals::{Member, Terminal, TerminalPicture};
 
+use crate::Fault;
 use crate::capability::{Capabilities, Exported};
 use crate::model::{Block, Experiment, Model};
 use crate::probe;
 use crate::row::{Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
-use crate::Fault;
 use serde::{Deserialize, Serialize};
 
 /// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
@@ -256,12 +256,7 @@ impl Variable {
     }
 }
 
-fn variable(
-    name: String,
-    meta: &Meta,
-    value_reference: u32,
-    start: Option<Value>,
-) -> Variable {
+fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value>) -> Variable {
     Variable {
         name,
         description: meta.description.into(),

@@ -155,7 +155,8 @@ fn values<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) ->
 /// Moves state `i` by about its nominal value.
 fn shift<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], i: usize, draw: &mut Draw) {
     let nominal = M::TABLE.entry(block, states[i]).and_then(|(meta, _)| meta.nominal).unwrap_or(1.0);
-    *(can.states()[i].at)(&mut block.model) += nominal * draw.between(0.3, 1.0) * if draw.below(2) == 0 { 1.0 } else { -1.0 };
+    *(can.states()[i].at)(&mut block.model) +=
+        nominal * draw.between(0.3, 1.0) * if draw.below(2) == 0 { 1.0 } else { -1.0 };
     if let Some(continuous) = &can.continuous {
         (continuous.settle)(&mut block.model);
     }

@@ -159,8 +159,7 @@ impl<E: Exported> Instance<E> {
         if let Some((meta, slot)) = found {
             let allowed = value.judge(meta);
             let held = meta.causality == Causality::Input && T::read(meta, &slot) == Some(value);
-            let of_state = self.states.contains(&index) && matches!(state, State::Event | State::Continuous);
-            if allowed == Some(true) && (open(meta, state) || of_state || held) {
+            if allowed == Some(true) && (open(meta, state) || held || self.sets_state(index)) {
                 return Ok(());
             }
             if allowed == Some(false) && state == State::Continuous {
@@ -168,6 +167,13 @@ impl<E: Exported> Instance<E> {
             }
         }
         Err(self.refusal(reference, index, value).into())
+    }
+
+    /// Whether the variable is a state that can be set: FMI 3.0.2, 3.2.1.
+    fn sets_state(&self, index: usize) -> bool {
+        self.exchanges()
+            && matches!(self.current.life.state(), State::Event | State::Continuous)
+            && self.states.contains(&index)
     }
 
     /// Writes a value that was judged before.
@@ -210,7 +216,8 @@ impl<E: Exported> Instance<E> {
                     dirty |= meta.causality == Causality::Parameter;
                     continue;
                 }
-                let Some((meta, slot)) = settable(table::<E>().entry(&mut self.current.block, index), state, value) else {
+                let Some((meta, slot)) = settable(table::<E>().entry(&mut self.current.block, index), state, value)
+                else {
                     self.take_back(&old[..done]);
                     return Err(self.refusal(reference, index, value));
                 };
@@ -257,7 +264,7 @@ impl<E: Exported> Instance<E> {
         match table::<E>().entry(&mut self.current.block, index) {
             Some((meta, _)) => match value.judge(meta) {
                 None => message::type_of::<E::Model>(index, meta, T::CARRIES),
-                Some(_) if !open(meta, self.current.life.state()) => {
+                Some(_) if !open(meta, self.current.life.state()) && !self.sets_state(index) => {
                     message::fixed::<E::Model>(index, meta, self.current.life.state())
                 }
                 Some(_) => message::range::<E::Model>(index, meta, value),
@@ -298,7 +305,9 @@ impl<E: Exported> Instance<E> {
         let index = index(reference);
         match table::<E>().element(index) {
             Some(element) if element > 0 => Err(message::element::<E::Model>(reference, index, element)),
-            _ => Ok(table::<E>().entry(&mut self.current.block, index).and_then(|(meta, _)| meta.dimension).unwrap_or(1)),
+            _ => {
+                Ok(table::<E>().entry(&mut self.current.block, index).and_then(|(meta, _)| meta.dimension).unwrap_or(1))
+            }
         }
     }
 }

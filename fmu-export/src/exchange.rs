@@ -27,7 +27,7 @@ impl<E: Exported> Instance<E> {
         if let Some(events) = &E::CAN.events {
             (events.begin)(&mut current.block.model, current.elapsed);
         }
-        self.observe();
+        self.changed();
     }
 
     /// Updates the discrete states with the inputs as they are set. Tunable parameters take effect here, all together.
@@ -52,7 +52,7 @@ impl<E: Exported> Instance<E> {
             };
         }
         self.current.pending = update.outcome.again;
-        self.observe();
+        self.changed();
         self.warn();
         Ok(update)
     }
@@ -72,7 +72,7 @@ impl<E: Exported> Instance<E> {
     }
 
     /// The outputs are to be computed anew: in Model Exchange when they are read.
-    fn observe(&mut self) {
+    fn changed(&mut self) {
         if self.exchanges() {
             self.stale = true;
         } else {

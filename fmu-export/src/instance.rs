@@ -130,6 +130,7 @@ impl<E: Exported> Instance<E> {
     /// Restores the state after instantiation; name and logger stay.
     pub fn reset(&mut self) {
         self.current = Snapshot::new(self.current.life.interface());
+        self.stale = false;
         self.warned.clear();
         self.log.event(|| format!("{}: reset", self.name));
     }
@@ -230,6 +231,12 @@ impl<E: Exported> Instance<E> {
             self.current.block.initialize();
             self.current.dirty = false;
         }
+        self.observe();
+    }
+
+    /// Computes outputs that are of another instant.
+    #[inline]
+    fn observe(&mut self) {
         if self.stale {
             let observe = match &E::CAN.continuous {
                 Some(continuous) => continuous.observe,
@@ -245,7 +252,8 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// The handle is unknown.
-    pub fn save(&self, handle: usize) -> Result<usize, Fault> {
+    pub fn save(&mut self, handle: usize) -> Result<usize, Fault> {
+        self.observe();
         if handle == 0 {
             return Ok(registry::keep(self.current.clone()));
         }
@@ -268,7 +276,7 @@ impl<E: Exported> Instance<E> {
             self.current.clone_from(state);
             Ok(())
         })?;
-        self.stale = self.exchanges();
+        self.stale = false;
         Ok(())
     }
 

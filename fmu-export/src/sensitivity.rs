@@ -54,13 +54,7 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// As [`directional`](Self::directional).
-    pub fn adjoint(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        out: &mut [f64],
-    ) -> Result<(), Refusal> {
+    pub fn adjoint(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
         supported::<E>("providesAdjointDerivatives = false")?;
         self.check_sides(unknowns, knowns)?;
         check_sizes(seed, unknowns.len(), (out.len(), knowns.len()))?;
@@ -105,7 +99,8 @@ impl<E: Exported> Instance<E> {
     pub fn input_derivatives(&mut self, knowns: &[u32], orders: &[i32], values: &[f64]) -> Result<(), Fault> {
         supported::<E>("canInterpolateInputs = false")?;
         for ((&known, order), value) in knowns.iter().zip(orders).zip(values) {
-            let input = E::Model::TABLE.entry(&mut self.current.block, index(known)).is_some_and(|(meta, _)| ramps(meta));
+            let input =
+                E::Model::TABLE.entry(&mut self.current.block, index(known)).is_some_and(|(meta, _)| ramps(meta));
             if !input {
                 return Err(self.no_side(known, "a continuous real input"));
             }
