@@ -143,6 +143,11 @@ impl<M: Model> Capabilities<M> {
         self.continuous.is_some() || self.events.is_some()
     }
 
+    /// Co-simulation with Event Mode and early return (FMI 3.0): for a sampled model without states of its own.
+    pub const fn event_mode(&self) -> bool {
+        self.samples.is_some() && self.continuous.is_none()
+    }
+
     /// The states; none for a model without [`ContinuousTime`].
     pub const fn states(&self) -> &'static [State<M>] {
         match &self.continuous {

@@ -222,7 +222,7 @@ impl Description {
             states: states.iter().map(|&row| reference(row)).collect(),
             derivatives: (0..states.len()).map(after).collect(),
             indicators: (0..can.indicators().len()).map(|i| after(states.len() + i)).collect(),
-            event_mode: can.samples.is_some(),
+            event_mode: can.event_mode(),
         });
         let info = M::INFO;
         Ok(Self {

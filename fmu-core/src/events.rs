@@ -21,6 +21,29 @@ pub enum Next {
     At(Elapsed),
 }
 
+impl Next {
+    /// Seconds from `now` to this event: 0 if it is due, also if `now` misses it by rounding. An importer may take a time
+    /// of its own for that of the event if both are the same to 1e-9 of the time.
+    pub fn left(self, now: Elapsed) -> Option<f64> {
+        self.ahead(now).map(|(left, _)| left)
+    }
+
+    /// The same, and how far apart two times may be to be the same instant.
+    pub(crate) fn ahead(self, now: Elapsed) -> Option<(f64, f64)> {
+        let (left, width) = match self {
+            Self::Never => return None,
+            Self::Grid { k, period } => (-now.minus_periods(k, period), SampleGrid { period }.width()),
+            Self::At(time) => (time.since(now), 1e-9 * now.seconds().abs()),
+        };
+        Some((if left <= width { 0.0 } else { left }, width))
+    }
+
+    /// Whether the event is due at `now`.
+    pub fn is_due(self, now: Elapsed) -> bool {
+        self.left(now) == Some(0.0)
+    }
+}
+
 /// What an event did, besides changing discrete variables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {

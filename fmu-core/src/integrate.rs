@@ -5,7 +5,7 @@
 //! falsi and bisection in turn, each trial being a substep of its own, as exact as the integration itself.
 
 use crate::events::{bounded, grid};
-use crate::{ContinuousTime, Elapsed, Events, Fault, Next, Sampled, Step};
+use crate::{ContinuousTime, Elapsed, Events, Fault, Sampled, Step};
 
 /// Maximum number of substeps in one communication step.
 const MAX_SUBSTEPS: f64 = 1e8;
@@ -60,7 +60,7 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
             break;
         }
         // An event at the end belongs to the next step, with its inputs.
-        let left = match until(model, now) {
+        let left = match model.next(now).ahead(now) {
             Some((next, width)) if rest - next > width => next,
             _ => rest,
         };
@@ -74,7 +74,7 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
         }
         let passed = substep::<M, N>(model, now, h)?;
         now = now.plus(passed.unwrap_or(h));
-        let due = until(model, now).is_some_and(|(next, width)| next <= 0.0 && end.since(now) > width);
+        let due = model.next(now).ahead(now).is_some_and(|(next, width)| next <= 0.0 && end.since(now) > width);
         if passed.is_some() || due {
             handle(model, now)?;
         }
@@ -96,16 +96,6 @@ pub fn sampled<M: Sampled>(model: &mut M, step: &Step) -> Result<(), Fault> {
     }
     model.begin(end);
     Ok(())
-}
-
-/// Seconds from `now` to the next event, 0 if it is due, and how close two instants are the same.
-fn until<M: Events>(model: &M, now: Elapsed) -> Option<(f64, f64)> {
-    let (left, width) = match model.next(now) {
-        Next::Never => return None,
-        Next::Grid { k, period } => (-now.minus_periods(k, period), crate::SampleGrid { period }.width()),
-        Next::At(time) => (time.since(now), 4.0 * f64::EPSILON * now.seconds().abs()),
-    };
-    Some((if left <= width { 0.0 } else { left }, width))
 }
 
 /// All of an event at `now`.

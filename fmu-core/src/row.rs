@@ -63,6 +63,7 @@ impl<W: 'static> Row<W> {
             range: Range::ALL,
             nominal: None,
             unbounded: false,
+            mean: false,
             dimension: None,
         };
         Self { meta, access }
@@ -250,6 +251,17 @@ impl<W: 'static> Row<W> {
     /// The variable is unbounded, like an angle that is not wrapped (FMI 3.0.2, 2.4.4 `unbounded`).
     pub const fn unbounded(mut self) -> Self {
         self.meta.unbounded = true;
+        self
+    }
+
+    /// The output is a mean over the last communication step.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not a real output.
+    pub const fn mean(mut self) -> Self {
+        let real = matches!(self.meta.kind, Kind::Real(_));
+        assert!(real && matches!(self.meta.causality, Causality::Output), "only a real output can be a mean");
+        self.meta.mean = true;
         self
     }
 

@@ -132,6 +132,8 @@ pub struct Meta {
     pub nominal: Option<f64>,
     /// The value is unbounded, like an angle that is not wrapped.
     pub unbounded: bool,
+    /// The value is a mean over the last communication step.
+    pub mean: bool,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,
 }

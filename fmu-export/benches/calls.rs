@@ -5,7 +5,7 @@
 mod timing;
 
 use fmu_core::unit::VOLT;
-use fmu_core::{Block, Exported, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table};
+use fmu_core::{Block, Elapsed, Experiment, Exported, Fault, Info, Model, Row, Step, Table};
 use fmu_export::abi::types::{Fmi2Boolean, Instance, References, c_int};
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;

@@ -109,7 +109,7 @@ impl<E: Exported> Instance<E> {
         let read = if after < states {
             self.derivatives(&mut values[..states])
         } else {
-            self.indicators(&mut values[states..]).map_err(Refusal::from)
+            self.indicators(&mut values[states..])
         };
         let x = values[after];
         self.values = values;
@@ -141,7 +141,7 @@ impl<E: Exported> Instance<E> {
         for write in [false, true] {
             let mut next = values.iter();
             for &reference in references {
-                let count = self.elements(reference)?;
+                let count = if self.arrays { self.elements(reference)? } else { 1 };
                 for (offset, &value) in (0..count).zip(&mut next) {
                     let index = index(reference).wrapping_add(offset);
                     if write { self.write(index, value) } else { self.try_value(state, reference, index, value)? }
@@ -159,8 +159,7 @@ impl<E: Exported> Instance<E> {
         if let Some((meta, slot)) = found {
             let allowed = value.judge(meta);
             let held = meta.causality == Causality::Input && T::read(meta, &slot) == Some(value);
-            let of_state = self.states.contains(&index) && matches!(state, State::Event | State::Continuous);
-            if allowed == Some(true) && (open(meta, state) || of_state || held) {
+            if allowed == Some(true) && (open(meta, state) || held || self.sets_state(index)) {
                 return Ok(());
             }
             // FMI 2.0.5, 2.1.3. CVode looks ahead of an event, where FMPy already sets the discrete inputs of after it.
@@ -169,6 +168,13 @@ impl<E: Exported> Instance<E> {
             }
         }
         Err(self.refusal(reference, index, value).into())
+    }
+
+    /// Whether the variable is a state that can be set: FMI 3.0.2, 3.2.1.
+    fn sets_state(&self, index: usize) -> bool {
+        self.exchanges()
+            && matches!(self.current.life.state(), State::Event | State::Continuous)
+            && self.states.contains(&index)
     }
 
     /// Writes a value that was judged before.
@@ -211,7 +217,8 @@ impl<E: Exported> Instance<E> {
                     dirty |= meta.causality == Causality::Parameter;
                     continue;
                 }
-                let Some((meta, slot)) = settable(table::<E>().entry(&mut self.current.block, index), state, value) else {
+                let Some((meta, slot)) = settable(table::<E>().entry(&mut self.current.block, index), state, value)
+                else {
                     self.take_back(&old[..done]);
                     return Err(self.refusal(reference, index, value));
                 };
@@ -224,7 +231,7 @@ impl<E: Exported> Instance<E> {
                 dirty |= meta.causality == Causality::Parameter;
             }
         }
-        self.current.dirty |= dirty || state != State::Step;
+        self.current.dirty |= dirty || matches!(state, State::Instantiated | State::Initialization);
         Ok(())
     }
 
@@ -258,7 +265,7 @@ impl<E: Exported> Instance<E> {
         match table::<E>().entry(&mut self.current.block, index) {
             Some((meta, _)) => match value.judge(meta) {
                 None => message::type_of::<E::Model>(index, meta, T::CARRIES),
-                Some(_) if !open(meta, self.current.life.state()) => {
+                Some(_) if !open(meta, self.current.life.state()) && !self.sets_state(index) => {
                     message::fixed::<E::Model>(index, meta, self.current.life.state())
                 }
                 Some(_) => message::range::<E::Model>(index, meta, value),
@@ -299,7 +306,9 @@ impl<E: Exported> Instance<E> {
         let index = index(reference);
         match table::<E>().element(index) {
             Some(element) if element > 0 => Err(message::element::<E::Model>(reference, index, element)),
-            _ => Ok(table::<E>().entry(&mut self.current.block, index).and_then(|(meta, _)| meta.dimension).unwrap_or(1)),
+            _ => {
+                Ok(table::<E>().entry(&mut self.current.block, index).and_then(|(meta, _)| meta.dimension).unwrap_or(1))
+            }
         }
     }
 }

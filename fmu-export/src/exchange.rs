@@ -27,7 +27,7 @@ impl<E: Exported> Instance<E> {
         if let Some(events) = &E::CAN.events {
             (events.begin)(&mut current.block.model, current.elapsed);
         }
-        self.observe();
+        self.changed();
     }
 
     /// Updates the discrete states with the inputs as they are set. Tunable parameters take effect here, all together.
@@ -52,18 +52,18 @@ impl<E: Exported> Instance<E> {
             };
         }
         self.current.pending = update.outcome.again;
-        self.observe();
+        self.changed();
         self.warn();
         Ok(update)
     }
 
-    /// Leaves Event Mode; an event that the importer did not update is done now.
+    /// Leaves Event Mode; an event that the importer did not update, or tunable parameters that it set since, are done now.
     ///
     /// # Errors
     /// As [`update_discrete`](Self::update_discrete); an event that does not settle.
     pub fn leave_event(&mut self) -> Result<(), Fault> {
         for _ in 0..MAX_ITERATIONS {
-            if !self.current.pending {
+            if !self.current.pending && !self.current.dirty {
                 return Ok(());
             }
             self.update_discrete()?;
@@ -71,9 +71,9 @@ impl<E: Exported> Instance<E> {
         Err(Fault::new(format!("the event at {} s does not settle", self.current.end)))
     }
 
-    /// The outputs are to be computed anew: at once for a model without states, for others when they are read.
-    fn observe(&mut self) {
-        if self.exchanges() && E::CAN.continuous.is_some() {
+    /// The outputs are to be computed anew: in Model Exchange when they are read.
+    fn changed(&mut self) {
+        if self.exchanges() {
             self.stale = true;
         } else {
             let current = &mut self.current;
@@ -102,17 +102,20 @@ impl<E: Exported> Instance<E> {
     /// An integrator step is complete: no earlier time will be set.
     pub fn completed_step(&mut self) {
         self.current.settled = self.current.settled.max(self.current.end);
+        self.warn();
     }
 
     /// Sets all states.
     ///
     /// # Errors
-    /// Another number than there are states (Error); a state that is not finite (Discard): nothing has changed.
+    /// Another number than there are states (Error); a state that is out of its range or not finite (Discard): nothing
+    /// has changed.
+    #[inline]
     pub fn set_states(&mut self, x: &[f64]) -> Result<(), Refusal> {
         let states = E::CAN.states();
         count("nContinuousStates", x.len(), states.len())?;
-        if let Some(i) = x.iter().position(|x| !x.is_finite()) {
-            return Err(Refusal::Discard(Fault::value(states[i].name, x[i], "a finite number")));
+        if let Some(i) = x.iter().zip(&self.ranges).position(|(x, range)| !range.contains(*x)) {
+            return Err(Refusal::Discard(Fault::value(states[i].name, x[i], self.ranges[i])));
         }
         for (state, x) in states.iter().zip(x) {
             *(state.at)(&mut self.current.block.model) = *x;
@@ -176,14 +179,19 @@ impl<E: Exported> Instance<E> {
     /// Reads the event indicators.
     ///
     /// # Errors
-    /// Room for another number than there are.
-    pub fn indicators(&mut self, z: &mut [f64]) -> Result<(), Fault> {
-        count("nEventIndicators", z.len(), E::CAN.indicators().len())?;
+    /// Room for another number than there are (Error); indicators that are not a number (Discard).
+    #[inline]
+    pub fn indicators(&mut self, z: &mut [f64]) -> Result<(), Refusal> {
+        let list = E::CAN.indicators();
+        count("nEventIndicators", z.len(), list.len())?;
         self.refresh_initial();
         if let Some(events) = &E::CAN.events {
             (events.indicators)(&self.current.block.model, self.current.elapsed, z);
         }
-        Ok(())
+        match z.iter().position(|z| z.is_nan()) {
+            None => Ok(()),
+            Some(i) => Err(Refusal::Discard(Fault::value(list[i].name, z[i], "a number"))),
+        }
     }
 
     /// Reads the nominal values of the states.

@@ -6,7 +6,7 @@ use crate::sensitivity::Scratch;
 use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
 use fmu_core::log::Warnings;
-use fmu_core::{Exported, Fault, Interface, Model, SampleGrid, Step};
+use fmu_core::{Exported, Fault, Interface, Model, Range, SampleGrid, Step};
 
 /// Why a call failed.
 #[derive(Debug)]
@@ -48,6 +48,8 @@ pub struct Instance<E: Exported> {
     pub(crate) arrays: bool,
     /// Indices of the states' rows.
     pub(crate) states: Vec<usize>,
+    /// Ranges of the states.
+    pub(crate) ranges: Vec<Range>,
     /// Room for the derivatives and the indicators.
     pub(crate) values: Vec<f64>,
     /// The outputs are of another instant; in Model Exchange only.
@@ -68,6 +70,7 @@ impl<E: Exported> Instance<E> {
         log.event(|| format!("{name}: instance of {} {}", info.name, info.version));
         // A state without a row has no reference; `fmu build` refuses such a model.
         let states = E::CAN.rows().unwrap_or_default();
+        let range = |&row: &usize| table.locate(row).map_or(Range::ALL, |(_, meta, _)| meta.range);
         Self {
             standard,
             name,
@@ -75,6 +78,7 @@ impl<E: Exported> Instance<E> {
             current,
             early_return: false,
             arrays,
+            ranges: states.iter().map(range).collect(),
             states,
             values: vec![0.0; E::CAN.states().len() + E::CAN.indicators().len()],
             stale: false,
@@ -126,6 +130,7 @@ impl<E: Exported> Instance<E> {
     /// Restores the state after instantiation; name and logger stay.
     pub fn reset(&mut self) {
         self.current = Snapshot::new(self.current.life.interface());
+        self.stale = false;
         self.warned.clear();
         self.log.event(|| format!("{}: reset", self.name));
     }
@@ -145,7 +150,7 @@ impl<E: Exported> Instance<E> {
             current.dirty = false;
         }
         let handles_events = current.life.handles_events();
-        if E::CAN.samples.is_some() && (handles_events || self.early_return) {
+        if E::CAN.event_mode() && (handles_events || self.early_return) {
             return self.step_to_event(t, h);
         }
         if E::CAN.continuous.is_some() && !current.slopes.is_empty() {
@@ -166,7 +171,7 @@ impl<E: Exported> Instance<E> {
         let event_mode = self.current.life.handles_events();
         let (start, end) = (self.current.elapsed, self.current.elapsed.plus(h));
         let model = &mut self.current.block.model;
-        (samples.bounded)(model, end)?;
+        (samples.bounded)(model, if self.early_return { start } else { end })?;
         let grid = SampleGrid { period: (samples.period)(model) };
         let mut stepped = Stepped::default();
         loop {
@@ -226,11 +231,19 @@ impl<E: Exported> Instance<E> {
             self.current.block.initialize();
             self.current.dirty = false;
         }
-        if self.stale
-            && let Some(continuous) = &E::CAN.continuous
-        {
+        self.observe();
+    }
+
+    /// Computes outputs that are of another instant.
+    #[inline]
+    fn observe(&mut self) {
+        if self.stale {
+            let observe = match &E::CAN.continuous {
+                Some(continuous) => continuous.observe,
+                None => E::Model::output,
+            };
             let block = &mut self.current.block;
-            (continuous.observe)(&block.model, self.current.elapsed, &mut block.out);
+            observe(&block.model, self.current.elapsed, &mut block.out);
             self.stale = false;
         }
     }
@@ -239,7 +252,8 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// The handle is unknown.
-    pub fn save(&self, handle: usize) -> Result<usize, Fault> {
+    pub fn save(&mut self, handle: usize) -> Result<usize, Fault> {
+        self.observe();
         if handle == 0 {
             return Ok(registry::keep(self.current.clone()));
         }
@@ -262,7 +276,7 @@ impl<E: Exported> Instance<E> {
             self.current.clone_from(state);
             Ok(())
         })?;
-        self.stale = self.exchanges();
+        self.stale = false;
         Ok(())
     }
 

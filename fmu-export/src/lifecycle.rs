@@ -228,22 +228,16 @@ impl Call {
             Self::Reset => any(both(&State::ALL), To(Instantiated)),
             // FMI 3.0.2, 2.3.2 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
             // In Error: for debugging (2.0.5, table in 4.2.4).
-            Self::Get => any(
-                each(&[Initialization, Step, Event, Continuous, Terminated, Error], &State::ALL),
-                Stay,
-            ),
+            Self::Get => any(each(&[Initialization, Step, Event, Continuous, Terminated, Error], &State::ALL), Stay),
             Self::Set => any(both(&[Instantiated, Initialization, Step, Event, Continuous]), Stay),
             Self::DoStep => stepping(both(&[Step]), Stay),
             // A state that an error left behind is of no use.
-            Self::SaveState => {
-                any(both(&[Instantiated, Initialization, Step, Event, Continuous, Terminated]), Stay)
-            }
+            Self::SaveState => any(both(&[Instantiated, Initialization, Step, Event, Continuous, Terminated]), Stay),
             Self::Status => stepping(each(&[Step, Terminated], &[]), Stay),
             // An FMU of FMI 2.0 without states may never leave Event Mode (FMI 2.0.5, 3.2.3).
-            Self::EnterEvent => Row {
-                event: States::of(&[Step]),
-                ..exchange(each(&[Event, Continuous], &[Continuous]), To(Event))
-            },
+            Self::EnterEvent => {
+                Row { event: States::of(&[Step]), ..exchange(each(&[Event, Continuous], &[Continuous]), To(Event)) }
+            }
             Self::UpdateDiscrete => Row { event: States::of(&[Event]), ..exchange(both(&[Event]), Stay) },
             Self::EvaluateDiscrete => Row { event: States::of(&[Event]), ..exchange(each(&[], &[Event]), Stay) },
             Self::EnterContinuous => exchange(both(&[Event]), To(Continuous)),
@@ -264,10 +258,7 @@ impl Call {
                 ),
                 Stay,
             ),
-            Self::Count => exchange(
-                each(&[], &[Instantiated, Initialization, Event, Continuous, Terminated]),
-                Stay,
-            ),
+            Self::Count => exchange(each(&[], &[Instantiated, Initialization, Event, Continuous, Terminated]), Stay),
             Self::Sensitivity => any(
                 each(
                     &[Initialization, Step, Event, Continuous, Terminated, Error],

@@ -26,6 +26,9 @@ const _: () = assert!(matches!(CATEGORIES[WARNINGS].0.as_bytes(), b"logStatusWar
 pub trait Sink {
     /// Passes one message to the importer.
     fn write(&self, status: Status, category: &str, message: &str);
+
+    /// Whether there is a logger at all.
+    fn hears(&self) -> bool;
 }
 
 /// The logger and the enabled categories.
@@ -58,7 +61,7 @@ impl Log {
     /// Whether anyone hears warnings.
     #[inline]
     pub fn hears_warnings(&self) -> bool {
-        self.enabled[WARNINGS]
+        self.enabled[WARNINGS] && self.sink.hears()
     }
 
     /// Logs a warning that comes from a call that succeeded.
@@ -75,7 +78,7 @@ impl Log {
     }
 
     fn is_on(&self, category: &str) -> bool {
-        position(category).is_some_and(|i| self.enabled[i])
+        position(category).is_some_and(|i| self.enabled[i]) && self.sink.hears()
     }
 
     /// `SetDebugLogging`. No category means all. In FMI 2.0 the listed categories become the only ones (2.0.5, 2.1.5),

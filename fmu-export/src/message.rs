@@ -115,7 +115,9 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>) -> Stri
 #[cold]
 pub(crate) fn real(time: bool, carries: &str) -> Fault {
     Fault::new(if time {
-        format!("time (value reference {TIME}) is a real number that only a step or SetTime changes; this call carries {carries}")
+        format!(
+            "time (value reference {TIME}) is a real number that only a step or SetTime changes; this call carries {carries}"
+        )
     } else {
         format!("a derivative or an event indicator is a real number; this call carries {carries}")
     })

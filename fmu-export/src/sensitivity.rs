@@ -20,8 +20,11 @@ pub struct Scratch<M: Model> {
     /// A copy of the model, or the direction.
     block: Block<M>,
     /// The derivatives there, or along the direction.
+    dx: Vec<f64>,
+    /// The direction: the change of the states, and that of inputs and parameters by reference.
     rates: Vec<f64>,
-    seed: Vec<f64>,
+    others: Vec<(u32, f64)>,
+    /// A column of the adjoint derivative.
     column: Vec<f64>,
 }
 
@@ -43,7 +46,7 @@ impl<E: Exported> Instance<E> {
             Standard::Fmi3 => "providesDirectionalDerivatives = false",
         })?;
         self.check_sides(unknowns, knowns)?;
-        self.check_sizes((seed.len(), knowns.len()), (out.len(), unknowns.len()))?;
+        check_sizes(seed, knowns.len(), (out.len(), unknowns.len()))?;
         self.column(unknowns, knowns, seed, out)
     }
 
@@ -51,16 +54,10 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// As [`directional`](Self::directional).
-    pub fn adjoint(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        out: &mut [f64],
-    ) -> Result<(), Refusal> {
+    pub fn adjoint(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
         supported::<E>("providesAdjointDerivatives = false")?;
         self.check_sides(unknowns, knowns)?;
-        self.check_sizes((seed.len(), unknowns.len()), (out.len(), knowns.len()))?;
+        check_sizes(seed, unknowns.len(), (out.len(), knowns.len()))?;
         let mut column = std::mem::take(&mut self.scratch().column);
         column.clear();
         column.resize(unknowns.len(), 0.0);
@@ -81,17 +78,17 @@ impl<E: Exported> Instance<E> {
         if let Some(order) = orders.iter().find(|&&order| order != 1) {
             return Err(Fault::value("order", order, "1: maxOutputDerivativeOrder = 1").into());
         }
-        self.check_sizes((orders.len(), unknowns.len()), (out.len(), unknowns.len()))?;
+        check_sizes(&[], 0, (out.len(), unknowns.len()))?;
         for &unknown in unknowns {
             if !self.is_output(unknown, false) {
                 return Err(self.no_side(unknown, "a continuous output").into());
             }
         }
-        let mut rates = std::mem::take(&mut self.scratch().seed);
+        let mut rates = std::mem::take(&mut self.scratch().rates);
         rates.clear();
         rates.resize(E::CAN.states().len(), 0.0);
         let done = self.derivatives(&mut rates).and_then(|()| self.along(unknowns, &[], &rates, 1.0, out));
-        self.scratch().seed = rates;
+        self.scratch().rates = rates;
         done
     }
 
@@ -102,7 +99,8 @@ impl<E: Exported> Instance<E> {
     pub fn input_derivatives(&mut self, knowns: &[u32], orders: &[i32], values: &[f64]) -> Result<(), Fault> {
         supported::<E>("canInterpolateInputs = false")?;
         for ((&known, order), value) in knowns.iter().zip(orders).zip(values) {
-            let input = E::Model::TABLE.entry(&mut self.current.block, index(known)).is_some_and(|(meta, _)| ramps(meta));
+            let input =
+                E::Model::TABLE.entry(&mut self.current.block, index(known)).is_some_and(|(meta, _)| ramps(meta));
             if !input {
                 return Err(self.no_side(known, "a continuous real input"));
             }
@@ -124,6 +122,9 @@ impl<E: Exported> Instance<E> {
 
     /// One step of `h` (s) with inputs that change at the rates that were set. Afterwards the inputs are as they were set.
     pub(crate) fn step_on_slopes(&mut self, h: f64) -> Result<(), Fault> {
+        let table = E::Model::TABLE;
+        let is_mean = |&index: &usize| table.locate(index).is_some_and(|(_, meta, _)| meta.mean);
+        let mut means: Vec<(usize, f64)> = (0..table.len()).filter(is_mean).map(|index| (index, 0.0)).collect();
         let current = &mut self.current;
         let slopes = std::mem::take(&mut current.slopes);
         let mut block = current.block.clone();
@@ -133,7 +134,7 @@ impl<E: Exported> Instance<E> {
             for &(row, slope) in &slopes {
                 let held = real(&mut current.block, row as usize);
                 let changed = held + slope * middle;
-                match E::Model::TABLE.entry(&mut block, row as usize) {
+                match table.entry(&mut block, row as usize) {
                     Some((meta, Slot::Real(x))) if meta.range.contains(changed) => *x = changed,
                     _ => {
                         let what = format!("{} + {slope} t", message::name::<E::Model>(row as usize));
@@ -141,16 +142,20 @@ impl<E: Exported> Instance<E> {
                     }
                 }
             }
-            block.model.advance(&Step { start: now, h: part })?;
+            block.step(&Step { start: now, h: part })?;
+            for (index, mean) in &mut means {
+                *mean += real(&mut block, *index) / f64::from(PARTS);
+            }
             now = now.plus(part);
         }
         for &(row, _) in &slopes {
             let held = real(&mut current.block, row as usize);
-            if let Some((_, Slot::Real(x))) = E::Model::TABLE.entry(&mut block, row as usize) {
-                *x = held;
-            }
+            put(&mut block, row as usize, held);
         }
         block.model.output(current.elapsed.plus(h), &mut block.out);
+        for (index, mean) in means {
+            put(&mut block, index, mean);
+        }
         current.block = block;
         Ok(())
     }
@@ -159,8 +164,9 @@ impl<E: Exported> Instance<E> {
         self.scratch.get_or_insert_with(|| {
             Box::new(Scratch {
                 block: self.current.block.clone(),
-                rates: vec![0.0; E::CAN.states().len()],
-                seed: Vec::new(),
+                dx: vec![0.0; E::CAN.states().len()],
+                rates: Vec::new(),
+                others: Vec::new(),
                 column: Vec::new(),
             })
         })
@@ -168,21 +174,20 @@ impl<E: Exported> Instance<E> {
 
     /// Divides the knowns into states and others, and takes the derivative.
     fn column(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
-        let mut rates = std::mem::take(&mut self.scratch().seed);
+        let scratch = self.scratch();
+        let (mut rates, mut others) = (std::mem::take(&mut scratch.rates), std::mem::take(&mut scratch.others));
         rates.clear();
         rates.resize(E::CAN.states().len(), 0.0);
-        let others = knowns.iter().zip(seed).filter(|(known, _)| {
-            // A state is not known in Initialization Mode, where the importer cannot set it.
-            self.current.life.state() == State::Initialization || !self.states.contains(&index(**known))
-        });
-        let others: Vec<(u32, f64)> = others.map(|(&known, &seed)| (known, seed)).collect();
+        others.clear();
         for (&known, &seed) in knowns.iter().zip(seed) {
-            if let Some(i) = self.states.iter().position(|&row| row == index(known)) {
-                rates[i] = seed;
+            match self.states.iter().position(|&row| row == index(known)) {
+                Some(i) => rates[i] = seed,
+                None => others.push((known, seed)),
             }
         }
         let done = self.along(unknowns, &others, &rates, 0.0, out);
-        self.scratch().seed = rates;
+        let scratch = self.scratch();
+        (scratch.rates, scratch.others) = (rates, others);
         done
     }
 
@@ -198,28 +203,32 @@ impl<E: Exported> Instance<E> {
         out.fill(0.0);
         let initial = self.current.life.state() == State::Initialization;
         self.refresh();
-        let inputs_only = others.iter().all(|&(known, _)| self.is_continuous_input(known));
-        if let (Some(tangent), true, false) = (E::CAN.tangent, inputs_only, initial) {
-            let now = self.current.elapsed;
-            self.scratch();
-            let Self { current, scratch, .. } = self;
-            let Some(scratch) = scratch else { return Ok(()) };
-            let direction = &mut scratch.block;
-            clear::<E>(direction);
-            for &(known, seed) in others {
-                put(direction, index(known), seed);
-            }
-            for (state, rate) in E::CAN.states().iter().zip(rates) {
-                *(state.at)(&mut direction.model) = *rate;
-            }
-            let (along, change) = (&direction.model, &mut direction.out);
-            tangent(&current.block.model, now, along, &mut scratch.rates, change).map_err(Refusal::Discard)?;
-            for (&unknown, out) in unknowns.iter().zip(out) {
-                *out = pick::<E>(&mut scratch.block, &scratch.rates, index(unknown));
-            }
-            return Ok(());
+        let exact = others.iter().all(|&(known, _)| self.is_continuous_input(known))
+            && unknowns.iter().all(|&unknown| self.is_derivative(unknown) || self.is_output(unknown, false));
+        let Some(tangent) = E::CAN.tangent.filter(|_| exact && !initial) else {
+            return self.difference(unknowns, others, rates, time, out);
+        };
+        if time != 0.0 {
+            // A tangent is along states and inputs.
+            self.difference(unknowns, &[], &[], time, out)?;
         }
-        self.difference(unknowns, others, rates, time, initial, out)
+        self.scratch();
+        let Self { current, scratch, .. } = self;
+        let Some(scratch) = scratch else { return Ok(()) };
+        let direction = &mut scratch.block;
+        clear::<E>(direction);
+        for &(known, seed) in others {
+            put(direction, index(known), seed);
+        }
+        for (state, rate) in E::CAN.states().iter().zip(rates) {
+            *(state.at)(&mut direction.model) = *rate;
+        }
+        let (along, change) = (&direction.model, &mut direction.out);
+        tangent(&current.block.model, current.elapsed, along, &mut scratch.dx, change).map_err(Refusal::Discard)?;
+        for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
+            *out += pick::<E>(&mut scratch.block, &scratch.dx, index(unknown));
+        }
+        self.finite(unknowns, out)
     }
 
     /// The same by a central difference.
@@ -229,7 +238,6 @@ impl<E: Exported> Instance<E> {
         others: &[(u32, f64)],
         rates: &[f64],
         time: f64,
-        initial: bool,
         out: &mut [f64],
     ) -> Result<(), Refusal> {
         // cbrt(2^-52)
@@ -237,18 +245,19 @@ impl<E: Exported> Instance<E> {
         let mut largest = 0.0_f64;
         for &(known, seed) in others {
             let block = &mut self.current.block;
-            let size = message::nominal::<E::Model>(block, index(known)).max(real(block, index(known)).abs());
-            largest = largest.max(seed.abs() / size);
+            let x = real(block, index(known));
+            largest = largest.max(seed.abs() / message::nominal::<E::Model>(block, index(known)).max(x.abs()));
         }
-        for (i, rate) in rates.iter().enumerate() {
+        for ((rate, state), &row) in rates.iter().zip(E::CAN.states()).zip(&self.states) {
             let block = &mut self.current.block;
-            let size = message::nominal::<E::Model>(block, self.states[i]);
-            largest = largest.max(rate.abs() / size);
+            let x = *(state.at)(&mut block.model);
+            largest = largest.max(rate.abs() / message::nominal::<E::Model>(block, row).max(x.abs()));
         }
         if largest == 0.0 && time == 0.0 {
             return Ok(());
         }
         let eps = if largest > 0.0 { SHARE / largest } else { SHARE };
+        let initial = self.current.life.state() == State::Initialization;
         let mut parameters = false;
         for &(known, _) in others {
             let row = E::Model::TABLE.entry(&mut self.current.block, index(known));
@@ -273,13 +282,28 @@ impl<E: Exported> Instance<E> {
             } else if parameters {
                 block.model.derive();
             }
-            let dx = &mut scratch.rates;
+            let dx = &mut scratch.dx;
             evaluate::<E>(block, now, initial, dx).map_err(Refusal::Discard)?;
             for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
                 *out += side * pick::<E>(block, dx, index(unknown)) / (2.0 * eps);
             }
         }
-        Ok(())
+        self.finite(unknowns, out)
+    }
+
+    /// A derivative that is no finite number does not exist.
+    fn finite(&self, unknowns: &[u32], out: &[f64]) -> Result<(), Refusal> {
+        match out.iter().position(|x| !x.is_finite()) {
+            None => Ok(()),
+            Some(i) => {
+                let name = format!("the derivative of {}", self.name_of(unknowns[i]));
+                Err(Refusal::Discard(Fault::value(&name, out[i], "a finite number")))
+            }
+        }
+    }
+
+    fn is_derivative(&self, unknown: u32) -> bool {
+        index(unknown).wrapping_sub(E::Model::TABLE.len()) < E::CAN.states().len()
     }
 
     fn is_continuous_input(&mut self, known: u32) -> bool {
@@ -300,13 +324,12 @@ impl<E: Exported> Instance<E> {
         let state = self.current.life.state();
         let initial = state == State::Initialization;
         for (i, &unknown) in unknowns.iter().enumerate() {
-            let derivative = (0..E::CAN.states().len()).contains(&index(unknown).wrapping_sub(E::Model::TABLE.len()));
             let entry = E::Model::TABLE.entry(&mut self.current.block, index(unknown));
             let calculated = entry.is_some_and(|(meta, _)| {
                 meta.causality == Causality::CalculatedParameter && matches!(meta.kind, Kind::Real(_))
             });
             let of_start = initial && (calculated || self.states.contains(&index(unknown)));
-            if !(derivative || of_start || self.is_output(unknown, state == State::Event || initial)) {
+            if !(self.is_derivative(unknown) || of_start || self.is_output(unknown, state == State::Event || initial)) {
                 return Err(self.no_side(unknown, "an unknown of derivatives in this state"));
             }
             if unknowns[..i].contains(&unknown) {
@@ -335,21 +358,35 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    fn check_sizes(&self, seed: (usize, usize), out: (usize, usize)) -> Result<(), Fault> {
-        match (seed, out) {
-            ((given, needed), _) if given != needed => Err(Fault::value("nSeed", given, format_args!("{needed}"))),
-            (_, (given, needed)) if given != needed => {
-                Err(Fault::value("nSensitivity", given, format_args!("{needed}")))
-            }
-            _ => Ok(()),
-        }
+    #[cold]
+    fn no_side(&self, reference: u32, wanted: &str) -> Fault {
+        Fault::new(format!("{} is not {wanted}", self.name_of(reference)))
     }
 
     #[cold]
-    fn no_side(&self, reference: u32, wanted: &str) -> Fault {
-        let exists = E::Model::TABLE.locate(index(reference)).is_some();
-        let name = if exists { message::name::<E::Model>(index(reference)) } else { format!("reference {reference}") };
-        Fault::new(format!("{name} is not {wanted}"))
+    fn name_of(&self, reference: u32) -> String {
+        let index = index(reference);
+        if E::Model::TABLE.locate(index).is_some() {
+            return message::name::<E::Model>(index);
+        }
+        match E::CAN.states().get(index.wrapping_sub(E::Model::TABLE.len())) {
+            Some(state) => message::derivative(state),
+            None => format!("value reference {reference}"),
+        }
+    }
+}
+
+/// As many numbers in the seed as it needs, all finite, and room for as many as there are.
+fn check_sizes(seed: &[f64], needed: usize, (room, results): (usize, usize)) -> Result<(), Fault> {
+    if seed.len() != needed {
+        return Err(Fault::value("nSeed", seed.len(), format_args!("{needed} for these value references")));
+    }
+    if room != results {
+        return Err(Fault::value("nSensitivity", room, format_args!("{results} for these value references")));
+    }
+    match seed.iter().find(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(x) => Err(Fault::value("seed", x, "finite numbers")),
     }
 }
 
@@ -384,11 +421,11 @@ fn pick<E: Exported>(block: &mut Block<E::Model>, dx: &[f64], index: usize) -> f
     }
 }
 
-/// Makes a direction: no continuous input and no state changes.
+/// Makes a direction: no continuous input and no state changes, and so far no output.
 fn clear<E: Exported>(direction: &mut Block<E::Model>) {
     for index in 0..E::Model::TABLE.len() {
         if let Some((meta, Slot::Real(x))) = E::Model::TABLE.entry(direction, index)
-            && ramps(meta)
+            && (ramps(meta) || meta.causality == Causality::Output)
         {
             *x = 0.0;
         }

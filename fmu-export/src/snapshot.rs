@@ -165,9 +165,7 @@ impl<M: Model> Snapshot<M> {
         // A sum that is not in its normal form hides numbers that cancel.
         let fits = self.elapsed == self.elapsed.plus(0.0)
             && match (self.life.state(), self.experiment) {
-                (State::Instantiated, _) | (State::Initialization, Some(_)) => {
-                    since == 0.0 && elapsed == 0.0
-                }
+                (State::Instantiated, _) | (State::Initialization, Some(_)) => since == 0.0 && elapsed == 0.0,
                 (State::Step | State::Event | State::Continuous | State::Terminated, Some(_)) => {
                     self.end.is_finite()
                         && (start..=self.end + rounding).contains(&self.settled)

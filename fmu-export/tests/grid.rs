@@ -11,7 +11,7 @@
 )]
 
 use fmu_core::unit::SECOND;
-use fmu_core::{Block, Exported, Elapsed, Experiment, Fault, Info, Model, Row, SampleGrid, Step, Table};
+use fmu_core::{Block, Elapsed, Experiment, Exported, Fault, Info, Model, Row, SampleGrid, Step, Table};
 use fmu_export::abi::types::*;
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;

@@ -118,10 +118,10 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
         .with("canHandleVariableCommunicationStepSize", "true")
         .with("canBeInstantiatedOnlyOncePerProcess", "false")
         .with_some("canInterpolateInputs", (version == FmiVersion::V2).then_some(interpolates))
-        .with_some("maxOutputDerivativeOrder", continuous.then_some("1"))
+        .with_some("maxOutputDerivativeOrder", continuous.then_some("1"));
+    let element = states_and_memory(element, version)
         .with_some("hasEventMode", event_mode.then_some("true"))
         .with_some("mightReturnEarlyFromDoStep", event_mode.then_some("true"));
-    let element = states_and_memory(element, version);
     match exchange {
         Some(exchange) => derivatives(element, exchange, version),
         None => element,

@@ -218,9 +218,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn get_states(entry: Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
-        unsafe {
-            enter::<E>(entry, instance, |instance| Ok(instance.get_states(numbers(x, n, "continuous states")?)?))
-        }
+        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.get_states(numbers(x, n, "continuous states")?)?)) }
     }
 
     pub unsafe fn derivatives(entry: Entry, instance: Instance, dx: *mut f64, n: usize) -> c_int {
@@ -230,9 +228,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn indicators(entry: Entry, instance: Instance, z: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
-        unsafe {
-            enter::<E>(entry, instance, |instance| Ok(instance.indicators(numbers(z, n, "event indicators")?)?))
-        }
+        unsafe { enter::<E>(entry, instance, |instance| instance.indicators(numbers(z, n, "event indicators")?)) }
     }
 
     pub unsafe fn nominals(entry: Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {

@@ -46,8 +46,7 @@ impl<E: Exported> Abi<E> {
             let allowed = || Fault::value("fmuType", fmu_type, format_args!("fmi2CoSimulation (1){or}"));
             if fits { Ok(name) } else { Err(allowed()) }
         });
-        let interface =
-            if fmu_type == MODEL_EXCHANGE { Interface::ModelExchange } else { Interface::CoSimulation };
+        let interface = if fmu_type == MODEL_EXCHANGE { Interface::ModelExchange } else { Interface::CoSimulation };
         open::<E>(entry, Log::new(Box::new(sink), logging_on), judged, interface, false)
     }
 

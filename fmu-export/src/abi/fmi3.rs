@@ -32,7 +32,7 @@ impl<E: Exported> Abi<E> {
             Interface::ModelExchange if !E::CAN.model_exchange() => {
                 Some("not supported: Model Exchange; this FMU is for Co-Simulation")
             }
-            Interface::EventMode if E::CAN.samples.is_none() => {
+            Interface::EventMode if !E::CAN.event_mode() => {
                 Some("eventModeUsed = true is not allowed: hasEventMode = false")
             }
             _ => None,

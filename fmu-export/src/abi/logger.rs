@@ -31,6 +31,10 @@ pub(crate) struct Fmi3Sink {
 }
 
 impl Sink for Fmi2Sink {
+    fn hears(&self) -> bool {
+        self.logger.is_some()
+    }
+
     fn write(&self, status: Status, category: &str, message: &str) {
         let Some(logger) = self.logger else { return };
         // The message is a format (FMI 2.0.5, 2.1.5), and `#` begins a reference to a variable in both standards.
@@ -44,6 +48,10 @@ impl Sink for Fmi2Sink {
 }
 
 impl Sink for Fmi3Sink {
+    fn hears(&self) -> bool {
+        self.logger.is_some()
+    }
+
     fn write(&self, status: Status, category: &str, message: &str) {
         let Some(logger) = self.logger else { return };
         let (category, message) = (c_text(category), c_text(&message.replace('#', "##")));

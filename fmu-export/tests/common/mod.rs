@@ -1,14 +1,15 @@
 //! An importer for tests: the C functions of both standards behind one set of names.
 #![allow(dead_code, unreachable_pub, reason = "a module of every test crate, each of which uses a part")]
 
+pub mod journal;
 pub mod model;
 pub mod unsupported;
 
 pub(crate) use fmi::*;
 use fmu_core::Exported;
 use fmu_export::abi::types::*;
+pub use journal::*;
 use model::Probe;
-use std::cell::RefCell;
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
 use std::sync::Once;
@@ -18,45 +19,6 @@ fmu_export::export!(Probe);
 pub const OK: c_int = 0;
 pub const DISCARD: c_int = 2;
 pub const ERROR: c_int = 3;
-
-/// One message of the logger.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Message {
-    pub instance: Option<String>,
-    pub status: c_int,
-    pub category: String,
-    pub text: String,
-}
-
-/// What the logger was told; its address is the environment pointer.
-#[derive(Default)]
-pub struct Journal(pub RefCell<Vec<Message>>);
-
-fn string(text: Text) -> String {
-    unsafe { CStr::from_ptr(text) }.to_str().unwrap().into()
-}
-
-pub extern "C" fn log2(environment: *mut c_void, name: Text, status: c_int, category: Text, text: Text) {
-    let journal = unsafe { &*environment.cast::<Journal>() };
-    let (instance, category, text) = (Some(string(name)), string(category), string(text));
-    journal.0.borrow_mut().push(Message { instance, status, category, text });
-}
-
-pub extern "C" fn log3(environment: *mut c_void, status: c_int, category: Text, text: Text) {
-    let journal = unsafe { &*environment.cast::<Journal>() };
-    let (category, text) = (string(category), string(text));
-    journal.0.borrow_mut().push(Message { instance: None, status, category, text });
-}
-
-/// Whether instances of a standard can have a logger here: Miri rightly refuses what [`variadic`] does.
-pub const fn has_logger(version: u8) -> bool {
-    !(cfg!(miri) && version == 2)
-}
-
-/// A function with fixed arguments as the variadic logger: the first five go the same way on our platforms.
-pub fn variadic(f: extern "C" fn(*mut c_void, Text, c_int, Text, Text)) -> Fmi2Logger {
-    unsafe { std::mem::transmute(f) }
-}
 
 pub fn token() -> CString {
     CString::new(fmi::This::TOKEN.as_str()).unwrap()
