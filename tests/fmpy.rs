@@ -15,6 +15,11 @@ fn fmpy_validates_and_cosimulates() {
 }
 
 #[test]
+fn model_exchange_and_events() {
+    pytest("fmpy", "exchange", &["test_model_exchange.py", "test_casadi.py"], &[]);
+}
+
+#[test]
 fn tuning_a_running_drive() {
     pytest("fmpy", "tuning", &["test_tuning.py"], &[]);
 }

@@ -1,18 +1,29 @@
-//! The modelDescription.xml of every FMU, as it was last looked at and accepted: a changed name, unit, range, start value,
-//! dependency or token shows as a difference. `UPDATE_GOLDEN=1 cargo test --test golden_xml` accepts.
+//! The modelDescription.xml of every packed FMU, as it was last looked at and accepted: a changed name, unit, range, start
+//! value, dependency, capability or token shows as a difference. `UPDATE_GOLDEN=1 cargo test --test golden_xml` accepts.
 #![allow(missing_docs)]
 
-use drive::{PmsmDrive, PmsmPlant, SensorlessController};
-use fmu_core::{Description, Model};
-use model_description::{FmiVersion, Generation, write};
+mod common;
+
 use std::path::Path;
 
-fn check<M: Model>() {
-    let description = Description::of::<M>().unwrap();
-    let generation = Generation { tool: "fmu".into(), date_and_time: "2000-01-01T00:00:00Z".into() };
-    for version in [FmiVersion::V2, FmiVersion::V3] {
-        let xml = write(&description, version, &generation);
-        let name = format!("{}-{version}.xml", M::INFO.name);
+/// The file without what differs from build to build.
+fn lasting(xml: &str) -> String {
+    let mut xml = xml.to_owned();
+    for (attribute, value) in [("generationTool", "fmu"), ("generationDateAndTime", "2000-01-01T00:00:00Z")] {
+        let open = format!("{attribute}=\"");
+        let start = xml.find(&open).expect("the attribute") + open.len();
+        let end = start + xml[start..].find('"').expect("the end of the attribute");
+        xml.replace_range(start..end, value);
+    }
+    xml
+}
+
+fn check(model: &str) {
+    for (folder, version) in [("fmi2", "2.0"), ("fmi3", "3.0")] {
+        let archive = common::archives().join(folder).join(format!("{model}.fmu"));
+        let (_, files) = fmu_import::contents(&archive).unwrap();
+        let xml = lasting(std::str::from_utf8(&files["modelDescription.xml"]).unwrap());
+        let name = format!("{model}-{version}.xml");
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(&name);
         if std::env::var_os("UPDATE_GOLDEN").is_some() {
             std::fs::write(&path, &xml).unwrap();
@@ -26,15 +37,15 @@ fn check<M: Model>() {
 
 #[test]
 fn plant() {
-    check::<PmsmPlant>();
+    check("PmsmPlant");
 }
 
 #[test]
 fn controller() {
-    check::<SensorlessController>();
+    check("SensorlessController");
 }
 
 #[test]
 fn whole_drive() {
-    check::<PmsmDrive>();
+    check("PmsmDrive");
 }

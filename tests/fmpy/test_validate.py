@@ -57,7 +57,16 @@ def test_fmpy_validates_with_start_values(archive):
 def test_header(archive, description):
     assert description.fmiVersion == {"fmi2": "2.0", "fmi3": "3.0"}[archive.parent.name]
     assert description.modelName == archive.stem == description.coSimulation.modelIdentifier
-    assert description.modelExchange is None
+    exchange, states = description.modelExchange, 0 if archive.stem == "SensorlessController" else 4
+    assert exchange.modelIdentifier == archive.stem
+    assert exchange.canGetAndSetFMUstate
+    assert description.numberOfContinuousStates == states
+    assert description.numberOfEventIndicators == (2 if states else 0)
+    assert [d.variable.derivative.name for d in description.derivatives] == ["psi_d", "psi_q", "speed", "angle"][:states]
+    if description.fmiVersion == "2.0":  # FMPy looks for this name in FMI 3.0 too, where it ends with s
+        assert exchange.providesDirectionalDerivative == (states > 0)
+        assert description.coSimulation.providesDirectionalDerivative == (states > 0)
+    assert description.coSimulation.hasEventMode == (description.fmiVersion == "3.0" and states == 0)
     assert description.coSimulation.canGetAndSetFMUstate
     assert description.coSimulation.canSerializeFMUstate
     assert description.coSimulation.canHandleVariableCommunicationStepSize
@@ -107,7 +116,8 @@ def test_units(description):
 
 def test_discrete_and_continuous_inputs(archive, variables):
     if archive.stem == "PmsmPlant":
-        assert {variables[name].variability for name in ("u_a", "u_b", "u_c")} == {"discrete"}
+        # A discrete input cannot be set between events, and CasADi leaves it out.
+        assert {variables[name].variability for name in ("u_a", "u_b", "u_c")} == {"continuous"}
 
 
 def test_estimators_are_a_subset_in_order(archive, description, variables):
@@ -138,9 +148,12 @@ def test_start_values_are_those_of_the_binary(unpacked):
 
 def test_both_standards_tell_the_same(archives, archive):
     two, three = (read_model_description(archives / f"fmi{n}" / archive.name) for n in (2, 3))
-    # Time is first in FMI 2.0 and last in FMI 3.0.
+    # Time is first in FMI 2.0 and last in FMI 3.0, after the event indicators, which FMI 2.0 only counts.
     time, *others = two.modelVariables
-    for old, new in zip([*others, time], three.modelVariables, strict=True):
+    indicators = {indicator.variable.name for indicator in three.eventIndicators}
+    shared = [variable for variable in three.modelVariables if variable.name not in indicators]
+    assert len(indicators) == two.numberOfEventIndicators
+    for old, new in zip([*others, time], shared, strict=True):
         same = ("name", "valueReference", "causality", "variability", "description", "unit", "start", "min", "max")
         assert [getattr(old, key) for key in same] == [getattr(new, key) for key in same]
 
