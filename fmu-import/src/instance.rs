@@ -1,5 +1,9 @@
 //! One instance of an FMU, the same for both standards.
 
+mod equations;
+
+pub use equations::{CompletedStep, Stepped, Update};
+
 use super::standard::{Experiment, Outcome, Refusal, Standard};
 use super::{Error, Values, explain};
 use crate::abi::log::{Log, Message, Status};
@@ -185,7 +189,8 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<ControlFlow<()>, Error> {
-        self.call(|s| s.do_step(t, h))
+        let stepped = self.call(|s| s.do_step(t, h))?;
+        Ok(if stepped.terminate { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
     /// Time (s) that the last step reached; it differs from its end when the FMU asked to end the simulation.
