@@ -30,6 +30,7 @@ pub mod elf;
 mod error;
 mod folder;
 mod instance;
+pub mod integration;
 pub mod platform;
 pub mod ssp;
 mod standard;
