@@ -30,7 +30,7 @@ pub mod elf;
 mod error;
 mod folder;
 mod instance;
-pub mod integration;
+mod integration;
 pub mod platform;
 pub mod ssp;
 mod standard;
@@ -168,7 +168,7 @@ impl Fmu {
     /// # Errors
     /// The FMU refuses or has no such interface, or a name has a null byte.
     pub fn instantiate_as(&self, kind: Kind, name: &str, logging: bool) -> Result<Instance, Error> {
-        let functions = self.functions(kind)?;
+        let functions = self.functions(kind, name)?;
         let c_name = text(name, name)?;
         let token = text(name, &self.description.token)?;
         let log = Arc::<Log>::default();
@@ -179,15 +179,15 @@ impl Fmu {
         };
         let resources = text(name, &resources)?;
         match functions.instantiate(&c_name, &token, &resources, &log, logging, kind) {
-            Ok(standard) => Ok(Instance::new(name, self.description.clone(), standard, log)),
+            Ok(standard) => Ok(Instance::new(name, self.description.clone(), standard, kind, log)),
             Err(refusal) => Err(explain(name, refusal, log.reason())),
         }
     }
 
     /// The functions of the interface that a kind of instance needs.
-    fn functions(&self, kind: Kind) -> Result<&Functions, Error> {
+    fn functions(&self, kind: Kind, instance: &str) -> Result<&Functions, Error> {
         let has = archive::interfaces(&self.description);
-        let none = |what: &str| Error::file(&self.path, format!("has no {what}; it has {has}"));
+        let none = |what: &str| Error::usage(instance, format!("has no {what}; it has {has}"));
         match kind {
             Kind::ModelExchange => match &self.model_exchange {
                 Some(functions) => functions.as_ref().map_err(Clone::clone),
