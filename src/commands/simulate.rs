@@ -2,7 +2,7 @@
 
 use crate::Failed;
 use crate::pack;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use drive_study::plot;
 use fmu_import::cosimulation::{Integration, Method, Point, Recording, Schedule, Settings, Solver, System};
@@ -95,9 +95,9 @@ pub struct Simulate {
     /// Integrate the FMUs (Model Exchange) instead of having them step themselves (Co-Simulation)
     #[arg(long, conflicts_with = "sequential")]
     pub me: bool,
-    /// How --me integrates: adaptive steps (Dormand-Prince 5(4)), or fixed ones (Runge-Kutta 4) of the size --step
-    #[arg(long, value_enum, default_value_t)]
-    pub solver: SolverName,
+    /// How --me integrates [default: dopri]
+    #[arg(long, value_enum)]
+    pub solver: Option<SolverName>,
     /// Relative tolerance of --solver dopri; the absolute one is this times the nominal value of a state [default: 1e-6]
     #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
     pub rtol: Option<f64>,
@@ -113,12 +113,11 @@ pub struct Simulate {
 }
 
 /// Integrators of Model Exchange.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SolverName {
-    /// Runge-Kutta of order 4, fixed step
+    /// Runge-Kutta of order 4, with fixed steps of the size --step
     Rk4,
-    /// Dormand-Prince of order 5, adaptive step
-    #[default]
+    /// Dormand-Prince of order 5, with adaptive steps
     Dopri,
 }
 
@@ -127,7 +126,7 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
     let cannot_step = fmus.iter().find(|(_, fmu)| fmu.description().co_simulation.is_none());
     let all_exchange = fmus.iter().all(|(_, fmu)| fmu.description().model_exchange.is_some());
     match cannot_step {
-        Some((name, _)) if all_exchange && !args.me => {
+        Some((name, _)) if all_exchange && !args.me && !args.event_mode && !args.early_return => {
             eprintln!("note: {name} has no Co-Simulation: the FMUs are integrated, as with --me");
         }
         _ if !args.me => {
@@ -136,9 +135,9 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
         _ => {}
     }
     let solver = match (args.solver, args.rtol) {
-        (SolverName::Rk4, _) => Solver::Rk4,
-        (SolverName::Dopri, Some(rtol)) => Solver::Dopri { rtol },
-        (SolverName::Dopri, None) => Solver::default(),
+        (Some(SolverName::Rk4), _) => Solver::Rk4,
+        (_, Some(rtol)) => Solver::Dopri { rtol },
+        (_, None) => Solver::default(),
     };
     Method::ModelExchange(Integration { solver, ..Integration::default() })
 }
@@ -149,6 +148,13 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
 /// A file is not an FMU that runs here, a name is wrong, or an FMU fails.
 pub fn run(args: &Simulate) -> Result<()> {
     let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, |fmus| method(args, fmus))?;
+    let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
+    if steps && (args.solver.is_some() || args.rtol.is_some()) {
+        bail!("--solver and --rtol are for Model Exchange: add --me");
+    }
+    if args.solver == Some(SolverName::Rk4) && args.rtol.is_some() {
+        bail!("--rtol is for --solver dopri; --solver rk4 takes the steps of --step");
+    }
     loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let settings = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;

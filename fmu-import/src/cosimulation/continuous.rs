@@ -144,6 +144,11 @@ impl Hybrid for Fmus<'_> {
         &self.nominals
     }
 
+    fn name(&self, t: f64) -> String {
+        let due = self.outcomes.iter().position(|outcome| outcome.next.is_some_and(|next| next <= t));
+        due.map_or_else(|| "events".into(), |index| self.instances[index].name().into())
+    }
+
     fn indicator_count(&self) -> usize {
         self.indicators.last().map_or(0, |range| range.end)
     }

@@ -35,6 +35,10 @@ pub(super) fn iterate(
             if update.terminate {
                 return Ok(Some(index));
             }
+            if update.next_event_time.is_some_and(f64::is_nan) {
+                let cause = format!("the next event time that it gave at t = {t} s is not a number");
+                return Err(Error::usage(instances[index].name(), cause));
+            }
             let outcome = &mut outcomes[index];
             outcome.next = update.next_event_time;
             outcome.again = update.again;

@@ -207,7 +207,7 @@ impl Driver {
         }
         if self.events > EVENTS {
             let next = self.next_event.map(|next| format!("; the next event time is {next} s")).unwrap_or_default();
-            return Err(Error::usage("integration", format!("more than {EVENTS} events at t = {t} s{next}")));
+            return Err(Error::usage(&system.name(t), format!("more than {EVENTS} events at t = {t} s{next}")));
         }
         if !self.z.is_empty() {
             system.indicators(t, &self.step.x, &mut self.z).map_err(Trial::into_error)?;

@@ -61,6 +61,9 @@ pub(crate) trait Hybrid {
     /// Nominal values of the states, one for each.
     fn nominals(&self) -> &[f64];
 
+    /// The part whose next event is at or before the time `t` (s), for messages.
+    fn name(&self, t: f64) -> String;
+
     /// Number of event indicators.
     fn indicator_count(&self) -> usize;
 

@@ -24,6 +24,10 @@ where
         &self.nominals
     }
 
+    fn name(&self, _: f64) -> String {
+        "plain".into()
+    }
+
     fn indicator_count(&self) -> usize {
         self.indicators
     }
@@ -141,6 +145,10 @@ struct Oscillator;
 impl Hybrid for Oscillator {
     fn nominals(&self) -> &[f64] {
         &[1.0, 1.0]
+    }
+
+    fn name(&self, _: f64) -> String {
+        "plain".into()
     }
 
     fn indicator_count(&self) -> usize {
@@ -324,5 +332,5 @@ fn events_without_end_are_an_error() {
     };
     let mut driver = Driver::start(&mut system, Solver::Rk4, 1.0, 0.5).unwrap().0;
     let error = driver.run_to(&mut system, 1.0).unwrap_err().to_string();
-    assert_eq!(error, "integration: more than 100 events at t = 0.5 s; the next event time is 0.5 s");
+    assert_eq!(error, "plain: more than 100 events at t = 0.5 s; the next event time is 0.5 s");
 }

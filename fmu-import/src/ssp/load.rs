@@ -163,7 +163,14 @@ impl Loaded {
             let fmu = Fmu::open(&fmu).map_err(|e| anyhow!("{}: {}: {}", of(), component.source, e.cause()))?;
             fmus.push((component.name.clone(), fmu));
         }
-        let mut loaded = Self { system: System::new(method(&fmus)), ..Self::default() };
+        let method = method(&fmus);
+        if let (Method::CoSimulation { .. }, Some(component)) =
+            (&method, structure.components.iter().find(|component| component.model_exchange))
+        {
+            let cause = "implementation=\"ModelExchange\" is no Co-Simulation: simulate it with --me";
+            return Err(in_description(format!("line {}: {cause}", component.line)));
+        }
+        let mut loaded = Self { system: System::new(method), ..Self::default() };
         loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
         for (component, (name, fmu)) in structure.components.iter().zip(&fmus) {
             let experiment = fmu.description().default_experiment;
