@@ -3,7 +3,8 @@
    Plant (STATES = 1): x' = u - x, output x. At every crossing of x and level it notes the time in y and counts.
    Sampler (STATES = 0): at start + k T it samples the input i; from the next sample on its output y is 1 - 2 i of that sample.
 
-   `fault` selects what a model does wrong. */
+   Both refuse a step that does not begin where they are, a discrete input outside of event mode (Model Exchange), and an update
+   of discrete states in another mode. `fault` selects what a model does wrong. */
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -19,7 +20,7 @@ typedef void (*Log3)(void *, int, const char *, const char *);
 typedef struct {
     double t, start, v[N], computed;
     int k;
-    bool above, events, early, init, exchange;
+    bool above, events, early, initial, in_event, exchange;
     void *environment;
     Log3 log;
 } M;
@@ -29,7 +30,7 @@ typedef struct { bool again, terminate, states, defined; double next; } Update;
 static M *make(bool exchange, bool events, bool early, void *environment, Log3 log) {
     M *m = calloc(1, sizeof(M));
     m->v[X] = 1, m->v[T] = 0.1, m->v[LEVEL] = -1;
-    m->exchange = exchange, m->events = events || exchange, m->early = early;
+    m->initial = true, m->exchange = exchange, m->events = events || exchange, m->early = early;
     m->environment = environment, m->log = log;
     return m;
 }
@@ -38,9 +39,12 @@ static bool fault(M *m, int which) { return m->v[FAULT] == which; }
 static double instant(M *m) { return fma(m->k, m->v[T], m->start); }
 static bool due(M *m, double t) { return !STATES && t >= instant(m) - 1e-5 * m->v[T]; }
 
-static void begin(M *m) {
+static int begin(M *m) {
     if (due(m, m->t)) m->v[Y] = m->computed;
+    return m->in_event = true, OK;
 }
+
+static int leave(M *m) { return m->in_event = false, OK; }
 
 static void sample(M *m) {
     m->computed = 1 - 2 * m->v[I];
@@ -50,6 +54,7 @@ static void sample(M *m) {
 static int update(M *m, Update *u) {
     bool above = m->v[X] > m->v[LEVEL];
     memset(u, 0, sizeof *u);
+    if (!m->in_event) return ERROR;
     if (!STATES) {
         while (due(m, m->t)) sample(m);
         u->defined = true, u->next = instant(m);
@@ -84,12 +89,15 @@ static int get(M *m, const uint32_t *vr, size_t n, double *to) {
 }
 
 static int set(M *m, const uint32_t *vr, size_t n, const double *from) {
-    for (size_t i = 0; i < n; i++) m->v[vr[i]] = from[i];
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] == I && m->exchange && !m->initial && !m->in_event) return ERROR;
+        m->v[vr[i]] = from[i];
+    }
     return OK;
 }
 
 static int leave_initialization(M *m) {
-    m->t = m->start, m->above = m->v[X] > m->v[LEVEL], m->init = false;
+    m->t = m->start, m->above = m->v[X] > m->v[LEVEL], m->initial = false;
     if (m->events) begin(m);
     return OK;
 }
@@ -97,6 +105,7 @@ static int leave_initialization(M *m) {
 static int step(M *m, double t, double h, bool *event, bool *early, double *last) {
     double end = t + h, width = 1e-5 * m->v[T];
     *event = *early = false;
+    if (m->in_event || fabs(t - m->t) > width) return ERROR;
     if (STATES) {
         m->v[X] = m->v[U] + (m->v[X] - m->v[U]) * exp(-h);
     } else {
@@ -127,7 +136,7 @@ void *fmi2Instantiate(const char *n, int type, const char *g, const char *r, con
 }
 void fmi2FreeInstance(M *m) { free(m); }
 int fmi2SetupExperiment(M *m, int a, double b, double start, int c, double d) { return m->start = m->t = start, OK; }
-int fmi2EnterInitializationMode(M *m) { return m->init = true, OK; }
+int fmi2EnterInitializationMode(M *m) { return OK; }
 int fmi2ExitInitializationMode(M *m) { return leave_initialization(m); }
 int fmi2Terminate(M *m) { return OK; }
 int fmi2Reset(M *m) { return ERROR; }
@@ -144,14 +153,14 @@ int fmi2DoStep(M *m, double t, double h, int p) {
     double last;
     return step(m, t, h, &event, &early, &last);
 }
-int fmi2EnterEventMode(M *m) { return begin(m), OK; }
+int fmi2EnterEventMode(M *m) { return begin(m); }
 int fmi2NewDiscreteStates(M *m, EventInfo *info) {
     Update u;
     int status = update(m, &u);
     *info = (EventInfo){u.again, u.terminate, 0, u.states, u.defined, u.next};
     return status;
 }
-int fmi2EnterContinuousTimeMode(M *m) { return OK; }
+int fmi2EnterContinuousTimeMode(M *m) { return leave(m); }
 int fmi2CompletedIntegratorStep(M *m, int p, int *event, int *terminate) {
     return *event = fault(m, STEP_EVENTS), *terminate = 0, m->v[COUNT] += fault(m, STEP_EVENTS), OK;
 }
@@ -189,15 +198,15 @@ int fmi3SetFloat64(M *m, const uint32_t *vr, size_t n, const double *from, size_
 int fmi3DoStep(M *m, double t, double h, bool p, bool *event, bool *terminate, bool *early, double *last) {
     return *terminate = false, step(m, t, h, event, early, last);
 }
-int fmi3EnterEventMode(M *m) { return begin(m), OK; }
-int fmi3EnterStepMode(M *m) { return OK; }
+int fmi3EnterEventMode(M *m) { return begin(m); }
+int fmi3EnterStepMode(M *m) { return leave(m); }
 int fmi3UpdateDiscreteStates(M *m, bool *again, bool *terminate, bool *nominal, bool *state, bool *defined, double *next) {
     Update u;
     int status = update(m, &u);
     *again = u.again, *terminate = u.terminate, *nominal = false, *state = u.states, *defined = u.defined, *next = u.next;
     return status;
 }
-int fmi3EnterContinuousTimeMode(M *m) { return OK; }
+int fmi3EnterContinuousTimeMode(M *m) { return leave(m); }
 int fmi3CompletedIntegratorStep(M *m, bool p, bool *event, bool *terminate) {
     return *event = fault(m, STEP_EVENTS), *terminate = false, m->v[COUNT] += fault(m, STEP_EVENTS), OK;
 }
