@@ -48,6 +48,7 @@ use std::time::{Duration, Instant};
 ///   fmu simulate BouncingBall.fmu --me --rtol 1e-8 --step 0.01 --stop 3 --csv ball.csv
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
+#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub struct Simulate {
     /// FMUs, each optionally with a name; or one SSP file
     #[arg(value_name = "[NAME=]FILE", required = true)]
