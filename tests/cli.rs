@@ -67,9 +67,9 @@ fn a_bad_file_gives_one_line_and_status_2() {
     refused("fmi1.fmu", "fmiVersion=\"1.0\" is not supported");
     zip(&path("source.fmu"), &[("modelDescription.xml", DESCRIPTION), ("binaries/sparc-solaris/X.so", b"x")]);
     refused("source.fmu", "for this platform (FMI 3.0); it has binaries for sparc-solaris");
-    let me = text(DESCRIPTION).replace("CoSimulation", "ModelExchange");
-    zip(&path("me.fmu"), &[("modelDescription.xml", me.as_bytes())]);
-    refused("me.fmu", "has no co-simulation interface");
+    let se = text(DESCRIPTION).replace("CoSimulation", "ScheduledExecution");
+    zip(&path("se.fmu"), &[("modelDescription.xml", se.as_bytes())]);
+    refused("se.fmu", "has neither Co-Simulation nor Model Exchange; it has Scheduled Execution (FMI 3.0)");
     let bytes = std::fs::read(path("slip.fmu")).unwrap();
     std::fs::write(path("cut.fmu"), &bytes[..bytes.len() / 2]).unwrap();
     refused("cut.fmu", "cut short");
@@ -95,6 +95,42 @@ fn a_bad_binary_gives_one_line_and_status_2() {
             &["x.fmu: the function fmi3InstantiateCoSimulation is missing"],
         );
     }
+}
+
+/// An FMU of another tool with Model Exchange alone: x' = u - x from 1, in C.
+#[test]
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn model_exchange_is_integrated() {
+    let dir = tempfile::tempdir().unwrap();
+    let (library, path) = (dir.path().join("x.so"), dir.path().join("p.fmu"));
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("fmu-import/tests/model_exchange/fmu.c");
+    let mut cc = Command::new("cc");
+    cc.args(["-std=c11", "-D_GNU_SOURCE", "-shared", "-fPIC", "-w", "-DSTATES=1"]).arg(source);
+    assert!(cc.arg("-o").arg(&library).arg("-lm").status().unwrap().success());
+    let xml = br#"<fmiModelDescription fmiVersion="2.0" guid="g" modelName="P" numberOfEventIndicators="1">
+<ModelExchange modelIdentifier="x"/><ModelVariables>
+<ScalarVariable name="x" valueReference="2" causality="output"><Real/></ScalarVariable>
+<ScalarVariable name="der(x)" valueReference="3"><Real derivative="1"/></ScalarVariable>
+</ModelVariables><ModelStructure><Derivatives><Unknown index="2"/></Derivatives></ModelStructure></fmiModelDescription>"#;
+    zip(&path, &[("modelDescription.xml", xml), ("binaries/linux64/x.so", &std::fs::read(&library).unwrap())]);
+    let path = path.to_str().unwrap();
+    for (options, note, tolerance) in [
+        (&[][..], "note: p has no Co-Simulation: the FMUs are integrated, as with --me", 1e-5),
+        (&["--me", "--rtol", "1e-10"], "", 1e-9),
+        (&["--me", "--solver", "rk4"], "", 1e-5),
+    ] {
+        let output = fmu(&[&["simulate", path, "--step", "0.1", "--stop", "1", "--csv", "-"], options].concat());
+        let (csv, error) = (text(&output.stdout), text(&output.stderr));
+        assert!(output.status.success() && error.contains(note), "{options:?}: {error}");
+        let x: f64 = csv.lines().last().unwrap().split(',').nth(1).unwrap().parse().unwrap();
+        assert!((x - (-1.0_f64).exp()).abs() < tolerance, "{options:?}: {csv}");
+    }
+    let refused = |options: &[&str], part: &str| fails(&[&["simulate", path], options].concat(), 2, &[part]);
+    refused(&["--event-mode"], "p: has no Co-Simulation; it has Model Exchange (FMI 2.0)");
+    refused(&["--me", "--rtol", "0"], "the relative tolerance 0 must be between 1e-14 and 0.1");
+    refused(&["--me", "--solver", "rk4", "--rtol", "1e-3"], "--rtol is for --solver dopri");
+    let drive = archive("fmi3", "PmsmDrive");
+    fails(&["simulate", drive.to_str().unwrap(), "--rtol", "1e-3"], 2, &["--solver and --rtol are for Model Exchange"]);
 }
 
 #[test]

@@ -127,8 +127,8 @@ impl Instance<'_> {
         for _ in 0..100 {
             let mut again = false;
             let status = self.call("UpdateDiscreteStates", |raw| {
-                let (status, more, _) = raw.update_discrete_states(self.handle)?;
-                again = more;
+                let (status, updated) = raw.update_discrete_states(self.handle, false)?;
+                again = updated.again != 0;
                 Some(status)
             })?;
             self.must("UpdateDiscreteStates", status)?;

@@ -261,6 +261,7 @@ impl Session {
             lasting: true,
             logging: false,
             event_mode: clocks,
+            early_return: false,
             environment: 0x5000 + 0x10 * self.instances_made.get(),
         }
     }

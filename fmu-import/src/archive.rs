@@ -3,7 +3,7 @@
 use super::Error;
 use crate::folder::Folder;
 use crate::platform::Platform;
-use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
+use model_description::{FmiVersion, Interface, ModelDescription, TerminalsAndIcons};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, Write};
@@ -29,6 +29,31 @@ pub(super) struct Archive {
     names: Vec<String>,
     /// Its modelDescription.xml.
     pub(super) description: Arc<ModelDescription>,
+}
+
+/// What was extracted of an archive.
+pub(super) struct Extracted {
+    pub(super) folder: Folder,
+    /// Path of the binary for Co-Simulation, if there is that interface.
+    pub(super) co_simulation: Option<PathBuf>,
+    /// Path of the binary for Model Exchange, if there is that interface.
+    pub(super) model_exchange: Option<Result<PathBuf, Error>>,
+    /// Number of files.
+    pub(super) files: usize,
+}
+
+/// The interfaces that an FMU has, in words.
+pub(super) fn interfaces(description: &ModelDescription) -> String {
+    let ModelDescription { co_simulation: cs, model_exchange: me, scheduled_execution: se, version, .. } = description;
+    let standard = if *version == FmiVersion::V2 { "FMI 2.0" } else { "FMI 3.0" };
+    let event_mode = if cs.as_ref().is_some_and(Interface::has_event_mode) { " with event mode" } else { "" };
+    let names = [
+        cs.as_ref().map(|_| format!("Co-Simulation{event_mode}")),
+        me.as_ref().map(|_| "Model Exchange".to_owned()),
+        se.as_ref().map(|_| "Scheduled Execution".to_owned()),
+    ];
+    let names: Vec<String> = names.into_iter().flatten().collect();
+    if names.is_empty() { "no interface".into() } else { format!("{} ({standard})", names.join(" and ")) }
 }
 
 impl Archive {
@@ -66,27 +91,43 @@ impl Archive {
         xml.map(read).transpose()
     }
 
-    /// Extracts the binaries for this platform and the resources; returns the folder, the path of the binary, and whether
-    /// that is the only file.
-    pub(super) fn extract(&mut self) -> Result<(Folder, PathBuf, bool), Error> {
-        let wrong = |path: &Path, cause: &dyn std::fmt::Display| Error::file(path, cause);
-        let Some(interface) = &self.description.co_simulation else {
-            return Err(wrong(&self.path, &"has no co-simulation interface"));
-        };
+    /// Extracts the binaries for this platform and the resources.
+    pub(super) fn extract(&mut self) -> Result<Extracted, Error> {
+        let wrong = |e: &dyn std::fmt::Display| Error::file(&self.path, e);
+        let description = self.description.clone();
+        let binary = |interface: &Option<Interface>| interface.as_ref().map(|i| self.binary(&i.model_identifier));
+        let co_simulation = binary(&description.co_simulation).transpose()?;
+        let model_exchange = binary(&description.model_exchange);
+        if co_simulation.is_none() && model_exchange.is_none() {
+            let has = interfaces(&description);
+            return Err(wrong(&format!("has neither Co-Simulation nor Model Exchange; it has {has}")));
+        }
+        let folder = Folder::new().map_err(|e| wrong(&e))?;
+        // The resources folder is named to the FMU, so it exists even when the archive has none.
+        fs::create_dir(folder.path().join("resources")).map_err(|e| wrong(&e))?;
+        let found = co_simulation.iter().chain(model_exchange.iter().flatten());
+        let mut prefixes: Vec<String> = found.map(|(folder, _)| format!("binaries/{folder}/")).collect();
+        prefixes.push("resources/".into());
+        let files = self.extract_into(folder.path(), &prefixes).map_err(|e| Error::file(&self.path, e))?;
+        let place = |(of, name): (&str, String)| folder.path().join("binaries").join(of).join(name);
+        Ok(Extracted {
+            co_simulation: co_simulation.map(place),
+            model_exchange: model_exchange.map(|found| found.map(place)),
+            files,
+            folder,
+        })
+    }
+
+    /// Folder and file name of the binary with this model identifier for this platform.
+    fn binary(&self, model_identifier: &str) -> Result<(&'static str, String), Error> {
         let host = Platform::host();
         let folders = host.folders(self.description.version);
-        let name = format!("{}.{}", interface.model_identifier, host.extension());
+        let name = format!("{model_identifier}.{}", host.extension());
         let has = |folder: &&&str| self.names.iter().any(|n| *n == format!("binaries/{folder}/{name}"));
-        let Some(&folder) = folders.iter().find(has) else {
-            return Err(wrong(&self.path, &self.missing_binary(folders[0], &name)));
-        };
-        let dir = Folder::new().map_err(|e| wrong(&self.path, &e))?;
-        // The resources folder is named to the FMU, so it exists even when the archive has none.
-        fs::create_dir(dir.path().join("resources")).map_err(|e| wrong(&self.path, &e))?;
-        let binaries = format!("binaries/{folder}/");
-        let files = self.extract_into(dir.path(), &[&binaries, "resources/"]).map_err(|e| wrong(&self.path, &e))?;
-        let binary = dir.path().join(&binaries).join(name);
-        Ok((dir, binary, files == 1))
+        match folders.iter().find(has) {
+            Some(&folder) => Ok((folder, name)),
+            None => Err(Error::file(&self.path, self.missing_binary(folders[0], &name))),
+        }
     }
 
     /// Every file, with its name.
@@ -110,10 +151,10 @@ impl Archive {
     }
 
     /// Extracts what begins with one of the prefixes; returns the number of files.
-    fn extract_into(&mut self, dir: &Path, prefixes: &[&str]) -> io::Result<usize> {
+    fn extract_into(&mut self, dir: &Path, prefixes: &[String]) -> io::Result<usize> {
         let (mut left, mut files) = (LIMIT, 0);
         for (index, name) in self.names.iter().enumerate() {
-            if !prefixes.iter().any(|p| name.starts_with(p)) {
+            if !prefixes.iter().any(|p| name.starts_with(p.as_str())) {
                 continue;
             }
             let mut entry = self.zip.by_index(index)?;

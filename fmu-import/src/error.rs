@@ -1,5 +1,6 @@
 //! Errors of an FMU: in its file, in its use, or in a call.
 
+use crate::Status;
 use std::path::{Path, PathBuf};
 
 /// One line that names the file or the instance, and the cause.
@@ -62,6 +63,11 @@ impl Error {
             Self::File { cause, .. } | Self::Usage { cause, .. } => cause.clone(),
             Self::Call { .. } => self.to_string(),
         }
+    }
+
+    /// Whether the FMU discarded the call: it did nothing, and the instance remains usable.
+    pub fn is_discard(&self) -> bool {
+        matches!(self, Self::Call { status, .. } if *status == Status::DISCARD.to_string())
     }
 
     /// Whether the FMU itself refused, rather than its file or the user's wishes being wrong.

@@ -1,6 +1,10 @@
 //! One instance of an FMU, the same for both standards.
 
-use super::standard::{Experiment, Outcome, Refusal, Standard};
+mod equations;
+
+pub use equations::{CompletedStep, Stepped, Update};
+
+use super::standard::{Experiment, Kind, Outcome, Refusal, Standard};
 use super::{Error, Values, explain};
 use crate::abi::log::{Log, Message, Status};
 use crate::abi::shared::Handle;
@@ -17,6 +21,7 @@ pub struct Instance {
     name: String,
     description: Arc<ModelDescription>,
     standard: Box<dyn Standard + Send>,
+    kind: Kind,
     states: Vec<Option<Handle>>,
     dead: bool,
     // After the instance, which may log while it is freed.
@@ -28,14 +33,20 @@ impl Instance {
         name: &str,
         description: Arc<ModelDescription>,
         standard: Box<dyn Standard + Send>,
+        kind: Kind,
         log: Arc<Log>,
     ) -> Self {
-        Self { name: name.into(), description, standard, states: Vec::new(), dead: false, log }
+        Self { name: name.into(), description, standard, kind, states: Vec::new(), dead: false, log }
     }
 
     /// The name that the instance was given.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// What the instance was made for.
+    pub fn kind(&self) -> Kind {
+        self.kind
     }
 
     /// The contents of modelDescription.xml.
@@ -185,7 +196,8 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<ControlFlow<()>, Error> {
-        self.call(|s| s.do_step(t, h))
+        let stepped = self.call(|s| s.do_step(t, h))?;
+        Ok(if stepped.terminate { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
     /// Time (s) that the last step reached; it differs from its end when the FMU asked to end the simulation.

@@ -1,4 +1,5 @@
-//! An importer: runs any co-simulation FMU of FMI 2.0 and FMI 3.0, from any tool, with one interface for both.
+//! An importer: runs any FMU of FMI 2.0 and FMI 3.0, Co-Simulation and Model Exchange, from any tool, with one interface for
+//! both standards.
 //!
 //! - [`Fmu`] and [`Instance`]: one FMU with valid calls only; [`raw`]: single calls, valid or not, for a checker.
 //! - [`cosimulation`]: several FMUs connected; [`ssp`]: systems of FMUs from files.
@@ -29,6 +30,7 @@ pub mod elf;
 mod error;
 mod folder;
 mod instance;
+mod integration;
 pub mod platform;
 pub mod ssp;
 mod standard;
@@ -38,13 +40,14 @@ pub use abi::library::describe;
 pub use abi::log::{Message, Status};
 pub use abi::raw;
 pub use error::Error;
-pub use instance::{Instance, State};
+pub use instance::{CompletedStep, Instance, State, Stepped, Update};
+pub use standard::Kind;
 pub use value::Values;
 
 use abi::Functions;
 use abi::log::Log;
-use archive::Archive;
-use model_description::{FmiVersion, ModelDescription, TerminalsAndIcons};
+use archive::{Archive, Extracted};
+use model_description::{FmiVersion, Interface, ModelDescription, TerminalsAndIcons};
 use standard::Refusal;
 use std::collections::BTreeMap;
 use std::ffi::CString;
@@ -67,7 +70,9 @@ pub struct Fmu {
     path: PathBuf,
     description: Arc<ModelDescription>,
     terminals: Arc<Result<Option<TerminalsAndIcons>, Error>>,
-    functions: Functions,
+    /// Each interface of the description with its binary. A binary for Model Exchange alone may fail beside Co-Simulation.
+    co_simulation: Option<Functions>,
+    model_exchange: Option<Result<Functions, Error>>,
     archive: Arc<Mutex<Archive>>,
     /// Path of the unpacked folder `resources`, which is only there if the archive has one.
     resources: PathBuf,
@@ -77,8 +82,8 @@ impl Fmu {
     /// Opens an `.fmu` file of FMI 2.0 or FMI 3.0.
     ///
     /// # Errors
-    /// The file is missing, no archive, has no readable description, no co-simulation interface, no binary for this
-    /// platform, or a binary that lacks a function.
+    /// The file is missing, no archive, has no readable description, neither Co-Simulation nor Model Exchange, no binary for
+    /// this platform, or a binary that lacks a function.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
         Self::load(&Arc::new(Mutex::new(Archive::open(path.as_ref())?)))
     }
@@ -102,15 +107,34 @@ impl Fmu {
 
     fn load(shared: &Arc<Mutex<Archive>>) -> Result<Self, Error> {
         let mut archive = shared.lock().unwrap_or_else(PoisonError::into_inner);
-        let (folder, binary, alone) = archive.extract()?;
+        let Extracted { folder, co_simulation, model_exchange, files } = archive.extract()?;
         let folder = Arc::new(folder);
         let (terminals, description) = (Arc::new(archive.terminals()), archive.description.clone());
         let (path, resources) = (archive.path.clone(), folder.path().join("resources"));
         // A binary that is loaded needs its file no more, except on Windows: then a kill leaves nothing behind.
-        let kept = (cfg!(windows) || !alone).then(|| folder.clone());
-        let functions =
-            Functions::load(&binary, description.version, kept).map_err(|e| Error::file(&path, e.cause()))?;
-        Ok(Self { path, description, terminals, functions, archive: shared.clone(), resources })
+        let kept = (cfg!(windows) || files > 1).then(|| folder.clone());
+        let load = |binary: &Path, kind| {
+            Functions::load(binary, description.version, kind, kept.clone()).map_err(|e| Error::file(&path, e.cause()))
+        };
+        let stepping = co_simulation.as_ref().map(|binary| load(binary, Kind::default())).transpose()?;
+        let exchanging = model_exchange.map(|binary| match &stepping {
+            Some(functions) if binary.as_ref().ok() == co_simulation.as_ref() => Ok(functions.clone()),
+            _ => load(&binary?, Kind::ModelExchange),
+        });
+        let exchanging = match exchanging {
+            Some(Err(error)) if stepping.is_none() => return Err(error),
+            other => other,
+        };
+        let archive = shared.clone();
+        Ok(Self {
+            description,
+            terminals,
+            co_simulation: stepping,
+            model_exchange: exchanging,
+            archive,
+            resources,
+            path,
+        })
     }
 
     /// The contents of modelDescription.xml.
@@ -131,11 +155,20 @@ impl Fmu {
         &self.path
     }
 
-    /// Creates an instance; with `logging`, the FMU logs more than errors.
+    /// Creates an instance for co-simulation; with `logging`, the FMU logs more than errors.
     ///
     /// # Errors
-    /// The FMU refuses, or a name has a null byte.
+    /// The FMU refuses or has no Co-Simulation, or a name has a null byte.
     pub fn instantiate(&self, name: &str, logging: bool) -> Result<Instance, Error> {
+        self.instantiate_as(Kind::default(), name, logging)
+    }
+
+    /// Creates an instance of this kind.
+    ///
+    /// # Errors
+    /// The FMU refuses or has no such interface, or a name has a null byte.
+    pub fn instantiate_as(&self, kind: Kind, name: &str, logging: bool) -> Result<Instance, Error> {
+        let functions = self.functions(kind, name)?;
         let c_name = text(name, name)?;
         let token = text(name, &self.description.token)?;
         let log = Arc::<Log>::default();
@@ -145,9 +178,31 @@ impl Fmu {
             FmiVersion::V3 => format!("{}{}", self.resources.display(), std::path::MAIN_SEPARATOR),
         };
         let resources = text(name, &resources)?;
-        match self.functions.instantiate(&c_name, &token, &resources, &log, logging) {
-            Ok(standard) => Ok(Instance::new(name, self.description.clone(), standard, log)),
+        match functions.instantiate(&c_name, &token, &resources, &log, logging, kind) {
+            Ok(standard) => Ok(Instance::new(name, self.description.clone(), standard, kind, log)),
             Err(refusal) => Err(explain(name, refusal, log.reason())),
+        }
+    }
+
+    /// The functions of the interface that a kind of instance needs.
+    fn functions(&self, kind: Kind, instance: &str) -> Result<&Functions, Error> {
+        let has = archive::interfaces(&self.description);
+        let none = |what: &str| Error::usage(instance, format!("has no {what}; it has {has}"));
+        match kind {
+            Kind::ModelExchange => match &self.model_exchange {
+                Some(functions) => functions.as_ref().map_err(Clone::clone),
+                None => Err(none("Model Exchange")),
+            },
+            Kind::CoSimulation { event_mode, early_return } => {
+                let functions = self.co_simulation.as_ref().ok_or_else(|| none("Co-Simulation"))?;
+                if event_mode && !self.description.co_simulation.as_ref().is_some_and(Interface::has_event_mode) {
+                    return Err(none("event mode"));
+                }
+                if early_return && self.description.version == FmiVersion::V2 {
+                    return Err(none("early return"));
+                }
+                Ok(functions)
+            }
         }
     }
 }

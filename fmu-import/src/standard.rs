@@ -3,8 +3,8 @@
 use super::value::Values;
 use crate::abi::log::Status;
 use crate::abi::shared::SharedInstance;
+use crate::instance::{CompletedStep, Stepped, Update};
 use model_description::BaseType;
-use std::ops::ControlFlow;
 
 /// A call that did not succeed.
 pub(super) enum Refusal {
@@ -32,9 +32,30 @@ pub(super) struct Experiment {
     pub(super) tolerance: Option<f64>,
 }
 
+/// What an instance is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Steps, which the FMU computes.
+    CoSimulation {
+        /// Events are handled in event mode, outside of steps (FMI 3.0 only).
+        event_mode: bool,
+        /// `DoStep` may return before the end of the step (FMI 3.0 only).
+        early_return: bool,
+    },
+    /// States, derivatives and events, for an integrator of the importer.
+    ModelExchange,
+}
+
+impl Default for Kind {
+    /// Co-Simulation without event mode and early return.
+    fn default() -> Self {
+        Self::CoSimulation { event_mode: false, early_return: false }
+    }
+}
+
 /// One instance, seen through either standard. Dropping it frees the instance.
-pub(super) trait Standard {
-    /// The calls that both standards share: end of initialization, terminate, reset, saved states.
+pub(super) trait Standard: Equations {
+    /// The calls that both standards share: end of initialization, terminate, reset, saved states, modes, vectors.
     fn shared(&mut self) -> &mut SharedInstance;
     fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome;
     fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome;
@@ -43,9 +64,39 @@ pub(super) trait Standard {
     fn set_debug_logging(&mut self, on: bool) -> Outcome;
     fn setup(&mut self, experiment: Experiment) -> Outcome;
     fn enter_initialization(&mut self) -> Outcome;
-    /// Breaks when the FMU asks to end the simulation.
-    fn do_step(&mut self, t: f64, h: f64) -> Outcome<ControlFlow<()>>;
+    fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped>;
     fn last_successful_time(&mut self) -> Outcome<f64>;
+}
+
+/// Events and derivatives, which the standards give different types: of Model Exchange, and of event mode and derivatives in
+/// Co-Simulation.
+pub(super) trait Equations {
+    /// `fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`.
+    fn update_discrete_states(&mut self) -> Outcome<Update>;
+    fn completed_integrator_step(&mut self) -> Outcome<CompletedStep>;
+    /// Numbers of continuous states and event indicators; `None` where only the description tells.
+    fn counts(&mut self) -> Outcome<Option<(usize, usize)>>;
+    fn directional_derivative(&mut self, s: Sensitivity<'_>, sensitivity: &mut [f64]) -> Outcome;
+    fn adjoint_derivative(&mut self, s: Sensitivity<'_>, sensitivity: &mut [f64]) -> Outcome;
+    fn output_derivatives(&mut self, references: &[u32], orders: &[i32], values: &mut [f64]) -> Outcome;
+    fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Outcome;
+}
+
+/// Which partial derivatives: value references and the seed.
+#[derive(Clone, Copy)]
+pub(super) struct Sensitivity<'a> {
+    pub(super) unknowns: &'a [u32],
+    pub(super) knowns: &'a [u32],
+    pub(super) seed: &'a [f64],
+}
+
+/// Refuses arrays that do not have one element each.
+pub(super) fn same_length(what: &str, lengths: &[usize]) -> Outcome {
+    if lengths.windows(2).all(|pair| pair[0] == pair[1]) {
+        return Ok(());
+    }
+    let found = lengths.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    Err(Refusal::Impossible(format!("{what} must have as many elements, and have {found}")))
 }
 
 /// A value that does not fit the type that crosses the interface.

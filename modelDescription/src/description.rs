@@ -1,4 +1,4 @@
-//! The content of a modelDescription.xml, as far as importers of co-simulation FMUs need it.
+//! The content of a modelDescription.xml, as far as importers need it.
 
 use crate::units::{TypeDefinition, Unit};
 use crate::variable::ModelVariable;
@@ -32,11 +32,13 @@ pub struct ModelDescription {
     /// Names are structured (`part.name[1]`), not flat.
     pub structured_names: bool,
     /// The co-simulation interface, if there is one.
-    pub co_simulation: Option<CoSimulation>,
-    /// The model exchange interface's model identifier, if there is one.
-    pub model_exchange: Option<String>,
-    /// The scheduled execution interface's model identifier, if there is one (FMI 3.0 only).
-    pub scheduled_execution: Option<String>,
+    pub co_simulation: Option<Interface>,
+    /// The model exchange interface, if there is one.
+    pub model_exchange: Option<Interface>,
+    /// The scheduled execution interface, if there is one (FMI 3.0 only).
+    pub scheduled_execution: Option<Interface>,
+    /// `numberOfEventIndicators` as the file has it (FMI 2.0 only).
+    pub number_of_event_indicators: Option<u32>,
     /// Recommended times, step size and tolerance.
     pub default_experiment: Experiment,
     /// Units with their display units.
@@ -53,6 +55,8 @@ pub struct ModelDescription {
     pub derivatives: Vec<Unknown>,
     /// Initial unknowns of the model structure.
     pub initial_unknowns: Vec<Unknown>,
+    /// Event indicators of the model structure (FMI 3.0 only).
+    pub event_indicators: Vec<Unknown>,
 }
 
 impl ModelDescription {
@@ -71,6 +75,17 @@ impl ModelDescription {
         }
     }
 
+    /// The state whose derivative a variable is, if it is one.
+    pub fn state_of(&self, derivative: &ModelVariable) -> Option<&ModelVariable> {
+        self.referenced(derivative.derivative?)
+    }
+
+    /// The continuous states in the order of `x` in every call, which is the order of the derivatives in the model structure
+    /// (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). An entry that refers to no derivative of a variable is left out.
+    pub fn states(&self) -> Vec<&ModelVariable> {
+        self.derivatives.iter().filter_map(|unknown| self.state_of(self.referenced(unknown.reference)?)).collect()
+    }
+
     /// The unit with this name.
     pub fn unit(&self, name: &str) -> Option<&Unit> {
         self.units.iter().find(|u| u.name == name)
@@ -82,11 +97,11 @@ impl ModelDescription {
     }
 }
 
-/// The co-simulation interface: its model identifier and the capabilities it claims.
+/// One of the interfaces: its model identifier and the capabilities it claims.
 ///
 /// Capabilities are kept as written, so that a checker can find misspelled ones; [`flag`](Self::flag) reads them.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CoSimulation {
+pub struct Interface {
     /// Base name of the binaries.
     pub model_identifier: String,
     /// Every attribute except the model identifier, as written.
@@ -95,7 +110,10 @@ pub struct CoSimulation {
     pub line: usize,
 }
 
-impl CoSimulation {
+/// The co-simulation interface.
+pub type CoSimulation = Interface;
+
+impl Interface {
     /// The value of an attribute.
     pub fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
@@ -122,9 +140,23 @@ impl CoSimulation {
         self.flag("needsExecutionTool")
     }
 
-    /// There is an event mode (FMI 3.0 only).
+    /// There is an event mode (FMI 3.0 Co-Simulation only; in Model Exchange there always is one).
     pub fn has_event_mode(&self) -> bool {
         self.flag("hasEventMode")
+    }
+
+    /// `DoStep` may return before the end of the step, for its own reasons or after an intermediate update (FMI 3.0 only).
+    pub fn may_return_early(&self) -> bool {
+        self.flag("mightReturnEarlyFromDoStep") || self.flag("canReturnEarlyAfterIntermediateUpdate")
+    }
+
+    /// The FMU wants to know of every completed integrator step (Model Exchange): FMI 2.0 says when it does not, FMI 3.0
+    /// when it does.
+    pub fn needs_completed_integrator_step(&self, version: FmiVersion) -> bool {
+        match version {
+            FmiVersion::V2 => !self.flag("completedIntegratorStepNotNeeded"),
+            FmiVersion::V3 => self.flag("needsCompletedIntegratorStep"),
+        }
     }
 }
 

@@ -22,7 +22,7 @@ mod write;
 mod xml;
 
 pub use date::date_from_epoch;
-pub use description::{CoSimulation, Experiment, LogCategory, ModelDescription, Unknown};
+pub use description::{CoSimulation, Experiment, Interface, LogCategory, ModelDescription, Unknown};
 pub use error::Error;
 pub use number::{format as format_number, parse as parse_number};
 pub use read::{read, read_terminals};

@@ -10,13 +10,13 @@ mod terminals;
 mod types;
 mod variables;
 
-use crate::description::{CoSimulation, Experiment, LogCategory, ModelDescription};
+use crate::description::{Experiment, Interface, LogCategory, ModelDescription};
 use crate::error::Error;
 use crate::version::FmiVersion;
 use crate::xml::{Element, parse};
 pub use terminals::read_terminals;
 
-use attributes::{boolean, number, owned, required};
+use attributes::{boolean, integer, number, owned, required};
 
 /// Reads modelDescription.xml; the bytes must be UTF-8, as both standards require.
 ///
@@ -44,9 +44,10 @@ pub fn read(xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
         generation_tool: owned(&root, "generationTool"),
         generation_date_and_time: owned(&root, "generationDateAndTime"),
         structured_names: root.get("variableNamingConvention") == Some("structured"),
-        co_simulation: root.child("CoSimulation").map(co_simulation).transpose()?,
-        model_exchange: model_identifier(&root, "ModelExchange")?,
-        scheduled_execution: model_identifier(&root, "ScheduledExecution")?,
+        co_simulation: interface(&root, "CoSimulation")?,
+        model_exchange: interface(&root, "ModelExchange")?,
+        scheduled_execution: interface(&root, "ScheduledExecution")?,
+        number_of_event_indicators: integer(&root, "numberOfEventIndicators")?,
         default_experiment: root.child("DefaultExperiment").map_or(Ok(Experiment::default()), experiment)?,
         units: types::units(&root)?,
         variables: variables::variables(element(&root, "ModelVariables")?, version, &types)?,
@@ -55,6 +56,10 @@ pub fn read(xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
         outputs: structure::unknowns(structure, version, "Outputs", "Output")?,
         derivatives: structure::unknowns(structure, version, "Derivatives", "ContinuousStateDerivative")?,
         initial_unknowns: structure::unknowns(structure, version, "InitialUnknowns", "InitialUnknown")?,
+        event_indicators: match version {
+            FmiVersion::V2 => Vec::new(),
+            FmiVersion::V3 => structure::unknowns(structure, version, "", "EventIndicator")?,
+        },
     })
 }
 
@@ -86,23 +91,20 @@ fn element<'a>(parent: &'a Element, name: &str) -> Result<&'a Element, Error> {
     parent.child(name).ok_or_else(missing)
 }
 
-fn model_identifier(root: &Element, interface: &str) -> Result<Option<String>, Error> {
-    root.child(interface).map(|e| required(e, "modelIdentifier").map(str::to_owned)).transpose()
-}
-
-fn co_simulation(element: &Element) -> Result<CoSimulation, Error> {
+fn interface(root: &Element, name: &str) -> Result<Option<Interface>, Error> {
     const IDENTIFIER: &str = "modelIdentifier";
+    let Some(element) = root.child(name) else { return Ok(None) };
     for (name, _) in &element.attributes {
         // Every capability that begins like this is an xs:boolean, in both standards.
-        if ["can", "has", "might", "needs", "provides"].iter().any(|verb| name.starts_with(verb)) {
+        if ["can", "completed", "has", "might", "needs", "provides"].iter().any(|verb| name.starts_with(verb)) {
             boolean(element, name)?;
         }
     }
-    Ok(CoSimulation {
+    Ok(Some(Interface {
         model_identifier: required(element, IDENTIFIER)?.into(),
         attributes: element.attributes.iter().filter(|(name, _)| name != IDENTIFIER).cloned().collect(),
         line: element.line,
-    })
+    }))
 }
 
 fn experiment(element: &Element) -> Result<Experiment, Error> {

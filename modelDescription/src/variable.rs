@@ -183,6 +183,8 @@ pub struct ModelVariable {
     pub aliases: Vec<Alias>,
     /// The state whose derivative this is, as the file says it: an index in FMI 2.0, a value reference in FMI 3.0.
     pub derivative: Option<u32>,
+    /// A state may jump at events (Model Exchange only).
+    pub reinit: bool,
     /// Value references of the clocks that this belongs to (FMI 3.0 only).
     pub clocks: Vec<u32>,
     /// Line of the element.

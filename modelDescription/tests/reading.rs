@@ -107,6 +107,45 @@ fn what_only_fmi_3_has() {
 }
 
 #[test]
+fn model_exchange() {
+    let md = read(
+        two("<ModelExchange modelIdentifier='m' completedIntegratorStepNotNeeded='true'/>
+         <ModelVariables><ScalarVariable name='der(x)' valueReference='7'><Real derivative='2'/></ScalarVariable>
+         <ScalarVariable name='x' valueReference='9'><Real reinit='true'/></ScalarVariable></ModelVariables>")
+        .replace("guid=", "numberOfEventIndicators='3' guid=")
+        .replace(
+            "<ModelStructure/>",
+            "<ModelStructure><Derivatives><Unknown index='1'/></Derivatives></ModelStructure>",
+        ),
+    )
+    .unwrap();
+    let me = md.model_exchange.as_ref().unwrap();
+    assert!(md.co_simulation.is_none() && !me.needs_completed_integrator_step(md.version));
+    assert_eq!((md.number_of_event_indicators, me.model_identifier.as_str()), (Some(3), "m"));
+    let states: Vec<_> = md.states().iter().map(|v| (v.name.as_str(), v.reinit)).collect();
+    assert_eq!(states, [("x", true)], "an index, not a value reference");
+
+    let md = read(
+        three("<ModelExchange modelIdentifier='m' needsCompletedIntegratorStep='1' providesDirectionalDerivatives='true'/>
+         <ModelVariables><Float64 name='z' valueReference='1'/><Float64 name='b' valueReference='3'/>
+         <Float64 name='der(a)' valueReference='5' derivative='2'/><Float64 name='der(b)' valueReference='4' derivative='3'/>
+         <Float64 name='a' valueReference='2'/></ModelVariables>")
+        .replace("<ModelStructure/>", "<ModelStructure><ContinuousStateDerivative valueReference='4'/>
+         <ContinuousStateDerivative valueReference='5'/><EventIndicator valueReference='1'/></ModelStructure>"),
+    )
+    .unwrap();
+    let me = md.model_exchange.as_ref().unwrap();
+    assert!(me.needs_completed_integrator_step(md.version) && me.flag("providesDirectionalDerivatives"));
+    assert_eq!(
+        md.states().iter().map(|v| v.name.as_str()).collect::<Vec<_>>(),
+        ["b", "a"],
+        "the order of the derivatives"
+    );
+    assert_eq!(md.event_indicators.iter().map(|u| u.reference).collect::<Vec<_>>(), [1]);
+    assert_eq!(md.number_of_event_indicators, None);
+}
+
+#[test]
 fn versions() {
     let file = |version: &str| two("<ModelVariables/>").replace("'2.0'", &format!("'{version}'"));
     let token = |text: String| text.replace("guid", "instantiationToken");

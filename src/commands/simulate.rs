@@ -1,14 +1,14 @@
-//! `fmu simulate`: co-simulates FMUs.
+//! `fmu simulate`: co-simulates FMUs, or integrates those for Model Exchange.
 
 use crate::Failed;
 use crate::pack;
-use anyhow::{Context, Result, anyhow};
-use clap::Args;
+use anyhow::{Context, Result, anyhow, bail};
+use clap::{Args, ValueEnum};
 use drive_study::plot;
-use fmu_import::Message;
-use fmu_import::cosimulation::{Point, Recording, Schedule, Settings, System};
+use fmu_import::cosimulation::{Integration, Method, Point, Recording, Schedule, Settings, Solver, System};
 use fmu_import::ssp::load::Loaded;
 use fmu_import::ssp::{ssv, values};
+use fmu_import::{Fmu, Kind, Message};
 use indicatif::{ProgressBar, ProgressStyle};
 use model_description::ModelVariable;
 use std::io::{self, BufWriter, IsTerminal};
@@ -23,6 +23,11 @@ use std::time::{Duration, Instant};
 /// At every communication point the command reads all outputs, sets all inputs, then steps all FMUs: an output reaches other
 /// FMUs one step later. With --sequential, the FMUs step in the order given, and each receives the new outputs of those before
 /// it.
+///
+/// With --me, the command integrates FMUs for Model Exchange itself: it lands on time events, locates state events, and sets
+/// discrete inputs at events alone. --step is then the distance of the recorded points, and the step of --solver rk4. FMUs of
+/// which one has no Co-Simulation run so without --me. With --event-mode and --early-return, FMUs for Co-Simulation of FMI 3.0
+/// handle their events at their time, whatever --step is.
 ///
 /// After the run, warnings on standard error list inputs that kept their start values because nothing feeds or sets them, and a
 /// step that is longer than the DefaultExperiment of an FMU.
@@ -39,8 +44,11 @@ use std::time::{Duration, Instant};
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --connect c.u_a=p.u_a --connect c.u_b=p.u_b \
 ///     --connect c.u_c=p.u_c --connect p.i_a=c.i_a --connect p.i_b=c.i_b --connect p.i_c=c.i_c \
 ///     --set p.motor.R_s=3.3 --input c.speed_ref=0:0,0.1:104.7 --stop 1 --record p.speed,c.speed_est --csv -
+/// A bouncing ball for Model Exchange, integrated with a relative tolerance of 1e-8 and recorded every 10 ms:
+///   fmu simulate BouncingBall.fmu --me --rtol 1e-8 --step 0.01 --stop 3 --csv ball.csv
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
+#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub struct Simulate {
     /// FMUs, each optionally with a name; or one SSP file
     #[arg(value_name = "[NAME=]FILE", required = true)]
@@ -85,9 +93,54 @@ pub struct Simulate {
     /// Step the FMUs one after another; each receives the new outputs of those before it
     #[arg(long)]
     pub sequential: bool,
+    /// Integrate the FMUs (Model Exchange) instead of having them step themselves (Co-Simulation)
+    #[arg(long, conflicts_with = "sequential")]
+    pub me: bool,
+    /// How --me integrates [default: dopri]
+    #[arg(long, value_enum)]
+    pub solver: Option<SolverName>,
+    /// Relative tolerance of --solver dopri; the absolute one is this times the nominal value of a state [default: 1e-6]
+    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
+    pub rtol: Option<f64>,
+    /// Handle events of FMUs of FMI 3.0 that have event mode at their time (Co-Simulation)
+    #[arg(long, conflicts_with_all = ["me", "sequential"])]
+    pub event_mode: bool,
+    /// Let FMUs of FMI 3.0 return early from a step (Co-Simulation)
+    #[arg(long, conflicts_with_all = ["me", "sequential"])]
+    pub early_return: bool,
     /// Show all messages that the FMUs log
     #[arg(long)]
     pub logging: bool,
+}
+
+/// Integrators of Model Exchange.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SolverName {
+    /// Runge-Kutta of order 4, with fixed steps of the size --step
+    Rk4,
+    /// Dormand-Prince of order 5, with adaptive steps
+    Dopri,
+}
+
+/// How these FMUs are run.
+fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
+    let cannot_step = fmus.iter().find(|(_, fmu)| fmu.description().co_simulation.is_none());
+    let all_exchange = fmus.iter().all(|(_, fmu)| fmu.description().model_exchange.is_some());
+    match cannot_step {
+        Some((name, _)) if all_exchange && !args.me && !args.event_mode && !args.early_return => {
+            eprintln!("note: {name} has no Co-Simulation: the FMUs are integrated, as with --me");
+        }
+        _ if !args.me => {
+            return Method::CoSimulation { event_mode: args.event_mode, early_return: args.early_return };
+        }
+        _ => {}
+    }
+    let solver = match (args.solver, args.rtol) {
+        (Some(SolverName::Rk4), _) => Solver::Rk4,
+        (_, Some(rtol)) => Solver::Dopri { rtol },
+        (_, None) => Solver::default(),
+    };
+    Method::ModelExchange(Integration { solver, ..Integration::default() })
 }
 
 /// Runs the command.
@@ -95,7 +148,14 @@ pub struct Simulate {
 /// # Errors
 /// A file is not an FMU that runs here, a name is wrong, or an FMU fails.
 pub fn run(args: &Simulate) -> Result<()> {
-    let mut loaded = Loaded::open_files(&args.fmus, Path::new(""), args.logging)?;
+    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, |fmus| method(args, fmus))?;
+    let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
+    if steps && (args.solver.is_some() || args.rtol.is_some()) {
+        bail!("--solver and --rtol are for Model Exchange: add --me");
+    }
+    if args.solver == Some(SolverName::Rk4) && args.rtol.is_some() {
+        bail!("--rtol is for --solver dopri; --solver rk4 takes the steps of --step");
+    }
     loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let settings = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
@@ -135,7 +195,8 @@ fn warnings(system: &System, settings: &Settings) -> Vec<String> {
                 inputs.join(", ")
             ));
         }
-        let step = instance.description().default_experiment.step;
+        let steps_itself = instance.kind() != Kind::ModelExchange;
+        let step = instance.description().default_experiment.step.filter(|_| steps_itself);
         if let Some(longest) = step.filter(|longest| settings.step > longest * (1.0 + 1e-9)) {
             found.push(format!(
                 "{name}: the step of {} s is longer than the stepSize of its DefaultExperiment, {longest} s; --step {longest} \

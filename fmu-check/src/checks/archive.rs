@@ -191,11 +191,12 @@ fn base_names(fmu: &FmuFile) -> Verdict {
         Ok(description) => description,
         Err(cause) => return Verdict::NotDetermined(cause.clone()),
     };
-    let identifiers: Vec<&str> = [&description.model_exchange, &description.scheduled_execution]
-        .into_iter()
-        .filter_map(|i| i.as_deref())
-        .chain(description.co_simulation.as_ref().map(|c| c.model_identifier.as_str()))
-        .collect();
+    let identifiers: Vec<&str> =
+        [&description.model_exchange, &description.scheduled_execution, &description.co_simulation]
+            .into_iter()
+            .flatten()
+            .map(|interface| interface.model_identifier.as_str())
+            .collect();
     if fmu.binaries.is_empty() {
         return Verdict::NotApplicable("there are no shared libraries".into());
     }

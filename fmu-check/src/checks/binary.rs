@@ -52,8 +52,8 @@ pub(super) fn functions(version: FmiVersion) -> Vec<&'static str> {
 fn libraries(fmu: &FmuFile) -> Vec<&Binary> {
     let description = fmu.description.as_ref().ok();
     let names: Vec<&str> = description.map_or_else(Vec::new, |d| {
-        let identifiers = [&d.model_exchange, &d.scheduled_execution].into_iter().filter_map(|i| i.as_deref());
-        d.co_simulation.iter().map(|c| c.model_identifier.as_str()).chain(identifiers).collect()
+        let interfaces = [&d.co_simulation, &d.model_exchange, &d.scheduled_execution].into_iter().flatten();
+        interfaces.map(|interface| interface.model_identifier.as_str()).collect()
     });
     let base = |b: &Binary| b.name.rsplit('/').next().and_then(|f| f.rsplit_once('.')).map(|(base, _)| base.to_owned());
     fmu.binaries.iter().filter(|b| base(b).is_some_and(|base| names.contains(&base.as_str()))).collect()

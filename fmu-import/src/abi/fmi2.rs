@@ -1,4 +1,6 @@
-//! Calls of FMI 2.0 for co-simulation (FMI 2.0.5, 2.1 and 4.2).
+//! Calls of FMI 2.0 (FMI 2.0.5, 2.1, 3.2 and 4.2).
+
+mod equations;
 
 use super::Loaded;
 use super::library::symbols;
@@ -6,13 +8,14 @@ use super::log::{Log, Status, copy_text};
 use super::shared::{SharedInstance, missing};
 use super::signatures::OfInstance;
 use super::signatures::v2::{
-    Callbacks, DoStep, Get, GetStatus, Instantiate, Set, SetDebugLogging, SetupExperiment, calloc, free,
+    Callbacks, CompletedIntegratorStep, DoStep, Get, GetStatus, InputDerivatives, Instantiate, NewDiscreteStates,
+    OutputDerivatives, Sensitivity, Set, SetDebugLogging, SetupExperiment, calloc, free,
 };
-use crate::standard::{Experiment, Outcome, Standard, judge, misfit, narrow};
+use crate::instance::Stepped;
+use crate::standard::{Experiment, Kind, Outcome, Standard, judge, misfit, narrow};
 use crate::value::Values;
 use model_description::BaseType;
 use std::ffi::{CString, c_char, c_int, c_void};
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicPtr;
 use std::{ptr, slice};
@@ -31,17 +34,42 @@ symbols! {
         set_boolean: "fmi2SetBoolean" = Set<c_int>,
         get_string: "fmi2GetString" = Get<*const c_char>,
         set_string: "fmi2SetString" = Set<*const c_char>,
-        do_step: "fmi2DoStep" = DoStep,
         ;
+        // Interfaces that an FMU need not have; see `PROMISED`.
+        do_step: "fmi2DoStep" = DoStep,
+        new_discrete_states: "fmi2NewDiscreteStates" = NewDiscreteStates,
+        completed_integrator_step: "fmi2CompletedIntegratorStep" = CompletedIntegratorStep,
         // Some exporters omit these; a call reports it.
         set_debug_logging: "fmi2SetDebugLogging" = SetDebugLogging,
         get_boolean_status: "fmi2GetBooleanStatus" = GetStatus<c_int>,
         get_real_status: "fmi2GetRealStatus" = GetStatus<f64>,
+        get_directional_derivative: "fmi2GetDirectionalDerivative" = Sensitivity,
+        get_output_derivatives: "fmi2GetRealOutputDerivatives" = OutputDerivatives,
+        set_input_derivatives: "fmi2SetRealInputDerivatives" = InputDerivatives,
     }
 }
 
-/// `fmi2CoSimulation`.
-const CO_SIMULATION: c_int = 1;
+/// Functions that a description with Co-Simulation promises.
+pub(super) const CO_SIMULATION: &[&str] = &["fmi2Instantiate", "fmi2DoStep"];
+/// Functions that a description with Model Exchange promises.
+pub(super) const MODEL_EXCHANGE: &[&str] = &[
+    "fmi2Instantiate",
+    "fmi2EnterEventMode",
+    "fmi2NewDiscreteStates",
+    "fmi2EnterContinuousTimeMode",
+    "fmi2CompletedIntegratorStep",
+    "fmi2SetTime",
+    "fmi2SetContinuousStates",
+    "fmi2GetDerivatives",
+    "fmi2GetEventIndicators",
+    "fmi2GetContinuousStates",
+    "fmi2GetNominalsOfContinuousStates",
+];
+
+/// `fmi2ModelExchange`, a type of FMU.
+const TYPE_MODEL_EXCHANGE: c_int = 0;
+/// `fmi2CoSimulation`, a type of FMU.
+const TYPE_CO_SIMULATION: c_int = 1;
 /// `fmi2LastSuccessfulTime`, a status kind.
 const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Terminated`, a status kind.
@@ -83,7 +111,12 @@ impl Instance {
         resources: &CString,
         log: &Arc<Log>,
         logging: bool,
+        kind: Kind,
     ) -> Outcome<Self> {
+        let fmu_type = match kind {
+            Kind::CoSimulation { .. } => TYPE_CO_SIMULATION,
+            Kind::ModelExchange => TYPE_MODEL_EXCHANGE,
+        };
         let callbacks = Arc::new(Callbacks {
             logger: Some(logger),
             allocate: Some(calloc),
@@ -95,7 +128,7 @@ impl Instance {
         let component = unsafe {
             (functions.api.instantiate)(
                 name.as_ptr(),
-                CO_SIMULATION,
+                fmu_type,
                 token.as_ptr(),
                 resources.as_ptr(),
                 Arc::as_ptr(&callbacks),
@@ -200,19 +233,22 @@ impl Standard for Instance {
         self.shared.call("fmi2EnterInitializationMode", self.functions.api.enter)
     }
 
-    fn do_step(&mut self, t: f64, h: f64) -> Outcome<ControlFlow<()>> {
+    fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped> {
+        let do_step = self.functions.api.do_step.ok_or_else(|| missing("fmi2DoStep"))?;
         // SAFETY: the instance is alive. "No set state before this point" is false: a state may be set at any time.
-        let status = unsafe { (self.functions.api.do_step)(self.shared.pointer(), t, h, 0) };
+        let status = unsafe { do_step(self.shared.pointer(), t, h, 0) };
+        let stepped = Stepped { terminate: false, event: false, early: false, last: t + h };
         if let (Status::DISCARD, Some(function)) = (status, self.functions.api.get_boolean_status) {
             let mut ended = 0;
             // SAFETY: the instance is alive, there is room for one value.
             let asked = unsafe { function(self.shared.pointer(), TERMINATED, &raw mut ended) };
             if asked == Status::OK && ended != 0 {
-                return Ok(ControlFlow::Break(()));
+                return Ok(Stepped { terminate: true, ..stepped });
             }
         }
-        judge("fmi2DoStep", status).map(ControlFlow::Continue)
+        judge("fmi2DoStep", status).map(|()| stepped)
     }
+
     fn last_successful_time(&mut self) -> Outcome<f64> {
         let function = self.functions.api.get_real_status.ok_or_else(|| missing("fmi2GetRealStatus"))?;
         let mut time = 0.0;

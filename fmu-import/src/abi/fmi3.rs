@@ -1,27 +1,41 @@
-//! Calls of FMI 3.0 for co-simulation, without event mode and early return (FMI 3.0.2, 2.2, 2.3 and 4.2).
+//! Calls of FMI 3.0 (FMI 3.0.2, 2.2, 2.3, 3.2 and 4.2), without clocks and intermediate update.
+
+mod equations;
 
 use super::Loaded;
 use super::library::symbols;
 use super::log::{Log, Status, copy_text};
 use super::shared::{SharedInstance, missing};
-use super::signatures::v3::{DoStep, EnterInitializationMode, Get, InstantiateCoSimulation, Set, SetDebugLogging};
-use crate::standard::{Experiment, Outcome, Refusal, Standard, judge, misfit, narrow};
+use super::signatures::v3::{
+    CompletedIntegratorStep, Count, DoStep, EnterInitializationMode, Get, InstantiateCoSimulation,
+    InstantiateModelExchange, OutputDerivatives, Sensitivity, Set, SetDebugLogging, UpdateDiscreteStates,
+};
+use crate::instance::Stepped;
+use crate::standard::{Experiment, Kind, Outcome, Refusal, Standard, judge, misfit, narrow};
 use crate::value::Values;
 use model_description::BaseType;
 use std::ffi::{CString, c_char, c_void};
-use std::ops::ControlFlow;
 use std::ptr;
 use std::sync::Arc;
 
 symbols! {
     /// The functions of FMI 3.0 that this importer calls and FMI 2.0 does not have with the same type.
     Functions {
-        instantiate: "fmi3InstantiateCoSimulation" = InstantiateCoSimulation,
         enter: "fmi3EnterInitializationMode" = EnterInitializationMode,
         get_float64: "fmi3GetFloat64" = Get<f64>,
         set_float64: "fmi3SetFloat64" = Set<f64>,
-        do_step: "fmi3DoStep" = DoStep,
         ;
+        // Interfaces that an FMU need not have; see `CO_SIMULATION`, `EVENT_MODE`, `MODEL_EXCHANGE`.
+        co_simulation: "fmi3InstantiateCoSimulation" = InstantiateCoSimulation,
+        do_step: "fmi3DoStep" = DoStep,
+        model_exchange: "fmi3InstantiateModelExchange" = InstantiateModelExchange,
+        update_discrete_states: "fmi3UpdateDiscreteStates" = UpdateDiscreteStates,
+        completed_integrator_step: "fmi3CompletedIntegratorStep" = CompletedIntegratorStep,
+        number_of_states: "fmi3GetNumberOfContinuousStates" = Count,
+        number_of_indicators: "fmi3GetNumberOfEventIndicators" = Count,
+        get_directional_derivative: "fmi3GetDirectionalDerivative" = Sensitivity,
+        get_adjoint_derivative: "fmi3GetAdjointDerivative" = Sensitivity,
+        get_output_derivatives: "fmi3GetOutputDerivatives" = OutputDerivatives,
         // The standard requires all of these; a call reports one that an FMU omits.
         get_float32: "fmi3GetFloat32" = Get<f32>,
         set_float32: "fmi3SetFloat32" = Set<f32>,
@@ -48,6 +62,27 @@ symbols! {
         set_debug_logging: "fmi3SetDebugLogging" = SetDebugLogging,
     }
 }
+
+/// Functions that a description with Co-Simulation promises.
+pub(super) const CO_SIMULATION: &[&str] = &["fmi3InstantiateCoSimulation", "fmi3DoStep"];
+/// Functions that `hasEventMode` promises.
+pub(super) const EVENT_MODE: &[&str] = &["fmi3EnterEventMode", "fmi3UpdateDiscreteStates", "fmi3EnterStepMode"];
+/// Functions that a description with Model Exchange promises.
+pub(super) const MODEL_EXCHANGE: &[&str] = &[
+    "fmi3InstantiateModelExchange",
+    "fmi3EnterEventMode",
+    "fmi3UpdateDiscreteStates",
+    "fmi3EnterContinuousTimeMode",
+    "fmi3CompletedIntegratorStep",
+    "fmi3SetTime",
+    "fmi3SetContinuousStates",
+    "fmi3GetContinuousStateDerivatives",
+    "fmi3GetEventIndicators",
+    "fmi3GetContinuousStates",
+    "fmi3GetNominalsOfContinuousStates",
+    "fmi3GetNumberOfContinuousStates",
+    "fmi3GetNumberOfEventIndicators",
+];
 
 unsafe extern "C" fn log_message(
     environment: *mut c_void,
@@ -85,26 +120,45 @@ impl Instance {
         resources: &CString,
         log: &Arc<Log>,
         logging: bool,
+        kind: Kind,
     ) -> Outcome<Self> {
-        // SAFETY: the strings outlive the call, the log outlives the instance; no intermediate variables, no callback.
-        let component = unsafe {
-            (functions.api.instantiate)(
-                name.as_ptr(),
-                token.as_ptr(),
-                resources.as_ptr(),
-                false,
-                logging,
-                false,
-                false,
-                ptr::null(),
-                0,
-                log.environment(),
-                Some(log_message),
-                ptr::null(),
-            )
+        let (name, token, resources) = (name.as_ptr(), token.as_ptr(), resources.as_ptr());
+        let (function, component) = match kind {
+            Kind::CoSimulation { event_mode, early_return } => {
+                let function = "fmi3InstantiateCoSimulation";
+                let instantiate = functions.api.co_simulation.ok_or_else(|| missing(function))?;
+                let (environment, log) = (log.environment(), Some(log_message as _));
+                let none = ptr::null();
+                // SAFETY: the strings outlive the call, the log outlives the instance; no intermediate variables, no
+                // callback.
+                (function, unsafe {
+                    instantiate(
+                        name,
+                        token,
+                        resources,
+                        false,
+                        logging,
+                        event_mode,
+                        early_return,
+                        none,
+                        0,
+                        environment,
+                        log,
+                        ptr::null(),
+                    )
+                })
+            }
+            Kind::ModelExchange => {
+                let function = "fmi3InstantiateModelExchange";
+                let instantiate = functions.api.model_exchange.ok_or_else(|| missing(function))?;
+                // SAFETY: as above.
+                (function, unsafe {
+                    instantiate(name, token, resources, false, logging, log.environment(), Some(log_message))
+                })
+            }
         };
         // SAFETY: the instance is of this library, which `functions` keeps loaded.
-        let shared = unsafe { SharedInstance::new("fmi3InstantiateCoSimulation", &functions.shared, component) }?;
+        let shared = unsafe { SharedInstance::new(function, &functions.shared, component) }?;
         let experiment = Experiment { start: 0.0, stop: None, tolerance: None };
         Ok(Self { shared, functions, experiment, last_successful_time: 0.0 })
     }
@@ -246,12 +300,13 @@ impl Standard for Instance {
         judge("fmi3EnterInitializationMode", status)
     }
 
-    fn do_step(&mut self, t: f64, h: f64) -> Outcome<ControlFlow<()>> {
+    fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped> {
+        let do_step = function!(self.do_step, "fmi3DoStep");
         let (mut event, mut terminate, mut early, mut last) = (0, 0, 0, t);
         // SAFETY: the instance is alive, there is room for each result. "No set state before this point" is false: a
         // state may be set at any time.
         let status = unsafe {
-            (self.functions.api.do_step)(
+            do_step(
                 self.shared.pointer(),
                 t,
                 h,
@@ -264,8 +319,9 @@ impl Standard for Instance {
         };
         judge("fmi3DoStep", status)?;
         self.last_successful_time = last;
-        Ok(if terminate == 0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) })
+        Ok(Stepped { terminate: terminate != 0, event: event != 0, early: early != 0, last })
     }
+
     fn last_successful_time(&mut self) -> Outcome<f64> {
         Ok(self.last_successful_time)
     }

@@ -10,7 +10,7 @@ mod signatures;
 
 use crate::Error;
 use crate::folder::Folder;
-use crate::standard::{Outcome, Standard};
+use crate::standard::{Kind, Outcome, Refusal, Standard};
 use log::Log;
 use model_description::FmiVersion;
 use shared::SharedFunctions;
@@ -22,7 +22,7 @@ use std::sync::Arc;
 pub(crate) struct Loaded<F> {
     api: F,
     shared: Arc<SharedFunctions>,
-    _library: libloading::Library,
+    library: libloading::Library,
     _folder: Option<Arc<Folder>>,
 }
 
@@ -34,31 +34,38 @@ pub(crate) enum Functions {
 }
 
 impl Functions {
-    /// Loads the binary, and keeps the folder as long as the library is loaded.
-    pub(crate) fn load(binary: &Path, version: FmiVersion, folder: Option<Arc<Folder>>) -> Result<Self, Error> {
+    /// Loads the binary that a description with the interface of this kind promises, and keeps the folder as long as the
+    /// library is loaded.
+    pub(crate) fn load(
+        binary: &Path,
+        version: FmiVersion,
+        kind: Kind,
+        folder: Option<Arc<Folder>>,
+    ) -> Result<Self, Error> {
         let library = library::load(binary)?;
+        // First: a library that is not an FMU lacks the one that instantiates.
+        promised(&library, version, kind).map_err(|cause| Error::file(binary, cause))?;
         let load = move || {
             // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that they go
             // to keeps the library.
             let shared = || unsafe { SharedFunctions::load(&library, version) }.map(Arc::new);
-            // The functions of each standard first: a library that is not an FMU lacks the one that instantiates.
             Ok(match version {
                 FmiVersion::V2 => {
                     // SAFETY: as above.
                     let (api, shared) = (unsafe { fmi2::Functions::load(&library) }?, shared()?);
-                    Self::V2(Arc::new(Loaded { api, shared, _library: library, _folder: folder }))
+                    Self::V2(Arc::new(Loaded { api, shared, library, _folder: folder }))
                 }
                 FmiVersion::V3 => {
                     // SAFETY: as above.
                     let (api, shared) = (unsafe { fmi3::Functions::load(&library) }?, shared()?);
-                    Self::V3(Arc::new(Loaded { api, shared, _library: library, _folder: folder }))
+                    Self::V3(Arc::new(Loaded { api, shared, library, _folder: folder }))
                 }
             })
         };
         load().map_err(|cause: String| Error::file(binary, cause))
     }
 
-    /// An instance for co-simulation; `resources` is a URI in FMI 2.0 and a path in FMI 3.0.
+    /// An instance; `resources` is a URI in FMI 2.0 and a path in FMI 3.0.
     pub(crate) fn instantiate(
         &self,
         name: &CString,
@@ -66,14 +73,35 @@ impl Functions {
         resources: &CString,
         log: &Arc<Log>,
         logging: bool,
+        kind: Kind,
     ) -> Outcome<Box<dyn Standard + Send>> {
+        let (library, version) = match self {
+            Self::V2(functions) => (&functions.library, FmiVersion::V2),
+            Self::V3(functions) => (&functions.library, FmiVersion::V3),
+        };
+        promised(library, version, kind).map_err(Refusal::Impossible)?;
         match self {
-            Self::V2(functions) => {
-                fmi2::Instance::new(functions.clone(), name, token, resources, log, logging).map(|i| Box::new(i) as _)
-            }
-            Self::V3(functions) => {
-                fmi3::Instance::new(functions.clone(), name, token, resources, log, logging).map(|i| Box::new(i) as _)
-            }
+            Self::V2(functions) => fmi2::Instance::new(functions.clone(), name, token, resources, log, logging, kind)
+                .map(|i| Box::new(i) as _),
+            Self::V3(functions) => fmi3::Instance::new(functions.clone(), name, token, resources, log, logging, kind)
+                .map(|i| Box::new(i) as _),
         }
+    }
+}
+
+/// Names the first function that is missing of those that an instance of this kind needs.
+fn promised(library: &libloading::Library, version: FmiVersion, kind: Kind) -> Result<(), String> {
+    let (names, more): (&[&str], &[&str]) = match (version, kind) {
+        (FmiVersion::V2, Kind::CoSimulation { .. }) => (fmi2::CO_SIMULATION, &[]),
+        (FmiVersion::V2, Kind::ModelExchange) => (fmi2::MODEL_EXCHANGE, &[]),
+        (FmiVersion::V3, Kind::CoSimulation { event_mode: false, .. }) => (fmi3::CO_SIMULATION, &[]),
+        (FmiVersion::V3, Kind::CoSimulation { event_mode: true, .. }) => (fmi3::CO_SIMULATION, fmi3::EVENT_MODE),
+        (FmiVersion::V3, Kind::ModelExchange) => (fmi3::MODEL_EXCHANGE, &[]),
+    };
+    // SAFETY: only whether there is such a symbol is asked; nothing is called under this type.
+    let lacks = |name: &&&str| unsafe { library.get::<signatures::OfInstance>(**name) }.is_err();
+    match names.iter().chain(more).find(lacks) {
+        Some(name) => Err(format!("the function {name} is missing")),
+        None => Ok(()),
     }
 }

@@ -1,7 +1,8 @@
 //! The part that both standards share: functions with one C type, and an instance that calls them.
 
 use super::signatures::{
-    Deserialize, FreeInstance, InstancePointer, OfInstance, Serialize, SetState, StatePlace, StateSize,
+    Deserialize, FreeInstance, GetVector, InstancePointer, OfInstance, Serialize, SetState, SetTime, SetVector,
+    StatePlace, StateSize,
 };
 use crate::standard::{Outcome, Refusal, judge};
 use libloading::Library;
@@ -31,7 +32,8 @@ pub(super) fn missing(name: &str) -> Refusal {
     Refusal::Impossible(format!("the function {name} is missing"))
 }
 
-/// Functions that have one C type in both standards. An FMU may omit those of saved states.
+/// Functions that have one C type in both standards. An FMU may omit those of saved states and of interfaces that it does not
+/// have.
 pub(super) struct SharedFunctions {
     free: Function<FreeInstance>,
     exit_initialization: Function<OfInstance>,
@@ -43,6 +45,21 @@ pub(super) struct SharedFunctions {
     state_size: Function<StateSize>,
     serialize: Function<Serialize>,
     deserialize: Function<Deserialize>,
+    enter_event_mode: Function<OfInstance>,
+    enter_continuous_time_mode: Function<OfInstance>,
+    enter_step_mode: Function<OfInstance>,
+    set_time: Function<SetTime>,
+    set_states: Function<SetVector>,
+    vectors: [Function<GetVector>; 4],
+}
+
+/// What a Model Exchange instance fills an array with: the index of its function.
+#[derive(Clone, Copy)]
+pub(crate) enum Vector {
+    States,
+    Derivatives,
+    Indicators,
+    Nominals,
 }
 
 impl SharedFunctions {
@@ -74,6 +91,18 @@ impl SharedFunctions {
                 state_size: find(l, v, ["fmi2SerializedFMUstateSize", "fmi3SerializedFMUStateSize"]),
                 serialize: find(l, v, ["fmi2SerializeFMUstate", "fmi3SerializeFMUState"]),
                 deserialize: find(l, v, ["fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState"]),
+                enter_event_mode: find(l, v, ["fmi2EnterEventMode", "fmi3EnterEventMode"]),
+                enter_continuous_time_mode: find(l, v, ["fmi2EnterContinuousTimeMode", "fmi3EnterContinuousTimeMode"]),
+                // FMI 2.0 has none, under no name.
+                enter_step_mode: find(l, v, ["fmi2EnterStepMode", "fmi3EnterStepMode"]),
+                set_time: find(l, v, ["fmi2SetTime", "fmi3SetTime"]),
+                set_states: find(l, v, ["fmi2SetContinuousStates", "fmi3SetContinuousStates"]),
+                vectors: [
+                    find(l, v, ["fmi2GetContinuousStates", "fmi3GetContinuousStates"]),
+                    find(l, v, ["fmi2GetDerivatives", "fmi3GetContinuousStateDerivatives"]),
+                    find(l, v, ["fmi2GetEventIndicators", "fmi3GetEventIndicators"]),
+                    find(l, v, ["fmi2GetNominalsOfContinuousStates", "fmi3GetNominalsOfContinuousStates"]),
+                ],
             })
         }
     }
@@ -173,6 +202,38 @@ impl SharedInstance {
         // SAFETY: the instance is alive; the pointer and the length are those of one slice.
         let status = unsafe { function(self.pointer(), bytes.as_ptr(), bytes.len(), &raw mut state) };
         judge(self.functions.deserialize.name, status).map(|()| Handle(state))
+    }
+
+    pub(crate) fn enter_event_mode(&self) -> Outcome {
+        self.call(self.functions.enter_event_mode.name, self.functions.enter_event_mode.get()?)
+    }
+
+    pub(crate) fn enter_continuous_time_mode(&self) -> Outcome {
+        let function = &self.functions.enter_continuous_time_mode;
+        self.call(function.name, function.get()?)
+    }
+
+    pub(crate) fn enter_step_mode(&self) -> Outcome {
+        self.call(self.functions.enter_step_mode.name, self.functions.enter_step_mode.get()?)
+    }
+
+    pub(crate) fn set_time(&self, t: f64) -> Outcome {
+        let function = self.functions.set_time.get()?;
+        // SAFETY: the instance is alive.
+        judge(self.functions.set_time.name, unsafe { function(self.pointer(), t) })
+    }
+
+    pub(crate) fn set_states(&self, x: &[f64]) -> Outcome {
+        let function = self.functions.set_states.get()?;
+        // SAFETY: the instance is alive; the pointer and the length are those of one slice.
+        judge(self.functions.set_states.name, unsafe { function(self.pointer(), x.as_ptr(), x.len()) })
+    }
+
+    pub(crate) fn get_vector(&self, which: Vector, values: &mut [f64]) -> Outcome {
+        let function = &self.functions.vectors[which as usize];
+        let get = function.get()?;
+        // SAFETY: the instance is alive; the pointer and the length are those of one slice.
+        judge(function.name, unsafe { get(self.pointer(), values.as_mut_ptr(), values.len()) })
     }
 
     /// Forgets the instance without freeing it: after a fatal error the standard forbids every further call.

@@ -22,6 +22,11 @@ pub(super) type StateSize = unsafe extern "C" fn(InstancePointer, StatePointer, 
 pub(super) type Serialize = unsafe extern "C" fn(InstancePointer, StatePointer, *mut u8, usize) -> Status;
 pub(super) type Deserialize = unsafe extern "C" fn(InstancePointer, *const u8, usize, *mut StatePointer) -> Status;
 
+pub(super) type SetTime = unsafe extern "C" fn(InstancePointer, f64) -> Status;
+/// States, derivatives, event indicators, nominals: an array and its length.
+pub(super) type GetVector = unsafe extern "C" fn(InstancePointer, *mut f64, usize) -> Status;
+pub(super) type SetVector = unsafe extern "C" fn(InstancePointer, *const f64, usize) -> Status;
+
 /// FMI 2.0.
 pub(super) mod v2 {
     use super::{InstancePointer, Status, c_char, c_int, c_void};
@@ -47,6 +52,27 @@ pub(super) mod v2 {
     pub(in crate::abi) type GetStatus<T> = unsafe extern "C" fn(InstancePointer, c_int, *mut T) -> Status;
     pub(in crate::abi) type OutputDerivatives =
         unsafe extern "C" fn(InstancePointer, *const u32, usize, *const c_int, *mut f64) -> Status;
+    pub(in crate::abi) type InputDerivatives =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *const c_int, *const f64) -> Status;
+    pub(in crate::abi) type NewDiscreteStates = unsafe extern "C" fn(InstancePointer, *mut EventInfo) -> Status;
+    pub(in crate::abi) type CompletedIntegratorStep =
+        unsafe extern "C" fn(InstancePointer, c_int, *mut c_int, *mut c_int) -> Status;
+    /// `fmi2GetDirectionalDerivative`: unknowns, knowns, seed, sensitivity.
+    pub(in crate::abi) type Sensitivity =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *const u32, usize, *const f64, *mut f64) -> Status;
+
+    /// `fmi2EventInfo`.
+    #[repr(C)]
+    #[derive(Default)]
+    pub(in crate::abi) struct EventInfo {
+        pub(in crate::abi) new_discrete_states_needed: c_int,
+        pub(in crate::abi) terminate_simulation: c_int,
+        pub(in crate::abi) nominals_changed: c_int,
+        pub(in crate::abi) states_changed: c_int,
+        pub(in crate::abi) next_event_time_defined: c_int,
+        pub(in crate::abi) next_event_time: f64,
+    }
+
     /// `fmi2CallbackLogger`. In C it is variadic, which a Rust function cannot be. On x86_64 and 64-bit ARM, Linux and Windows,
     /// a variadic call passes its arguments where any call passes them and the caller cleans up, so the first six can be
     /// received as fixed ones; nothing beyond them is read. (Apple's ARM passes variadic arguments elsewhere: there only five
@@ -123,6 +149,22 @@ pub(super) mod v3 {
         unsafe extern "C" fn(InstancePointer, bool, usize, *const *const c_char) -> Status;
     pub(in crate::abi) type OutputDerivatives =
         unsafe extern "C" fn(InstancePointer, *const u32, usize, *const c_int, *mut f64, usize) -> Status;
+    pub(in crate::abi) type CompletedIntegratorStep =
+        unsafe extern "C" fn(InstancePointer, bool, *mut u8, *mut u8) -> Status;
+    /// Number of states, of event indicators.
+    pub(in crate::abi) type Count = unsafe extern "C" fn(InstancePointer, *mut usize) -> Status;
+    /// `fmi3GetDirectionalDerivative`, `fmi3GetAdjointDerivative`: unknowns, knowns, seed, sensitivity.
+    pub(in crate::abi) type Sensitivity = unsafe extern "C" fn(
+        InstancePointer,
+        *const u32,
+        usize,
+        *const u32,
+        usize,
+        *const f64,
+        usize,
+        *mut f64,
+        usize,
+    ) -> Status;
     pub(in crate::abi) type UpdateDiscreteStates =
         unsafe extern "C" fn(InstancePointer, *mut u8, *mut u8, *mut u8, *mut u8, *mut u8, *mut f64) -> Status;
 }

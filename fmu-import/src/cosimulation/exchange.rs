@@ -14,19 +14,28 @@ pub(super) enum Source {
     Schedule(Schedule),
 }
 
+/// An input and what feeds it.
+#[derive(Clone)]
+struct Feed {
+    target: Port,
+    source: Source,
+    /// The input is continuous: in Model Exchange it is set all the time, a discrete one at events.
+    continuous: bool,
+}
+
 /// Who feeds whom.
 #[derive(Clone, Default)]
 pub(super) struct Wiring {
-    feeds: Vec<(Port, Source)>,
+    feeds: Vec<Feed>,
 }
 
 impl Wiring {
-    pub(super) fn add(&mut self, target: Port, source: Source) {
-        self.feeds.push((target, source));
+    pub(super) fn add(&mut self, target: Port, source: Source, continuous: bool) {
+        self.feeds.push(Feed { target, source, continuous });
     }
 
     pub(super) fn feeds(&self, instance: usize, name: &str) -> bool {
-        self.feeds.iter().any(|(target, _)| target.instance == instance && target.name == name)
+        self.feeds.iter().any(|Feed { target, .. }| target.instance == instance && target.name == name)
     }
 }
 
@@ -42,12 +51,18 @@ enum Place {
 struct Traffic {
     read: Vec<u32>,
     read_singly: Vec<Port>,
+    /// How many of `read` and of `read_singly` feed inputs: these come first.
+    feeding: [usize; 2],
     /// Values read last: those of `read`, then those of `read_singly`.
     values: Vec<f64>,
     write: Vec<(u32, Place)>,
     write_singly: Vec<(Port, Place)>,
+    /// How many of `write` and of `write_singly` are continuous: these come first.
+    continuous: [usize; 2],
     references: Vec<u32>,
+    /// Values written last: those of `write`, then those of `write_singly`.
     buffer: Vec<f64>,
+    singles: Vec<f64>,
 }
 
 /// All traffic of a run.
@@ -55,12 +70,23 @@ struct Traffic {
 pub(super) struct Exchange {
     traffic: Vec<Traffic>,
     row: Vec<Place>,
+    /// Number of inputs that are fed.
+    fed: usize,
+    /// Time (s) from which on steps of schedules are held; `None` where every exchange reads them.
+    pub(super) since: Option<f64>,
+}
+
+/// Which inputs are set.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Inputs {
+    All,
+    Continuous,
 }
 
 impl Exchange {
     pub(super) fn new(instances: usize, wiring: &Wiring, records: &[Port]) -> Self {
         let mut traffic: Vec<Traffic> = (0..instances).map(|_| Traffic::default()).collect();
-        let fed = |port: &Port| wiring.feeds.iter().find(|(target, _)| target == port).map(|(_, source)| source);
+        let fed = |port: &Port| wiring.feeds.iter().find(|feed| feed.target == *port).map(|feed| &feed.source);
         // A fed input need not be read: its value is known here.
         let origin = |port: &Port| match fed(port) {
             Some(Source::Port(source)) => Source::Port(source.clone()),
@@ -68,8 +94,8 @@ impl Exchange {
             None => Source::Port(port.clone()),
         };
         let origins: Vec<Source> = records.iter().map(origin).collect();
-        let sources = wiring.feeds.iter().map(|(_, source)| source).chain(&origins);
-        for source in sources {
+        let sources = wiring.feeds.iter().map(|feed| &feed.source).chain(&origins);
+        for (index, source) in sources.enumerate() {
             let Source::Port(port) = source else { continue };
             let traffic = &mut traffic[port.instance];
             if port.base != BaseType::Float64 {
@@ -79,27 +105,34 @@ impl Exchange {
             } else if !traffic.read.contains(&port.reference) {
                 traffic.read.push(port.reference);
             }
+            if index < wiring.feeds.len() {
+                traffic.feeding = [traffic.read.len(), traffic.read_singly.len()];
+            }
         }
         let place = |traffic: &[Traffic], source: &Source| match source {
             Source::Port(port) => Place::Read { instance: port.instance, slot: traffic[port.instance].slot(port) },
             Source::Schedule(schedule) => Place::Schedule(schedule.clone()),
         };
         let row = origins.iter().map(|source| place(&traffic, source)).collect();
-        for (target, source) in &wiring.feeds {
+        let (continuous, discrete): (Vec<_>, Vec<_>) = wiring.feeds.iter().partition(|feed| feed.continuous);
+        for Feed { target, source, continuous } in continuous.into_iter().chain(discrete) {
             let place = place(&traffic, source);
             let traffic = &mut traffic[target.instance];
-            if target.base == BaseType::Float64 {
+            let fast = target.base == BaseType::Float64;
+            if fast {
                 traffic.references.push(target.reference);
                 traffic.write.push((target.reference, place));
             } else {
                 traffic.write_singly.push((target.clone(), place));
             }
+            traffic.continuous[usize::from(!fast)] += usize::from(*continuous);
         }
         for t in &mut traffic {
             t.values = vec![0.0; t.read.len() + t.read_singly.len()];
             t.buffer = vec![0.0; t.write.len()];
+            t.singles = vec![0.0; t.write_singly.len()];
         }
-        Self { traffic, row }
+        Self { traffic, row, fed: wiring.feeds.len(), since: None }
     }
 
     pub(super) fn read_all(&mut self, instances: &mut [Instance]) -> Result<(), Error> {
@@ -111,19 +144,13 @@ impl Exchange {
     }
 
     pub(super) fn read(&mut self, index: usize, instance: &mut Instance) -> Result<(), Error> {
-        let Traffic { read, read_singly, values, .. } = &mut self.traffic[index];
-        let (fast, slow) = values.split_at_mut(read.len());
-        if !read.is_empty() {
-            instance.get_reals(read, fast)?;
-        }
-        for (port, value) in read_singly.iter().zip(slow) {
-            *value = instance.read(port.base, port.reference, 1)?.number().unwrap_or(f64::NAN);
-        }
-        Ok(())
+        let traffic = &mut self.traffic[index];
+        traffic.read([traffic.read.len(), traffic.read_singly.len()], instance)
     }
 
     pub(super) fn write(&mut self, index: usize, instance: &mut Instance, t: f64) -> Result<(), Error> {
         let mut buffer = std::mem::take(&mut self.traffic[index].buffer);
+        let mut singles = std::mem::take(&mut self.traffic[index].singles);
         let traffic = &self.traffic[index];
         for (value, (_, place)) in buffer.iter_mut().zip(&traffic.write) {
             *value = self.value(place, t);
@@ -131,13 +158,101 @@ impl Exchange {
         if !buffer.is_empty() {
             instance.set_reals(&traffic.references, &buffer)?;
         }
-        for (port, place) in &traffic.write_singly {
-            let value = Values::from_number(self.value(place, t), port.base);
-            let value = value.map_err(|cause| Error::usage(instance.name(), cause))?;
-            instance.write(port.base, port.reference, &value)?;
+        for ((port, place), single) in traffic.write_singly.iter().zip(&mut singles) {
+            *single = self.value(place, t);
+            write_single(instance, port, *single)?;
         }
-        self.traffic[index].buffer = buffer;
+        (self.traffic[index].buffer, self.traffic[index].singles) = (buffer, singles);
         Ok(())
+    }
+
+    /// Passes outputs on to inputs until nothing changes: an output may depend on an input, through several FMUs. Returns
+    /// whether a discrete input changed.
+    pub(super) fn settle(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<bool, Error> {
+        let mut discrete = false;
+        let mut unsettled = 0;
+        // Without a loop, each pass settles one more input at least.
+        for _ in 0..self.fed + 2 {
+            for (traffic, instance) in self.traffic.iter_mut().zip(instances.iter_mut()) {
+                traffic.read(traffic.feeding, instance)?;
+            }
+            let mut settled = true;
+            for (index, instance) in instances.iter_mut().enumerate() {
+                let (some, some_discrete) = self.pass_on(index, instance, t, inputs)?;
+                discrete |= some_discrete;
+                if some {
+                    (settled, unsettled) = (false, index);
+                }
+            }
+            if settled {
+                return Ok(discrete);
+            }
+        }
+        let cause = format!("its inputs do not settle at t = {t} s: the connections form an algebraic loop");
+        Err(Error::usage(instances[unsettled].name(), cause))
+    }
+
+    /// Passes outputs on to inputs once, as at a communication point. Returns whether a discrete input of one of these
+    /// instances changed.
+    pub(super) fn pass_on_once(&mut self, instances: &mut [Instance], t: f64, of: &[usize]) -> Result<bool, Error> {
+        self.read_all(instances)?;
+        let mut discrete = false;
+        for (index, instance) in instances.iter_mut().enumerate() {
+            let (_, some) = self.pass_on(index, instance, t, Inputs::All)?;
+            discrete |= some && of.contains(&index);
+        }
+        Ok(discrete)
+    }
+
+    /// Sets the inputs of an instance that have changed; returns whether any has, and whether a discrete one has.
+    fn pass_on(
+        &mut self,
+        index: usize,
+        instance: &mut Instance,
+        t: f64,
+        inputs: Inputs,
+    ) -> Result<(bool, bool), Error> {
+        let mut buffer = std::mem::take(&mut self.traffic[index].buffer);
+        let mut singles = std::mem::take(&mut self.traffic[index].singles);
+        let traffic = &self.traffic[index];
+        let [fast, single] = match inputs {
+            Inputs::All => [buffer.len(), singles.len()],
+            Inputs::Continuous => traffic.continuous,
+        };
+        let (mut changed, mut discrete) = (false, false);
+        for (i, (value, (_, place))) in buffer.iter_mut().zip(&traffic.write).enumerate().take(fast) {
+            let new = self.value(place, t);
+            if new.to_bits() != value.to_bits() {
+                *value = new;
+                changed = true;
+                discrete |= i >= traffic.continuous[0];
+            }
+        }
+        if changed {
+            instance.set_reals(&traffic.references[..fast], &buffer[..fast])?;
+        }
+        for (i, (value, (port, place))) in singles.iter_mut().zip(&traffic.write_singly).enumerate().take(single) {
+            let new = self.value(place, t);
+            if new.to_bits() != value.to_bits() {
+                *value = new;
+                write_single(instance, port, new)?;
+                changed = true;
+                discrete |= i >= traffic.continuous[1];
+            }
+        }
+        (self.traffic[index].buffer, self.traffic[index].singles) = (buffer, singles);
+        Ok((changed, discrete))
+    }
+
+    /// The first point of a schedule after the time `t` (s).
+    pub(super) fn next_point(&self, t: f64) -> Option<f64> {
+        let next = |place: &Place| match place {
+            Place::Read { .. } => None,
+            Place::Schedule(schedule) => schedule.next_point(t),
+        };
+        let fast = self.traffic.iter().flat_map(|t| t.write.iter().map(|(_, place)| place));
+        let singly = self.traffic.iter().flat_map(|t| t.write_singly.iter().map(|(_, place)| place));
+        fast.chain(singly).filter_map(next).reduce(f64::min)
     }
 
     /// The recorded values at time `t`.
@@ -149,12 +264,32 @@ impl Exchange {
     fn value(&self, place: &Place, t: f64) -> f64 {
         match place {
             Place::Read { instance, slot } => self.traffic[*instance].values[*slot],
-            Place::Schedule(schedule) => schedule.at(t),
+            Place::Schedule(schedule) => match self.since {
+                None => schedule.at(t),
+                Some(since) => schedule.held(since, t),
+            },
         }
     }
 }
 
+fn write_single(instance: &mut Instance, port: &Port, value: f64) -> Result<(), Error> {
+    let value = Values::from_number(value, port.base).map_err(|cause| Error::usage(instance.name(), cause))?;
+    instance.write(port.base, port.reference, &value)
+}
+
 impl Traffic {
+    /// Reads the first of `read` and of `read_singly`.
+    fn read(&mut self, [fast, single]: [usize; 2], instance: &mut Instance) -> Result<(), Error> {
+        let (numbers, others) = self.values.split_at_mut(self.read.len());
+        if fast > 0 {
+            instance.get_reals(&self.read[..fast], &mut numbers[..fast])?;
+        }
+        for (port, value) in self.read_singly[..single].iter().zip(others) {
+            *value = instance.read(port.base, port.reference, 1)?.number().unwrap_or(f64::NAN);
+        }
+        Ok(())
+    }
+
     /// Where the value of a port is found among those that are read; the port is one of them.
     fn slot(&self, port: &Port) -> usize {
         let fast = || self.read.iter().position(|reference| *reference == port.reference);

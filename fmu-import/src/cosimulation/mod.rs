@@ -1,4 +1,7 @@
-//! A master for several FMUs: connects outputs to inputs, feeds inputs over time, steps, records.
+//! A master for several FMUs: connects outputs to inputs, feeds inputs over time, runs, records.
+//!
+//! A [`Method`] says how: by default the FMUs step themselves (Co-Simulation); they can use event mode and early return of FMI
+//! 3.0, or the master integrates their states (Model Exchange).
 //!
 //! At every communication point `t = start + k h` the master reads all outputs and sets all inputs; then it steps all
 //! FMUs (Jacobi), so that what is sent at `t` acts from `t` on. With [`Settings::sequential`] it steps them one after the
@@ -23,8 +26,12 @@
 //!
 //! For many runs of one system there is [`Plan`].
 
+mod continuous;
+mod events;
 mod exchange;
 mod grid;
+mod iteration;
+mod method;
 mod parts;
 mod plan;
 mod recording;
@@ -32,7 +39,9 @@ mod run;
 mod schedule;
 mod terminals;
 
+pub use crate::integration::Solver;
 pub use grid::Settings;
+pub use method::{Integration, Method};
 pub use plan::{Plan, Target, Worker};
 pub use recording::{Column, Recording};
 pub use run::{Ended, Point};
@@ -40,12 +49,13 @@ pub use schedule::Schedule;
 
 use crate::{Error, Fmu, Instance, Message, Values};
 use exchange::{Source, Wiring};
-use model_description::{BaseType, Causality, ModelVariable};
+use model_description::{BaseType, Causality, ModelVariable, Variability};
 use parts::{Part, Parts, Port, kind};
 
 /// FMUs and their connections.
 #[derive(Default)]
 pub struct System {
+    method: Method,
     parts: Parts,
     /// One of each part.
     instances: Vec<Instance>,
@@ -58,6 +68,11 @@ pub struct System {
 }
 
 impl System {
+    /// A system that is run by this method.
+    pub fn new(method: Method) -> Self {
+        Self { method, ..Self::default() }
+    }
+
     /// Adds an instance of an FMU.
     ///
     /// # Errors
@@ -66,8 +81,9 @@ impl System {
         if self.instances.iter().any(|i| i.name() == name) {
             return Err(Error::usage(name, "two instances have this name; NAME=FILE gives another"));
         }
-        self.instances.push(fmu.instantiate(name, logging)?);
-        self.parts.0.push(Part { name: name.into(), fmu: fmu.clone(), logging });
+        let kind = self.method.kind(fmu);
+        self.instances.push(fmu.instantiate_as(kind, name, logging)?);
+        self.parts.0.push(Part { name: name.into(), fmu: fmu.clone(), logging, kind });
         Ok(())
     }
 
@@ -214,7 +230,9 @@ impl System {
         if self.wiring.feeds(target.instance, &target.name) {
             return Err(Error::usage(written, "is fed twice"));
         }
-        self.wiring.add(target, source);
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let continuous = variable.variability == Variability::Continuous && variable.base.is_float();
+        self.wiring.add(target, source, continuous);
         Ok(())
     }
 }

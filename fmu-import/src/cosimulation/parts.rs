@@ -1,7 +1,7 @@
 //! The FMUs of a system with their names, and what is found in them by `instance.variable`.
 
 use super::Column;
-use crate::{Error, Fmu};
+use crate::{Error, Fmu, Kind};
 use model_description::{BaseType, Causality, Initial, ModelDescription, ModelVariable, Variability};
 
 /// A variable of one of the instances.
@@ -19,6 +19,7 @@ pub(super) struct Part {
     pub(super) name: String,
     pub(super) fmu: Fmu,
     pub(super) logging: bool,
+    pub(super) kind: Kind,
 }
 
 impl Part {

@@ -23,17 +23,19 @@
 
 use super::exchange::{Exchange, Wiring};
 use super::grid::Grid;
+use super::method::Method;
 use super::parts::{Part, Parts, Port};
 use super::run::{Ended, simulate};
 use super::{Column, Recording, Settings, System};
-use crate::{Error, Fmu, Instance, Values};
-use model_description::{BaseType, CoSimulation};
+use crate::{Error, Fmu, Instance, Kind, Values};
+use model_description::{BaseType, Interface};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What all runs of a system share: FMUs, connections, recorded variables, times, and the values that were set.
 pub struct Plan {
+    method: Method,
     parts: Parts,
     /// The FMU of each part to make instances of.
     live: Arc<[Live]>,
@@ -86,7 +88,16 @@ impl System {
         let columns = self.columns().collect();
         let live = |fmu: &Fmu| Live { fmu: Mutex::new(fmu.clone()), generation: AtomicU32::new(0) };
         let live = self.parts.0.iter().map(|part| live(&part.fmu)).collect();
-        Ok(Plan { live, exchange, grid, columns, parts: self.parts, wiring: self.wiring, set: self.set })
+        Ok(Plan {
+            live,
+            exchange,
+            grid,
+            columns,
+            method: self.method,
+            parts: self.parts,
+            wiring: self.wiring,
+            set: self.set,
+        })
     }
 
     /// The recorded columns, without values.
@@ -138,6 +149,7 @@ impl Plan {
         let ports = variables.iter().map(|(port, _)| self.parts.scalar(port)).collect::<Result<Vec<_>, _>>()?;
         let columns = ports.iter().zip(variables).map(|(port, (_, name))| self.parts.column(port, name)).collect();
         Ok(Self {
+            method: self.method.clone(),
             parts: self.parts.clone(),
             live: self.live.clone(),
             wiring: self.wiring.clone(),
@@ -155,8 +167,12 @@ impl Plan {
 
     /// The name of an FMU of which a process can have one instance only, if there is one: then there is one worker.
     pub fn only_one_instance(&self) -> Option<&str> {
-        let flag = |interface: &CoSimulation| interface.flag("canBeInstantiatedOnlyOncePerProcess");
-        let only_one = |part: &&Part| part.description().co_simulation.iter().any(flag);
+        let flag = |interface: &Interface| interface.flag("canBeInstantiatedOnlyOncePerProcess");
+        let interface = |part: &Part| match part.kind {
+            Kind::CoSimulation { .. } => part.description().co_simulation.clone(),
+            Kind::ModelExchange => part.description().model_exchange.clone(),
+        };
+        let only_one = |part: &&Part| interface(part).iter().any(flag);
         self.parts.0.iter().find(only_one).map(|part| part.name.as_str())
     }
 
@@ -210,7 +226,7 @@ impl Worker {
         self.used = true;
         let outcome = self.set(values).and_then(|()| {
             let Self { instances, exchange, row, plan, .. } = self;
-            simulate(instances, exchange, &plan.grid, row, |point| Ok(hook(point.time, point.values)))
+            simulate(&plan.method, instances, exchange, &plan.grid, row, |point| Ok(hook(point.time, point.values)))
         });
         if outcome.is_err() {
             self.give_up();
@@ -243,7 +259,7 @@ impl Worker {
         for (part, live) in self.plan.parts.0.iter().zip(self.plan.live.iter()) {
             let fmu = live.fmu();
             self.generations.push(live.generation());
-            self.instances.push(fmu.instantiate(&part.name, part.logging)?);
+            self.instances.push(fmu.instantiate_as(part.kind, &part.name, part.logging)?);
         }
         self.used = false;
         Ok(())

@@ -2,8 +2,9 @@
 
 use super::exchange::Exchange;
 use super::grid::Grid;
-use super::{Recording, Settings, System, take_messages};
-use crate::{Error, Instance, Message};
+use super::method::Method;
+use super::{Recording, Settings, System, continuous, events, take_messages};
+use crate::{Error, Instance, Kind, Message};
 use std::ops::ControlFlow;
 
 /// A communication point, as a hook sees it: outputs are read, inputs are set, the step is to come.
@@ -14,12 +15,15 @@ pub struct Point<'a> {
     pub time: f64,
     /// The recorded values, in the order of [`System::record`].
     pub values: &'a [f64],
-    instances: &'a mut [Instance],
+    pub(super) instances: &'a mut [Instance],
+    /// The hook had an instance in its hands.
+    pub(super) touched: bool,
 }
 
 impl Point<'_> {
     /// An instance by its name: to read more, or to set what is not connected.
     pub fn instance(&mut self, name: &str) -> Option<&mut Instance> {
+        self.touched = true;
         self.instances.iter_mut().find(|i| i.name() == name)
     }
 
@@ -39,8 +43,9 @@ pub struct Ended {
 }
 
 /// Simulates instances that have their values, from start to stop. `hook` sees every communication point, the last one
-/// included, and may end the run. The one algorithm of all runs.
+/// included, and may end the run. All runs begin and end here.
 pub(super) fn simulate(
+    method: &Method,
     instances: &mut [Instance],
     exchange: &mut Exchange,
     grid: &Grid,
@@ -48,6 +53,9 @@ pub(super) fn simulate(
     mut hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
+    let kinds: Vec<Kind> = instances.iter().map(Instance::kind).collect();
+    method.check(&kinds, settings.sequential)?;
+    exchange.since = None;
     for instance in instances.iter_mut() {
         instance.setup(settings.start, Some(settings.stop))?;
         instance.enter_initialization()?;
@@ -60,6 +68,28 @@ pub(super) fn simulate(
     for instance in instances.iter_mut() {
         instance.exit_initialization()?;
     }
+    let ended = match method {
+        Method::CoSimulation { event_mode: false, early_return: false } => {
+            step(instances, exchange, grid, row, &mut hook)?
+        }
+        Method::CoSimulation { .. } => events::run(instances, exchange, grid, row, &mut hook)?,
+        Method::ModelExchange(integration) => continuous::run(instances, exchange, grid, integration, row, &mut hook)?,
+    };
+    for instance in instances.iter_mut() {
+        instance.terminate()?;
+    }
+    Ok(ended)
+}
+
+/// Steps instances that are initialized.
+fn step(
+    instances: &mut [Instance],
+    exchange: &mut Exchange,
+    grid: &Grid,
+    row: &mut Vec<f64>,
+    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+) -> Result<Ended, Error> {
+    let settings = grid.settings();
     let mut ended = Ended { time: settings.start, by: None };
     for index in 0..=grid.steps() {
         let time = grid.time(index);
@@ -69,7 +99,7 @@ pub(super) fn simulate(
         if index < grid.steps() {
             exchange.write_all(instances, time)?;
         }
-        let flow = hook(&mut Point { index, time, values: row, instances })?;
+        let flow = hook(&mut Point { index, time, values: row, instances, touched: false })?;
         if flow.is_break() || index == grid.steps() {
             break;
         }
@@ -88,9 +118,6 @@ pub(super) fn simulate(
             break;
         }
     }
-    for instance in instances.iter_mut() {
-        instance.terminate()?;
-    }
     Ok(ended)
 }
 
@@ -107,7 +134,7 @@ impl System {
         let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
         let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
         let mut recording = Recording::new(self.columns());
-        let ended = simulate(&mut self.instances, &mut exchange, &grid, &mut Vec::new(), |point| {
+        let ended = simulate(&self.method, &mut self.instances, &mut exchange, &grid, &mut Vec::new(), |point| {
             recording.push(point.time, point.values);
             hook(point)
         })?;

@@ -110,6 +110,19 @@ impl Schedule {
     }
 }
 
+impl Schedule {
+    /// Value at time `t` (s) of a run whose last event was at `since`: every point is an event, so steps hold until the next
+    /// one, and do not change before it.
+    pub(super) fn held(&self, since: f64, t: f64) -> f64 {
+        self.at(if self.linear { t } else { since })
+    }
+
+    /// Time (s) of the first point after `t`.
+    pub(super) fn next_point(&self, t: f64) -> Option<f64> {
+        self.points.get(self.points.partition_point(|(time, _)| *time <= t + SAME)).map(|(time, _)| *time)
+    }
+}
+
 impl fmt::Display for Schedule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let points: Vec<_> = self.points.iter().map(|(t, x)| format!("{t}:{x}")).collect();
@@ -130,6 +143,15 @@ mod tests {
         let lines = Schedule::parse("1:0~2:10~3:10").unwrap();
         assert_eq!([0.0, 1.0, 1.5, 2.0, 2.5, 4.0].map(|t| lines.at(t)), [0.0, 0.0, 5.0, 10.0, 10.0, 10.0]);
         assert_eq!(Schedule::parse("325").unwrap().at(-7.0), 325.0);
+    }
+
+    #[test]
+    fn steps_hold_until_their_event() {
+        let steps = Schedule::parse("0:1, 0.1:2").unwrap();
+        assert_eq!((steps.held(0.0, 0.1), steps.held(0.1, 0.1)), (1.0, 2.0));
+        assert_eq!([-1.0, 0.0, 0.1 - 1e-12, 0.2].map(|t| steps.next_point(t)), [Some(0.0), Some(0.1), None, None]);
+        let lines = Schedule::parse("0:1~0.1:2").unwrap();
+        assert_eq!((lines.held(0.0, 0.05), lines.held(0.0, 0.1)), (1.5, 2.0));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::ssv::{self, Parameter};
 use super::structure::{Binding, Connection, Connector, End, Structure, Values};
 use super::{DESCRIPTION, values};
 use crate::Fmu;
-use crate::cosimulation::{Schedule, Settings, System};
+use crate::cosimulation::{Method, Schedule, Settings, System};
 use anyhow::{Context, Result, anyhow, bail};
 use model_description::Experiment;
 use std::fs::File;
@@ -96,18 +96,34 @@ impl Loaded {
     /// # Errors
     /// As [`open`](Self::open), or an SSP file is not alone.
     pub fn open_files(files: &[String], folder: &Path, logging: bool) -> Result<Self> {
-        let mut loaded = Self::default();
+        Self::open_files_with(files, folder, logging, |_| Method::default())
+    }
+
+    /// As [`open_files`](Self::open_files), run by the method that suits the FMUs.
+    ///
+    /// # Errors
+    /// As [`open_files`](Self::open_files), or an FMU does not have the interface that the method needs.
+    pub fn open_files_with(
+        files: &[String],
+        folder: &Path,
+        logging: bool,
+        method: impl FnOnce(&[(String, Fmu)]) -> Method,
+    ) -> Result<Self> {
+        let mut fmus = Vec::new();
         for text in files {
             let (name, path) = name_and_path(text)?;
             if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
                 if files.len() > 1 {
                     bail!("{}: an SSP is simulated alone: its FMUs are inside", path.display());
                 }
-                return Self::open(&folder.join(path), logging);
+                return Self::open_with(&folder.join(path), logging, method);
             }
-            let fmu = Fmu::open(folder.join(path))?;
+            fmus.push((name, Fmu::open(folder.join(path))?));
+        }
+        let mut loaded = Self { system: System::new(method(&fmus)), ..Self::default() };
+        for (name, fmu) in &fmus {
             loaded.experiments.push(fmu.description().default_experiment);
-            loaded.system.add(&name, &fmu, logging)?;
+            loaded.system.add(name, fmu, logging)?;
         }
         Ok(loaded)
     }
@@ -127,6 +143,11 @@ impl Loaded {
     /// # Errors
     /// Names the file, the place in it, what is wrong and what to do.
     pub fn open(path: &Path, logging: bool) -> Result<Self> {
+        Self::open_with(path, logging, |_| Method::default())
+    }
+
+    /// As [`open`](Self::open), run by the method that suits the FMUs.
+    fn open_with(path: &Path, logging: bool, method: impl FnOnce(&[(String, Fmu)]) -> Method) -> Result<Self> {
         let of = || path.display().to_string();
         let file = File::open(path).with_context(of)?;
         let zip = ZipArchive::new(file).map_err(|e| anyhow!("{}: not a ZIP archive, or cut short: {e}", of()))?;
@@ -134,19 +155,30 @@ impl Loaded {
         let text = package.text(DESCRIPTION)?;
         let in_description = |cause: String| anyhow!("{}: {DESCRIPTION}: {cause}", of());
         let structure = Structure::read(&text).map_err(in_description)?;
-        let mut loaded = Self::default();
-        loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
+        let mut fmus = Vec::new();
         let dir = tempfile::tempdir()?;
         for (index, component) in structure.components.iter().enumerate() {
             let fmu = dir.path().join(format!("{index}.fmu"));
             std::fs::write(&fmu, package.bytes(&component.source)?)?;
             let fmu = Fmu::open(&fmu).map_err(|e| anyhow!("{}: {}: {}", of(), component.source, e.cause()))?;
+            fmus.push((component.name.clone(), fmu));
+        }
+        let method = method(&fmus);
+        if let (Method::CoSimulation { .. }, Some(component)) =
+            (&method, structure.components.iter().find(|component| component.model_exchange))
+        {
+            let cause = "implementation=\"ModelExchange\" is no Co-Simulation: simulate it with --me";
+            return Err(in_description(format!("line {}: {cause}", component.line)));
+        }
+        let mut loaded = Self { system: System::new(method), ..Self::default() };
+        loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
+        for (component, (name, fmu)) in structure.components.iter().zip(&fmus) {
             let experiment = fmu.description().default_experiment;
             // The system's times go before those of its parts.
             let times = structure.start.or(structure.stop).is_some();
             let part = Experiment { step: experiment.step, ..Experiment::default() };
             loaded.experiments.push(if times { part } else { experiment });
-            loaded.system.add(&component.name, &fmu, logging)?;
+            loaded.system.add(name, fmu, logging)?;
             loaded.check_connectors(&component.connectors, &component.name).map_err(in_description)?;
         }
         for connection in &structure.connections {

@@ -35,6 +35,8 @@ pub struct Component {
     pub connectors: Vec<Connector>,
     /// Values of its variables.
     pub bindings: Vec<Binding>,
+    /// It is made for Model Exchange alone.
+    pub model_exchange: bool,
     /// Line of the element.
     pub line: usize,
 }
@@ -188,14 +190,12 @@ fn component(e: &Element) -> Result<Component, String> {
     if kind != FMU_TYPE {
         return Err(at(e, format!("type={kind:?} is not supported, expected {FMU_TYPE}")));
     }
-    if e.get("implementation") == Some("ModelExchange") {
-        return Err(at(e, "implementation=\"ModelExchange\" is not supported, expected CoSimulation or any"));
-    }
     Ok(Component {
         name: required(e, "name")?,
         source: path(e, &source)?,
         connectors: connectors(e)?,
         bindings: bindings(e)?,
+        model_exchange: e.get("implementation") == Some("ModelExchange"),
         line: e.line,
     })
 }
@@ -312,7 +312,6 @@ mod tests {
             (component("source='../a.fmu'"), "is not a file within the archive"),
             (component("source='http://a/b.fmu'"), "is not a file within the archive"),
             (component("source='a%zz.fmu'"), "is not a file within the archive"),
-            (component("source='a.fmu' implementation='ModelExchange'"), "expected CoSimulation"),
             (component("source='a.ssp' type='application/x-ssp-package'"), "type=\"application/x-ssp-package\""),
             (
                 system("<Elements><Component name='a' source='a'/><Component name='a' source='a'/></Elements>"),

@@ -1,6 +1,6 @@
 //! `ModelVariables`.
 
-use super::attributes::{integer, integers, number, owned, required, required_integer, word, wrong};
+use super::attributes::{boolean, integer, integers, number, owned, required, required_integer, word, wrong};
 use super::types::base_type_2;
 use crate::error::Error;
 use crate::units::TypeDefinition;
@@ -73,6 +73,7 @@ fn variable(
         dimensions: element.all("Dimension").map(dimension).collect::<Result<_, _>>()?,
         aliases: element.all("Alias").map(alias).collect::<Result<_, _>>()?,
         derivative: integer(typed, "derivative")?,
+        reinit: boolean(typed, "reinit")?.unwrap_or(false),
         clocks: integers(element, "clocks")?.unwrap_or_default(),
         line: element.line,
     })

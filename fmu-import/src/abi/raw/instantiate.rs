@@ -42,6 +42,8 @@ pub struct Arguments {
     pub logging: bool,
     /// Whether event mode is used (FMI 3.0 only).
     pub event_mode: bool,
+    /// Whether `DoStep` may return early (FMI 3.0 only).
+    pub early_return: bool,
     /// The environment, which the callbacks receive unchanged.
     pub environment: usize,
 }
@@ -115,7 +117,7 @@ impl Raw {
                         false,
                         b.logging,
                         b.event_mode,
-                        false,
+                        b.early_return,
                         ptr::null(),
                         0,
                         environment,

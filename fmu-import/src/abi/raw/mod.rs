@@ -7,6 +7,7 @@
 
 mod buffer;
 mod callbacks;
+mod equations;
 mod instantiate;
 mod names;
 mod optional;
@@ -15,8 +16,9 @@ mod states;
 
 pub use buffer::{Buffer, type_name, width};
 pub use callbacks::{Event, allocations, take_events};
+pub use equations::{SensitivityArguments, Updated};
 pub use instantiate::{Arguments, Interface};
-pub use names::{Optional, Simple, StepStatus, Text};
+pub use names::{Count, Optional, Sensitivity, Simple, StepStatus, Text, Vector};
 pub use processor::float_control;
 
 use super::log::Status;
@@ -351,15 +353,5 @@ impl Raw {
         let mut value = CANARY;
         // SAFETY: FMI 2.0's type but for the place, which has room for each of its values.
         Some((unsafe { f(instance.pointer(), kind, &raw mut value) }, value))
-    }
-
-    /// `fmi3UpdateDiscreteStates`: whether another iteration is needed, and whether the simulation is to end.
-    pub fn update_discrete_states(&self, instance: Handle) -> Option<(Status, bool, bool)> {
-        let (f, mut flags, mut next): (v3::UpdateDiscreteStates, _, _) =
-            (self.function("UpdateDiscreteStates")?, [0_u8; 5], 0.0);
-        let [a, b, c, d, e] = &mut flags;
-        // SAFETY: FMI 3.0's type; the places are ours.
-        let status = unsafe { f(instance.pointer(), a, b, c, d, e, &raw mut next) };
-        Some((status, flags[0] != 0, flags[1] != 0))
     }
 }

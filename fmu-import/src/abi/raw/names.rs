@@ -46,6 +46,24 @@ names! {
 }
 
 names! {
+    /// Functions of an instance, an array of doubles and its length (Model Exchange).
+    Vector {
+        GetContinuousStates SetContinuousStates GetDerivatives GetContinuousStateDerivatives GetEventIndicators
+        GetNominalsOfContinuousStates
+    }
+}
+
+names! {
+    /// Functions that return a number of elements (FMI 3.0).
+    Count { GetNumberOfContinuousStates GetNumberOfEventIndicators }
+}
+
+names! {
+    /// Functions of partial derivatives.
+    Sensitivity { GetDirectionalDerivative GetAdjointDerivative }
+}
+
+names! {
     /// Functions of optional capabilities.
     Optional {
         GetBinary SetBinary GetClock SetClock

@@ -1,0 +1,205 @@
+//! Model Exchange, event mode and derivatives, the same for both standards.
+
+use super::Instance;
+use crate::Error;
+use crate::abi::shared::Vector;
+use crate::standard::Sensitivity;
+
+/// What `DoStep` returned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stepped {
+    /// The FMU asks to end the simulation.
+    pub terminate: bool,
+    /// The FMU is to enter event mode before the next step (FMI 3.0 only).
+    pub event: bool,
+    /// The step ended before its end (FMI 3.0 only).
+    pub early: bool,
+    /// Time (s) that the step reached.
+    pub last: f64,
+}
+
+/// What an update of the discrete states returned.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "the results of the standards")]
+pub struct Update {
+    /// The FMU needs another update.
+    pub again: bool,
+    /// The FMU asks to end the simulation.
+    pub terminate: bool,
+    /// Nominal values of states have changed.
+    pub nominals_changed: bool,
+    /// States have jumped.
+    pub states_changed: bool,
+    /// Time (s) of the next time event, if one is known. Every update tells it anew.
+    pub next_event_time: Option<f64>,
+}
+
+/// What the end of an integrator step returned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CompletedStep {
+    /// There is a step event.
+    pub enter_event_mode: bool,
+    /// The FMU asks to end the simulation.
+    pub terminate: bool,
+}
+
+impl Instance {
+    /// Steps from `t` to `t + h`, or less far if the FMU was allowed to return early.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn advance(&mut self, t: f64, h: f64) -> Result<Stepped, Error> {
+        self.call(|s| s.do_step(t, h))
+    }
+
+    /// Enters event mode: from continuous-time mode, or from step mode of an instance that uses event mode.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn enter_event_mode(&mut self) -> Result<(), Error> {
+        self.call(|s| s.shared().enter_event_mode())
+    }
+
+    /// Updates the discrete states once, in event mode (`fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`).
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn update_discrete_states(&mut self) -> Result<Update, Error> {
+        self.call(|s| s.update_discrete_states())
+    }
+
+    /// Leaves event mode for continuous-time mode (Model Exchange).
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn enter_continuous_time_mode(&mut self) -> Result<(), Error> {
+        self.call(|s| s.shared().enter_continuous_time_mode())
+    }
+
+    /// Leaves event mode for step mode (Co-Simulation of FMI 3.0).
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn enter_step_mode(&mut self) -> Result<(), Error> {
+        self.call(|s| s.shared().enter_step_mode())
+    }
+
+    /// Numbers of continuous states and of event indicators. FMI 3.0 asks the FMU, FMI 2.0 the description.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn state_and_indicator_counts(&mut self) -> Result<(usize, usize), Error> {
+        let counts = self.call(|s| s.counts())?;
+        let indicators = || self.description.number_of_event_indicators.unwrap_or(0) as usize;
+        Ok(counts.unwrap_or_else(|| (self.description.derivatives.len(), indicators())))
+    }
+
+    /// Sets the time (s) in continuous-time mode.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    #[inline]
+    pub fn set_time(&mut self, t: f64) -> Result<(), Error> {
+        self.call(|s| s.shared().set_time(t))
+    }
+
+    /// Sets all continuous states.
+    ///
+    /// # Errors
+    /// The FMU refuses; a state that it does not take in a trial step is discarded: see [`Error::is_discard`].
+    #[inline]
+    pub fn set_continuous_states(&mut self, x: &[f64]) -> Result<(), Error> {
+        if x.is_empty() { Ok(()) } else { self.call(|s| s.shared().set_states(x)) }
+    }
+
+    /// Reads all continuous states.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn get_continuous_states(&mut self, x: &mut [f64]) -> Result<(), Error> {
+        self.vector(Vector::States, x)
+    }
+
+    /// Computes the derivatives of all continuous states.
+    ///
+    /// # Errors
+    /// As [`set_continuous_states`](Self::set_continuous_states).
+    #[inline]
+    pub fn get_derivatives(&mut self, dx: &mut [f64]) -> Result<(), Error> {
+        self.vector(Vector::Derivatives, dx)
+    }
+
+    /// Computes all event indicators.
+    ///
+    /// # Errors
+    /// As [`set_continuous_states`](Self::set_continuous_states).
+    pub fn get_event_indicators(&mut self, z: &mut [f64]) -> Result<(), Error> {
+        self.vector(Vector::Indicators, z)
+    }
+
+    /// Reads the nominal values of all continuous states.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn get_nominals(&mut self, nominals: &mut [f64]) -> Result<(), Error> {
+        self.vector(Vector::Nominals, nominals)
+    }
+
+    /// Says that an integrator step is complete.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn completed_integrator_step(&mut self) -> Result<CompletedStep, Error> {
+        self.call(|s| s.completed_integrator_step())
+    }
+
+    /// Partial derivatives of the unknowns in the direction of the seed of the knowns, both by value reference.
+    ///
+    /// # Errors
+    /// The FMU refuses or has none, or an array has another length than its list.
+    pub fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        sensitivity: &mut [f64],
+    ) -> Result<(), Error> {
+        self.call(|s| s.directional_derivative(Sensitivity { unknowns, knowns, seed }, sensitivity))
+    }
+
+    /// The seed of the unknowns times the partial derivatives: one number for each of the knowns (FMI 3.0 only).
+    ///
+    /// # Errors
+    /// As [`directional_derivative`](Self::directional_derivative).
+    pub fn adjoint_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        sensitivity: &mut [f64],
+    ) -> Result<(), Error> {
+        self.call(|s| s.adjoint_derivative(Sensitivity { unknowns, knowns, seed }, sensitivity))
+    }
+
+    /// Derivatives of outputs with respect to time at the end of the last step (Co-Simulation).
+    ///
+    /// # Errors
+    /// The FMU refuses or has none, or the arrays have different lengths.
+    pub fn output_derivatives(&mut self, references: &[u32], orders: &[i32], values: &mut [f64]) -> Result<(), Error> {
+        self.call(|s| s.output_derivatives(references, orders, values))
+    }
+
+    /// Derivatives of inputs with respect to time at the beginning of the next step (Co-Simulation of FMI 2.0 only).
+    ///
+    /// # Errors
+    /// The FMU refuses or takes none, or the arrays have different lengths.
+    pub fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Result<(), Error> {
+        self.call(|s| s.set_input_derivatives(references, orders, values))
+    }
+
+    /// An FMU without states or indicators is not asked for them.
+    #[inline]
+    fn vector(&mut self, which: Vector, values: &mut [f64]) -> Result<(), Error> {
+        if values.is_empty() { Ok(()) } else { self.call(|s| s.shared().get_vector(which, values)) }
+    }
+}
