@@ -1,5 +1,5 @@
 //! Model Exchange natively: derivatives and events, integrated in steps of 1 us between events, against co-simulation.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::float_cmp)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 
 use drive::control::signals::ControllerInputs;
