@@ -1,5 +1,5 @@
 //! Model Exchange natively: derivatives and events, integrated in steps of 1 us between events, against co-simulation.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::float_cmp)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 
 use drive::control::signals::ControllerInputs;
@@ -109,20 +109,34 @@ fn the_drive_does_not_depend_on_the_importers_step() {
 
 #[test]
 fn an_enabled_plant_is_integrated_to_the_same_currents() {
-    let w = 1000.0 * RPM;
-    let mut plant = Both::<PmsmPlant>::new(|plant| plant.parameters.initial.speed = w);
-    let mut largest = (0.0_f64, 0.0_f64);
-    for k in 0..500 {
-        let theta = 3.0 * w * T_S * f64::from(k) + PI / 2.0;
-        let u = 0.15 * 3.0 * w + 8.0 * f64::from(k % 7) / 6.0;
-        plant.set(|plant| plant.inputs.u = Phases::from_stator(AlphaBeta::new(u * theta.cos(), u * theta.sin())));
-        plant.step(T_S, FINE);
-        let (di, dw) = apart(&plant.stepped.out, &plant.integrated.out);
-        largest = (largest.0.max(di), largest.1.max(dw));
+    let dead_time: fn(&mut PmsmPlant) = |plant| plant.parameters.inverter.dead_time = 2e-6;
+    let saturated = |plant: &mut PmsmPlant| {
+        let saturation = &mut plant.parameters.saturation;
+        (saturation.s_2, saturation.s_3, saturation.s_dq) = (40.0, 40.0, 7.0);
+    };
+    // Dead time has kinks, which cost the substeps of co-simulation their order.
+    let cases =
+        [("dead time", dead_time, 5e-4, 1e-4), ("linear", |_| (), 1e-7, 1e-6), ("saturated", saturated, 1e-7, 1e-6)];
+    for (name, set, allowed, allowed_speed) in cases {
+        let w = 1000.0 * RPM;
+        let mut plant = Both::<PmsmPlant>::new(|plant| {
+            (plant.parameters.initial.speed, plant.parameters.mechanics.J) = (w, 0.05);
+            set(plant);
+        });
+        let (mut largest, mut highest) = ((0.0_f64, 0.0_f64), 0.0_f64);
+        for k in 0..500 {
+            let theta = 3.0 * w * T_S * f64::from(k) + PI / 2.0;
+            let u = 0.15 * 3.0 * w + 10.0 + 8.0 * f64::from(k % 7) / 6.0;
+            plant.set(|plant| plant.inputs.u = Phases::from_stator(AlphaBeta::new(u * theta.cos(), u * theta.sin())));
+            plant.step(T_S, FINE);
+            let (di, dw) = apart(&plant.stepped.out, &plant.integrated.out);
+            largest = (largest.0.max(di), largest.1.max(dw));
+            highest = highest.max(plant.stepped.out.i_q);
+        }
+        println!("{name}: {:e} A, {:e} rad/s apart, up to {highest} A", largest.0, largest.1);
+        assert!(largest.0 < allowed && largest.1 < allowed_speed, "{name}: {largest:?}");
+        assert!(highest > 0.5, "{name}: {highest} A");
     }
-    println!("enabled: {largest:?} A, rad/s apart");
-    assert!(largest.0 < 1e-7 && largest.1 < 1e-6, "{largest:?}");
-    assert!(plant.stepped.out.i_q.abs() > 0.5, "{:?}", plant.stepped.out);
 }
 
 #[test]

@@ -9,6 +9,8 @@ use crate::{ContinuousTime, Elapsed, Events, Fault, Sampled, Step};
 
 /// Maximum number of substeps in one communication step.
 const MAX_SUBSTEPS: f64 = 1e8;
+/// Maximum number of events located by indicators in one communication step, besides one in every substep.
+const MAX_LOCATED: f64 = 1e5;
 /// Maximum number of calls of [`Events::event`] at one instant.
 const MAX_ITERATIONS: usize = 100;
 /// Maximum number of event indicators.
@@ -52,7 +54,8 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
     const { assert!(N == M::STATES.len(), "N is the number of the states") };
     const { assert!(M::INDICATORS.len() <= MAX_INDICATORS, "more event indicators than the integrator has room for") };
     let (mut now, end) = (step.start, step.end());
-    let mut budget = substeps(step.h, longest)? + MAX_SUBSTEPS;
+    let count = substeps(step.h, longest)?;
+    let (mut budget, mut located) = (count + MAX_SUBSTEPS, count + MAX_LOCATED);
     handle(model, now)?;
     loop {
         let rest = end.since(now);
@@ -68,11 +71,12 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
             return Err(standstill(now));
         }
         let h = left / substeps(left, longest)?;
+        let passed = substep::<M, N>(model, now, h)?;
         budget -= 1.0;
-        if budget < 0.0 {
+        located -= f64::from(u8::from(passed.is_some()));
+        if budget < 0.0 || located < 0.0 {
             return Err(standstill(now));
         }
-        let passed = substep::<M, N>(model, now, h)?;
         now = now.plus(passed.unwrap_or(h));
         let due = model.next(now).ahead(now).is_some_and(|(next, width)| next <= 0.0 && end.since(now) > width);
         if passed.is_some() || due {

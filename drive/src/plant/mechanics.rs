@@ -99,7 +99,11 @@ impl<'a, S: Scalar> Shaft<'a, S> {
     /// The motion at `speed` (rad/s) and the torque `tau_e` (N.m).
     #[inline]
     pub fn motion(&self, speed: S, tau_e: S) -> Motion<S> {
-        let coulomb = if speed.value() * self.sign > self.full { self.tau_full.into() } else { self.coulomb(speed) };
+        let coulomb = if speed.value() * self.sign > self.full {
+            self.tau_full.into()
+        } else {
+            self.mechanics.coulomb(speed, self.share(speed.value()))
+        };
         let friction = speed * self.B + coulomb;
         let p_friction = friction * speed;
         if self.mechanics.imposed {
@@ -109,13 +113,12 @@ impl<'a, S: Scalar> Shaft<'a, S> {
         Motion { acceleration, p_shaft: self.tau_load * speed, p_friction }
     }
 
-    /// Coulomb torque (N.m) at a `speed` (rad/s) near standstill.
+    /// Share of the Coulomb torque at a `speed` (rad/s) near standstill.
     #[inline(never)]
-    fn coulomb(&self, speed: S) -> S {
+    fn share(&self, speed: f64) -> f64 {
         let w_coulomb = self.mechanics.w_coulomb;
-        let d = (speed.value() - self.speed) * reciprocal(w_coulomb);
-        let share = if d.abs() <= 0.5 { tanh_beside(self.share, d) } else { tanh(speed.value() / w_coulomb) };
-        self.mechanics.coulomb(speed, share)
+        let d = (speed - self.speed) * reciprocal(w_coulomb);
+        if d.abs() <= 0.5 { tanh_beside(self.share, d) } else { tanh(speed / w_coulomb) }
     }
 }
 

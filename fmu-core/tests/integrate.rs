@@ -1,0 +1,245 @@
+//! The integrators: order, events where they are due, and an end to events without end.
+#![allow(missing_docs)]
+
+use fmu_core::unit::{ONE, Quantity, Unit};
+use fmu_core::*;
+use serde::{Deserialize, Serialize};
+
+const RATE: Quantity = Quantity::new("TestRate", Unit::si("1/s", unit::Exponents::mechanical(0, 0, -1, 0)));
+
+/// A model with two states, without variables: what is tested is its motion.
+macro_rules! model {
+    ($model:ty) => {
+        impl Model for $model {
+            type Outputs = ();
+            const INFO: Info = Info { name: stringify!($model), ..Info::DEFAULT };
+            const TABLE: &'static Table<Block<Self>> = &Table::new(const { &[] });
+            fn initialize(&mut self) {}
+            fn output(&self, _now: Elapsed, _out: &mut ()) {}
+            fn advance(&mut self, _step: &Step) -> Result<(), Fault> {
+                unreachable!("the tests call the integrators")
+            }
+        }
+    };
+}
+
+/// `steps` steps of `h` (s) by `advance`, from the start.
+fn run<M>(
+    model: &mut M,
+    steps: u32,
+    h: f64,
+    advance: impl Fn(&mut M, &Step) -> Result<(), Fault>,
+) -> Result<Elapsed, Fault> {
+    let mut now = Elapsed::ZERO;
+    for _ in 0..steps {
+        let step = Step { start: now, h };
+        advance(model, &step)?;
+        now = step.end();
+    }
+    Ok(now)
+}
+
+/// A capacitor behind a resistor with a time constant of 1 s, on a voltage that falls with the same time constant.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Circuit {
+    u: f64,
+}
+
+model!(Circuit);
+
+impl ContinuousTime for Circuit {
+    const STATES: &'static [State<Self>] = &[State::new("u", &RATE, |m| &mut m.u)];
+    fn derivatives(&self, now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = (-now.seconds()).exp() - self.u;
+        Ok(())
+    }
+}
+
+#[test]
+fn a_smooth_model_is_integrated_with_order_four() {
+    // u = t e^-t.
+    let error = |longest: f64| {
+        let mut circuit = Circuit::default();
+        run(&mut circuit, 2, 1.0, |m, step| integrate::smooth::<_, 1>(m, step, longest)).unwrap();
+        (circuit.u - 2.0 * (-2.0_f64).exp()).abs()
+    };
+    let (coarse, fine) = (error(0.05), error(0.025));
+    assert!((coarse / fine - 16.0).abs() < 1.5 && fine < 1e-8, "{coarse} {fine}");
+}
+
+#[test]
+fn a_state_that_leaves_the_numbers_is_named() {
+    let mut circuit = Circuit { u: f64::MAX };
+    let step = Step { start: Elapsed::ZERO, h: 1e4 };
+    let fault = integrate::smooth::<_, 1>(&mut circuit, &step, 1e4).unwrap_err();
+    assert!(fault.message().starts_with('u') && fault.message().contains("a finite number"), "{fault}");
+    assert!(circuit.u.is_finite(), "nothing changed");
+    let fault = integrate::smooth::<_, 1>(&mut circuit, &Step { h: 1e9, ..step }, 1e-3).unwrap_err();
+    assert!(fault.message().contains("at most 100000 s"), "{fault}");
+}
+
+/// Gravity in m/s2.
+const G: f64 = 9.81;
+/// Speed after a bounce over the speed before it.
+const BOUNCE: f64 = 0.7;
+
+/// A ball that falls from 1 m; slower than `rest` (m/s) it stays on the ground.
+#[derive(Clone, Serialize, Deserialize)]
+struct Ball {
+    height: f64,
+    speed: f64,
+    rest: f64,
+    resting: bool,
+    /// Times of the bounces in s.
+    bounces: Vec<f64>,
+}
+
+impl Default for Ball {
+    fn default() -> Self {
+        Self { height: 1.0, speed: 0.0, rest: 0.01, resting: false, bounces: Vec::new() }
+    }
+}
+
+model!(Ball);
+
+impl ContinuousTime for Ball {
+    const STATES: &'static [State<Self>] =
+        &[State::new("h", &RATE, |m| &mut m.height), State::<Self>::new("v", &RATE, |m| &mut m.speed).reinit()];
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        (dx[0], dx[1]) = if self.resting { (0.0, 0.0) } else { (self.speed, -G) };
+        Ok(())
+    }
+}
+
+impl Events for Ball {
+    const INDICATORS: &'static [Indicator] = &[Indicator { name: "z", description: "Height" }];
+    fn indicators(&self, _now: Elapsed, z: &mut [f64]) {
+        z[0] = self.height;
+    }
+    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault> {
+        if self.height > 0.0 {
+            return Ok(Outcome::default());
+        }
+        self.bounces.push(now.seconds());
+        // Above the ground by the least there is.
+        (self.height, self.speed) = (f64::MIN_POSITIVE, -BOUNCE * self.speed);
+        if self.speed < self.rest {
+            (self.speed, self.resting) = (0.0, true);
+        }
+        Ok(Outcome { states_changed: true, ..Outcome::default() })
+    }
+    fn next(&self, _now: Elapsed) -> Next {
+        Next::Never
+    }
+}
+
+#[test]
+fn a_ball_bounces_when_it_reaches_the_ground() {
+    let first = (2.0 / G).sqrt();
+    for (h, steps) in [(1e-3, 4000), (0.013, 308), (0.5, 8)] {
+        let mut ball = Ball::default();
+        run(&mut ball, steps, h, |m, step| integrate::hybrid::<_, 2>(m, step, 10e-3)).unwrap();
+        let (mut expected, mut flight) = (first, 2.0 * first);
+        assert_eq!(ball.bounces.len(), 18, "h = {h} s: 0.7^18 of 4.4 m/s is below 0.01 m/s");
+        for bounce in &ball.bounces {
+            assert!((bounce - expected).abs() < 1e-9, "h = {h} s: {bounce} s, not {expected} s");
+            flight *= BOUNCE;
+            expected += flight;
+        }
+        assert!(ball.resting && ball.height > 0.0 && ball.speed == 0.0, "h = {h} s: {} m", ball.height);
+    }
+}
+
+#[test]
+fn events_without_end_are_refused() {
+    // Without rest, the bounces come ever closer: 2.6 s after the start, infinitely many have passed.
+    let mut ball = Ball { rest: -1.0, ..Ball::default() };
+    let fault = run(&mut ball, 1, 3.0, |m, step| integrate::hybrid::<_, 2>(m, step, 10e-3)).unwrap_err();
+    assert!(fault.message().contains("events follow each other"), "{fault}");
+    assert!(ball.height > -1e-9, "{} m", ball.height);
+}
+
+/// Switches the sign of its state's derivative at given times; or at k `period`, if that is not 0.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Switch {
+    x: f64,
+    off: bool,
+    period: f64,
+    k: u64,
+    /// Values of x at the events.
+    seen: Vec<f64>,
+    broken: bool,
+}
+
+model!(Switch);
+
+impl Switch {
+    /// The time of switching number `k`.
+    fn at(k: u64) -> Elapsed {
+        Elapsed::ZERO.plus([0.0, 0.1, 0.1 + 1e-7, 0.3, 0.55, 1e9][usize::try_from(k).unwrap()])
+    }
+}
+
+impl ContinuousTime for Switch {
+    const STATES: &'static [State<Self>] = &[State::new("x", &ONE, |m| &mut m.x)];
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = if self.off { -1.0 } else { 1.0 };
+        Ok(())
+    }
+}
+
+impl Events for Switch {
+    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault> {
+        let due = match self.next(now) {
+            Next::Grid { k, period } => SampleGrid { period }.reached(k, now),
+            Next::At(time) => now.since(time) > -1e-12,
+            Next::Never => false,
+        };
+        if due && !self.broken {
+            (self.off, self.k) = (!self.off, self.k + 1);
+            self.seen.push(self.x);
+        }
+        Ok(Outcome::default())
+    }
+    fn next(&self, _now: Elapsed) -> Next {
+        if self.period > 0.0 { Next::Grid { k: self.k, period: self.period } } else { Next::At(Self::at(self.k)) }
+    }
+}
+
+#[test]
+fn time_events_are_met_exactly() {
+    // Steps that end at an event, between events and far beyond several.
+    for (h, steps) in [(0.05, 12), (0.1, 6), (0.07, 9), (0.6, 1), (0.0125, 48)] {
+        let mut switch = Switch::default();
+        let end = run(&mut switch, steps, h, |m, step| integrate::hybrid::<_, 1>(m, step, 3e-3)).unwrap();
+        let expected = [0.0, -0.1, -0.1 + 1e-7, -0.3 + 2e-7, -0.05 + 2e-7];
+        assert_eq!(switch.seen.len(), 5, "h = {h} s");
+        for (seen, expected) in switch.seen.iter().zip(expected) {
+            assert!((seen - expected).abs() < 1e-14, "h = {h} s: {:?}", switch.seen);
+        }
+        let left = end.seconds() - 0.55;
+        assert!((switch.x - (-0.05 + 2e-7 - left)).abs() < 1e-14, "h = {h} s: {}", switch.x);
+    }
+}
+
+#[test]
+fn events_on_a_grid_are_met_once_each() {
+    for (h, steps) in [(1e-3, 100), (0.7e-3, 143), (4.3e-3, 23), (1e-4 / 3.0, 3000)] {
+        let mut switch = Switch { period: 1e-3, ..Switch::default() };
+        let end = run(&mut switch, steps, h, |m, step| integrate::hybrid::<_, 1>(m, step, 1.0)).unwrap();
+        // One at the end itself belongs to the next step.
+        let due = (1..200).take_while(|&k| SampleGrid { period: 1e-3 }.passed(k, end)).count() + 1;
+        assert_eq!(switch.seen.len(), due, "h = {h} s");
+        for (k, seen) in switch.seen.iter().enumerate() {
+            let expected = if k % 2 == 0 { 0.0 } else { -1e-3 };
+            assert!((seen - expected).abs() < 1e-12, "h = {h} s, event {k}: {seen}");
+        }
+    }
+}
+
+#[test]
+fn an_event_that_does_not_go_away_is_refused() {
+    let mut switch = Switch { broken: true, ..Switch::default() };
+    let fault = run(&mut switch, 1, 1.0, |m, step| integrate::hybrid::<_, 1>(m, step, 1e-3)).unwrap_err();
+    assert!(fault.message().contains("events follow each other without time between them"), "{fault}");
+}
