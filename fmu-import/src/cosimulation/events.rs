@@ -42,8 +42,13 @@ impl Fmus<'_> {
         self.with_events.iter().any(due)
     }
 
-    /// Event mode at `t`, and back to step mode. After the initialization, the instances are in event mode.
-    fn event(&mut self, t: f64, initial: bool) -> Result<(), Error> {
+    /// Event mode at the time `at` (s), and back to step mode. After the initialization, the instances are in event mode.
+    fn event(&mut self, at: f64, initial: bool) -> Result<(), Error> {
+        // The time of the event itself, where a communication point is the same time but for rounding: schedules then give the
+        // same bits at any communication step.
+        let next = self.with_events.iter().filter_map(|&i| self.outcomes[i].next);
+        let t = next.filter(|next| (next - at).abs() <= self.near).fold(f64::INFINITY, f64::min);
+        let t = if t.is_finite() { t } else { at };
         let Self { instances, exchange, with_events, outcomes, stepped, .. } = self;
         for &index in with_events.iter() {
             stepped[index].event = false;

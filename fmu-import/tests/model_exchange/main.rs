@@ -4,6 +4,7 @@
 
 use fmu_import::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
 use fmu_import::{Fmu, Kind};
+use model_description::FmiVersion;
 use std::f64::consts::LN_2;
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -440,6 +441,59 @@ fn calls_of_an_instance() {
         let error = p.adjoint_derivative(&[3], &[2], &[1.0], &mut one).unwrap_err().to_string();
         let cause = if version == 2 { "FMI 2.0 has no adjoint" } else { "fmi3GetAdjointDerivative is missing" };
         assert!(error.contains(cause), "{error}");
+    }
+}
+
+/// The same calls one by one, as the checker makes them.
+#[test]
+fn raw_calls() {
+    use fmu_import::Status;
+    use fmu_import::raw::{Arguments, Count, Interface, Raw, Sensitivity, SensitivityArguments, Simple, Vector};
+    let workshop = Workshop::new();
+    for (number, version) in [(2, FmiVersion::V2), (3, FmiVersion::V3)] {
+        let archive = workshop.archive("plant", number, &[], |xml| xml);
+        let raw = Raw::open(&archive.with_file_name("x.so"), version).unwrap();
+        let arguments = Arguments {
+            name: Some(c"p".into()),
+            token: Some(c"g".into()),
+            resources: None,
+            interface: Interface::ModelExchange,
+            logger: true,
+            callbacks: true,
+            memory: true,
+            lasting: true,
+            logging: false,
+            event_mode: false,
+            early_return: false,
+            environment: 0,
+        };
+        let p = raw.instantiate(&arguments).unwrap().unwrap();
+        let ok = |status: Option<Status>| assert_eq!(status, Some(Status::OK));
+        ok(raw.experiment(p, None, 0.5, None));
+        ok(raw.simple(Simple::ExitInitializationMode, p));
+        let (status, updated) = raw.update_discrete_states(p, false).unwrap();
+        assert_eq!((status, updated.again, updated.next_event_time_defined), (Status::OK, 0, 0));
+        ok(raw.simple(Simple::EnterContinuousTimeMode, p));
+        assert_eq!(raw.update_discrete_states(p, false).unwrap().0, Status::ERROR, "not in event mode");
+        ok(raw.set_time(p, 0.75));
+        let mut one = [0.25];
+        ok(raw.vector(Vector::SetContinuousStates, p, Some(&mut one), 1));
+        let derivatives = if number == 2 { Vector::GetDerivatives } else { Vector::GetContinuousStateDerivatives };
+        ok(raw.vector(derivatives, p, Some(&mut one), 1));
+        assert_eq!(one, [-0.25]);
+        assert_eq!(raw.completed_integrator_step(p, true, false), Some((Status::OK, [0, 0])));
+        let count = raw.count(Count::GetNumberOfContinuousStates, p, false);
+        assert_eq!(count, (number == 3).then_some((Status::OK, 1)));
+        let seed = SensitivityArguments {
+            unknowns: (Some(&[3]), 1),
+            knowns: (Some(&[2, 1]), 2),
+            seed: (Some(&[2.0, 5.0]), 2),
+        };
+        ok(raw.sensitivity(Sensitivity::GetDirectionalDerivative, p, seed, Some(&mut one), 1));
+        assert_eq!(one, [3.0]);
+        assert_eq!(raw.sensitivity(Sensitivity::GetAdjointDerivative, p, seed, Some(&mut one), 1), None, "missing");
+        assert_eq!(raw.input_derivatives(p, Some(&[1]), 1, Some(&[1]), Some(&[0.0])), None, "missing");
+        raw.free(p).unwrap();
     }
 }
 
