@@ -6,6 +6,7 @@ pub mod ball;
 #[path = "../common/journal.rs"]
 pub mod journal;
 pub mod sampler;
+pub mod slopes;
 pub mod table;
 
 use crate::fmi::{This, *};
