@@ -157,13 +157,15 @@ impl<E: Exported> Instance<E> {
     fn try_value<T: Value>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
         let found = table::<E>().entry(&mut self.current.block, index);
         if let Some((meta, slot)) = found {
-            let allowed = value.judge(meta);
             let held = meta.causality == Causality::Input && T::read(meta, &slot) == Some(value);
-            if allowed == Some(true) && (open(meta, state) || held || self.sets_state(index)) {
-                return Ok(());
-            }
-            if allowed == Some(false) && state == State::Continuous {
-                return Err(Refusal::Discard(message::range::<E::Model>(index, meta, value)));
+            if open(meta, state) || held || self.sets_state(index) {
+                match value.judge(meta) {
+                    Some(true) => return Ok(()),
+                    Some(false) if state == State::Continuous => {
+                        return Err(Refusal::Discard(message::range::<E::Model>(index, meta, value)));
+                    }
+                    _ => {}
+                }
             }
         }
         Err(self.refusal(reference, index, value).into())

@@ -260,7 +260,11 @@ fn model_exchange_samples_at_its_time_events() {
                     assert_eq!((fmu.leave(), fmu.get(Y)), (OK, shown));
                     // An ulp early or late.
                     let at = next + off * f64::EPSILON * next;
-                    assert_eq!((fmu.set_time(at + 0.3 * T), fmu.get(Y)), (OK, shown), "no output changes with time alone");
+                    assert_eq!(
+                        (fmu.set_time(at + 0.3 * T), fmu.get(Y)),
+                        (OK, shown),
+                        "no output changes with time alone"
+                    );
                     assert_eq!((fmu.set_time(at), fmu.completed(), fmu.get(Y)), (OK, OK, shown));
                     assert_eq!(fmu.event(), OK);
                     next = act(&fmu, k, start, &mut seen).unwrap();
@@ -353,7 +357,8 @@ fn states_of_interfaces_do_not_mix() {
 
 #[test]
 fn a_fault_of_a_sample_is_an_error() {
-    for kind in [Kind::Cs2, Kind::Cs3 { event: true, early: false }, Kind::Cs3 { event: false, early: true }, Kind::Me2] {
+    for kind in [Kind::Cs2, Kind::Cs3 { event: true, early: false }, Kind::Cs3 { event: false, early: true }, Kind::Me2]
+    {
         let fmu = Fmu::running(kind, 0.0);
         assert_eq!(fmu.set(&[X], &[2e6]), OK);
         let status = if kind.exchanges() {
@@ -389,7 +394,13 @@ fn a_step_of_a_year() {
 
 #[test]
 fn warnings_come_once_a_second_in_every_mode() {
-    let kinds = [Kind::Cs2, Kind::Cs3 { event: false, early: true }, Kind::Cs3 { event: true, early: false }, Kind::Me2, Kind::Me3];
+    let kinds = [
+        Kind::Cs2,
+        Kind::Cs3 { event: false, early: true },
+        Kind::Cs3 { event: true, early: false },
+        Kind::Me2,
+        Kind::Me3,
+    ];
     for kind in kinds {
         let fmu = Fmu::running(kind, 0.0);
         assert_eq!((fmu.logging(true, &[c"logStatusWarning"]), fmu.set(&[X], &[200.0])), (OK, OK));

@@ -10,10 +10,11 @@ use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
 use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::estimator::{Class, Estimator, Sample};
-use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::log::Warnings;
+use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
-    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns, integrate,
+    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns,
+    integrate,
 };
 use serde::{Deserialize, Serialize};
 
@@ -159,7 +160,8 @@ impl Model for SensorlessController {
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
         // An importer that handles events exchanges values at the instant, before the sample is taken.
         if interface != Interface::CoSimulation && self.parameters.delay == 0 {
-            let allowed = "1 or 2: at an event, the voltages of the last sample act, and the currents are sampled after that";
+            let allowed =
+                "1 or 2: at an event, the voltages of the last sample act, and the currents are sampled after that";
             return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.delay, allowed));
         }
         Ok(())

@@ -19,9 +19,7 @@ use crate::plant::power::{Powers, dc_current};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::PlantParameters;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
-use fmu_core::{
-    ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar, State,
-};
+use fmu_core::{ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar, State};
 
 /// Shift of the indicators in the direction of the decision that an event took, so that none stays at 0.
 const SHIFT: f64 = 1e-9;
@@ -29,11 +27,7 @@ const SHIFT: f64 = 1e-9;
 impl PmsmPlant {
     /// The state of flux linkage (Wb), speed (rad/s) and angle (rad) as the equations see it under these `inputs`.
     #[inline]
-    fn instant<S: Scalar>(
-        &self,
-        inputs: &PlantInputs<S>,
-        (psi, speed, angle): (Vector<Rotor, S>, S, S),
-    ) -> Instant<S> {
+    fn instant<S: Scalar>(&self, inputs: &PlantInputs<S>, (psi, speed, angle): (Vector<Rotor, S>, S, S)) -> Instant<S> {
         let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
         let theta = |angle: S| angle * f64::from(motor.n_p);
         let (speed, angle, axis) = if mechanics.imposed {
@@ -168,13 +162,7 @@ impl ContinuousTime for PmsmPlant {
 }
 
 impl Differentiable for PmsmPlant {
-    fn tangent(
-        &self,
-        _now: Elapsed,
-        along: &Self,
-        dx: &mut [f64],
-        outputs: &mut PlantOutputs,
-    ) -> Result<(), Fault> {
+    fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut PlantOutputs) -> Result<(), Fault> {
         *outputs = self.tangent_under(&self.inputs.changing(&along.inputs), along, dx);
         Ok(())
     }

@@ -106,13 +106,7 @@ impl<S: Scalar> Held<'_, S> {
     /// (rad/s).
     #[expect(clippy::inline_always, reason = "its four calls take half of the time of a step")]
     #[inline(always)]
-    pub(super) fn rates(
-        &self,
-        axis: Axis<Rotor, S>,
-        psi: Vector<Rotor, S>,
-        i: Vector<Rotor, S>,
-        speed: S,
-    ) -> Rates<S> {
+    pub(super) fn rates(&self, axis: Axis<Rotor, S>, psi: Vector<Rotor, S>, i: Vector<Rotor, S>, speed: S) -> Rates<S> {
         let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
         let i = axis.to_stator(i);
         let u = self.legs.map_or(self.u, |legs| self.u - legs.loss(i));
@@ -253,9 +247,7 @@ impl PmsmPlant {
         let acceleration = k_2.acceleration + k_3.acceleration;
         let angle = start.angle + h * (speed + sixth * (k_1.acceleration + acceleration));
         let speed = speed + sixth * (k_1.acceleration + 2.0 * acceleration + k_4.acceleration);
-        let over = |power: fn(&Rates) -> f64| {
-            sixth * (power(&k_1) + 2.0 * (power(&k_2) + power(&k_3)) + power(&k_4))
-        };
+        let over = |power: fn(&Rates) -> f64| sixth * (power(&k_1) + 2.0 * (power(&k_2) + power(&k_3)) + power(&k_4));
         let energy = Energy { r#in: over(|k| k.p_in), mech: over(|k| k.p_mech), loss: over(|k| k.p_loss) };
         let axis = axis_at(motor, angle);
         (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, energy)

@@ -151,11 +151,24 @@ type E = Row<Energy>;
 pub const ENERGY: &Table<Energy> = &Table::new(
     const {
         &[
-            E::output("in", &JOULE, "Energy from the DC link since the start, the integral of p_in; 0 in Model Exchange", |e| &mut e.r#in),
-            E::output("mech", &JOULE, "Energy delivered to the load since the start, the integral of p_mech; 0 in Model Exchange", |e| {
-                &mut e.mech
-            }),
-            E::output("loss", &JOULE, "Energy lost since the start, the integral of p_loss; 0 in Model Exchange", |e| &mut e.loss),
+            E::output(
+                "in",
+                &JOULE,
+                "Energy from the DC link since the start, the integral of p_in; 0 in Model Exchange",
+                |e| &mut e.r#in,
+            ),
+            E::output(
+                "mech",
+                &JOULE,
+                "Energy delivered to the load since the start, the integral of p_mech; 0 in Model Exchange",
+                |e| &mut e.mech,
+            ),
+            E::output(
+                "loss",
+                &JOULE,
+                "Energy lost since the start, the integral of p_loss; 0 in Model Exchange",
+                |e| &mut e.loss,
+            ),
         ]
     },
 );

@@ -5,6 +5,7 @@
 pub mod ball;
 #[path = "../common/journal.rs"]
 pub mod journal;
+pub mod random;
 pub mod sampler;
 pub mod slopes;
 pub mod table;

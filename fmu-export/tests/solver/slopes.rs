@@ -245,7 +245,10 @@ pub fn input_derivatives() {
     assert_eq!(fmu.input_derivatives(&[U], &[1], &[7.0]), OK);
     let (other, bytes) = (Fmu::new(Kind::Cs2), fmu.bytes());
     let mut state = null_mut();
-    assert_eq!((other.deserialize(&bytes, &mut state), other.restore(state), other.free_state(&mut state)), (OK, OK, OK));
+    assert_eq!(
+        (other.deserialize(&bytes, &mut state), other.restore(state), other.free_state(&mut state)),
+        (OK, OK, OK)
+    );
     assert_eq!((fmu.step(0.8, 0.4).0, other.step(0.8, 0.4).0), (OK, OK));
     assert!(fmu.bytes() == other.bytes());
     type Wrong = (&'static str, fn(&Fmu) -> c_int);
