@@ -4,7 +4,7 @@
 
 mod solver;
 
-use fmu_core::{Capabilities, Exported};
+use fmu_core::{Capabilities, Elapsed, Exported, Model, Step};
 use solver::ball::*;
 use solver::random::{Twin, random_calls};
 use solver::{Kind, ball::Ball};
@@ -20,7 +20,9 @@ impl Twin for Ball {
     const VALUES: &'static [f64] = &[0.5, 1.0, 0.0, 2.0, 0.1, 0.7, 3.0, 5.0];
 
     fn is_healthy(&self) -> bool {
-        self.fits()
+        let mut next = self.clone();
+        next.derive();
+        self.fits() && next.advance(&Step { start: Elapsed::ZERO, h: 1e-3 }).is_ok()
     }
 
     fn fits(&self) -> bool {
