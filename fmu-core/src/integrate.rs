@@ -40,7 +40,8 @@ pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, lon
 }
 
 /// The same for a model with events, which happen where they are due: time events exactly, others where an indicator
-/// changes its sign. Every communication point is an event too, because inputs may have changed.
+/// changes its sign. Every step begins with an event, because inputs may have changed; one that is due at the end of the
+/// step belongs to the next one.
 ///
 /// # Errors
 /// Those of [`smooth`] and of [`Events::event`]; events without end.
@@ -55,14 +56,16 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
     let mut budget = substeps(step.h, longest)? + MAX_SUBSTEPS;
     handle(model, now)?;
     loop {
-        let left = match model.next(now).left(now) {
-            Some(0.0) => return Err(standstill(now)),
-            Some(next) if next < end.since(now) => next,
-            _ => end.since(now),
-        };
-        if left <= 0.0 {
+        let rest = end.since(now);
+        if rest <= 0.0 {
             break;
         }
+        let next = model.next(now);
+        let left = match next.left(now) {
+            Some(0.0) => return Err(standstill(now)),
+            Some(left) if left < rest - next.width(end) => left,
+            _ => rest,
+        };
         let h = left / substeps(left, longest)?;
         budget -= 1.0;
         if budget < 0.0 {
@@ -70,8 +73,7 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
         }
         let passed = substep::<M, N>(model, now, h)?;
         now = now.plus(passed.unwrap_or(h));
-        let due = model.next(now).is_due(now);
-        if passed.is_some() || (due && end.since(now) > 0.0) {
+        if passed.is_some() || (end.since(now) > 0.0 && model.next(now).is_due(now)) {
             handle(model, now)?;
         }
     }

@@ -257,7 +257,8 @@ fn model_exchange() {
         // The order of the states, not that of the variables; an output that is a state depends on itself.
         let states = [named("der(inner)", &["u_dc", "speed", "inner"]), named("der(speed)", &[])];
         assert_eq!(unknowns(&md.derivatives), states, "S01");
-        let sector: &[&str] = if two { &["time", "enable", "inner"] } else { &["time", "enable", "bandwidth", "inner"] };
+        let sector: &[&str] =
+            if two { &["time", "enable", "inner"] } else { &["time", "enable", "bandwidth", "inner"] };
         let outputs = [named("speed", &["speed"]), named("sector", sector), named("ready", &[])];
         assert_eq!(unknowns(&md.outputs), outputs, "S01");
         let initial: Vec<_> = unknowns(&md.initial_unknowns).into_iter().map(|(name, _)| name).collect();
@@ -276,7 +277,8 @@ fn model_exchange() {
         assert!(!cs.has_event_mode());
         assert_eq!(cs.attribute("maxOutputDerivativeOrder"), Some("1"));
         assert_eq!(cs.attribute("canInterpolateInputs"), two.then_some("true"));
-        let flag = if two { "providesDirectionalDerivative=\"true\"" } else { "providesDirectionalDerivatives=\"true\"" };
+        let flag =
+            if two { "providesDirectionalDerivative=\"true\"" } else { "providesDirectionalDerivatives=\"true\"" };
         assert_eq!(text.matches(flag).count(), 2, "in both interfaces");
         assert_eq!(text.matches("providesAdjointDerivatives=\"true\"").count(), if two { 0 } else { 2 });
     }

@@ -193,4 +193,4 @@ def test_golden_descriptions(name, version):
     file = GOLDEN / f"{name}-{version}.0.xml"
     schema = etree.XMLSchema(file=Path(fmpy.__file__).parent / f"schema/fmi{version}/fmi{version}ModelDescription.xsd")
     schema.assertValid(etree.parse(file))
-    read_model_description(file, validate=True, validate_variable_names=True, validate_model_structure=True)
+    read_model_description(str(file), validate=True, validate_variable_names=True, validate_model_structure=True)

@@ -192,7 +192,7 @@ impl<M: Twin> Snapshot<M> {
             return Err(ERROR);
         }
         self.tune()?;
-        let (start, end) = (self.elapsed, self.elapsed.plus(h));
+        let (start, end, last) = (self.elapsed, self.elapsed.plus(h), self.end);
         let (event, early) = match self.kind {
             Kind::Cs3 { event, early } if M::CAN.event_mode() => (event, early),
             _ => (false, false),
@@ -211,7 +211,7 @@ impl<M: Twin> Snapshot<M> {
                     (samples.show)(&mut self.block.model);
                     if (samples.sample)(&mut self.block.model).is_err() {
                         // Time has not passed.
-                        self.end = t;
+                        self.end = last;
                         return Err(ERROR);
                     }
                 } else if self.due(k, end) {
@@ -231,7 +231,7 @@ impl<M: Twin> Snapshot<M> {
                 }
             }
         } else if self.block.model.advance(&Step { start, h }).is_err() {
-            self.end = t;
+            self.end = last;
             return Err(ERROR);
         }
         self.elapsed = reached;
@@ -716,7 +716,8 @@ impl<M: Twin> World<M> {
             assert_eq!(bits(&values), bits(&expected), "{references:?} {}", self.trace);
         }
         if now.block.model.is_healthy() {
-            assert_eq!(fmu.state(), now.state, "{}", self.trace);
+            let state = fmu.state();
+            assert_eq!(state, now.state, "{} {:?}", self.trace, (now.end, serde_json::to_string(&now.block)));
             fmu.messages();
         }
     }
