@@ -18,7 +18,8 @@ use fmu_export::snapshot::Snapshot;
 /// Saves and restores a block's state.
 fn again_and_again<M: Model>(block: Block<M>, what: &str) {
     let log = Log::new(Box::new(Silent), false);
-    let mut instance = Instance::<Plain<M>>::new(Standard::Fmi3, what.into(), log, Snapshot { block, ..Snapshot::default() });
+    let mut instance =
+        Instance::<Plain<M>>::new(Standard::Fmi3, what.into(), log, Snapshot { block, ..Snapshot::default() });
     let handle = instance.save(0).unwrap();
     let before = calls();
     for _ in 0..100 {
@@ -33,6 +34,10 @@ struct Silent;
 
 impl Sink for Silent {
     fn write(&self, _: Status, _: &str, _: &str) {}
+
+    fn hears(&self) -> bool {
+        false
+    }
 }
 
 #[test]

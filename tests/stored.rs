@@ -30,6 +30,10 @@ struct Silent;
 
 impl Sink for Silent {
     fn write(&self, _: Status, _: &str, _: &str) {}
+
+    fn hears(&self) -> bool {
+        false
+    }
 }
 
 /// Random numbers: `SplitMix64` (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014).

@@ -25,17 +25,21 @@ impl Next {
     /// Seconds from `now` to this event: 0 if it is due, also if `now` misses it by rounding. An importer may take a time
     /// of its own for that of the event if both are the same to 1e-9 of the time.
     pub fn left(self, now: Elapsed) -> Option<f64> {
-        self.ahead(now).map(|(left, _)| left)
+        let left = match self {
+            Self::Never => return None,
+            Self::Grid { k, period } => -now.minus_periods(k, period),
+            Self::At(time) => time.since(now),
+        };
+        Some(if left <= self.width(now) { 0.0 } else { left })
     }
 
-    /// The same, and how far apart two times may be to be the same instant.
-    pub(crate) fn ahead(self, now: Elapsed) -> Option<(f64, f64)> {
-        let (left, width) = match self {
-            Self::Never => return None,
-            Self::Grid { k, period } => (-now.minus_periods(k, period), SampleGrid { period }.width()),
-            Self::At(time) => (time.since(now), 1e-9 * now.seconds().abs()),
-        };
-        Some((if left <= width { 0.0 } else { left }, width))
+    /// Instants closer than this many seconds are the same instant.
+    pub(crate) fn width(self, now: Elapsed) -> f64 {
+        match self {
+            Self::Never => 0.0,
+            Self::Grid { period, .. } => SampleGrid { period }.width(),
+            Self::At(_) => 1e-9 * now.seconds().abs(),
+        }
     }
 
     /// Whether the event is due at `now`.

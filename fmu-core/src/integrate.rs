@@ -42,7 +42,8 @@ pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, lon
 }
 
 /// The same for a model with events, which happen where they are due: time events exactly, others where an indicator
-/// changes its sign. Every communication point is an event too, because inputs may have changed.
+/// changes its sign. Every step begins with an event, because inputs may have changed; one that is due at the end of the
+/// step belongs to the next one.
 ///
 /// # Errors
 /// Those of [`smooth`] and of [`Events::event`]; events without end.
@@ -63,8 +64,9 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
             break;
         }
         // An event at the end belongs to the next step, with its inputs.
-        let left = match model.next(now).ahead(now) {
-            Some((next, width)) if rest - next > width => next,
+        let next = model.next(now);
+        let left = match next.left(now) {
+            Some(left) if left < rest - next.width(end) => left,
             _ => rest,
         };
         if left <= 0.0 {
@@ -78,8 +80,7 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
             return Err(standstill(now));
         }
         now = now.plus(passed.unwrap_or(h));
-        let due = model.next(now).ahead(now).is_some_and(|(next, width)| next <= 0.0 && end.since(now) > width);
-        if passed.is_some() || due {
+        if passed.is_some() || (model.next(now).is_due(now) && end.since(now) > model.next(now).width(now)) {
             handle(model, now)?;
         }
     }

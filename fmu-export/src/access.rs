@@ -157,13 +157,14 @@ impl<E: Exported> Instance<E> {
     fn try_value<T: Value>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
         let found = table::<E>().entry(&mut self.current.block, index);
         if let Some((meta, slot)) = found {
-            let allowed = value.judge(meta);
             let held = meta.causality == Causality::Input && T::read(meta, &slot) == Some(value);
-            if allowed == Some(true) && (open(meta, state) || held || self.sets_state(index)) {
+            let (possible, settable) = (value.judge(meta), open(meta, state) || held || self.sets_state(index));
+            if possible == Some(true) && settable {
                 return Ok(());
             }
             // FMI 2.0.5, 2.1.3. CVode looks ahead of an event, where FMPy already sets the discrete inputs of after it.
-            if state == State::Continuous && meta.causality == Causality::Input && allowed.is_some() {
+            let tried = settable || meta.causality == Causality::Input;
+            if state == State::Continuous && tried && possible.is_some() {
                 return Err(Refusal::Discard(self.refusal(reference, index, value)));
             }
         }

@@ -35,6 +35,7 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// Tunable parameters that do not fit together, or what the model reports.
     pub fn update_discrete(&mut self) -> Result<Update, Fault> {
+        self.stale |= self.exchanges();
         let current = &mut self.current;
         if current.dirty {
             current.block.model = current.judged()?;

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{AWKWARD, VERSIONS, generation, sample, xml};
+use common::{AWKWARD, VERSIONS, exchange_sample, generation, sample, sampled_sample, xml};
 use fmu_core::Description;
 use model_description::{
     BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, Unknown, Variability, read, write,
@@ -15,15 +15,17 @@ fn sample_read(version: FmiVersion) -> ModelDescription {
 /// The whole text, so that a change of it is seen. `UPDATE_GOLDEN=1 cargo test -p model-description` accepts a change.
 #[test]
 fn golden_files() {
-    for version in VERSIONS {
-        let path = format!("{}/tests/golden/sample-{version}.xml", env!("CARGO_MANIFEST_DIR"));
-        let written = xml(version);
-        if std::env::var_os("UPDATE_GOLDEN").is_some() {
-            std::fs::write(&path, &written).unwrap();
+    for (name, of) in [("sample", sample()), ("exchange", exchange_sample()), ("sampled", sampled_sample())] {
+        for version in VERSIONS {
+            let path = format!("{}/tests/golden/{name}-{version}.xml", env!("CARGO_MANIFEST_DIR"));
+            let written = write(&of, version, &generation());
+            if std::env::var_os("UPDATE_GOLDEN").is_some() {
+                std::fs::write(&path, &written).unwrap();
+            }
+            let golden = std::fs::read_to_string(&path).unwrap();
+            assert!(written == golden, "{path} differs from what is written now:\n{written}");
+            assert_eq!(written, write(&of, version, &generation()), "not deterministic");
         }
-        let golden = std::fs::read_to_string(&path).unwrap();
-        assert!(written == golden, "{path} differs from what is written now:\n{written}");
-        assert_eq!(written, xml(version), "not deterministic");
     }
 }
 
@@ -231,5 +233,68 @@ fn a_model_without_outputs_has_no_empty_list() {
         let text = write(&bare, version, &generation());
         assert!(text.contains("<ModelStructure/>") && !text.contains("TypeDefinitions"), "X01: {text}");
         assert_eq!(read(&text).unwrap().variables.len(), 1);
+    }
+}
+
+/// FMI 2.0.5, 2.2.1, 2.2.7 and 2.2.8; FMI 3.0.2, 2.4.7.5 and 2.4.8.
+#[test]
+fn model_exchange() {
+    for version in VERSIONS {
+        let text = write(&exchange_sample(), version, &generation());
+        let md = read(&text).unwrap();
+        assert_eq!(md.model_exchange.as_ref().map(|i| i.model_identifier.as_str()), Some("Exchange"));
+        assert!(text.find("<ModelExchange").unwrap() < text.find("<CoSimulation").unwrap(), "the order of the schemas");
+        let two = version == FmiVersion::V2;
+        assert_eq!(text.contains("numberOfEventIndicators=\"1\""), two);
+        assert_eq!(text.contains("name=\"edge\""), !two);
+        assert_eq!(text.matches("<EventIndicator valueReference=\"17\"/>").count(), usize::from(!two));
+        let name = |&reference: &u32| md.referenced(reference).unwrap().name.as_str();
+        let unknowns = |list: &[Unknown]| -> Vec<(String, Vec<String>)> {
+            let of = |u: &Unknown| u.dependencies.iter().flatten().map(|r| name(r).to_owned()).collect();
+            list.iter().map(|u| (name(&u.reference).to_owned(), of(u))).collect()
+        };
+        let named = |name: &str, of: &[&str]| (name.to_owned(), of.iter().map(ToString::to_string).collect::<Vec<_>>());
+        // The order of the states, not that of the variables; an output that is a state depends on itself.
+        let states = [named("der(inner)", &["u_dc", "speed", "inner"]), named("der(speed)", &[])];
+        assert_eq!(unknowns(&md.derivatives), states, "S01");
+        let sector: &[&str] =
+            if two { &["time", "enable", "inner"] } else { &["time", "enable", "bandwidth", "inner"] };
+        let outputs = [named("speed", &["speed"]), named("sector", sector), named("ready", &[])];
+        assert_eq!(unknowns(&md.outputs), outputs, "S01");
+        let initial: Vec<_> = unknowns(&md.initial_unknowns).into_iter().map(|(name, _)| name).collect();
+        assert_eq!(initial, ["gain", "speed", "sector", "ready", "inner", "der(inner)", "der(speed)"], "S02");
+        assert!(md.initial_unknowns.is_sorted_by(|a, b| a.reference < b.reference), "S02: sorted, each once");
+        for (derivative, state) in [("der(inner)", "inner"), ("der(speed)", "speed")] {
+            let v = md.variable(derivative).unwrap();
+            assert_eq!((v.causality, v.initial, &v.start), (Causality::Local, Some(Initial::Calculated), &None));
+            // An index in FMI 2.0, a value reference in FMI 3.0.
+            let position = md.variables.iter().position(|v| v.name == state).unwrap() + 1;
+            let reference = md.variable(state).unwrap().value_reference;
+            assert_eq!(v.derivative, Some(if two { u32::try_from(position).unwrap() } else { reference }));
+        }
+        assert_eq!(text.matches("reinit=\"true\"").count(), 1);
+        let cs = md.co_simulation.unwrap();
+        assert!(!cs.has_event_mode());
+        assert_eq!(cs.attribute("maxOutputDerivativeOrder"), Some("1"));
+        assert_eq!(cs.attribute("canInterpolateInputs"), two.then_some("true"));
+        let flag =
+            if two { "providesDirectionalDerivative=\"true\"" } else { "providesDirectionalDerivatives=\"true\"" };
+        assert_eq!(text.matches(flag).count(), 2, "in both interfaces");
+        assert_eq!(text.matches("providesAdjointDerivatives=\"true\"").count(), if two { 0 } else { 2 });
+    }
+}
+
+/// Time events only: Event Mode and early return in FMI 3.0, no derivatives.
+#[test]
+fn a_sampled_model() {
+    for version in VERSIONS {
+        let text = write(&sampled_sample(), version, &generation());
+        let md = read(&text).unwrap();
+        let (two, cs) = (version == FmiVersion::V2, md.co_simulation.unwrap());
+        assert_eq!((cs.has_event_mode(), cs.flag("mightReturnEarlyFromDoStep")), (!two, !two));
+        assert!(md.derivatives.is_empty() && !text.contains("Derivative"), "{text}");
+        assert_eq!(text.contains("numberOfEventIndicators=\"0\""), two);
+        assert!(md.outputs.iter().all(|u| u.dependencies == Some(vec![])));
+        assert_eq!(cs.attribute("canInterpolateInputs"), two.then_some("false"));
     }
 }

@@ -194,3 +194,16 @@ def test_archives_that_must_exist(archives):
     for name in CONTRACT:
         for standard in (2, 3):
             assert (archives / f"fmi{standard}" / f"{name}.fmu").is_file()
+
+
+GOLDEN = Path(__file__).parents[2] / "modelDescription/tests/golden"
+
+
+@pytest.mark.parametrize("name", ["sample", "exchange", "sampled"])
+@pytest.mark.parametrize("version", ["2", "3"])
+def test_golden_descriptions(name, version):
+    """States, event indicators and event mode as model-description writes them: the schemas and FMPy accept them."""
+    file = GOLDEN / f"{name}-{version}.0.xml"
+    schema = etree.XMLSchema(file=Path(fmpy.__file__).parent / f"schema/fmi{version}/fmi{version}ModelDescription.xsd")
+    schema.assertValid(etree.parse(file))
+    read_model_description(str(file), validate=True, validate_variable_names=True, validate_model_structure=True)

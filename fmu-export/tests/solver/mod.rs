@@ -5,7 +5,9 @@
 pub mod ball;
 #[path = "../common/journal.rs"]
 pub mod journal;
+pub mod random;
 pub mod sampler;
+pub mod slopes;
 pub mod table;
 
 use crate::fmi::{This, *};

@@ -17,12 +17,14 @@ pub struct Sampler {
     pub samples: u64,
     pub computed: f64,
     pub shown: f64,
+    pub derived: i32,
 }
 
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Outputs {
     pub y: f64,
     pub count: i32,
+    pub derived: i32,
 }
 
 // Value references, written down by hand.
@@ -36,7 +38,8 @@ pub const GAIN: u32 = 6;
 pub const PERIOD: u32 = 7;
 pub const FIXED: u32 = 8;
 pub const PRODUCT: u32 = 9;
-pub const UNKNOWN: u32 = 10;
+pub const DERIVED: u32 = 10;
+pub const UNKNOWN: u32 = 11;
 
 impl Default for Sampler {
     fn default() -> Self {
@@ -51,6 +54,7 @@ impl Default for Sampler {
             samples: 0,
             computed: 0.0,
             shown: 0.0,
+            derived: 0,
         }
     }
 }
@@ -77,12 +81,14 @@ impl Model for Sampler {
                 V::parameter("T", &SECOND, "Sample period", |m| &mut m.model.period).above(0.0),
                 V::parameter("fixed", &ONE, "Factor", |m| &mut m.model.fixed).at_least(0.0).at_most(10.0),
                 V::calculated("product", &ONE, "gain times fixed", |m| &mut m.model.product),
+                V::integer_output("derived", "How often derive ran", |m| &mut m.out.derived),
             ]
         },
     );
 
     fn derive(&mut self) {
         self.product = self.gain * self.fixed;
+        self.derived += 1;
     }
 
     fn validate(&self) -> Result<(), Fault> {
@@ -94,7 +100,7 @@ impl Model for Sampler {
     }
 
     fn output(&self, _now: Elapsed, out: &mut Outputs) {
-        *out = Outputs { y: self.shown, count: i32::try_from(self.samples).unwrap_or(i32::MAX) };
+        *out = Outputs { y: self.shown, count: i32::try_from(self.samples).unwrap_or(i32::MAX), derived: self.derived };
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {

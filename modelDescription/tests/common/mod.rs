@@ -2,9 +2,9 @@
 
 #![allow(dead_code)] // each test file uses its own part
 
-use fmu_core::description::{Member, Terminal, TerminalPicture, Value, Variable, VariableKind};
+use fmu_core::description::{Member, ModelExchange, Terminal, TerminalPicture, Value, Variable, VariableKind};
 use fmu_core::terminal::{MatchingRule, MemberKind};
-use fmu_core::unit::{ONE, Quantity, RAD_PER_S, SPEED, VOLT};
+use fmu_core::unit::{ONE, Quantity, RAD_PER_S, SPEED, Unit, VOLT};
 use fmu_core::{Causality, Description, Experiment, Variability};
 use model_description::{FmiVersion, Generation, write};
 
@@ -134,6 +134,48 @@ pub(crate) fn sample() -> Description {
         icon: Some(SVG.into()),
         model_exchange: None,
     }
+}
+
+/// The sample with two states, whose order is not that of the variables, and an event indicator.
+pub(crate) fn exchange_sample() -> Description {
+    let local = (Causality::Local, Variability::Continuous);
+    let acceleration = Quantity::new("Acceleration", Unit::si("rad/s2", RAD_PER_S.unit.exponents));
+    let mut description = sample();
+    for v in &mut description.variables {
+        match &*v.name {
+            "speed" => v.dependencies = Some(vec![11]),
+            // On a discrete input, a state, a parameter, which FMI 2.0 does not count, and time.
+            "sector" => v.dependencies = Some(vec![2, 14, 8, 0]),
+            "ready" => v.dependencies = Some(vec![]),
+            "inner" => (v.initial_dependencies, v.reinit, v.nominal) = (Some(vec![1]), true, Some(-20.0)),
+            _ => {}
+        }
+    }
+    let derivative = |name: &str, reference, of, dependencies: &[u32]| Variable {
+        initial_dependencies: Some(dependencies.iter().copied().filter(|&known| known < 11).collect()),
+        dependencies: Some(dependencies.to_vec()),
+        derivative: Some(of),
+        ..variable(name, reference, local, real(&acceleration))
+    };
+    description.variables.extend([
+        derivative("der(inner)", 15, 14, &[1, 11, 14]),
+        derivative("der(speed)", 16, 11, &[]),
+        variable("edge", 17, local, real(&ONE)),
+    ]);
+    let exchange =
+        ModelExchange { states: vec![14, 11], derivatives: vec![15, 16], indicators: vec![17], event_mode: false };
+    Description { name: "Exchange".into(), model_exchange: Some(exchange), ..description }
+}
+
+/// The sample as a sampled model: time events, no states.
+pub(crate) fn sampled_sample() -> Description {
+    let exchange =
+        ModelExchange { states: Vec::new(), derivatives: Vec::new(), indicators: Vec::new(), event_mode: true };
+    let mut description = sample();
+    for v in description.variables.iter_mut().filter(|v| v.causality == Causality::Output) {
+        v.dependencies = Some(Vec::new());
+    }
+    Description { name: "Sampled".into(), model_exchange: Some(exchange), ..description }
 }
 
 /// A picture of nothing.

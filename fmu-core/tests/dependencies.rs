@@ -1,0 +1,193 @@
+//! Dependencies found by probing, for a model whose dependencies are known.
+#![allow(missing_docs)]
+
+use fmu_core::unit::ONE;
+use fmu_core::*;
+use serde::{Deserialize, Serialize};
+
+/// dx/dt = -x + fixed u + k, dy/dt = q x if the time event has come; it holds the input.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Known {
+    u: f64,
+    k: f64,
+    on: bool,
+    unused: f64,
+    fixed: f64,
+    tunable: f64,
+    twice: f64,
+    x_start: f64,
+    x: f64,
+    y: f64,
+    held: f64,
+    late: bool,
+}
+
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Outputs {
+    through: f64,
+    gated: f64,
+    tuned: f64,
+    clock: f64,
+    held: f64,
+    constant: f64,
+    sum: f64,
+}
+
+type V = Row<Block<Known>>;
+
+impl Model for Known {
+    type Outputs = Outputs;
+    const INFO: Info = Info { name: "Known", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = &Table::new(
+        const {
+            &[
+                V::input("u", &ONE, "", |m| &mut m.model.u),
+                V::discrete_input("k", &ONE, "", |m| &mut m.model.k).at_least(-1.0).at_most(1.0),
+                V::boolean_input("on", "", |m| &mut m.model.on),
+                V::input("unused", &ONE, "", |m| &mut m.model.unused),
+                V::parameter("fixed", &ONE, "", |m| &mut m.model.fixed),
+                V::parameter("tunable", &ONE, "", |m| &mut m.model.tunable).tunable(),
+                V::parameter("x_start", &ONE, "", |m| &mut m.model.x_start),
+                V::calculated("twice", &ONE, "", |m| &mut m.model.twice),
+                V::output("x", &ONE, "", |m| &mut m.model.x),
+                V::state("y", &ONE, "", |m| &mut m.model.y),
+                V::output("through", &ONE, "", |m| &mut m.out.through),
+                V::output("gated", &ONE, "", |m| &mut m.out.gated),
+                V::output("tuned", &ONE, "", |m| &mut m.out.tuned),
+                V::output("clock", &ONE, "", |m| &mut m.out.clock),
+                V::discrete_output("held", &ONE, "", |m| &mut m.out.held),
+                V::output("constant", &ONE, "", |m| &mut m.out.constant),
+                V::output("sum", &ONE, "", |m| &mut m.out.sum),
+            ]
+        },
+    );
+
+    fn derive(&mut self) {
+        self.twice = 2.0 * self.tunable;
+    }
+
+    fn initialize(&mut self) {
+        (self.x, self.y, self.held, self.late) = (self.x_start, 0.0, self.u, false);
+    }
+
+    fn output(&self, now: Elapsed, out: &mut Outputs) {
+        *out = Outputs {
+            through: self.u,
+            gated: if self.on { self.u * self.x } else { 0.0 },
+            tuned: self.twice * self.y,
+            clock: now.seconds(),
+            held: self.held,
+            constant: 1.0,
+            sum: self.k + self.x + self.fixed,
+        };
+    }
+
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        integrate::hybrid::<Self, 2>(self, step, 0.1)
+    }
+}
+
+impl ContinuousTime for Known {
+    const STATES: &'static [State<Self>] =
+        &[State::new("y", &ONE, |m: &mut Known| &mut m.y), State::new("x", &ONE, |m: &mut Known| &mut m.x)];
+
+    fn derivatives(&self, _: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = if self.late { self.twice * self.x } else { 0.0 };
+        dx[1] = -self.x + self.fixed * self.u + self.k;
+        Ok(())
+    }
+}
+
+impl Events for Known {
+    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault> {
+        self.held = self.u;
+        self.late = now.seconds() > 0.5;
+        Ok(Outcome::default())
+    }
+
+    fn next(&self, _: Elapsed) -> Next {
+        Next::Never
+    }
+}
+
+struct This;
+
+impl Exported for This {
+    type Model = Known;
+    const CAN: Capabilities<Known> = Capabilities::NONE.ContinuousTime().Events();
+}
+
+fn names(description: &Description, of: Option<&Vec<u32>>) -> Option<String> {
+    let name = |reference: &u32| match *reference {
+        description::TIME => "time".to_owned(),
+        reference => description.variables.iter().find(|v| v.value_reference == reference).unwrap().name.clone(),
+    };
+    of.map(|list| list.iter().map(name).collect::<Vec<_>>().join(" "))
+}
+
+#[test]
+fn between_events() {
+    let description = Description::exported::<This>().unwrap();
+    let known = [
+        ("x", Some("x")),
+        ("through", Some("u")),
+        ("gated", Some("u on x")),
+        ("tuned", Some("tunable y")),
+        ("clock", Some("time")),
+        // An event changes it, and nothing between events.
+        ("held", Some("")),
+        ("constant", Some("")),
+        ("sum", Some("k x")),
+        // Only after its event, which the probe must meet.
+        ("der(y)", Some("tunable x")),
+        ("der(x)", Some("u k x")),
+        ("y", None),
+        ("twice", None),
+        ("u", None),
+    ];
+    for (name, wanted) in known {
+        let variable = description.variable(name).unwrap();
+        assert_eq!(names(&description, variable.dependencies.as_ref()).as_deref(), wanted, "{name}");
+    }
+}
+
+#[test]
+fn at_the_start() {
+    let description = Description::exported::<This>().unwrap();
+    let known = [
+        ("x", Some("x_start")),
+        ("y", Some("")),
+        ("twice", Some("tunable")),
+        ("through", Some("u")),
+        ("gated", Some("u on x_start")),
+        ("tuned", Some("")),
+        ("clock", Some("")),
+        ("held", Some("u")),
+        ("sum", Some("k fixed x_start")),
+        ("der(y)", Some("")),
+        ("der(x)", Some("u k fixed x_start")),
+        ("tunable", None),
+    ];
+    for (name, wanted) in known {
+        let variable = description.variable(name).unwrap();
+        assert_eq!(names(&description, variable.initial_dependencies.as_ref()).as_deref(), wanted, "{name}");
+    }
+    // For co-simulation alone there is nothing between events, and no state is an initial unknown.
+    let plain = Description::of::<Known>().unwrap();
+    assert!(plain.variables.iter().all(|v| v.dependencies.as_ref().is_none_or(Vec::is_empty)));
+    assert!(plain.variable("y").unwrap().initial_dependencies.is_none() && plain.variable("der(x)").is_none());
+}
+
+/// The order of the states is that of STATES; their references follow the table.
+#[test]
+fn states_and_references() {
+    let description = Description::exported::<This>().unwrap();
+    let exchange = description.model_exchange.as_ref().unwrap();
+    assert_eq!(
+        (&exchange.states[..], &exchange.derivatives[..], exchange.event_mode),
+        (&[10, 9][..], &[18, 19][..], false)
+    );
+    let der = description.variable("der(x)").unwrap();
+    assert_eq!((der.value_reference, der.derivative, der.causality), (19, Some(9), Causality::Local));
+    assert_ne!(description.token, Description::of::<Known>().unwrap().token, "another interface is another token");
+}
