@@ -1,4 +1,4 @@
-//! An FMU of your own in one file: a capacitor charged through a resistor.
+//! An FMU of your own in one file: a capacitor charged through a resistor, for Co-Simulation and Model Exchange.
 //!
 //! ```sh
 //! cargo run --release -- build --package own-fmu
@@ -6,12 +6,16 @@
 //!     --stop 5 --step 0.1 --csv -
 //! ```
 
+use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, Exponents, OHM, Quantity, Unit, VOLT};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table};
+use fmu_core::{
+    Block, ContinuousTime, Elapsed, Experiment, Fault, Info, Model, Row, State, Step, Table, Warns, integrate,
+};
 use serde::{Deserialize, Serialize};
 
 /// A quantity of your own: a name, a unit, its SI base exponents (kg, m, s, A).
 const FARAD: Quantity = Quantity::new("Capacitance", Unit::si("F", Exponents::mechanical(-1, -2, 4, 2)));
+const VOLT_PER_S: Quantity = Quantity::new("VoltageRate", Unit::si("V/s", Exponents::mechanical(1, 2, -4, -1)));
 
 /// Inputs, parameters and state are plain data: this is all that a saved FMU state has to hold.
 #[derive(Clone, Serialize, Deserialize)]
@@ -20,13 +24,14 @@ struct RcCircuit {
     resistance: f64,
     capacitance: f64,
     u_start: f64,
+    u_rated: f64,
     u_c: f64,
 }
 
 /// Start values come from here and from nowhere else.
 impl Default for RcCircuit {
     fn default() -> Self {
-        Self { u: 0.0, resistance: 1e3, capacitance: 1e-3, u_start: 0.0, u_c: 0.0 }
+        Self { u: 0.0, resistance: 1e3, capacitance: 1e-3, u_start: 0.0, u_rated: 16.0, u_c: 0.0 }
     }
 }
 
@@ -49,7 +54,7 @@ impl Model for RcCircuit {
         license: "MIT",
         copyright: "Copyright (c) 2026 You",
         experiment: Experiment { start: 0.0, stop: 5.0, step: 0.1 },
-        documentation: "<p>R C du<sub>c</sub>/dt = u − u<sub>c</sub>, solved exactly for a held input.</p>",
+        documentation: "<p>R C du<sub>c</sub>/dt = u − u<sub>c</sub></p>",
     };
 
     // Name, unit, range and place of every variable; names must differ, or this does not compile.
@@ -62,6 +67,7 @@ impl Model for RcCircuit {
                 V::parameter("R", &OHM, "Resistance", |m| &mut m.model.resistance).above(0.0),
                 V::parameter("C", &FARAD, "Capacitance", |m| &mut m.model.capacitance).above(0.0),
                 V::parameter("u_start", &VOLT, "Voltage of the capacitor at the start", |m| &mut m.model.u_start),
+                V::parameter("u_rated", &VOLT, "Rated voltage of the capacitor", |m| &mut m.model.u_rated).above(0.0),
             ]
         },
     );
@@ -74,11 +80,29 @@ impl Model for RcCircuit {
         *out = Outputs { u_c: self.u_c, i: (self.u - self.u_c) / self.resistance };
     }
 
+    // Co-Simulation: the built-in integrator, with substeps of at most 1 ms.
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        let decay = (-step.h / (self.resistance * self.capacitance)).exp();
-        self.u_c = self.u + (self.u_c - self.u) * decay;
+        integrate::smooth::<Self, 1>(self, step, 1e-3)
+    }
+}
+
+// The physics. With it, the FMU has Model Exchange and derivatives besides.
+impl ContinuousTime for RcCircuit {
+    const STATES: &'static [State<Self>] = &[State::new("u_c", &VOLT_PER_S, |m: &mut Self| &mut m.u_c)];
+
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = (self.u - self.u_c) / (self.resistance * self.capacitance);
         Ok(())
     }
 }
 
-fmu_export::export!(RcCircuit);
+// Reaches the importer's log, at most once a second, if it asked for warnings.
+impl Warns for RcCircuit {
+    fn warn(&self, log: &mut Warnings<'_>) {
+        if self.u_c.abs() > self.u_rated {
+            log.warn("rating", || format!("u_c = {} V is above the rated {} V", self.u_c, self.u_rated));
+        }
+    }
+}
+
+fmu_export::export!(RcCircuit: ContinuousTime + Warns);
