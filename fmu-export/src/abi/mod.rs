@@ -96,6 +96,45 @@ macro_rules! functions {
 /// ```ignore
 /// fmu_export::export!(drive::PmsmPlant: ContinuousTime + Events + Differentiable);
 /// ```
+///
+/// A capability whose trait the model lacks does not compile:
+///
+/// ```compile_fail,E0277
+/// # use fmu_core::*;
+/// #[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
+/// struct Still;
+/// # type Whole = Block<Still>;
+/// impl Model for Still {
+///     # type Outputs = ();
+///     # const INFO: Info = Info { name: "Still", ..Info::DEFAULT };
+///     # const TABLE: &'static Table<Whole> = &Table::new(const { &[] });
+///     # fn initialize(&mut self) {}
+///     # fn output(&self, _: Elapsed, (): &mut ()) {}
+///     # fn advance(&mut self, _: &Step) -> Result<(), Fault> { Ok(()) }
+///     // ...
+/// }
+/// fmu_export::export!(Still: ContinuousTime); // the trait `ContinuousTime` is not implemented for `Still`
+/// # fn main() {}
+/// ```
+///
+/// and without it, it does:
+///
+/// ```
+/// # use fmu_core::*;
+/// # #[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
+/// # struct Still;
+/// # type Whole = Block<Still>;
+/// # impl Model for Still {
+/// #     type Outputs = ();
+/// #     const INFO: Info = Info { name: "Still", ..Info::DEFAULT };
+/// #     const TABLE: &'static Table<Whole> = &Table::new(const { &[] });
+/// #     fn initialize(&mut self) {}
+/// #     fn output(&self, _: Elapsed, (): &mut ()) {}
+/// #     fn advance(&mut self, _: &Step) -> Result<(), Fault> { Ok(()) }
+/// # }
+/// fmu_export::export!(Still);
+/// # fn main() {}
+/// ```
 #[macro_export]
 macro_rules! export {
     ($model:ty $(: $first:ident $(+ $more:ident)*)?) => {

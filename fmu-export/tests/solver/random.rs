@@ -96,6 +96,13 @@ impl<M: Twin> Snapshot<M> {
         }
     }
 
+    /// No variable is NaN.
+    fn is_storable(&self) -> bool {
+        let mut block = self.block.clone();
+        let real = |i| !matches!(M::TABLE.entry(&mut block, i), Some((_, Slot::Real(x))) if x.is_nan());
+        (0..M::TABLE.len()).all(real)
+    }
+
     fn derivatives(&mut self) -> Result<Vec<f64>, c_int> {
         let mut dx = vec![0.0; M::CAN.states().len()];
         if let Some(continuous) = &M::CAN.continuous {
@@ -380,7 +387,7 @@ impl<M: Twin> World<M> {
                 fmu.enter(start, None)
             }
             "exit" => {
-                wanted = if is("n") && now.block.model.fits() { OK } else { ERROR };
+                wanted = if is("n") && now.block.model.fits() && now.is_storable() { OK } else { ERROR };
                 if wanted == OK {
                     now.block.initialize();
                     (now.fresh, now.running) = (false, true);
@@ -656,9 +663,7 @@ impl<M: Twin> World<M> {
                 {
                     // Through bytes; a variable that is no number is refused.
                     let bytes = fmu.serialized(handle);
-                    let mut block = saved.block.clone();
-                    let real = |i| !matches!(M::TABLE.entry(&mut block, i), Some((_, Slot::Real(x))) if x.is_nan());
-                    let fits = (0..M::TABLE.len()).all(real);
+                    let fits = saved.is_storable();
                     assert_eq!(fmu.deserialize(&bytes, &mut stored), if fits { OK } else { ERROR }, "{}", self.trace);
                     fmu.messages();
                     handle = stored;
