@@ -40,6 +40,19 @@ fn it_charges_as_its_equation_says() {
     }
 }
 
+/// Three lines of physics give both interfaces in both standards, with the state's derivative.
+#[test]
+fn it_has_model_exchange_besides() {
+    for file in archives() {
+        let fmu = Fmu::open(file).unwrap();
+        let md = fmu.description();
+        assert_eq!(md.model_exchange.as_deref(), Some("RcCircuit"));
+        assert_eq!(md.co_simulation.as_ref().unwrap().model_identifier, "RcCircuit");
+        let der = md.variable("der(u_c)").unwrap();
+        assert!(md.derivatives.len() == 1 && der.derivative.is_some());
+    }
+}
+
 /// A value comes through a chain of FMUs within initialization, whatever their order.
 #[test]
 fn a_chain_is_consistent_at_the_start() {
