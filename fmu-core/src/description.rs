@@ -61,6 +61,7 @@ pub struct ModelExchange {
 }
 
 /// A variable of the description.
+#[expect(clippy::struct_excessive_bools, reason = "properties that do not depend on each other")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Variable {
     /// Full name.
@@ -167,8 +168,8 @@ impl Description {
         let mut block = Block::<M>::default();
         block.initialize();
         let states = can.rows()?;
-        let initial = probe::initial_dependencies(can, &states)?;
-        let between = probe::dependencies(can, &states)?;
+        let initial = probe::initial_dependencies(can, &states);
+        let between = probe::dependencies(can, &states);
         let references = |of: &Option<Vec<usize>>| of.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
         let table = M::TABLE;
         let mut variables: Vec<Variable> = Vec::new();

@@ -1,11 +1,11 @@
 //! Finds dependencies by running the model itself: each known is changed alone, at several operating points; every
 //! unknown whose bits change depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
 
+use crate::Elapsed;
 use crate::capability::Capabilities;
 use crate::model::{Block, Model};
 use crate::row::Slot;
 use crate::variable::{Causality, Kind, Meta, Variability};
-use crate::{Elapsed, Fault};
 
 /// Operating points tried, the start values among them.
 const POINTS: u32 = 64;
@@ -17,7 +17,7 @@ pub(crate) const NOW: usize = usize::MAX;
 type Dependencies = Vec<Option<Vec<usize>>>;
 
 /// What initial values depend on: outputs, calculated parameters, states and derivatives on inputs and parameters.
-pub(crate) fn initial_dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Result<Dependencies, Fault> {
+pub(crate) fn initial_dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Dependencies {
     let causality = causalities::<M>();
     let knowns: Vec<usize> = (0..causality.len()).filter(|&i| causality[i].0.is_settable()).collect();
     let mut found = Found::new(causality.len() + states.len());
@@ -39,12 +39,12 @@ pub(crate) fn initial_dependencies<M: Model>(can: &Capabilities<M>, states: &[us
         let calculated = |&(c, _): &(Causality, _)| matches!(c, Causality::Output | Causality::CalculatedParameter);
         states.contains(&i) || causality.get(i).is_none_or(calculated)
     };
-    Ok(found.list(unknown))
+    found.list(unknown)
 }
 
 /// What values depend on between two events: outputs and derivatives on states, inputs, tunable parameters and time,
 /// for any values of the parameters.
-pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Result<Dependencies, Fault> {
+pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Dependencies {
     let causality = causalities::<M>();
     let known = |&(c, v): &(Causality, Variability)| c == Causality::Input || v == Variability::Tunable;
     let mut found = Found::new(causality.len() + states.len());
@@ -82,7 +82,7 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) ->
         now = now.plus(draw.between(0.1, 1.0));
         found.compare(NOW, &before, &observed(can, base, now));
     }
-    Ok(found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output)))
+    found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output))
 }
 
 /// The start values first; then about half of the inputs and parameters have others.

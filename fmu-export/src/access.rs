@@ -125,7 +125,12 @@ impl<E: Exported> Instance<E> {
         self.check_count(references, values.len())?;
         let Some(&any) = values.first() else { return Ok(()) };
         if self.exchanges() {
-            return self.set_in_exchange(references, values);
+            if !self.set_inputs(references, values, any) {
+                self.set_in_exchange(references, values)?;
+            }
+            self.current.dirty |= matches!(self.current.life.state(), State::Instantiated | State::Initialization);
+            self.stale |= matches!(self.current.life.state(), State::Event | State::Continuous);
+            return Ok(());
         }
         Ok(if self.arrays {
             self.set_each::<T, true>(references, values, any)
@@ -148,9 +153,34 @@ impl<E: Exported> Instance<E> {
                 }
             }
         }
-        self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);
-        self.stale |= matches!(state, State::Event | State::Continuous);
         Ok(())
+    }
+
+    /// Sets a few inputs quickly, or nothing if one cannot be set in this way.
+    #[inline]
+    fn set_inputs<T: Value>(&mut self, references: &[u32], values: &[T], any: T) -> bool {
+        if self.arrays || references.len() > SHORT {
+            return false;
+        }
+        let (state, mut old) = (self.current.life.state(), [any; SHORT]);
+        for (i, (&reference, &value)) in references.iter().zip(values).enumerate() {
+            match T::find(table::<E>(), &mut self.current.block, index(reference)) {
+                Some((meta, place))
+                    if meta.causality == Causality::Input && open(meta, state) && value.judge(meta) == Some(true) =>
+                {
+                    (old[i], *place) = (*place, value);
+                }
+                _ => {
+                    for (&reference, &before) in references[..i].iter().zip(&old).rev() {
+                        if let Some((_, place)) = T::find(table::<E>(), &mut self.current.block, index(reference)) {
+                            *place = before;
+                        }
+                    }
+                    return false;
+                }
+            }
+        }
+        true
     }
 
     /// Whether the value can be written in this state.

@@ -81,7 +81,7 @@ impl<E: Exported> Instance<E> {
         check_sizes(&[], 0, (out.len(), unknowns.len()))?;
         for &unknown in unknowns {
             if !self.is_output(unknown, false) {
-                return Err(self.no_side(unknown, "a continuous output").into());
+                return Err(Self::no_side(unknown, "a continuous output").into());
             }
         }
         let mut rates = std::mem::take(&mut self.scratch().rates);
@@ -102,7 +102,7 @@ impl<E: Exported> Instance<E> {
             let input =
                 E::Model::TABLE.entry(&mut self.current.block, index(known)).is_some_and(|(meta, _)| ramps(meta));
             if !input {
-                return Err(self.no_side(known, "a continuous real input"));
+                return Err(Self::no_side(known, "a continuous real input"));
             }
             if *order != 1 {
                 return Err(Fault::value("order", order, "1"));
@@ -204,7 +204,7 @@ impl<E: Exported> Instance<E> {
         let initial = self.current.life.state() == State::Initialization;
         self.refresh();
         let exact = others.iter().all(|&(known, _)| self.is_continuous_input(known))
-            && unknowns.iter().all(|&unknown| self.is_derivative(unknown) || self.is_output(unknown, false));
+            && unknowns.iter().all(|&unknown| Self::is_derivative(unknown) || self.is_output(unknown, false));
         let Some(tangent) = E::CAN.tangent.filter(|_| exact && !initial) else {
             return self.difference(unknowns, others, rates, time, out);
         };
@@ -228,7 +228,7 @@ impl<E: Exported> Instance<E> {
         for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
             *out += pick::<E>(&mut scratch.block, &scratch.dx, index(unknown));
         }
-        self.finite(unknowns, out)
+        Self::finite(unknowns, out)
     }
 
     /// The same by a central difference.
@@ -288,21 +288,21 @@ impl<E: Exported> Instance<E> {
                 *out += side * pick::<E>(block, dx, index(unknown)) / (2.0 * eps);
             }
         }
-        self.finite(unknowns, out)
+        Self::finite(unknowns, out)
     }
 
     /// A derivative that is no finite number does not exist.
-    fn finite(&self, unknowns: &[u32], out: &[f64]) -> Result<(), Refusal> {
+    fn finite(unknowns: &[u32], out: &[f64]) -> Result<(), Refusal> {
         match out.iter().position(|x| !x.is_finite()) {
             None => Ok(()),
             Some(i) => {
-                let name = format!("the derivative of {}", self.name_of(unknowns[i]));
+                let name = format!("the derivative of {}", Self::name_of(unknowns[i]));
                 Err(Refusal::Discard(Fault::value(&name, out[i], "a finite number")))
             }
         }
     }
 
-    fn is_derivative(&self, unknown: u32) -> bool {
+    fn is_derivative(unknown: u32) -> bool {
         index(unknown).wrapping_sub(E::Model::TABLE.len()) < E::CAN.states().len()
     }
 
@@ -329,11 +329,12 @@ impl<E: Exported> Instance<E> {
                 meta.causality == Causality::CalculatedParameter && matches!(meta.kind, Kind::Real(_))
             });
             let of_start = initial && (calculated || self.states.contains(&index(unknown)));
-            if !(self.is_derivative(unknown) || of_start || self.is_output(unknown, state == State::Event || initial)) {
-                return Err(self.no_side(unknown, "an unknown of derivatives in this state"));
+            if !(Self::is_derivative(unknown) || of_start || self.is_output(unknown, state == State::Event || initial))
+            {
+                return Err(Self::no_side(unknown, "an unknown of derivatives in this state"));
             }
             if unknowns[..i].contains(&unknown) {
-                return Err(self.no_side(unknown, "named once among the unknowns"));
+                return Err(Self::no_side(unknown, "named once among the unknowns"));
             }
         }
         for (i, &known) in knowns.iter().enumerate() {
@@ -349,22 +350,22 @@ impl<E: Exported> Instance<E> {
                 fits && matches!(meta.kind, Kind::Real(_)) && meta.dimension.is_none()
             });
             if !(state_row || input) {
-                return Err(self.no_side(known, "a known of derivatives in this state"));
+                return Err(Self::no_side(known, "a known of derivatives in this state"));
             }
             if knowns[..i].contains(&known) {
-                return Err(self.no_side(known, "named once among the knowns"));
+                return Err(Self::no_side(known, "named once among the knowns"));
             }
         }
         Ok(())
     }
 
     #[cold]
-    fn no_side(&self, reference: u32, wanted: &str) -> Fault {
-        Fault::new(format!("{} is not {wanted}", self.name_of(reference)))
+    fn no_side(reference: u32, wanted: &str) -> Fault {
+        Fault::new(format!("{} is not {wanted}", Self::name_of(reference)))
     }
 
     #[cold]
-    fn name_of(&self, reference: u32) -> String {
+    fn name_of(reference: u32) -> String {
         let index = index(reference);
         if E::Model::TABLE.locate(index).is_some() {
             return message::name::<E::Model>(index);

@@ -23,11 +23,11 @@ fn allocations(mut work: impl FnMut()) -> u64 {
     calls() - before
 }
 
-fn derivatives(fmu: &Fmu, knowns: &[u32; 2]) {
+fn derivatives(fmu: &Fmu, knowns: [u32; 2]) {
     let mut out = [0.0; 3];
-    assert_eq!(fmu.directional(&[DER_H, DER_V, E], knowns, &[1.0, 2.0], &mut out), OK);
+    assert_eq!(fmu.directional(&[DER_H, DER_V, E], &knowns, &[1.0, 2.0], &mut out), OK);
     if fmu.kind.version() == 3 {
-        assert_eq!(fmu.adjoint(&[DER_H, DER_V, E], knowns, &[1.0, 2.0, 3.0], &mut out[..2]), OK);
+        assert_eq!(fmu.adjoint(&[DER_H, DER_V, E], &knowns, &[1.0, 2.0, 3.0], &mut out[..2]), OK);
     }
 }
 
@@ -46,9 +46,9 @@ fn a_solver_does_not_allocate() {
             assert_eq!((fmu.try_derivatives(&mut x), fmu.try_indicators(&mut z), fmu.try_states(&mut x)), (OK, OK, OK));
             assert_eq!(fmu.try_get(&[TIME, H, E, A, V, DER_H, DER_V], &mut values), OK);
             assert_eq!((fmu.try_nominals(&mut x), fmu.completed()), (OK, OK));
-            derivatives(&fmu, &[U, V]);
+            derivatives(&fmu, [U, V]);
             assert_eq!((fmu.event(), fmu.set(&[K], &[1.0])), (OK, OK));
-            derivatives(&fmu, &[K, H]);
+            derivatives(&fmu, [K, H]);
             fmu.settle();
             assert_eq!(fmu.leave(), OK);
             assert_eq!((fmu.save(&mut state), fmu.restore(state)), (OK, OK));
@@ -66,7 +66,7 @@ fn a_solver_does_not_allocate() {
             let mut out = [0.0; 2];
             assert_eq!((fmu.set(&[U, K], &[3.0, 1.0]), fmu.step(t, 0.01).0), (OK, OK));
             assert_eq!(fmu.output_derivatives(&[E, H], &[1, 1], &mut out), OK);
-            derivatives(&fmu, &[U, V]);
+            derivatives(&fmu, [U, V]);
             t += 0.01;
         };
         assert_eq!(allocations(step), 0, "{kind:?}");

@@ -17,6 +17,9 @@ fmu_export::export!(Ball: ContinuousTime + Events + Warns);
 
 use fmi::*;
 
+/// What a message tells, and the call.
+type Trial = (&'static str, fn(&Fmu) -> c_int);
+
 const BALL2: &[Line] = &[
     ("fmi2SetDebugLogging", "invcste", '.', |f| f.logging(false, &[])),
     ("fmi2SetupExperiment", "i", '.', |f| f.set_up(0.0, None)),
@@ -28,7 +31,7 @@ const BALL2: &[Line] = &[
     ("fmi2GetBoolean", "nvcste", '.', |f| unsafe { fmi2GetBoolean(f.it, &RESTING, 1, &mut Fmi2Boolean(0)) }),
     ("fmi2GetString", "nvcste", '.', |f| unsafe { fmi2GetString(f.it, null(), 0, null_mut()) }),
     ("fmi2SetReal", "invcs", '.', |f| f.set(&[U], &[2.0])),
-    ("fmi2SetReal", "invs", '.', |f| f.set(&[K, C], &[2.0, 0.2])),
+    ("fmi2SetReal", "invs", '.', |f| f.set(&[C, K], &[0.2, 2.0])),
     ("fmi2SetReal", "in", '.', |f| f.set(&[M, MAP, MAP + 1], &[2.0, 3.0, 4.0])),
     ("fmi2SetReal", "vc", '.', |f| f.set(&[V], &[2.0])),
     ("fmi2SetReal", "", '.', |f| f.set(&[E], &[2.0])),
@@ -77,7 +80,7 @@ const BALL3: &[Line] = &[
     ("fmi3GetInt32", "invcste", '.', |f| unsafe { fmi3GetInt32(f.it, &BOUNCES, 1, &mut 0, 1) }),
     ("fmi3GetBoolean", "invcste", '.', |f| unsafe { fmi3GetBoolean(f.it, &RESTING, 1, &mut Fmi3Boolean(0), 1) }),
     ("fmi3SetFloat64", "invcs", '.', |f| f.set(&[U], &[2.0])),
-    ("fmi3SetFloat64", "invs", '.', |f| f.set(&[K, C], &[2.0, 0.2])),
+    ("fmi3SetFloat64", "invs", '.', |f| f.set(&[C, K], &[0.2, 2.0])),
     ("fmi3SetFloat64", "in", '.', |f| f.set(&[M, MAP], &[2.0, 3.0, 4.0])),
     ("fmi3SetFloat64", "vc", '.', |f| f.set(&[V], &[2.0])),
     ("fmi3SetFloat64", "", '.', |f| f.set(&[E], &[2.0])),
@@ -186,8 +189,9 @@ fn a_state_of_another_interface_is_refused() {
 /// Discard: in Continuous-Time Mode a solver tries values, and nothing changes.
 #[test]
 fn a_trial_step_is_discarded() {
-    type Trial = (&'static str, fn(&Fmu) -> c_int);
-    let trials: [Trial; 9] = [
+    let trials: [Trial; 10] = [
+        // CVode looks ahead of an event, where FMPy already sets the inputs of after it.
+        ("k changes at events only", |f| f.set(&[U, K], &[1.0, 2.0])),
         ("h = NaN", |f| f.set_states(&[f64::NAN, 0.0])),
         ("v = inf", |f| f.set_states(&[0.0, f64::INFINITY])),
         ("v = 2000000000", |f| f.set_states(&[0.0, 2e9])),
@@ -226,11 +230,10 @@ fn a_trial_step_is_discarded() {
 #[test]
 fn bad_input_is_an_error_that_names_its_cause() {
     type Wrong = (char, &'static str, fn(&Fmu) -> c_int);
-    let wrong: [Wrong; 27] = [
+    let wrong: [Wrong; 26] = [
         ('v', "u = NaN", |f| f.set(&[U], &[f64::NAN])),
         ('v', "k = 6", |f| f.set(&[K], &[6.0])),
         ('v', "v = 2000000000", |f| f.set(&[V], &[2e9])),
-        ('c', "k changes at events only", |f| f.set(&[K], &[2.0])),
         ('c', "c changes at events only", |f| f.set(&[C], &[0.2])),
         ('c', "c changes at events only", |f| f.set(&[C], &[0.1])),
         ('c', "m is a fixed parameter", |f| f.set(&[M], &[0.1])),
@@ -267,8 +270,7 @@ fn bad_input_is_an_error_that_names_its_cause() {
         }
     }
     // Lengths that FMI 2.0 does not pass.
-    type Length = (&'static str, fn(&Fmu) -> c_int);
-    let lengths: [Length; 6] = [
+    let lengths: [Trial; 6] = [
         ("nSeed = 2", |f| f.directional(&[A], &[U], &[1.0, 2.0], &mut [0.0])),
         ("nSeed = 0", |f| f.directional(&[A], &[U], &[], &mut [0.0])),
         ("nSensitivity = 2", |f| f.directional(&[A], &[U], &[1.0], &mut [0.0; 2])),
@@ -344,7 +346,7 @@ fn a_discrete_input_can_be_set_to_the_value_that_it_has() {
     for kind in ME {
         let fmu = Fmu::running(kind, 0.0);
         assert_eq!(fmu.set(&[U, K], &[1.0, 0.0]), OK);
-        assert_eq!((fmu.get(U), fmu.set(&[U, K], &[2.0, 0.5])), (1.0, ERROR));
+        assert_eq!((fmu.get(U), fmu.set(&[U, K], &[2.0, 0.5])), (1.0, DISCARD));
         assert_eq!(fmu.get(U), 1.0, "all or none");
     }
 }

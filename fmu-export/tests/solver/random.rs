@@ -195,7 +195,8 @@ impl<M: Twin> Snapshot<M> {
     /// FMI 3.0.2, 4.2.1; the first instant that the step meets ends it, if it may.
     fn step(&mut self, t: f64, h: f64) -> Result<Stepped, c_int> {
         let rounding = 2.0 * f64::EPSILON * t.abs();
-        if !(h > 0.0 && h.is_finite() && t.is_finite() && (t - self.end).abs() <= h / 100.0 + rounding && t + h > t) {
+        let fits = h > 0.0 && h.is_finite() && t.is_finite() && t + h > t;
+        if !fits || (t - self.end).abs() > h / 100.0 + rounding {
             return Err(ERROR);
         }
         self.tune()?;
@@ -214,7 +215,7 @@ impl<M: Twin> Snapshot<M> {
             loop {
                 let k = (samples.samples)(&self.block.model);
                 let at_start = self.due(k, start);
-                if before(k, self) && !(early && !at_start) {
+                if before(k, self) && (at_start || !early) {
                     (samples.show)(&mut self.block.model);
                     if (samples.sample)(&mut self.block.model).is_err() {
                         // Time has not passed.
@@ -262,6 +263,7 @@ impl<M: Twin> Snapshot<M> {
         match (may, range.contains(value)) {
             (true, true) => OK,
             (true, false) if state == 'c' => DISCARD,
+            _ if exchanges && state == 'c' && causality == Causality::Input => DISCARD,
             _ => ERROR,
         }
     }

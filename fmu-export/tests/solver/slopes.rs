@@ -12,6 +12,9 @@ pub struct Exactness {
     pub linear: f64,
 }
 
+/// What is wrong, and the call.
+type Wrong = (&'static str, fn(&Fmu) -> c_int);
+
 const KNOWNS: [u32; 3] = [U, H, V];
 const UNKNOWNS: [u32; 6] = [DER_H, DER_V, H, E, A, V_MEAN];
 
@@ -183,7 +186,6 @@ pub fn output_derivatives(exactness: Exactness) {
         assert_eq!(fmu.directional(&[DER_V], &[V], &[1.0], &mut one), OK);
         assert!((one[0] + 0.1 * v.abs() * rho(h)).abs() < 1e-7);
         assert!(fmu.bytes() == bytes, "a derivative changed the state");
-        type Wrong = (&'static str, fn(&Fmu) -> c_int);
         let wrong: [Wrong; 4] = [
             ("order = 2", |f| f.output_derivatives(&[E], &[2], &mut [0.0])),
             ("order = 0", |f| f.output_derivatives(&[E], &[0], &mut [0.0])),
@@ -251,7 +253,6 @@ pub fn input_derivatives() {
     );
     assert_eq!((fmu.step(0.8, 0.4).0, other.step(0.8, 0.4).0), (OK, OK));
     assert!(fmu.bytes() == other.bytes());
-    type Wrong = (&'static str, fn(&Fmu) -> c_int);
     let wrong: [Wrong; 6] = [
         ("k is not a continuous real input", |f| f.input_derivatives(&[U, K], &[1, 1], &[1.0, 1.0])),
         ("h is not a continuous real input", |f| f.input_derivatives(&[H], &[1], &[1.0])),
