@@ -228,6 +228,10 @@ impl ContinuousTime for PmsmDrive {
         outputs.plant = self.pair.plant.model.outputs_under(&self.plant_inputs());
         outputs.controller.clone_from(&self.pair.controller.out);
     }
+
+    fn integrands(&self, _now: Elapsed, outputs: &mut DriveOutputs) {
+        outputs.plant.energy = self.pair.plant.model.outputs_under(&self.plant_inputs()).powers.into();
+    }
 }
 
 impl Differentiable for PmsmDrive {

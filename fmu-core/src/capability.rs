@@ -27,6 +27,8 @@ pub struct Continuous<M: Model> {
     pub settle: fn(&mut M),
     /// [`ContinuousTime::observe`].
     pub observe: fn(&M, Elapsed, &mut M::Outputs),
+    /// [`ContinuousTime::integrands`].
+    pub integrands: fn(&M, Elapsed, &mut M::Outputs),
 }
 
 /// The functions of [`Events`].
@@ -85,8 +87,13 @@ impl<M: Model> Capabilities<M> {
     where
         M: ContinuousTime,
     {
-        let continuous =
-            Continuous { states: M::STATES, derivatives: M::derivatives, settle: M::settle, observe: M::observe };
+        let continuous = Continuous {
+            states: M::STATES,
+            derivatives: M::derivatives,
+            settle: M::settle,
+            observe: M::observe,
+            integrands: M::integrands,
+        };
         Self { continuous: Some(continuous), ..self }
     }
 

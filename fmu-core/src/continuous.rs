@@ -56,6 +56,10 @@ pub trait ContinuousTime: Model {
     fn observe(&self, now: Elapsed, outputs: &mut Self::Outputs) {
         self.output(now, outputs);
     }
+
+    /// Writes the rates of outputs that grow at given states and inputs, like the energy since the start, in their own
+    /// places, and leaves the others alone: a part of the output derivatives of Co-Simulation.
+    fn integrands(&self, _now: Elapsed, _outputs: &mut Self::Outputs) {}
 }
 
 /// A continuous model that knows its own tangent, for example with [`Dual`](crate::Dual) numbers. For a model that

@@ -1,5 +1,5 @@
-//! Model Exchange and Event Mode: the importer integrates the states and handles the events (FMI 2.0.5, chapter 3;
-//! FMI 3.0.2, chapter 3 and 2.3.5).
+//! Model Exchange and Event Mode: the importer integrates the states and handles the events (FMI 2.0.5, 3.1 and 3.2;
+//! FMI 3.0.2, 2.3.5, 3.1 and 3.2).
 
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::State;

@@ -227,7 +227,7 @@ impl Call {
             Self::Terminate => any(both(&[Step, Event, Continuous]), To(Terminated)),
             Self::Reset => any(both(&State::ALL), To(Instantiated)),
             // FMI 3.0.2, 2.3.2 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
-            // In Error: for debugging (2.0.5, table in 4.2.4).
+            // In Error: for debugging (2.0.5, 4.2.4).
             Self::Get => any(each(&[Initialization, Step, Event, Continuous, Terminated, Error], &State::ALL), Stay),
             Self::Set => any(both(&[Instantiated, Initialization, Step, Event, Continuous]), Stay),
             Self::DoStep => stepping(both(&[Step]), Stay),

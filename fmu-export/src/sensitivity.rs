@@ -89,7 +89,26 @@ impl<E: Exported> Instance<E> {
         rates.resize(E::CAN.states().len(), 0.0);
         let done = self.derivatives(&mut rates).and_then(|()| self.along(unknowns, &[], &rates, 1.0, out));
         self.scratch().rates = rates;
-        done
+        done?;
+        self.add_integrands(unknowns, out);
+        Ok(())
+    }
+
+    /// Adds the rates of outputs that grow with time.
+    fn add_integrands(&mut self, unknowns: &[u32], out: &mut [f64]) {
+        let Some(continuous) = &E::CAN.continuous else { return };
+        self.scratch();
+        let Self { current, scratch, .. } = self;
+        let Some(scratch) = scratch else { return };
+        for sign in [-1.0, 1.0] {
+            scratch.block.out = <E::Model as Model>::Outputs::default();
+            if sign > 0.0 {
+                (continuous.integrands)(&current.block.model, current.elapsed, &mut scratch.block.out);
+            }
+            for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
+                *out += sign * real(&mut scratch.block, index(unknown));
+            }
+        }
     }
 
     /// Sets first derivatives of continuous inputs; they hold for the next step (FMI 2.0.5, 4.2.1).

@@ -159,6 +159,10 @@ impl ContinuousTime for PmsmPlant {
     fn observe(&self, _now: Elapsed, outputs: &mut PlantOutputs) {
         *outputs = self.outputs_under(&self.inputs);
     }
+
+    fn integrands(&self, _now: Elapsed, outputs: &mut PlantOutputs) {
+        outputs.energy = self.outputs_under(&self.inputs).powers.into();
+    }
 }
 
 impl Differentiable for PmsmPlant {

@@ -96,6 +96,13 @@ pub struct Energy {
     pub loss: f64,
 }
 
+impl From<Powers> for Energy {
+    /// What a second at these powers passes on.
+    fn from(powers: Powers) -> Self {
+        Self { r#in: powers.p_in, mech: powers.p_mech, loss: powers.p_loss }
+    }
+}
+
 impl Energy {
     /// Adds the energy transferred in a step.
     #[inline]

@@ -1,4 +1,4 @@
-//! Events and derivatives in FMI 2.0 (FMI 2.0.5, chapters 2.1.9, 3.2 and 4.2.1).
+//! Events and derivatives in FMI 2.0 (FMI 2.0.5, 2.1.9, 3.2 and 4.2.1).
 
 use super::super::shared::missing;
 use super::super::signatures::v2::EventInfo;

@@ -1,4 +1,4 @@
-//! Events and derivatives in FMI 3.0 (FMI 3.0.2, chapters 2.2.12, 2.3.5, 3.2 and 4.2).
+//! Events and derivatives in FMI 3.0 (FMI 3.0.2, 2.2.12, 2.3.5, 3.2 and 4.2).
 
 use super::super::shared::missing;
 use super::super::signatures::v3;
