@@ -208,4 +208,6 @@ def nonsense_in_model_exchange(fmu):
         assert fmu.function("GetContinuousStates")(handle, after, 4) == OK
         assert list(before) == list(after)
     assert fmu.function("SetTime")(handle, c.c_double(1e-5)) == OK
-    recovers(it, run(fmu.instance().begin(), 10))
+    fmu.function("FreeInstance")(handle)
+    it.handle = None
+    run(fmu.instance().begin(), 10)
