@@ -269,7 +269,10 @@ impl<E: Exported> Instance<E> {
     /// The handle is unknown, or the state is of an instance for another interface.
     pub fn restore(&mut self, handle: usize) -> Result<(), Fault> {
         registry::with(handle, |state| {
-            self.same_interface(state)?;
+            let (theirs, ours) = (state.life.interface(), self.current.life.interface());
+            if theirs != ours {
+                return Err(message::interface(theirs, ours));
+            }
             self.current.clone_from(state);
             Ok(())
         })?;
@@ -280,16 +283,9 @@ impl<E: Exported> Instance<E> {
     /// Makes a state from bytes and returns its handle.
     ///
     /// # Errors
-    /// As [`blob::read`]; a state of an instance for another interface.
+    /// As [`blob::read`].
     pub fn deserialize(&self, bytes: &[u8]) -> Result<usize, Fault> {
-        let state = blob::read::<E::Model>(bytes)?;
-        self.same_interface(&state)?;
-        Ok(registry::keep(state))
-    }
-
-    fn same_interface(&self, state: &Snapshot<E::Model>) -> Result<(), Fault> {
-        let (theirs, ours) = (state.life.interface(), self.current.life.interface());
-        if theirs == ours { Ok(()) } else { Err(message::interface(theirs, ours)) }
+        blob::read::<E::Model>(bytes).map(registry::keep)
     }
 
     /// Whether the importer integrates.
