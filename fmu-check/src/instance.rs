@@ -83,7 +83,7 @@ impl Instance<'_> {
         self.call(name.as_str(), |raw| raw.simple(name, self.handle))
     }
 
-    fn must(&self, name: &str, status: Status) -> Result<(), NotDetermined> {
+    pub(super) fn must(&self, name: &str, status: Status) -> Result<(), NotDetermined> {
         if status.is_ok() {
             Ok(())
         } else {
