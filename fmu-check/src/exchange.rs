@@ -413,6 +413,11 @@ impl<'a, 'b> Importer<'a, 'b> {
     }
 }
 
+/// Whether two vectors differ by more than rounding.
+pub(super) fn differ(a: &[f64], b: &[f64]) -> bool {
+    deviation(&[a.to_vec()], &[b.to_vec()]).is_some()
+}
+
 /// Where two trajectories differ by more than rounding: the step, from 1, and the relative difference.
 pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> {
     if a.len() != b.len() {

@@ -1,9 +1,9 @@
 //! Dependencies proved by perturbation (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8).
 
-use crate::exchange::Importer;
+use crate::exchange::{Importer, differ};
 use crate::session::{NotDetermined, Session, settable};
 use fmu_import::raw::Simple;
-use model_description::{ModelVariable, Unknown, Variability};
+use model_description::{BaseType, ModelVariable, Unknown, Variability};
 
 /// Changes every known that is not a dependency of an initial unknown and requires that the unknown stays the same.
 pub(super) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> {
@@ -69,7 +69,9 @@ pub(super) fn exchange_dependencies(session: &Session) -> Result<(), NotDetermin
             // In FMI 2.0 a variable may have several names.
             let same = |v: &ModelVariable| v.value_reference == known.value_reference && v.base == known.base;
             let named = same(unknown) || dependencies.iter().any(|r| d.referenced(*r).is_some_and(same));
-            session.require(named || old == new || old.is_empty() || new.is_empty(), || {
+            let reals = |bits: &[u64]| bits.iter().map(|b| f64::from_bits(*b)).collect::<Vec<_>>();
+            let changed = if unknown.base == BaseType::Float64 { differ(&reals(old), &reals(new)) } else { old != new };
+            session.require(named || !changed || old.is_empty() || new.is_empty(), || {
                 format!(
                     "line {}: {} changes with {}, which is not among its dependencies",
                     unknown.line, unknown.name, known.name

@@ -83,13 +83,22 @@ pub(super) fn slopes(session: &Session) -> Result<(), NotDetermined> {
         if !status.is_ok() || !instance.step(short_step)?.is_ok() {
             return Err(NotDetermined(format!("GetOutputDerivatives returned {status}, or a second short step failed")));
         }
+        let mut held = 0;
         for (((v, derivative), before), after) in outputs.iter().zip(&derivatives).zip(&before).zip(values()?) {
+            // An output that a sampling part of the FMU holds has no slope in a short step.
+            if *derivative != 0.0 && after.to_bits() == before.to_bits() {
+                held += 1;
+                continue;
+            }
             let slope = (after - before) / short_step;
             let scale = derivative.abs().max(slope.abs());
             let rounding = 1e-12 * before.abs().max(after.abs()) / short_step;
             session.require((derivative - slope).abs() <= 0.1 * scale + rounding + 1e-9, || {
                 format!("the FMU returns {derivative} as the derivative of {}, but its slope is {slope}", v.name)
             });
+        }
+        if held > 0 {
+            session.note(format!("{held} outputs did not change in a short step and were not compared"));
         }
         Ok(())
     });

@@ -17,6 +17,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "N01", requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed, the next from lastSuccessfulTime.", clause: STEP, levels: MUST, run: Run::Probe(combinations) },
     Check { id: "N02", requirement: "A step returns early only if that is allowed, and asks for event handling only if event mode is used; Booleans are 0 or 1.", clause: STEP, levels: MUST, run: Run::Probe(permitted) },
     Check { id: "N03", requirement: "After an early return lastSuccessfulTime lies between the communication point and the end of the step, and time goes on.", clause: STEP, levels: MUST, run: Run::Probe(reached) },
+    Check { id: "N03e", requirement: "earlyReturn is true only if the step ended before its end.", clause: STEP, levels: SHOULD, run: Run::Probe(truly_early) },
     Check { id: "N04", requirement: "Without eventModeUsed, EnterEventMode returns Error.", clause: "3.0.2, 2.2.4", levels: SHOULD, run: Run::Probe(without_event_mode) },
     Check { id: "N05", requirement: "DoStep in Event Mode, and UpdateDiscreteStates and EnterStepMode in Step Mode, return Error.", clause: "3.0.2, 2.2.4", levels: SHOULD, run: Run::Probe(wrong_mode) },
     Check { id: "N06", requirement: "The next event time of an update is after now, if it is defined.", clause: "3.0.2, 2.3.5", levels: SHOULD, run: Run::Probe(next_event_time) },
@@ -86,11 +87,13 @@ impl<'b> Importer<'b> {
     }
 
     /// A step of `h`, at most to the next event, and the event that it ends in: what it returned, and what was asked for.
-    fn step(&mut self, h: f64) -> Result<(Status, Stepped, f64), NotDetermined> {
+    fn step(&mut self, whole: f64) -> Result<(Status, Stepped, f64), NotDetermined> {
         let t = self.instance.time.get();
         let variable = self.instance.session.flag("canHandleVariableCommunicationStepSize");
-        // A step that ends where the event is: the importer must not go beyond.
-        let h = self.next.filter(|next| variable && *next > t && *next < t + h).map_or(h, |next| next - t);
+        // A step that ends where the event is: the importer must not go beyond. Closer than this it is reached.
+        let near = 1e-9 * whole + 4.0 * f64::EPSILON * t.abs();
+        let inside = |next: &f64| variable && *next > t + near && *next < t + whole;
+        let h = self.next.filter(inside).map_or(whole, |next| next - t);
         let mut stepped = Stepped { event: 0, terminate: 0, early: 0, last: t };
         let status = self.instance.call(&format!("DoStep(t={t:?}, h={h:?})"), |raw| {
             let (status, found) = raw.do_step(self.instance.handle, t, h, false, [true; 4])?;
@@ -102,7 +105,7 @@ impl<'b> Importer<'b> {
         }
         self.over |= stepped.terminate == 1;
         self.instance.time.set(stepped.last);
-        let reached = self.next.is_some_and(|next| stepped.last >= next - 1e-9 * h);
+        let reached = self.next.is_some_and(|next| stepped.last >= next - near);
         if self.event_mode && !self.over && (stepped.event == 1 || reached) {
             self.event()?;
         }
@@ -178,8 +181,15 @@ fn reached(session: &Session) -> Result<(), NotDetermined> {
         // Without an early return, an internal solver may end a little elsewhere.
         let early = stepped.early == 1;
         standing.set(if stepped.last <= t { standing.get() + 1 } else { 0 });
-        let good = stepped.last.is_finite() && stepped.last >= t && (!early || stepped.last < end) && standing.get() < 20;
+        let good = stepped.last.is_finite() && stepped.last >= t && (!early || stepped.last <= end + 1e-9 * (end - t)) && standing.get() < 20;
         (!good).then(|| format!("gave earlyReturn={}, lastSuccessfulTime={:?}", stepped.early, stepped.last))
+    })
+}
+
+fn truly_early(session: &Session) -> Result<(), NotDetermined> {
+    each_step(session, &|_, status, stepped, [_, end]| {
+        let whole = status.is_ok() && stepped.early == 1 && stepped.last >= end;
+        whole.then(|| format!("gave earlyReturn=1, lastSuccessfulTime={:?}, the end of the step", stepped.last))
     })
 }
 

@@ -79,7 +79,8 @@ fn calls<'b>(session: &'b Session) -> Vec<Call<'b>> {
     add(
         "SetTime",
         &[Continuous],
-        if v2 && session.states() == 0 { &[Event] } else { &[] },
+        // FMI 2.0 allows it there for a purely discrete FMU, and does not say what that is.
+        if v2 { &[Event] } else { &[] },
         Box::new(|instance, _| instance.set_time(instance.time.get())),
     );
     add(
@@ -217,9 +218,30 @@ pub(super) fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
+/// Functions that FMI 2.0 lists for Initialization Mode in its table, though a simulation needs them after it only.
+const EARLY: [&str; 5] = [
+    "GetContinuousStates",
+    "GetDerivatives",
+    "GetContinuousStateDerivatives",
+    "GetEventIndicators",
+    "GetNominalsOfContinuousStates",
+];
+
+fn is_early(call: &Call<'_>, mode: Mode) -> bool {
+    matches!(mode, Instantiated | Initialization) && EARLY.contains(&call.name.as_str())
+}
+
 pub(super) fn allowed(session: &Session) -> Result<(), NotDetermined> {
+    succeed(session, false)
+}
+
+pub(super) fn allowed_early(session: &Session) -> Result<(), NotDetermined> {
+    succeed(session, true)
+}
+
+fn succeed(session: &Session, early: bool) -> Result<(), NotDetermined> {
     for call in calls(session) {
-        for &mode in &call.allowed {
+        for &mode in call.allowed.iter().filter(|mode| is_early(&call, **mode) == early) {
             session.case(|| {
                 let instance = session.exchange(mode)?;
                 let status = (call.make)(&instance, mode)?;

@@ -71,6 +71,10 @@ fn accumulated(session: &Session) -> Result<(), NotDetermined> {
         for k in 0..100_000 {
             let inside = instance.time.get() + h <= stop;
             let status = instance.step(h)?;
+            if instance.over.get() {
+                session.note(format!("the FMU ended the simulation after {k} steps"));
+                return Ok(());
+            }
             if !status.is_ok() && inside {
                 session.violated(format!("step {k}, DoStep(t={:?}, h={h:?}), returned {status}", instance.time.get()));
                 return Ok(());
@@ -167,6 +171,10 @@ fn variable(session: &Session) -> Result<(), NotDetermined> {
         let part = h * (0.05 + 3.0 * f64::from(random >> 8) / f64::from(1 << 24));
         let t = instance.time.get();
         let status = instance.step(part)?;
+        if instance.over.get() {
+            session.note("the FMU ended the simulation");
+            break;
+        }
         if !status.is_ok() {
             session.violated(format!("DoStep(t={t:?}, h={part:?}) returned {status}"));
             break;
