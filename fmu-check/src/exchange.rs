@@ -72,7 +72,8 @@ impl Session {
         self.prepare(|| {
             let arguments = Arguments { interface: Interface::ModelExchange, ..self.arguments("probe") };
             let made = self.instantiate(&arguments)?;
-            let instance = made.ok_or_else(|| NotDetermined("an instantiation for Model Exchange returned NULL".into()))?;
+            let instance =
+                made.ok_or_else(|| NotDetermined("an instantiation for Model Exchange returned NULL".into()))?;
             instance.bring_to(mode)?;
             Ok(instance)
         })
@@ -131,8 +132,11 @@ impl Instance<'_> {
 
     /// One update of the discrete states.
     pub(super) fn update(&self) -> Result<(Status, Updated), NotDetermined> {
-        let name =
-            if self.session.description.version == FmiVersion::V2 { "NewDiscreteStates" } else { "UpdateDiscreteStates" };
+        let name = if self.session.description.version == FmiVersion::V2 {
+            "NewDiscreteStates"
+        } else {
+            "UpdateDiscreteStates"
+        };
         let mut result = None;
         let status = self.call(name, |raw| {
             let (status, updated) = raw.update_discrete_states(self.handle, false)?;

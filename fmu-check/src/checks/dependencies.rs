@@ -106,7 +106,9 @@ pub(super) fn exchange_dependencies(session: &Session) -> Result<(), NotDetermin
         }
         let before = instance.snapshot(&variables)?;
         for input in session.number_inputs().filter(|v| (v.variability == Variability::Discrete) == discrete) {
-            let (Some(values), (_, old)) = (session.different_value(input, 9.0), instance.get(input)?) else { continue };
+            let (Some(values), (_, old)) = (session.different_value(input, 9.0), instance.get(input)?) else {
+                continue;
+            };
             if instance.set(input, &values)?.is_ok() {
                 compare(input, &before, &instance.snapshot(&variables)?);
                 tried += 1;

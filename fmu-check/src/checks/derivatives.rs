@@ -28,11 +28,7 @@ fn scope(session: &Session) -> Result<Option<(i32, Vec<&ModelVariable>)>, NotDet
     Ok(Some((order, outputs)))
 }
 
-fn read(
-    instance: &Instance<'_>,
-    outputs: &[&ModelVariable],
-    order: i32,
-) -> Result<(Status, Vec<f64>), NotDetermined> {
+fn read(instance: &Instance<'_>, outputs: &[&ModelVariable], order: i32) -> Result<(Status, Vec<f64>), NotDetermined> {
     let references: Vec<u32> = outputs.iter().map(|v| v.value_reference).collect();
     let missing = || NotDetermined("the function GetOutputDerivatives is missing".into());
     instance.session.record_call(&format!("GetOutputDerivatives({} outputs, order {order})", outputs.len()));
@@ -81,7 +77,9 @@ pub(super) fn slopes(session: &Session) -> Result<(), NotDetermined> {
         }
         let (before, (status, derivatives)) = (values()?, read(&instance, &outputs, 1)?);
         if !status.is_ok() || !instance.step(short_step)?.is_ok() {
-            return Err(NotDetermined(format!("GetOutputDerivatives returned {status}, or a second short step failed")));
+            return Err(NotDetermined(format!(
+                "GetOutputDerivatives returned {status}, or a second short step failed"
+            )));
         }
         let mut held = 0;
         for (((v, derivative), before), after) in outputs.iter().zip(&derivatives).zip(&before).zip(values()?) {

@@ -181,7 +181,10 @@ fn reached(session: &Session) -> Result<(), NotDetermined> {
         // Without an early return, an internal solver may end a little elsewhere.
         let early = stepped.early == 1;
         standing.set(if stepped.last <= t { standing.get() + 1 } else { 0 });
-        let good = stepped.last.is_finite() && stepped.last >= t && (!early || stepped.last <= end + 1e-9 * (end - t)) && standing.get() < 20;
+        let good = stepped.last.is_finite()
+            && stepped.last >= t
+            && (!early || stepped.last <= end + 1e-9 * (end - t))
+            && standing.get() < 20;
         (!good).then(|| format!("gave earlyReturn={}, lastSuccessfulTime={:?}", stepped.early, stepped.last))
     })
 }

@@ -55,7 +55,8 @@ fn update_results(session: &Session) -> Result<(), NotDetermined> {
             let flags = [u.again, u.terminate, u.nominals_changed, u.states_changed, u.next_event_time_defined];
             let good = flags.iter().all(|f| matches!(f, 0 | 1));
             let time = u.next_event_time_defined == 0 || u.next_event_time.is_finite();
-            (!good || !time).then(|| format!("{u:?}: a Boolean is not 0 or 1, or was not written, or the time is not finite"))
+            (!good || !time)
+                .then(|| format!("{u:?}: a Boolean is not 0 or 1, or was not written, or the time is not finite"))
         })
     })
 }
@@ -69,7 +70,8 @@ fn next_event_time(session: &Session) -> Result<(), NotDetermined> {
 
 fn ends(session: &Session) -> Result<(), NotDetermined> {
     each_event(session, &|_, event| {
-        (!event.ended() && !event.terminates()).then(|| format!("{} updates, and it needs another", event.updates.len()))
+        (!event.ended() && !event.terminates())
+            .then(|| format!("{} updates, and it needs another", event.updates.len()))
     })
 }
 
@@ -94,7 +96,11 @@ fn indicators(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.excited()?;
     Importer::survey(&instance, STEPS, &mut |_, _| (), &mut |importer, event| {
         session.require(!event || importer.z.iter().all(|z| *z != 0.0), || {
-            format!("after the event at t = {:?} the event indicators are {:?}", importer.instance.time.get(), importer.z)
+            format!(
+                "after the event at t = {:?} the event indicators are {:?}",
+                importer.instance.time.get(),
+                importer.z
+            )
         });
         Ok(())
     })

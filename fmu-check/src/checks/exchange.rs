@@ -38,8 +38,7 @@ fn counts(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.exchange(Mode::Event)?;
     let (states, indicators) = (session.states(), session.indicators());
     if session.description.version == FmiVersion::V3 {
-        let counts =
-            [(Count::GetNumberOfContinuousStates, states), (Count::GetNumberOfEventIndicators, indicators)];
+        let counts = [(Count::GetNumberOfContinuousStates, states), (Count::GetNumberOfEventIndicators, indicators)];
         for (name, expected) in counts {
             let mut found = 0;
             let status = instance.call(name.as_str(), |raw| {

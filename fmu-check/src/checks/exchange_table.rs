@@ -153,11 +153,16 @@ fn vectors<'b>(session: &'b Session, add: Add<'_, 'b>) {
             instance.set_states(&x)
         }),
     );
-    if session.exchange_flag("providesDirectionalDerivative") || session.exchange_flag("providesDirectionalDerivatives") {
+    if session.exchange_flag("providesDirectionalDerivative") || session.exchange_flag("providesDirectionalDerivatives")
+    {
         let reference = |v: Option<&&ModelVariable>| v.map(|v| v.value_reference);
         let known = session.description.states();
-        let unknown: Vec<_> =
-            session.description.derivatives.iter().filter_map(|u| session.description.referenced(u.reference)).collect();
+        let unknown: Vec<_> = session
+            .description
+            .derivatives
+            .iter()
+            .filter_map(|u| session.description.referenced(u.reference))
+            .collect();
         if let (Some(known), Some(unknown)) = (reference(known.first()), reference(unknown.first())) {
             add(
                 "GetDirectionalDerivative",

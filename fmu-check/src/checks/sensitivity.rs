@@ -30,7 +30,8 @@ macro_rules! needs_derivatives {
             return $session.not_applicable("providesDirectionalDerivatives is false for Model Exchange");
         }
         if Variables::of($session).is_empty() {
-            return $session.not_applicable("there are no scalar states or continuous inputs, or nothing depends on them");
+            return $session
+                .not_applicable("there are no scalar states or continuous inputs, or nothing depends on them");
         }
     };
 }
@@ -111,8 +112,11 @@ fn differences(session: &Session) -> Result<(), NotDetermined> {
         if sides.iter().any(Vec::is_empty) {
             return Err(NotDetermined(format!("{} could not be changed", known.name)));
         }
-        let (status, found) =
-            instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&unknowns, &[known.value_reference]], &[1.0])?;
+        let (status, found) = instance.sensitivity(
+            Sensitivity::GetDirectionalDerivative,
+            [&unknowns, &[known.value_reference]],
+            &[1.0],
+        )?;
         if !status.is_ok() {
             session.violated(format!("GetDirectionalDerivative with respect to {} returned {status}", known.name));
             continue;
