@@ -154,7 +154,7 @@ impl Instance<'_> {
             let (status, updated) = self.update()?;
             self.must("UpdateDiscreteStates", status)?;
             let after = self.states()?;
-            let changed = before.iter().zip(&after).any(|(a, b)| a.to_bits() != b.to_bits() && a != b);
+            let changed = before.iter().zip(&after).any(|(a, b)| (a - b).abs() > 0.0 || a.is_nan() != b.is_nan());
             before = after;
             event.updates.push((updated, changed));
             if updated.again == 0 || updated.terminate != 0 {
@@ -431,7 +431,11 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
     let scale: Vec<f64> = (0..columns).map(|i| a.iter().map(|row| row[i].abs()).fold(0.0, f64::max)).collect();
     a.iter().zip(b).enumerate().find_map(|(k, (x, y))| {
         let differences = x.iter().zip(y).zip(&scale).map(|((x, y), scale)| {
-            if x == y || (x.is_nan() && y.is_nan()) { 0.0 } else { (x - y).abs() / (scale + f64::MIN_POSITIVE) }
+            if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
+                0.0
+            } else {
+                (x - y).abs() / (scale + f64::MIN_POSITIVE)
+            }
         });
         let largest = differences.fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
         (largest > 1e-9).then_some((k + 1, largest))

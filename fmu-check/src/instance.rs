@@ -159,11 +159,10 @@ impl Instance<'_> {
             let (status, stepped) = raw.do_step(self.handle, t, h, false, [true; 4])?;
             // fmi2Terminated is 3.
             let ends = || raw.step_status(StepStatus::GetBooleanStatus, self.handle, 3);
-            let over = match v2 {
-                true => {
-                    status == Status::DISCARD && ends().is_some_and(|(s, value)| s.is_ok() && value & 0xffff_ffff == 1)
-                }
-                false => status.is_ok() && stepped.terminate == 1,
+            let over = if v2 {
+                status == Status::DISCARD && ends().is_some_and(|(s, value)| s.is_ok() && value & 0xffff_ffff == 1)
+            } else {
+                status.is_ok() && stepped.terminate == 1
             };
             self.over.set(self.over.get() || over);
             Some(status)

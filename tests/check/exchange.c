@@ -96,7 +96,7 @@ static int update(M *m, Update *u) {
     if (m->k > 3) u->next = NAN;
 #endif
 #ifdef FAULT_E21
-    u->next -= m->t;
+    if (m->exchange) u->next -= m->t;
 #endif
 #ifdef FAULT_E22
     if (fabs(m->t - m->start - (m->k - 1) * 0.1) > 1e-6) u->defined = false;

@@ -310,9 +310,10 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
     let first = run(&session.exchange(Mode::Event)?)?;
     for mode in Mode::ALL {
         session.case(|| {
-            let instance = session.exchange(mode)?;
-            if mode == Mode::Continuous {
-                Importer::resume(&instance, None)?.run(20, &mut |_| Ok(()))?;
+            let running = mode == Mode::Continuous;
+            let instance = session.exchange(if running { Mode::Event } else { mode })?;
+            if running {
+                Importer::start(&instance)?.run(20, &mut |_| Ok(()))?;
             }
             let status = instance.simple(Simple::Reset)?;
             if !status.is_ok() {

@@ -197,18 +197,15 @@ fn variables<'b>(session: &'b Session, add: Add<'_, 'b>) {
     let discrete = |v: &ModelVariable| is_input(v) && v.variability == Variability::Discrete;
     let tunable = |v: &ModelVariable| is_parameter(v) && v.variability == Variability::Tunable;
     let fixed = |v: &ModelVariable| is_parameter(v) && v.variability == Variability::Fixed;
-    let kinds: [(&str, &dyn Fn(&ModelVariable) -> bool, Vec<Mode>, &[Mode]); 4] = [
-        ("Set(continuous input)", &continuous, [before, &[Initialization, Event, Continuous]].concat(), open),
-        ("Set(discrete input)", &discrete, [before, &[Initialization, Event]].concat(), open),
-        ("Set(tunable parameter)", &tunable, vec![Instantiated, Initialization, Event], &[]),
-        ("Set(fixed parameter)", &fixed, vec![Instantiated, Initialization], &[]),
-    ];
-    for (name, fits, allowed, open) in kinds {
-        let found = find(fits).and_then(|v| Some((v, session.different_value(v, 1.0)?)));
-        if let Some((v, values)) = found {
-            add(name, &allowed, open, Box::new(move |instance, _| instance.set(v, &values)));
+    let mut add_setter = |name: &str, fits: &dyn Fn(&ModelVariable) -> bool, allowed: &[Mode], open: &[Mode]| {
+        if let Some((v, values)) = find(fits).and_then(|v| Some((v, session.different_value(v, 1.0)?))) {
+            add(name, allowed, open, Box::new(move |instance, _| instance.set(v, &values)));
         }
-    }
+    };
+    add_setter("Set(continuous input)", &continuous, &[before, &[Initialization, Event, Continuous]].concat(), open);
+    add_setter("Set(discrete input)", &discrete, &[before, &[Initialization, Event]].concat(), open);
+    add_setter("Set(tunable parameter)", &tunable, &[Instantiated, Initialization, Event], &[]);
+    add_setter("Set(fixed parameter)", &fixed, &[Instantiated, Initialization], &[]);
 }
 
 pub(super) fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
