@@ -15,8 +15,9 @@
 //! represent it. The outputs are therefore means over the plant's last step, integrated with the state by the same
 //! method, and `energy.in`, `energy.mech` and `energy.loss` are the time integrals of the powers. Before the first
 //! step, the powers are the initial values. In Model Exchange, where the importer integrates, the powers are those of the
-//! instant, and the energies stay 0: an importer that wants them integrates the powers too. i_dc is also defined for u_dc = 0 V: the link still carries the current of
-//! the legs connected to it; in this case it is the value at the end of the step.
+//! instant, and the energies stay 0: an importer that wants them integrates the powers. i_dc is also defined for
+//! u_dc = 0 V: the link still carries the current of the legs connected to it; in this case it is the value at the end of
+//! the step.
 //!
 //! Two events transfer energy instantly and count in the step in which they occur: a jump of the imposed angle, where
 //! the magnetic field does work on the shaft, and blocking diodes, where the energy of the remaining current is lost.
