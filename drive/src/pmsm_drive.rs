@@ -16,7 +16,7 @@ use crate::control::tables::{self, ENABLED, LIMITED, LOCK_LOST};
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
-use crate::plant::{model::STATES, power::Powers, tables as plant};
+use crate::plant::{power::Powers, tables as plant};
 use fmu_core::events::{bounded, grid};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, RADIAN, SPEED, VOLT};
@@ -330,7 +330,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 "controller.",
                 &Part { table: tables::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
             ),
-            V::part("", &Part { table: STATES, lens: |m| &mut m.model.pair.plant.model }),
+            V::part("", &Part { table: plant::STATES, lens: |m| &mut m.model.pair.plant.model }),
         ]
     },
 );
