@@ -8,7 +8,8 @@ use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
 use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
-use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
+use crate::control::tables::{ControllerParameters, LATER_OUTPUTS, OUTPUTS, PARAMETERS};
+use crate::control::weakening::{self, WEAKENING, WeakeningGains};
 use crate::estimator::{Class, Estimator, Sample};
 use crate::motor::Motor;
 use fmu_core::log::Warnings;
@@ -114,13 +115,14 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 6;
+    const STATE_VERSION: u16 = 7;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
         let k = motor.torque_constant();
-        let tau =
-            if estimator.class() == Class::FluxObserver { limit.tau } else { max_torque(motor, limit, current.mtpa) };
+        let observes_flux = estimator.class() == Class::FluxObserver;
+        let tau = if observes_flux { limit.tau } else { max_torque(motor, limit, current.mtpa) };
+        let weakening = WeakeningGains::new(&self.parameters, tau, current.mtpa && !observes_flux);
         let speed = SpeedGains::new(speed_loop, *J, k);
         if !self.tuned {
             self.last_gains.clone_from(&self.gains);
@@ -132,6 +134,7 @@ impl Model for SensorlessController {
             k,
             i_tau: tau / k,
             lock: LockGains::new(lock, motor, *T_s),
+            weakening,
         };
     }
 
@@ -152,6 +155,7 @@ impl Model for SensorlessController {
             polarity::validate(par)?;
         }
         estimator.validate(par)?;
+        weakening::validate(par)?;
         if zero_speed.i_0 > limit.i {
             return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
         }
@@ -266,6 +270,8 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             ),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+            V::part("weakening.", &Part { table: WEAKENING, lens: |m| &mut m.model.parameters.weakening }),
+            V::part("", &Part { table: LATER_OUTPUTS, lens: |m| &mut m.out }),
         ]
     },
 );

@@ -73,13 +73,22 @@ pub struct ControllerOutputs {
     pub voltage_limited: bool,
     /// Whether a current or torque limit limited the current references.
     pub current_limited: bool,
+    /// Greatest torque in N.m that the references may ask for.
+    pub tau_max: f64,
+    /// Least torque in N.m that the references may ask for.
+    pub tau_min: f64,
+    /// Voltage that the current loop requests, as a share of u_dc / sqrt(3).
+    pub u_share: f64,
+    /// Field weakening lowers the reference of i_d.
+    pub weakens: bool,
 }
 
 impl ControllerOutputs {
     /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
-        let Self { u, speed_est, theta_est, i, i_ref, lock_lost, .. } = self;
-        all_finite([u.a, u.b, u.c, *speed_est, *theta_est, i.d, i.q, i_ref.d, i_ref.q, *lock_lost])
+        let Self { u, speed_est, theta_est, i, i_ref, lock_lost, tau_max, tau_min, u_share, .. } = self;
+        let scalars = [*speed_est, *theta_est, *lock_lost, *tau_max, *tau_min, *u_share];
+        all_finite([u.a, u.b, u.c, i.d, i.q, i_ref.d, i_ref.q]) && all_finite(scalars)
     }
 }
 
