@@ -88,7 +88,7 @@ impl SpeedController {
 }
 
 impl SpeedController {
-    /// Moves the integral part by the `cut` (A) of a limit that falls, at the rate `bandwidth` (rad/s).
+    /// Moves the integral part with the `cut` (A) that a limit makes, at the rate `bandwidth` (rad/s).
     #[inline]
     pub fn follow(&mut self, bandwidth: f64, cut: f64, T_s: f64) {
         self.integral += T_s * bandwidth * cut;

@@ -242,7 +242,7 @@ impl State {
             (requested.clamp(-low, high), requested)
         } else {
             let (limited, wanted) = self.speed.update(&gains.speed, w_ref, speed, (-low, high), par.T_s);
-            if low < limit || high < limit {
+            if par.weakening.used {
                 self.speed.follow(par.speed_loop.bandwidth, limited - wanted, par.T_s);
             }
             (limited, wanted)

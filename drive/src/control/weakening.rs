@@ -8,8 +8,8 @@
 //! |u| that the current loop requests, before the hexagon. It changes U, never i_d, so that MTPV and the current limit
 //! stay right; it also moves while the current error is large, where wrong estimates would saturate the loop for good.
 //!
-//! The speed loop's limits are those of the torque. The limit falls as the speed rises; while it acts, the
-//! integrator follows: dI/dt = w_s (limited - wanted), besides the hold of [`speed`](crate::control::speed).
+//! The speed loop's limits are those of the torque. They fall as the speed rises, so while one acts, the integrator
+//! follows: dI/dt = w_s (limited - wanted), besides the hold of [`speed`](crate::control::speed).
 //!
 //! The limit of the sign that the drive uses is computed at every sample, the other one at every fourth.
 
