@@ -177,14 +177,15 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
     let table = ALL_PARAMETERS;
     let estimator_is = table.tell(par, |p| &mut p.estimator);
     let limit_is = table.tell(par, |p| &mut p.limit.i);
+    let use_is = table.tell(par, |p| &mut p.weakening.used);
     if own.k_t < own.k_u {
         let least = table.tell(par, |p| &mut p.weakening.k_u);
         return Err(table.fault(par, |p| &mut p.weakening.k_t, format!("at least {least}")));
     }
     if estimator.class() == Class::Injection {
         return Err(Fault::new(format!(
-            "{} with {estimator_is}: injection leaves no voltage for field weakening; choose Hybrid, or set the first to false",
-            table.tell(par, |p| &mut p.weakening.used)
+            "{use_is} with {estimator_is}: injection leaves no voltage for field weakening; choose Hybrid, or set the first \
+             to false"
         )));
     }
     if *estimator == Kind::VoltageFeedback && (own.k_u > 0.9 || own.k_t > own.k_u) {
@@ -198,17 +199,15 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
     let most = 0.7 * motor.psi_M / motor.L_d;
     if *estimator == Kind::VoltageModel && limit.i > most {
         return Err(Fault::new(format!(
-            "{limit_is} with {estimator_is} and {}: its gain grows without limit towards i_d = -psi_M / L_d; at most 0.7 \
-             psi_M / L_d = {most:.4} A, or another estimator",
-            table.tell(par, |p| &mut p.weakening.used)
+            "{limit_is} with {estimator_is} and {use_is}: the estimator's gain has no bound near the current -psi_M / L_d; at \
+             most {most:.4} A (0.7 psi_M / L_d), or another estimator"
         )));
     }
     let most = (1.0 - LEAST_TORQUE) * motor.psi_M / (motor.L_d - motor.L_q);
     if motor.L_q < motor.L_d && limit.i > most {
         return Err(Fault::new(format!(
-            "{limit_is} with {}: with L_q < L_d, the torque of i_q vanishes at i_d = -psi_M / (L_d - L_q); at most 0.8 \
-             psi_M / (L_d - L_q) = {most:.4} A",
-            table.tell(par, |p| &mut p.weakening.used)
+            "{limit_is} with {use_is} and L_q < L_d: the torque of i_q vanishes at the current -psi_M / (L_d - L_q); at most \
+             {most:.4} A (0.8 psi_M / (L_d - L_q))"
         )));
     }
     Ok(())
