@@ -266,6 +266,17 @@ impl Drive {
 }
 
 #[test]
+fn between_the_ends_the_voltage_can_be_higher() {
+    // b at 3900 rpm: full generating torque fits the voltage, no load does not (without load up to 3783 rpm).
+    let (machine, tau, rpm) = (b(), -0.5, 3900.0);
+    assert!((machine.limit(rpm, -1.0)[1].tau - 5.0625).abs() < 1e-9);
+    let (i, state) = currents(&machine, rpm, tau);
+    let excess = machine.envelope().excess(i, machine.w(rpm), machine.U(0.95));
+    assert!(state.weakens && excess.abs() < 1e-6 * machine.U(1.0).powi(2), "{i:?}: {excess}");
+    assert!((machine.motor.torque(i.d(), i.q()) - tau).abs() < 1e-9, "{i:?}");
+}
+
+#[test]
 fn full_torque_on_a_slow_ramp() {
     for (machine, top, acceleration, most) in [
         (a(), 4000.0, 400.0, 0.001_65),

@@ -197,7 +197,7 @@ fn value(p: &[f64; 5], x: f64) -> f64 {
 /// The root of `p` between `left`, where it is not positive, and `right`, where it is; starts at `x` if that is inside.
 /// A Newton step that leaves the bracket is replaced by bisection; one that hits its end stays.
 fn root(p: &[f64; 5], mut left: f64, mut right: f64, x: f64) -> f64 {
-    let (mut x, steps) = if x > left && x < right { (x, 3) } else { (0.5 * (left + right), 6) };
+    let (mut x, steps) = if x > left && x < right { (x, 2) } else { (0.5 * (left + right), 6) };
     for _ in 0..steps {
         let y = value(p, x);
         *(if y > 0.0 { &mut right } else { &mut left }) = x;

@@ -11,7 +11,7 @@
 //! The speed loop's limits are those of the torque. They fall as the speed rises, so while one acts, the integrator
 //! follows: dI/dt = w_s (limited - wanted), besides the hold of [`speed`](crate::control::speed).
 //!
-//! The limit of the sign that the drive uses is computed at every sample, the other one at every fourth.
+//! The limit of the sign that the drive uses is computed at every sample, the other one at every eighth.
 
 use crate::control::envelope::{Envelope, Limit, Warm};
 use crate::control::reference::max_torque_per_ampere;
@@ -23,6 +23,7 @@ use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
+const INVERSE_SQRT_3: f64 = 1.0 / SQRT_3;
 
 /// Least share of u_dc / sqrt 3 that the references may use.
 const LEAST_SHARE: f64 = 0.05;
@@ -61,6 +62,10 @@ pub struct WeakeningGains {
     envelope: Envelope,
     /// Currents (A) of the greatest positive torque of today's reference.
     end: DqHat,
+    /// Parts of |u|^2 that bound those of all its currents: constant, by w, by w^2.
+    voltage: [f64; 3],
+    /// Least useful i_d in A.
+    least: f64,
 }
 
 impl WeakeningGains {
@@ -72,7 +77,15 @@ impl WeakeningGains {
         } else {
             DqHat::new(0.0, (tau / motor.torque_constant()).min(limit.i_q).min(limit.i))
         };
-        Self { envelope: Envelope::new(motor, limit.i), end }
+        let psi = DqHat::new(motor.psi_M + motor.L_d * end.d(), motor.L_q * end.q());
+        let t = motor.torque(end.d(), end.q()) / (1.5 * f64::from(motor.n_p));
+        let R = motor.R_s;
+        Self {
+            envelope: Envelope::new(motor, limit.i),
+            end,
+            voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
+            least: -limit.i.min(motor.psi_M / motor.L_d),
+        }
     }
 }
 
@@ -83,6 +96,8 @@ pub struct Weakening {
     trim: f64,
     /// Voltage in V for the references of this sample.
     U: f64,
+    /// Some of today's references does not fit the voltage.
+    near: bool,
     /// Motoring, generating.
     limits: [Limit; 2],
     warm: [Warm; 2],
@@ -106,34 +121,54 @@ impl Weakening {
         tau: f64,
         k: u64,
     ) -> (f64, f64) {
-        let highest = u_dc / SQRT_3;
+        let highest = u_dc * INVERSE_SQRT_3;
         self.U = (par.k_u * highest - self.trim - injected).max(LEAST_SHARE * highest);
-        let speed = w.abs().max(LEAST_SPEED);
+        let ([copper, cross, flux], speed) = (gains.voltage, w.abs());
+        if copper + speed * (cross + speed * flux) <= self.U * self.U {
+            if self.near {
+                let Self { trim, U, .. } = *self;
+                *self = Self { trim, U, ..Self::default() };
+            }
+            return (tau, tau);
+        }
+        self.near = true;
+        let [motoring, generating] = self.limits_near(gains, speed.max(LEAST_SPEED), tau, k);
+        if w >= 0.0 { (generating, motoring) } else { (motoring, generating) }
+    }
+
+    /// The limits (N.m), motoring and generating, where today's references may not fit; at most `tau`.
+    #[inline(never)]
+    fn limits_near(&mut self, gains: &WeakeningGains, w: f64, tau: f64, k: u64) -> [f64; 2] {
         let mut allowed = [tau; 2];
         for (side, s) in [1.0, -1.0].into_iter().enumerate() {
             let end = DqHat::new(gains.end.d(), s * gains.end.q());
-            if gains.envelope.excess(end, speed, self.U) <= 0.0 {
+            if gains.envelope.excess(end, w, self.U) <= 0.0 {
                 self.warm[side] = Warm::default();
-                self.limits[side] = Limit { i: end, tau: f64::INFINITY };
+                self.limits[side] = Limit { i: DqHat::new(gains.least, 0.0), tau: f64::INFINITY };
                 continue;
             }
-            if self.generates == (side == 1) || k.is_multiple_of(4) || self.warm[side].is_cold() {
-                self.limits[side] = gains.envelope.limit(speed, s, self.U, &mut self.warm[side]);
+            let in_use = self.generates == (side == 1);
+            if in_use || k.is_multiple_of(8) || self.warm[side].is_cold() {
+                self.limits[side] = gains.envelope.limit(w, s, self.U, &mut self.warm[side]);
             }
             // Not a number if the speed is none: no torque then.
             allowed[side] = self.limits[side].tau.max(0.0).min(tau);
         }
-        let [motoring, generating] = allowed;
-        if w >= 0.0 { (generating, motoring) } else { (motoring, generating) }
+        allowed
     }
 
     /// Currents (A) for the torque `tau` (N.m) at the electrical speed `w` (rad/s): `today`'s, or on the voltage limit; |i_q|
     /// at most `i_q_max`.
     #[inline]
     pub fn currents(&mut self, gains: &WeakeningGains, tau: f64, w: f64, today: DqHat, i_q_max: f64) -> DqHat {
+        if self.near { self.currents_near(gains, tau, w, today, i_q_max) } else { today }
+    }
+
+    #[inline(never)]
+    fn currents_near(&mut self, gains: &WeakeningGains, tau: f64, w: f64, today: DqHat, i_q_max: f64) -> DqHat {
         self.generates = tau * w < 0.0;
         let limit = self.limits[usize::from(self.generates)];
-        if limit.tau == f64::INFINITY || gains.envelope.excess(today, w, self.U) <= 0.0 {
+        if gains.envelope.excess(today, w, self.U) <= 0.0 {
             self.weakens = false;
             return today;
         }
@@ -146,15 +181,15 @@ impl Weakening {
             let i_d = warm.or_else(|| solve(today.d(), 8)).unwrap_or(limit.i.d()).max(limit.i.d());
             DqHat::new(i_d, gains.envelope.i_q(tau, i_d))
         };
-        self.weakens = i.d() < today.d();
         self.i_d = i.d();
+        self.weakens = i.d() < today.d();
         if self.weakens { DqHat::new(i.d(), i.q().clamp(-i_q_max, i_q_max)) } else { today }
     }
 
     /// Integrates the trim over one sample of `T_s` (s) with the voltage `u` (V) that the current loop requests.
     #[inline]
     pub fn integrate(&mut self, par: &WeakeningParameters, u: f64, u_dc: f64, T_s: f64) {
-        let highest = u_dc / SQRT_3;
+        let highest = u_dc * INVERSE_SQRT_3;
         self.trim = (self.trim + T_s * par.bandwidth * (u - par.k_t * highest)).min(GREATEST_TRIM * highest).max(0.0);
     }
 }
