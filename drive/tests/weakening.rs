@@ -184,7 +184,7 @@ fn currents(machine: &Machine, rpm: f64, tau: f64) -> (DqHat, Weakening) {
     let today = max_torque_per_ampere(&par.motor, tau);
     let mut i = DqHat::ZERO;
     for k in 0..8 {
-        state.limits(&gains, &par.weakening, (w, machine.u_dc, 0.0), most, k);
+        state.limits(&gains, &par.weakening, (w, machine.u_dc, 0.0), most / par.motor.torque_constant(), k);
         i = state.currents(&gains, tau, w, today, machine.i);
     }
     (i, state)

@@ -231,12 +231,11 @@ impl State {
         };
         let w = f64::from(par.motor.n_p) * speed;
         let (mut low, mut high) = (limit, limit);
-        self.tau = (gains.k * limit, gains.k * limit);
         if par.weakening.used {
             let at = (w, inputs.u_dc, injected);
-            self.tau = self.weakening.limits(&gains.weakening, &par.weakening, at, gains.k * limit, self.k);
-            (low, high) = (limit.min(self.tau.0 / gains.k), limit.min(self.tau.1 / gains.k));
+            (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, limit, self.k);
         }
+        self.tau = (gains.k * low, gains.k * high);
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
             (requested.clamp(-low, high), requested)

@@ -62,6 +62,8 @@ pub struct WeakeningGains {
     envelope: Envelope,
     /// Currents (A) of the greatest positive torque of today's reference.
     end: DqHat,
+    /// Torque constant in N.m/A.
+    k: f64,
     /// Parts of |u|^2 that bound those of all its currents: constant, by w, by w^2.
     voltage: [f64; 3],
     /// Least useful i_d in A.
@@ -83,6 +85,7 @@ impl WeakeningGains {
         Self {
             envelope: Envelope::new(motor, limit.i),
             end,
+            k: motor.torque_constant(),
             voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
             least: -limit.i.min(motor.psi_M / motor.L_d),
         }
@@ -110,15 +113,16 @@ pub struct Weakening {
 }
 
 impl Weakening {
-    /// Greatest magnitudes (N.m) of negative and positive torque at the electrical speed `w` (rad/s), at most `tau`, where the
-    /// DC link of `u_dc` (V) also feeds an injection of `injected` (V). `k` counts the samples.
+    /// Greatest magnitudes of negative and positive torque at the electrical speed `w` (rad/s), as i_q (A) of the magnet's
+    /// torque and at most `i`, where the DC link of `u_dc` (V) also feeds an injection of `injected` (V). `k` counts the
+    /// samples.
     #[inline]
     pub fn limits(
         &mut self,
         gains: &WeakeningGains,
         par: &WeakeningParameters,
         (w, u_dc, injected): (f64, f64, f64),
-        tau: f64,
+        i: f64,
         k: u64,
     ) -> (f64, f64) {
         let highest = u_dc * INVERSE_SQRT_3;
@@ -129,17 +133,17 @@ impl Weakening {
                 let Self { trim, U, .. } = *self;
                 *self = Self { trim, U, ..Self::default() };
             }
-            return (tau, tau);
+            return (i, i);
         }
         self.near = true;
-        let [motoring, generating] = self.limits_near(gains, speed.max(LEAST_SPEED), tau, k);
+        let [motoring, generating] = self.limits_near(gains, speed.max(LEAST_SPEED), i, k);
         if w >= 0.0 { (generating, motoring) } else { (motoring, generating) }
     }
 
-    /// The limits (N.m), motoring and generating, where today's references may not fit; at most `tau`.
+    /// The limits (A), motoring and generating, where today's references may not fit; at most `i`.
     #[inline(never)]
-    fn limits_near(&mut self, gains: &WeakeningGains, w: f64, tau: f64, k: u64) -> [f64; 2] {
-        let mut allowed = [tau; 2];
+    fn limits_near(&mut self, gains: &WeakeningGains, w: f64, i: f64, k: u64) -> [f64; 2] {
+        let mut allowed = [i; 2];
         for (side, s) in [1.0, -1.0].into_iter().enumerate() {
             let end = DqHat::new(gains.end.d(), s * gains.end.q());
             if gains.envelope.excess(end, w, self.U) <= 0.0 {
@@ -152,7 +156,7 @@ impl Weakening {
                 self.limits[side] = gains.envelope.limit(w, s, self.U, &mut self.warm[side]);
             }
             // Not a number if the speed is none: no torque then.
-            allowed[side] = self.limits[side].tau.max(0.0).min(tau);
+            allowed[side] = (self.limits[side].tau / gains.k).max(0.0).min(i);
         }
         allowed
     }
