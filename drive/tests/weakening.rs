@@ -14,6 +14,8 @@ use drive::control::weakening::{Weakening, WeakeningGains, WeakeningParameters};
 use drive::estimator::Kind;
 use drive::frame::DqHat;
 use drive::motor::Motor;
+use fmu_core::Warns;
+use fmu_core::log::Warnings;
 use std::f64::consts::TAU;
 
 const RPM: f64 = std::f64::consts::PI / 30.0;
@@ -413,6 +415,25 @@ fn a_speed_step_to_two_and_a_half_times_base_speed() {
     println!("rise {rise} s, overshoot {} %", 100.0 * (most - 1.0));
     assert!((rise - 0.145).abs() < 1e-3 && most < 1.00005, "{rise} s, {most}");
     assert!((drive.pair.plant.out.speed / target - 1.0).abs() < 1e-4);
+}
+
+#[test]
+fn a_clipped_request_is_told() {
+    // a at 2000 rpm gives 24.9058 N.m; 24 N.m are within.
+    for (tau, told) in [(24.0, false), (100.0, true), (-100.0, true)] {
+        let mut drive = Drive::imposed(&a(), |_| ());
+        drive.settle(0.2, 2000.0, tau);
+        let (out, mut messages) = (&drive.pair.controller.out, Vec::new());
+        let mut sink = |key: &'static str, message: &dyn Fn() -> String| messages.push((key, message()));
+        drive.pair.controller.model.warn(&mut Warnings::to(&mut sink));
+        assert!((out.tau_max - 24.9058).abs() < 1e-3 && (out.tau_min + 32.8101).abs() < 1e-3, "{out:?}");
+        assert!(out.weakens && (out.u_share - 0.95).abs() < 2e-3, "{out:?}");
+        assert_eq!(out.current_limited, told, "{tau} N.m");
+        assert_eq!(messages.iter().any(|(key, _)| *key == "tau_ref"), told, "{tau} N.m: {messages:?}");
+        if told {
+            assert!(messages[0].1.contains(&format!("tau_ref = {tau} N.m is clipped")), "{messages:?}");
+        }
+    }
 }
 
 #[test]

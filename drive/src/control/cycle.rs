@@ -106,7 +106,7 @@ impl SensorlessController {
             Mode::Voltage(_) => (DqHat::ZERO, false),
             Mode::AfterStart | Mode::AfterSearch | Mode::ClosedLoop => {
                 let old = (tuned && mode == Mode::ClosedLoop).then_some(&last_gains.speed);
-                state.references(par.estimator, gains, old, par, inputs, speed, injection.magnitude())
+                state.references(par.estimator, gains, old, par, inputs, speed, injection)
             }
         }
     }

@@ -209,7 +209,16 @@ impl Sampled for SensorlessController {
 
 impl Warns for SensorlessController {
     fn warn(&self, log: &mut Warnings<'_>) {
-        let out = &self.state.shown;
+        let (out, par, tau_ref) = (&self.state.shown, &self.parameters, self.inputs.tau_ref);
+        let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
+        if par.weakening.used && par.speed_loop.torque_mode && out.current_limited && beyond {
+            log.warn("tau_ref", || {
+                format!(
+                    "tau_ref = {tau_ref} N.m is clipped: at this speed and u_dc, the drive gives {} to {} N.m (tau_min, tau_max)",
+                    out.tau_min, out.tau_max
+                )
+            });
+        }
         if out.lock_lost < 1.0 {
             return;
         }

@@ -9,7 +9,7 @@ use crate::control::speed::{SpeedController, SpeedGains};
 use crate::control::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::control::tables::ControllerParameters;
 use crate::control::weakening::{Weakening, WeakeningGains};
-use crate::estimator::{Class, Context, Estimate, Estimator, EstimatorParameters, Kind, Sample};
+use crate::estimator::{Class, Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use crate::math::wrap;
 use crate::motor::Motor;
@@ -202,7 +202,7 @@ impl State {
         }
     }
 
-    /// The current references (A) at the estimated mechanical `speed` (rad/s) beside a voltage of `injected` (V), and whether
+    /// The current references (A) at the estimated mechanical `speed` (rad/s) beside an `injection`, and whether
     /// a limit reduced them; `old` are the gains of a speed loop that is retuned at this sample.
     #[inline]
     #[expect(clippy::too_many_arguments, reason = "parameters, inputs and estimate, each of its own kind")]
@@ -214,7 +214,7 @@ impl State {
         par: &ControllerParameters,
         inputs: &ControllerInputs,
         speed: f64,
-        injected: f64,
+        injection: Injection,
     ) -> (DqHat, bool) {
         self.w_ref = par.speed_loop.ramped(self.w_ref, inputs.speed_ref, par.T_s);
         let w_ref = self.w_ref;
@@ -232,7 +232,7 @@ impl State {
         let w = f64::from(par.motor.n_p) * speed;
         let (mut low, mut high) = (limit, limit);
         if par.weakening.used {
-            let at = (w, inputs.u_dc, injected);
+            let at = (w, inputs.u_dc, injection.magnitude());
             (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, limit, self.k);
         }
         self.tau = (gains.k * low, gains.k * high);

@@ -11,7 +11,8 @@
 //! The speed loop's limits are those of the torque. They fall as the speed rises, so while one acts, the integrator
 //! follows: dI/dt = w_s (limited - wanted), besides the hold of [`speed`](crate::control::speed).
 //!
-//! The limit of the sign that the drive uses is computed at every sample, the other one at every eighth.
+//! The limit of the sign that the drive uses is computed at every sample while it acts, else at every other one, and that
+//! of the other sign at every eighth.
 
 use crate::control::envelope::{Envelope, Limit, Warm};
 use crate::control::reference::max_torque_per_ampere;
@@ -62,8 +63,8 @@ pub struct WeakeningGains {
     envelope: Envelope,
     /// Currents (A) of the greatest positive torque of today's reference.
     end: DqHat,
-    /// Torque constant in N.m/A.
-    k: f64,
+    /// Inverse of the torque constant in A/(N.m).
+    per_torque: f64,
     /// Parts of |u|^2 that bound those of all its currents: constant, by w, by w^2.
     voltage: [f64; 3],
     /// Least useful i_d in A.
@@ -85,7 +86,7 @@ impl WeakeningGains {
         Self {
             envelope: Envelope::new(motor, limit.i),
             end,
-            k: motor.torque_constant(),
+            per_torque: 1.0 / motor.torque_constant(),
             voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
             least: -limit.i.min(motor.psi_M / motor.L_d),
         }
@@ -106,6 +107,8 @@ pub struct Weakening {
     warm: [Warm; 2],
     /// The drive generates: the second limit is the one in use.
     generates: bool,
+    /// The limit in use acts.
+    clipped: bool,
     /// i_d of the last sample in A, read while weakening.
     i_d: f64,
     /// i_d is below today's reference.
@@ -151,12 +154,18 @@ impl Weakening {
                 self.limits[side] = Limit { i: DqHat::new(gains.least, 0.0), tau: f64::INFINITY };
                 continue;
             }
-            let in_use = self.generates == (side == 1);
-            if in_use || k.is_multiple_of(8) || self.warm[side].is_cold() {
+            let every = if self.generates != (side == 1) {
+                8
+            } else if self.clipped {
+                1
+            } else {
+                2
+            };
+            if k.is_multiple_of(every) || self.warm[side].is_cold() {
                 self.limits[side] = gains.envelope.limit(w, s, self.U, &mut self.warm[side]);
             }
             // Not a number if the speed is none: no torque then.
-            allowed[side] = (self.limits[side].tau / gains.k).max(0.0).min(i);
+            allowed[side] = (self.limits[side].tau * gains.per_torque).max(0.0).min(i);
         }
         allowed
     }
@@ -176,7 +185,8 @@ impl Weakening {
             self.weakens = false;
             return today;
         }
-        let i = if tau.abs() >= limit.tau * (1.0 - 1e-9) {
+        self.clipped = tau.abs() >= limit.tau * (1.0 - 1e-9);
+        let i = if self.clipped {
             // At the limit, the root is double on MTPV: its currents are known already.
             DqHat::new(limit.i.d(), limit.i.q().abs().copysign(tau))
         } else {
