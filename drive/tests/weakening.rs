@@ -335,8 +335,11 @@ fn a_sag_of_the_link() {
     assert!((quick[1] - 12.6).abs() < 0.25 && (quick[2] - 17.5).abs() < 0.1, "{quick:?}");
 }
 
+/// Makes an estimate wrong.
+type Wrong = fn(&mut Motor);
+
 /// Share of the true envelope, and of the voltage, at full torque at `n` times the base speed with wrong estimates of a.
-fn with_wrong(set: fn(&mut Motor), n: f64) -> (f64, f64) {
+fn with_wrong(set: Wrong, n: f64) -> (f64, f64) {
     let (rpm, mut now) = (n * 999.14, 200.0);
     let mut drive = Drive::imposed(&a(), |p| set(&mut p.motor));
     while now < rpm {
@@ -349,7 +352,7 @@ fn with_wrong(set: fn(&mut Motor), n: f64) -> (f64, f64) {
 
 #[test]
 fn wrong_estimates() {
-    let figures: [(&str, fn(&mut Motor), [f64; 2], bool); 6] = [
+    let figures: [(&str, Wrong, [f64; 2], bool); 6] = [
         ("R 0.9", |m| m.R_s *= 0.9, [1.016, 1.020], false),
         ("psi_M 0.92", |m| m.psi_M *= 0.92, [1.021, 1.020], false),
         ("psi_M 1.08", |m| m.psi_M *= 1.08, [0.976, 0.966], false),

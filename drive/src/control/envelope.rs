@@ -134,7 +134,8 @@ impl Envelope {
     /// Currents (A) of the most torque per volt; `warm` is the direction of u, from the last sample on.
     fn max_torque_per_volt(&self, w: f64, s: f64, U: f64, warm: &mut [f64; 2]) -> DqHat {
         let &Self { R, L_d, L_q, dL, psi_M, .. } = self;
-        let (mut u, steps) = if *warm == [0.0; 2] { (self.without_resistance(w, s, U), 4) } else { (*warm, 2) };
+        let (mut u, steps) =
+            if warm.iter().all(|&part| part == 0.0) { (self.without_resistance(w, s, U), 4) } else { (*warm, 2) };
         let inverse = 1.0 / (R * R + w * w * L_d * L_q);
         // Currents of the voltage (d, q) with the magnet's EMF set to zero.
         let current = |d: f64, q: f64| ((R * d + w * L_q * q) * inverse, (R * q - w * L_d * d) * inverse);

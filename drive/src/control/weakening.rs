@@ -95,6 +95,7 @@ impl WeakeningGains {
 
 /// State from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "answers of the last sample, each on its own")]
 pub struct Weakening {
     /// Trim in V.
     trim: f64,
