@@ -129,25 +129,29 @@ pub const POWERS: &Table<Powers> = &Table::new(
                 &AMPERE,
                 "Current that the inverter draws from the DC link, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.i_dc,
-            ),
+            )
+            .mean(),
             P::output(
                 "p_in",
                 &WATT,
                 "Power from the DC link, u_dc i_dc, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_in,
-            ),
+            )
+            .mean(),
             P::output(
                 "p_mech",
                 &WATT,
                 "Power delivered to the load at the shaft, tau_shaft speed, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_mech,
-            ),
+            )
+            .mean(),
             P::output(
                 "p_loss",
                 &WATT,
                 "Copper loss of the stator and friction, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_loss,
-            ),
+            )
+            .mean(),
         ]
     },
 );
