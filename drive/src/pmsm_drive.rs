@@ -12,7 +12,8 @@ use crate::PmsmPlant;
 #[cfg(doc)]
 use crate::SensorlessController;
 use crate::control::signals::ControllerOutputs;
-use crate::control::tables::{self, ENABLED, LIMITED, LOCK_LOST};
+use crate::control::tables::{self, ENABLED, LATER_OUTPUTS, LIMITED, LOCK_LOST};
+use crate::control::weakening::WEAKENING;
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
@@ -147,7 +148,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 6;
+    const STATE_VERSION: u16 = 7;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -331,6 +332,11 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 &Part { table: tables::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
             ),
             V::part("", &Part { table: plant::STATES, lens: |m| &mut m.model.pair.plant.model }),
+            V::part(
+                "controller.weakening.",
+                &Part { table: WEAKENING, lens: |m| &mut m.model.pair.controller.model.parameters.weakening },
+            ),
+            V::part("", &Part { table: LATER_OUTPUTS, lens: |m| &mut m.out.controller }),
         ]
     },
 );
