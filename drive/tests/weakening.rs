@@ -146,6 +146,8 @@ fn the_base_speed() {
             let base = Machine::last_speed(fits);
             println!("base speed {base} rpm, {figure}");
             assert!(figure.is_nan() || (base - figure).abs() < 6e-3, "{base} rpm, not {figure}");
+            let closed = machine.envelope().base_speed(machine.U(k_u)) / machine.w(1.0);
+            assert!((closed - base).abs() < 1e-9 * base, "{closed} rpm, not {base}");
         }
     }
 }
