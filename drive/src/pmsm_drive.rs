@@ -157,7 +157,7 @@ impl Model for PmsmDrive {
 
     fn validate(&self) -> Result<(), Fault> {
         self.pair.plant.model.validate().map_err(|fault| in_part("plant", &fault))?;
-        self.pair.controller.model.validate().map_err(|fault| in_part("controller", &fault))
+        self.pair.controller.model.validate_on(self.inputs.u_dc).map_err(|fault| in_part("controller", &fault))
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {

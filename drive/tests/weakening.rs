@@ -425,18 +425,20 @@ fn a_speed_step_to_two_and_a_half_times_base_speed() {
 #[test]
 fn a_clipped_request_is_told() {
     // a at 2000 rpm gives 24.9058 N.m; 24 N.m are within.
-    for (tau, told) in [(24.0, false), (100.0, true), (-100.0, true)] {
+    for (tau, seconds, clipped, told) in
+        [(24.0, 1.1, false, false), (100.0, 0.9, true, false), (100.0, 1.1, true, true), (-100.0, 1.1, true, true)]
+    {
         let mut drive = Drive::imposed(&a(), |_| ());
-        drive.settle(0.2, 2000.0, tau);
+        drive.settle(seconds, 2000.0, tau);
         let (out, mut messages) = (&drive.pair.controller.out, Vec::new());
         let mut sink = |key: &'static str, message: &dyn Fn() -> String| messages.push((key, message()));
         drive.pair.controller.model.warn(&mut Warnings::to(&mut sink));
         assert!((out.tau_max - 24.9058).abs() < 1e-3 && (out.tau_min + 32.8101).abs() < 1e-3, "{out:?}");
         assert!(out.weakens && (out.u_share - 0.95).abs() < 2e-3, "{out:?}");
-        assert_eq!(out.current_limited, told, "{tau} N.m");
+        assert_eq!(out.current_limited, clipped, "{tau} N.m");
         assert_eq!(messages.iter().any(|(key, _)| *key == "tau_ref"), told, "{tau} N.m: {messages:?}");
         if told {
-            assert!(messages[0].1.contains(&format!("tau_ref = {tau} N.m is clipped")), "{messages:?}");
+            assert!(messages[0].1.contains(&format!("tau_ref = {tau} N.m has been clipped")), "{messages:?}");
         }
     }
 }

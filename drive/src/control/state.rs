@@ -118,6 +118,8 @@ pub(super) struct State {
     pub(super) weakening: Weakening,
     /// Greatest magnitude of negative and of positive torque at the last sample in N.m.
     pub(super) tau: (f64, f64),
+    /// Time in s for which a limit has reduced the references, while field weakening is in use.
+    pub(super) limited_for: f64,
     /// Outputs of the last sample, hidden until the next instant.
     pub(super) computed: ControllerOutputs,
     /// Outputs visible now.
@@ -253,6 +255,7 @@ impl State {
             DqHat::new(i_d_ref, i_q_ref)
         };
         if par.weakening.used {
+            self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
             let tau = gains.k * i_q_ref;
             return (self.weakening.currents(&gains.weakening, tau, w, i_ref, par.limit.i_q), limited);
         }

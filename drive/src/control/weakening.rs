@@ -15,7 +15,7 @@
 //! of the other sign at every eighth.
 
 use crate::control::envelope::{Envelope, Limit, Warm};
-use crate::control::reference::max_torque_per_ampere;
+use crate::control::reference::{max_torque, max_torque_per_ampere};
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
 use crate::estimator::{Class, Kind};
 use crate::frame::DqHat;
@@ -90,6 +90,15 @@ impl WeakeningGains {
             voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
             least: -limit.i.min(motor.psi_M / motor.L_d),
         }
+    }
+}
+
+impl WeakeningGains {
+    /// Electrical speed in rad/s below which all of today's references fit the voltage `U` (V).
+    pub fn onset(&self, U: f64) -> f64 {
+        let [copper, cross, flux] = self.voltage;
+        let free = U * U - copper;
+        if U <= 0.0 || free <= 0.0 { 0.0 } else { 2.0 * free / (cross + (cross * cross + 4.0 * flux * free).sqrt()) }
     }
 }
 
@@ -215,12 +224,12 @@ pub fn share(u: f64, u_dc: f64) -> f64 {
     if u_dc > 1e-3 { u * SQRT_3 / u_dc } else { 0.0 }
 }
 
-/// Checks that field weakening can work with the other parameters.
+/// Checks that field weakening can work with the other parameters, on a DC link of `u_dc` (V).
 ///
 /// # Errors
 /// States which parameters do not fit together, and what to do.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let ControllerParameters { weakening: own, motor, limit, estimator, .. } = par;
+pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
+    let ControllerParameters { weakening: own, motor, limit, estimator, zero_speed, .. } = par;
     if !own.used {
         return Ok(());
     }
@@ -237,6 +246,19 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
             "{use_is} with {estimator_is}: injection leaves no voltage for field weakening; choose Hybrid, or set the first \
              to false"
         )));
+    }
+    if *estimator == Kind::Hybrid && u_dc > 0.0 {
+        // Above this speed the references may need field weakening; an injection leaves them less voltage.
+        let gains = WeakeningGains::new(par, max_torque(motor, limit, par.current.mtpa), par.current.mtpa);
+        let onset = gains.onset(own.k_u * u_dc * INVERSE_SQRT_3 - par.estimators.square_wave.voltage);
+        if par.estimators.hybrid.w_high > onset {
+            let injected = table.tell(par, |p| &mut p.estimators.square_wave.voltage);
+            let allowed = format!(
+                "at most {onset:.4} rad/s, where field weakening begins with {use_is}, {injected} and a DC link of {u_dc} V; \
+                 lower it or the injected voltage, or raise the DC link's"
+            );
+            return Err(table.fault(par, |p| &mut p.estimators.hybrid.w_high, allowed));
+        }
     }
     if *estimator == Kind::VoltageFeedback && (own.k_u > 0.9 || own.k_t > own.k_u) {
         return Err(Fault::new(format!(
@@ -258,6 +280,15 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
         return Err(Fault::new(format!(
             "{limit_is} with {use_is} and L_q < L_d: the torque of i_q vanishes at the current -psi_M / (L_d - L_q); at most \
              {most:.4} A (0.8 psi_M / (L_d - L_q))"
+        )));
+    }
+    if estimator.class() == Class::FluxObserver && zero_speed.i_0 * (motor.L_q - motor.L_d) > (1.0 - LEAST_TORQUE) * motor.psi_M
+    {
+        return Err(Fault::new(format!(
+            "{} with {use_is} and L_q > L_d: the torque of i_q vanishes at the current psi_M / (L_q - L_d); at most {:.4} A \
+             (0.8 psi_M / (L_q - L_d))",
+            table.tell(par, |p| &mut p.zero_speed.i_0),
+            -most
         )));
     }
     Ok(())
