@@ -189,7 +189,7 @@ fn currents(machine: &Machine, rpm: f64, tau: f64) -> (DqHat, Weakening) {
     let mut i = DqHat::ZERO;
     for k in 0..8 {
         state.limits(&gains, &par.weakening, (w, machine.u_dc, 0.0), most / par.motor.torque_constant(), k);
-        i = state.currents(&gains, tau, w, today, machine.i);
+        i = state.currents(&gains, tau, w, machine.i, true, || today);
     }
     (i, state)
 }

@@ -52,13 +52,6 @@ pub struct Warm {
     u: [f64; 2],
 }
 
-impl Warm {
-    /// Nothing is known from the last sample.
-    pub fn is_cold(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
 impl Envelope {
     /// For the estimates `motor` and the current limit `I` (A).
     pub fn new(motor: &Motor, I: f64) -> Self {
@@ -196,6 +189,12 @@ impl Envelope {
             i_d -= (g * l * l + e) * l / slope;
         }
         Some(i_d)
+    }
+
+    /// Whether i_d is less than that of maximum torque per ampere at the same torque.
+    #[inline]
+    pub fn beyond_mtpa(&self, i: DqHat) -> bool {
+        i.d() * (self.psi_M - self.dL * i.d()) + self.dL * i.q() * i.q() < 0.0
     }
 
     /// i_q (A) for the torque `tau` (N.m) beside `i_d` (A).

@@ -231,34 +231,53 @@ impl State {
         } else {
             (0.0, gains.i_tau)
         };
-        let w = f64::from(par.motor.n_p) * speed;
-        let (mut low, mut high) = (limit, limit);
+        let salient = par.current.mtpa && !observes_flux;
+        let today = |i_q_ref: f64| {
+            if salient { max_torque_per_ampere(&par.motor, gains.k * i_q_ref) } else { DqHat::new(i_d_ref, i_q_ref) }
+        };
         if par.weakening.used {
-            let at = (w, inputs.u_dc, injection.magnitude());
-            (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, limit, self.k);
+            return self.weakened(gains, par, inputs, (speed, w_ref), limit, injection, salient, today);
         }
+        self.tau = (gains.k * limit, gains.k * limit);
+        let (i_q_ref, requested) = if par.speed_loop.torque_mode {
+            let requested = inputs.tau_ref / gains.k;
+            (requested.clamp(-limit, limit), requested)
+        } else {
+            self.speed.update(&gains.speed, w_ref, speed, (-limit, limit), par.T_s)
+        };
+        (today(i_q_ref), requested.abs() > limit)
+    }
+
+    /// [`references`](Self::references) with field weakening.
+    #[inline(never)]
+    #[expect(clippy::too_many_arguments, reason = "what the references have computed")]
+    fn weakened(
+        &mut self,
+        gains: &Gains,
+        par: &ControllerParameters,
+        inputs: &ControllerInputs,
+        (speed, w_ref): (f64, f64),
+        limit: f64,
+        injection: Injection,
+        salient: bool,
+        today: impl Fn(f64) -> DqHat,
+    ) -> (DqHat, bool) {
+        let w = f64::from(par.motor.n_p) * speed;
+        let at = (w, inputs.u_dc, injection.magnitude());
+        let (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, limit, self.k);
         self.tau = (gains.k * low, gains.k * high);
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
             (requested.clamp(-low, high), requested)
         } else {
             let (limited, wanted) = self.speed.update(&gains.speed, w_ref, speed, (-low, high), par.T_s);
-            if par.weakening.used {
-                self.speed.follow(par.speed_loop.bandwidth, limited - wanted, par.T_s);
-            }
+            self.speed.follow(par.speed_loop.bandwidth, limited - wanted, par.T_s);
             (limited, wanted)
         };
         let limited = requested > high || requested < -low;
-        let i_ref = if par.current.mtpa && !observes_flux {
-            max_torque_per_ampere(&par.motor, gains.k * i_q_ref)
-        } else {
-            DqHat::new(i_d_ref, i_q_ref)
-        };
-        if par.weakening.used {
-            self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
-            let tau = gains.k * i_q_ref;
-            return (self.weakening.currents(&gains.weakening, tau, w, i_ref, par.limit.i_q), limited);
-        }
+        self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
+        let tau = gains.k * i_q_ref;
+        let i_ref = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, salient, || today(i_q_ref));
         (i_ref, limited)
     }
 

@@ -11,8 +11,7 @@
 //! The speed loop's limits are those of the torque. They fall as the speed rises, so while one acts, the integrator
 //! follows: dI/dt = w_s (limited - wanted), besides the hold of [`speed`](crate::control::speed).
 //!
-//! The limit of the sign that the drive uses is computed at every sample while it acts, else at every other one, and that
-//! of the other sign at every eighth.
+//! A limit is computed at every sample while it acts, else at every eighth one and when the voltage has changed by 1 %.
 
 use crate::control::envelope::{Envelope, Limit, Warm};
 use crate::control::reference::{max_torque, max_torque_per_ampere};
@@ -31,6 +30,11 @@ const LEAST_SHARE: f64 = 0.05;
 
 /// Greatest trim, as a share of u_dc / sqrt 3.
 const GREATEST_TRIM: f64 = 0.3;
+
+/// Samples after which a limit that does not act is computed again, and the change of the voltage, as a share, after which
+/// both are.
+const EVERY: u64 = 8;
+const LEAST_CHANGE: f64 = 0.01;
 
 /// Least electrical speed in rad/s that the limits are computed for.
 const LEAST_SPEED: f64 = 1e-3;
@@ -110,6 +114,8 @@ pub struct Weakening {
     trim: f64,
     /// Voltage in V for the references of this sample.
     U: f64,
+    /// Voltage in V at the last sample that had to compute both limits.
+    U_then: f64,
     /// Some of today's references does not fit the voltage.
     near: bool,
     /// Motoring, generating.
@@ -154,60 +160,80 @@ impl Weakening {
     }
 
     /// The limits (A), motoring and generating, where today's references may not fit; at most `i`.
-    #[inline(never)]
     fn limits_near(&mut self, gains: &WeakeningGains, w: f64, i: f64, k: u64) -> [f64; 2] {
-        let mut allowed = [i; 2];
-        for (side, s) in [1.0, -1.0].into_iter().enumerate() {
-            let end = DqHat::new(gains.end.d(), s * gains.end.q());
-            if gains.envelope.excess(end, w, self.U) <= 0.0 {
-                self.warm[side] = Warm::default();
-                self.limits[side] = Limit { i: DqHat::new(gains.least, 0.0), tau: f64::INFINITY };
-                continue;
-            }
-            let every = if self.generates != (side == 1) {
-                8
-            } else if self.clipped {
-                1
-            } else {
-                2
-            };
-            if k.is_multiple_of(every) || self.warm[side].is_cold() {
-                self.limits[side] = gains.envelope.limit(w, s, self.U, &mut self.warm[side]);
-            }
-            // Not a number if the speed is none: no torque then.
-            allowed[side] = (self.limits[side].tau * gains.per_torque).max(0.0).min(i);
+        let moved = (self.U - self.U_then).abs() > LEAST_CHANGE * self.U;
+        if moved {
+            self.U_then = self.U;
         }
-        allowed
+        for (side, s) in [1.0, -1.0].into_iter().enumerate() {
+            let acts = self.clipped && self.generates == (side == 1);
+            let turn = k % EVERY == side as u64 * (EVERY / 2);
+            if moved || acts || turn {
+                self.limits[side] = self.limit(gains, side, s, w);
+            }
+        }
+        // Not a number if the speed is none: no torque then.
+        self.limits.map(|limit| (limit.tau * gains.per_torque).max(0.0).min(i))
     }
 
-    /// Currents (A) for the torque `tau` (N.m) at the electrical speed `w` (rad/s): `today`'s, or on the voltage limit; |i_q|
-    /// at most `i_q_max`.
+    fn limit(&mut self, gains: &WeakeningGains, side: usize, s: f64, w: f64) -> Limit {
+        let end = DqHat::new(gains.end.d(), s * gains.end.q());
+        if gains.envelope.excess(end, w, self.U) <= 0.0 {
+            self.warm[side] = Warm::default();
+            return Limit { i: DqHat::new(gains.least, 0.0), tau: f64::INFINITY };
+        }
+        gains.envelope.limit(w, s, self.U, &mut self.warm[side])
+    }
+
+    /// Currents (A) for the torque `tau` (N.m) at the electrical speed `w` (rad/s): `today`'s, of maximum torque per ampere
+    /// if `mtpa`, or on the voltage limit; |i_q| at most `i_q_max`.
     #[inline]
-    pub fn currents(&mut self, gains: &WeakeningGains, tau: f64, w: f64, today: DqHat, i_q_max: f64) -> DqHat {
-        if self.near { self.currents_near(gains, tau, w, today, i_q_max) } else { today }
-    }
-
-    #[inline(never)]
-    fn currents_near(&mut self, gains: &WeakeningGains, tau: f64, w: f64, today: DqHat, i_q_max: f64) -> DqHat {
+    pub fn currents(
+        &mut self,
+        gains: &WeakeningGains,
+        tau: f64,
+        w: f64,
+        i_q_max: f64,
+        mtpa: bool,
+        today: impl Fn() -> DqHat,
+    ) -> DqHat {
+        if !self.near {
+            return today();
+        }
         self.generates = tau * w < 0.0;
         let limit = self.limits[usize::from(self.generates)];
-        if gains.envelope.excess(today, w, self.U) <= 0.0 {
-            self.weakens = false;
-            return today;
-        }
         self.clipped = tau.abs() >= limit.tau * (1.0 - 1e-9);
-        let i = if self.clipped {
-            // At the limit, the root is double on MTPV: its currents are known already.
-            DqHat::new(limit.i.d(), limit.i.q().abs().copysign(tau))
-        } else {
-            let solve = |i_d, steps| gains.envelope.i_d(tau, w, self.U, i_d, steps);
-            let warm = if self.weakens { solve(self.i_d, 2) } else { None };
-            let i_d = warm.or_else(|| solve(today.d(), 8)).unwrap_or(limit.i.d()).max(limit.i.d());
+        let solve = |i_d, steps| gains.envelope.i_d(tau, w, self.U, i_d, steps);
+        let on_the_limit = |i_d: f64| {
+            let i_d = i_d.max(limit.i.d());
             DqHat::new(i_d, gains.envelope.i_q(tau, i_d))
         };
-        self.i_d = i.d();
-        self.weakens = i.d() < today.d();
-        if self.weakens { DqHat::new(i.d(), i.q().clamp(-i_q_max, i_q_max)) } else { today }
+        let i = if self.clipped {
+            // The root is double on MTPV, but its currents are known already.
+            DqHat::new(limit.i.d(), limit.i.q().abs().copysign(tau))
+        } else {
+            // While weakening, the root is near the last one, and left of maximum torque per ampere.
+            let warm = if self.weakens && mtpa { solve(self.i_d, 2).map(on_the_limit) } else { None };
+            match warm.filter(|&i| gains.envelope.beyond_mtpa(i)) {
+                Some(i) => i,
+                None => {
+                    let today = today();
+                    if gains.envelope.excess(today, w, self.U) <= 0.0 {
+                        self.weakens = false;
+                        return today;
+                    }
+                    let warm = if self.weakens { solve(self.i_d, 2) } else { None };
+                    let i = on_the_limit(warm.or_else(|| solve(today.d(), 8)).unwrap_or(limit.i.d()));
+                    if i.d() >= today.d() {
+                        self.weakens = false;
+                        return today;
+                    }
+                    i
+                }
+            }
+        };
+        (self.i_d, self.weakens) = (i.d(), true);
+        DqHat::new(i.d(), i.q().clamp(-i_q_max, i_q_max))
     }
 
     /// Integrates the trim over one sample of `T_s` (s) with the voltage `u` (V) that the current loop requests.
