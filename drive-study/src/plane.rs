@@ -104,7 +104,7 @@ pub fn svg(panels: &[Panel]) -> Result<String> {
             }
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::MiddleRight)
+                .position(SeriesLabelPosition::MiddleLeft)
                 .background_style(WHITE.mix(0.8))
                 .border_style(GRAY)
                 .label_font(("sans-serif", 15))

@@ -77,7 +77,9 @@ pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
         let reference = line(t, 0.5, FROM, 1.0, target);
         candidate.set(p, reference, line(t, 1.5, 0.0, 1.8, load));
         follow.trace(t, reference, p);
-        follow.add(t, reference, p);
+        if t > 0.5 {
+            follow.add(t, reference, p);
+        }
         let speed = runner::speed(p);
         if t <= 1.5 {
             fast.peak = fast.peak.max(speed);

@@ -89,6 +89,19 @@ pub(super) enum Mode {
     ClosedLoop,
 }
 
+/// The references of a sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct References {
+    /// Currents in A.
+    pub(super) i: DqHat,
+    /// Whether a limit reduced them.
+    pub(super) limited: bool,
+    /// Greatest magnitude of negative and of positive torque in N.m.
+    pub(super) tau: (f64, f64),
+    /// Whether field weakening lowers i_d.
+    pub(super) weakens: bool,
+}
+
 /// Values passed from one sample to the next.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
@@ -116,8 +129,6 @@ pub(super) struct State {
     pub(super) u_pi: DqHat,
     pub(super) lock: Lock,
     pub(super) weakening: Weakening,
-    /// Greatest magnitude of negative and of positive torque at the last sample in N.m.
-    pub(super) tau: (f64, f64),
     /// Time in s for which a limit has reduced the references, while field weakening is in use.
     pub(super) limited_for: f64,
     /// Outputs of the last sample, hidden until the next instant.
@@ -204,8 +215,8 @@ impl State {
         }
     }
 
-    /// The current references (A) at the estimated mechanical `speed` (rad/s) beside an `injection`, and whether
-    /// a limit reduced them; `old` are the gains of a speed loop that is retuned at this sample.
+    /// The references at the estimated mechanical `speed` (rad/s) beside an `injection`; `old` are the gains of a speed loop
+    /// that is retuned at this sample.
     #[inline]
     #[expect(clippy::too_many_arguments, reason = "parameters, inputs and estimate, each of its own kind")]
     pub(super) fn references(
@@ -217,7 +228,7 @@ impl State {
         inputs: &ControllerInputs,
         speed: f64,
         injection: Injection,
-    ) -> (DqHat, bool) {
+    ) -> References {
         self.w_ref = par.speed_loop.ramped(self.w_ref, inputs.speed_ref, par.T_s);
         let w_ref = self.w_ref;
         if let Some(old) = old {
@@ -238,14 +249,14 @@ impl State {
         if par.weakening.used {
             return self.weakened(gains, par, inputs, (speed, w_ref), limit, injection, salient, today);
         }
-        self.tau = (gains.k * limit, gains.k * limit);
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
             (requested.clamp(-limit, limit), requested)
         } else {
             self.speed.update(&gains.speed, w_ref, speed, (-limit, limit), par.T_s)
         };
-        (today(i_q_ref), requested.abs() > limit)
+        let tau = gains.k * limit;
+        References { i: today(i_q_ref), limited: requested.abs() > limit, tau: (tau, tau), weakens: false }
     }
 
     /// [`references`](Self::references) with field weakening.
@@ -261,11 +272,10 @@ impl State {
         injection: Injection,
         salient: bool,
         today: impl Fn(f64) -> DqHat,
-    ) -> (DqHat, bool) {
+    ) -> References {
         let w = f64::from(par.motor.n_p) * speed;
         let at = (w, inputs.u_dc, injection.magnitude());
         let (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, limit, self.k);
-        self.tau = (gains.k * low, gains.k * high);
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
             (requested.clamp(-low, high), requested)
@@ -277,8 +287,8 @@ impl State {
         let limited = requested > high || requested < -low;
         self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
         let tau = gains.k * i_q_ref;
-        let i_ref = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, salient, || today(i_q_ref));
-        (i_ref, limited)
+        let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, salient, || today(i_q_ref));
+        References { i, limited, tau: (gains.k * low, gains.k * high), weakens: self.weakening.weakens }
     }
 
     /// The north pole is known: the estimator supplies the angle, and both loops start at rest.
