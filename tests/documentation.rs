@@ -45,7 +45,8 @@ fn the_envelope_is_that_of_the_running_drive() {
         assert!((torque / figure - 1.0).abs() < 0.01, "{rpm} rpm: {torque} N.m, not {figure}");
     }
     for pair in plane.panel.dots.chunks(2).filter(|pair| [3000.0, 4000.0, 4500.0, 5000.0].contains(&pair[0].0)) {
-        let row = format!("<tr><td>{} rpm</td><td>{:.2} N.m</td><td>{:.2} N.m</td></tr>", pair[0].0, pair[0].1, pair[1].1);
+        let row =
+            format!("<tr><td>{} rpm</td><td>{:.2} N.m</td><td>{:.2} N.m</td></tr>", pair[0].0, pair[0].1, pair[1].1);
         let row = row.replace('-', "−");
         assert!(text.contains(&row), "drive/docs/envelope.html has another row than\n{row}");
     }

@@ -366,7 +366,10 @@ fn the_traction_drive_reaches_two_and_a_half_times_its_base_speed() {
             pair.plant.out.speed
         );
         assert!(weakens && (reached / top - 1.0).abs() < 0.002, "{reached} of {top} rad/s");
-        assert!(highest < 1.01 * top && worst < 15.0 && current < 1.02 * 240.0, "{highest} rad/s, {worst} deg, {current} A");
+        assert!(
+            highest < 1.01 * top && worst < 15.0 && current < 1.02 * 240.0,
+            "{highest} rad/s, {worst} deg, {current} A"
+        );
         assert!(pair.plant.out.speed < 0.98 * top && (share - 1.0).abs() < 0.01, "{share} at {}", pair.plant.out.speed);
     }
 }

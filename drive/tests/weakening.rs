@@ -218,6 +218,27 @@ fn points_inside() {
     }
 }
 
+#[test]
+fn an_injected_voltage_is_taken_off() {
+    let (machine, rpm, injected) = (a(), 1500.0, 40.0);
+    let (par, w) = (machine.parameters(), machine.w(rpm));
+    let k = par.motor.torque_constant();
+    let gains = WeakeningGains::new(&par, machine.limit(100.0, 1.0)[1].tau, true);
+    let mut state = Weakening::default();
+    let both =
+        (0..9).map(|n| state.limits(&gains, &par.weakening, (w, machine.u_dc, injected), 1e3, n)).last().unwrap();
+    for (i, s) in [(both.1, 1.0), (both.0, -1.0)] {
+        let mut warm = Warm::default();
+        let mut limit = || machine.envelope().limit(w, s, machine.U(0.95) - injected, &mut warm).tau;
+        let figure = (0..9).map(|_| limit()).last().unwrap();
+        assert!(
+            (i * k - figure).abs() < 1e-6 && figure < machine.limit(rpm, s)[1].tau - 3.0,
+            "{} N.m, {figure}",
+            i * k
+        );
+    }
+}
+
 /// A drive with a sensor and exact estimates; its shaft turns at an imposed speed.
 struct Drive {
     pair: Pair,
@@ -350,6 +371,33 @@ fn with_wrong(set: Wrong, n: f64) -> (f64, f64) {
     }
     drive.settle(1.0, rpm, 1e3);
     (drive.torque() / a().limit(rpm, 1.0)[1].tau, drive.pair.controller.out.u_share)
+}
+
+#[test]
+fn injection_ends_before_field_weakening_begins() {
+    // Hybrid with the highest w_high that is accepted: 126.6 rad/s beside 150 V of injection.
+    let machine = a();
+    for s in [1.0, -1.0] {
+        let mut drive = Drive::imposed(&machine, |p| {
+            p.estimator = Kind::Hybrid;
+            p.estimators.tracker.bandwidth = TAU * 40.0;
+            (p.estimators.hybrid.w_low, p.estimators.hybrid.w_high) = (63.0, 126.0);
+        });
+        let (mut rpm, mut weakest) = (0.0, f64::INFINITY);
+        drive.settle(0.2, rpm, 0.0);
+        while rpm < 2500.0 {
+            drive.step(rpm, s * 1e3, machine.u_dc);
+            let out = &drive.pair.controller.out;
+            if out.weakens {
+                weakest = weakest.min(3.0 * out.speed_est.abs());
+            }
+            rpm += 400.0 / RPM * T_S;
+        }
+        let share = s * drive.torque() / machine.limit(rpm, s)[1].tau;
+        println!("{s}: weakens from {weakest} rad/s on, {share} of the envelope at {rpm} rpm");
+        assert!(weakest > 126.0 && weakest < 330.0, "{weakest} rad/s");
+        assert!((share - 1.0).abs() < 0.01, "{share} of the envelope");
+    }
 }
 
 #[test]

@@ -165,10 +165,9 @@ impl Weakening {
         if moved {
             self.U_then = self.U;
         }
-        for (side, s) in [1.0, -1.0].into_iter().enumerate() {
+        for (side, (s, turn)) in [(1.0, 0), (-1.0, EVERY / 2)].into_iter().enumerate() {
             let acts = self.clipped && self.generates == (side == 1);
-            let turn = k % EVERY == side as u64 * (EVERY / 2);
-            if moved || acts || turn {
+            if moved || acts || (k + turn).is_multiple_of(EVERY) {
                 self.limits[side] = self.limit(gains, side, s, w);
             }
         }
@@ -222,7 +221,7 @@ impl Weakening {
                         self.weakens = false;
                         return today;
                     }
-                    let warm = if self.weakens { solve(self.i_d, 2) } else { None };
+                    let warm = if self.weakens && !mtpa { solve(self.i_d, 2) } else { None };
                     let i = on_the_limit(warm.or_else(|| solve(today.d(), 8)).unwrap_or(limit.i.d()));
                     if i.d() >= today.d() {
                         self.weakens = false;
@@ -308,7 +307,8 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
              {most:.4} A (0.8 psi_M / (L_d - L_q))"
         )));
     }
-    if estimator.class() == Class::FluxObserver && zero_speed.i_0 * (motor.L_q - motor.L_d) > (1.0 - LEAST_TORQUE) * motor.psi_M
+    if estimator.class() == Class::FluxObserver
+        && zero_speed.i_0 * (motor.L_q - motor.L_d) > (1.0 - LEAST_TORQUE) * motor.psi_M
     {
         return Err(Fault::new(format!(
             "{} with {use_is} and L_q > L_d: the torque of i_q vanishes at the current psi_M / (L_q - L_d); at most {:.4} A \
