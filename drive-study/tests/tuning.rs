@@ -1,5 +1,5 @@
 //! Parameters tuned on a running drive: no bump at the next sample, the new gains after it, a bad combination refused.
-#![allow(missing_docs)]
+#![allow(missing_docs, non_snake_case)]
 
 use drive::control::envelope::{Envelope, Warm};
 use drive::control::signals::ControllerOutputs;

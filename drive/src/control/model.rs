@@ -66,8 +66,8 @@ impl SensorlessController {
     fn rest(&mut self) -> ControllerOutputs {
         let Self { parameters: par, state, .. } = self;
         let new = State::new(par, false);
-        let out = new.computed.clone();
-        *state = State { samples: state.samples, shown: state.shown.clone(), ..new };
+        let out = new.computed;
+        *state = State { samples: state.samples, shown: state.shown, ..new };
         out
     }
 
@@ -84,8 +84,8 @@ impl SensorlessController {
             k: state.k,
             estimator,
             lock: Lock::lost(),
-            computed: state.computed.clone(),
-            shown: state.shown.clone(),
+            computed: state.computed,
+            shown: state.shown,
             ..State::default()
         };
         ControllerOutputs { theta_est: theta, lock_lost: LOST, enabled: true, ..ControllerOutputs::default() }

@@ -141,13 +141,7 @@ impl State {
     /// Before the first sample.
     pub(super) fn new(par: &ControllerParameters, enabled: bool) -> Self {
         let shown = ControllerOutputs { theta_est: wrap(par.theta_est), enabled, ..ControllerOutputs::default() };
-        Self {
-            leader: Leader::of(par.start.mode),
-            w_ref: par.speed_est,
-            computed: shown.clone(),
-            shown,
-            ..Self::default()
-        }
+        Self { leader: Leader::of(par.start.mode), w_ref: par.speed_est, computed: shown, shown, ..Self::default() }
     }
 
     /// Changes from the I-f start's frame at `theta_frame` (rad) to the estimated one at `theta` (rad), which turns at

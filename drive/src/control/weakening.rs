@@ -207,29 +207,26 @@ impl Weakening {
             let i_d = i_d.max(limit.i.d());
             DqHat::new(i_d, gains.envelope.i_q(tau, i_d))
         };
+        // While weakening, the root is near the last one, and left of maximum torque per ampere.
+        let warm = || solve(self.i_d, 2).map(on_the_limit).filter(|&i| gains.envelope.beyond_mtpa(i));
         let i = if self.clipped {
             // The root is double on MTPV, but its currents are known already.
             DqHat::new(limit.i.d(), limit.i.q().abs().copysign(tau))
+        } else if let Some(i) = if self.weakens && mtpa { warm() } else { None } {
+            i
         } else {
-            // While weakening, the root is near the last one, and left of maximum torque per ampere.
-            let warm = if self.weakens && mtpa { solve(self.i_d, 2).map(on_the_limit) } else { None };
-            match warm.filter(|&i| gains.envelope.beyond_mtpa(i)) {
-                Some(i) => i,
-                None => {
-                    let today = today();
-                    if gains.envelope.excess(today, w, self.U) <= 0.0 {
-                        self.weakens = false;
-                        return today;
-                    }
-                    let warm = if self.weakens && !mtpa { solve(self.i_d, 2) } else { None };
-                    let i = on_the_limit(warm.or_else(|| solve(today.d(), 8)).unwrap_or(limit.i.d()));
-                    if i.d() >= today.d() {
-                        self.weakens = false;
-                        return today;
-                    }
-                    i
-                }
+            let today = today();
+            if gains.envelope.excess(today, w, self.U) <= 0.0 {
+                self.weakens = false;
+                return today;
             }
+            let warm = if self.weakens && !mtpa { solve(self.i_d, 2) } else { None };
+            let i = on_the_limit(warm.or_else(|| solve(today.d(), 8)).unwrap_or(limit.i.d()));
+            if i.d() >= today.d() {
+                self.weakens = false;
+                return today;
+            }
+            i
         };
         (self.i_d, self.weakens) = (i.d(), true);
         DqHat::new(i.d(), i.q().clamp(-i_q_max, i_q_max))
