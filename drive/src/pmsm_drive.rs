@@ -16,7 +16,8 @@ use crate::control::tables::{self, ENABLED, LIMITED, LOCK_LOST};
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
-use crate::plant::{model::STATES, power::Powers, tables as plant};
+use crate::plant::tables::{self as plant, PlantParameters};
+use crate::plant::{model::STATES, power::Powers};
 use fmu_core::events::{bounded, grid};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, RADIAN, SPEED, VOLT};
@@ -78,6 +79,8 @@ pub struct PmsmDrive {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,
+    /// Model Exchange: voltages of the plant, and whether its gates switch, before the event.
+    before: (Phases, bool),
     period: Period,
 }
 
@@ -147,7 +150,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 6;
+    const STATE_VERSION: u16 = 7;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -167,16 +170,17 @@ impl Model for PmsmDrive {
         self.set_inputs();
         self.pair.initialize();
         self.period = Period { last: self.pair.plant.out.powers, ..Period::default() };
+        self.before = (self.pair.plant.model.inputs.u, self.pair.plant.model.inputs.enable);
     }
 
     fn output(&self, _now: Elapsed, out: &mut DriveOutputs) {
-        out.plant = PlantOutputs { powers: self.period.last, ..self.pair.plant.out.clone() };
+        out.plant = self.pair.plant.out.with(self.period.last);
         out.controller.clone_from(&self.pair.controller.out);
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         self.set_inputs();
-        let Self { inputs, pair, period } = self;
+        let Self { inputs, pair, period, .. } = self;
         let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
         let end = step.end();
         if step.h > MAX_SAMPLES * grid.period {
@@ -255,6 +259,8 @@ impl Events for PmsmDrive {
     fn begin(&mut self, now: Elapsed) {
         let controller = &self.pair.controller.model;
         if grid(controller).reached(controller.samples(), now) {
+            let PlantInputs { u, enable, .. } = self.pair.plant.model.inputs;
+            self.before = (u, enable);
             self.show(now);
         }
     }
@@ -265,10 +271,16 @@ impl Events for PmsmDrive {
         let grid = grid(&self.pair.controller.model);
         while grid.reached(self.pair.controller.model.samples(), now) {
             self.show(now);
+            // With iron loss, the currents depend on the voltages: the controller samples them before they change.
+            let shown = self.pair.plant.model.inputs.clone();
             let Pair { plant, controller, .. } = &mut self.pair;
+            (plant.model.inputs.u, plant.model.inputs.enable) = self.before;
             plant.model.observe(now, &mut plant.out);
+            plant.model.inputs = shown;
             controller.model.inputs.measure(&plant.out);
             controller.model.sample()?;
+            let PlantInputs { u, enable, .. } = plant.model.inputs;
+            self.before = (u, enable);
         }
         self.pair.plant.model.event(now)
     }
@@ -331,9 +343,15 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 &Part { table: tables::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
             ),
             V::part("", &Part { table: STATES, lens: |m| &mut m.model.pair.plant.model }),
+            V::part("", &Part { table: plant::LOSS_OUTPUTS, lens: |m| &mut m.out.plant }),
+            V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
         ]
     },
 );
+
+/// The plant's parameters of the losses.
+const LOSS_PARAMETERS: &Table<PlantParameters> =
+    &Table::new(const { &[Row::part("plant.", &Part { table: plant::LOSS_PARAMETERS, lens: |p| p })] });
 
 type O = Row<ControllerOutputs>;
 

@@ -111,6 +111,11 @@ pub const VOLT: Quantity = Quantity::new("Voltage", Unit::si("V", Exponents::mec
 pub const AMPERE: Quantity = Quantity::new("Current", Unit::si("A", Exponents::mechanical(0, 0, 0, 1)));
 /// Resistance in Ohm.
 pub const OHM: Quantity = Quantity::new("Resistance", Unit::si("Ohm", Exponents::mechanical(1, 2, -3, -2)));
+/// Conductance in S.
+pub const SIEMENS: Quantity = Quantity::new("Conductance", Unit::si("S", Exponents::mechanical(-1, -2, 3, 2)));
+/// Reciprocal inductance in 1/H.
+pub const PER_HENRY: Quantity =
+    Quantity::new("ReciprocalInductance", Unit::si("1/H", Exponents::mechanical(-1, -2, 2, 2)));
 /// Inductance in H.
 pub const HENRY: Quantity = Quantity::new("Inductance", Unit::si("H", Exponents::mechanical(1, 2, -2, -2)));
 /// Flux linkage in Wb.
@@ -126,6 +131,12 @@ pub const KG_M2: Quantity = Quantity::new("Inertia", Unit::si("kg.m2", Exponents
 /// Viscous friction in N.m.s/rad.
 pub const NM_S_PER_RAD: Quantity =
     Quantity::new("ViscousFriction", Unit::si("N.m.s/rad", Exponents::mechanical(1, 2, -1, 0).with_rad(-1)));
+/// Windage coefficient in N.m.s2/rad2.
+pub const NM_S2_PER_RAD2: Quantity =
+    Quantity::new("Windage", Unit::si("N.m.s2/rad2", Exponents::mechanical(1, 2, 0, 0).with_rad(-2)));
+/// Coefficient of the square of a speed in s2/rad2.
+pub const S2_PER_RAD2: Quantity =
+    Quantity::new("PerSquareOfSpeed", Unit::si("s2/rad2", Exponents::mechanical(0, 0, 2, 0).with_rad(-2)));
 /// Angle in rad, shown in degrees.
 pub const RADIAN: Quantity = Quantity::new("Angle", Unit::si("rad", Exponents::NONE.with_rad(1))).shown_in(DEGREE);
 /// Speed of rotation in rad/s, shown in rpm.

@@ -10,7 +10,7 @@
 //! this ends, or begins: the greatest current over the zone of [`legs`](crate::plant::legs), and the line-to-line back
 //! EMF over the DC-link voltage, both less 1.
 
-use crate::frame::{Axis, Dq, Phases, Rotor, Vector};
+use crate::frame::{Axis, Phases, Rotor, Vector};
 use crate::modulation::limit_to_hexagon;
 use crate::plant::machine::{self, Machine};
 use crate::plant::mechanics::Shaft;
@@ -28,16 +28,17 @@ impl PmsmPlant {
     /// The state of flux linkage (Wb), speed (rad/s) and angle (rad) as the equations see it under these `inputs`.
     #[inline]
     fn instant<S: Scalar>(&self, inputs: &PlantInputs<S>, (psi, speed, angle): (Vector<Rotor, S>, S, S)) -> Instant<S> {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let PlantParameters { motor, saturation, mechanics, iron, .. } = &self.parameters;
         let theta = |angle: S| angle * f64::from(motor.n_p);
         let (speed, angle, axis) = if mechanics.imposed {
             (inputs.speed_shaft, inputs.angle_shaft, Axis::at(theta(inputs.angle_shaft)))
         } else {
             (speed, angle, self.state.axis.with(theta(angle)))
         };
-        let without = self.blocked && !inputs.enable;
-        let i = if without { Vector::fixed(Dq::ZERO) } else { Machine::new(motor, saturation).current(psi) };
-        Instant { psi, i, speed, angle, axis }
+        let idle = self.blocked && !inputs.enable;
+        let psi = if idle && !iron.is_none() { self.idle_flux(speed) } else { psi };
+        let i = if idle { self.idle_current(speed) } else { Machine::new(motor, saturation).current(psi) };
+        Instant { psi, i, speed, angle, axis, idle }
     }
 
     /// The present instant under these `inputs`.
@@ -55,16 +56,18 @@ impl PmsmPlant {
 
     /// Derivatives and powers at an instant.
     #[inline]
-    fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
+    pub(super) fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
         let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
         let legs = self.legs(inputs);
+        let lossy = self.lossy(inputs, &legs);
         let held = Held {
             machine: Machine::new(motor, saturation),
             u: if inputs.enable { limit_to_hexagon(inputs.u, inputs.u_dc) } else { Vector::fixed(Vector::ZERO) },
             legs: legs.drop().then_some(&legs),
+            lossy: lossy.as_ref(),
             shaft: Shaft::new(mechanics, inputs.tau_load, at.speed.value()),
         };
-        held.rates(at.axis, at.psi, at.i, at.speed)
+        if at.idle { held.idle_rates(at.psi, at.i, at.speed) } else { held.rates(at.axis, at.psi, at.i, at.speed) }
     }
 
     /// The derivatives of the states at an instant.
@@ -82,12 +85,13 @@ impl PmsmPlant {
 
     /// The outputs at an instant; their powers are those of the instant.
     fn outputs<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> PlantOutputs<S> {
-        let Rates { p_in, p_mech, p_loss, .. } = self.rates(inputs, at);
+        let Rates { p_in, p_mech, p_loss, losses, i, .. } = self.rates(inputs, at);
+        let i = if self.parameters.iron.is_none() { at.i } else { at.axis.from_stator(i) };
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let p_in = p_in + 0.0.into();
-        let currents = || Phases::from_stator(at.axis.to_stator(at.i));
+        let currents = || Phases::from_stator(at.axis.to_stator(i));
         let i_dc = dc_current(p_in, inputs, &self.legs(inputs), currents);
-        self.shown(at, inputs.tau_load, Powers { i_dc, p_in, p_mech, p_loss })
+        self.shown(at, i, inputs.tau_load, Powers { i_dc, p_in, p_mech, p_loss, losses })
     }
 
     /// [`ContinuousTime::derivatives`] under these `inputs`.
@@ -134,7 +138,8 @@ impl PmsmPlant {
     fn diodes(&self, inputs: &PlantInputs) -> (bool, [f64; 2]) {
         let PlantParameters { motor, saturation, .. } = &self.parameters;
         let Instant { psi, speed, axis, .. } = self.present(inputs);
-        let (legs, i) = (self.legs(inputs), machine::current(motor, saturation, psi));
+        let idle = self.idle_current(speed);
+        let (legs, i) = (self.legs(inputs), machine::current(motor, saturation, psi) - idle);
         let w = f64::from(motor.n_p) * speed;
         (legs.block(motor, axis, i, w), legs.excess(motor, axis, i, w))
     }
@@ -196,7 +201,7 @@ impl Events for PmsmPlant {
         }
         self.blocked = self.blocks(&self.inputs);
         if self.blocked {
-            state.psi = machine::flux(&self.parameters.motor, Dq::ZERO);
+            state.psi = self.idle_flux(state.speed);
         }
         let states_changed = state != self.state;
         self.state = state;

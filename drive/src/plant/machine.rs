@@ -12,8 +12,8 @@ use fmu_core::Scalar;
 
 /// Flux linkage (Wb) for the current `i` (A) without saturation.
 #[inline]
-pub fn flux(motor: &Motor, i: Dq) -> Dq {
-    Dq::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q())
+pub fn flux<S: Scalar>(motor: &Motor, i: Vector<Rotor, S>) -> Vector<Rotor, S> {
+    Vector::new(i.d() * motor.L_d + S::from(motor.psi_M), i.q() * motor.L_q)
 }
 
 /// Current (A) for the flux linkage `psi` (Wb).
@@ -71,6 +71,12 @@ impl<'a> Machine<'a> {
     #[inline]
     pub fn from_stator(&self, axis: Axis<Rotor>, psi: AlphaBeta) -> Dq {
         axis.from_stator(psi - axis.along(self.psi_M)) + Dq::new(self.psi_M, 0.0)
+    }
+
+    /// Resistance (Ohm) of the stator.
+    #[inline]
+    pub fn resistance(&self) -> f64 {
+        self.R_s
     }
 
     /// Derivative of the flux linkage (V) in stator axes at the voltage `u` (V) and the current `i` (A).

@@ -6,11 +6,13 @@ use crate::math::{all_finite, wrap};
 use crate::modulation::limit_to_hexagon;
 use crate::motor::Motor;
 use crate::plant::legs::Legs;
+use crate::plant::losses::flow::{Flow, Lossy};
+use crate::plant::losses::{Losses, efficiency};
 use crate::plant::machine::{self, Machine};
 use crate::plant::mechanics::{Motion, Shaft};
 use crate::plant::power::{Energy, Powers};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
-use crate::plant::tables::{OUTPUTS, PARAMETERS, PlantParameters};
+use crate::plant::tables::{LOSS_OUTPUTS, LOSS_PARAMETERS, OUTPUTS, PARAMETERS, PlantParameters};
 use fmu_core::unit::{NEWTON_METER, RADIAN, SPEED, VOLT, WEBER};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Scalar, Step, Table, Terminal};
 use nalgebra::SVector;
@@ -69,7 +71,7 @@ fn axis_at(motor: &Motor, angle: f64) -> Axis<Rotor> {
 pub(super) struct Instant<S = f64> {
     /// Stator flux linkage in Wb.
     pub(super) psi: Vector<Rotor, S>,
-    /// Its current in A.
+    /// Its current in A; with iron loss, that at the terminals differs.
     pub(super) i: Vector<Rotor, S>,
     /// Mechanical speed in rad/s.
     pub(super) speed: S,
@@ -77,6 +79,8 @@ pub(super) struct Instant<S = f64> {
     pub(super) angle: S,
     /// The rotor's d-axis at this angle.
     pub(super) axis: Axis<Rotor, S>,
+    /// The diodes block: there is no current at the terminals.
+    pub(super) idle: bool,
 }
 
 /// What stays over an integration step.
@@ -86,6 +90,8 @@ pub(super) struct Held<'a, S = f64> {
     pub(super) u: Vector<Stator, S>,
     /// Legs with a voltage drop.
     pub(super) legs: Option<&'a Legs<S>>,
+    /// Losses of inverter and machine besides that of a constant resistance.
+    pub(super) lossy: Option<&'a Lossy<'a, S>>,
     pub(super) shaft: Shaft<'a, S>,
 }
 
@@ -99,6 +105,18 @@ pub(super) struct Rates<S = f64> {
     pub(super) p_in: S,
     pub(super) p_mech: S,
     pub(super) p_loss: S,
+    /// Each loss in W.
+    pub(super) losses: Losses<S>,
+    /// Current at the terminals in A.
+    pub(super) i: Vector<Stator, S>,
+}
+
+/// What passes in a step.
+#[derive(Clone, Copy, Debug, Default)]
+struct Passed {
+    energy: Energy,
+    /// In J.
+    losses: Losses,
 }
 
 impl<S: Scalar> Held<'_, S> {
@@ -108,11 +126,37 @@ impl<S: Scalar> Held<'_, S> {
     #[inline(always)]
     pub(super) fn rates(&self, axis: Axis<Rotor, S>, psi: Vector<Rotor, S>, i: Vector<Rotor, S>, speed: S) -> Rates<S> {
         let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
+        let applied = |i| self.legs.map_or(self.u, |legs| self.u - legs.loss(i));
+        if let Some(lossy) = self.lossy {
+            let steady = axis.to_stator(lossy.steady(psi, i, speed));
+            let (u, i) = (applied(steady), axis.to_stator(i));
+            let Flow { i, d_psi, p_in, losses } = lossy.flow(self.machine.resistance(), u, i, steady, speed);
+            let losses = Losses { friction: p_friction, ..losses };
+            return Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i };
+        }
         let i = axis.to_stator(i);
-        let u = self.legs.map_or(self.u, |legs| self.u - legs.loss(i));
-        let p_loss = self.machine.copper_loss(i) + p_friction;
+        let u = applied(i);
+        let losses = Losses { cu: self.machine.copper_loss(i), friction: p_friction, ..Losses::none() };
         let d_psi = self.machine.flux_derivative(u, i);
-        Rates { d_psi, acceleration, p_in: u.dot(i) * 1.5, p_mech: p_shaft, p_loss }
+        Rates { d_psi, acceleration, p_in: u.dot(i) * 1.5, p_mech: p_shaft, p_loss: losses.cu + p_friction, losses, i }
+    }
+
+    /// The same while the diodes block: the current `i` (A) of the flux linkage `psi` (Wb) flows through the iron only,
+    /// which brakes with its loss.
+    pub(super) fn idle_rates(&self, psi: Vector<Rotor, S>, i: Vector<Rotor, S>, speed: S) -> Rates<S> {
+        let tau_e = self.machine.torque(psi, i);
+        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, tau_e);
+        let losses = Losses { iron: S::from(0.0) - tau_e * speed, friction: p_friction, ..Losses::none() };
+        let none = Vector::fixed(Vector::ZERO);
+        Rates {
+            d_psi: none,
+            acceleration,
+            p_in: 0.0.into(),
+            p_mech: p_shaft,
+            p_loss: losses.iron + p_friction,
+            losses,
+            i: none,
+        }
     }
 }
 
@@ -152,12 +196,55 @@ impl PmsmPlant {
         if inputs.enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
     }
 
-    /// The outputs with the load torque `tau_load` (N.m) and these `powers`.
+    /// The current (A) that the flux linkage has while the diodes block, at the mechanical `speed` (rad/s).
     #[inline]
-    pub(super) fn shown<S: Scalar>(&self, at: &Instant<S>, tau_load: S, powers: Powers<S>) -> PlantOutputs<S> {
+    pub(super) fn idle_current<S: Scalar>(&self, speed: S) -> Vector<Rotor, S> {
+        let PlantParameters { motor, iron, .. } = &self.parameters;
+        if iron.is_none() {
+            return Vector::fixed(Dq::ZERO);
+        }
+        iron.idle_current(motor, speed * f64::from(motor.n_p))
+    }
+
+    /// The flux linkage (Wb) of [`idle_current`](Self::idle_current).
+    pub(super) fn idle_flux<S: Scalar>(&self, speed: S) -> Vector<Rotor, S> {
+        machine::flux(&self.parameters.motor, self.idle_current(speed))
+    }
+
+    /// The losses besides that of a constant resistance, with the voltage drop of these `legs`.
+    #[inline]
+    pub(super) fn lossy<S: Scalar>(&self, inputs: &PlantInputs<S>, legs: &Legs<S>) -> Option<Lossy<'_, S>> {
+        Lossy::new(&self.parameters, inputs.enable, inputs.u_dc, legs.i_zone())
+    }
+
+    /// The current (A) at the terminals under these `inputs`.
+    #[inline]
+    fn terminal_current(&self, inputs: &PlantInputs, at: &Instant) -> Dq {
+        if self.parameters.iron.is_none() { at.i } else { at.axis.from_stator(self.rates(inputs, at).i) }
+    }
+
+    /// The present instant, at the end of a step.
+    #[inline]
+    fn reached(&self) -> Instant {
+        let PlantParameters { motor, saturation, .. } = &self.parameters;
+        let State { psi, speed, angle, axis } = self.state;
+        let idle = self.blocked && !self.inputs.enable;
+        let i = if idle { self.idle_current(speed) } else { machine::current(motor, saturation, psi) };
+        Instant { psi, i, speed, angle, axis, idle }
+    }
+
+    /// The outputs with the current `i` (A) at the terminals, the load torque `tau_load` (N.m) and these `powers`.
+    #[inline]
+    pub(super) fn shown<S: Scalar>(
+        &self,
+        at: &Instant<S>,
+        i: Vector<Rotor, S>,
+        tau_load: S,
+        powers: Powers<S>,
+    ) -> PlantOutputs<S> {
         let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
-        let &Instant { psi, i, speed, angle, axis } = at;
-        let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::new(motor, saturation).torque(psi, i));
+        let &Instant { psi, speed, angle, axis, .. } = at;
+        let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::new(motor, saturation).torque(psi, at.i));
         let friction = if mechanics.imposed { mechanics.friction(speed) } else { 0.0.into() };
         PlantOutputs {
             i: Phases::from_stator(axis.to_stator(i)),
@@ -170,13 +257,14 @@ impl PmsmPlant {
             powers,
             tau_shaft: mechanics.tau_shaft(tau_e, tau_load, friction),
             energy: self.energy,
+            efficiency: efficiency(powers.p_in, powers.p_mech),
         }
     }
 
     /// Stator currents in A.
     fn currents(&self) -> Phases {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
-        Phases::from_stator(self.state.axis.to_stator(machine::current(motor, saturation, self.state.psi)))
+        let at = self.reached();
+        Phases::from_stator(at.axis.to_stator(self.terminal_current(&self.inputs, &at)))
     }
 
     /// The state at the beginning of a step and the energy needed to reach it: an imposed shaft takes the angle of the
@@ -198,11 +286,16 @@ impl PmsmPlant {
     }
 
     /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s).
-    fn substeps(&self, h: f64, speed: f64, legs: &Legs) -> Result<f64, Fault> {
-        let motor = &self.parameters.motor;
+    fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
+        let PlantParameters { motor, inverter, .. } = &self.parameters;
+        let threshold = if lossy { inverter.devices.u_transistor.max(inverter.devices.u_diode) } else { 0.0 };
         let w = (f64::from(motor.n_p) * speed).abs();
         let longest =
-            if legs.drop() { LONGEST_SUBSTEP_WITH_KINKS.min(0.5 * legs.time(motor)) } else { LONGEST_SUBSTEP };
+            if legs.drop() || threshold > 0.0 {
+                LONGEST_SUBSTEP_WITH_KINKS.min(0.5 * legs.time(motor, threshold))
+            } else {
+                LONGEST_SUBSTEP
+            };
         if h <= longest && w * h <= LARGEST_TURN {
             return Ok(1.0);
         }
@@ -222,12 +315,21 @@ impl PmsmPlant {
     /// follows the rotor, so a step is more exact than two of half its length in rotor axes.
     #[expect(clippy::inline_always, reason = "as a call, it passes the state through memory: 10 % of a period")]
     #[inline(always)]
-    fn drive(&self, start: &State, h: f64, u: AlphaBeta, legs: &Legs) -> (State, Energy) {
+    fn drive<const LOSSY: bool>(
+        &self,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+        legs: &Legs,
+        lossy: Option<&Lossy<'_>>,
+    ) -> (State, Passed) {
         let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
         let held = Held {
             machine: Machine::new(motor, saturation),
             u,
             legs: legs.drop().then_some(legs),
+            // Known to the compiler, so that a step without these losses takes no time for them.
+            lossy: if LOSSY { lossy } else { None },
             shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
         };
         let (n_p, half, speed) = (f64::from(motor.n_p), 0.5 * h, start.speed);
@@ -249,31 +351,50 @@ impl PmsmPlant {
         let speed = speed + sixth * (k_1.acceleration + 2.0 * acceleration + k_4.acceleration);
         let over = |power: fn(&Rates) -> f64| sixth * (power(&k_1) + 2.0 * (power(&k_2) + power(&k_3)) + power(&k_4));
         let energy = Energy { r#in: over(|k| k.p_in), mech: over(|k| k.p_mech), loss: over(|k| k.p_loss) };
+        let friction = over(|k| k.losses.friction);
+        let losses = if LOSSY {
+            let [cu, iron] = [over(|k| k.losses.cu), over(|k| k.losses.iron)];
+            Losses { cu, iron, cond: over(|k| k.losses.cond), sw: over(|k| k.losses.sw), friction }
+        } else {
+            Losses { cu: energy.loss - friction, friction, ..Losses::none() }
+        };
         let axis = axis_at(motor, angle);
-        (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, energy)
+        (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
     }
 
     /// One integration step of `h` (s) with the gates off.
-    fn coast(&self, start: &State, h: f64, legs: &Legs) -> (State, Energy) {
+    fn coast(&self, start: &State, h: f64, legs: &Legs, lossy: Option<&Lossy<'_>>) -> (State, Passed) {
         let Some(lost) = self.remaining(start, legs) else {
-            return self.drive(start, h, AlphaBeta::ZERO, legs);
+            return match lossy {
+                None => self.drive::<false>(start, h, AlphaBeta::ZERO, legs, None),
+                lossy => self.drive::<true>(start, h, AlphaBeta::ZERO, legs, lossy),
+            };
         };
-        let PlantParameters { motor, mechanics, .. } = &self.parameters;
-        let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
-        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost]), h, |x| {
-            let Motion { acceleration, p_shaft, p_friction } = shaft.motion(x[0], 0.0);
-            SVector::from([acceleration, x[0], p_shaft, p_friction])
+        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let held = Held {
+            machine: Machine::new(motor, saturation),
+            u: AlphaBeta::ZERO,
+            legs: None,
+            lossy: None,
+            shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
+        };
+        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost, 0.0]), h, |x| {
+            let i = self.idle_current(x[0]);
+            let rates = held.idle_rates(machine::flux(motor, i), i, x[0]);
+            SVector::from([rates.acceleration, x[0], rates.p_mech, rates.p_loss, rates.losses.iron])
         });
-        let state = State::new(motor, machine::flux(motor, Dq::ZERO), x[0], x[1]);
-        (state, Energy { r#in: 0.0, mech: x[2], loss: x[3] })
+        let state = State::new(motor, self.idle_flux(x[0]), x[0], x[1]);
+        let losses = Losses { cu: lost, iron: x[4], friction: x[3] - lost - x[4], ..Losses::none() };
+        (state, Passed { energy: Energy { r#in: 0.0, mech: x[2], loss: x[3] }, losses })
     }
 
     /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.
     fn remaining(&self, state: &State, legs: &Legs) -> Option<f64> {
         let PlantParameters { motor, saturation, .. } = &self.parameters;
-        let i = machine::current(motor, saturation, state.psi);
+        let i = machine::current(motor, saturation, state.psi) - self.idle_current(state.speed);
         let blocked = legs.block(motor, state.axis, i, f64::from(motor.n_p) * state.speed);
-        blocked.then(|| machine::magnetic_energy(motor, saturation, state.psi))
+        let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
+        blocked.then(|| stored(state.psi) - stored(self.idle_flux(state.speed)))
     }
 }
 
@@ -294,7 +415,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 6;
+    const STATE_VERSION: u16 = 7;
 
     fn initialize(&mut self) {
         let PlantParameters { motor, mechanics, initial, .. } = &self.parameters;
@@ -304,42 +425,49 @@ impl Model for PmsmPlant {
         } else {
             (initial.speed, initial.theta_e / f64::from(motor.n_p))
         };
-        self.state = State::new(motor, machine::flux(motor, Dq::ZERO), speed, angle);
+        let psi = if self.inputs.enable { machine::flux(motor, Dq::ZERO) } else { self.idle_flux(speed) };
+        self.state = State::new(motor, psi, speed, angle);
         self.energy = Energy::default();
         self.blocked = self.blocks(&self.inputs);
         // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
         let tau_shaft = mechanics.tau_shaft(0.0, self.inputs.tau_load, friction);
-        self.powers = Powers { p_mech: tau_shaft * speed, p_loss: friction * speed, ..Powers::default() };
+        let losses = Losses { friction: friction * speed, ..Losses::default() };
+        self.powers = Powers { p_mech: tau_shaft * speed, p_loss: losses.friction, losses, ..Powers::default() };
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
-        let State { psi, speed, angle, axis } = self.state;
-        let i = machine::current(motor, saturation, psi);
-        *out = self.shown(&Instant { psi, i, speed, angle, axis }, self.inputs.tau_load, self.powers);
+        let at = self.reached();
+        let i = self.terminal_current(&self.inputs, &at);
+        *out = self.shown(&at, i, self.inputs.tau_load, self.powers);
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        let motor = &self.parameters.motor;
         let legs = self.legs(&self.inputs);
+        let lossy = self.lossy(&self.inputs, &legs);
         let (mut state, mut energy) = self.at_the_shaft();
-        let mut left = self.substeps(step.h, state.speed, &legs)?;
+        let mut losses = Losses::none();
+        let mut left = self.substeps(step.h, state.speed, &legs, lossy.is_some())?;
         let h = step.h / left;
         let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
         while left > 0.0 {
-            let (next, passed) =
-                if self.inputs.enable { self.drive(&state, h, u, &legs) } else { self.coast(&state, h, &legs) };
+            let (next, passed) = match (self.inputs.enable, lossy.as_ref()) {
+                (true, None) => self.drive::<false>(&state, h, u, &legs, None),
+                (true, lossy) => self.drive::<true>(&state, h, u, &legs, lossy),
+                (false, lossy) => self.coast(&state, h, &legs, lossy),
+            };
             state = next;
-            energy.add(&passed);
+            energy.add(&passed.energy);
+            losses.add(&passed.losses);
             left -= 1.0;
         }
         let lost = if self.inputs.enable { None } else { self.remaining(&state, &legs) };
         if let Some(lost) = lost {
-            state.psi = machine::flux(motor, Dq::ZERO);
+            state.psi = self.idle_flux(state.speed);
             energy.loss += lost;
+            losses.cu += lost;
         }
-        if !(state.is_finite() && energy.is_finite()) {
+        if !(state.is_finite() && energy.is_finite() && losses.is_finite()) {
             return Err(Fault::new(format!(
                 "the machine's state left the finite numbers within a step of {} s; the step before it ended with {}",
                 step.h,
@@ -348,7 +476,7 @@ impl Model for PmsmPlant {
         }
         (self.state, self.blocked) = (state, lost.is_some());
         self.energy.add(&energy);
-        self.powers = Powers::mean(&energy, step.h, &self.inputs, &legs, || self.currents());
+        self.powers = Powers::mean(&energy, losses, step.h, &self.inputs, &legs, || self.currents());
         Ok(())
     }
 }
@@ -392,6 +520,8 @@ const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
             V::part("", &Part { table: STATES, lens: |m| &mut m.model }),
+            V::part("", &Part { table: LOSS_OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.parameters }),
         ]
     },
 );

@@ -1,6 +1,7 @@
 //! Inputs and outputs of the plant.
 
 use crate::frame::Phases;
+use crate::plant::losses::efficiency;
 use crate::plant::power::{Energy, Powers};
 use fmu_core::Dual;
 use serde::{Deserialize, Serialize};
@@ -67,6 +68,15 @@ pub struct PlantOutputs<S = f64> {
     pub tau_shaft: S,
     /// Energy since the start.
     pub energy: Energy,
+    /// Efficiency of the powers.
+    pub efficiency: S,
+}
+
+impl PlantOutputs {
+    /// These outputs with other `powers`.
+    pub fn with(&self, powers: Powers) -> Self {
+        Self { powers, efficiency: efficiency(powers.p_in, powers.p_mech), ..self.clone() }
+    }
 }
 
 impl PlantOutputs<Dual> {
@@ -86,9 +96,11 @@ impl PlantOutputs<Dual> {
                 p_in: powers.p_in.change,
                 p_mech: powers.p_mech.change,
                 p_loss: powers.p_loss.change,
+                losses: powers.losses.map(|p| p.change),
             },
             tau_shaft: self.tau_shaft.change,
             energy: Energy::default(),
+            efficiency: self.efficiency.change,
         }
     }
 }
