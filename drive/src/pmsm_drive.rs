@@ -79,7 +79,7 @@ pub struct PmsmDrive {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,
-    /// Model Exchange: voltages of the plant, and whether its gates switch, before the event.
+    /// Model Exchange: voltages of the plant, and whether its gates switch, since the last sample.
     before: (Phases, bool),
     period: Period,
 }
@@ -259,8 +259,6 @@ impl Events for PmsmDrive {
     fn begin(&mut self, now: Elapsed) {
         let controller = &self.pair.controller.model;
         if grid(controller).reached(controller.samples(), now) {
-            let PlantInputs { u, enable, .. } = self.pair.plant.model.inputs;
-            self.before = (u, enable);
             self.show(now);
         }
     }

@@ -7,7 +7,7 @@ use drive::motor::Motor;
 use drive::plant::machine;
 use drive::plant::tables::PlantParameters;
 use drive::{PmsmDrive, PmsmPlant};
-use fmu_core::{Block, Capabilities, ContinuousTime, Description, Elapsed, Events, Model, Step, integrate};
+use fmu_core::{Block, Capabilities, ContinuousTime, Description, Elapsed, Events, Exported, Step, integrate};
 use std::f64::consts::PI;
 
 /// Every loss, of a machine with 2.2 kW.
@@ -29,7 +29,7 @@ fn draw(seed: &mut u64) -> f64 {
 
 #[test]
 fn the_powers_are_balanced_at_every_instant() {
-    let (mut seed, mut worst) = (7_u64, 0.0_f64);
+    let (mut seed, mut worst, mut conducting) = (7_u64, 0.0_f64, 0);
     for point in 0..300_u32 {
         let mut block = Block::<PmsmPlant>::default();
         let par = &mut block.model.parameters;
@@ -47,6 +47,8 @@ fn the_powers_are_balanced_at_every_instant() {
             *(state.at)(&mut block.model) = value;
         }
         block.model.settle();
+        block.model.event(Elapsed::ZERO).unwrap();
+        let values = [0, 1, 2].map(|k: usize| *(PmsmPlant::STATES[k].at)(&mut block.model));
         let mut dx = [0.0; 4];
         block.model.derivatives(Elapsed::ZERO, &mut dx).unwrap();
         block.model.observe(Elapsed::ZERO, &mut block.out);
@@ -58,12 +60,14 @@ fn the_powers_are_balanced_at_every_instant() {
         let parts = [p.p_mech, l.cu, l.iron, l.cond, l.sw, l.friction, stored];
         let size = parts.iter().map(|x| x.abs()).fold(p.p_in.abs(), f64::max);
         worst = worst.max((p.p_in - parts.iter().sum::<f64>()).abs() / size);
-        assert!(l.cu > 0.0 && l.iron > 0.0 && l.cond > 0.0 && l.friction >= 0.0, "{l:?}");
+        let flows = block.out.i_d != 0.0;
+        conducting += u32::from(flows);
+        assert!(l.iron >= 0.0 && l.friction >= 0.0 && (l.cu > 0.0 && l.cond > 0.0 || !flows), "{l:?}");
         assert!((p.p_loss - l.sum()).abs() <= 1e-15 * l.sum());
         assert!(block.out.efficiency.is_finite());
     }
-    println!("largest residue {worst:e}");
-    assert!(worst < 1e-12, "{worst}");
+    println!("largest residue {worst:e}, {conducting} points with current");
+    assert!(worst < 1e-12 && (200..300).contains(&conducting), "{worst}, {conducting}");
 }
 
 /// The plant at 1500 rpm under the voltage that turns with it, with steps of `h` (s).
@@ -144,8 +148,12 @@ fn the_drive_with_iron_loss_is_the_same_in_model_exchange() {
 
 #[test]
 fn the_currents_depend_on_the_voltages() {
-    let can = Capabilities::<PmsmPlant>::NONE.ContinuousTime().Events().Differentiable();
-    let description = Description::with(&can).unwrap();
+    struct Plant;
+    impl Exported for Plant {
+        type Model = PmsmPlant;
+        const CAN: Capabilities<PmsmPlant> = Capabilities::NONE.ContinuousTime().Events().Differentiable();
+    }
+    let description = Description::exported::<Plant>().unwrap();
     let reference = |name: &str| description.variable(name).unwrap().value_reference;
     for name in ["i_a", "i_b", "i_c", "i_d", "i_q"] {
         let known = description.variable(name).unwrap().dependencies.clone().unwrap();

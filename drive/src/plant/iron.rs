@@ -71,9 +71,12 @@ type P = Row<Iron>;
 pub const IRON: &Table<Iron> = &Table::new(
     const {
         &[
-            P::parameter("G_e", &SIEMENS, "Iron loss by eddy currents: conductance parallel to the flux; 0: none", |p| {
-                &mut p.G_e
-            })
+            P::parameter(
+                "G_e",
+                &SIEMENS,
+                "Iron loss by eddy currents: conductance parallel to the flux; 0: none",
+                |p| &mut p.G_e,
+            )
             .at_least(0.0),
             P::parameter(
                 "G_h",

@@ -101,7 +101,8 @@ impl<'a, S: Scalar> Shaft<'a, S> {
         // From here on, the nearest number to tanh is +-1.
         let full = 20.0 * mechanics.w_coulomb;
         let share = if speed.abs() > full { sign } else { tanh(speed / mechanics.w_coulomb) };
-        let (B, k_w, by_J, tau_full) = (mechanics.B, mechanics.k_w, reciprocal(mechanics.J), sign * mechanics.tau_coulomb);
+        let (B, k_w, by_J, tau_full) =
+            (mechanics.B, mechanics.k_w, reciprocal(mechanics.J), sign * mechanics.tau_coulomb);
         Self { mechanics, B, k_w, by_J, tau_load, speed, share, sign, full, tau_full }
     }
 

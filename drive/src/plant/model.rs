@@ -128,9 +128,8 @@ impl<S: Scalar> Held<'_, S> {
         let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
         let applied = |i| self.legs.map_or(self.u, |legs| self.u - legs.loss(i));
         if let Some(lossy) = self.lossy {
-            let steady = axis.to_stator(lossy.steady(psi, i, speed));
-            let (u, i) = (applied(steady), axis.to_stator(i));
-            let Flow { i, d_psi, p_in, losses } = lossy.flow(self.machine.resistance(), u, i, steady, speed);
+            let u = applied(axis.to_stator(lossy.steady(psi, i, speed)));
+            let Flow { i, d_psi, p_in, losses } = lossy.flow(self.machine.resistance(), u, axis.to_stator(i), speed);
             let losses = Losses { friction: p_friction, ..losses };
             return Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i };
         }
@@ -290,12 +289,11 @@ impl PmsmPlant {
         let PlantParameters { motor, inverter, .. } = &self.parameters;
         let threshold = if lossy { inverter.devices.u_transistor.max(inverter.devices.u_diode) } else { 0.0 };
         let w = (f64::from(motor.n_p) * speed).abs();
-        let longest =
-            if legs.drop() || threshold > 0.0 {
-                LONGEST_SUBSTEP_WITH_KINKS.min(0.5 * legs.time(motor, threshold))
-            } else {
-                LONGEST_SUBSTEP
-            };
+        let longest = if legs.drop() || threshold > 0.0 {
+            LONGEST_SUBSTEP_WITH_KINKS.min(0.5 * legs.time(motor, threshold))
+        } else {
+            LONGEST_SUBSTEP
+        };
         if h <= longest && w * h <= LARGEST_TURN {
             return Ok(1.0);
         }

@@ -52,7 +52,14 @@ pub struct Powers<S = f64> {
 impl Powers {
     /// Means over a step of `h` (s) in which `energy` passed, with its `losses`; `i` gives the stator currents (A) at its end.
     #[inline]
-    pub fn mean(energy: &Energy, losses: Losses, h: f64, inputs: &PlantInputs, legs: &Legs, i: impl FnOnce() -> Phases) -> Self {
+    pub fn mean(
+        energy: &Energy,
+        losses: Losses,
+        h: f64,
+        inputs: &PlantInputs,
+        legs: &Legs,
+        i: impl FnOnce() -> Phases,
+    ) -> Self {
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let rate = 1.0 / h;
         let p_in = energy.r#in * rate + 0.0;

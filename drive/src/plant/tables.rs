@@ -117,9 +117,12 @@ pub const LOSS_PARAMETERS: &Table<PlantParameters> = &Table::new(
         &[
             P::part("iron.", &Part { table: IRON, lens: |p| &mut p.iron }),
             P::part("inverter.", &Part { table: DEVICES, lens: |p| &mut p.inverter.devices }),
-            P::parameter("mechanics.k_w", &NM_S2_PER_RAD2, "Windage: torque over the square of the speed; 0: none", |p| {
-                &mut p.mechanics.k_w
-            })
+            P::parameter(
+                "mechanics.k_w",
+                &NM_S2_PER_RAD2,
+                "Windage: torque over the square of the speed; 0: none",
+                |p| &mut p.mechanics.k_w,
+            )
             .at_least(0.0),
             P::parameter(
                 "winding.k_ac",

@@ -96,9 +96,9 @@ impl Drive {
             let (machine, shaft) = (Machine::new(motor, &par.saturation), Shaft::new(&par.mechanics, 0.0, speed));
             let held = Held { machine, u, legs: None, lossy: Some(&lossy), shaft };
             let Rates { p_in, p_mech, losses, d_psi, .. } = held.rates(axis, psi, i, speed);
-            // Steady: d psi/dt = j w psi in stator axes.
+            // Steady: d psi/dt = j w psi in stator axes, but for the resistance of the devices times G drop.
             let rest: AlphaBeta = d_psi - axis.to_stator(psi.turned() * w);
-            assert!(rest.magnitude() < 1e-9, "{rest:?} V");
+            assert!(rest.magnitude() < 1e-3, "{rest:?} V");
             let powers = [p_in, p_mech, losses.cu, losses.iron, losses.cond, losses.sw, losses.friction];
             for (sum, power) in sum.iter_mut().zip(powers) {
                 *sum += power / f64::from(count);
@@ -134,7 +134,9 @@ fn the_loss_split_of_three_machines() {
     for (drive, figures) in [(a(), &A[..]), (b(), &B[..]), (c(), &C[..])] {
         for &(rpm, torque, [i_d, i_q], wanted, p_in, efficiency) in figures {
             let [link, shaft, got @ .., found] = drive.at(rpm, Dq::new(i_d, i_q));
-            println!("{rpm} rpm, {torque} N.m: {got:.4?} W of {wanted:?}, {link:.3} of {p_in}, {found:.5} of {efficiency}");
+            println!(
+                "{rpm} rpm, {torque} N.m: {got:.4?} W of {wanted:?}, {link:.3} of {p_in}, {found:.5} of {efficiency}"
+            );
             for (got, wanted) in got.iter().zip(wanted) {
                 if (got - wanted).abs() > 5e-4 * wanted + 1e-3 {
                     wrong.push(format!("{rpm} rpm, {torque} N.m: {got} W, not {wanted} W"));

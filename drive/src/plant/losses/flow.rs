@@ -4,10 +4,11 @@
 //! e = (u - drop - R i_m) / (1 + R G), R = R_s (1 + k_ac w^2)          i_s = i_m + G e          p_in = 1.5 u i_s + p_sw
 //! ```
 //!
-//! u is the voltage of the legs with dead time, i_m the current of the flux linkage. Dead time, diodes and the devices'
-//! drop follow the current that i_s is in steady state, i_m + G j w psi: so everything is explicit, and the balance
-//! p_in = p_cu + p_iron + p_cond + p_sw + 1.5 i_m e holds exactly. With i_m instead, the drops would be those of a current
-//! that is 10 % less at a tenth of the torque, and diodes would block the wrong current.
+//! u is the voltage of the legs with dead time, i_m the current of the flux linkage. Dead time, and the diodes with the
+//! gates off, follow the current that i_s is in steady state, i_m + G j w psi; the devices' drop follows what i_s would be
+//! without it, from which i_s differs by G drop, mA. So everything is explicit, no loss is negative, and the balance p_in =
+//! p_cu + p_iron + p_cond + p_sw + 1.5 i_m e holds exactly. With i_m instead, the drops would be those of a current that is
+//! 10 % less at a fifth of the torque, and diodes would block the wrong current.
 
 use crate::frame::{Rotor, Stator, Vector};
 use crate::plant::iron::Iron;
@@ -65,22 +66,18 @@ impl<'a, S: Scalar> Lossy<'a, S> {
         i + psi.turned().scaled(self.iron.conductance(w) * w)
     }
 
-    /// With the resistance `R_s` (Ohm), the voltage `u` (V) of the legs, the current `i` (A) of the flux linkage, that of
-    /// [`steady`](Self::steady), and the mechanical `speed` (rad/s).
-    pub fn flow(
-        &self,
-        R_s: f64,
-        u: Vector<Stator, S>,
-        i: Vector<Stator, S>,
-        steady: Vector<Stator, S>,
-        speed: S,
-    ) -> Flow<S> {
+    /// With the resistance `R_s` (Ohm), the voltage `u` (V) of the legs, the current `i` (A) of the flux linkage and the
+    /// mechanical `speed` (rad/s).
+    pub fn flow(&self, R_s: f64, u: Vector<Stator, S>, i: Vector<Stator, S>, speed: S) -> Flow<S> {
         let w = speed * self.n_p;
         let one = S::from(1.0);
         let R = (w * w * self.k_ac + one) * R_s;
         let G = if self.iron.is_none() { 0.0.into() } else { self.iron.conductance(w) };
-        let drop = self.conduction.map_or(Vector::fixed(Vector::ZERO), |conduction| conduction.drop(u, steady));
-        let e = (u - drop - i.scaled(R)).scaled(one / (R * G + one));
+        let part = one / (R * G + one);
+        let driving = (u - i.scaled(R)).scaled(part);
+        let none = Vector::fixed(Vector::ZERO);
+        let drop = self.conduction.map_or(none, |conduction| conduction.drop(u, i + driving.scaled(G)));
+        let e = driving - drop.scaled(part);
         let i = i + e.scaled(G);
         let losses = Losses {
             cu: i.dot(i) * R * 1.5,
