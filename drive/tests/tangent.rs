@@ -114,6 +114,7 @@ struct Kinds {
     imposed: u32,
     saturated: u32,
     no_link: u32,
+    lossy: u32,
 }
 
 fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
@@ -128,6 +129,13 @@ fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
     }
     if draw.often() {
         (par.inverter.dead_time, par.inverter.i_zero) = (2e-6, 1.0);
+    }
+    if point % 5 < 2 {
+        (par.iron.G_e, par.iron.G_h, par.winding.k_ac, par.mechanics.k_w) = (2.7e-4, 0.127, 1e-7, 1e-6);
+        let devices = &mut par.inverter.devices;
+        (devices.u_transistor, devices.r_transistor, devices.u_diode, devices.r_diode) = (0.9, 0.06, 0.7, 0.05);
+        (devices.E_sw, devices.i_sw, devices.u_sw) = (2.5e-3, 15.0, 600.0);
+        kinds.lossy += 1;
     }
     par.mechanics.imposed = point % 4 == 1;
     kinds.imposed += u32::from(par.mechanics.imposed);
@@ -193,20 +201,29 @@ fn the_tangent_of_the_plant_is_its_derivative() {
         let exact: Vec<Vec<f64>> = seeds.iter().map(|seed| tangent(&base, &knowns, seed)).collect();
         // The steps stay clear of the nearest kinks at these points.
         let near: Vec<Vec<f64>> = seeds.iter().map(|seed| difference(&base, &knowns, seed, 1e-5)).collect();
-        for row in 0..value.len() {
+        // Without power at the shaft the efficiency, the last row, has a kink: it is 0, and p_mech / p_in on one side.
+        let smooth = value.len() - usize::from(base.out.powers.p_mech.abs() < 1e-6);
+        for row in 0..smooth {
             let size = exact.iter().map(|column| column[row].abs()).fold(0.0, f64::max);
             for (exact, near) in exact.iter().zip(&near) {
-                // Rounding of the difference: of values of this size, divided by the step.
-                let rounding = 1e-10 * value[row].abs();
+                // Rounding of the difference: of values of this size, or of 1 % of 1 where this one is 0, over the step.
+                let rounding = 1e-10 * value[row].abs() + 1e-12;
                 let error = ((exact[row] - near[row]).abs() - rounding).max(0.0) / size.max(1e-9);
-                assert!(error < 1e-6, "point {point}, unknown {row}: {} {} {kinds:?}", exact[row], near[row]);
+                assert!(
+                    error < 1e-6,
+                    "point {point}, unknown {row}: {} {} {kinds:?} of {}, {size} {:?}",
+                    exact[row],
+                    near[row],
+                    value[row],
+                    base.out.powers
+                );
                 worst = worst.max(error);
             }
         }
     }
     println!("worst relative error {worst:e}; points: {kinds:?}");
-    let Kinds { standstill, limited, zone, blocked, conducting, imposed, saturated, no_link } = kinds;
-    let all = [standstill, limited, zone, blocked, conducting, imposed, saturated, no_link];
+    let Kinds { standstill, limited, zone, blocked, conducting, imposed, saturated, no_link, lossy } = kinds;
+    let all = [standstill, limited, zone, blocked, conducting, imposed, saturated, no_link, lossy];
     assert!(all.iter().all(|&count| count > 3), "{kinds:?}");
 }
 

@@ -12,3 +12,4 @@ pub mod power;
 pub mod saturation;
 pub mod signals;
 pub mod tables;
+pub mod thermal;

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! [`iron`](crate::plant::iron), [`conduction`] and [`switching`] have the equations. The efficiency is p_mech / p_in of
-//! a motor, p_in / p_mech of a generator, and 0 where power comes in from both sides or p_mech is below 1 uW.
+//! a motor, p_in / p_mech of a generator, and 0 elsewhere: where power comes in from both sides, where p_mech is below
+//! 1 uW, and where the ratio is above 1 because stored energy supplies the power.
 
 pub mod conduction;
 #[cfg(test)]
@@ -85,9 +86,9 @@ impl Losses {
 #[inline]
 pub fn efficiency<S: Scalar>(p_in: S, p_mech: S) -> S {
     let (link, shaft) = (p_in.value(), p_mech.value());
-    if shaft >= 1e-6 && link > 0.0 {
+    if shaft >= 1e-6 && shaft <= link {
         p_mech / p_in
-    } else if shaft <= -1e-6 && link < 0.0 {
+    } else if shaft <= -1e-6 && link < 0.0 && shaft <= link {
         p_in / p_mech
     } else {
         0.0.into()
@@ -147,7 +148,17 @@ mod tests {
     fn efficiency_is_a_number_in_every_quadrant() {
         assert_eq!(efficiency(100.0, 80.0), 0.8);
         assert_eq!(efficiency(-80.0, -100.0), 0.8);
-        for (p_in, p_mech) in [(0.0, 0.0), (5.0, 0.0), (5.0, -3.0), (-5.0, 3.0), (0.0, 1.0), (1.0, 1e-7), (0.0, -1.0)] {
+        for (p_in, p_mech) in [
+            (0.0, 0.0),
+            (5.0, 0.0),
+            (5.0, -3.0),
+            (-5.0, 3.0),
+            (3.0, 5.0),
+            (-5.0, -3.0),
+            (0.0, 1.0),
+            (1.0, 1e-7),
+            (0.0, -1.0),
+        ] {
             assert_eq!(efficiency(p_in, p_mech), 0.0, "{p_in} W, {p_mech} W");
         }
     }
