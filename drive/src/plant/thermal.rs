@@ -130,11 +130,11 @@ mod tests {
         })
     }
 
-    /// Coolant in degC, copper loss at 20 degC and iron loss in W, then in degC: steady and after 600 s; time constants.
-    const FIGURES: [([f64; 3], [f64; 3], [f64; 3], [f64; 3]); 3] = [
-        ([20.0, 180.60, 61.64], [87.380, 68.345, 72.454], [48.461, 34.181, 23.493], [2479.5, 822.1, 81.76]),
-        ([40.0, 45.11, 7.90], [133.570, 100.950, 103.583], [88.172, 62.338, 47.841], [1397.9, 530.5, 63.20]),
-        ([65.0, 661.23, 264.18], [86.204, 72.316, 75.619], [85.787, 71.957, 69.999], [795.6, 101.9, 30.84]),
+    /// Of each machine: coolant in degC, copper loss at 20 degC and iron loss in W, then in degC: steady and after 600 s; time constants.
+    const FIGURES: [[[f64; 3]; 4]; 3] = [
+        [[20.0, 180.60, 61.64], [87.380, 68.345, 72.454], [48.461, 34.181, 23.493], [2479.5, 822.1, 81.76]],
+        [[40.0, 45.11, 7.90], [133.570, 100.950, 103.583], [88.172, 62.338, 47.841], [1397.9, 530.5, 63.20]],
+        [[65.0, 661.23, 264.18], [86.204, 72.316, 75.619], [85.787, 71.957, 69.999], [795.6, 101.9, 30.84]],
     ];
 
     /// The temperatures (degC) after `time` (s) with the copper loss that follows the winding, in steps of `h` (s).
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn temperatures_of_three_machines() {
-        for (network, (losses, steady, late, _)) in networks().iter().zip(FIGURES) {
+        for (network, [losses, steady, late, _]) in networks().iter().zip(FIGURES) {
             let [found, after] = [after(network, losses, 1e5, 10.0), after(network, losses, 600.0, 0.1)];
             println!("{found:.3?} of {steady:?}, {after:.3?} of {late:?} degC");
             for (got, wanted) in found.iter().zip(steady).chain(after.iter().zip(late)) {
@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn time_constants_of_three_machines() {
-        for (network, (_, _, _, wanted)) in networks().iter().zip(FIGURES) {
+        for (network, [_, _, _, wanted]) in networks().iter().zip(FIGURES) {
             let mut found: Vec<f64> = network.matrix().complex_eigenvalues().iter().map(|x| -1.0 / x.re).collect();
             found.sort_by(|a, b| b.total_cmp(a));
             println!("{found:.2?} of {wanted:?} s");

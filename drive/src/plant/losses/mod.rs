@@ -141,6 +141,7 @@ pub const LOSSES: &Table<Losses> = &Table::new(
 );
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact numbers")]
 mod tests {
     use super::*;
 

@@ -28,6 +28,7 @@ pub fn magnitudes<S: Scalar>(i: Vector<Stator, S>) -> S {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact numbers")]
 mod tests {
     use super::*;
     use crate::frame::AlphaBeta;
