@@ -59,7 +59,8 @@ impl Mechanics {
 /// Viscous friction and windage over the `speed` (rad/s), in N.m.s/rad.
 #[inline]
 fn viscous<S: Scalar>(B: f64, k_w: f64, speed: S) -> S {
-    abs(speed) * k_w + B.into()
+    // A branch, so that a machine without windage does not wait for the sum.
+    if k_w > 0.0 { abs(speed) * k_w + B.into() } else { B.into() }
 }
 
 /// The shaft with constants for many evaluations at almost the same speed.

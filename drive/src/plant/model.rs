@@ -360,12 +360,26 @@ impl PmsmPlant {
         (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
     }
 
+    /// [`drive`](Self::drive) with losses besides that of a constant resistance.
+    #[inline(never)]
+    fn drive_lossy(
+        &self,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+        legs: &Legs,
+        lossy: Option<&Lossy<'_>>,
+    ) -> (State, Passed) {
+        self.drive::<true>(start, h, u, legs, lossy)
+    }
+
     /// One integration step of `h` (s) with the gates off.
+    #[inline(never)]
     fn coast(&self, start: &State, h: f64, legs: &Legs, lossy: Option<&Lossy<'_>>) -> (State, Passed) {
         let Some(lost) = self.remaining(start, legs) else {
             return match lossy {
                 None => self.drive::<false>(start, h, AlphaBeta::ZERO, legs, None),
-                lossy => self.drive::<true>(start, h, AlphaBeta::ZERO, legs, lossy),
+                lossy => self.drive_lossy(start, h, AlphaBeta::ZERO, legs, lossy),
             };
         };
         let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
@@ -451,7 +465,7 @@ impl Model for PmsmPlant {
         while left > 0.0 {
             let (next, passed) = match (self.inputs.enable, lossy.as_ref()) {
                 (true, None) => self.drive::<false>(&state, h, u, &legs, None),
-                (true, lossy) => self.drive::<true>(&state, h, u, &legs, lossy),
+                (true, lossy) => self.drive_lossy(&state, h, u, &legs, lossy),
                 (false, lossy) => self.coast(&state, h, &legs, lossy),
             };
             state = next;

@@ -46,14 +46,20 @@ impl<'a, S: Scalar> Lossy<'a, S> {
     /// (A); `None` without these losses.
     #[inline]
     pub fn new(parameters: &'a PlantParameters, switching: bool, u_dc: S, i_zone: S) -> Option<Self> {
-        let PlantParameters { motor, inverter, iron, winding, .. } = parameters;
-        let k_ac = winding.k_ac;
-        if iron.is_none() && inverter.devices.is_none() && k_ac == 0.0 {
+        let PlantParameters { inverter, iron, winding, .. } = parameters;
+        if iron.is_none() && inverter.devices.is_none() && winding.k_ac == 0.0 {
             return None;
         }
+        Some(Self::with(parameters, switching, u_dc, i_zone))
+    }
+
+    /// The same with these losses; kept out of the code of a step without them.
+    #[inline(never)]
+    fn with(parameters: &'a PlantParameters, switching: bool, u_dc: S, i_zone: S) -> Self {
+        let PlantParameters { motor, inverter, iron, winding, .. } = parameters;
         let sw = if switching { switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc) } else { 0.0.into() };
         let conduction = Conduction::new(&inverter.devices, switching, u_dc, i_zone);
-        Some(Self { iron, k_ac, n_p: f64::from(motor.n_p), conduction, sw })
+        Self { iron, k_ac: winding.k_ac, n_p: f64::from(motor.n_p), conduction, sw }
     }
 
     /// Current (A) at the terminals in steady state with the flux linkage `psi` (Wb), its current `i` (A) and the
