@@ -10,7 +10,8 @@ use std::{fs, process};
 
 #[test]
 fn fmpy_validates_and_cosimulates() {
-    let files = ["test_validate.py", "test_controller.py", "test_cosimulation.py", "test_simulate_fmu.py"];
+    let files =
+        ["test_validate.py", "test_controller.py", "test_cosimulation.py", "test_simulate_fmu.py", "test_weakening.py"];
     pytest("fmpy", "fmpy", &files, &[]);
 }
 

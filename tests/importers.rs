@@ -6,6 +6,7 @@ mod common;
 
 use common::importers::{self, DRIVE_STEP, Experiment};
 use common::python::{environment, pytest, pytest_with, run, scratch};
+use fmu::commands::build;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, fs, process};
@@ -22,6 +23,17 @@ fn ecos_libcosim_fmucontainer_and_pathsim() {
     let file = references();
     let files = ["test_ecos.py", "test_libcosim.py", "test_fmucontainer.py", "test_pathsim.py"];
     pytest("importers", "importers", &files, &[("FMU_REFERENCE", &file)]);
+}
+
+/// PathSim integrates the template of an FMU of one's own; the test says why the motor FMUs do not run there.
+#[test]
+#[ignore = "opt-in: cargo test --test importers pathsim_in_model_exchange -- --ignored (half a minute)"]
+fn pathsim_in_model_exchange() {
+    let own = scratch().join("pathsim-own-fmu");
+    let template = build::Build { package: Some("own-fmu".into()), out: Some(own.clone()), ..build::Build::default() };
+    build::run(&template).unwrap();
+    let variables = [("FMU_REFERENCE", &*references()), ("FMU_OWN", &*own)];
+    pytest("importers", "pathsim-exchange", &["test_pathsim_exchange.py"], &variables);
 }
 
 /// jaxonomy runs the whole drive.

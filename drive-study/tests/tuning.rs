@@ -7,7 +7,10 @@ use drive::estimator::Kind::{
 };
 use drive::{Pair, PmsmPlant, SensorlessController};
 use drive_study::runner;
+use drive_study::tune::motor::MotorFile;
+use drive_study::tune::rules::{self, Tuned};
 use fmu_core::{Block, Elapsed, Fault, Model, Slot, Step, Variability};
+use std::path::Path;
 
 const T_S: f64 = 1e-4;
 
@@ -263,5 +266,41 @@ fn the_plant_warms_up() {
         }
         assert!((plant.out.i_d - 10.0 / r_s).abs() < 1e-6, "{}", plant.out.i_d);
         assert!((plant.out.powers.p_loss - 1.5 * 100.0 / r_s).abs() < 1e-4);
+    }
+}
+
+/// The values of the reference machine's file with some lines replaced.
+fn tuned_with(changes: &[(&str, &str)]) -> anyhow::Result<Tuned> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors/reference.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let changed = changes.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    rules::tune(&MotorFile::parse(&changed, &path)?)
+}
+
+#[test]
+fn field_weakening_is_tuned_where_the_rating_needs_it() {
+    let used = |tuned: &Tuned| tuned.controller.iter().any(|s| s.name == "weakening.use");
+    let own = tuned_with(&[]).unwrap();
+    assert!(!used(&own), "3000 rpm and 2.5 N.m fit 0.95 u_dc / sqrt(3)");
+    // 4500 rpm: 3.0945 N.m at 7.5 A; the diodes conduct from 3982 rpm (417 rad/s) on.
+    let fast = tuned_with(&[("speed = 314.159265", "speed = 471.238898")]).unwrap();
+    assert!(used(&fast) && fast.notes.iter().any(|note| note.contains("above 417 rad/s")), "{:?}", fast.notes);
+    let more = [("speed = 314.159265", "speed = 471.238898"), ("torque = 2.5 ", "torque = 3.2 ")];
+    let refused = tuned_with(&more).unwrap_err().to_string();
+    assert!(refused.contains("rating.speed") && refused.contains("at most 3.09 N.m of the 3.2 N.m"), "{refused}");
+}
+
+#[test]
+fn two_machines_need_it_at_their_rated_point() {
+    // The 2.2 kW machine takes 0.9504 u_dc / sqrt(3) at 1500 rpm and 14 N.m with maximum torque per ampere.
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors");
+    for (name, needed) in [("reference", false), ("servo-6.6kw", false), ("ipmsm-2.2kw", true), ("pmsyrm-5.5kw", true)]
+    {
+        let tuned = drive_study::tune::tune(&folder.join(format!("{name}.toml"))).unwrap();
+        assert_eq!(tuned.controller.iter().any(|s| s.name == "weakening.use"), needed, "{name}");
+        tuned.pair().start().unwrap();
     }
 }

@@ -12,12 +12,12 @@ use crate::PmsmPlant;
 #[cfg(doc)]
 use crate::SensorlessController;
 use crate::control::signals::ControllerOutputs;
-use crate::control::tables::{self, ENABLED, LIMITED, LOCK_LOST};
+use crate::control::tables::{self, ENABLED, LATER_OUTPUTS, LIMITED, LOCK_LOST};
+use crate::control::weakening::WEAKENING;
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
-use crate::plant::tables::{self as plant, PlantParameters};
-use crate::plant::{model::STATES, power::Powers};
+use crate::plant::{power::Powers, tables as plant, tables::PlantParameters};
 use fmu_core::events::{bounded, grid};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, RADIAN, SPEED, VOLT};
@@ -340,7 +340,12 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 "controller.",
                 &Part { table: tables::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
             ),
-            V::part("", &Part { table: STATES, lens: |m| &mut m.model.pair.plant.model }),
+            V::part("", &Part { table: plant::STATES, lens: |m| &mut m.model.pair.plant.model }),
+            V::part(
+                "controller.weakening.",
+                &Part { table: WEAKENING, lens: |m| &mut m.model.pair.controller.model.parameters.weakening },
+            ),
+            V::part("", &Part { table: LATER_OUTPUTS, lens: |m| &mut m.out.controller }),
             V::part("", &Part { table: plant::LOSS_OUTPUTS, lens: |m| &mut m.out.plant }),
             V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
         ]

@@ -114,9 +114,15 @@ fn an_enabled_plant_is_integrated_to_the_same_currents() {
         let saturation = &mut plant.parameters.saturation;
         (saturation.s_2, saturation.s_3, saturation.s_dq) = (40.0, 40.0, 7.0);
     };
+    // Most of the voltages lie outside of the hexagon of this link.
+    let limited = |plant: &mut PmsmPlant| plant.inputs.u_dc = 95.0;
     // Dead time has kinks, which cost the substeps of co-simulation their order.
-    let cases =
-        [("dead time", dead_time, 5e-4, 1e-4), ("linear", |_| (), 1e-7, 1e-6), ("saturated", saturated, 1e-7, 1e-6)];
+    let cases = [
+        ("dead time", dead_time, 5e-4, 1e-4),
+        ("linear", |_| (), 1e-7, 1e-6),
+        ("saturated", saturated, 1e-7, 1e-6),
+        ("hexagon", limited, 1e-7, 1e-6),
+    ];
     for (name, set, allowed, allowed_speed) in cases {
         let w = 1000.0 * RPM;
         let mut plant = Both::<PmsmPlant>::new(|plant| {

@@ -3,9 +3,10 @@
 
 use drive::SensorlessController;
 use drive::control::start::StartMode;
-use drive::control::tables::{ControllerParameters, PARAMETERS};
-use drive::estimator::Kind;
+use drive::control::tables::{ALL_PARAMETERS, ControllerParameters};
+use drive::control::weakening::WeakeningParameters;
 use drive::estimator::tracker::TrackerKind;
+use drive::estimator::{Class, Kind};
 use drive::motor::Motor;
 use fmu_core::Model;
 use std::f64::consts::TAU;
@@ -32,7 +33,8 @@ fn refused(kind: Kind, set: impl FnOnce(&mut ControllerParameters), parts: &[&st
         assert!(message.contains(part), "{part}: {message}");
     }
     let words: Vec<&str> = message.split_whitespace().map(|word| word.trim_end_matches([':', ',', ';', '.'])).collect();
-    let names: Vec<String> = (0..PARAMETERS.len()).filter_map(|i| PARAMETERS.locate(i)).map(|found| found.0).collect();
+    let names: Vec<String> =
+        (0..ALL_PARAMETERS.len()).filter_map(|i| ALL_PARAMETERS.locate(i)).map(|found| found.0).collect();
     for (word, next) in words.iter().zip(words.iter().skip(1).chain(&[""])) {
         let dotted = word.contains('.') && word.starts_with(|first: char| first.is_alphabetic()) && *word != "kg.m2";
         assert!(!(dotted || *next == "=") || names.iter().any(|name| name == word), "{word} is no variable: {message}");
@@ -121,5 +123,41 @@ fn currents_above_the_limit() {
         refused(kind, |p| p.zero_speed.i_0 = 16.0, &["zero_speed.i_0 = 16 A", "at most limit.i = 15 A"]);
         let strong = |p: &mut ControllerParameters| (p.start.mode, p.start.i) = (StartMode::CurrentFrequency, 16.0);
         refused(kind, strong, &["start.i = 16 A", "at most limit.i = 15 A"]);
+    }
+}
+
+#[test]
+fn field_weakening_with_an_estimator_that_cannot() {
+    let weaken = |p: &mut ControllerParameters| p.weakening.used = true;
+    let name = |kind: Kind| format!("estimator = {} ({})", kind as i32, kind.name());
+    for &kind in Kind::ALL.iter().filter(|kind| kind.class() == Class::Injection) {
+        refused(kind, weaken, &["weakening.use = true", &name(kind), "Hybrid"]);
+    }
+    refused(Kind::VoltageModel, weaken, &["limit.i = 15 A", &name(Kind::VoltageModel), "10.597"]);
+    let fed_back = Kind::VoltageFeedback;
+    refused(fed_back, weaken, &["weakening.k_u = 0.95", "weakening.k_t = 0.98", &name(fed_back), "at most 0.9"]);
+    let late = |p: &mut ControllerParameters| {
+        p.weakening = WeakeningParameters { used: true, k_u: 0.9, k_t: 0.95, ..p.weakening.clone() };
+    };
+    refused(fed_back, late, &["weakening.k_t = 0.95"]);
+    let early = |p: &mut ControllerParameters| {
+        p.weakening = WeakeningParameters { used: true, k_t: 0.9, ..p.weakening.clone() };
+    };
+    refused(Kind::ExtendedEmf, early, &["weakening.k_t = 0.9", "at least weakening.k_u = 0.95"]);
+    let reversed = |p: &mut ControllerParameters| {
+        (p.weakening.used, p.motor.L_d, p.motor.L_q) = (true, p.motor.L_q, 0.2 * p.motor.L_d);
+    };
+    refused(Kind::ExtendedEmf, reversed, &["limit.i = 15 A", "L_q < L_d", "9.954"]);
+    // The others work, and these two within their limits.
+    for &kind in Kind::ALL.iter().filter(|kind| kind.class() != Class::Injection) {
+        let mut controller = controller(kind);
+        let par = &mut controller.parameters;
+        par.weakening = WeakeningParameters { used: true, ..WeakeningParameters::default() };
+        match kind {
+            Kind::VoltageModel => (par.limit.i, par.limit.i_q) = (10.5, 10.5),
+            Kind::VoltageFeedback => (par.weakening.k_u, par.weakening.k_t) = (0.9, 0.9),
+            _ => {}
+        }
+        controller.validate().unwrap();
     }
 }

@@ -65,6 +65,8 @@ pub(super) enum Run {
     Silent(fn(&Session) -> Result<(), NotDetermined>),
     /// As `Probe`, in two processes that must report the same.
     Twice(fn(&Session) -> Result<(), NotDetermined>),
+    /// As `Probe`, with instances for Model Exchange.
+    Exchange(fn(&Session) -> Result<(), NotDetermined>),
 }
 
 /// Checks that belong together.

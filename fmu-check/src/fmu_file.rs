@@ -2,7 +2,7 @@
 
 use crate::zip_headers::{Archive, contents, is_inside};
 use fmu_import::platform::Platform;
-use model_description::{CoSimulation, Element, FmiVersion, ModelDescription};
+use model_description::{Element, FmiVersion, Interface, ModelDescription};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -132,14 +132,14 @@ impl FmuFile {
         self.tree.as_ref().ok()
     }
 
-    /// The co-simulation interface.
-    pub(super) fn interface(&self) -> Option<&CoSimulation> {
-        self.description.as_ref().ok()?.co_simulation.as_ref()
+    /// The interface for co-simulation, or for Model Exchange where there is no other.
+    pub(super) fn interface(&self) -> Option<&Interface> {
+        let description = self.description.as_ref().ok()?;
+        description.co_simulation.as_ref().or(description.model_exchange.as_ref())
     }
 
-    /// The binary for this machine, as it is named in the archive.
-    pub(super) fn host_binary(&self) -> Result<&Binary, String> {
-        let interface = self.interface().ok_or("the description has no readable co-simulation interface")?;
+    /// The binary of an interface for this machine, as it is named in the archive.
+    pub(super) fn host_binary(&self, interface: &Interface) -> Result<&Binary, String> {
         let host = Platform::host();
         let file = format!("{}.{}", interface.model_identifier, host.extension());
         let folders = host.folders(self.version);

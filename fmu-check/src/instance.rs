@@ -3,7 +3,7 @@
 use crate::encoding::show;
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Buffer, Handle, Raw, SavedState, Simple};
+use fmu_import::raw::{Arguments, Buffer, Handle, Raw, SavedState, Simple, StepStatus};
 use model_description::{FmiVersion, ModelVariable};
 use std::cell::Cell;
 
@@ -16,6 +16,8 @@ pub(super) struct Instance<'b> {
     stop: Cell<Option<f64>>,
     /// Start time of the next step in s.
     pub(super) time: Cell<f64>,
+    /// A step has asked for the end of the simulation, as an FMU may.
+    pub(super) over: Cell<bool>,
 }
 
 impl Session {
@@ -60,7 +62,7 @@ impl Session {
 impl<'b> Instance<'b> {
     fn new(session: &'b Session, handle: Handle, event_mode: bool) -> Self {
         let (start, stop, time) = (Cell::new(session.start()), Cell::new(None), Cell::new(session.start()));
-        Self { session, handle, event_mode, start, stop, time }
+        Self { session, handle, event_mode, start, stop, time, over: Cell::new(false) }
     }
 }
 
@@ -83,7 +85,7 @@ impl Instance<'_> {
         self.call(name.as_str(), |raw| raw.simple(name, self.handle))
     }
 
-    fn must(&self, name: &str, status: Status) -> Result<(), NotDetermined> {
+    pub(super) fn must(&self, name: &str, status: Status) -> Result<(), NotDetermined> {
         if status.is_ok() {
             Ok(())
         } else {
@@ -152,7 +154,19 @@ impl Instance<'_> {
     /// A step from any time.
     pub(super) fn step_at(&self, t: f64, h: f64) -> Result<Status, NotDetermined> {
         let call = if self.session.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?})") };
-        let status = self.call(&call, |raw| raw.do_step(self.handle, t, h, false, [true; 4]).map(|(s, _)| s))?;
+        let v2 = self.session.description.version == FmiVersion::V2;
+        let status = self.call(&call, |raw| {
+            let (status, stepped) = raw.do_step(self.handle, t, h, false, [true; 4])?;
+            // fmi2Terminated is 3.
+            let ends = || raw.step_status(StepStatus::GetBooleanStatus, self.handle, 3);
+            let over = if v2 {
+                status == Status::DISCARD && ends().is_some_and(|(s, value)| s.is_ok() && value & 0xffff_ffff == 1)
+            } else {
+                status.is_ok() && stepped.terminate == 1
+            };
+            self.over.set(self.over.get() || over);
+            Some(status)
+        })?;
         if self.event_mode && status.is_ok() {
             self.must("EnterEventMode", self.simple(Simple::EnterEventMode)?)?;
             self.events()?;

@@ -1,4 +1,4 @@
-//! Checks whether a co-simulation FMU conforms to FMI 2.0 or FMI 3.0, whichever tool made it.
+//! Checks whether an FMU for co-simulation or Model Exchange conforms to FMI 2.0 or FMI 3.0, whichever tool made it.
 //!
 //! The checks are data ([`GROUPS`], one file for each group in `checks/`): an id, one sentence, the clause, the level in each
 //! standard, and the function that decides. Checks of the file run in this process. Each check of the binary runs in its own
@@ -10,6 +10,7 @@ mod check;
 mod checks;
 pub mod command;
 mod encoding;
+mod exchange;
 mod fmu_file;
 mod instance;
 pub mod probe;

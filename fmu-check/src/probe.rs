@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 /// Checks that are violated if the probe cannot start; all others are then not determined.
-const VIOLATED_WHEN_BLOCKED: [&str; 2] = ["B00", "L00"];
+const VIOLATED_WHEN_BLOCKED: [&str; 3] = ["B00", "L00", "E00"];
 
 /// Runs one probe, in this process.
 ///
@@ -16,7 +16,8 @@ const VIOLATED_WHEN_BLOCKED: [&str; 2] = ["B00", "L00"];
 /// There is no such check, or the folder is not readable.
 pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == args.id);
-    let Some(Run::Probe(probe) | Run::Silent(probe) | Run::Twice(probe)) = check.map(|c| c.run) else {
+    let Some(Run::Probe(probe) | Run::Silent(probe) | Run::Twice(probe) | Run::Exchange(probe)) = check.map(|c| c.run)
+    else {
         anyhow::bail!("there is no probe {}: --list names the checks", args.id);
     };
     match Session::open(args) {
@@ -46,6 +47,6 @@ pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
 /// Whether the FMU needs a tool that may not be here.
 fn needs_tool(dir: &Path) -> bool {
     let xml = fs::read(dir.join("modelDescription.xml")).unwrap_or_default();
-    let interface = model_description::read(&xml).ok().and_then(|d| d.co_simulation);
+    let interface = model_description::read(&xml).ok().and_then(|d| d.co_simulation.or(d.model_exchange));
     interface.is_some_and(|i| i.needs_execution_tool())
 }

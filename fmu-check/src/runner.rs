@@ -8,6 +8,7 @@ use crate::check::{Check, Options, Run, Verdict};
 use crate::checks::GROUPS;
 use crate::fmu_file::FmuFile;
 use crate::session::Line;
+use model_description::Interface;
 use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -18,7 +19,9 @@ use std::time::{Duration, Instant};
 /// Default time limit of a probe.
 const TIMEOUT: Duration = Duration::from_secs(10);
 /// Checks that run even if a minimal run fails, because they show why.
-const WITHOUT_MINIMAL_RUN: [&str; 3] = ["B00", "L00", "X02b"];
+const WITHOUT_MINIMAL_RUN: [&str; 4] = ["B00", "L00", "E00", "X02b"];
+/// Checks with `Run::Probe` that make no instance, so that they apply to every interface.
+const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
 /// Maximum number of restarts of a probe whose cases crash it.
 const MAX_RESTARTS: usize = 12;
 
@@ -29,22 +32,24 @@ pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Ve
     for (check, verdict) in checks.iter().zip(&verdicts) {
         match check.run {
             Run::File(check_file) => store(verdict, check_file(fmu)),
-            Run::Probe(_) | Run::Silent(_) | Run::Twice(_) => queue.push_back((*check, verdict)),
+            _ => queue.push_back((*check, verdict)),
         }
     }
     let runner = Runner::new(fmu, options);
-    let why_no_run_succeeds = if queue.is_empty() { None } else { why_no_run_succeeds(&runner) };
+    let [simulates, exchanges] = [false, true].map(|exchange| {
+        let mut checks = queue.iter().filter(|(check, _)| exchange == is_exchange(check));
+        checks.next().and_then(|_| why_no_run_succeeds(&runner, if exchange { "E00" } else { "L00" }))
+    });
     let queue = Mutex::new(queue);
     let workers = std::thread::available_parallelism().map_or(2, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|| {
                 while let Some((check, verdict)) = take(&queue) {
-                    let found = match (&runner, &why_no_run_succeeds) {
+                    let why = if is_exchange(check) { &exchanges } else { &simulates };
+                    let found = match (&runner, why) {
                         (Err(cause), _) => Verdict::NotDetermined(cause.clone()),
-                        (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => {
-                            Verdict::NotDetermined(cause.clone())
-                        }
+                        (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone(),
                         (Ok(runner), _) => runner.run(check),
                     };
                     store(verdict, found);
@@ -56,15 +61,21 @@ pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Ve
     verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect()
 }
 
-/// Why all other probes would fail: the minimal run (L00) fails.
-fn why_no_run_succeeds(runner: &Result<Runner, String>) -> Option<String> {
-    let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == "L00")?;
+fn is_exchange(check: &Check) -> bool {
+    matches!(check.run, Run::Exchange(_))
+}
+
+/// The verdict of all other probes of an interface if its minimal run does not succeed: L00 of co-simulation, E00 of Model
+/// Exchange.
+fn why_no_run_succeeds(runner: &Result<Runner, String>, id: &str) -> Option<Verdict> {
+    let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == id)?;
     match runner.as_ref().ok()?.run(check) {
-        Verdict::Violated(found) => {
-            Some(format!("a minimal run fails (L00): {}", found.first().map_or("", String::as_str)))
-        }
-        Verdict::NotDetermined(why) => Some(why),
-        _ => None,
+        Verdict::Violated(found) => Some(Verdict::NotDetermined(format!(
+            "a minimal run fails ({id}): {}",
+            found.first().map_or("", String::as_str)
+        ))),
+        verdict @ (Verdict::NotDetermined(_) | Verdict::NotApplicable(_)) => Some(verdict),
+        Verdict::Pass(_) => None,
     }
 }
 
@@ -82,7 +93,9 @@ fn store(place: &Mutex<Option<Verdict>>, verdict: Verdict) {
 struct Runner {
     program: PathBuf,
     dir: PathBuf,
-    binary: PathBuf,
+    /// The binaries for co-simulation and for Model Exchange; mostly the same one.
+    simulation: Option<PathBuf>,
+    exchange: Option<PathBuf>,
     timeout: Duration,
 }
 
@@ -94,19 +107,33 @@ enum Outcome {
 
 impl Runner {
     fn new(fmu: &FmuFile, options: &Options) -> Result<Self, String> {
-        let binary = fmu.host_binary()?;
+        let description = fmu.description.as_ref().map_err(|_| "the description cannot be read")?;
+        let binary = |interface: &Option<Interface>| {
+            interface.as_ref().map(|i| Ok::<_, String>(fmu.dir().join(&fmu.host_binary(i)?.name))).transpose()
+        };
+        let (simulation, exchange) = (binary(&description.co_simulation)?, binary(&description.model_exchange)?);
+        if simulation.is_none() && exchange.is_none() {
+            return Err("the description has no interface for co-simulation or Model Exchange".into());
+        }
         let program = options.program.clone().map_or_else(std::env::current_exe, Ok).map_err(|e| e.to_string())?;
         Ok(Self {
             program,
             dir: fmu.dir().to_owned(),
-            binary: fmu.dir().join(&binary.name),
+            simulation,
+            exchange,
             timeout: options.timeout.unwrap_or(TIMEOUT),
         })
     }
 
     fn run(&self, check: &Check) -> Verdict {
+        let binary = match (is_exchange(check), &self.simulation, &self.exchange) {
+            (true, _, None) => return Verdict::NotApplicable("the FMU has no interface for Model Exchange".into()),
+            (true, _, Some(binary)) | (false, Some(binary), _) => binary,
+            (false, None, Some(binary)) if WITHOUT_INSTANCE.contains(&check.id) => binary,
+            (false, None, _) => return Verdict::NotApplicable("the FMU has no interface for co-simulation".into()),
+        };
         let run = || {
-            self.attempt(check)
+            self.attempt(check, binary)
                 .unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be started: {e}")))
         };
         let verdict = run();
@@ -122,7 +149,7 @@ impl Runner {
         }
     }
 
-    fn attempt(&self, check: &Check) -> std::io::Result<Verdict> {
+    fn attempt(&self, check: &Check, binary: &Path) -> std::io::Result<Verdict> {
         let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
         let (out, working_directory) = (folder.path().join("out"), folder.path().join("home"));
         fs::create_dir(&working_directory)?;
@@ -130,7 +157,7 @@ impl Runner {
         let mut from = 0;
         let began = Instant::now();
         loop {
-            let end = self.child(check, folder.path(), from)?;
+            let end = self.child(check, binary, folder.path(), from)?;
             let lines = read(&out);
             if lines.iter().any(|l| matches!(l, Line::Done)) {
                 break;
@@ -154,7 +181,7 @@ impl Runner {
         Ok(verdict)
     }
 
-    fn child(&self, check: &Check, folder: &Path, from: usize) -> std::io::Result<Outcome> {
+    fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> std::io::Result<Outcome> {
         let console = File::options().create(true).append(true).open(folder.join("console"))?;
         let mut child = Command::new(&self.program)
             .args(["probe", "--id", check.id, "--from", &from.to_string()])
@@ -162,7 +189,7 @@ impl Runner {
             .arg("--dir")
             .arg(&self.dir)
             .arg("--binary")
-            .arg(&self.binary)
+            .arg(binary)
             .arg("--out")
             .arg(folder.join("out"))
             .current_dir(folder.join("home"))
@@ -243,7 +270,7 @@ fn verdict_of(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>) -> Ver
         }
         // Preparing the probe failed: another check reports that.
         let call = call.strip_prefix("P ").unwrap_or("the start");
-        if id == "B00" || (id == "L00" && !call.starts_with("loading")) {
+        if id == "B00" || (["L00", "E00"].contains(&id) && !call.starts_with("loading")) {
             violated.push(format!("{call} {how}"));
         } else {
             not_determined = not_determined.or(Some(format!("{call} {how}, before the probe began")));

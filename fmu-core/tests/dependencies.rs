@@ -74,7 +74,8 @@ impl Model for Known {
         *out = Outputs {
             through: self.u,
             gated: if self.on { self.u * self.x } else { 0.0 },
-            tuned: self.twice * self.y,
+            // Never -0, which has other bits than 0.
+            tuned: self.twice * self.y + 0.0,
             clock: now.seconds(),
             held: self.held,
             constant: 1.0,

@@ -2,7 +2,7 @@
 //! derivatives after it, or of the event indicators after them.
 
 use crate::instance::{Instance, Refusal};
-use crate::lifecycle::State;
+use crate::lifecycle::{Standard, State};
 use crate::message;
 use crate::value::Value;
 use fmu_core::description::TIME;
@@ -94,17 +94,20 @@ impl<E: Exported> Instance<E> {
         let x = if time { Some(self.current.end) } else { self.calculated(index)? };
         match x {
             Some(x) => T::from_real(x).ok_or_else(|| message::real(time, T::CARRIES).into()),
-            None => Err(message::unknown::<E>(reference).into()),
+            None => Err(message::unknown::<E>(reference, self.standard).into()),
         }
+    }
+
+    /// The position after the table of a derivative or, in FMI 3.0, of an indicator.
+    fn after_table(&self, index: usize) -> Option<usize> {
+        let indicators = if self.standard == Standard::Fmi3 { E::CAN.indicators().len() } else { 0 };
+        index.checked_sub(table::<E>().len()).filter(|after| *after < E::CAN.states().len() + indicators)
     }
 
     /// A derivative or an indicator, by its index after the table.
     fn calculated(&mut self, index: usize) -> Result<Option<f64>, Refusal> {
-        let (states, indicators) = (E::CAN.states().len(), E::CAN.indicators().len());
-        let after = index.wrapping_sub(table::<E>().len());
-        if after >= states + indicators {
-            return Ok(None);
-        }
+        let Some(after) = self.after_table(index) else { return Ok(None) };
+        let states = E::CAN.states().len();
         let mut values = std::mem::take(&mut self.values);
         let read = if after < states {
             self.derivatives(&mut values[..states])
@@ -302,7 +305,19 @@ impl<E: Exported> Instance<E> {
                 Some(_) => message::range::<E::Model>(index, meta, value),
             },
             None if reference == TIME => message::real(true, T::CARRIES),
-            None => message::unknown::<E>(reference),
+            None => self.beside_table(reference, T::CARRIES, true),
+        }
+    }
+
+    /// Why a reference past the table cannot be set, or read as another type.
+    #[cold]
+    fn beside_table(&self, reference: u32, carries: &str, set: bool) -> Fault {
+        match self.after_table(index(reference)) {
+            Some(after) if set => {
+                Fault::new(format!("{} is calculated and cannot be set", message::calculated::<E>(after)))
+            }
+            Some(_) => message::real(false, carries),
+            None => message::unknown::<E>(reference, self.standard),
         }
     }
 
@@ -315,7 +330,7 @@ impl<E: Exported> Instance<E> {
         match table::<E>().entry(&mut self.current.block, index(reference)) {
             Some((meta, _)) => Err(message::type_of::<E::Model>(index(reference), meta, carries)),
             None if reference == TIME => Err(message::real(true, carries)),
-            None => Err(message::unknown::<E>(reference)),
+            None => Err(self.beside_table(reference, carries, false)),
         }
     }
 

@@ -46,7 +46,14 @@ impl<E: Exported> Instance<E> {
             let (model, now) = (&mut current.block.model, current.elapsed);
             update.outcome = (events.event)(model, now)?;
             let start = current.experiment.map_or(0.0, |e| e.start);
-            update.next = match (events.next)(model, now) {
+            let next = (events.next)(model, now);
+            if !update.outcome.again && next.is_due(now) {
+                let at = current.end;
+                return Err(Fault::new(format!(
+                    "after the event at {at} s the next one is due at once: an error of the model"
+                )));
+            }
+            update.next = match next {
                 Next::Never => None,
                 Next::Grid { k, period } => Some(SampleGrid { period }.instant(k, start)),
                 Next::At(time) => Some(start + time.seconds()),

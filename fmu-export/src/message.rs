@@ -1,6 +1,6 @@
 //! Texts of messages. Variable names are looked up only here, when a call fails or logging is on.
 
-use crate::lifecycle;
+use crate::lifecycle::{self, Standard};
 use crate::snapshot::Snapshot;
 use fmu_core::description::TIME;
 use fmu_core::{Block, Causality, Exported, Fault, Interface, Kind, Meta, Model, Slot, State, Variability};
@@ -43,8 +43,10 @@ fn kind(kind: &Kind) -> &'static str {
 
 /// No variable has this value reference.
 #[cold]
-pub(crate) fn unknown<E: Exported>(reference: u32) -> Fault {
-    let last = E::Model::TABLE.len() + E::CAN.states().len() + E::CAN.indicators().len();
+pub(crate) fn unknown<E: Exported>(reference: u32, standard: Standard) -> Fault {
+    // Event indicators are variables in FMI 3.0 only.
+    let indicators = if standard == Standard::Fmi3 { E::CAN.indicators().len() } else { 0 };
+    let last = E::Model::TABLE.len() + E::CAN.states().len() + indicators;
     Fault::new(format!("value reference {reference} does not exist; 0 to {last} do"))
 }
 
@@ -126,6 +128,15 @@ pub(crate) fn real(time: bool, carries: &str) -> Fault {
 /// Name of the derivative of a state.
 pub(crate) fn derivative<M>(state: &State<M>) -> String {
     format!("der({})", state.name)
+}
+
+/// Name of the derivative or event indicator at a position after the table.
+pub(crate) fn calculated<E: Exported>(after: usize) -> String {
+    let states = E::CAN.states();
+    match states.get(after) {
+        Some(state) => derivative(state),
+        None => E::CAN.indicators().get(after - states.len()).map_or_else(String::new, |i| i.name.to_owned()),
+    }
 }
 
 /// Nominal value of a variable: that of its row, 1 without one.

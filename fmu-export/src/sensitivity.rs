@@ -3,7 +3,7 @@
 //!
 //! A model with a [tangent](fmu_core::Differentiable) gives exact values. For another one, and in Initialization Mode, a
 //! central difference along the whole direction is taken on a copy; its step makes the errors of rounding and of the
-//! third derivative about equal, 1e-10 of a value of nominal size. FMI 2.0.5, 2.1.9; FMI 3.0.2, 2.2.11.
+//! third derivative about equal, 1e-10 of a value of nominal size. FMI 2.0.5, 2.1.9; FMI 3.0.2, 2.2.12.
 
 use crate::access::index;
 use crate::instance::{Instance, Refusal};

@@ -7,7 +7,7 @@
 
 mod solver;
 
-use fmu_core::Plain;
+use fmu_core::{Capabilities, Exported, Interface, Next, Plain};
 use fmu_export::abi::types::*;
 use fmu_export::instance::Instance as Native;
 use fmu_export::log::{Log, Sink, Status};
@@ -203,6 +203,31 @@ fn without_entering_event_mode_nothing_is_lost() {
             assert!(plain.get_integer(COUNT) > 25);
         }
     }
+}
+
+/// A sampler whose next event is always now.
+struct Stuck;
+
+impl Exported for Stuck {
+    type Model = Sampler;
+    const CAN: Capabilities<Sampler> = {
+        let mut can = Capabilities::NONE.Sampled();
+        if let Some(events) = &mut can.events {
+            events.next = |_, now| Next::At(now);
+        }
+        can
+    };
+}
+
+#[test]
+fn an_importer_is_not_led_into_a_loop() {
+    let log = Log::new(Box::new(Deaf), false);
+    let fresh = Snapshot::new(Interface::ModelExchange);
+    let mut stuck = Native::<Stuck>::new(lifecycle::Standard::Fmi3, "stuck".into(), log, fresh);
+    stuck.set_up(2.0, None).unwrap();
+    stuck.exit_initialization().unwrap();
+    let fault = stuck.update_discrete().unwrap_err();
+    assert_eq!(fault.message(), "after the event at 2 s the next one is due at once: an error of the model");
 }
 
 struct Deaf;

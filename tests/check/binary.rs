@@ -115,6 +115,11 @@ const FAULTS3: &[(&str, &[&str])] = &[
 /// Compiles the small FMU; `None` without a compiler.
 fn compile(dir: &Path, version: u8, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
     let source = if version == 2 { "tests/check/fmu.c" } else { "tests/check/fmu3.c" };
+    compile_source(dir, source, version, fault, more)
+}
+
+/// Compiles a C file with one fault.
+pub fn compile_source(dir: &Path, source: &str, version: u8, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(source);
     let out = dir.join(format!("{version}-{fault}.so"));
     let mut cc = Command::new("cc");
@@ -129,7 +134,7 @@ fn pack(dir: &Path, version: u8, fault: &str, binary: &[u8]) -> std::path::PathB
     pack_with(dir, &format!("{version}-{fault}"), xml, binary)
 }
 
-fn pack_with(dir: &Path, name: &str, xml: &str, binary: &[u8]) -> std::path::PathBuf {
+pub fn pack_with(dir: &Path, name: &str, xml: &str, binary: &[u8]) -> std::path::PathBuf {
     let path = dir.join(format!("{name}.fmu"));
     let platform = if xml.contains("fmiVersion=\"2.0\"") { "linux64" } else { "x86_64-linux" };
     let entries = [
@@ -185,9 +190,16 @@ fn derivatives_of_outputs() {
     let dir = tempfile::tempdir().unwrap();
     let flag = "canGetAndSetFMUstate=\"true\"";
     let xml = include_str!("fmu.xml").replace(flag, &format!("{flag} maxOutputDerivativeOrder=\"1\""));
-    for (fault, ids) in [("NONE", &[][..]), ("T09o", &["T09"]), ("T09v", &["T09"])] {
+    for (fault, ids) in [("NONE", &[][..]), ("T09e", &["T09"]), ("T09o", &["T09s"]), ("T09v", &["T09s"])] {
         let Some(binary) = compile(dir.path(), 2, fault, &["-DDERIVATIVES"]) else { return };
         let report = check(&pack_with(dir.path(), fault, &xml, &binary), &["time", "lifecycle"]);
+        assert_eq!(violated(&report), ids, "{fault}: {}", told(&report));
+    }
+    // A mean over the step has no value at its beginning; and an FMU that interpolates inputs takes their derivatives.
+    let claims = xml.replace(flag, &format!("{flag} canInterpolateInputs=\"true\""));
+    for (fault, xml, ids) in [("MEAN", &xml, &[][..]), ("NONE", &claims, &["T11"])] {
+        let Some(binary) = compile(dir.path(), 2, fault, &["-DDERIVATIVES"]) else { return };
+        let report = check(&pack_with(dir.path(), fault, xml, &binary), &["time"]);
         assert_eq!(violated(&report), ids, "{fault}: {}", told(&report));
     }
 }

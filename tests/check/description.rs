@@ -103,10 +103,11 @@ fn faults_of_fmi_3() {
             (&["X02a"], "fmiVersion=\"3.0\"", "fmiVersion=\"3.0.2\""),
             (
                 &["X08"],
-                "canGetAndSetFMUState=\"true\"",
-                "canGetAndSetFMUState=\"true\" canReturnEarlyAfterIntermediateUpdate=\"true\"",
+                "canHandleVariableCommunicationStepSize=\"true\"",
+                "canHandleVariableCommunicationStepSize=\"true\" canReturnEarlyAfterIntermediateUpdate=\"true\"",
             ),
-            (&["V02a"], "valueReference=\"2\"", "valueReference=\"1\""),
+            // Others depend on the input whose reference is gone.
+            (&["V02a", "S03a"], "valueReference=\"2\"", "valueReference=\"1\""),
             (&["V03"], "causality=\"independent\"", "causality=\"local\" initial=\"calculated\""),
             (&["V09a"], "unit=\"N.m\" start", "unit=\"Nm\" start"),
             (

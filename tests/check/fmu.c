@@ -561,7 +561,9 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
 #ifdef FAULT_T05
     if (no_prior) d->y += 1e-9;
 #endif
-#ifdef FAULT_T03
+#ifdef FAULT_MEAN
+    d->y = (pow(t + 1 + h, 3) - pow(t + 1, 3)) / (3 * h);
+#elif defined FAULT_T03
     d->y += d->gain * d->u + d->bias;
 #else
     d->y += (d->gain * d->u + d->bias) * h;
@@ -590,11 +592,17 @@ EXPORT int fmi2GetRealOutputDerivatives(void *c, const unsigned *vr, size_t n, c
 #ifdef DERIVATIVES
     ENTER(STEP | TERMINATED);
     for (size_t i = 0; i < n; i++) {
+#ifdef FAULT_T09e
+        return fail(f, "no derivatives");
+#endif
 #ifndef FAULT_T09o
         if (o[i] != 1) return fail(f, "no such order");
 #endif
         if (vr[i] != 3) return fail(f, "no output");
         v[i] = f->data.gain * f->data.u + f->data.bias;
+#ifdef FAULT_MEAN
+        v[i] = 2 * (f->data.time + 1);
+#endif
 #ifdef FAULT_T09v
         v[i] *= 2;
 #endif

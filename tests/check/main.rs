@@ -7,6 +7,7 @@ mod common;
 mod archive;
 mod binary;
 mod description;
+mod exchange;
 mod foreign;
 mod survives;
 mod terminals;

@@ -6,6 +6,8 @@
 //! electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest electrical
 //! acceleration alpha = n_p K i_q / J. R^ = 0.9 R: the safe side at standstill, where R^ > R runs away.
 //!
+//! Field weakening is used where rated torque at rated speed takes more than its share of the voltage (k_u u_dc / sqrt 3).
+//!
 //! The current loop must be stable with every current in use. Its gain, w_c L or with active resistance 2 w_c L - R,
 //! acts on the incremental inductance, which saturation lowers. During a start, while the frame is not yet aligned with
 //! the rotor, the gain of one axis acts on the inductance of the other. With one sample of delay, `i[k+2] = i[k+1] -
@@ -15,7 +17,10 @@
 use super::check::check;
 use super::motor::{Data, MotorFile, Number};
 use anyhow::{Result, bail};
-use drive::frame::Dq;
+use drive::control::envelope::{Envelope, Warm};
+use drive::control::reference::max_torque_per_ampere;
+use drive::control::weakening::WeakeningParameters;
+use drive::frame::{Dq, DqHat};
 use drive::motor::Motor;
 use drive::plant::{machine, saturation::Saturation};
 use std::f64::consts::TAU;
@@ -91,6 +96,7 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     } else {
         controller.extend(extended_emf(data, &mut notes));
     }
+    controller.extend(weakening(motor, estimator != "Rasmussen", &mut notes)?);
     cap_current_loop(data, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
     Ok(Tuned { name: data.name.clone(), source: data.source.clone(), plant, controller, notes })
@@ -165,7 +171,7 @@ fn torque_constant(data: &Data) -> f64 {
 
 /// Rules for every estimator.
 fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
-    let Data { machine, rating, dc_link, bandwidth, .. } = &motor.data;
+    let Data { rating, bandwidth, .. } = &motor.data;
     for (name, x) in [("speed", &rating.speed), ("torque", &rating.torque), ("current", &rating.current)] {
         if !(x.get_ref().is_finite() && *x.get_ref() > 0.0) {
             bail!("{}: rating.{name} = {} must be greater than 0: correct the value", motor.place(x), x.get_ref());
@@ -178,19 +184,62 @@ fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
             "{place}: bandwidth.speed = {w_s} rad/s is more than a third of bandwidth.observer = {w_o} rad/s: lower the former or raise the latter"
         );
     }
-    let emf = f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * machine.psi_M.get_ref();
-    let highest = dc_link.u_dc.get_ref() / 3.0_f64.sqrt();
-    if emf >= highest {
-        let place = motor.place(&rating.speed);
-        bail!(
-            "{place}: at rating.speed the magnet's EMF is {emf:.1} V, but dc_link.u_dc gives {highest:.1} V: lower the speed, or raise u_dc"
-        );
-    }
     let hertz = bandwidth.current.get_ref() / TAU;
     if !(60.0..=600.0).contains(&hertz) {
         notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to 600 Hz were tried"));
     }
     Ok(())
+}
+
+/// Field weakening where rated torque at rated speed needs it.
+fn weakening(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Result<Vec<Setting>> {
+    let Data { rating, dc_link, .. } = &motor.data;
+    let machine = electrical(&motor.data);
+    let (speed, torque, u_dc) = (*rating.speed.get_ref(), *rating.torque.get_ref(), *dc_link.u_dc.get_ref());
+    let (w, highest) = (f64::from(machine.n_p) * speed, u_dc / 3.0_f64.sqrt());
+    let envelope = Envelope::new(&machine, *rating.current.get_ref());
+    let i = if salient {
+        max_torque_per_ampere(&machine, torque)
+    } else {
+        DqHat::new(0.0, torque / machine.torque_constant())
+    };
+    let U = WeakeningParameters::default().k_u * highest;
+    if envelope.excess(i, w, U) <= 0.0 {
+        return Ok(Vec::new());
+    }
+    let mut warm = Warm::default();
+    let most = (0..8).map(|_| envelope.limit(w, 1.0, U, &mut warm).tau).last().unwrap_or_default();
+    if most < torque {
+        bail!(
+            "{}: at rating.speed, even field weakening gives at most {most:.2} N.m of the {torque} N.m of rating.torque: lower \
+             the speed or the torque, or raise rating.current or dc_link.u_dc = {u_dc} V",
+            motor.place(&rating.speed)
+        );
+    }
+    let diodes = highest / (f64::from(machine.n_p) * machine.psi_M);
+    if speed > diodes {
+        notes.push(format!(
+            "above {diodes:.0} rad/s, the magnet's EMF exceeds dc_link.u_dc = {u_dc} V: gates that switch off there feed the DC \
+             link through the diodes; rating.speed is {speed:.0} rad/s"
+        ));
+    }
+    Ok(vec![set(
+        "weakening.use",
+        Value::Boolean(true),
+        "rated torque at rated speed needs more than 0.95 u_dc / sqrt(3)",
+    )])
+}
+
+/// The machine's electrical data.
+fn electrical(data: &Data) -> Motor {
+    let m = &data.machine;
+    Motor {
+        n_p: *m.n_p.get_ref(),
+        R_s: *m.R_s.get_ref(),
+        L_d: *m.L_d.get_ref(),
+        L_q: *m.L_q.get_ref(),
+        psi_M: *m.psi_M.get_ref(),
+    }
 }
 
 /// Maximum product of the current loop's gain and T_s / L: half of the value at which the loop oscillates.
@@ -227,14 +276,7 @@ fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<Str
 
 /// The smallest incremental inductance in H of the plant with a current of `i` (A) in any direction.
 fn least_inductance(data: &Data, i: f64) -> f64 {
-    let (m, of) = (&data.machine, |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref()));
-    let motor = Motor {
-        n_p: *m.n_p.get_ref(),
-        R_s: *m.R_s.get_ref(),
-        L_d: *m.L_d.get_ref(),
-        L_q: *m.L_q.get_ref(),
-        psi_M: *m.psi_M.get_ref(),
-    };
+    let (motor, of) = (electrical(data), |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref()));
     let saturation = data.saturation.as_ref().map_or_else(Saturation::default, |s| Saturation {
         s_2: of(&s.s_2),
         s_3: of(&s.s_3),

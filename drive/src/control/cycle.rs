@@ -4,6 +4,7 @@ use crate::control::lock::Lock;
 use crate::control::model::SensorlessController;
 use crate::control::signals::ControllerOutputs;
 use crate::control::state::{Command, Mode, context};
+use crate::control::weakening::share;
 use crate::estimator::{Estimate, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
 use crate::math::wrap;
@@ -33,8 +34,8 @@ impl SensorlessController {
         let sample = self.measure();
         let (frame, mode) = self.estimate(&sample, tuned);
         let speed = frame.w / f64::from(self.parameters.motor.n_p);
-        let (i_ref, current_limited) = self.reference(mode, speed, tuned);
-        let (u, voltage_limited) = self.modulate(mode, &frame, i_ref, tuned);
+        let (i_ref, current_limited) = self.reference(mode, speed, frame.injection, tuned);
+        let (u, voltage_limited, u_share) = self.modulate(mode, &frame, i_ref, tuned);
         let lock_lost = self.lock(mode, &frame, &sample);
         self.keep(&sample, i_ref, frame.i);
 
@@ -48,6 +49,10 @@ impl SensorlessController {
             enabled: true,
             voltage_limited,
             current_limited,
+            tau_max: self.state.tau.1,
+            tau_min: -self.state.tau.0,
+            u_share,
+            weakens: self.state.weakening.weakens,
         }
     }
 
@@ -91,24 +96,25 @@ impl SensorlessController {
         (Frame { axis, theta, w, i: axis.from_stator(i), injection }, mode)
     }
 
-    /// Current references in A at the estimated mechanical `speed` (rad/s), and whether a limit reduced them.
+    /// Current references in A at the estimated mechanical `speed` (rad/s) beside an `injection`, and whether a limit reduced
+    /// them.
     #[inline]
-    fn reference(&mut self, mode: Mode, speed: f64, tuned: bool) -> (DqHat, bool) {
+    fn reference(&mut self, mode: Mode, speed: f64, injection: Injection, tuned: bool) -> (DqHat, bool) {
         let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
         match mode {
             Mode::Current(i_ref) => (i_ref, false),
             Mode::Voltage(_) => (DqHat::ZERO, false),
             Mode::AfterStart | Mode::AfterSearch | Mode::ClosedLoop => {
                 let old = (tuned && mode == Mode::ClosedLoop).then_some(&last_gains.speed);
-                state.references(par.estimator, gains, old, par, inputs, speed)
+                state.references(par.estimator, gains, old, par, inputs, speed, injection)
             }
         }
     }
 
-    /// Current control, injection, the hexagon and dead-time compensation: the voltage references in V, and whether the
-    /// hexagon limited them.
+    /// Current control, injection, the hexagon and dead-time compensation: the voltage references in V, whether the
+    /// hexagon limited them, and the share of u_dc / sqrt(3) that was requested.
     #[inline]
-    fn modulate(&mut self, mode: Mode, frame: &Frame, i_ref: DqHat, tuned: bool) -> (Phases, bool) {
+    fn modulate(&mut self, mode: Mode, frame: &Frame, i_ref: DqHat, tuned: bool) -> (Phases, bool, f64) {
         let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
         let (motor, T_s) = (&par.motor, par.T_s);
         if tuned && mode != Mode::AfterSearch {
@@ -119,6 +125,11 @@ impl SensorlessController {
         } else {
             state.current.command(&gains.current, motor, i_ref, frame.i, frame.w)
         };
+        let magnitude = requested.magnitude();
+        let u_share = share(magnitude, inputs.u_dc);
+        if par.weakening.used && matches!(mode, Mode::ClosedLoop) {
+            state.weakening.integrate(&par.weakening, magnitude, inputs.u_dc, T_s);
+        }
         // The command acts from `delay` to `delay + 1` samples from now, so rotate it to the middle of that interval.
         let acting = frame.axis.ahead(Turn::new((f64::from(par.delay) + 0.5) * T_s * frame.w));
         let injected = match frame.injection {
@@ -137,9 +148,9 @@ impl SensorlessController {
             let legs = Phases::from_stator(acting.to_stator(i_ref));
             let loss = dead_time_loss(par.compensation.u_dead, par.compensation.i_zero, legs);
             let (compensated, beyond) = within_hexagon(command + loss, inputs.u_dc);
-            (Phases::from_stator(compensated), limited || beyond)
+            (Phases::from_stator(compensated), limited || beyond, u_share)
         } else {
-            (Phases::from_stator(command), limited)
+            (Phases::from_stator(command), limited, u_share)
         }
     }
 

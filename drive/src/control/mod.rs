@@ -2,6 +2,7 @@
 
 pub mod current;
 mod cycle;
+pub mod envelope;
 pub mod lock;
 pub mod model;
 pub mod polarity;
@@ -12,4 +13,5 @@ pub mod speed;
 pub mod start;
 mod state;
 pub mod tables;
+pub mod weakening;
 pub mod zero_speed;

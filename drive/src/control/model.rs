@@ -8,7 +8,8 @@ use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
 use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
-use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
+use crate::control::tables::{ControllerParameters, LATER_OUTPUTS, OUTPUTS, PARAMETERS};
+use crate::control::weakening::{self, WEAKENING, WeakeningGains};
 use crate::estimator::{Class, Estimator, Sample};
 use crate::motor::Motor;
 use fmu_core::log::Warnings;
@@ -114,13 +115,14 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 6;
+    const STATE_VERSION: u16 = 7;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
         let k = motor.torque_constant();
-        let tau =
-            if estimator.class() == Class::FluxObserver { limit.tau } else { max_torque(motor, limit, current.mtpa) };
+        let observes_flux = estimator.class() == Class::FluxObserver;
+        let tau = if observes_flux { limit.tau } else { max_torque(motor, limit, current.mtpa) };
+        let weakening = WeakeningGains::new(&self.parameters, tau, current.mtpa && !observes_flux);
         let speed = SpeedGains::new(speed_loop, *J, k);
         if !self.tuned {
             self.last_gains.clone_from(&self.gains);
@@ -132,6 +134,7 @@ impl Model for SensorlessController {
             k,
             i_tau: tau / k,
             lock: LockGains::new(lock, motor, *T_s),
+            weakening,
         };
     }
 
@@ -152,6 +155,7 @@ impl Model for SensorlessController {
             polarity::validate(par)?;
         }
         estimator.validate(par)?;
+        weakening::validate(par)?;
         if zero_speed.i_0 > limit.i {
             return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
         }
@@ -205,7 +209,16 @@ impl Sampled for SensorlessController {
 
 impl Warns for SensorlessController {
     fn warn(&self, log: &mut Warnings<'_>) {
-        let out = &self.state.shown;
+        let (out, par, tau_ref) = (&self.state.shown, &self.parameters, self.inputs.tau_ref);
+        let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
+        if par.weakening.used && par.speed_loop.torque_mode && out.current_limited && beyond {
+            log.warn("tau_ref", || {
+                format!(
+                    "tau_ref = {tau_ref} N.m is clipped: at this speed and u_dc, the drive gives {} to {} N.m (tau_min, tau_max)",
+                    out.tau_min, out.tau_max
+                )
+            });
+        }
         if out.lock_lost < 1.0 {
             return;
         }
@@ -266,6 +279,8 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             ),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+            V::part("weakening.", &Part { table: WEAKENING, lens: |m| &mut m.model.parameters.weakening }),
+            V::part("", &Part { table: LATER_OUTPUTS, lens: |m| &mut m.out }),
         ]
     },
 );

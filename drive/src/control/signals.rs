@@ -54,6 +54,7 @@ impl Default for ControllerInputs {
 
 /// Outputs: the results of sample k, visible from t_k + T_s on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a variable")]
 pub struct ControllerOutputs {
     /// Stator voltage references in V, inside the hexagon of u_dc.
     pub u: Phases,
@@ -73,11 +74,20 @@ pub struct ControllerOutputs {
     pub voltage_limited: bool,
     /// Whether a current or torque limit limited the current references.
     pub current_limited: bool,
+    /// Greatest torque in N.m that the references may ask for.
+    pub tau_max: f64,
+    /// Least torque in N.m that the references may ask for.
+    pub tau_min: f64,
+    /// Voltage that the current loop requests, as a share of u_dc / sqrt(3).
+    pub u_share: f64,
+    /// Field weakening lowers the reference of i_d.
+    pub weakens: bool,
 }
 
 impl ControllerOutputs {
     /// Whether all values are numbers.
     pub fn is_finite(&self) -> bool {
+        // The limits of the torque are bounded, and the share of the voltage is finite with u.
         let Self { u, speed_est, theta_est, i, i_ref, lock_lost, .. } = self;
         all_finite([u.a, u.b, u.c, *speed_est, *theta_est, i.d, i.q, i_ref.d, i_ref.q, *lock_lost])
     }

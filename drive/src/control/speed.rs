@@ -72,14 +72,14 @@ pub struct SpeedController {
 }
 
 impl SpeedController {
-    /// Reference of i_q in A at speed reference `w_ref` and speed `w` (rad/s), within +-`limit` (A), and its value
-    /// without the limit; one sample of `T_s` (s).
+    /// Reference of i_q in A at speed reference `w_ref` and speed `w` (rad/s), within `limits` (A), and its value
+    /// without them; one sample of `T_s` (s).
     #[inline]
-    pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limit: f64, T_s: f64) -> (f64, f64) {
-        let error = w_ref - w;
+    pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limits: (f64, f64), T_s: f64) -> (f64, f64) {
+        let ((low, high), error) = (limits, w_ref - w);
         let wanted = gains.k_p * (gains.b * w_ref - w) + self.integral;
-        let i_q_ref = wanted.clamp(-limit, limit);
-        let further_in = (wanted > limit && error > 0.0) || (wanted < -limit && error < 0.0);
+        let i_q_ref = wanted.clamp(low, high);
+        let further_in = (wanted > high && error > 0.0) || (wanted < low && error < 0.0);
         if !further_in {
             self.integral += T_s * gains.k_i * error;
         }
@@ -88,6 +88,12 @@ impl SpeedController {
 }
 
 impl SpeedController {
+    /// Moves the integral part with the `cut` (A) that a limit makes, at the rate `bandwidth` (rad/s).
+    #[inline]
+    pub fn follow(&mut self, bandwidth: f64, cut: f64, T_s: f64) {
+        self.integral += T_s * bandwidth * cut;
+    }
+
     /// Changes from gains `old` to `new` without a step in the output at speed reference `w_ref` and speed `w` (rad/s).
     pub fn retune(&mut self, old: &SpeedGains, new: &SpeedGains, w_ref: f64, w: f64) {
         let proportional = |gains: &SpeedGains| gains.k_p * (gains.b * w_ref - w);
@@ -163,10 +169,10 @@ mod tests {
     fn the_integrator_holds_at_the_limit_only_when_driven_in() {
         let gains = SpeedGains::new(&SpeedLoop::default(), 1.5e-3, 0.675);
         let mut held = SpeedController { integral: 7.0 };
-        let (i_q_ref, wanted) = held.update(&gains, 10.0, 0.0, 6.0, 1e-4);
+        let (i_q_ref, wanted) = held.update(&gains, 10.0, 0.0, (-6.0, 6.0), 1e-4);
         assert!((i_q_ref - 6.0).abs() < 1e-15 && wanted > 7.0);
         assert!((held.integral - 7.0).abs() < 1e-15, "the error drives it in: held");
-        held.update(&gains, -1.0, 0.0, 6.0, 1e-4);
+        held.update(&gains, -1.0, 0.0, (-6.0, 6.0), 1e-4);
         assert!(held.integral < 7.0, "the error drives it out: it moves");
     }
 }

@@ -8,7 +8,8 @@ use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::{SpeedController, SpeedGains};
 use crate::control::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::control::tables::ControllerParameters;
-use crate::estimator::{Class, Context, Estimate, Estimator, EstimatorParameters, Kind, Sample};
+use crate::control::weakening::{Weakening, WeakeningGains};
+use crate::estimator::{Class, Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use crate::math::wrap;
 use crate::motor::Motor;
@@ -33,6 +34,7 @@ pub(super) struct Gains {
     /// Maximum torque in N.m divided by the torque constant: the limit of the speed loop in A.
     pub(super) i_tau: f64,
     pub(super) lock: LockGains,
+    pub(super) weakening: WeakeningGains,
 }
 
 /// Parameters the estimator uses: at the first sample after retuning, still the previous ones.
@@ -113,6 +115,9 @@ pub(super) struct State {
     /// Output of the current PI at the last sample in V.
     pub(super) u_pi: DqHat,
     pub(super) lock: Lock,
+    pub(super) weakening: Weakening,
+    /// Greatest magnitude of negative and of positive torque at the last sample in N.m.
+    pub(super) tau: (f64, f64),
     /// Outputs of the last sample, hidden until the next instant.
     pub(super) computed: ControllerOutputs,
     /// Outputs visible now.
@@ -197,9 +202,10 @@ impl State {
         }
     }
 
-    /// The current references (A) at the estimated mechanical `speed` (rad/s), and whether a limit reduced them; `old` are
-    /// the gains of a speed loop that is retuned at this sample.
+    /// The current references (A) at the estimated mechanical `speed` (rad/s) beside an `injection`, and whether
+    /// a limit reduced them; `old` are the gains of a speed loop that is retuned at this sample.
     #[inline]
+    #[expect(clippy::too_many_arguments, reason = "parameters, inputs and estimate, each of its own kind")]
     pub(super) fn references(
         &mut self,
         kind: Kind,
@@ -208,33 +214,48 @@ impl State {
         par: &ControllerParameters,
         inputs: &ControllerInputs,
         speed: f64,
+        injection: Injection,
     ) -> (DqHat, bool) {
         self.w_ref = par.speed_loop.ramped(self.w_ref, inputs.speed_ref, par.T_s);
         let w_ref = self.w_ref;
         if let Some(old) = old {
             self.speed.retune(old, &gains.speed, w_ref, speed);
         }
-        let mut i_q_ref = |limit: f64| {
-            let (limited, requested) = if par.speed_loop.torque_mode {
-                let requested = inputs.tau_ref / gains.k;
-                (requested.clamp(-limit, limit), requested)
-            } else {
-                self.speed.update(&gains.speed, w_ref, speed, limit, par.T_s)
-            };
-            (limited, requested.abs() > limit)
-        };
         // Only a flux observer needs the low-speed law at standstill; with the other methods it would only add losses.
-        if kind.class() == Class::FluxObserver {
+        let observes_flux = kind.class() == Class::FluxObserver;
+        let (i_d_ref, limit) = if observes_flux {
             let i_d_ref = par.zero_speed.i_d_ref(speed);
-            let (i_q_ref, limited) = i_q_ref(par.limit.i_q_beside(i_d_ref).min(gains.i_tau));
-            return (DqHat::new(i_d_ref, i_q_ref), limited);
+            (i_d_ref, par.limit.i_q_beside(i_d_ref).min(gains.i_tau))
+        } else {
+            (0.0, gains.i_tau)
+        };
+        let w = f64::from(par.motor.n_p) * speed;
+        let (mut low, mut high) = (limit, limit);
+        if par.weakening.used {
+            let at = (w, inputs.u_dc, injection.magnitude());
+            (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, limit, self.k);
         }
-        let (i_q_ref, limited) = i_q_ref(gains.i_tau);
-        let i_ref = if par.current.mtpa {
+        self.tau = (gains.k * low, gains.k * high);
+        let (i_q_ref, requested) = if par.speed_loop.torque_mode {
+            let requested = inputs.tau_ref / gains.k;
+            (requested.clamp(-low, high), requested)
+        } else {
+            let (limited, wanted) = self.speed.update(&gains.speed, w_ref, speed, (-low, high), par.T_s);
+            if par.weakening.used {
+                self.speed.follow(par.speed_loop.bandwidth, limited - wanted, par.T_s);
+            }
+            (limited, wanted)
+        };
+        let limited = requested > high || requested < -low;
+        let i_ref = if par.current.mtpa && !observes_flux {
             max_torque_per_ampere(&par.motor, gains.k * i_q_ref)
         } else {
-            DqHat::new(0.0, i_q_ref)
+            DqHat::new(i_d_ref, i_q_ref)
         };
+        if par.weakening.used {
+            let tau = gains.k * i_q_ref;
+            return (self.weakening.currents(&gains.weakening, tau, w, i_ref, par.limit.i_q), limited);
+        }
         (i_ref, limited)
     }
 

@@ -7,6 +7,7 @@ use crate::control::sensor::{SENSOR, Sensor};
 use crate::control::signals::ControllerOutputs;
 use crate::control::speed::{SPEED_LOOP, SpeedLoop};
 use crate::control::start::{START, StartParameters};
+use crate::control::weakening::{WEAKENING, WeakeningParameters};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::Kind;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
@@ -106,6 +107,8 @@ pub struct ControllerParameters {
     pub polarity: PolarityParameters,
     /// Estimate of the second-order d-axis saturation coefficient in A/Wb2, >= 0; 0: unknown.
     pub s_2: f64,
+    /// Field weakening.
+    pub weakening: WeakeningParameters,
     /// Initial estimate of the electrical angle in rad.
     pub theta_est: f64,
     /// Initial estimate of the mechanical speed in rad/s.
@@ -133,6 +136,7 @@ impl Default for ControllerParameters {
             start: StartParameters::default(),
             polarity: PolarityParameters::default(),
             s_2: 0.0,
+            weakening: WeakeningParameters::default(),
             theta_est: 0.0,
             speed_est: 0.0,
         }
@@ -196,6 +200,17 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
     },
 );
 
+/// All parameters, for messages. The models append what joined later to their tables: value references of older variables
+/// stay.
+pub const ALL_PARAMETERS: &Table<ControllerParameters> = &Table::new(
+    const {
+        &[
+            P::part("", &Part { table: PARAMETERS, lens: |p| p }),
+            P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
+        ]
+    },
+);
+
 type O = Row<ControllerOutputs>;
 
 /// Description of the output `lock_lost`, on the controller and on `PmsmDrive`.
@@ -216,7 +231,7 @@ pub const LIMITED: &Table<ControllerOutputs> = &Table::new(
             ),
             O::boolean_output(
                 "current_limited",
-                "limit.i_q, limit.i or limit.tau limited the current references of the last sample",
+                "limit.i_q, limit.i, limit.tau or field weakening limited the current references of the last sample",
                 |o| &mut o.current_limited,
             ),
         ]
@@ -243,6 +258,27 @@ pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
             O::boolean_output("enabled", ENABLED, |o| &mut o.enabled),
             O::part("", &Part { table: LIMITED, lens: |o| o }),
+        ]
+    },
+);
+
+/// Outputs that joined later, on the controller and on `PmsmDrive`.
+pub const LATER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
+    const {
+        &[
+            O::discrete_output("tau_max", &NEWTON_METER, "Greatest torque that the references may ask for now", |o| {
+                &mut o.tau_max
+            }),
+            O::discrete_output("tau_min", &NEWTON_METER, "The same in the negative direction, 0 or less", |o| {
+                &mut o.tau_min
+            }),
+            O::discrete_output(
+                "u_share",
+                &ONE,
+                "Voltage that the current loop requests, before the hexagon, as a share of u_dc / sqrt(3)",
+                |o| &mut o.u_share,
+            ),
+            O::boolean_output("weakens", "Field weakening lowers i_d_ref", |o| &mut o.weakens),
         ]
     },
 );

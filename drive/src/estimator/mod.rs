@@ -96,6 +96,18 @@ pub enum Injection {
     Estimated(DqHat),
 }
 
+impl Injection {
+    /// Its magnitude in V.
+    #[inline]
+    pub fn magnitude(self) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Stator(u) => u.magnitude(),
+            Self::Estimated(u) => u.magnitude(),
+        }
+    }
+}
+
 /// An estimator's results at sample k, and the voltage it requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {

@@ -12,9 +12,8 @@ use crate::plant::machine::{self, Machine};
 use crate::plant::mechanics::{Motion, Shaft};
 use crate::plant::power::{Energy, Powers};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
-use crate::plant::tables::{LOSS_OUTPUTS, LOSS_PARAMETERS, OUTPUTS, PARAMETERS, PlantParameters};
-use fmu_core::unit::{NEWTON_METER, RADIAN, SPEED, VOLT, WEBER};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Part, Row, Scalar, Step, Table, Terminal};
+use crate::plant::tables::{PlantParameters, TABLE};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Scalar, Step, Table, Terminal};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -492,51 +491,6 @@ impl Model for PmsmPlant {
         Ok(())
     }
 }
-
-type P = Row<PmsmPlant>;
-
-/// States that are no outputs; of the plant and of `PmsmDrive`.
-pub const STATES: &Table<PmsmPlant> = &Table::new(
-    const {
-        &[
-            P::state("psi_d", &WEBER, "d-axis stator flux linkage", |m| m.state.psi.parts_mut().0).nominal(0.1),
-            P::state("psi_q", &WEBER, "q-axis stator flux linkage", |m| m.state.psi.parts_mut().1).nominal(0.1),
-        ]
-    },
-);
-
-type V = Row<Block<PmsmPlant>>;
-
-const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
-    const {
-        &[
-            V::input("u_a", &VOLT, "Voltage reference of phase a, average over a PWM period", |m| {
-                &mut m.model.inputs.u.a
-            }),
-            V::input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
-            V::input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
-            V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
-            V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
-                &mut m.model.inputs.tau_load
-            }),
-            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft; read only with mechanics.imposed", |m| {
-                &mut m.model.inputs.speed_shaft
-            }),
-            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft; read only with mechanics.imposed", |m| {
-                &mut m.model.inputs.angle_shaft
-            })
-            .unbounded(),
-            V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
-                &mut m.model.inputs.enable
-            }),
-            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-            V::part("", &Part { table: STATES, lens: |m| &mut m.model }),
-            V::part("", &Part { table: LOSS_OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.parameters }),
-        ]
-    },
-);
 
 #[cfg(test)]
 mod tests {

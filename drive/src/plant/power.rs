@@ -16,8 +16,9 @@
 //! represent it. The outputs are therefore means over the plant's last step, integrated with the state by the same
 //! method, and `energy.in`, `energy.mech` and `energy.loss` are the time integrals of the powers. Before the first
 //! step, the powers are the initial values. In Model Exchange, where the importer integrates, the powers are those of the
-//! instant, and the energies stay 0: an importer that wants them integrates the powers too. i_dc is also defined for u_dc = 0 V: the link still carries the current of
-//! the legs connected to it; in this case it is the value at the end of the step.
+//! instant, and the energies stay 0: an importer that wants them integrates the powers. i_dc is also defined for
+//! u_dc = 0 V: the link still carries the current of the legs connected to it; in this case it is the value at the end of
+//! the step.
 //!
 //! Two events transfer energy instantly and count in the step in which they occur: a jump of the imposed angle, where
 //! the magnetic field does work on the shaft, and blocking diodes, where the energy of the remaining current is lost.
@@ -141,25 +142,29 @@ pub const POWERS: &Table<Powers> = &Table::new(
                 &AMPERE,
                 "Current that the inverter draws from the DC link, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.i_dc,
-            ),
+            )
+            .mean(),
             P::output(
                 "p_in",
                 &WATT,
                 "Power from the DC link, u_dc i_dc, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_in,
-            ),
+            )
+            .mean(),
             P::output(
                 "p_mech",
                 &WATT,
                 "Power delivered to the load at the shaft, tau_shaft speed, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_mech,
-            ),
+            )
+            .mean(),
             P::output(
                 "p_loss",
                 &WATT,
                 "All losses, p_cu + p_iron + p_cond + p_sw + p_friction, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_loss,
-            ),
+            )
+            .mean(),
         ]
     },
 );

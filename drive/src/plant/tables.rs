@@ -1,4 +1,4 @@
-//! The plant's parameters, and the tables of its parameters and outputs.
+//! The plant's parameters, and the tables of its variables.
 
 use crate::motor::{MOTOR, Motor};
 use crate::plant::inverter::{INVERTER, Inverter};
@@ -6,11 +6,12 @@ use crate::plant::iron::{IRON, Iron};
 use crate::plant::losses::LOSSES;
 use crate::plant::losses::conduction::DEVICES;
 use crate::plant::mechanics::{MECHANICS, Mechanics};
+use crate::plant::model::PmsmPlant;
 use crate::plant::power::{ENERGY, POWERS};
 use crate::plant::saturation::{SATURATION, Saturation};
 use crate::plant::signals::PlantOutputs;
-use fmu_core::unit::{AMPERE, NEWTON_METER, NM_S2_PER_RAD2, ONE, RADIAN, S2_PER_RAD2, SPEED};
-use fmu_core::{Part, Row, Table};
+use fmu_core::unit::{AMPERE, NEWTON_METER, NM_S2_PER_RAD2, ONE, RADIAN, S2_PER_RAD2, SPEED, VOLT, WEBER};
+use fmu_core::{Block, Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
 /// The parameters of machine, inverter and shaft.
@@ -131,6 +132,52 @@ pub const LOSS_PARAMETERS: &Table<PlantParameters> = &Table::new(
                 |p| &mut p.winding.k_ac,
             )
             .at_least(0.0),
+        ]
+    },
+);
+
+type S = Row<PmsmPlant>;
+
+/// States that are no outputs; of the plant and of `PmsmDrive`.
+pub const STATES: &Table<PmsmPlant> = &Table::new(
+    const {
+        &[
+            S::state("psi_d", &WEBER, "d-axis stator flux linkage", |m| m.state.psi.parts_mut().0).nominal(0.1),
+            S::state("psi_q", &WEBER, "q-axis stator flux linkage", |m| m.state.psi.parts_mut().1).nominal(0.1),
+        ]
+    },
+);
+
+type V = Row<Block<PmsmPlant>>;
+
+/// All variables of `PmsmPlant`.
+pub const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
+    const {
+        &[
+            V::input("u_a", &VOLT, "Voltage reference of phase a, average over a PWM period", |m| {
+                &mut m.model.inputs.u.a
+            }),
+            V::input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
+            V::input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
+            V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+            V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
+                &mut m.model.inputs.tau_load
+            }),
+            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft; read only with mechanics.imposed", |m| {
+                &mut m.model.inputs.speed_shaft
+            }),
+            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft; read only with mechanics.imposed", |m| {
+                &mut m.model.inputs.angle_shaft
+            })
+            .unbounded(),
+            V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
+                &mut m.model.inputs.enable
+            }),
+            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+            V::part("", &Part { table: STATES, lens: |m| &mut m.model }),
+            V::part("", &Part { table: LOSS_OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.parameters }),
         ]
     },
 );

@@ -157,8 +157,11 @@ fn exported(file: &object::File<'_>) -> Vec<String> {
 fn exports(fmu: &FmuFile) -> Verdict {
     let needed: Vec<String> = match fmu.version {
         FmiVersion::V2 => {
-            let exchange = fmu.description.as_ref().is_ok_and(|d| d.model_exchange.is_some());
-            let lists = [COMMON2, COSIMULATION2, if exchange { EXCHANGE2 } else { "" }];
+            let description = fmu.description.as_ref().ok();
+            let exchange = description.is_some_and(|d| d.model_exchange.is_some());
+            let simulation = description.is_none_or(|d| d.co_simulation.is_some());
+            let of = |has: bool, list: &'static str| if has { list } else { "" };
+            let lists = [COMMON2, of(simulation, COSIMULATION2), of(exchange, EXCHANGE2)];
             lists.iter().flat_map(|l| l.split_whitespace()).map(|n| format!("fmi2{n}")).collect()
         }
         FmiVersion::V3 => ALL3.split_whitespace().map(|n| format!("fmi3{n}")).collect(),

@@ -1,6 +1,9 @@
 //! Dependencies proved by perturbation (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8).
 
+use crate::exchange::{Importer, differ};
 use crate::session::{NotDetermined, Session, settable};
+use fmu_import::raw::Simple;
+use model_description::{BaseType, ModelVariable, Unknown, Variability};
 
 /// Changes every known that is not a dependency of an initial unknown and requires that the unknown stays the same.
 pub(super) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> {
@@ -42,5 +45,77 @@ pub(super) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
         let _ = one.free();
     }
     session.note(format!("{tried} knowns were changed"));
+    Ok(())
+}
+
+/// Changes every continuous state and input of Model Exchange that is not a dependency of an output or derivative and requires
+/// that these stay the same.
+pub(super) fn exchange_dependencies(session: &Session) -> Result<(), NotDetermined> {
+    let d = &session.description;
+    let given = |u: &'_ Unknown| Some((d.referenced(u.reference)?, u.dependencies.clone()?));
+    let unknowns: Vec<(&ModelVariable, Vec<u32>)> = d
+        .outputs
+        .iter()
+        .chain(&d.derivatives)
+        .filter_map(given)
+        .filter(|(v, _)| session.numeric().any(|n| n.name == v.name) && v.clocks.is_empty())
+        .collect();
+    if unknowns.is_empty() {
+        return session.not_applicable("no dependencies of outputs and derivatives are given");
+    }
+    let variables: Vec<_> = unknowns.iter().map(|(v, _)| *v).collect();
+    let compare = |known: &ModelVariable, before: &[Vec<u64>], after: &[Vec<u64>]| {
+        for (((unknown, dependencies), old), new) in unknowns.iter().zip(before).zip(after) {
+            // In FMI 2.0 a variable may have several names.
+            let same = |v: &ModelVariable| v.value_reference == known.value_reference && v.base == known.base;
+            let named = same(unknown) || dependencies.iter().any(|r| d.referenced(*r).is_some_and(same));
+            let reals = |bits: &[u64]| bits.iter().map(|b| f64::from_bits(*b)).collect::<Vec<_>>();
+            let changed = if unknown.base == BaseType::Float64 { differ(&reals(old), &reals(new)) } else { old != new };
+            session.require(named || !changed || old.is_empty() || new.is_empty(), || {
+                format!(
+                    "line {}: {} changes with {}, which is not among its dependencies",
+                    unknown.line, unknown.name, known.name
+                )
+            });
+        }
+    };
+    let instance = session.excited()?;
+    let mut importer = Importer::start(&instance)?;
+    importer.run(50, &mut |_| Ok(()))?;
+    if importer.over {
+        return Err(NotDetermined("the FMU ends the simulation at once".into()));
+    }
+    let (x, mut tried, mut at) = (instance.states()?, 0, 0);
+    let before = instance.snapshot(&variables)?;
+    for state in d.states() {
+        let mut moved = x.clone();
+        for value in moved.iter_mut().skip(at).take(session.elements(state)) {
+            *value += 1e-3 * value.abs().max(state.nominal.unwrap_or(1.0).abs());
+        }
+        at += session.elements(state);
+        if instance.set_states(&moved)?.is_ok() {
+            compare(state, &before, &instance.snapshot(&variables)?);
+            tried += 1;
+        }
+        instance.must("SetContinuousStates", instance.set_states(&x)?)?;
+    }
+    // Discrete inputs change in Event Mode only.
+    for discrete in [false, true] {
+        if discrete {
+            instance.must("EnterEventMode", instance.simple(Simple::EnterEventMode)?)?;
+        }
+        let before = instance.snapshot(&variables)?;
+        for input in session.number_inputs().filter(|v| (v.variability == Variability::Discrete) == discrete) {
+            let (Some(values), (_, old)) = (session.different_value(input, 9.0), instance.get(input)?) else {
+                continue;
+            };
+            if instance.set(input, &values)?.is_ok() {
+                compare(input, &before, &instance.snapshot(&variables)?);
+                tried += 1;
+            }
+            instance.must("Set", instance.set(input, &old)?)?;
+        }
+    }
+    session.note(format!("{tried} states and inputs were changed"));
     Ok(())
 }

@@ -8,6 +8,10 @@ mod binary;
 mod clocked;
 mod dependencies;
 mod derivatives;
+mod event_mode;
+mod events;
+mod exchange;
+mod exchange_table;
 mod host;
 mod instances;
 mod layered;
@@ -16,6 +20,7 @@ mod lifecycle_states;
 mod logging;
 mod schema;
 mod schema_rules;
+mod sensitivity;
 mod state;
 mod state_table;
 mod structure;
@@ -39,6 +44,10 @@ pub const GROUPS: &[Group] = &[
     Group { name: "lifecycle", title: "Life cycle", checks: lifecycle::CHECKS },
     Group { name: "access", title: "Getting and setting", checks: access::CHECKS },
     Group { name: "time", title: "Steps and time", checks: time::CHECKS },
+    Group { name: "event-mode", title: "Event mode and early return", checks: event_mode::CHECKS },
+    Group { name: "exchange", title: "Model Exchange", checks: exchange::CHECKS },
+    Group { name: "events", title: "Events of Model Exchange", checks: events::CHECKS },
+    Group { name: "derivatives", title: "Partial derivatives", checks: sensitivity::CHECKS },
     Group { name: "state", title: "FMU state", checks: state::CHECKS },
     Group { name: "logging", title: "Logging", checks: logging::CHECKS },
     Group { name: "instances", title: "Instances, threads, loading", checks: instances::CHECKS },

@@ -1,6 +1,6 @@
 //! Steps and time (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1).
 
-use super::derivatives::output_derivatives;
+use super::derivatives::{input_derivatives, output_derivatives, slopes};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
@@ -25,7 +25,9 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "T06b", requirement: "The independent variable equals the time of the last communication point.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent) },
     Check { id: "T06c", requirement: "NULL pointers for results do no harm.", clause: "3.0.2, 2.2.1", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(null_results) },
     Check { id: "T07", requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), run: Run::Probe(statuses) },
-    Check { id: "T09", requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read and match their slopes; order 0 and orders above the maximum give Error.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::MUST, run: Run::Probe(output_derivatives) },
+    Check { id: "T09", requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::MUST, run: Run::Probe(output_derivatives) },
+    Check { id: "T09s", requirement: "First derivatives of outputs match the slopes, to 10 %; orders above the maximum give Error.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::SHOULD, run: Run::Probe(slopes) },
+    Check { id: "T11", requirement: "With canInterpolateInputs, first derivatives of continuous inputs can be set.", clause: "2.0.5, 4.2.1", levels: Levels(Some(Level::Must), None), run: Run::Probe(input_derivatives) },
     Check { id: "T10", requirement: "Two consecutive runs with the same inputs are equal bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(determinism) },
     Check { id: "T10p", requirement: "Two processes with different addresses give the same results bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes) },
 ];
@@ -69,6 +71,10 @@ fn accumulated(session: &Session) -> Result<(), NotDetermined> {
         for k in 0..100_000 {
             let inside = instance.time.get() + h <= stop;
             let status = instance.step(h)?;
+            if instance.over.get() {
+                session.note(format!("the FMU ended the simulation after {k} steps"));
+                return Ok(());
+            }
             if !status.is_ok() && inside {
                 session.violated(format!("step {k}, DoStep(t={:?}, h={h:?}), returned {status}", instance.time.get()));
                 return Ok(());
@@ -165,6 +171,10 @@ fn variable(session: &Session) -> Result<(), NotDetermined> {
         let part = h * (0.05 + 3.0 * f64::from(random >> 8) / f64::from(1 << 24));
         let t = instance.time.get();
         let status = instance.step(part)?;
+        if instance.over.get() {
+            session.note("the FMU ended the simulation");
+            break;
+        }
         if !status.is_ok() {
             session.violated(format!("DoStep(t={t:?}, h={part:?}) returned {status}"));
             break;

@@ -3,7 +3,7 @@
 use super::schema;
 use crate::check::{Check, Level, Levels, Run, Verdict};
 use crate::fmu_file::FmuFile;
-use model_description::{Element, FmiVersion, ModelDescription};
+use model_description::{Element, FmiVersion, Interface, ModelDescription};
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
@@ -103,20 +103,22 @@ fn metadata(fmu: &FmuFile) -> Verdict {
 
 fn flags(fmu: &FmuFile) -> Verdict {
     with_description(fmu, |description| {
-        let Some(i) = &description.co_simulation else { return vec!["the FMU has no co-simulation interface".into()] };
         let mut findings = Vec::new();
-        let mut implies = |holds: bool, what: &str| {
+        let mut implies = |i: &Interface, holds: bool, what: &str| {
             if !holds {
                 findings.push(format!("line {}: {what}", i.line));
             }
         };
-        let state = i.can_get_and_set_state() || !i.can_serialize_state();
-        implies(state, "canSerializeFMUState requires canGetAndSetFMUState");
+        for i in [&description.co_simulation, &description.model_exchange].into_iter().flatten() {
+            let state = i.can_get_and_set_state() || !i.can_serialize_state();
+            implies(i, state, "canSerializeFMUState requires canGetAndSetFMUState");
+        }
+        let Some(i) = &description.co_simulation else { return findings };
         if description.version == FmiVersion::V3 {
             let early = !i.flag("canReturnEarlyAfterIntermediateUpdate") || i.flag("providesIntermediateUpdate");
-            implies(early, "canReturnEarlyAfterIntermediateUpdate without providesIntermediateUpdate");
+            implies(i, early, "canReturnEarlyAfterIntermediateUpdate without providesIntermediateUpdate");
             let clocked = description.variables.iter().any(|v| v.base == model_description::BaseType::Clock);
-            implies(!clocked || i.has_event_mode(), "there are clocks, but hasEventMode is false");
+            implies(i, !clocked || i.has_event_mode(), "there are clocks, but hasEventMode is false");
         }
         findings
     })

@@ -145,6 +145,10 @@ impl<M: Twin> Snapshot<M> {
         if index < table + states {
             return self.derivatives().map(|dx| vec![dx[index - table]]);
         }
+        // Event indicators are variables in FMI 3.0 only.
+        if flat {
+            return Err(ERROR);
+        }
         self.indicators().get(index - table - states).map(|z| vec![*z]).ok_or(ERROR)
     }
 

@@ -123,8 +123,17 @@ FMI3 = {
 FUNCTIONS = {2: FMI2, 3: FMI3}
 ALL = {**FMI2, **FMI3}
 
-# What an FMU without model exchange, events, clocks, structural parameters, derivatives, strings and asynchronous steps
-# refuses in every state. The getters and setters of types that no variable has are refused for their value reference.
+# What an instance for co-simulation without Event Mode, clocks, structural parameters, strings and asynchronous steps refuses
+# in every state; of these, a model with states offers DERIVATIVES. The getters and setters of types that no variable has are
+# refused for their value reference.
+DERIVATIVES = {
+    "fmi2GetDirectionalDerivative",
+    "fmi2SetRealInputDerivatives",
+    "fmi2GetRealOutputDerivatives",
+    "fmi3GetDirectionalDerivative",
+    "fmi3GetAdjointDerivative",
+    "fmi3GetOutputDerivatives",
+}
 UNSUPPORTED = {
     2: [
         "fmi2GetDirectionalDerivative",

@@ -144,52 +144,70 @@ def wrong_name(fmu):
 
 @case
 def wrong_kind(fmu):
-    """Model exchange, scheduled execution, event mode: not in this FMU."""
+    """A type that does not exist, Event Mode where there is none, scheduled execution."""
     if fmu.version == 2:
-        refusal(fmu, "fmuType", "fmi2CoSimulation", type=0)
-        refusal(fmu, type=17)
+        refusal(fmu, "fmuType", "fmi2CoSimulation", "fmi2ModelExchange", type=17)
+        refusal(fmu, "fmuType", type=-1)
         return
-    refusal(fmu, "event", events=True)
-    for kind, more in (("ModelExchange", 0), ("ScheduledExecution", 3)):
-        it = fmu.instance()
-        callbacks = [c.cast(it.logger, c.c_void_p), *([None] * more)]
-        create = fmu.function(f"Instantiate{kind}")
-        assert create(b"it", fmu.token.encode(), None, 0, 1, ENVIRONMENT, *callbacks) is None
-        assert len(it.errors()) == 1, it.messages
+    if fmu.identifier != "SensorlessController":
+        refusal(fmu, "event", events=True)
+    it = fmu.instance()
+    create = fmu.function("InstantiateScheduledExecution")
+    logger = c.cast(it.logger, c.c_void_p)
+    assert create(b"it", fmu.token.encode(), None, 0, 1, ENVIRONMENT, logger, None, None, None) is None
+    assert len(it.errors()) == 1, it.messages
+
+
+def exchange(fmu):
+    """A handle of an instance for Model Exchange in Event Mode, and a call of one of its functions."""
+    it = fmu.instance()
+    logger = c.cast(it.logger, c.c_void_p)
+    if fmu.version == 2:
+        it = Instance(fmu, b"it", type=0)
+        handle = it.handle
+        assert it.call("SetupExperiment", 0, 0.0, 0.0, 0, 0.0) == OK
+        enter = fmu.function("EnterInitializationMode")
+        assert enter(handle) == OK
+    else:
+        handle = fmu.function("InstantiateModelExchange")(b"it", fmu.token.encode(), None, 0, 0, ENVIRONMENT, logger)
+        assert fmu.function("EnterInitializationMode")(handle, 0, 0.0, 0.0, 0, 0.0) == OK
+    assert fmu.function("ExitInitializationMode")(handle) == OK
+    return it, handle
 
 
 @case
-def refused_without_a_logger(fmu):
-    """What cannot be said is not said, and nothing crashes."""
-    assert Instance(fmu, b"it", token=b"wrong", logger=False).handle is None
-    assert Instance(fmu, None, logger=False).handle is None
-    it = fmu.instance(logger=False).begin()
-    run(it, 5)
-    assert it.step(-1.0) == ERROR
-    assert it.call("Reset") == OK
-    run(it.begin(), 5)
-    if fmu.version == 2:  # no callbacks at all: an instance or not, no crash
-        handle = fmu.function("Instantiate")(b"it", 1, fmu.token.encode(), None, None, 0, 1)
-        fmu.function("FreeInstance")(handle)
+def nonsense_in_model_exchange(fmu):
+    """Null pointers, wrong counts, numbers that are none: an Error or Discard, never a crash; a reset heals."""
+    it, handle = exchange(fmu)
+    derivatives = "GetDerivatives" if fmu.version == 2 else "GetContinuousStateDerivatives"
+    states, nan, room = (0 if fmu.identifier == "SensorlessController" else 4), float("nan"), (c.c_double * 8)()
 
+    def begin():
+        assert fmu.function("Reset")(handle) == OK
+        if fmu.version == 2:
+            assert fmu.function("SetupExperiment")(handle, 0, 0.0, 0.0, 0, 0.0) == OK
+            assert fmu.function("EnterInitializationMode")(handle) == OK
+        else:
+            assert fmu.function("EnterInitializationMode")(handle, 0, 0.0, 0.0, 0, 0.0) == OK
+        assert fmu.function("ExitInitializationMode")(handle) == OK
+        assert fmu.function("EnterContinuousTimeMode")(handle) == OK
 
-@case
-def resource_locations(fmu):
-    """No resource is needed: whatever is given is tolerated."""
-    places = (None, b"", b"file:///tmp/x/resources", b"file:/tmp/x", b"file:///a%20b%zz", b"\xff\xff", b"C:\\x", b"x" * 100_000)
-    for place in places:
-        it = fmu.instance(resources=place).begin()
-        run(it, 2)
-        it.free()
-
-
-@case
-def long_names(fmu):
-    """A name of a megabyte, one with percent signs, one in UTF-8, one that is not UTF-8."""
-    for name in (b"n" * 1_000_000, b"%s%n%d%p", "Prüfstand №1".encode()):
-        it = fmu.instance(name).begin()
-        run(it, 2)
-        assert it.step(0.0) == ERROR
-        assert it.errors()
-        it.free()
-    Instance(fmu, b"\xff\xfe\x80", logger=False).free()  # refused or not, no crash
+    for name in (derivatives, "GetContinuousStates", "SetContinuousStates", "GetNominalsOfContinuousStates"):
+        for pointer, count in ((None, states + 1), (room, states + 1), (None, 2**62), (room, 7)):
+            begin()
+            assert fmu.function(name)(handle, pointer, count) == ERROR, (name, count)
+    for time in (nan, float("inf"), -1.0):
+        begin()
+        assert fmu.function("SetTime")(handle, c.c_double(time)) == ERROR, time
+    begin()
+    for bad in (nan, float("inf"), -float("inf")) if states else ():
+        before = (c.c_double * 4)()
+        assert fmu.function("GetContinuousStates")(handle, before, 4) == OK
+        assert fmu.function("SetContinuousStates")(handle, (c.c_double * 4)(0.1, bad, 1.0, 1.0), 4) == DISCARD
+        after = (c.c_double * 4)()
+        assert fmu.function("GetContinuousStates")(handle, after, 4) == OK
+        assert list(before) == list(after)
+    assert fmu.function("SetTime")(handle, c.c_double(1e-5)) == OK
+    fmu.function("FreeInstance")(handle)
+    it.handle = None
+    run(fmu.instance().begin(), 10)

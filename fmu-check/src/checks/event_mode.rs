@@ -1,0 +1,270 @@
+//! Event mode and early return of co-simulation (FMI 3.0.2, 4.2.1).
+
+use crate::check::{Check, Level, Levels, Run};
+use crate::exchange::deviation;
+use crate::instance::Instance;
+use crate::session::{NotDetermined, Session};
+use fmu_import::Status;
+use fmu_import::raw::{Arguments, Simple, Stepped};
+use model_description::BaseType;
+
+const STEP: &str = "3.0.2, 4.2.1";
+const MUST: Levels = Levels(None, Some(Level::Must));
+const SHOULD: Levels = Levels(None, Some(Level::Should));
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "N01", requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed, the next from lastSuccessfulTime.", clause: STEP, levels: MUST, run: Run::Probe(combinations) },
+    Check { id: "N02", requirement: "A step returns early only if that is allowed, and asks for event handling only if event mode is used; Booleans are 0 or 1.", clause: STEP, levels: MUST, run: Run::Probe(permitted) },
+    Check { id: "N03", requirement: "After an early return lastSuccessfulTime lies between the communication point and the end of the step, and time goes on.", clause: STEP, levels: MUST, run: Run::Probe(reached) },
+    Check { id: "N03e", requirement: "earlyReturn is true only if the step ended before its end.", clause: STEP, levels: SHOULD, run: Run::Probe(truly_early) },
+    Check { id: "N04", requirement: "Without eventModeUsed, EnterEventMode returns Error.", clause: "3.0.2, 2.2.4", levels: SHOULD, run: Run::Probe(without_event_mode) },
+    Check { id: "N05", requirement: "DoStep in Event Mode, and UpdateDiscreteStates and EnterStepMode in Step Mode, return Error.", clause: "3.0.2, 2.2.4", levels: SHOULD, run: Run::Probe(wrong_mode) },
+    Check { id: "N06", requirement: "The next event time of an update is after now, if it is defined.", clause: "3.0.2, 2.3.5", levels: SHOULD, run: Run::Probe(next_event_time) },
+    Check { id: "N07", requirement: "Entering and leaving Event Mode where there is no event changes no result.", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(round_trip) },
+];
+
+/// Ends a probe of an FMU without event mode.
+macro_rules! needs_event_mode {
+    ($session:ident) => {
+        if !$session.flag("hasEventMode") {
+            return $session.not_applicable("hasEventMode is false");
+        }
+        if $session.description.variables.iter().any(|v| v.base == BaseType::Clock) {
+            return $session.not_applicable("the FMU has clocks, which the importer would have to serve");
+        }
+    };
+}
+
+const COMBINATIONS: [(bool, bool); 4] = [(false, false), (false, true), (true, false), (true, true)];
+
+/// An importer that uses event mode and early return as it said.
+struct Importer<'b> {
+    instance: Instance<'b>,
+    event_mode: bool,
+    early: bool,
+    /// The next event that an update defined.
+    next: Option<f64>,
+    over: bool,
+}
+
+impl<'b> Importer<'b> {
+    /// An instance in Step Mode.
+    fn start(session: &'b Session, (event_mode, early): (bool, bool)) -> Result<Self, NotDetermined> {
+        session.prepare(|| {
+            let arguments = Arguments { event_mode, early_return: early, ..session.arguments("probe") };
+            let made = session.instantiate(&arguments)?;
+            let instance = made.ok_or_else(|| NotDetermined(format!("{} returned NULL", session.instantiation())))?;
+            instance.enter()?;
+            instance.must("ExitInitializationMode", instance.simple(Simple::ExitInitializationMode)?)?;
+            let mut importer = Self { instance, event_mode, early, next: None, over: false };
+            if event_mode {
+                importer.leave_event_mode()?;
+            }
+            Ok(importer)
+        })
+    }
+
+    fn leave_event_mode(&mut self) -> Result<(), NotDetermined> {
+        for _ in 0..100 {
+            let (status, updated) = self.instance.update()?;
+            self.instance.must("UpdateDiscreteStates", status)?;
+            self.over |= updated.terminate == 1;
+            self.next = (updated.next_event_time_defined == 1).then_some(updated.next_event_time);
+            if updated.again == 0 || self.over {
+                break;
+            }
+        }
+        if self.over {
+            return Ok(());
+        }
+        self.instance.must("EnterStepMode", self.instance.simple(Simple::EnterStepMode)?)
+    }
+
+    fn event(&mut self) -> Result<(), NotDetermined> {
+        self.instance.must("EnterEventMode", self.instance.simple(Simple::EnterEventMode)?)?;
+        self.leave_event_mode()
+    }
+
+    /// A step of `h`, at most to the next event, and the event that it ends in: what it returned, and what was asked for.
+    fn step(&mut self, whole: f64) -> Result<(Status, Stepped, f64), NotDetermined> {
+        let t = self.instance.time.get();
+        let variable = self.instance.session.flag("canHandleVariableCommunicationStepSize");
+        // A step that ends where the event is: the importer must not go beyond. Closer than this it is reached.
+        let near = 1e-9 * whole + 4.0 * f64::EPSILON * t.abs();
+        let inside = |next: &f64| variable && *next > t + near && *next < t + whole;
+        let h = self.next.filter(inside).map_or(whole, |next| next - t);
+        let mut stepped = Stepped { event: 0, terminate: 0, early: 0, last: t };
+        let status = self.instance.call(&format!("DoStep(t={t:?}, h={h:?})"), |raw| {
+            let (status, found) = raw.do_step(self.instance.handle, t, h, false, [true; 4])?;
+            stepped = found;
+            Some(status)
+        })?;
+        if !status.is_ok() {
+            return Ok((status, stepped, t + h));
+        }
+        self.over |= stepped.terminate == 1;
+        self.instance.time.set(stepped.last);
+        let reached = self.next.is_some_and(|next| stepped.last >= next - near);
+        if self.event_mode && !self.over && (stepped.event == 1 || reached) {
+            self.event()?;
+        }
+        Ok((status, stepped, t + h))
+    }
+}
+
+/// What is wrong with a step, from its status, its results, and its two ends as the importer asked for them.
+type Rule<'a> = &'a dyn Fn(&Importer<'_>, Status, Stepped, [f64; 2]) -> Option<String>;
+
+/// Steps of one and of five communication steps, within the default experiment, for each combination of the two flags.
+fn each_step(session: &Session, rule: Rule<'_>) -> Result<(), NotDetermined> {
+    needs_event_mode!(session);
+    let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
+    // An FMU with a fixed step may insist on that of its default experiment.
+    let variable = session.flag("canHandleVariableCommunicationStepSize");
+    for flags in COMBINATIONS {
+        for multiple in if variable { &[1.0, 5.0][..] } else { &[1.0] } {
+            session.case(|| {
+                let h = multiple * session.h();
+                let mut importer = Importer::start(session, flags)?;
+                for _ in 0..200 {
+                    let t = importer.instance.time.get();
+                    if importer.over || t + h > stop * (1.0 + 1e-9) || session.half_time_used() {
+                        break;
+                    }
+                    let (status, stepped, end) = importer.step(h)?;
+                    if let Some(text) = rule(&importer, status, stepped, [t, end]) {
+                        session.violated(format!(
+                            "eventModeUsed={}, earlyReturnAllowed={}: DoStep(t={t:?}, h={:?}) {text}",
+                            flags.0,
+                            flags.1,
+                            end - t
+                        ));
+                        break;
+                    }
+                    if !status.is_ok() {
+                        break;
+                    }
+                }
+                Ok(())
+            });
+        }
+    }
+    Ok(())
+}
+
+fn combinations(session: &Session) -> Result<(), NotDetermined> {
+    each_step(session, &|_, status, _, _| (!status.is_ok()).then(|| format!("returned {status}")))
+}
+
+fn permitted(session: &Session) -> Result<(), NotDetermined> {
+    each_step(session, &|importer, status, stepped, _| {
+        let flags = [stepped.event, stepped.terminate, stepped.early];
+        if !status.is_ok() {
+            None
+        } else if flags.iter().any(|f| *f > 1) {
+            Some(format!("gave {stepped:?}: a Boolean is not 0 or 1, or was not written"))
+        } else if stepped.early == 1 && !importer.early {
+            Some("returned early, which was not allowed".into())
+        } else if stepped.event == 1 && !importer.event_mode {
+            Some("asked for event handling, but event mode is not used".into())
+        } else {
+            None
+        }
+    })
+}
+
+fn reached(session: &Session) -> Result<(), NotDetermined> {
+    let standing = std::cell::Cell::new(0);
+    each_step(session, &|_, status, stepped, [t, end]| {
+        if !status.is_ok() {
+            return None;
+        }
+        // Without an early return, an internal solver may end a little elsewhere.
+        let early = stepped.early == 1;
+        standing.set(if stepped.last <= t { standing.get() + 1 } else { 0 });
+        let good = stepped.last.is_finite()
+            && stepped.last >= t
+            && (!early || stepped.last <= end + 1e-9 * (end - t))
+            && standing.get() < 20;
+        (!good).then(|| format!("gave earlyReturn={}, lastSuccessfulTime={:?}", stepped.early, stepped.last))
+    })
+}
+
+fn truly_early(session: &Session) -> Result<(), NotDetermined> {
+    each_step(session, &|_, status, stepped, [_, end]| {
+        let whole = status.is_ok() && stepped.early == 1 && stepped.last >= end;
+        whole.then(|| format!("gave earlyReturn=1, lastSuccessfulTime={:?}, the end of the step", stepped.last))
+    })
+}
+
+fn without_event_mode(session: &Session) -> Result<(), NotDetermined> {
+    needs_event_mode!(session);
+    let importer = Importer::start(session, (false, false))?;
+    let status = importer.instance.simple(Simple::EnterEventMode)?;
+    session.require(status == Status::ERROR, || format!("EnterEventMode returned {status}"));
+    Ok(())
+}
+
+fn wrong_mode(session: &Session) -> Result<(), NotDetermined> {
+    needs_event_mode!(session);
+    let check = |call: &str, status: Status| {
+        session.require(status == Status::ERROR, || format!("{call} returned {status}"));
+    };
+    session.case(|| {
+        let importer = Importer::start(session, (true, false))?;
+        importer.instance.must("EnterEventMode", importer.instance.simple(Simple::EnterEventMode)?)?;
+        let (t, h) = (importer.instance.time.get(), session.h());
+        let status = importer.instance.call("DoStep in Event Mode", |raw| {
+            raw.do_step(importer.instance.handle, t, h, false, [true; 4]).map(|(status, _)| status)
+        })?;
+        check("DoStep in Event Mode", status);
+        Ok(())
+    });
+    session.case(|| {
+        let importer = Importer::start(session, (true, false))?;
+        check("UpdateDiscreteStates in Step Mode", importer.instance.update()?.0);
+        Ok(())
+    });
+    session.case(|| {
+        let importer = Importer::start(session, (true, false))?;
+        check("EnterStepMode in Step Mode", importer.instance.simple(Simple::EnterStepMode)?);
+        Ok(())
+    });
+    Ok(())
+}
+
+fn next_event_time(session: &Session) -> Result<(), NotDetermined> {
+    each_step(session, &|importer, _, _, _| {
+        let t = importer.instance.time.get();
+        let bad = importer.next.filter(|next| importer.event_mode && !importer.over && *next <= t - 1e-9 * t.abs());
+        bad.map(|next| format!("reached {t:?}, and the next event time is {next:?}"))
+    })
+}
+
+fn round_trip(session: &Session) -> Result<(), NotDetermined> {
+    needs_event_mode!(session);
+    let outputs: Vec<_> = session.watched().into_iter().filter(|v| v.base == BaseType::Float64).collect();
+    let run = |visits: bool| -> Result<Vec<Vec<f64>>, NotDetermined> {
+        let mut importer = Importer::start(session, (true, false))?;
+        let mut rows = Vec::new();
+        for _ in 0..30 {
+            if importer.over {
+                break;
+            }
+            let (status, stepped, _) = importer.step(session.h())?;
+            importer.instance.must("DoStep", status)?;
+            let due = importer.next.is_some_and(|next| next <= stepped.last + 1e-6 * session.h());
+            if visits && stepped.event == 0 && !due && !importer.over {
+                importer.event()?;
+            }
+            let values = importer.instance.snapshot(&outputs)?;
+            rows.push(values.into_iter().flatten().map(f64::from_bits).collect());
+        }
+        Ok(rows)
+    };
+    if let Some((k, largest)) = deviation(&run(false)?, &run(true)?) {
+        session.violated(format!("after {k} steps the outputs differ (relative {largest:e})"));
+    }
+    Ok(())
+}

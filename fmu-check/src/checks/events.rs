@@ -1,0 +1,184 @@
+//! Events of Model Exchange (FMI 2.0.5, 3.1 and 3.2.2; FMI 3.0.2, 2.3.5 and 3.1.1).
+
+use crate::check::{Check, Level, Levels, Run};
+use crate::exchange::Importer;
+use crate::session::{NotDetermined, Session};
+use model_description::{Causality, ModelVariable, Variability};
+use std::cell::RefCell;
+
+const UPDATE: &str = "2.0.5, 3.2.2; 3.0.2, 2.3.5";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "E20", requirement: "Every update of the discrete states returns Booleans of 0 or 1, and a finite time where it defines a next event.", clause: UPDATE, levels: Levels::MUST, run: Run::Exchange(update_results) },
+    Check { id: "E21", requirement: "The next time event, from the first update after initialization on, is an absolute time after now.", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(next_event_time) },
+    Check { id: "E22", requirement: "An event before the next time event does not lose it: the update defines it anew.", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(renewed) },
+    Check { id: "E23", requirement: "The iteration of an event comes to an end within 100 updates.", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(ends) },
+    Check { id: "E24a", requirement: "An update that changes a state says so with valuesOfContinuousStatesChanged.", clause: UPDATE, levels: Levels::MUST, run: Run::Exchange(told_changes) },
+    Check { id: "E24b", requirement: "valuesOfContinuousStatesChanged is true only if a state has changed.", clause: UPDATE, levels: Levels(Some(Level::Must), Some(Level::Should)), run: Run::Exchange(true_changes) },
+    Check { id: "E25", requirement: "After Event Mode no event indicator is 0.", clause: "2.0.5, 3.2.2; 3.0.2, 3.1.1", levels: Levels::MUST, run: Run::Exchange(indicators) },
+    Check { id: "E26", requirement: "Discrete variables do not change in Continuous-Time Mode.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::Exchange(discrete) },
+];
+
+/// Steps of the integrator in a probe of events.
+const STEPS: usize = 1000;
+
+/// Looks at every event of a run; reports its count.
+fn each_event(
+    session: &Session,
+    rule: &dyn Fn(f64, &crate::exchange::Event) -> Option<String>,
+) -> Result<(), NotDetermined> {
+    let (mut events, mut found) = (0, 0);
+    let instance = session.excited()?;
+    let result = Importer::survey(
+        &instance,
+        STEPS,
+        &mut |instance, event| {
+            events += 1;
+            // One finding of a kind is enough, but the first event is unlike the others.
+            if found < 3
+                && let Some(text) = rule(instance.time.get(), event)
+            {
+                found += 1;
+                session.violated(format!("event {events}, t = {:?}: {text}", instance.time.get()));
+            }
+        },
+        &mut |_, _| Ok(()),
+    );
+    session.note(format!("{events} events"));
+    if found > 0 { Ok(()) } else { result }
+}
+
+fn update_results(session: &Session) -> Result<(), NotDetermined> {
+    each_event(session, &|_, event| {
+        event.updates.iter().find_map(|(u, _)| {
+            let flags = [u.again, u.terminate, u.nominals_changed, u.states_changed, u.next_event_time_defined];
+            let good = flags.iter().all(|f| matches!(f, 0 | 1));
+            let time = u.next_event_time_defined == 0 || u.next_event_time.is_finite();
+            (!good || !time)
+                .then(|| format!("{u:?}: a Boolean is not 0 or 1, or was not written, or the time is not finite"))
+        })
+    })
+}
+
+fn next_event_time(session: &Session) -> Result<(), NotDetermined> {
+    each_event(session, &|t, event| {
+        let next = event.next().filter(|_| event.ended() && !event.terminates())?;
+        (next <= t).then(|| format!("nextEventTime is {next:?}"))
+    })
+}
+
+fn ends(session: &Session) -> Result<(), NotDetermined> {
+    each_event(session, &|_, event| {
+        (!event.ended() && !event.terminates())
+            .then(|| format!("{} updates, and it needs another", event.updates.len()))
+    })
+}
+
+fn told_changes(session: &Session) -> Result<(), NotDetermined> {
+    each_event(session, &|_, event| {
+        let silent = event.updates.iter().any(|(u, changed)| *changed && u.states_changed == 0);
+        silent.then(|| "a state changed, and valuesOfContinuousStatesChanged is false".into())
+    })
+}
+
+fn true_changes(session: &Session) -> Result<(), NotDetermined> {
+    each_event(session, &|_, event| {
+        let idle = event.updates.iter().any(|(u, changed)| !changed && u.states_changed == 1);
+        idle.then(|| "valuesOfContinuousStatesChanged is true, and no state changed".into())
+    })
+}
+
+fn indicators(session: &Session) -> Result<(), NotDetermined> {
+    if session.indicators() == 0 {
+        return session.not_applicable("there are no event indicators");
+    }
+    let instance = session.excited()?;
+    Importer::survey(&instance, STEPS, &mut |_, _| (), &mut |importer, event| {
+        session.require(!event || importer.z.iter().all(|z| *z != 0.0), || {
+            format!(
+                "after the event at t = {:?} the event indicators are {:?}",
+                importer.instance.time.get(),
+                importer.z
+            )
+        });
+        Ok(())
+    })
+}
+
+fn discrete(session: &Session) -> Result<(), NotDetermined> {
+    let fits = |v: &&ModelVariable| {
+        v.variability == Variability::Discrete
+            && v.clocks.is_empty()
+            && matches!(v.causality, Causality::Output | Causality::Local)
+    };
+    let variables: Vec<_> = session.numeric().filter(fits).take(60).collect();
+    if variables.is_empty() {
+        return session.not_applicable("there are no discrete outputs or local variables");
+    }
+    let instance = session.excited()?;
+    let held = RefCell::new(Vec::new());
+    let mut found = 0;
+    Importer::survey(&instance, 200, &mut |_, _| (), &mut |importer, event| {
+        let now = importer.instance.snapshot(&variables)?;
+        for ((v, old), new) in variables.iter().zip(held.borrow().iter()).zip(&now) {
+            if !event && old != new && found < 10 {
+                found += 1;
+                session.violated(format!(
+                    "{}, discrete, changed in Continuous-Time Mode before t = {:?}",
+                    v.name,
+                    importer.instance.time.get()
+                ));
+            }
+        }
+        *held.borrow_mut() = now;
+        Ok(())
+    })
+}
+
+fn renewed(session: &Session) -> Result<(), NotDetermined> {
+    let instance = session.excited()?;
+    let mut importer = Importer::start(&instance)?;
+    let mut tried = 0;
+    for _ in 0..10 {
+        let (Some(next), t) = (importer.next, instance.time.get()) else { break };
+        if importer.over || next <= t {
+            break;
+        }
+        // To a time halfway, in short steps; a state event on the way may change what comes next.
+        let half = t + 0.5 * (next - t);
+        let steps = ((half - t) / session.integrator_step()).ceil().clamp(1.0, 200.0);
+        let mut disturbed = false;
+        for _ in 0..200 {
+            if importer.over || disturbed || instance.time.get() + (half - t) / steps > half * (1.0 + 1e-15) {
+                break;
+            }
+            disturbed = importer.step((half - t) / steps, &mut |_, _| ())?;
+        }
+        if importer.over {
+            break;
+        }
+        if !disturbed {
+            let event = importer.event(&mut |_, _| ())?;
+            let (now, kept) = (instance.time.get(), importer.next);
+            tried += 1;
+            let lost = kept.is_none_or(|kept| kept > next + 1e-6 * (next - t));
+            if lost && !event.jumped() && !event.terminates() {
+                session.violated(format!(
+                    "the next event was at {next:?}; after an event at {now:?} that nothing asked for, it is at {kept:?}"
+                ));
+                return Ok(());
+            }
+        }
+        // On to the time event itself.
+        if let Some(next) = importer.next {
+            let rest = next - instance.time.get();
+            for _ in 0..60 {
+                if importer.over || importer.step(rest / 50.0, &mut |_, _| ())? {
+                    break;
+                }
+            }
+        }
+    }
+    if tried == 0 { session.not_applicable("no time event was announced") } else { Ok(()) }
+}

@@ -1,0 +1,420 @@
+//! Model Exchange: life cycle, states and their derivatives (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2).
+
+use super::dependencies::exchange_dependencies;
+use super::exchange_table::{allowed, allowed_early, minimal_run, refused};
+use crate::check::{Check, Level, Levels, Run};
+use crate::exchange::{Importer, Mode, deviation, differ};
+use crate::instance::Instance;
+use crate::session::{NotDetermined, Session};
+use fmu_import::Status;
+use fmu_import::raw::{Count, Simple, Vector};
+use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
+
+const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2.1";
+
+#[rustfmt::skip]
+pub(super) const CHECKS: &[Check] = &[
+    Check { id: "E00", requirement: "A minimal run of Model Exchange succeeds: initialization, event iteration, integrator steps, termination.", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(minimal_run) },
+    Check { id: "E01", requirement: "Every call that the state of a Model Exchange instance allows succeeds.", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(allowed) },
+    Check { id: "E01i", requirement: "States, derivatives, event indicators and nominals can be read in Initialization Mode.", clause: "2.0.5, 3.2.3; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(allowed_early) },
+    Check { id: "E02", requirement: "Every call that the state of a Model Exchange instance does not allow returns Error.", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Exchange(refused) },
+    Check { id: "E03", requirement: "States, derivatives, event indicators and nominals are as many as the description has, and nothing is written past them.", clause: "2.0.5, 3.2.2; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(counts) },
+    Check { id: "E04a", requirement: "The nominals of the continuous states are above 0.", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Exchange(positive_nominals) },
+    Check { id: "E04b", requirement: "The nominals of the continuous states are those of the description, or 1 where it has none.", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(declared_nominals) },
+    Check { id: "E05", requirement: "Continuous states that are set can be read back, as a vector and as variables.", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(round_trip) },
+    Check { id: "E06a", requirement: "Derivatives depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls.", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure) },
+    Check { id: "E06b", requirement: "The same time, states and inputs give the same derivatives bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(same_bits) },
+    Check { id: "E07", requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states nor derivatives.", clause: "2.0.5, 3.2.2; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(completed_step) },
+    Check { id: "E08", requirement: "The independent variable is the time that SetTime set.", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(independent) },
+    Check { id: "E09", requirement: "States that are NaN, infinite or huge cause no crash, no hang and no Error, but Discard at most: with valid ones the derivatives are those of before.", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wild_states) },
+    Check { id: "E10", requirement: "A vector of the wrong length is refused with Error.", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wrong_length) },
+    Check { id: "E11", requirement: "An output or derivative changes only with the states and inputs among its dependencies.", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(exchange_dependencies) },
+    Check { id: "E12", requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset) },
+    Check { id: "E13", requirement: "An FMU state saved in Event Mode or in Continuous-Time Mode restores the run from there.", clause: "2.0.5, 2.1.8; 3.0.2, 2.2.7.4", levels: Levels::MUST, run: Run::Exchange(saved_states) },
+    Check { id: "E14", requirement: "A state of a Model Exchange instance does no harm to an instance for co-simulation, nor the reverse.", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(foreign_states) },
+];
+
+fn counts(session: &Session) -> Result<(), NotDetermined> {
+    let instance = session.exchange(Mode::Event)?;
+    let (states, indicators) = (session.states(), session.indicators());
+    if session.description.version == FmiVersion::V3 {
+        let counts = [(Count::GetNumberOfContinuousStates, states), (Count::GetNumberOfEventIndicators, indicators)];
+        for (name, expected) in counts {
+            let mut found = 0;
+            let status = instance.call(name.as_str(), |raw| {
+                let (status, n) = raw.count(name, instance.handle, false)?;
+                found = n;
+                Some(status)
+            })?;
+            session.require(status.is_ok() && found == expected, || {
+                format!("fmi3{} returned {status}, {found}; the description has {expected}", name.as_str())
+            });
+        }
+    }
+    let untouched = 0xc5c5_c5c5_c5c5_c5c5;
+    for (name, n) in [
+        (Vector::GetContinuousStates, states),
+        (instance.derivatives_name(), states),
+        (Vector::GetNominalsOfContinuousStates, states),
+        (Vector::GetEventIndicators, indicators),
+    ] {
+        if n == 0 {
+            continue;
+        }
+        let (status, values, intact) = instance.vector(name, n)?;
+        session.require(intact, || format!("{} wrote past the {n} values", name.as_str()));
+        session.require(!status.is_ok() || values.iter().all(|v| v.to_bits() != untouched), || {
+            format!("{} did not write all of the {n} values", name.as_str())
+        });
+    }
+    session.note(format!("{states} states, {indicators} event indicators"));
+    Ok(())
+}
+
+/// Ends a probe of an FMU without continuous states.
+macro_rules! needs_states {
+    ($session:ident) => {
+        if $session.states() == 0 {
+            return $session.not_applicable("there are no continuous states");
+        }
+    };
+}
+
+fn nominals(session: &Session) -> Result<Vec<f64>, NotDetermined> {
+    let instance = session.exchange(Mode::Continuous)?;
+    let (status, values, _) = instance.vector(Vector::GetNominalsOfContinuousStates, session.states())?;
+    instance.must("GetNominalsOfContinuousStates", status)?;
+    Ok(values)
+}
+
+fn positive_nominals(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let found = nominals(session)?;
+    let bad = found.iter().any(|n| !(n.is_finite() && *n > 0.0));
+    session.require(!bad, || format!("the nominals are {found:?}"));
+    Ok(())
+}
+
+fn declared_nominals(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let states = session.description.states();
+    let declared = states.iter().flat_map(|v| vec![(v, v.nominal.unwrap_or(1.0)); session.elements(v)]);
+    for ((v, declared), found) in declared.zip(nominals(session)?) {
+        session.require((found - declared).abs() <= 1e-12 * declared.abs(), || {
+            format!("line {}: {} has the nominal {declared}, but the binary returned {found}", v.line, v.name)
+        });
+    }
+    Ok(())
+}
+
+/// States near those given, one of them or all moved a little.
+fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
+    let nominal = session.description.states();
+    let size = |i: usize| nominal.get(i).and_then(|v| v.nominal).unwrap_or(1.0).abs().max(x[i].abs());
+    x.iter().enumerate().map(|(i, x)| if i == k || k >= nominal.len() { x + 1e-3 * size(i) } else { *x }).collect()
+}
+
+fn round_trip(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let instance = session.exchange(Mode::Continuous)?;
+    let x = moved(session, &instance.states()?, usize::MAX);
+    let status = instance.set_states(&x)?;
+    if !status.is_ok() {
+        return Err(NotDetermined(format!("SetContinuousStates({x:?}) returned {status}")));
+    }
+    let found = instance.states()?;
+    session.require(found == x, || format!("the states were set to {x:?}, and read as {found:?}"));
+    let mut rest = &x[..];
+    for v in session.description.states() {
+        let (one, more) = rest.split_at(session.elements(v).min(rest.len()));
+        rest = more;
+        let (status, found) = instance.get(v)?;
+        let found: Vec<f64> = found.into_iter().map(f64::from_bits).collect();
+        session.require(status.is_ok() && found == one, || {
+            format!("the state {} was set to {one:?}, but getting it returned {status}, {found:?}", v.name)
+        });
+    }
+    Ok(())
+}
+
+/// Derivatives at one point, each evaluated after something else has happened.
+fn evaluations(session: &Session) -> Result<Vec<(&'static str, Vec<f64>)>, NotDetermined> {
+    let begin = || -> Result<_, NotDetermined> {
+        let instance = session.excited()?;
+        let mut importer = Importer::start(&instance)?;
+        importer.run(50, &mut |_| Ok(()))?;
+        let over = importer.over;
+        Ok((instance, over))
+    };
+    let (instance, over) = begin()?;
+    if over {
+        return Err(NotDetermined("the FMU ends the simulation at once".into()));
+    }
+    let (t, x) = (instance.time.get(), instance.states()?);
+    let inputs: Vec<(&ModelVariable, Vec<u64>)> = session
+        .number_inputs()
+        .filter(|v| v.variability == Variability::Continuous)
+        .filter_map(|v| Some((v, session.different_value(v, 3.0)?)))
+        .collect();
+    let point = |instance: &Instance<'_>, order: [usize; 3]| -> Result<(), NotDetermined> {
+        for what in order {
+            match what {
+                0 => instance.must("SetTime", instance.set_time(t)?)?,
+                1 => instance.must("SetContinuousStates", instance.set_states(&x)?)?,
+                _ => {
+                    for (v, values) in &inputs {
+                        instance.must("Set", instance.set(v, values)?)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    };
+    point(&instance, [0, 1, 2])?;
+    let mut found = vec![("first", instance.derivatives()?), ("read twice", instance.derivatives()?)];
+    let _ = instance.snapshot(&session.watched())?;
+    let _ = instance.indicators()?;
+    found.push(("after outputs and indicators", instance.derivatives()?));
+    for (k, what) in [(0, "after another state"), (usize::MAX, "after other states")] {
+        instance.must("SetContinuousStates", instance.set_states(&moved(session, &x, k))?)?;
+        let _ = instance.derivatives()?;
+        instance.must("SetTime", instance.set_time(t + session.integrator_step())?)?;
+        let _ = instance.derivatives()?;
+        point(&instance, [1, 2, 0])?;
+        found.push((what, instance.derivatives()?));
+    }
+    let (other, _) = begin()?;
+    point(&other, [2, 1, 0])?;
+    found.push(("in another instance, set in another order", other.derivatives()?));
+    Ok(found)
+}
+
+fn pure(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let found = evaluations(session)?;
+    let (_, first) = &found[0];
+    for (what, values) in &found[1..] {
+        if let Some((_, largest)) = deviation(std::slice::from_ref(first), std::slice::from_ref(values)) {
+            session.violated(format!("the derivatives are {first:?}; {what}, {values:?} (relative {largest:e})"));
+        }
+    }
+    Ok(())
+}
+
+fn same_bits(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let found = evaluations(session)?;
+    let (_, first) = &found[0];
+    for (what, values) in &found[1..] {
+        let same = first.iter().zip(values).all(|(a, b)| a.to_bits() == b.to_bits());
+        session.require(same, || format!("the derivatives are {first:?}; {what}, {values:?}"));
+    }
+    Ok(())
+}
+
+fn completed_step(session: &Session) -> Result<(), NotDetermined> {
+    let instance = session.exchange(Mode::Continuous)?;
+    for k in 0..5 {
+        instance.must("SetTime", instance.set_time(instance.time.get() + 1e-3 * session.integrator_step())?)?;
+        let before = [instance.states()?, instance.derivatives()?];
+        let (status, flags) = instance.completed()?;
+        session.require(status.is_ok() && flags.iter().all(|f| matches!(f, 0 | 1)), || {
+            format!("CompletedIntegratorStep returned {status}, enterEventMode and terminateSimulation {flags:?}")
+        });
+        if !status.is_ok() || flags != [0, 0] {
+            return Ok(());
+        }
+        let after = [instance.states()?, instance.derivatives()?];
+        let changed = before.iter().zip(&after).any(|(a, b)| differ(a, b));
+        session.require(!changed, || {
+            format!("step {k}: states and derivatives were {before:?} before CompletedIntegratorStep, {after:?} after")
+        });
+    }
+    Ok(())
+}
+
+fn independent(session: &Session) -> Result<(), NotDetermined> {
+    let fits = |v: &&ModelVariable| v.causality == Causality::Independent && v.base == BaseType::Float64;
+    let Some(time) = session.description.variables.iter().find(fits) else {
+        return session.not_applicable("there is no independent variable of type Float64");
+    };
+    let instance = session.exchange(Mode::Continuous)?;
+    for _ in 0..3 {
+        let t = instance.time.get() + 0.1 * session.integrator_step();
+        instance.must("SetTime", instance.set_time(t)?)?;
+        let (status, bits) = instance.get(time)?;
+        let found = bits.first().map_or(f64::NAN, |b| f64::from_bits(*b));
+        session.require(status.is_ok() && (found - t).abs() <= 1e-9 * t.abs(), || {
+            format!("after SetTime({t:?}), Get({}) returned {status}, {found:?}", time.name)
+        });
+    }
+    Ok(())
+}
+
+fn wild_states(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    for wild in [f64::NAN, f64::INFINITY, 1e300] {
+        session.case(|| {
+            let instance = session.exchange(Mode::Continuous)?;
+            let (x, f) = (instance.states()?, instance.derivatives()?);
+            let set = instance.set_states(&vec![wild; x.len()])?;
+            let mut told = vec![("SetContinuousStates", set)];
+            if set.is_ok() {
+                told.push((instance.derivatives_name().as_str(), instance.vector(instance.derivatives_name(), x.len())?.0));
+                if session.indicators() > 0 {
+                    let (status, ..) = instance.vector(Vector::GetEventIndicators, session.indicators())?;
+                    told.push(("GetEventIndicators", status));
+                }
+            }
+            for (name, status) in told {
+                session.require(status.is_ok() || status == Status::DISCARD, || {
+                    format!("{name} with states of {wild:e} returned {status}, which ends the simulation")
+                });
+                if !status.is_ok() && status != Status::DISCARD {
+                    return Ok(());
+                }
+            }
+            let status = instance.set_states(&x)?;
+            let again = if status.is_ok() { instance.derivatives()? } else { Vec::new() };
+            session.require(!differ(&again, &f), || {
+                format!("the derivatives were {f:?}; after states of {wild:e} and the old ones ({status}) they are {again:?}")
+            });
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn wrong_length(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    for (name, n) in [
+        (Vector::GetContinuousStates, session.states() + 1),
+        (Vector::SetContinuousStates, session.states() + 1),
+        (Vector::GetNominalsOfContinuousStates, session.states() + 1),
+        (Vector::GetEventIndicators, session.indicators() + 1),
+    ] {
+        session.case(|| {
+            let instance = session.exchange(Mode::Continuous)?;
+            let mut room = vec![0.0; n + 8];
+            let call = format!("{}(n={n})", name.as_str());
+            let status = instance.call(&call, |raw| raw.vector(name, instance.handle, Some(&mut room), n))?;
+            session.require(status == Status::ERROR, || format!("{call} returned {status}"));
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn reset(session: &Session) -> Result<(), NotDetermined> {
+    let run = |instance: &Instance<'_>| Importer::start(instance)?.trajectory(100);
+    let first = run(&session.exchange(Mode::Event)?)?;
+    for mode in Mode::ALL {
+        session.case(|| {
+            let running = mode == Mode::Continuous;
+            let instance = session.exchange(if running { Mode::Event } else { mode })?;
+            if running {
+                Importer::start(&instance)?.run(20, &mut |_| Ok(()))?;
+            }
+            let status = instance.simple(Simple::Reset)?;
+            if !status.is_ok() {
+                session.violated(format!("Reset after {mode:?} returned {status}"));
+                return Ok(());
+            }
+            instance.experiment(session.start(), None);
+            instance.bring_to(Mode::Event)?;
+            if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
+                session.violated(format!(
+                    "Reset after {mode:?}: the run differs from that of a new instance after {k} steps (relative {largest:e})"
+                ));
+            }
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn saved_states(session: &Session) -> Result<(), NotDetermined> {
+    if !session.exchange_saves() {
+        return session.not_applicable("canGetAndSetFMUState is false for Model Exchange");
+    }
+    let compare = |mode: &str, first: &[Vec<f64>], second: &[Vec<f64>]| {
+        if let Some((k, largest)) = deviation(first, second) {
+            session.violated(format!(
+                "restored in {mode}: the run differs from the first after {k} steps (relative {largest:e})"
+            ));
+        }
+    };
+    session.case(|| {
+        let instance = session.excited()?;
+        let (saved, t) = (instance.save()?, instance.time.get());
+        let first = Importer::start(&instance)?.trajectory(100)?;
+        instance.restore(saved, t)?;
+        compare("Event Mode", &first, &Importer::start(&instance)?.trajectory(100)?);
+        Ok(())
+    });
+    session.case(|| {
+        let instance = session.excited()?;
+        let mut importer = Importer::start(&instance)?;
+        importer.run(50, &mut |_| Ok(()))?;
+        let (saved, t, next) = (instance.save()?, instance.time.get(), importer.next);
+        let mut first = importer.trajectory(100)?;
+        for _ in 0..2 {
+            instance.restore(saved, t)?;
+            let second = Importer::resume(&instance, next)?.trajectory(100)?;
+            compare("Continuous-Time Mode", &first, &second);
+            first = second;
+        }
+        Ok(())
+    });
+    // In the middle of an event: the update that follows is the same.
+    session.case(|| {
+        let instance = session.excited()?;
+        let mut importer = Importer::start(&instance)?;
+        importer.run(50, &mut |_| Ok(()))?;
+        if importer.over {
+            return Ok(());
+        }
+        instance.must("EnterEventMode", instance.simple(Simple::EnterEventMode)?)?;
+        let (saved, t) = (instance.save()?, instance.time.get());
+        let first = Importer::start(&instance)?.trajectory(100)?;
+        instance.restore(saved, t)?;
+        compare("Event Mode", &first, &Importer::start(&instance)?.trajectory(100)?);
+        Ok(())
+    });
+    Ok(())
+}
+
+fn foreign_states(session: &Session) -> Result<(), NotDetermined> {
+    let d = &session.description;
+    let both = d.model_exchange.as_ref().zip(d.co_simulation.as_ref());
+    let Some((exchange, simulation)) = both else { return session.not_applicable("the FMU has one interface only") };
+    if exchange.model_identifier != simulation.model_identifier {
+        return session.not_applicable("the interfaces have binaries of their own");
+    }
+    if !exchange.can_get_and_set_state() || !simulation.can_get_and_set_state() {
+        return session.not_applicable("canGetAndSetFMUState is false");
+    }
+    for to_simulation in [true, false] {
+        session.case(|| {
+            let (exchange, simulation) = (session.exchange(Mode::Continuous)?, session.stepping()?);
+            let (from, to) = if to_simulation { (&exchange, &simulation) } else { (&simulation, &exchange) };
+            let saved = from.save()?;
+            let status = to.call("SetFMUState of the other interface", |raw| raw.set_state(to.handle, saved))?;
+            session.note(format!("SetFMUState returned {status}"));
+            if status == Status::FATAL {
+                return Ok(());
+            }
+            // Whatever it answered, the next calls and a reset must not crash.
+            if to_simulation {
+                let _ = to.step(session.h())?;
+            } else {
+                let _ = to.set_time(to.time.get() + session.integrator_step())?;
+                let _ = to.vector(to.derivatives_name(), session.states())?;
+            }
+            let status = to.simple(Simple::Reset)?;
+            session.require(status.is_ok(), || format!("Reset after a state of the other interface returned {status}"));
+            Ok(())
+        });
+    }
+    Ok(())
+}

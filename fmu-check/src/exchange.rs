@@ -1,0 +1,443 @@
+//! An instance for Model Exchange under test, and a small importer that integrates it.
+//!
+//! The importer uses Euler's method and handles a state event at the end of the step in which it occurs: that is coarse, but every
+//! call is one that the standard allows.
+
+use crate::instance::Instance;
+use crate::session::{NotDetermined, Session};
+use fmu_import::Status;
+use fmu_import::raw::{Arguments, Interface, Sensitivity, SensitivityArguments, Simple, Updated, Vector};
+use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown};
+
+/// States of the life cycle of Model Exchange.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    Instantiated,
+    Initialization,
+    Event,
+    Continuous,
+    Terminated,
+}
+
+impl Mode {
+    pub(super) const ALL: [Self; 5] =
+        [Self::Instantiated, Self::Initialization, Self::Event, Self::Continuous, Self::Terminated];
+}
+
+/// Most updates of one event: a further one is needed only by an FMU that never comes to an end.
+const UPDATES: usize = 100;
+
+impl Session {
+    fn elements_of(&self, unknowns: &[Unknown]) -> usize {
+        unknowns.iter().filter_map(|u| self.description.referenced(u.reference)).map(|v| self.elements(v)).sum()
+    }
+
+    /// Number of continuous states.
+    pub(super) fn states(&self) -> usize {
+        self.elements_of(&self.description.derivatives)
+    }
+
+    /// Number of event indicators.
+    pub(super) fn indicators(&self) -> usize {
+        match self.description.version {
+            FmiVersion::V2 => {
+                self.description.number_of_event_indicators.and_then(|n| usize::try_from(n).ok()).unwrap_or(0)
+            }
+            FmiVersion::V3 => self.elements_of(&self.description.event_indicators),
+        }
+    }
+
+    /// A capability of Model Exchange.
+    pub(super) fn exchange_flag(&self, name: &str) -> bool {
+        self.description.model_exchange.as_ref().is_some_and(|i| i.flag(name))
+    }
+
+    /// The FMU saves states of Model Exchange.
+    pub(super) fn exchange_saves(&self) -> bool {
+        self.description.model_exchange.as_ref().is_some_and(model_description::Interface::can_get_and_set_state)
+    }
+
+    /// Inputs that are numbers and depend on no clock.
+    pub(super) fn number_inputs(&self) -> impl Iterator<Item = &ModelVariable> {
+        self.numeric().filter(|v| v.causality == Causality::Input && v.clocks.is_empty())
+    }
+
+    /// A step of the integrator in s.
+    pub(super) fn integrator_step(&self) -> f64 {
+        self.h() / 20.0
+    }
+
+    /// An instance for Model Exchange in a state of its life cycle. In Event Mode no update was made yet.
+    pub(super) fn exchange(&self, mode: Mode) -> Result<Instance<'_>, NotDetermined> {
+        self.prepare(|| {
+            let arguments = Arguments { interface: Interface::ModelExchange, ..self.arguments("probe") };
+            let made = self.instantiate(&arguments)?;
+            let instance =
+                made.ok_or_else(|| NotDetermined("an instantiation for Model Exchange returned NULL".into()))?;
+            instance.bring_to(mode)?;
+            Ok(instance)
+        })
+    }
+}
+
+/// What an event did.
+pub(super) struct Event {
+    /// The results of each update, and whether it changed a state.
+    pub(super) updates: Vec<(Updated, bool)>,
+}
+
+impl Event {
+    /// The next time event, if one is known.
+    pub(super) fn next(&self) -> Option<f64> {
+        self.updates.last().filter(|(u, _)| u.next_event_time_defined != 0).map(|(u, _)| u.next_event_time)
+    }
+
+    /// The FMU asks for the end of the simulation.
+    pub(super) fn terminates(&self) -> bool {
+        self.updates.iter().any(|(u, _)| u.terminate != 0)
+    }
+
+    /// The iteration came to an end.
+    pub(super) fn ended(&self) -> bool {
+        self.updates.last().is_some_and(|(u, _)| u.again == 0)
+    }
+
+    /// A state changed.
+    pub(super) fn jumped(&self) -> bool {
+        self.updates.iter().any(|(u, changed)| *changed || u.states_changed != 0)
+    }
+}
+
+impl Instance<'_> {
+    /// Brings a new instance to a state.
+    pub(super) fn bring_to(&self, mode: Mode) -> Result<(), NotDetermined> {
+        if mode == Mode::Instantiated {
+            return Ok(());
+        }
+        self.enter()?;
+        if mode == Mode::Initialization {
+            return Ok(());
+        }
+        self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
+        if mode == Mode::Event {
+            return Ok(());
+        }
+        let _ = self.iterate()?;
+        self.must("EnterContinuousTimeMode", self.simple(Simple::EnterContinuousTimeMode)?)?;
+        if mode == Mode::Continuous {
+            return Ok(());
+        }
+        self.must("Terminate", self.simple(Simple::Terminate)?)
+    }
+
+    /// One update of the discrete states.
+    pub(super) fn update(&self) -> Result<(Status, Updated), NotDetermined> {
+        let name = if self.session.description.version == FmiVersion::V2 {
+            "NewDiscreteStates"
+        } else {
+            "UpdateDiscreteStates"
+        };
+        let mut result = None;
+        let status = self.call(name, |raw| {
+            let (status, updated) = raw.update_discrete_states(self.handle, false)?;
+            result = Some(updated);
+            Some(status)
+        })?;
+        result.map(|updated| (status, updated)).ok_or_else(|| NotDetermined(format!("{name} is missing")))
+    }
+
+    /// The iteration of an event, in Event Mode.
+    pub(super) fn iterate(&self) -> Result<Event, NotDetermined> {
+        let mut event = Event { updates: Vec::new() };
+        let mut before = self.states()?;
+        while event.updates.len() < UPDATES {
+            let (status, updated) = self.update()?;
+            self.must("UpdateDiscreteStates", status)?;
+            let after = self.states()?;
+            let changed = before.iter().zip(&after).any(|(a, b)| (a - b).abs() > 0.0 || a.is_nan() != b.is_nan());
+            before = after;
+            event.updates.push((updated, changed));
+            if updated.again == 0 || updated.terminate != 0 {
+                break;
+            }
+        }
+        Ok(event)
+    }
+
+    /// A vector of Model Exchange, and whether nothing was written past it.
+    pub(super) fn vector(&self, name: Vector, n: usize) -> Result<(Status, Vec<f64>, bool), NotDetermined> {
+        let untouched = f64::from_bits(0xc5c5_c5c5_c5c5_c5c5);
+        let mut values = vec![untouched; n + 8];
+        let status = self.call(name.as_str(), |raw| raw.vector(name, self.handle, Some(&mut values), n))?;
+        let intact = values[n..].iter().all(|v| v.to_bits() == untouched.to_bits());
+        values.truncate(n);
+        Ok((status, values, intact))
+    }
+
+    fn read(&self, name: Vector, n: usize) -> Result<Vec<f64>, NotDetermined> {
+        if n == 0 {
+            return Ok(Vec::new());
+        }
+        let (status, values, _) = self.vector(name, n)?;
+        self.must(name.as_str(), status)?;
+        Ok(values)
+    }
+
+    /// The continuous states.
+    pub(super) fn states(&self) -> Result<Vec<f64>, NotDetermined> {
+        self.read(Vector::GetContinuousStates, self.session.states())
+    }
+
+    /// The function that returns the derivatives of the states.
+    pub(super) fn derivatives_name(&self) -> Vector {
+        match self.session.description.version {
+            FmiVersion::V2 => Vector::GetDerivatives,
+            FmiVersion::V3 => Vector::GetContinuousStateDerivatives,
+        }
+    }
+
+    /// The derivatives of the states.
+    pub(super) fn derivatives(&self) -> Result<Vec<f64>, NotDetermined> {
+        self.read(self.derivatives_name(), self.session.states())
+    }
+
+    /// The event indicators.
+    pub(super) fn indicators(&self) -> Result<Vec<f64>, NotDetermined> {
+        self.read(Vector::GetEventIndicators, self.session.indicators())
+    }
+
+    /// Sets the continuous states.
+    pub(super) fn set_states(&self, x: &[f64]) -> Result<Status, NotDetermined> {
+        let mut copy = x.to_vec();
+        self.call(&format!("SetContinuousStates({x:?})"), |raw| {
+            raw.vector(Vector::SetContinuousStates, self.handle, Some(&mut copy), x.len())
+        })
+    }
+
+    /// Sets the time.
+    pub(super) fn set_time(&self, t: f64) -> Result<Status, NotDetermined> {
+        let status = self.call(&format!("SetTime({t:?})"), |raw| raw.set_time(self.handle, t))?;
+        self.time.set(t);
+        Ok(status)
+    }
+
+    /// Ends a step of the integrator.
+    pub(super) fn completed(&self) -> Result<(Status, [i32; 2]), NotDetermined> {
+        let mut flags = [0; 2];
+        let status = self.call("CompletedIntegratorStep", |raw| {
+            let (status, found) = raw.completed_integrator_step(self.handle, false, false)?;
+            flags = found;
+            Some(status)
+        })?;
+        Ok((status, flags))
+    }
+
+    /// A directional derivative, or an adjoint one.
+    pub(super) fn sensitivity(
+        &self,
+        name: Sensitivity,
+        [unknowns, knowns]: [&[u32]; 2],
+        seed: &[f64],
+    ) -> Result<(Status, Vec<f64>), NotDetermined> {
+        let adjoint = name == Sensitivity::GetAdjointDerivative;
+        let mut result = vec![f64::NAN; if adjoint { knowns.len() } else { unknowns.len() }];
+        let n = result.len();
+        let arguments = SensitivityArguments {
+            unknowns: (Some(unknowns), unknowns.len()),
+            knowns: (Some(knowns), knowns.len()),
+            seed: (Some(seed), seed.len()),
+        };
+        let call = format!("{}(unknowns {unknowns:?}, knowns {knowns:?}, seed {seed:?})", name.as_str());
+        let status = self.call(&call, |raw| raw.sensitivity(name, self.handle, arguments, Some(&mut result), n))?;
+        Ok((status, result))
+    }
+
+    /// Sets all inputs that are numbers to values that differ from their start values, in Event Mode; false if one is refused.
+    fn excite(&self) -> Result<bool, NotDetermined> {
+        for (k, v) in self.session.number_inputs().enumerate() {
+            if v.base != BaseType::Boolean && !v.base.is_float() {
+                continue;
+            }
+            let scale = 5.0 + f64::from(u8::try_from(k % 7).unwrap_or(0));
+            if let Some(values) = self.session.different_value(v, scale)
+                && !self.set(v, &values)?.is_ok()
+            {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// An importer in Continuous-Time Mode.
+#[derive(Clone)]
+pub(super) struct Importer<'a, 'b> {
+    pub(super) instance: &'a Instance<'b>,
+    /// The next time event.
+    pub(super) next: Option<f64>,
+    /// The event indicators after the last step or event.
+    pub(super) z: Vec<f64>,
+    /// The FMU asked for the end.
+    pub(super) over: bool,
+}
+
+impl Session {
+    /// An instance in Event Mode whose inputs have been set; where the FMU does not take these values, with its start values.
+    pub(super) fn excited(&self) -> Result<Instance<'_>, NotDetermined> {
+        self.prepare(|| {
+            let instance = self.exchange(Mode::Event)?;
+            let trial = self.exchange(Mode::Event)?;
+            let good = trial.excite()? && Importer::start(&trial).is_ok();
+            Ok(if good && instance.excite()? { instance } else { self.exchange(Mode::Event)? })
+        })
+    }
+}
+
+impl<'a, 'b> Importer<'a, 'b> {
+    /// Begins with the event that ends the initialization.
+    pub(super) fn start(instance: &'a Instance<'b>) -> Result<Self, NotDetermined> {
+        let mut importer = Self { instance, next: None, z: Vec::new(), over: false };
+        importer.leave(&mut |_, _| ())?;
+        Ok(importer)
+    }
+
+    /// Begins as [`start`](Self::start), runs, and shows every event, and the importer after every step and whether there was
+    /// an event at its end.
+    pub(super) fn survey(
+        instance: &'a Instance<'b>,
+        steps: usize,
+        see: &mut dyn FnMut(&Instance<'_>, &Event),
+        look: &mut dyn FnMut(&Self, bool) -> Result<(), NotDetermined>,
+    ) -> Result<(), NotDetermined> {
+        let mut importer = Self { instance, next: None, z: Vec::new(), over: false };
+        let (session, dt) = (instance.session, instance.session.integrator_step());
+        session.record_calls(&format!("{steps} integrator steps of {dt} s with events"), || {
+            importer.leave(see)?;
+            for k in 0..steps {
+                if importer.over || (k % 100 == 99 && session.half_time_used()) {
+                    break;
+                }
+                look(&importer, k == 0)?;
+                let event = importer.step(dt, see)?;
+                if !importer.over {
+                    look(&importer, event)?;
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// Goes on in Continuous-Time Mode.
+    pub(super) fn resume(instance: &'a Instance<'b>, next: Option<f64>) -> Result<Self, NotDetermined> {
+        Ok(Self { instance, next, z: instance.indicators()?, over: false })
+    }
+
+    fn leave(&mut self, see: &mut dyn FnMut(&Instance<'_>, &Event)) -> Result<Event, NotDetermined> {
+        let event = self.instance.iterate()?;
+        see(self.instance, &event);
+        self.next = event.next();
+        self.over |= event.terminates() || !event.ended();
+        if !self.over {
+            let status = self.instance.simple(Simple::EnterContinuousTimeMode)?;
+            self.instance.must("EnterContinuousTimeMode", status)?;
+            self.z = self.instance.indicators()?;
+        }
+        Ok(event)
+    }
+
+    /// An event at this time.
+    pub(super) fn event(&mut self, see: &mut dyn FnMut(&Instance<'_>, &Event)) -> Result<Event, NotDetermined> {
+        let status = self.instance.simple(Simple::EnterEventMode)?;
+        self.instance.must("EnterEventMode", status)?;
+        self.leave(see)
+    }
+
+    /// One step of the integrator, at most to the next time event, with the event at its end if there is one, which it returns.
+    pub(super) fn step(&mut self, dt: f64, see: &mut dyn FnMut(&Instance<'_>, &Event)) -> Result<bool, NotDetermined> {
+        let i = self.instance;
+        let t = i.time.get();
+        let due = self.next.is_some_and(|next| next <= t + dt * (1.0 + 1e-9));
+        let end = self.next.filter(|_| due).map_or(t + dt, |next| next.max(t));
+        let (mut x, f) = (i.states()?, i.derivatives()?);
+        for (x, f) in x.iter_mut().zip(&f) {
+            *x += f * (end - t);
+        }
+        if x.iter().any(|x| !x.is_finite()) {
+            return Err(NotDetermined("Euler's method is not stable for this FMU".into()));
+        }
+        i.must("SetTime", i.set_time(end)?)?;
+        if !x.is_empty() {
+            i.must("SetContinuousStates", i.set_states(&x)?)?;
+        }
+        let z = i.indicators()?;
+        let crossed = self.z.iter().zip(&z).any(|(a, b)| (*a > 0.0) != (*b > 0.0));
+        self.z = z;
+        let (status, [enter, terminate]) = i.completed()?;
+        i.must("CompletedIntegratorStep", status)?;
+        self.over |= terminate != 0;
+        let event = !self.over && (due || crossed || enter != 0);
+        if event {
+            self.event(see)?;
+        }
+        Ok(event)
+    }
+
+    /// Several steps; `look` runs after each.
+    pub(super) fn run(
+        &mut self,
+        steps: usize,
+        look: &mut dyn FnMut(&Instance<'_>) -> Result<(), NotDetermined>,
+    ) -> Result<(), NotDetermined> {
+        let (session, dt) = (self.instance.session, self.instance.session.integrator_step());
+        let what = format!("{steps} integrator steps of {dt} s from {}", self.instance.time.get());
+        session.record_calls(&what, || {
+            for k in 0..steps {
+                if self.over || (k % 100 == 99 && session.half_time_used()) {
+                    break;
+                }
+                self.step(dt, &mut |_, _| ())?;
+                look(self.instance)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// States and outputs after each of several steps.
+    pub(super) fn trajectory(&mut self, steps: usize) -> Result<Vec<Vec<f64>>, NotDetermined> {
+        let session = self.instance.session;
+        let outputs: Vec<_> = session.watched().into_iter().filter(|v| v.base == BaseType::Float64).collect();
+        let mut rows = Vec::new();
+        self.run(steps, &mut |instance| {
+            let mut row = instance.states()?;
+            row.extend(instance.snapshot(&outputs)?.into_iter().flatten().map(f64::from_bits));
+            rows.push(row);
+            Ok(())
+        })?;
+        Ok(rows)
+    }
+}
+
+/// Whether two vectors differ by more than rounding.
+pub(super) fn differ(a: &[f64], b: &[f64]) -> bool {
+    deviation(&[a.to_vec()], &[b.to_vec()]).is_some()
+}
+
+/// Where two trajectories differ by more than rounding: the step, from 1, and the relative difference.
+pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> {
+    if a.len() != b.len() {
+        return Some((a.len().min(b.len()) + 1, f64::INFINITY));
+    }
+    let columns = a.first().map_or(0, Vec::len);
+    let scale: Vec<f64> = (0..columns).map(|i| a.iter().map(|row| row[i].abs()).fold(0.0, f64::max)).collect();
+    a.iter().zip(b).enumerate().find_map(|(k, (x, y))| {
+        let differences = x.iter().zip(y).zip(&scale).map(|((x, y), scale)| {
+            if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
+                0.0
+            } else {
+                (x - y).abs() / (scale + f64::MIN_POSITIVE)
+            }
+        });
+        let largest = differences.fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
+        (largest > 1e-9).then_some((k + 1, largest))
+    })
+}

@@ -1,0 +1,446 @@
+/* A small FMU for Model Exchange and co-simulation, FMI 2.0 and with -DFMI3 FMI 3.0, that breaks no rule; and with
+   -DFAULT_<name> exactly one.
+   x' = gain (u - x), y = 2 x + u; event indicator z = x - 0.5, whose crossing adds 100 to n; time events at start + k 0.1 add 1
+   to n, and every third one 0.25 to x. References: 0 time, 1 gain, 2 u, 3 x, 4 der(x), 5 y, 6 d (discrete, without use), 7 n, 8 z. */
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { OK, WARNING, DISCARD, ERROR, FATAL };
+enum { INSTANTIATED = 1, INITIALIZATION = 2, EVENT = 4, CONTINUOUS = 8, STEP = 16, TERMINATED = 32, FAILED = 64, ANY = 127 };
+#define EVALUATED (INITIALIZATION | EVENT | CONTINUOUS | STEP | TERMINATED)
+#define EXPORT __attribute__((visibility("default")))
+
+typedef struct {
+    double start, t, gain, u, x, d;
+    int n, k, above, mode, exchange, events, early, evaluations;
+    double last_x;
+} M;
+
+typedef struct { bool again, terminate, states, defined; double next; } Update;
+
+static int fail(M *m) { return m->mode = FAILED, ERROR; }
+#define ENTER(allowed) do { if (!m) return ERROR; if (!(m->mode & (allowed))) return fail(m); } while (0)
+
+static void fresh(M *m) {
+    M kept = *m;
+    memset(m, 0, sizeof *m);
+    m->exchange = kept.exchange, m->events = kept.events, m->early = kept.early;
+    m->gain = 1, m->x = 1, m->above = 1, m->mode = INSTANTIATED;
+#ifdef FAULT_E12
+    if (kept.mode) m->x = kept.x;
+#endif
+}
+
+static M *make(int exchange, int events, int early) {
+    M *m = calloc(1, sizeof *m);
+    m->exchange = exchange, m->events = events, m->early = early;
+    return fresh(m), m;
+}
+
+static double instant(const M *m) { return m->start + m->k * 0.1; }
+static bool due(const M *m, double t) { return t >= instant(m) - 1e-6; }
+
+static double slope(M *m) {
+    double dx = m->gain * (m->u - m->x);
+#ifdef FAULT_E06a
+    dx += 1e-4 * (m->x - m->last_x);
+    m->last_x = m->x;
+#endif
+#ifdef FAULT_E06b
+    dx *= 1 + 1e-14 * (m->evaluations++ % 5);
+#endif
+    return dx;
+}
+
+static double indicator(const M *m) {
+    double z = m->x - 0.5;
+#ifdef FAULT_E25
+    return m->n > 3 && m->n < 8 ? 0 : z == 0 ? 1e-12 : z;
+#endif
+    return z == 0 ? 1e-12 : z;
+}
+
+static bool tick(M *m) {
+    m->n++, m->k++;
+    if (m->k % 3) return false;
+    m->x += 0.25;
+    return true;
+}
+
+static int enter_initialization(M *m, double start) {
+    ENTER(INSTANTIATED);
+    return m->start = m->t = start, m->mode = INITIALIZATION, OK;
+}
+
+static int leave_initialization(M *m) {
+    ENTER(INITIALIZATION);
+    return m->mode = m->exchange || m->events ? EVENT : STEP, OK;
+}
+
+static int update(M *m, Update *u) {
+    memset(u, 0, sizeof *u);
+#ifdef FAULT_N05
+    ENTER(EVENT | STEP);
+#else
+    ENTER(EVENT);
+#endif
+    while (due(m, m->t)) u->states |= tick(m);
+    int above = m->x > 0.5;
+    if (above != m->above) m->above = above, m->n += 100;
+    u->defined = true, u->next = instant(m);
+#ifdef FAULT_E20
+    if (m->k > 3) u->next = NAN;
+#endif
+#ifdef FAULT_E21
+    if (m->exchange) u->next -= m->t;
+#endif
+#ifdef FAULT_E22
+    if (fabs(m->t - m->start - (m->k - 1) * 0.1) > 1e-6) u->defined = false;
+#endif
+#ifdef FAULT_E23
+    u->again = m->k > 3;
+#endif
+#ifdef FAULT_E24a
+    u->states = false;
+#endif
+#ifdef FAULT_E24b
+    u->states = true;
+#endif
+#ifdef FAULT_N06
+    if (!m->exchange) u->next -= 0.1;
+#endif
+    return OK;
+}
+
+static int enter_event(M *m) {
+#ifdef FAULT_N04
+    ENTER(CONTINUOUS | STEP);
+#else
+    ENTER(CONTINUOUS | (m->events ? STEP : 0));
+#endif
+#ifdef FAULT_N07
+    if (!m->exchange) m->x += 1e-3;
+#endif
+    return m->mode = EVENT, OK;
+}
+
+static int enter_continuous(M *m) {
+    ENTER(m->exchange ? EVENT : 0);
+#ifdef FAULT_E00
+    return fail(m);
+#endif
+    return m->mode = CONTINUOUS, OK;
+}
+
+static int terminate(M *m) {
+#ifdef FAULT_E01
+    ENTER(CONTINUOUS | STEP);
+#else
+    ENTER(EVENT | CONTINUOUS | STEP);
+#endif
+    return m->mode = TERMINATED, OK;
+}
+
+static int reset(M *m) { return m ? fresh(m), OK : ERROR; }
+
+static int set_time(M *m, double t) {
+    ENTER(CONTINUOUS);
+#ifdef FAULT_E26
+    m->n += t > m->t;
+#endif
+    return m->t = t, OK;
+}
+
+static int set_states(M *m, const double *x, size_t n) {
+    ENTER(CONTINUOUS);
+#ifndef FAULT_E10
+    if (n != 1) return fail(m);
+#endif
+#ifdef FAULT_E09
+    if (!isfinite(x[0])) return fail(m);
+#endif
+    if (!isfinite(x[0])) return DISCARD;
+    m->x = x[0];
+#ifdef FAULT_E05
+    m->x = (float)x[0];
+#endif
+    return OK;
+}
+
+static int vector(M *m, double *to, size_t n, int which) {
+#ifdef FAULT_E01i
+    ENTER(EVALUATED & ~INITIALIZATION);
+#else
+#ifdef FMI3
+    ENTER(EVALUATED);
+#else
+    ENTER(EVALUATED | (which == 3 ? INSTANTIATED : 0));
+#endif
+#endif
+    if (!m->exchange) return fail(m);
+#ifndef FAULT_E10
+    if (n != 1) return fail(m);
+#endif
+    double nominal = 2;
+#ifdef FAULT_E04a
+    nominal = 0;
+#endif
+#ifdef FAULT_E04b
+    nominal = 3;
+#endif
+    to[0] = which == 0 ? m->x : which == 1 ? slope(m) : which == 2 ? indicator(m) : nominal;
+#ifdef FAULT_E03
+    if (which == 1) to[1] = 0;
+#endif
+    return OK;
+}
+
+static int completed(M *m) {
+#ifdef FAULT_E02
+    ENTER(ANY);
+#else
+    ENTER(CONTINUOUS);
+#endif
+#ifdef FAULT_E07
+    m->x += 1e-6;
+#endif
+    return OK;
+}
+
+static int get(M *m, const unsigned *vr, size_t n, double *to) {
+#ifdef FMI3
+    ENTER(ANY);
+#else
+    ENTER(EVALUATED | FAILED);
+#endif
+    for (size_t i = 0; i < n; i++) {
+        double y = 2 * m->x + m->u, time = m->t;
+#ifdef FAULT_E08
+        time = m->start;
+#endif
+#ifdef FAULT_E11
+        y += m->d;
+#endif
+        if (vr[i] == 7 || vr[i] > 8) return fail(m);
+        const double all[] = {time, m->gain, m->u, m->x, vr[i] == 4 ? slope(m) : 0, y, m->d, 0, indicator(m)};
+        to[i] = all[vr[i]];
+    }
+    return OK;
+}
+
+static int set(M *m, const unsigned *vr, size_t n, const double *from) {
+    ENTER(INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP);
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] == 1 && m->mode & (INSTANTIATED | INITIALIZATION)) m->gain = from[i];
+        else if (vr[i] == 2) m->u = from[i];
+        else if (vr[i] == 3 && m->mode == CONTINUOUS) m->x = from[i];
+        else if (vr[i] == 6 && m->mode != CONTINUOUS) m->d = from[i];
+        else return fail(m);
+    }
+    return OK;
+}
+
+static int get_n(M *m, const unsigned *vr, size_t n, int *to) {
+    ENTER(EVALUATED | FAILED | INSTANTIATED);
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] != 7) return fail(m);
+        to[i] = m->n;
+    }
+    return OK;
+}
+
+/* Columns of the matrix: u, x; rows: der(x), x, y. */
+static int entry(M *m, unsigned unknown, unsigned known, double *to) {
+    if ((known != 2 && known != 3) || (unknown != 3 && unknown != 4 && unknown != 5)) return ERROR;
+    *to = unknown == 4 ? (known == 2 ? m->gain : -m->gain) : unknown == 5 ? (known == 2 ? 1 : 2) : known == 3;
+#ifdef FAULT_D01
+    if (unknown == 5 && known == 3) *to = 2.1;
+#endif
+    return OK;
+}
+
+static int partial(M *m, const unsigned *u, size_t nu, const unsigned *k, size_t nk, const double *seed, size_t ns, double *to,
+                   size_t nt, bool adjoint) {
+    ENTER(EVENT | CONTINUOUS | STEP | TERMINATED | INITIALIZATION);
+#ifdef FAULT_D05
+    if (!m->exchange) return fail(m);
+#endif
+#ifndef FAULT_D03
+    if (ns != (adjoint ? nu : nk) || nt != (adjoint ? nk : nu)) return fail(m);
+#endif
+    memset(to, 0, nt * sizeof *to);
+    for (size_t i = 0; i < nu; i++) {
+        for (size_t j = 0; j < nk; j++) {
+            double a;
+            if (entry(m, u[i], k[j], &a)) {
+#ifdef FAULT_D03
+                a = 0;
+#else
+                return fail(m);
+#endif
+            }
+#ifdef FAULT_D02
+            if (adjoint) a *= 1.01;
+#endif
+            if (adjoint) to[j] += a * seed[i];
+            else to[i] += a * seed[j];
+        }
+    }
+#ifdef FAULT_D04
+    m->x *= 1 + 1e-9;
+#endif
+    return OK;
+}
+
+static int step(M *m, double t, double h, bool *event, bool *early, double *last) {
+    *event = *early = false;
+    ENTER(STEP);
+    if (!(h > 0) || fabs(t - m->t) > 1e-6) return fail(m);
+    double end = t + h;
+    while (m->t < end - 1e-9) {
+        double to = fmin(end, fmax(instant(m), m->t));
+        m->x = m->u + (m->x - m->u) * exp(-m->gain * (to - m->t));
+        m->t = to;
+        if (!due(m, m->t)) continue;
+        if (m->events) *event = true;
+        if (m->early && to < end - 1e-9 && !(m->events && to == t)) {
+            if (!m->events) tick(m);
+            *early = true;
+            break;
+        }
+        if (m->events && to >= end - 1e-9) break;
+        tick(m);
+        *event = false;
+    }
+    *last = m->t;
+#ifdef FAULT_N01
+    if (m->early && m->k > 4) return fail(m);
+#endif
+#ifdef FAULT_N02
+    if (m->k == 5) *event = true;
+#endif
+#ifdef FAULT_N03
+    if (*early) *last = t + 2 * h;
+#endif
+#ifdef FAULT_N03e
+    if (m->early && m->k == 5) *early = true, *last = end;
+#endif
+    return OK;
+}
+
+static int load(M *m, const M *from) {
+    if (!m || !from) return ERROR;
+#ifdef FAULT_E14
+    if (from->exchange != m->exchange) abort();
+#endif
+    if (from->exchange != m->exchange) return fail(m);
+    int k = m->k;
+    (void)k;
+    *m = *from;
+#ifdef FAULT_E13
+    m->k = k;
+#endif
+    return OK;
+}
+
+static int save(const M *m, M **to) {
+    if (!m || !to) return ERROR;
+    if (!*to) *to = malloc(sizeof(M));
+    return **to = *m, OK;
+}
+
+static int drop(M **state) { return free(*state), *state = NULL, OK; }
+
+#ifndef FMI3
+typedef struct { int again, terminate, nominals, states, defined; double next; } EventInfo;
+
+EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
+EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
+EXPORT void *fmi2Instantiate(const char *n, int type, const char *g, const char *r, const void *c, int v, int l) { return make(type == 0, 0, 0); }
+EXPORT void fmi2FreeInstance(M *m) { free(m); }
+EXPORT int fmi2SetDebugLogging(M *m, int on, size_t n, const char *const *c) { return m ? OK : ERROR; }
+EXPORT int fmi2SetupExperiment(M *m, int a, double b, double start, int c, double d) { ENTER(INSTANTIATED); return m->start = start, OK; }
+EXPORT int fmi2EnterInitializationMode(M *m) { return m ? enter_initialization(m, m->start) : ERROR; }
+EXPORT int fmi2ExitInitializationMode(M *m) { return leave_initialization(m); }
+EXPORT int fmi2Terminate(M *m) { return terminate(m); }
+EXPORT int fmi2Reset(M *m) { return reset(m); }
+EXPORT int fmi2GetReal(M *m, const unsigned *vr, size_t n, double *to) { return get(m, vr, n, to); }
+EXPORT int fmi2SetReal(M *m, const unsigned *vr, size_t n, const double *from) { return set(m, vr, n, from); }
+EXPORT int fmi2GetInteger(M *m, const unsigned *vr, size_t n, int *to) { return get_n(m, vr, n, to); }
+EXPORT int fmi2GetFMUstate(M *m, M **to) { return save(m, to); }
+EXPORT int fmi2SetFMUstate(M *m, M *from) { return load(m, from); }
+EXPORT int fmi2FreeFMUstate(M *m, M **state) { return drop(state); }
+EXPORT int fmi2DoStep(M *m, double t, double h, int p) {
+    bool event, early;
+    double last;
+    return m ? step(m, t, h, &event, &early, &last) : ERROR;
+}
+EXPORT int fmi2EnterEventMode(M *m) { return enter_event(m); }
+EXPORT int fmi2NewDiscreteStates(M *m, EventInfo *info) {
+    Update u;
+    int status = update(m, &u);
+    *info = (EventInfo){u.again, u.terminate, 0, u.states, u.defined, u.next};
+    return status;
+}
+EXPORT int fmi2EnterContinuousTimeMode(M *m) { return enter_continuous(m); }
+EXPORT int fmi2CompletedIntegratorStep(M *m, int p, int *event, int *end) { return *event = *end = 0, completed(m); }
+EXPORT int fmi2SetTime(M *m, double t) { return set_time(m, t); }
+EXPORT int fmi2SetContinuousStates(M *m, const double *x, size_t n) { return set_states(m, x, n); }
+EXPORT int fmi2GetContinuousStates(M *m, double *to, size_t n) { return vector(m, to, n, 0); }
+EXPORT int fmi2GetDerivatives(M *m, double *to, size_t n) { return vector(m, to, n, 1); }
+EXPORT int fmi2GetEventIndicators(M *m, double *to, size_t n) { return vector(m, to, n, 2); }
+EXPORT int fmi2GetNominalsOfContinuousStates(M *m, double *to, size_t n) { return vector(m, to, n, 3); }
+EXPORT int fmi2GetDirectionalDerivative(M *m, const unsigned *u, size_t nu, const unsigned *k, size_t nk, const double *seed, double *to) {
+    return partial(m, u, nu, k, nk, seed, nk, to, nu, false);
+}
+#else
+EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
+EXPORT void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool events, bool early,
+                                         const unsigned *q, size_t nq, void *e, void *log, void *up) { return make(0, events, early); }
+EXPORT void *fmi3InstantiateModelExchange(const char *n, const char *t, const char *r, bool v, bool l, void *e, void *log) { return make(1, 0, 0); }
+EXPORT void fmi3FreeInstance(M *m) { free(m); }
+EXPORT int fmi3SetDebugLogging(M *m, bool on, size_t n, const char *const *c) { return m ? OK : ERROR; }
+EXPORT int fmi3EnterInitializationMode(M *m, bool a, double b, double start, bool c, double d) { return enter_initialization(m, start); }
+EXPORT int fmi3ExitInitializationMode(M *m) { return leave_initialization(m); }
+EXPORT int fmi3Terminate(M *m) { return terminate(m); }
+EXPORT int fmi3Reset(M *m) { return reset(m); }
+EXPORT int fmi3GetFloat64(M *m, const unsigned *vr, size_t n, double *to, size_t nv) { return get(m, vr, n, to); }
+EXPORT int fmi3SetFloat64(M *m, const unsigned *vr, size_t n, const double *from, size_t nv) { return set(m, vr, n, from); }
+EXPORT int fmi3GetInt32(M *m, const unsigned *vr, size_t n, int *to, size_t nv) { return get_n(m, vr, n, to); }
+EXPORT int fmi3GetFMUState(M *m, M **to) { return save(m, to); }
+EXPORT int fmi3SetFMUState(M *m, M *from) { return load(m, from); }
+EXPORT int fmi3FreeFMUState(M *m, M **state) { return drop(state); }
+EXPORT int fmi3DoStep(M *m, double t, double h, bool p, bool *event, bool *end, bool *early, double *last) {
+    return m ? *end = false, step(m, t, h, event, early, last) : ERROR;
+}
+EXPORT int fmi3EnterEventMode(M *m) { return enter_event(m); }
+EXPORT int fmi3EnterStepMode(M *m) { ENTER(m->exchange ? 0 : EVENT); return m->mode = STEP, OK; }
+EXPORT int fmi3UpdateDiscreteStates(M *m, bool *again, bool *end, bool *nominal, bool *state, bool *defined, double *next) {
+    Update u;
+    int status = update(m, &u);
+    *again = u.again, *end = u.terminate, *nominal = false, *state = u.states, *defined = u.defined, *next = u.next;
+    return status;
+}
+EXPORT int fmi3EnterContinuousTimeMode(M *m) { return enter_continuous(m); }
+EXPORT int fmi3CompletedIntegratorStep(M *m, bool p, bool *event, bool *end) { return *event = *end = false, completed(m); }
+EXPORT int fmi3SetTime(M *m, double t) { return set_time(m, t); }
+EXPORT int fmi3SetContinuousStates(M *m, const double *x, size_t n) { return set_states(m, x, n); }
+EXPORT int fmi3GetContinuousStates(M *m, double *to, size_t n) { return vector(m, to, n, 0); }
+EXPORT int fmi3GetContinuousStateDerivatives(M *m, double *to, size_t n) { return vector(m, to, n, 1); }
+EXPORT int fmi3GetEventIndicators(M *m, double *to, size_t n) { return vector(m, to, n, 2); }
+EXPORT int fmi3GetNominalsOfContinuousStates(M *m, double *to, size_t n) { return vector(m, to, n, 3); }
+EXPORT int fmi3GetNumberOfContinuousStates(M *m, size_t *n) { return *n = 1, OK; }
+EXPORT int fmi3GetNumberOfEventIndicators(M *m, size_t *n) { return *n = 1, OK; }
+EXPORT int fmi3GetDirectionalDerivative(M *m, const unsigned *u, size_t nu, const unsigned *k, size_t nk, const double *seed, size_t ns,
+                                        double *to, size_t nt) {
+    return partial(m, u, nu, k, nk, seed, ns, to, nt, false);
+}
+EXPORT int fmi3GetAdjointDerivative(M *m, const unsigned *u, size_t nu, const unsigned *k, size_t nk, const double *seed, size_t ns,
+                                    double *to, size_t nt) {
+    return partial(m, u, nu, k, nk, seed, ns, to, nt, true);
+}
+#endif

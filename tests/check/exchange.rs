@@ -1,0 +1,135 @@
+//! Faults of Model Exchange, of event mode and of partial derivatives: a small C FMU that breaks no rule, compiled with one
+//! fault at a time.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+use crate::binary::{compile_source, pack_with};
+use crate::{check, told, violated};
+use fmu_check::Verdict;
+use std::sync::Mutex;
+
+const GROUPS: [&str; 4] = ["exchange", "events", "derivatives", "event-mode"];
+
+/// Fault, and the checks that must fail.
+const FAULTS: &[(&str, &[&str])] = &[
+    ("NONE", &[]),
+    ("E00", &["E00"]),
+    ("E01", &["E01"]),
+    ("E01i", &["E01i"]),
+    ("E02", &["E02"]),
+    ("E03", &["E03"]),
+    ("E04a", &["E04a", "E04b"]),
+    ("E04b", &["E04b"]),
+    ("E05", &["E05", "D01"]),
+    // A derivative that remembers the last one shows wherever it is read twice.
+    ("E06a", &["E06a", "E06b", "E07", "E09", "D04"]),
+    ("E06b", &["E06b", "D04"]),
+    ("E07", &["E07"]),
+    ("E08", &["E08"]),
+    ("E09", &["E09"]),
+    ("E10", &["E10"]),
+    ("E11", &["E11"]),
+    ("E12", &["E12"]),
+    ("E13", &["E13"]),
+    ("E14", &["E14"]),
+    ("E20", &["E20"]),
+    ("E21", &["E21"]),
+    ("E22", &["E22"]),
+    ("E23", &["E23"]),
+    ("E24a", &["E24a"]),
+    ("E24b", &["E24b"]),
+    ("E25", &["E25"]),
+    ("E26", &["E26"]),
+    ("D01", &["D01"]),
+    ("D03", &["D03"]),
+    ("D04", &["D04"]),
+    ("D05", &["D05"]),
+];
+
+/// Faults of FMI 3.0: what only it has, and one of each function that differs.
+const FAULTS3: &[(&str, &[&str])] = &[
+    ("NONE", &[]),
+    ("E03", &["E03"]),
+    ("E05", &["E05", "D01"]),
+    ("E07", &["E07"]),
+    ("E13", &["E13"]),
+    ("E21", &["E21"]),
+    ("E24b", &["E24b"]),
+    ("D03", &["D03"]),
+    ("D05", &["D05"]),
+    ("D02", &["D02"]),
+    ("N01", &["N01"]),
+    ("N02", &["N02"]),
+    // A step from a wrong time is refused.
+    ("N03", &["N01", "N03", "N03e"]),
+    ("N03e", &["N01", "N03e"]),
+    ("N04", &["N04"]),
+    ("N05", &["N05"]),
+    ("N06", &["N06"]),
+    ("N07", &["N07"]),
+];
+
+fn each(version: u8, faults: &[(&str, &[&str])]) {
+    let dir = tempfile::tempdir().unwrap();
+    let xml = if version == 2 { include_str!("exchange2.xml") } else { include_str!("exchange3.xml") };
+    let standard: &[&str] = if version == 2 { &[] } else { &["-DFMI3"] };
+    let build = |fault: &str| compile_source(dir.path(), "tests/check/exchange.c", version, fault, standard);
+    if build("NONE").is_none() {
+        eprintln!("there is no C compiler: not tested");
+        return;
+    }
+    let (wrong, next) = (Mutex::new(Vec::new()), Mutex::new(faults.iter()));
+    std::thread::scope(|scope| {
+        for _ in 0..3 {
+            scope.spawn(|| {
+                loop {
+                    let Some((fault, ids)) = next.lock().unwrap().next() else { return };
+                    let path = pack_with(dir.path(), fault, xml, &build(fault).unwrap());
+                    let report = check(&path, &GROUPS);
+                    if violated(&report) != *ids {
+                        wrong.lock().unwrap().push(format!("{fault}: {}", told(&report)));
+                    }
+                    // What the fault does not hide is determined.
+                    let open = report.findings.iter().find(|f| matches!(f.verdict, Verdict::NotDetermined(_)));
+                    if let ("NONE", Some(open)) = (*fault, open) {
+                        wrong.lock().unwrap().push(format!("{fault}: {open:?}"));
+                    }
+                }
+            });
+        }
+    });
+    let wrong = wrong.into_inner().unwrap();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn each_fault_is_found_by_its_check() {
+    each(2, FAULTS);
+}
+
+#[test]
+fn each_fault_of_fmi_3_is_found_by_its_check() {
+    each(3, FAULTS3);
+}
+
+/// An FMU for Model Exchange alone is run as such; what co-simulation needs does not apply to it.
+#[test]
+fn an_fmu_without_co_simulation_is_run() {
+    let dir = tempfile::tempdir().unwrap();
+    for (version, xml, more) in
+        [(2, include_str!("exchange2.xml"), &[][..]), (3, include_str!("exchange3.xml"), &["-DFMI3"])]
+    {
+        let Some(binary) = compile_source(dir.path(), "tests/check/exchange.c", version, "NONE", more) else { return };
+        let without: Vec<_> = xml.lines().filter(|line| !line.contains("<CoSimulation")).collect();
+        let report = check(&pack_with(dir.path(), "exchange-only", &without.join("\n"), &binary), &[]);
+        let verdict = |id: &str| report.finding(id).map(|f| f.verdict.clone()).unwrap();
+        assert!(matches!(verdict("E00"), Verdict::Pass(_)), "{}", told(&report));
+        assert!(matches!(verdict("E13"), Verdict::Pass(_)), "{}", told(&report));
+        assert!(matches!(verdict("B00"), Verdict::Pass(_)), "{}", told(&report));
+        for id in ["L00", "L07", "T01a", "F02a", "D05"] {
+            assert!(matches!(verdict(id), Verdict::NotApplicable(_)), "{id}: {:?}", verdict(id));
+        }
+        for id in ["X08", "L03"] {
+            assert!(!matches!(verdict(id), Verdict::Violated(_)), "{id}: {:?}", verdict(id));
+        }
+    }
+}
