@@ -7,7 +7,7 @@ use crate::modulation::limit_to_hexagon;
 use crate::motor::Motor;
 use crate::plant::legs::Legs;
 use crate::plant::losses::flow::{Flow, Lossy};
-use crate::plant::losses::{Losses, efficiency};
+use crate::plant::losses::{self, Losses, efficiency};
 use crate::plant::machine::{self, Machine};
 use crate::plant::mechanics::{Motion, Shaft};
 use crate::plant::power::{Energy, Powers};
@@ -215,23 +215,28 @@ impl PmsmPlant {
         Lossy::new(&self.parameters, inputs.enable, inputs.u_dc, legs.i_zone())
     }
 
-    /// The present instant, at the end of a step, and the current (A) at the terminals.
+    /// The present instant, at the end of a step.
     #[inline]
-    fn reached(&self) -> (Instant, Dq) {
-        let PlantParameters { motor, saturation, iron, .. } = &self.parameters;
+    fn reached(&self) -> Instant {
+        let PlantParameters { motor, saturation, .. } = &self.parameters;
         let State { psi, speed, angle, axis } = self.state;
         let i = machine::current(motor, saturation, psi);
-        let at = Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable };
-        if iron.is_none() { (at, i) } else { self.with_iron(at) }
+        Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable }
     }
 
-    /// The same with iron loss, which draws a current beside that of the flux linkage.
-    #[inline(never)]
-    fn with_iron(&self, at: Instant) -> (Instant, Dq) {
-        let i = if at.idle { self.idle_current(at.speed) } else { at.i };
-        let at = Instant { i, ..at };
+    /// The same with iron loss, and the current (A) at the terminals.
+    fn reached_with_iron(&self) -> (Instant, Dq) {
+        let at = self.reached();
+        let at = if at.idle { Instant { i: self.idle_current(at.speed), ..at } } else { at };
         let i = at.axis.from_stator(self.rates(&self.inputs, &at).i);
         (at, i)
+    }
+
+    /// The outputs with iron loss.
+    #[inline(never)]
+    fn output_with_iron(&self, out: &mut PlantOutputs) {
+        let (at, i) = self.reached_with_iron();
+        *out = self.shown(&at, i, self.inputs.tau_load, self.powers);
     }
 
     /// The outputs with the current `i` (A) at the terminals, the load torque `tau_load` (N.m) and these `powers`.
@@ -263,8 +268,9 @@ impl PmsmPlant {
     }
 
     /// Stator currents in A.
+    #[inline(never)]
     fn currents(&self) -> Phases {
-        let (at, i) = self.reached();
+        let (at, i) = self.reached_with_iron();
         Phases::from_stator(at.axis.to_stator(i))
     }
 
@@ -363,32 +369,6 @@ impl PmsmPlant {
         (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
     }
 
-    /// `count` integration steps of `h` (s) from `state` on, with the gates off or with losses besides that of a constant
-    /// resistance.
-    #[inline(never)]
-    fn lose(
-        &self,
-        state: &mut State,
-        (h, count): (f64, f64),
-        u: AlphaBeta,
-        legs: &Legs,
-        lossy: Option<&Lossy<'_>>,
-    ) -> Passed {
-        let (mut passed, mut left) = (Passed::default(), count);
-        while left > 0.0 {
-            let (next, step) = if self.inputs.enable {
-                self.drive_lossy(state, h, u, legs, lossy)
-            } else {
-                self.coast(state, h, legs, lossy)
-            };
-            *state = next;
-            passed.energy.add(&step.energy);
-            passed.losses.add(&step.losses);
-            left -= 1.0;
-        }
-        passed
-    }
-
     /// [`drive`](Self::drive) with losses besides that of a constant resistance.
     #[inline(never)]
     fn drive_lossy(
@@ -427,6 +407,60 @@ impl PmsmPlant {
         let state = State::new(motor, self.idle_flux(x[0]), x[0], x[1]);
         let losses = Losses { cu: lost, iron: x[4], friction: x[3] - lost - x[4], ..Losses::none() };
         (state, Passed { energy: Energy { r#in: 0.0, mech: x[2], loss: x[3] }, losses })
+    }
+
+    /// A communication step; `LOSSY`: with the gates off or with losses besides that of a constant resistance.
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
+    fn step<const LOSSY: bool>(&mut self, step: &Step) -> Result<(), Fault> {
+        let legs = self.legs(&self.inputs);
+        let lossy = if LOSSY { self.lossy(&self.inputs, &legs) } else { None };
+        let (mut state, mut energy) = self.at_the_shaft();
+        let mut losses = Losses::none();
+        let mut left = self.substeps(step.h, state.speed, &legs, lossy.is_some())?;
+        let h = step.h / left;
+        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
+        while left > 0.0 {
+            let (next, passed) = match (LOSSY, self.inputs.enable, lossy.as_ref()) {
+                (false, ..) => self.drive::<false>(&state, h, u, &legs, None),
+                (true, true, lossy) => self.drive::<true>(&state, h, u, &legs, lossy),
+                (true, false, lossy) => self.coast(&state, h, &legs, lossy),
+            };
+            state = next;
+            energy.add(&passed.energy);
+            if LOSSY {
+                losses.add(&passed.losses);
+            } else {
+                losses.friction += passed.losses.friction;
+            }
+            left -= 1.0;
+        }
+        let lost = if !LOSSY || self.inputs.enable { None } else { self.remaining(&state, &legs) };
+        if let Some(lost) = lost {
+            state.psi = self.idle_flux(state.speed);
+            energy.loss += lost;
+            losses.cu += lost;
+        }
+        if !LOSSY {
+            losses.cu = energy.loss - losses.friction;
+        }
+        if !(state.is_finite() && energy.is_finite()) {
+            return Err(Fault::new(format!(
+                "the machine's state left the finite numbers within a step of {} s; the step before it ended with {}",
+                step.h,
+                self.state.tell()
+            )));
+        }
+        (self.state, self.blocked) = (state, lost.is_some());
+        self.energy.add(&energy);
+        self.powers = Powers::mean(&energy, losses, step.h, &self.inputs, &legs, || self.currents());
+        Ok(())
+    }
+
+    /// [`step`](Self::step) with losses, out of the way of a step without them.
+    #[inline(never)]
+    fn step_with_losses(&mut self, step: &Step) -> Result<(), Fault> {
+        self.step::<true>(step)
     }
 
     /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.
@@ -478,50 +512,19 @@ impl Model for PmsmPlant {
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
-        let (at, i) = self.reached();
-        *out = self.shown(&at, i, self.inputs.tau_load, self.powers);
+        if !self.parameters.iron.is_none() {
+            return self.output_with_iron(out);
+        }
+        let at = self.reached();
+        *out = self.shown(&at, at.i, self.inputs.tau_load, self.powers);
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        let legs = self.legs(&self.inputs);
-        let lossy = self.lossy(&self.inputs, &legs);
-        let (mut state, mut energy) = self.at_the_shaft();
-        let mut losses = Losses::none();
-        let mut left = self.substeps(step.h, state.speed, &legs, lossy.is_some())?;
-        let h = step.h / left;
-        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
-        // Two loops, so that one without these losses adds up none.
-        if self.inputs.enable && lossy.is_none() {
-            while left > 0.0 {
-                let (next, passed) = self.drive::<false>(&state, h, u, &legs, None);
-                state = next;
-                energy.add(&passed.energy);
-                losses.friction += passed.losses.friction;
-                left -= 1.0;
-            }
-            losses.cu = energy.loss - losses.friction;
+        if self.inputs.enable && !losses::any(&self.parameters) {
+            self.step::<false>(step)
         } else {
-            let passed = self.lose(&mut state, (h, left), u, &legs, lossy.as_ref());
-            energy.add(&passed.energy);
-            losses = passed.losses;
+            self.step_with_losses(step)
         }
-        let lost = if self.inputs.enable { None } else { self.remaining(&state, &legs) };
-        if let Some(lost) = lost {
-            state.psi = self.idle_flux(state.speed);
-            energy.loss += lost;
-            losses.cu += lost;
-        }
-        if !(state.is_finite() && energy.is_finite()) {
-            return Err(Fault::new(format!(
-                "the machine's state left the finite numbers within a step of {} s; the step before it ended with {}",
-                step.h,
-                self.state.tell()
-            )));
-        }
-        (self.state, self.blocked) = (state, lost.is_some());
-        self.energy.add(&energy);
-        self.powers = Powers::mean(&energy, losses, step.h, &self.inputs, &legs, || self.currents());
-        Ok(())
     }
 }
 

@@ -43,18 +43,12 @@ pub struct Flow<S> {
 
 impl<'a, S: Scalar> Lossy<'a, S> {
     /// At the DC-link voltage `u_dc` (V), with switching legs or the gates off, whose voltages fall linearly below `i_zone`
-    /// (A); `None` without these losses and windage.
-    #[inline]
+    /// (A); `None` without [`any`](super::any) of these losses.
     pub fn new(parameters: &'a PlantParameters, switching: bool, u_dc: S, i_zone: S) -> Option<Self> {
-        let PlantParameters { inverter, iron, winding, mechanics, .. } = parameters;
-        if iron.is_none() && inverter.devices.is_none() && winding.k_ac + mechanics.k_w == 0.0 {
-            return None;
-        }
-        Some(Self::with(parameters, switching, u_dc, i_zone))
+        super::any(parameters).then(|| Self::with(parameters, switching, u_dc, i_zone))
     }
 
-    /// The same with these losses; kept out of the code of a step without them.
-    #[inline(never)]
+    /// The same with these losses.
     fn with(parameters: &'a PlantParameters, switching: bool, u_dc: S, i_zone: S) -> Self {
         let PlantParameters { motor, inverter, iron, winding, .. } = parameters;
         let sw = if switching { switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc) } else { 0.0.into() };

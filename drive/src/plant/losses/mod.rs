@@ -15,6 +15,7 @@ mod figures;
 pub mod flow;
 pub mod switching;
 
+use crate::plant::tables::PlantParameters;
 use fmu_core::unit::WATT;
 use fmu_core::{Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
@@ -74,6 +75,13 @@ impl Losses {
             friction: f(self.friction, other.friction),
         }
     }
+}
+
+/// Whether there is a loss besides friction and that of a constant resistance.
+#[inline]
+pub fn any(parameters: &PlantParameters) -> bool {
+    let PlantParameters { inverter, mechanics, iron, winding, .. } = parameters;
+    !(iron.is_none() && inverter.devices.is_none() && winding.k_ac + mechanics.k_w == 0.0)
 }
 
 /// Efficiency of a drive that takes `p_in` (W) from the link and gives `p_mech` (W) to the load.
