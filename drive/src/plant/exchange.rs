@@ -18,6 +18,7 @@ use crate::plant::model::{Held, Instant, PmsmPlant, Rates};
 use crate::plant::power::{Powers, dc_current};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::PlantParameters;
+use crate::plant::thermal::ThermalMode;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
 use fmu_core::{ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar, State};
 
@@ -97,6 +98,9 @@ impl PmsmPlant {
 
     /// [`ContinuousTime::derivatives`] under these `inputs`.
     pub(crate) fn derivatives_under(&self, inputs: &PlantInputs, dx: &mut [f64]) -> Result<(), Fault> {
+        if self.parameters.thermal.mode == ThermalMode::Imposed {
+            self.judge_temperatures(inputs)?;
+        }
         let slopes = self.slopes(inputs, &self.present(inputs));
         if !crate::math::all_finite(slopes) {
             return Err(Fault::new(format!("the machine has no finite derivatives at {}", self.state.tell())));

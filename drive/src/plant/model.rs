@@ -443,7 +443,8 @@ impl Model for PmsmPlant {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        self.validate_temperatures()
+        self.parameters.thermal.validate()?;
+        self.judge_temperatures(&self.inputs)
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {

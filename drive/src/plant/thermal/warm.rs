@@ -68,28 +68,27 @@ impl PmsmPlant {
         self.warm.at = at;
     }
 
-    /// The temperatures (K) at the start of the simulation, and the names of those of winding and magnets.
-    fn start(&self) -> (Temperatures, [&'static str; 2]) {
+    /// The temperatures (K) that parameters and `inputs` say, and the names of those of winding and magnets.
+    fn given(&self, inputs: &PlantInputs) -> (Temperatures, [&'static str; 2]) {
         match self.parameters.thermal.mode {
-            ThermalMode::Imposed => (self.inputs.thermal.imposed, ["T_winding_imposed", "T_magnet_imposed"]),
+            ThermalMode::Imposed => (inputs.thermal.imposed, ["T_winding_imposed", "T_magnet_imposed"]),
             _ => (Temperatures::all(self.parameters.thermal.T_start), ["thermal.T_start"; 2]),
         }
     }
 
     /// The temperatures at the start act.
     pub(in crate::plant) fn start_temperatures(&mut self) {
-        self.take(self.start().0);
+        self.take(self.given(&self.inputs).0);
     }
 
     /// The imposed temperatures act from the beginning of a step on.
     #[inline(never)]
     pub(in crate::plant) fn impose(&mut self) -> Result<(), Fault> {
-        let (at, names) = self.start();
-        if at == self.warm.at {
-            return Ok(());
+        let at = self.inputs.thermal.imposed;
+        if at != self.warm.at {
+            self.judge_temperatures(&self.inputs)?;
+            self.change(at);
         }
-        self.possible(&at, names)?;
-        self.change(at);
         Ok(())
     }
 
@@ -113,16 +112,11 @@ impl PmsmPlant {
         }
     }
 
-    fn possible(&self, at: &Temperatures, names: [&str; 2]) -> Result<(), Fault> {
+    /// Refuses given temperatures that cannot be.
+    pub(in crate::plant) fn judge_temperatures(&self, inputs: &PlantInputs) -> Result<(), Fault> {
+        let (at, names) = self.given(inputs);
         let remedy = "temperatures are in K (20 degC are 293.15 K); correct the temperature or the coefficient";
-        self.parameters.thermal.check(&self.parameters.motor, at, names, remedy)
-    }
-
-    /// Refuses temperatures and heat capacities that cannot work.
-    pub(in crate::plant) fn validate_temperatures(&self) -> Result<(), Fault> {
-        self.parameters.thermal.validate()?;
-        let (at, names) = self.start();
-        self.possible(&at, names)
+        self.parameters.thermal.check(&self.parameters.motor, &at, names, remedy)
     }
 
     /// Refuses the network in Model Exchange.
