@@ -29,7 +29,7 @@ impl PmsmPlant {
     /// The state of flux linkage (Wb), speed (rad/s) and angle (rad) as the equations see it under these `inputs`.
     #[inline]
     fn instant<S: Scalar>(&self, inputs: &PlantInputs<S>, (psi, speed, angle): (Vector<Rotor, S>, S, S)) -> Instant<S> {
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let PlantParameters { saturation, mechanics, iron, thermal, .. } = &self.parameters;
         let motor = &self.motor(inputs);
         let theta = |angle: S| angle * f64::from(motor.n_p);
         let (speed, angle, axis) = if mechanics.imposed {
@@ -38,7 +38,9 @@ impl PmsmPlant {
             (speed, angle, self.state.axis.with(theta(angle)))
         };
         let idle = self.blocked && !inputs.enable;
-        let psi = if idle { self.idle_flux(motor, speed) } else { psi };
+        // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
+        let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
+        let psi = if follows { self.idle_flux(motor, speed) } else { psi };
         let i = if idle { self.idle_current(motor, speed) } else { Machine::new(motor, saturation).current(psi) };
         Instant { psi, i, speed, angle, axis, idle }
     }

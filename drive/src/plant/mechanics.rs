@@ -107,6 +107,12 @@ impl<'a, S: Scalar> Shaft<'a, S> {
         Self { mechanics, B, k_w, by_J, tau_load, speed, share, sign, full, tau_full }
     }
 
+    /// The same without windage.
+    #[inline]
+    pub fn without_windage(self) -> Self {
+        Self { k_w: 0.0, ..self }
+    }
+
     /// The motion at `speed` (rad/s) and the torque `tau_e` (N.m).
     #[inline]
     pub fn motion(&self, speed: S, tau_e: S) -> Motion<S> {

@@ -219,20 +219,24 @@ impl PmsmPlant {
         Lossy::new(&self.parameters, inputs.enable, inputs.u_dc, legs.i_zone())
     }
 
-    /// The current (A) at the terminals under these `inputs`.
+    /// The present instant, at the end of a step, and the current (A) at the terminals.
     #[inline]
-    fn terminal_current(&self, inputs: &PlantInputs, at: &Instant) -> Dq {
-        if self.parameters.iron.is_none() { at.i } else { at.axis.from_stator(self.rates(inputs, at).i) }
+    fn reached(&self) -> (Instant, Dq) {
+        let PlantParameters { saturation, iron, .. } = &self.parameters;
+        let motor = &self.warm.motor;
+        let State { psi, speed, angle, axis } = self.state;
+        let i = machine::current(motor, saturation, psi);
+        let at = Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable };
+        if iron.is_none() { (at, i) } else { self.with_iron(at) }
     }
 
-    /// The present instant, at the end of a step.
-    #[inline]
-    fn reached(&self) -> Instant {
-        let (motor, saturation) = (&self.warm.motor, &self.parameters.saturation);
-        let State { psi, speed, angle, axis } = self.state;
-        let idle = self.blocked && !self.inputs.enable;
-        let i = if idle { self.idle_current(motor, speed) } else { machine::current(motor, saturation, psi) };
-        Instant { psi, i, speed, angle, axis, idle }
+    /// The same with iron loss, which draws a current beside that of the flux linkage.
+    #[inline(never)]
+    fn with_iron(&self, at: Instant) -> (Instant, Dq) {
+        let i = if at.idle { self.idle_current(&self.warm.motor, at.speed) } else { at.i };
+        let at = Instant { i, ..at };
+        let i = at.axis.from_stator(self.rates(&self.inputs, &at).i);
+        (at, i)
     }
 
     /// The outputs under these `inputs` with the current `i` (A) at the terminals, the `temperatures` (K) and these `powers`.
@@ -268,8 +272,8 @@ impl PmsmPlant {
 
     /// Stator currents in A.
     fn currents(&self) -> Phases {
-        let at = self.reached();
-        Phases::from_stator(at.axis.to_stator(self.terminal_current(&self.inputs, &at)))
+        let (at, i) = self.reached();
+        Phases::from_stator(at.axis.to_stator(i))
     }
 
     /// The state at the beginning of a step and the energy needed to reach it: an imposed shaft takes the angle of the
@@ -330,13 +334,14 @@ impl PmsmPlant {
     ) -> (State, Passed) {
         let PlantParameters { saturation, mechanics, .. } = &self.parameters;
         let motor = &self.warm.motor;
+        let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
         let held = Held {
             machine: Machine::new(motor, saturation),
             u,
             legs: legs.drop().then_some(legs),
-            // Known to the compiler, so that a step without these losses takes no time for them.
+            // Known to the compiler, so that a step without them takes no time for them.
             lossy: if LOSSY { lossy } else { None },
-            shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
+            shaft: if LOSSY { shaft } else { shaft.without_windage() },
         };
         let (n_p, half, speed) = (f64::from(motor.n_p), 0.5 * h, start.speed);
         let psi = held.machine.to_stator(start.axis, start.psi);
@@ -366,6 +371,32 @@ impl PmsmPlant {
         };
         let axis = axis_at(motor, angle);
         (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
+    }
+
+    /// `count` integration steps of `h` (s) from `state` on, with the gates off or with losses besides that of a constant
+    /// resistance.
+    #[inline(never)]
+    fn lose(
+        &self,
+        state: &mut State,
+        (h, count): (f64, f64),
+        u: AlphaBeta,
+        legs: &Legs,
+        lossy: Option<&Lossy<'_>>,
+    ) -> Passed {
+        let (mut passed, mut left) = (Passed::default(), count);
+        while left > 0.0 {
+            let (next, step) = if self.inputs.enable {
+                self.drive_lossy(state, h, u, legs, lossy)
+            } else {
+                self.coast(state, h, legs, lossy)
+            };
+            *state = next;
+            passed.energy.add(&step.energy);
+            passed.losses.add(&step.losses);
+            left -= 1.0;
+        }
+        passed
     }
 
     /// [`drive`](Self::drive) with losses besides that of a constant resistance.
@@ -473,8 +504,7 @@ impl Model for PmsmPlant {
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
-        let at = self.reached();
-        let i = self.terminal_current(&self.inputs, &at);
+        let (at, i) = self.reached();
         *out = self.shown(&self.inputs, &at, i, self.warm.at, self.powers);
     }
 
@@ -490,16 +520,20 @@ impl Model for PmsmPlant {
         let mut left = self.substeps(step.h, state.speed, &legs, lossy.is_some())?;
         let h = step.h / left;
         let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
-        while left > 0.0 {
-            let (next, passed) = match (self.inputs.enable, lossy.as_ref()) {
-                (true, None) => self.drive::<false>(&state, h, u, &legs, None),
-                (true, lossy) => self.drive_lossy(&state, h, u, &legs, lossy),
-                (false, lossy) => self.coast(&state, h, &legs, lossy),
-            };
-            state = next;
+        // Two loops, so that one without these losses adds up none.
+        if self.inputs.enable && lossy.is_none() {
+            while left > 0.0 {
+                let (next, passed) = self.drive::<false>(&state, h, u, &legs, None);
+                state = next;
+                energy.add(&passed.energy);
+                losses.friction += passed.losses.friction;
+                left -= 1.0;
+            }
+            losses.cu = energy.loss - losses.friction;
+        } else {
+            let passed = self.lose(&mut state, (h, left), u, &legs, lossy.as_ref());
             energy.add(&passed.energy);
-            losses.add(&passed.losses);
-            left -= 1.0;
+            losses = passed.losses;
         }
         let lost = if self.inputs.enable { None } else { self.remaining(&state, &legs) };
         if let Some(lost) = lost {
@@ -507,7 +541,7 @@ impl Model for PmsmPlant {
             energy.loss += lost;
             losses.cu += lost;
         }
-        if !(state.is_finite() && energy.is_finite() && losses.is_finite()) {
+        if !(state.is_finite() && energy.is_finite()) {
             return Err(Fault::new(format!(
                 "the machine's state left the finite numbers within a step of {} s; the step before it ended with {}",
                 step.h,

@@ -43,11 +43,11 @@ pub struct Flow<S> {
 
 impl<'a, S: Scalar> Lossy<'a, S> {
     /// At the DC-link voltage `u_dc` (V), with switching legs or the gates off, whose voltages fall linearly below `i_zone`
-    /// (A); `None` without these losses.
+    /// (A); `None` without these losses and windage.
     #[inline]
     pub fn new(parameters: &'a PlantParameters, switching: bool, u_dc: S, i_zone: S) -> Option<Self> {
-        let PlantParameters { inverter, iron, winding, .. } = parameters;
-        if iron.is_none() && inverter.devices.is_none() && winding.k_ac == 0.0 {
+        let PlantParameters { inverter, iron, winding, mechanics, .. } = parameters;
+        if iron.is_none() && inverter.devices.is_none() && winding.k_ac + mechanics.k_w == 0.0 {
             return None;
         }
         Some(Self::with(parameters, switching, u_dc, i_zone))

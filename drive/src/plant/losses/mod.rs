@@ -15,7 +15,6 @@ mod figures;
 pub mod flow;
 pub mod switching;
 
-use crate::math::all_finite;
 use fmu_core::unit::WATT;
 use fmu_core::{Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
@@ -74,11 +73,6 @@ impl Losses {
             sw: f(self.sw, other.sw),
             friction: f(self.friction, other.friction),
         }
-    }
-
-    /// Whether all values are numbers.
-    pub fn is_finite(&self) -> bool {
-        all_finite([self.cu, self.iron, self.cond, self.sw, self.friction])
     }
 }
 
