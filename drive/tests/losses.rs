@@ -6,6 +6,7 @@ use drive::frame::{AlphaBeta, Phases};
 use drive::motor::Motor;
 use drive::plant::machine;
 use drive::plant::tables::PlantParameters;
+use drive::plant::thermal::{Temperatures, ThermalMode};
 use drive::{PmsmDrive, PmsmPlant};
 use fmu_core::{Block, Capabilities, ContinuousTime, Description, Elapsed, Events, Exported, Step, integrate};
 use std::f64::consts::PI;
@@ -19,6 +20,16 @@ fn lossy(par: &mut PlantParameters) {
     (devices.u_transistor, devices.r_transistor, devices.u_diode, devices.r_diode) = (0.9, 0.06, 0.7, 0.05);
     (devices.E_sw, devices.i_sw, devices.u_sw) = (2.5e-3, 15.0, 600.0);
     (par.inverter.dead_time, par.inverter.i_zero) = (2e-6, 0.1);
+}
+
+/// The same machine, warm.
+fn warm(par: &mut PlantParameters) {
+    (par.thermal.alpha_R, par.thermal.alpha_psi, par.thermal.T_start) = (3.93e-3, -1.1e-3, 393.15);
+}
+
+/// The machine at its temperature.
+fn machine_of(par: &PlantParameters) -> Motor {
+    par.thermal.motor(&par.motor, &Temperatures::all(par.thermal.T_start))
 }
 
 /// A deterministic number in -1..1.
@@ -37,6 +48,9 @@ fn the_powers_are_balanced_at_every_instant() {
         if point % 2 == 1 {
             (par.saturation.s_2, par.saturation.s_3, par.saturation.s_dq) = (40.0, 40.0, 7.0);
         }
+        if point % 5 > 2 {
+            warm(par);
+        }
         let inputs = &mut block.model.inputs;
         (inputs.u_dc, inputs.enable) = (540.0, point % 3 != 0);
         inputs.u = Phases { a: 300.0 * draw(&mut seed), b: 300.0 * draw(&mut seed), c: 300.0 * draw(&mut seed) };
@@ -52,7 +66,8 @@ fn the_powers_are_balanced_at_every_instant() {
         let mut dx = [0.0; 4];
         block.model.derivatives(Elapsed::ZERO, &mut dx).unwrap();
         block.model.observe(Elapsed::ZERO, &mut block.out);
-        let PlantParameters { motor, saturation, mechanics, .. } = &block.model.parameters;
+        let PlantParameters { saturation, mechanics, .. } = &block.model.parameters;
+        let motor = &machine_of(&block.model.parameters);
         let i = machine::current(motor, saturation, drive::frame::Dq::new(values[0], values[1]));
         let stored = 1.5 * (i.d() * dx[0] + i.q() * dx[1]) + mechanics.J * values[2] * dx[2];
         let p = &block.out.powers;
@@ -94,8 +109,9 @@ fn turning(h: f64, steps: u32, set: impl Fn(&mut PlantParameters)) -> Block<Pmsm
 fn the_energies_are_balanced_over_20_ms() {
     let stored = |block: &mut Block<PmsmPlant>| {
         let [d, q, speed] = [0, 1, 2].map(|k: usize| *(PmsmPlant::STATES[k].at)(&mut block.model));
-        let PlantParameters { motor, saturation, mechanics, .. } = &block.model.parameters;
-        machine::magnetic_energy(motor, saturation, drive::frame::Dq::new(d, q)) + 0.5 * mechanics.J * speed * speed
+        let PlantParameters { saturation, mechanics, .. } = &block.model.parameters;
+        machine::magnetic_energy(&machine_of(&block.model.parameters), saturation, drive::frame::Dq::new(d, q))
+            + 0.5 * mechanics.J * speed * speed
     };
     // Kinks of dead time and thresholds cost the method its order; without them the balance closes to 1e-8.
     let smooth = |par: &mut PlantParameters| {
@@ -104,7 +120,13 @@ fn the_energies_are_balanced_over_20_ms() {
         par.inverter.devices.r_diode = par.inverter.devices.r_transistor;
     };
     let kinks = |_: &mut PlantParameters| ();
-    for (name, set, allowed) in [("smooth", &smooth as &dyn Fn(&mut PlantParameters), 1e-8), ("all", &kinks, 3e-8)] {
+    let hot = |par: &mut PlantParameters| {
+        smooth(par);
+        warm(par);
+    };
+    for (name, set, allowed) in
+        [("smooth", &smooth as &dyn Fn(&mut PlantParameters), 1e-8), ("hot", &hot, 1e-8), ("all", &kinks, 3e-8)]
+    {
         let mut start = turning(5e-5, 0, set);
         let mut block = turning(5e-5, 400, set);
         let change = stored(&mut block) - stored(&mut start);
@@ -117,13 +139,15 @@ fn the_energies_are_balanced_over_20_ms() {
 }
 
 #[test]
-fn the_drive_with_iron_loss_is_the_same_in_model_exchange() {
+fn the_drive_with_iron_loss_and_temperatures_is_the_same_in_model_exchange() {
     let mut stepped = Block::<PmsmDrive>::default();
     let pair = &mut stepped.model.pair;
     let par = &mut pair.plant.model.parameters;
     (par.iron.G_e, par.iron.G_h) = (1.3e-4, 0.12);
     (par.inverter.devices.r_transistor, par.inverter.devices.r_diode) = (0.08, 0.08);
     par.initial.theta_e = PI;
+    (par.thermal.mode, par.thermal.alpha_R, par.thermal.alpha_psi) = (ThermalMode::Imposed, 3.93e-3, -1.1e-3);
+    stepped.model.inputs.thermal.imposed = Temperatures::all(323.15);
     stepped.model.inputs.speed_ref = 50.0;
     stepped.initialize();
     let mut integrated = stepped.clone();

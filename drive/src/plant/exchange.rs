@@ -18,6 +18,7 @@ use crate::plant::model::{Held, Instant, PmsmPlant, Rates};
 use crate::plant::power::{Powers, dc_current};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::PlantParameters;
+use crate::plant::thermal::ThermalMode;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
 use fmu_core::{ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar, State};
 
@@ -28,7 +29,8 @@ impl PmsmPlant {
     /// The state of flux linkage (Wb), speed (rad/s) and angle (rad) as the equations see it under these `inputs`.
     #[inline]
     fn instant<S: Scalar>(&self, inputs: &PlantInputs<S>, (psi, speed, angle): (Vector<Rotor, S>, S, S)) -> Instant<S> {
-        let PlantParameters { motor, saturation, mechanics, iron, .. } = &self.parameters;
+        let PlantParameters { saturation, mechanics, iron, thermal, .. } = &self.parameters;
+        let motor = &self.motor(inputs);
         let theta = |angle: S| angle * f64::from(motor.n_p);
         let (speed, angle, axis) = if mechanics.imposed {
             (inputs.speed_shaft, inputs.angle_shaft, Axis::at(theta(inputs.angle_shaft)))
@@ -36,8 +38,10 @@ impl PmsmPlant {
             (speed, angle, self.state.axis.with(theta(angle)))
         };
         let idle = self.blocked && !inputs.enable;
-        let psi = if idle && !iron.is_none() { self.idle_flux(speed) } else { psi };
-        let i = if idle { self.idle_current(speed) } else { Machine::new(motor, saturation).current(psi) };
+        // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
+        let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
+        let psi = if follows { self.idle_flux(motor, speed) } else { psi };
+        let i = if idle { self.idle_current(motor, speed) } else { Machine::new(motor, saturation).current(psi) };
         Instant { psi, i, speed, angle, axis, idle }
     }
 
@@ -57,8 +61,8 @@ impl PmsmPlant {
     /// Derivatives and powers at an instant.
     #[inline]
     pub(super) fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
-        let legs = self.legs(inputs);
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let (motor, legs) = (&self.motor(inputs), self.legs(inputs));
         let lossy = self.lossy(inputs, &legs);
         let held = Held {
             machine: Machine::new(motor, saturation),
@@ -91,11 +95,14 @@ impl PmsmPlant {
         let p_in = p_in + 0.0.into();
         let currents = || Phases::from_stator(at.axis.to_stator(i));
         let i_dc = dc_current(p_in, inputs, &self.legs(inputs), currents);
-        self.shown(at, i, inputs.tau_load, Powers { i_dc, p_in, p_mech, p_loss, losses })
+        self.shown(inputs, at, i, self.temperatures(inputs), Powers { i_dc, p_in, p_mech, p_loss, losses })
     }
 
     /// [`ContinuousTime::derivatives`] under these `inputs`.
     pub(crate) fn derivatives_under(&self, inputs: &PlantInputs, dx: &mut [f64]) -> Result<(), Fault> {
+        if self.parameters.thermal.mode == ThermalMode::Imposed {
+            self.judge_temperatures(inputs)?;
+        }
         let slopes = self.slopes(inputs, &self.present(inputs));
         if !crate::math::all_finite(slopes) {
             return Err(Fault::new(format!("the machine has no finite derivatives at {}", self.state.tell())));
@@ -136,9 +143,9 @@ impl PmsmPlant {
 
     /// Whether diodes block the current that the flux linkage has, and by how much this is exceeded.
     fn diodes(&self, inputs: &PlantInputs) -> (bool, [f64; 2]) {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
+        let (motor, saturation) = (&self.motor(inputs), &self.parameters.saturation);
         let Instant { psi, speed, axis, .. } = self.present(inputs);
-        let idle = self.idle_current(speed);
+        let idle = self.idle_current(motor, speed);
         let (legs, i) = (self.legs(inputs), machine::current(motor, saturation, psi) - idle);
         let w = f64::from(motor.n_p) * speed;
         (legs.block(motor, axis, i, w), legs.excess(motor, axis, i, w))
@@ -201,7 +208,7 @@ impl Events for PmsmPlant {
         }
         self.blocked = self.blocks(&self.inputs);
         if self.blocked {
-            state.psi = self.idle_flux(state.speed);
+            state.psi = self.idle_flux(&self.motor(&self.inputs), state.speed);
         }
         let states_changed = state != self.state;
         self.state = state;

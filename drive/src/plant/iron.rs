@@ -58,7 +58,7 @@ impl Iron {
 
     /// Current (A) of the flux linkage without terminal current at the electrical speed `w` (rad/s), without
     /// saturation.
-    pub fn idle_current<S: Scalar>(&self, motor: &Motor, w: S) -> Vector<Rotor, S> {
+    pub fn idle_current<S: Scalar>(&self, motor: &Motor<S>, w: S) -> Vector<Rotor, S> {
         let g = self.conductance(w) * w;
         let q = -(g * motor.psi_M) / (g * g * (motor.L_d * motor.L_q) + S::from(1.0));
         Vector::new(g * motor.L_q * q, q)

@@ -13,7 +13,9 @@ use crate::plant::mechanics::{Motion, Shaft};
 use crate::plant::power::{Energy, Powers};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::{PlantParameters, TABLE};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Scalar, Step, Table, Terminal};
+use crate::plant::thermal::warm::Warm;
+use crate::plant::thermal::{Temperatures, ThermalMode};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -84,7 +86,7 @@ pub(super) struct Instant<S = f64> {
 
 /// What stays over an integration step.
 pub(super) struct Held<'a, S = f64> {
-    pub(super) machine: Machine<'a>,
+    pub(super) machine: Machine<'a, S>,
     /// Stator voltage without the drop of the legs, in V.
     pub(super) u: Vector<Stator, S>,
     /// Legs with a voltage drop.
@@ -180,9 +182,11 @@ pub struct PmsmPlant {
     /// a step.
     pub(super) blocked: bool,
     /// Means over the last step.
-    powers: Powers,
+    pub(super) powers: Powers,
     /// Since the start.
     pub(super) energy: Energy,
+    /// Temperatures and the machine at them, held over a step.
+    pub(super) warm: Warm,
 }
 
 impl PmsmPlant {
@@ -194,10 +198,10 @@ impl PmsmPlant {
         if inputs.enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
     }
 
-    /// The current (A) that the flux linkage has while the diodes block, at the mechanical `speed` (rad/s).
+    /// The current (A) that the flux linkage of this `motor` has while the diodes block, at the mechanical `speed` (rad/s).
     #[inline]
-    pub(super) fn idle_current<S: Scalar>(&self, speed: S) -> Vector<Rotor, S> {
-        let PlantParameters { motor, iron, .. } = &self.parameters;
+    pub(super) fn idle_current<S: Scalar>(&self, motor: &Motor<S>, speed: S) -> Vector<Rotor, S> {
+        let iron = &self.parameters.iron;
         if iron.is_none() {
             return Vector::fixed(Dq::ZERO);
         }
@@ -205,8 +209,8 @@ impl PmsmPlant {
     }
 
     /// The flux linkage (Wb) of [`idle_current`](Self::idle_current).
-    pub(super) fn idle_flux<S: Scalar>(&self, speed: S) -> Vector<Rotor, S> {
-        machine::flux(&self.parameters.motor, self.idle_current(speed))
+    pub(super) fn idle_flux<S: Scalar>(&self, motor: &Motor<S>, speed: S) -> Vector<Rotor, S> {
+        machine::flux(motor, self.idle_current(motor, speed))
     }
 
     /// The losses besides that of a constant resistance, with the voltage drop of these `legs`.
@@ -218,7 +222,7 @@ impl PmsmPlant {
     /// The present instant, at the end of a step.
     #[inline]
     fn reached(&self) -> Instant {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
+        let (motor, saturation) = (&self.warm.motor, &self.parameters.saturation);
         let State { psi, speed, angle, axis } = self.state;
         let i = machine::current(motor, saturation, psi);
         Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable }
@@ -227,7 +231,7 @@ impl PmsmPlant {
     /// The same with iron loss, and the current (A) at the terminals.
     fn reached_with_iron(&self) -> (Instant, Dq) {
         let at = self.reached();
-        let at = if at.idle { Instant { i: self.idle_current(at.speed), ..at } } else { at };
+        let at = if at.idle { Instant { i: self.idle_current(&self.warm.motor, at.speed), ..at } } else { at };
         let i = at.axis.from_stator(self.rates(&self.inputs, &at).i);
         (at, i)
     }
@@ -236,16 +240,17 @@ impl PmsmPlant {
     #[inline(never)]
     fn output_with_iron(&self, out: &mut PlantOutputs) {
         let (at, i) = self.reached_with_iron();
-        *out = self.shown(&at, i, self.inputs.tau_load, self.powers);
+        *out = self.shown(&self.inputs, &at, i, self.warm.at, self.powers);
     }
 
-    /// The outputs with the current `i` (A) at the terminals, the load torque `tau_load` (N.m) and these `powers`.
+    /// The outputs under these `inputs` with the current `i` (A) at the terminals, the `temperatures` (K) and these `powers`.
     #[inline]
     pub(super) fn shown<S: Scalar>(
         &self,
+        inputs: &PlantInputs<S>,
         at: &Instant<S>,
         i: Vector<Rotor, S>,
-        tau_load: S,
+        temperatures: Temperatures<S>,
         powers: Powers<S>,
     ) -> PlantOutputs<S> {
         let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
@@ -261,9 +266,11 @@ impl PmsmPlant {
             i_d: i.d(),
             i_q: i.q(),
             powers,
-            tau_shaft: mechanics.tau_shaft(tau_e, tau_load, friction),
+            tau_shaft: mechanics.tau_shaft(tau_e, inputs.tau_load, friction),
             energy: self.energy,
             efficiency: efficiency(powers.p_in, powers.p_mech),
+            temperatures,
+            heat: self.heat(inputs, &temperatures, &powers.losses),
         }
     }
 
@@ -279,11 +286,12 @@ impl PmsmPlant {
     /// linkage, which cannot jump; the magnetic field then does work on the shaft.
     #[inline]
     fn at_the_shaft(&self) -> (State, Energy) {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         if !mechanics.imposed {
             return (self.state, Energy::default());
         }
+        let motor = &self.warm.motor;
         let axis = axis_at(motor, angle_shaft);
         let machine = Machine::new(motor, saturation);
         let psi = machine.from_stator(axis, machine.to_stator(self.state.axis, self.state.psi));
@@ -329,7 +337,8 @@ impl PmsmPlant {
         legs: &Legs,
         lossy: Option<&Lossy<'_>>,
     ) -> (State, Passed) {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let motor = &self.warm.motor;
         let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
         let held = Held {
             machine: Machine::new(motor, saturation),
@@ -391,7 +400,8 @@ impl PmsmPlant {
                 lossy => self.drive_lossy(start, h, AlphaBeta::ZERO, legs, lossy),
             };
         };
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let motor = &self.warm.motor;
         let held = Held {
             machine: Machine::new(motor, saturation),
             u: AlphaBeta::ZERO,
@@ -400,11 +410,11 @@ impl PmsmPlant {
             shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
         };
         let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost, 0.0]), h, |x| {
-            let i = self.idle_current(x[0]);
+            let i = self.idle_current(motor, x[0]);
             let rates = held.idle_rates(machine::flux(motor, i), i, x[0]);
             SVector::from([rates.acceleration, x[0], rates.p_mech, rates.p_loss, rates.losses.iron])
         });
-        let state = State::new(motor, self.idle_flux(x[0]), x[0], x[1]);
+        let state = State::new(motor, self.idle_flux(motor, x[0]), x[0], x[1]);
         let losses = Losses { cu: lost, iron: x[4], friction: x[3] - lost - x[4], ..Losses::none() };
         (state, Passed { energy: Energy { r#in: 0.0, mech: x[2], loss: x[3] }, losses })
     }
@@ -437,7 +447,7 @@ impl PmsmPlant {
         }
         let lost = if !LOSSY || self.inputs.enable { None } else { self.remaining(&state, &legs) };
         if let Some(lost) = lost {
-            state.psi = self.idle_flux(state.speed);
+            state.psi = self.idle_flux(&self.warm.motor, state.speed);
             energy.loss += lost;
             losses.cu += lost;
         }
@@ -457,19 +467,27 @@ impl PmsmPlant {
         Ok(())
     }
 
-    /// [`step`](Self::step) with losses, out of the way of a step without them.
+    /// [`step`](Self::step) with losses and temperatures, out of the way of a step without them.
     #[inline(never)]
     fn step_with_losses(&mut self, step: &Step) -> Result<(), Fault> {
-        self.step::<true>(step)
+        let mode = self.parameters.thermal.mode;
+        if mode == ThermalMode::Imposed {
+            self.impose()?;
+        }
+        self.step::<true>(step)?;
+        if mode == ThermalMode::Network {
+            self.warm_up(step.h)?;
+        }
+        Ok(())
     }
 
     /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.
     fn remaining(&self, state: &State, legs: &Legs) -> Option<f64> {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
-        let i = machine::current(motor, saturation, state.psi) - self.idle_current(state.speed);
+        let (motor, saturation) = (&self.warm.motor, &self.parameters.saturation);
+        let i = machine::current(motor, saturation, state.psi) - self.idle_current(motor, state.speed);
         let blocked = legs.block(motor, state.axis, i, f64::from(motor.n_p) * state.speed);
         let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
-        blocked.then(|| stored(state.psi) - stored(self.idle_flux(state.speed)))
+        blocked.then(|| stored(state.psi) - stored(self.idle_flux(motor, state.speed)))
     }
 }
 
@@ -490,17 +508,32 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 7;
+    const STATE_VERSION: u16 = 8;
+
+    fn derive(&mut self) {
+        self.take(self.warm.at);
+    }
+
+    fn validate(&self) -> Result<(), Fault> {
+        self.parameters.thermal.validate()?;
+        self.judge_temperatures(&self.inputs)
+    }
+
+    fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
+        self.validate_network(interface)
+    }
 
     fn initialize(&mut self) {
-        let PlantParameters { motor, mechanics, initial, .. } = &self.parameters;
+        self.start_temperatures();
+        let PlantParameters { mechanics, initial, .. } = &self.parameters;
+        let motor = &self.warm.motor;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         let (speed, angle) = if mechanics.imposed {
             (speed_shaft, angle_shaft)
         } else {
             (initial.speed, initial.theta_e / f64::from(motor.n_p))
         };
-        let psi = if self.inputs.enable { machine::flux(motor, Dq::ZERO) } else { self.idle_flux(speed) };
+        let psi = if self.inputs.enable { machine::flux(motor, Dq::ZERO) } else { self.idle_flux(motor, speed) };
         self.state = State::new(motor, psi, speed, angle);
         self.energy = Energy::default();
         self.blocked = self.blocks(&self.inputs);
@@ -516,11 +549,12 @@ impl Model for PmsmPlant {
             return self.output_with_iron(out);
         }
         let at = self.reached();
-        *out = self.shown(&at, at.i, self.inputs.tau_load, self.powers);
+        *out = self.shown(&self.inputs, &at, at.i, self.warm.at, self.powers);
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        if self.inputs.enable && !losses::any(&self.parameters) {
+        let PlantParameters { thermal, .. } = &self.parameters;
+        if self.inputs.enable && thermal.mode == ThermalMode::Constant && !losses::any(&self.parameters) {
             self.step::<false>(step)
         } else {
             self.step_with_losses(step)

@@ -10,6 +10,7 @@ use crate::plant::model::PmsmPlant;
 use crate::plant::power::{ENERGY, POWERS};
 use crate::plant::saturation::{SATURATION, Saturation};
 use crate::plant::signals::PlantOutputs;
+use crate::plant::thermal::{THERMAL, THERMAL_INPUTS, THERMAL_OUTPUTS, Thermal};
 use fmu_core::unit::{AMPERE, NEWTON_METER, NM_S2_PER_RAD2, ONE, RADIAN, S2_PER_RAD2, SPEED, VOLT, WEBER};
 use fmu_core::{Block, Part, Row, Table};
 use serde::{Deserialize, Serialize};
@@ -31,6 +32,8 @@ pub struct PlantParameters {
     pub iron: Iron,
     /// The winding beyond its resistance.
     pub winding: Winding,
+    /// Temperatures and heat.
+    pub thermal: Thermal,
 }
 
 /// The winding beyond its resistance.
@@ -112,7 +115,7 @@ pub const LOSS_OUTPUTS: &Table<PlantOutputs> = &Table::new(
     },
 );
 
-/// The parameters of the losses, which follow the older variables.
+/// The parameters of losses and temperatures, which follow the older variables.
 pub const LOSS_PARAMETERS: &Table<PlantParameters> = &Table::new(
     const {
         &[
@@ -132,6 +135,7 @@ pub const LOSS_PARAMETERS: &Table<PlantParameters> = &Table::new(
                 |p| &mut p.winding.k_ac,
             )
             .at_least(0.0),
+            P::part("", &Part { table: THERMAL, lens: |p| &mut p.thermal }),
         ]
     },
 );
@@ -178,6 +182,8 @@ pub const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             V::part("", &Part { table: STATES, lens: |m| &mut m.model }),
             V::part("", &Part { table: LOSS_OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.parameters }),
+            V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
+            V::part("", &Part { table: THERMAL_OUTPUTS, lens: |m| &mut m.out }),
         ]
     },
 );

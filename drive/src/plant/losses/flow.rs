@@ -68,7 +68,7 @@ impl<'a, S: Scalar> Lossy<'a, S> {
 
     /// With the resistance `R_s` (Ohm), the voltage `u` (V) of the legs, the current `i` (A) of the flux linkage and the
     /// mechanical `speed` (rad/s).
-    pub fn flow(&self, R_s: f64, u: Vector<Stator, S>, i: Vector<Stator, S>, speed: S) -> Flow<S> {
+    pub fn flow(&self, R_s: S, u: Vector<Stator, S>, i: Vector<Stator, S>, speed: S) -> Flow<S> {
         let w = speed * self.n_p;
         let one = S::from(1.0);
         let R = (w * w * self.k_ac + one) * R_s;
