@@ -165,6 +165,59 @@ impl<S: Scalar> Held<'_, S> {
     }
 }
 
+/// What [`PmsmPlant::drive`] integrates.
+trait Circuit {
+    fn machine(&self) -> &Machine<'_>;
+
+    /// Derivatives and powers with the d-axis on `axis`, the flux linkage `psi` (Wb), its current `i` (A) and the `speed`
+    /// (rad/s).
+    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates;
+
+    /// The same with the flux linkage `psi` (Wb) in stator axes.
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+    #[inline(always)]
+    fn rates_in_stator(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> Rates {
+        let psi = self.machine().from_stator(axis, psi);
+        self.rates(axis, psi, self.machine().current(psi), speed)
+    }
+}
+
+impl Circuit for Held<'_> {
+    #[inline]
+    fn machine(&self) -> &Machine<'_> {
+        &self.machine
+    }
+
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+    #[inline(always)]
+    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates {
+        Held::rates(self, axis, psi, i, speed)
+    }
+}
+
+/// Inverter, machine and shaft while the currents keep their sides.
+struct Between<'a> {
+    machine: Machine<'a>,
+    region: Region,
+    shaft: Shaft<'a>,
+}
+
+impl Circuit for Between<'_> {
+    #[inline]
+    fn machine(&self) -> &Machine<'_> {
+        &self.machine
+    }
+
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+    #[inline(always)]
+    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates {
+        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
+        let Flow { i, d_psi, p_in, losses } = self.region.flow(axis.to_stator(i));
+        let losses = Losses { friction: p_friction, ..losses };
+        Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i }
+    }
+}
+
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PmsmPlant {
@@ -251,7 +304,8 @@ impl PmsmPlant {
     }
 
     /// The outputs under these `inputs` with the current `i` (A) at the terminals, the `temperatures` (K) and these `powers`.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
     pub(super) fn shown<S: Scalar>(
         &self,
         inputs: &PlantInputs<S>,
@@ -291,7 +345,8 @@ impl PmsmPlant {
     /// The state at the beginning of a step and the energy needed to reach it: an imposed shaft takes the angle of the
     /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
     /// linkage, which cannot jump; the magnetic field then does work on the shaft.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
     fn at_the_shaft(&self) -> (State, Energy) {
         let PlantParameters { saturation, mechanics, .. } = &self.parameters;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
@@ -308,6 +363,8 @@ impl PmsmPlant {
     }
 
     /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s).
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
     fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
         let PlantParameters { motor, inverter, .. } = &self.parameters;
         let w = (f64::from(motor.n_p) * speed).abs();
@@ -320,7 +377,12 @@ impl PmsmPlant {
         if h <= longest && w * h <= LARGEST_TURN {
             return Ok(1.0);
         }
-        let longest = longest.min(LARGEST_TURN / w);
+        Self::count(h, longest.min(LARGEST_TURN / w))
+    }
+
+    /// Number of integration steps of at most `longest` (s) in `h` (s).
+    #[inline(never)]
+    fn count(h: f64, longest: f64) -> Result<f64, Fault> {
         let count = (h / longest - 1e-9).ceil().max(1.0);
         if count > MAX_SUBSTEPS {
             let limit = MAX_SUBSTEPS * longest;
@@ -336,29 +398,19 @@ impl PmsmPlant {
     /// follows the rotor, so a step is more exact than two of half its length in rotor axes.
     #[expect(clippy::inline_always, reason = "as a call, it passes the state through memory: 10 % of a period")]
     #[inline(always)]
-    fn drive<const LOSSY: bool>(
-        &self,
-        start: &State,
-        h: f64,
-        machine: &Machine<'_>,
-        rates: impl Fn(Axis<Rotor>, Dq, Dq, f64) -> Rates,
-    ) -> (State, Passed) {
+    fn drive<const LOSSY: bool>(&self, start: &State, h: f64, circuit: &impl Circuit) -> (State, Passed) {
         let motor = &self.warm.motor;
-        let rates = |axis, psi, speed| {
-            let psi = machine.from_stator(axis, psi);
-            rates(axis, psi, machine.current(psi), speed)
-        };
         let (n_p, half, speed) = (f64::from(motor.n_p), 0.5 * h, start.speed);
-        let psi = machine.to_stator(start.axis, start.psi);
+        let psi = circuit.machine().to_stator(start.axis, start.psi);
         let turn = Turn::new(n_p * half * speed);
         let middle = start.axis.ahead(turn);
 
-        let k_1 = rates(start.axis, psi, speed);
-        let k_2 = rates(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
+        let k_1 = circuit.rates_in_stator(start.axis, psi, speed);
+        let k_2 = circuit.rates_in_stator(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
         let axis = middle.ahead(Turn::tiny(n_p * half * half * k_1.acceleration));
-        let k_3 = rates(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
+        let k_3 = circuit.rates_in_stator(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
         let axis = middle.ahead(turn).ahead(Turn::tiny(n_p * half * h * k_2.acceleration));
-        let k_4 = rates(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
+        let k_4 = circuit.rates_in_stator(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
 
         let sixth = h / 6.0;
         let psi = psi + (k_1.d_psi + (k_2.d_psi + k_3.d_psi) * 2.0 + k_4.d_psi) * sixth;
@@ -375,7 +427,7 @@ impl PmsmPlant {
             Losses { cu: energy.loss - friction, friction, ..Losses::none() }
         };
         let axis = axis_at(motor, angle);
-        (State { psi: machine.from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
+        (State { psi: circuit.machine().from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
     }
 
     /// [`drive`](Self::drive) under the voltage `u` (V).
@@ -399,7 +451,7 @@ impl PmsmPlant {
             lossy: if LOSSY { lossy } else { None },
             shaft: if LOSSY { shaft } else { shaft.without_windage() },
         };
-        self.drive::<LOSSY>(start, h, &held.machine, |axis, psi, i, speed| held.rates(axis, psi, i, speed))
+        self.drive::<LOSSY>(start, h, &held)
     }
 
     /// The same with losses besides that of a constant resistance.
@@ -417,14 +469,8 @@ impl PmsmPlant {
 
     /// [`drive`](Self::drive) while the currents keep their sides.
     #[inline(never)]
-    fn drive_region(&self, start: &State, h: f64, region: &Region, shaft: &Shaft<'_>) -> (State, Passed) {
-        let machine = Machine::new(&self.warm.motor, &self.parameters.saturation);
-        self.drive::<true>(start, h, &machine, |axis, psi, i, speed| {
-            let Motion { acceleration, p_shaft, p_friction } = shaft.motion(speed, machine.torque(psi, i));
-            let Flow { i, d_psi, p_in, losses } = region.flow(axis.to_stator(i));
-            let losses = Losses { friction: p_friction, ..losses };
-            Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i }
-        })
+    fn drive_between(&self, start: &State, h: f64, circuit: &Between<'_>) -> (State, Passed) {
+        self.drive::<true>(start, h, circuit)
     }
 
     /// Integration steps over `h` (s) from `state` on with switching legs and losses. A step ends where a current enters
@@ -450,15 +496,15 @@ impl PmsmPlant {
             } else {
                 left / (left / longest.min(LARGEST_TURN / w) - 1e-9).ceil().max(1.0)
             };
-            let region = apart.then(|| {
+            let between = apart.then(|| {
                 // The middle of the step counts.
                 let shaft = Shaft::new(mechanics, self.inputs.tau_load, state.speed);
                 let tau_e = machine.torque(state.psi, machine.current(state.psi));
                 let speed = state.speed + 0.5 * h * shaft.motion(state.speed, tau_e).acceleration;
-                (lossy.region(R_s, u, legs, &sides, speed), shaft)
+                Between { machine, region: lossy.region(R_s, u, legs, &sides, speed), shaft }
             });
-            let drive = |h: f64| match &region {
-                Some((region, shaft)) => self.drive_region(state, h, region, shaft),
+            let drive = |h: f64| match &between {
+                Some(between) => self.drive_between(state, h, between),
                 None => self.drive_lossy(state, h, u, legs, Some(lossy)),
             };
             let (mut next, mut step) = drive(h);
@@ -476,8 +522,8 @@ impl PmsmPlant {
             (*state, i) = (next, end);
             left -= h;
             if left <= 1e-9 * h {
-                let emf = match &region {
-                    Some((region, _)) => region.emf(current(state)),
+                let emf = match &between {
+                    Some(between) => between.region.emf(current(state)),
                     None => {
                         let steady = lossy.steady(state.psi, machine.current(state.psi), state.speed);
                         let u = if legs.drop() { u - legs.loss(state.axis.to_stator(steady)) } else { u };
