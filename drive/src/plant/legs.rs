@@ -11,7 +11,7 @@
 //! Derived here from the ideal diode bridge; `drive-study/tests/gates_off.rs` compares it with such a bridge in stator axes.
 //! u in V, i in A.
 
-use crate::frame::{Axis, Dq, Phases, Rotor, Stator, Vector};
+use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Stator, Vector};
 use crate::modulation::{clamp_unit, dead_time_loss};
 use crate::motor::Motor;
 use crate::plant::inverter::Inverter;
@@ -77,6 +77,12 @@ impl<S: Scalar> Legs<S> {
 }
 
 impl Legs {
+    /// Voltage (V) lost at the stator with currents of these `signs` beyond the zone.
+    #[inline]
+    pub fn loss_beyond(&self, signs: Phases) -> AlphaBeta {
+        signs.to_stator() * self.u
+    }
+
     /// Time constant in s of a current within the zone, where the legs, which drop `threshold` (V) in their devices, act
     /// as resistances; infinite without a voltage.
     #[inline]

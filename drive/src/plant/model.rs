@@ -5,9 +5,11 @@ use crate::integrate::rk4;
 use crate::math::{all_finite, wrap};
 use crate::modulation::limit_to_hexagon;
 use crate::motor::Motor;
+use crate::plant::inverter::Inverter;
 use crate::plant::legs::Legs;
 use crate::plant::losses::flow::{Flow, Lossy};
-use crate::plant::losses::{self, Losses, efficiency};
+use crate::plant::losses::region::{Region, Sides};
+use crate::plant::losses::{self, Losses, efficiency, switching};
 use crate::plant::machine::{self, Machine};
 use crate::plant::mechanics::{Motion, Shaft};
 use crate::plant::power::{Energy, Powers};
@@ -25,6 +27,9 @@ const LONGEST_SUBSTEP: f64 = 100e-6;
 
 /// The same with such a voltage, which has kinks where a current changes its sign.
 const LONGEST_SUBSTEP_WITH_KINKS: f64 = 50e-6;
+
+/// Shortest integration step at a kink, as a share of the longest within the zone.
+const SHORTEST_SHARE: f64 = 0.01;
 
 /// Largest electrical angle in rad that the rotor turns in an integration step.
 const LARGEST_TURN: f64 = 0.25;
@@ -160,13 +165,56 @@ impl<S: Scalar> Held<'_, S> {
     }
 }
 
-impl Held<'_> {
+/// What [`PmsmPlant::drive`] integrates.
+trait Circuit {
+    fn machine(&self) -> &Machine<'_>;
+
+    /// Derivatives and powers with the d-axis on `axis`, the flux linkage `psi` (Wb), its current `i` (A) and the `speed`
+    /// (rad/s).
+    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates;
+
     /// The same with the flux linkage `psi` (Wb) in stator axes.
-    #[expect(clippy::inline_always, reason = "as for `rates`")]
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
     #[inline(always)]
     fn rates_in_stator(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> Rates {
-        let psi = self.machine.from_stator(axis, psi);
-        self.rates(axis, psi, self.machine.current(psi), speed)
+        let psi = self.machine().from_stator(axis, psi);
+        self.rates(axis, psi, self.machine().current(psi), speed)
+    }
+}
+
+impl Circuit for Held<'_> {
+    #[inline]
+    fn machine(&self) -> &Machine<'_> {
+        &self.machine
+    }
+
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+    #[inline(always)]
+    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates {
+        Held::rates(self, axis, psi, i, speed)
+    }
+}
+
+/// Inverter, machine and shaft while the currents keep their sides.
+struct Between<'a> {
+    machine: Machine<'a>,
+    region: Region,
+    shaft: Shaft<'a>,
+}
+
+impl Circuit for Between<'_> {
+    #[inline]
+    fn machine(&self) -> &Machine<'_> {
+        &self.machine
+    }
+
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+    #[inline(always)]
+    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates {
+        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
+        let Flow { i, d_psi, p_in, losses } = self.region.flow(axis.to_stator(i));
+        let losses = Losses { friction: p_friction, ..losses };
+        Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i }
     }
 }
 
@@ -187,6 +235,10 @@ pub struct PmsmPlant {
     pub(super) energy: Energy,
     /// Temperatures and the machine at them, held over a step.
     pub(super) warm: Warm,
+    /// Current (A) at the terminals less that of the flux linkage, at the end of a step.
+    by_iron: Dq,
+    /// The switching loss at the last link voltage.
+    sw: switching::Last,
 }
 
 impl PmsmPlant {
@@ -216,7 +268,9 @@ impl PmsmPlant {
     /// The losses besides that of a constant resistance, with the voltage drop of these `legs`.
     #[inline]
     pub(super) fn lossy<S: Scalar>(&self, inputs: &PlantInputs<S>, legs: &Legs<S>) -> Option<Lossy<'_, S>> {
-        Lossy::new(&self.parameters, inputs.enable, inputs.u_dc, legs.i_zone())
+        let Inverter { devices, T_pwm, .. } = &self.parameters.inverter;
+        let sw = if inputs.enable { switching::per_ampere(devices, *T_pwm, inputs.u_dc) } else { 0.0.into() };
+        Lossy::new(&self.parameters, inputs.enable, inputs.u_dc, legs.i_zone(), sw)
     }
 
     /// The present instant, at the end of a step.
@@ -236,15 +290,22 @@ impl PmsmPlant {
         (at, i)
     }
 
+    /// The current (A) at the terminals less that of the flux linkage.
+    fn current_by_iron(&self) -> Dq {
+        let (_, i) = self.reached_with_iron();
+        i - self.reached().i
+    }
+
     /// The outputs with iron loss.
     #[inline(never)]
     fn output_with_iron(&self, out: &mut PlantOutputs) {
-        let (at, i) = self.reached_with_iron();
-        *out = self.shown(&self.inputs, &at, i, self.warm.at, self.powers);
+        let at = self.reached();
+        *out = self.shown(&self.inputs, &at, at.i + self.by_iron, self.warm.at, self.powers);
     }
 
     /// The outputs under these `inputs` with the current `i` (A) at the terminals, the `temperatures` (K) and these `powers`.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
     pub(super) fn shown<S: Scalar>(
         &self,
         inputs: &PlantInputs<S>,
@@ -284,7 +345,8 @@ impl PmsmPlant {
     /// The state at the beginning of a step and the energy needed to reach it: an imposed shaft takes the angle of the
     /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
     /// linkage, which cannot jump; the magnetic field then does work on the shaft.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
     fn at_the_shaft(&self) -> (State, Energy) {
         let PlantParameters { saturation, mechanics, .. } = &self.parameters;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
@@ -301,19 +363,26 @@ impl PmsmPlant {
     }
 
     /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s).
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
     fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
         let PlantParameters { motor, inverter, .. } = &self.parameters;
-        let threshold = if lossy { inverter.devices.u_transistor.max(inverter.devices.u_diode) } else { 0.0 };
         let w = (f64::from(motor.n_p) * speed).abs();
+        let threshold = if lossy { inverter.devices.threshold() } else { 0.0 };
         let longest = if legs.drop() || threshold > 0.0 {
-            LONGEST_SUBSTEP_WITH_KINKS.min(0.5 * legs.time(motor, threshold))
+            Self::within_the_zone(motor, legs, threshold)
         } else {
             LONGEST_SUBSTEP
         };
         if h <= longest && w * h <= LARGEST_TURN {
             return Ok(1.0);
         }
-        let longest = longest.min(LARGEST_TURN / w);
+        Self::count(h, longest.min(LARGEST_TURN / w))
+    }
+
+    /// Number of integration steps of at most `longest` (s) in `h` (s).
+    #[inline(never)]
+    fn count(h: f64, longest: f64) -> Result<f64, Fault> {
         let count = (h / longest - 1e-9).ceil().max(1.0);
         if count > MAX_SUBSTEPS {
             let limit = MAX_SUBSTEPS * longest;
@@ -329,36 +398,19 @@ impl PmsmPlant {
     /// follows the rotor, so a step is more exact than two of half its length in rotor axes.
     #[expect(clippy::inline_always, reason = "as a call, it passes the state through memory: 10 % of a period")]
     #[inline(always)]
-    fn drive<const LOSSY: bool>(
-        &self,
-        start: &State,
-        h: f64,
-        u: AlphaBeta,
-        legs: &Legs,
-        lossy: Option<&Lossy<'_>>,
-    ) -> (State, Passed) {
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+    fn drive<const LOSSY: bool>(&self, start: &State, h: f64, circuit: &impl Circuit) -> (State, Passed) {
         let motor = &self.warm.motor;
-        let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
-        let held = Held {
-            machine: Machine::new(motor, saturation),
-            u,
-            legs: legs.drop().then_some(legs),
-            // Known to the compiler, so that a step without them takes no time for them.
-            lossy: if LOSSY { lossy } else { None },
-            shaft: if LOSSY { shaft } else { shaft.without_windage() },
-        };
         let (n_p, half, speed) = (f64::from(motor.n_p), 0.5 * h, start.speed);
-        let psi = held.machine.to_stator(start.axis, start.psi);
+        let psi = circuit.machine().to_stator(start.axis, start.psi);
         let turn = Turn::new(n_p * half * speed);
         let middle = start.axis.ahead(turn);
 
-        let k_1 = held.rates_in_stator(start.axis, psi, speed);
-        let k_2 = held.rates_in_stator(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
+        let k_1 = circuit.rates_in_stator(start.axis, psi, speed);
+        let k_2 = circuit.rates_in_stator(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
         let axis = middle.ahead(Turn::tiny(n_p * half * half * k_1.acceleration));
-        let k_3 = held.rates_in_stator(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
+        let k_3 = circuit.rates_in_stator(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
         let axis = middle.ahead(turn).ahead(Turn::tiny(n_p * half * h * k_2.acceleration));
-        let k_4 = held.rates_in_stator(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
+        let k_4 = circuit.rates_in_stator(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
 
         let sixth = h / 6.0;
         let psi = psi + (k_1.d_psi + (k_2.d_psi + k_3.d_psi) * 2.0 + k_4.d_psi) * sixth;
@@ -375,10 +427,34 @@ impl PmsmPlant {
             Losses { cu: energy.loss - friction, friction, ..Losses::none() }
         };
         let axis = axis_at(motor, angle);
-        (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
+        (State { psi: circuit.machine().from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
     }
 
-    /// [`drive`](Self::drive) with losses besides that of a constant resistance.
+    /// [`drive`](Self::drive) under the voltage `u` (V).
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
+    fn drive_held<const LOSSY: bool>(
+        &self,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+        legs: &Legs,
+        lossy: Option<&Lossy<'_>>,
+    ) -> (State, Passed) {
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
+        let held = Held {
+            machine: Machine::new(&self.warm.motor, saturation),
+            u,
+            legs: legs.drop().then_some(legs),
+            // Known to the compiler, so that a step without them takes no time for them.
+            lossy: if LOSSY { lossy } else { None },
+            shaft: if LOSSY { shaft } else { shaft.without_windage() },
+        };
+        self.drive::<LOSSY>(start, h, &held)
+    }
+
+    /// The same with losses besides that of a constant resistance.
     #[inline(never)]
     fn drive_lossy(
         &self,
@@ -388,7 +464,83 @@ impl PmsmPlant {
         legs: &Legs,
         lossy: Option<&Lossy<'_>>,
     ) -> (State, Passed) {
-        self.drive::<true>(start, h, u, legs, lossy)
+        self.drive_held::<true>(start, h, u, legs, lossy)
+    }
+
+    /// [`drive`](Self::drive) while the currents keep their sides.
+    #[inline(never)]
+    fn drive_between(&self, start: &State, h: f64, circuit: &Between<'_>) -> (State, Passed) {
+        self.drive::<true>(start, h, circuit)
+    }
+
+    /// Integration steps over `h` (s) from `state` on with switching legs and losses. A step ends where a current enters
+    /// or leaves the zone of the kinks: across a kink, the method loses its order.
+    fn switch(&self, state: &mut State, h: f64, u: AlphaBeta, legs: &Legs, lossy: &Lossy<'_>) -> (Passed, Dq) {
+        let PlantParameters { saturation, inverter, mechanics, .. } = &self.parameters;
+        let (motor, zone) = (&self.warm.motor, legs.i_zone());
+        let machine = Machine::new(motor, saturation);
+        let R_s = machine.resistance();
+        let current = |state: &State| state.axis.to_stator(machine.current(state.psi));
+        let kinks = legs.drop() || lossy.kinks();
+        let within = Self::within_the_zone(motor, legs, inverter.devices.threshold());
+        let (part, rest) = lossy.guide(R_s, u, state.speed);
+        let guide = |state: &State| current(state) * part + rest;
+        let (mut passed, mut left, mut i) = (Passed::default(), h, guide(state));
+        let mut sides = Sides::of(i, zone);
+        loop {
+            let apart = !kinks || sides.apart();
+            let longest = if apart { LONGEST_SUBSTEP } else { within };
+            let w = (f64::from(motor.n_p) * state.speed).abs();
+            let mut h = if left <= longest && w * left <= LARGEST_TURN {
+                left
+            } else {
+                left / (left / longest.min(LARGEST_TURN / w) - 1e-9).ceil().max(1.0)
+            };
+            let between = apart.then(|| {
+                // The middle of the step counts.
+                let shaft = Shaft::new(mechanics, self.inputs.tau_load, state.speed);
+                let tau_e = machine.torque(state.psi, machine.current(state.psi));
+                let speed = state.speed + 0.5 * h * shaft.motion(state.speed, tau_e).acceleration;
+                Between { machine, region: lossy.region(R_s, u, legs, &sides, speed), shaft }
+            });
+            let drive = |h: f64| match &between {
+                Some(between) => self.drive_between(state, h, between),
+                None => self.drive_lossy(state, h, u, legs, Some(lossy)),
+            };
+            let (mut next, mut step) = drive(h);
+            let mut end = guide(&next);
+            if kinks && let Some((share, then)) = sides.change(i, end, zone) {
+                sides = then;
+                if share < 0.99 {
+                    h = (h * share).max(SHORTEST_SHARE * within).min(h);
+                    (next, step) = drive(h);
+                    end = guide(&next);
+                }
+            }
+            passed.energy.add(&step.energy);
+            passed.losses.add(&step.losses);
+            (*state, i) = (next, end);
+            left -= h;
+            if left <= 1e-9 * h {
+                let emf = match &between {
+                    Some(between) => between.region.emf(current(state)),
+                    None => {
+                        let steady = lossy.steady(state.psi, machine.current(state.psi), state.speed);
+                        let u = if legs.drop() { u - legs.loss(state.axis.to_stator(steady)) } else { u };
+                        lossy.flow(R_s, u, current(state), state.speed).d_psi
+                    }
+                };
+                let by_iron = emf * lossy.conductance(state.speed);
+                return (passed, state.axis.from_stator(by_iron));
+            }
+        }
+    }
+
+    /// Longest integration step in s with a current in the zone where the voltages of the legs and of devices with this
+    /// `threshold` (V) fall linearly.
+    #[inline]
+    fn within_the_zone(motor: &Motor, legs: &Legs, threshold: f64) -> f64 {
+        LONGEST_SUBSTEP_WITH_KINKS.min(0.5 * legs.time(motor, threshold))
     }
 
     /// One integration step of `h` (s) with the gates off.
@@ -396,7 +548,7 @@ impl PmsmPlant {
     fn coast(&self, start: &State, h: f64, legs: &Legs, lossy: Option<&Lossy<'_>>) -> (State, Passed) {
         let Some(lost) = self.remaining(start, legs) else {
             return match lossy {
-                None => self.drive::<false>(start, h, AlphaBeta::ZERO, legs, None),
+                None => self.drive_held::<false>(start, h, AlphaBeta::ZERO, legs, None),
                 lossy => self.drive_lossy(start, h, AlphaBeta::ZERO, legs, lossy),
             };
         };
@@ -423,17 +575,32 @@ impl PmsmPlant {
     #[expect(clippy::inline_always, reason = "as for `drive`")]
     #[inline(always)]
     fn step<const LOSSY: bool>(&mut self, step: &Step) -> Result<(), Fault> {
+        let PlantInputs { enable, u_dc, .. } = self.inputs;
         let legs = self.legs(&self.inputs);
-        let lossy = if LOSSY { self.lossy(&self.inputs, &legs) } else { None };
+        let lossy = if LOSSY {
+            let sw = if enable { self.sw.per_ampere(&self.parameters.inverter, u_dc) } else { 0.0 };
+            Lossy::new(&self.parameters, enable, u_dc, legs.i_zone(), sw)
+        } else {
+            None
+        };
         let (mut state, mut energy) = self.at_the_shaft();
         let mut losses = Losses::none();
         let mut left = self.substeps(step.h, state.speed, &legs, lossy.is_some())?;
         let h = step.h / left;
         let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
+        let mut by_iron = None;
+        if LOSSY
+            && self.inputs.enable
+            && let Some(lossy) = &lossy
+        {
+            let (passed, current) = self.switch(&mut state, step.h, u, &legs, lossy);
+            energy.add(&passed.energy);
+            (losses, by_iron, left) = (passed.losses, Some(current), 0.0);
+        }
         while left > 0.0 {
             let (next, passed) = match (LOSSY, self.inputs.enable, lossy.as_ref()) {
-                (false, ..) => self.drive::<false>(&state, h, u, &legs, None),
-                (true, true, lossy) => self.drive::<true>(&state, h, u, &legs, lossy),
+                (false, ..) => self.drive_held::<false>(&state, h, u, &legs, None),
+                (true, true, lossy) => self.drive_lossy(&state, h, u, &legs, lossy),
                 (true, false, lossy) => self.coast(&state, h, &legs, lossy),
             };
             state = next;
@@ -463,6 +630,9 @@ impl PmsmPlant {
         }
         (self.state, self.blocked) = (state, lost.is_some());
         self.energy.add(&energy);
+        if LOSSY && !self.parameters.iron.is_none() {
+            self.by_iron = by_iron.unwrap_or_else(|| self.current_by_iron());
+        }
         self.powers = Powers::mean(&energy, losses, step.h, &self.inputs, &legs, || self.currents());
         Ok(())
     }
@@ -511,6 +681,7 @@ impl Model for PmsmPlant {
     const STATE_VERSION: u16 = 8;
 
     fn derive(&mut self) {
+        self.sw = switching::Last::default();
         self.take(self.warm.at);
     }
 
@@ -537,6 +708,7 @@ impl Model for PmsmPlant {
         self.state = State::new(motor, psi, speed, angle);
         self.energy = Energy::default();
         self.blocked = self.blocks(&self.inputs);
+        self.by_iron = self.current_by_iron();
         // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
         let tau_shaft = mechanics.tau_shaft(0.0, self.inputs.tau_load, friction);

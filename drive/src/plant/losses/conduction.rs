@@ -20,8 +20,9 @@
 //! The two-level model of a device (threshold and resistance) is that of the data sheets; the closed form is the field's,
 //! and a test repeats it. u in V, i in A.
 
-use crate::frame::{Phases, Stator, Vector};
+use crate::frame::{AlphaBeta, Phases, SQRT_3, Stator, Vector};
 use crate::modulation::clamp_unit;
+use crate::plant::losses::region::Affine;
 use fmu_core::Scalar;
 use fmu_core::unit::{AMPERE, JOULE, OHM, ONE, VOLT};
 use fmu_core::{Row, Table};
@@ -70,6 +71,12 @@ impl Devices {
         let &Self { u_transistor, r_transistor, u_diode, r_diode, E_sw, .. } = self;
         u_transistor + r_transistor + u_diode + r_diode + E_sw == 0.0
     }
+
+    /// The greater threshold voltage in V.
+    #[inline]
+    pub fn threshold(&self) -> f64 {
+        self.u_transistor.max(self.u_diode)
+    }
 }
 
 /// Voltage drop of the conducting devices over an integration step.
@@ -96,18 +103,40 @@ impl<S: Scalar> Conduction<S> {
 
     /// Voltage drop (V) at the stator with the voltage `u` (V) of the legs and the current `i` (A).
     pub fn drop(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Vector<Stator, S> {
-        let (u, i) = (Phases::from_stator(u), Phases::from_stator(i));
-        let max = |a: S, b: S| if a.value() > b.value() { a } else { b };
-        let min = |a: S, b: S| if a.value() < b.value() { a } else { b };
-        let middle = (max(max(u.a, u.b), u.c) + min(min(u.a, u.b), u.c)) * 0.5;
-        let leg = |u: S, i: S| {
-            // 2 d - 1 of the leg.
-            let on = if self.u_dc.value() > 0.0 { clamp_unit((u - middle) * 2.0 / self.u_dc) } else { 0.0.into() };
+        let (on, i) = (self.on(u), Phases::from_stator(i));
+        let leg = |on: S, i: S| {
             let sign = clamp_unit(i / self.i_zone);
             let transistor = sign * on;
             (transistor * self.u[1] + self.u[0].into()) * sign + (transistor * self.r[1] + self.r[0].into()) * i
         };
-        Phases { a: leg(u.a, i.a), b: leg(u.b, i.b), c: leg(u.c, i.c) }.to_stator()
+        Phases { a: leg(on.a, i.a), b: leg(on.b, i.b), c: leg(on.c, i.c) }.to_stator()
+    }
+
+    /// 2 d - 1 of the legs with the voltage `u` (V).
+    fn on(&self, u: Vector<Stator, S>) -> Phases<S> {
+        let u = Phases::from_stator(u);
+        let max = |a: S, b: S| if a.value() > b.value() { a } else { b };
+        let min = |a: S, b: S| if a.value() < b.value() { a } else { b };
+        let middle = (max(max(u.a, u.b), u.c) + min(min(u.a, u.b), u.c)) * 0.5;
+        let leg = |u: S| {
+            if self.u_dc.value() > 0.0 { clamp_unit((u - middle) * 2.0 / self.u_dc) } else { 0.0.into() }
+        };
+        Phases { a: leg(u.a), b: leg(u.b), c: leg(u.c) }
+    }
+}
+
+impl Conduction<f64> {
+    /// The [`drop`](Self::drop) (V) while the currents of the legs have these `signs`.
+    #[inline]
+    pub fn affine(&self, u: AlphaBeta, signs: Phases) -> Affine {
+        let on = self.on(u);
+        let leg = |on: f64, sign: f64| {
+            let transistor = sign * on;
+            ((transistor * self.u[1] + self.u[0]) * sign, transistor * self.r[1] + self.r[0])
+        };
+        let [(a, r_a), (b, r_b), (c, r_c)] = [leg(on.a, signs.a), leg(on.b, signs.b), leg(on.c, signs.c)];
+        let by = [(4.0 * r_a + r_b + r_c) / 6.0, (r_c - r_b) * (0.5 / SQRT_3), 0.5 * (r_b + r_c)];
+        Affine { at_0: Phases { a, b, c }.to_stator(), by }
     }
 }
 

@@ -9,6 +9,7 @@ use crate::motor::Motor;
 use crate::plant::legs::Legs;
 use crate::plant::losses::conduction::Conduction;
 use crate::plant::losses::efficiency;
+use crate::plant::losses::switching;
 use crate::plant::machine::{Machine, flux};
 use crate::plant::mechanics::Shaft;
 use crate::plant::model::{Held, PmsmPlant, Rates};
@@ -81,7 +82,8 @@ impl Drive {
         let i = Dq::new(i_d, i_s.q() - g * (motor.psi_M + motor.L_d * i_d));
         let psi = flux(motor, i);
         let legs = Legs::switching(&par.inverter, *u_dc);
-        let lossy = super::flow::Lossy::new(par, true, *u_dc, legs.i_zone()).unwrap();
+        let sw = switching::per_ampere(&par.inverter.devices, par.inverter.T_pwm, *u_dc);
+        let lossy = super::flow::Lossy::new(par, true, *u_dc, legs.i_zone(), sw).unwrap();
         let conduction = Conduction::new(&par.inverter.devices, true, *u_dc, legs.i_zone()).unwrap();
         let count = 7200;
         let mut sum = [0.0; 7];

@@ -10,9 +10,11 @@
 //! p_cu + p_iron + p_cond + p_sw + 1.5 i_m e holds exactly. With i_m instead, the drops would be those of a current that is
 //! 10 % less at a fifth of the torque, and diodes would block the wrong current.
 
-use crate::frame::{Rotor, Stator, Vector};
+use crate::frame::{AlphaBeta, Rotor, Stator, Vector};
 use crate::plant::iron::Iron;
+use crate::plant::legs::Legs;
 use crate::plant::losses::conduction::Conduction;
+use crate::plant::losses::region::{Affine, Region, Sides};
 use crate::plant::losses::{Losses, switching};
 use crate::plant::tables::PlantParameters;
 use fmu_core::Scalar;
@@ -43,17 +45,29 @@ pub struct Flow<S> {
 
 impl<'a, S: Scalar> Lossy<'a, S> {
     /// At the DC-link voltage `u_dc` (V), with switching legs or the gates off, whose voltages fall linearly below `i_zone`
-    /// (A); `None` without [`any`](super::any) of these losses.
-    pub fn new(parameters: &'a PlantParameters, switching: bool, u_dc: S, i_zone: S) -> Option<Self> {
-        super::any(parameters).then(|| Self::with(parameters, switching, u_dc, i_zone))
+    /// (A), and with the switching loss `sw` (W per ampere); `None` without [`any`](super::any) of these losses.
+    pub fn new(parameters: &'a PlantParameters, switching: bool, u_dc: S, i_zone: S, sw: S) -> Option<Self> {
+        let PlantParameters { motor, inverter, iron, winding, .. } = parameters;
+        super::any(parameters).then(|| Self {
+            iron,
+            k_ac: winding.k_ac,
+            n_p: f64::from(motor.n_p),
+            conduction: Conduction::new(&inverter.devices, switching, u_dc, i_zone),
+            sw,
+        })
     }
 
-    /// The same with these losses.
-    fn with(parameters: &'a PlantParameters, switching: bool, u_dc: S, i_zone: S) -> Self {
-        let PlantParameters { motor, inverter, iron, winding, .. } = parameters;
-        let sw = if switching { switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc) } else { 0.0.into() };
-        let conduction = Conduction::new(&inverter.devices, switching, u_dc, i_zone);
-        Self { iron, k_ac: winding.k_ac, n_p: f64::from(motor.n_p), conduction, sw }
+    /// Whether the losses have kinks where a current changes its sign.
+    pub fn kinks(&self) -> bool {
+        self.conduction.is_some() || self.sw.value() > 0.0
+    }
+
+    /// Resistance (Ohm) and conductance (S) at the electrical speed `w` (rad/s), with the resistance `R_s` (Ohm) at
+    /// standstill.
+    #[inline]
+    fn circuit(&self, R_s: S, w: S) -> (S, S) {
+        let R = (w * w * self.k_ac + S::from(1.0)) * R_s;
+        (R, if self.iron.is_none() { 0.0.into() } else { self.iron.conductance(w) })
     }
 
     /// Current (A) at the terminals in steady state with the flux linkage `psi` (Wb), its current `i` (A) and the
@@ -71,8 +85,7 @@ impl<'a, S: Scalar> Lossy<'a, S> {
     pub fn flow(&self, R_s: S, u: Vector<Stator, S>, i: Vector<Stator, S>, speed: S) -> Flow<S> {
         let w = speed * self.n_p;
         let one = S::from(1.0);
-        let R = (w * w * self.k_ac + one) * R_s;
-        let G = if self.iron.is_none() { 0.0.into() } else { self.iron.conductance(w) };
+        let (R, G) = self.circuit(R_s, w);
         let part = one / (R * G + one);
         let driving = (u - i.scaled(R)).scaled(part);
         let none = Vector::fixed(Vector::ZERO);
@@ -87,5 +100,33 @@ impl<'a, S: Scalar> Lossy<'a, S> {
             friction: 0.0.into(),
         };
         Flow { i, d_psi: e, p_in: u.dot(i) * 1.5 + losses.sw, losses }
+    }
+}
+
+impl Lossy<'_> {
+    /// Conductance (S) of the iron at the mechanical `speed` (rad/s).
+    #[inline]
+    pub fn conductance(&self, speed: f64) -> f64 {
+        self.circuit(0.0, speed * self.n_p).1
+    }
+
+    /// Inverter and machine near the mechanical `speed` (rad/s) while the currents keep their `sides`, with the resistance
+    /// `R_s` (Ohm) and the voltage `u` (V) of the legs before dead time.
+    pub fn region(&self, R_s: f64, u: AlphaBeta, legs: &Legs, sides: &Sides, speed: f64) -> Region {
+        let (R, G) = self.circuit(R_s, speed * self.n_p);
+        let signs = sides.legs();
+        let u = if legs.drop() { u - legs.loss_beyond(signs) } else { u };
+        let none = Affine { at_0: AlphaBeta::ZERO, by: [0.0; 3] };
+        let drop = self.conduction.as_ref().map_or(none, |conduction| conduction.affine(u, signs));
+        Region::new(u, R, G, drop, signs.to_stator() * (1.5 * self.sw))
+    }
+
+    /// The current (A) whose sides count, near the mechanical `speed` (rad/s): that at the terminals without any drop of
+    /// the legs, as (factor of the current of the flux linkage, rest), with the resistance `R_s` (Ohm) and the voltage
+    /// `u` (V) of the legs before dead time.
+    pub fn guide(&self, R_s: f64, u: AlphaBeta, speed: f64) -> (f64, AlphaBeta) {
+        let (R, G) = self.circuit(R_s, speed * self.n_p);
+        let part = 1.0 / (R * G + 1.0);
+        (part, u * (part * G))
     }
 }

@@ -13,6 +13,7 @@ pub mod conduction;
 #[cfg(test)]
 mod figures;
 pub mod flow;
+pub mod region;
 pub mod switching;
 
 use crate::plant::tables::PlantParameters;
