@@ -7,7 +7,7 @@ use crate::modulation::limit_to_hexagon;
 use crate::motor::Motor;
 use crate::plant::inverter::Inverter;
 use crate::plant::legs::Legs;
-use crate::plant::losses::flow::{Flow, Lossy};
+use crate::plant::losses::flow::{self, Flow, Lossy};
 use crate::plant::losses::region::{Region, Sides};
 use crate::plant::losses::{self, Losses, efficiency, switching};
 use crate::plant::machine::{self, Machine};
@@ -467,73 +467,85 @@ impl PmsmPlant {
         self.drive_held::<true>(start, h, u, legs, lossy)
     }
 
-    /// [`drive`](Self::drive) while the currents keep their sides.
+    /// [`drive`](Self::drive) while the currents keep their sides; a function of its own has registers enough.
     #[inline(never)]
     fn drive_between(&self, start: &State, h: f64, circuit: &Between<'_>) -> (State, Passed) {
         self.drive::<true>(start, h, circuit)
     }
 
-    /// Integration steps over `h` (s) from `state` on with switching legs and losses. A step ends where a current enters
-    /// or leaves the zone of the kinks: across a kink, the method loses its order.
+    /// Integration steps over `h` (s) from `state` on with switching legs and losses, and the current (A) by the iron at
+    /// their end. A step ends where a current enters or leaves the zone of the kinks: across a kink, the method loses its
+    /// order.
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
     fn switch(&self, state: &mut State, h: f64, u: AlphaBeta, legs: &Legs, lossy: &Lossy<'_>) -> (Passed, Dq) {
         let PlantParameters { saturation, inverter, mechanics, .. } = &self.parameters;
         let (motor, zone) = (&self.warm.motor, legs.i_zone());
         let machine = Machine::new(motor, saturation);
-        let R_s = machine.resistance();
-        let current = |state: &State| state.axis.to_stator(machine.current(state.psi));
+        let (R_s, n_p) = (machine.resistance(), f64::from(motor.n_p));
         let kinks = legs.drop() || lossy.kinks();
-        let within = Self::within_the_zone(motor, legs, inverter.devices.threshold());
-        let (part, rest) = lossy.guide(R_s, u, state.speed);
-        let guide = |state: &State| current(state) * part + rest;
-        let (mut passed, mut left, mut i) = (Passed::default(), h, guide(state));
-        let mut sides = Sides::of(i, zone);
+        let within = if kinks { Self::within_the_zone(motor, legs, inverter.devices.threshold()) } else { 0.0 };
+        let guide = flow::guide(lossy.circuit(R_s, n_p * state.speed), u);
+        let guide = |state: &State| guide(state.axis.to_stator(machine.current(state.psi)));
+        let (mut passed, mut left, mut start) = (Passed::default(), h, guide(state));
+        let mut sides = Sides::of(start, zone);
+        // A step that is known to end at a kink: its length, and the sides from there on.
+        let mut to_kink = None;
         loop {
             let apart = !kinks || sides.apart();
             let longest = if apart { LONGEST_SUBSTEP } else { within };
-            let w = (f64::from(motor.n_p) * state.speed).abs();
-            let mut h = if left <= longest && w * left <= LARGEST_TURN {
-                left
-            } else {
-                left / (left / longest.min(LARGEST_TURN / w) - 1e-9).ceil().max(1.0)
+            let w = (n_p * state.speed).abs();
+            let (h, then) = match to_kink.take() {
+                Some((h, then)) => (h, Some(then)),
+                None if left <= longest && w * left <= LARGEST_TURN => (left, None),
+                None => (left / (left / longest.min(LARGEST_TURN / w) - 1e-9).ceil().max(1.0), None),
             };
             let between = apart.then(|| {
-                // The middle of the step counts.
                 let shaft = Shaft::new(mechanics, self.inputs.tau_load, state.speed);
                 let tau_e = machine.torque(state.psi, machine.current(state.psi));
+                // Resistance and conductance of the middle of the step.
                 let speed = state.speed + 0.5 * h * shaft.motion(state.speed, tau_e).acceleration;
-                Between { machine, region: lossy.region(R_s, u, legs, &sides, speed), shaft }
+                let region = lossy.region(lossy.circuit(R_s, n_p * speed), u, legs, &sides);
+                Between { machine, region, shaft }
             });
-            let drive = |h: f64| match &between {
+            let (next, step) = match &between {
                 Some(between) => self.drive_between(state, h, between),
                 None => self.drive_lossy(state, h, u, legs, Some(lossy)),
             };
-            let (mut next, mut step) = drive(h);
-            let mut end = guide(&next);
-            if kinks && let Some((share, then)) = sides.change(i, end, zone) {
+            let end = guide(&next);
+            if let Some(then) = then {
                 sides = then;
+            } else if kinks && let Some((share, then)) = sides.change(start, end, zone) {
                 if share < 0.99 {
-                    h = (h * share).max(SHORTEST_SHARE * within).min(h);
-                    (next, step) = drive(h);
-                    end = guide(&next);
+                    to_kink = Some(((h * share).max(SHORTEST_SHARE * within).min(h), then));
+                    continue;
                 }
+                sides = then;
             }
+            start = end;
             passed.energy.add(&step.energy);
             passed.losses.add(&step.losses);
-            (*state, i) = (next, end);
+            *state = next;
             left -= h;
             if left <= 1e-9 * h {
+                let i = state.axis.to_stator(machine.current(state.psi));
                 let emf = match &between {
-                    Some(between) => between.region.emf(current(state)),
-                    None => {
-                        let steady = lossy.steady(state.psi, machine.current(state.psi), state.speed);
-                        let u = if legs.drop() { u - legs.loss(state.axis.to_stator(steady)) } else { u };
-                        lossy.flow(R_s, u, current(state), state.speed).d_psi
-                    }
+                    Some(between) => between.region.emf(i),
+                    None => self.emf(state, i, u, legs, lossy),
                 };
-                let by_iron = emf * lossy.conductance(state.speed);
-                return (passed, state.axis.from_stator(by_iron));
+                let (_, G) = lossy.circuit(R_s, n_p * state.speed);
+                return (passed, state.axis.from_stator(emf * G));
             }
         }
+    }
+
+    /// Voltage (V) behind the resistance with the current `i` (A) of the flux linkage and the voltage `u` (V) of the legs.
+    #[inline(never)]
+    fn emf(&self, state: &State, i: AlphaBeta, u: AlphaBeta, legs: &Legs, lossy: &Lossy<'_>) -> AlphaBeta {
+        let machine = Machine::new(&self.warm.motor, &self.parameters.saturation);
+        let steady = lossy.steady(state.psi, machine.current(state.psi), state.speed);
+        let u = if legs.drop() { u - legs.loss(state.axis.to_stator(steady)) } else { u };
+        lossy.flow(machine.resistance(), u, i, state.speed).d_psi
     }
 
     /// Longest integration step in s with a current in the zone where the voltages of the legs and of devices with this

@@ -118,9 +118,8 @@ impl<S: Scalar> Conduction<S> {
         let max = |a: S, b: S| if a.value() > b.value() { a } else { b };
         let min = |a: S, b: S| if a.value() < b.value() { a } else { b };
         let middle = (max(max(u.a, u.b), u.c) + min(min(u.a, u.b), u.c)) * 0.5;
-        let leg = |u: S| {
-            if self.u_dc.value() > 0.0 { clamp_unit((u - middle) * 2.0 / self.u_dc) } else { 0.0.into() }
-        };
+        let by_u_dc = if self.u_dc.value() > 0.0 { S::from(2.0) / self.u_dc } else { 0.0.into() };
+        let leg = |u: S| clamp_unit((u - middle) * by_u_dc);
         Phases { a: leg(u.a), b: leg(u.b), c: leg(u.c) }
     }
 }

@@ -65,7 +65,7 @@ impl<'a, S: Scalar> Lossy<'a, S> {
     /// Resistance (Ohm) and conductance (S) at the electrical speed `w` (rad/s), with the resistance `R_s` (Ohm) at
     /// standstill.
     #[inline]
-    fn circuit(&self, R_s: S, w: S) -> (S, S) {
+    pub fn circuit(&self, R_s: S, w: S) -> (S, S) {
         let R = (w * w * self.k_ac + S::from(1.0)) * R_s;
         (R, if self.iron.is_none() { 0.0.into() } else { self.iron.conductance(w) })
     }
@@ -104,29 +104,24 @@ impl<'a, S: Scalar> Lossy<'a, S> {
 }
 
 impl Lossy<'_> {
-    /// Conductance (S) of the iron at the mechanical `speed` (rad/s).
+    /// Inverter and machine while the currents keep their `sides`, with resistance and conductance of the `circuit` (Ohm, S)
+    /// and the voltage `u` (V) of the legs before dead time.
     #[inline]
-    pub fn conductance(&self, speed: f64) -> f64 {
-        self.circuit(0.0, speed * self.n_p).1
-    }
-
-    /// Inverter and machine near the mechanical `speed` (rad/s) while the currents keep their `sides`, with the resistance
-    /// `R_s` (Ohm) and the voltage `u` (V) of the legs before dead time.
-    pub fn region(&self, R_s: f64, u: AlphaBeta, legs: &Legs, sides: &Sides, speed: f64) -> Region {
-        let (R, G) = self.circuit(R_s, speed * self.n_p);
+    pub fn region(&self, circuit: (f64, f64), u: AlphaBeta, legs: &Legs, sides: &Sides) -> Region {
         let signs = sides.legs();
         let u = if legs.drop() { u - legs.loss_beyond(signs) } else { u };
         let none = Affine { at_0: AlphaBeta::ZERO, by: [0.0; 3] };
         let drop = self.conduction.as_ref().map_or(none, |conduction| conduction.affine(u, signs));
-        Region::new(u, R, G, drop, signs.to_stator() * (1.5 * self.sw))
+        Region::new(u, circuit, drop, signs.to_stator() * (1.5 * self.sw))
     }
+}
 
-    /// The current (A) whose sides count, near the mechanical `speed` (rad/s): that at the terminals without any drop of
-    /// the legs, as (factor of the current of the flux linkage, rest), with the resistance `R_s` (Ohm) and the voltage
-    /// `u` (V) of the legs before dead time.
-    pub fn guide(&self, R_s: f64, u: AlphaBeta, speed: f64) -> (f64, AlphaBeta) {
-        let (R, G) = self.circuit(R_s, speed * self.n_p);
-        let part = 1.0 / (R * G + 1.0);
-        (part, u * (part * G))
-    }
+/// The current (A) whose sides count: that at the terminals without any drop of the legs, with resistance and conductance
+/// of the `circuit` (Ohm, S) and the voltage `u` (V) of the legs before dead time, as a function of the current (A) of the
+/// flux linkage.
+#[inline]
+pub fn guide((R, G): (f64, f64), u: AlphaBeta) -> impl Fn(AlphaBeta) -> AlphaBeta {
+    let part = 1.0 / (R * G + 1.0);
+    let rest = u * (part * G);
+    move |i| i * part + rest
 }

@@ -18,7 +18,7 @@ use crate::plant::losses::Losses;
 use crate::plant::losses::flow::Flow;
 
 /// The side of the zone on which the current of each leg is: 1 above, -1 below, 0 within.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sides([f64; 3]);
 
 impl Sides {
@@ -46,6 +46,7 @@ impl Sides {
 
     /// Where in a step, as a share of it, the first current changes its side, if one does: the currents go from `start` (A)
     /// to `end` (A). The side changes to that in the second value there.
+    #[inline]
     pub fn change(&self, start: AlphaBeta, end: AlphaBeta, zone: f64) -> Option<(f64, Self)> {
         let next = Self::of(end, zone);
         if next == *self {
@@ -110,7 +111,7 @@ impl Region {
     /// With the voltage `u` (V) of the legs, resistance `R` (Ohm), conductance `G` (S), voltage `drop` (V) of the devices
     /// as a function of their current, and switching loss `sw` (W per ampere).
     #[inline]
-    pub fn new(u: AlphaBeta, R: f64, G: f64, drop: Affine, sw: AlphaBeta) -> Self {
+    pub fn new(u: AlphaBeta, (R, G): (f64, f64), drop: Affine, sw: AlphaBeta) -> Self {
         let part = 1.0 / (R * G + 1.0);
         let by = drop.by.map(|r| r * part);
         let drop = Affine { at_0: drop.at(u * (part * G)), by };
