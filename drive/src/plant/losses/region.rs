@@ -140,3 +140,58 @@ impl Region {
         Flow { i, d_psi: e, p_in: self.u.dot(i) * 1.5 + losses.sw, losses }
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "sides are exact")]
+mod tests {
+    use super::*;
+    use crate::plant::legs::Legs;
+    use crate::plant::losses::conduction::Devices;
+    use crate::plant::losses::flow::Lossy;
+    use crate::plant::tables::PlantParameters;
+
+    #[test]
+    fn beyond_the_zone_the_affine_flow_is_the_flow() {
+        let mut par = PlantParameters::default();
+        (par.iron.G_e, par.iron.G_h, par.winding.k_ac) = (2e-4, 0.1, 1e-7);
+        par.inverter.dead_time = 2e-6;
+        par.inverter.devices = Devices {
+            u_transistor: 0.9,
+            r_transistor: 0.06,
+            u_diode: 0.7,
+            r_diode: 0.05,
+            E_sw: 1e-3,
+            ..Devices::default()
+        };
+        let legs = Legs::switching(&par.inverter, 325.0);
+        let lossy = Lossy::new(&par, true, 325.0, legs.i_zone(), 1.2).unwrap();
+        let u = AlphaBeta::new(70.0, -90.0);
+        for k in 0..6_u32 {
+            let angle = 0.2 + std::f64::consts::FRAC_PI_3 * f64::from(k);
+            let i = AlphaBeta::new(5.0 * angle.cos(), 5.0 * angle.sin());
+            let sides = Sides::of(i, legs.i_zone());
+            assert!(sides.apart(), "{sides:?}");
+            let got = lossy.region(lossy.circuit(2.0, 300.0), u, &legs, &sides).flow(i);
+            let wanted = lossy.flow(2.0, u - legs.loss(i), i, 100.0);
+            let near = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
+            assert!((got.i - wanted.i).magnitude() < 1e-13 && (got.d_psi - wanted.d_psi).magnitude() < 1e-12, "{i:?}");
+            assert!(near(got.p_in, wanted.p_in) && near(got.losses.cond, wanted.losses.cond), "{i:?}");
+            assert!(near(got.losses.sw, wanted.losses.sw) && near(got.losses.iron, wanted.losses.iron), "{i:?}");
+        }
+    }
+
+    #[test]
+    fn the_first_current_at_an_edge_ends_a_step() {
+        // a goes from 3 A to -1 A and meets 0.2 A at 0.7; b goes from 0 to 0.5 A, out of the zone at 0.4.
+        let phases = |a: f64, b: f64| Phases { a, b, c: -a - b }.to_stator();
+        let (start, end) = (phases(3.0, 0.0), phases(-1.0, 0.5));
+        let sides = Sides::of(start, 0.2);
+        let (share, next) = sides.change(start, end, 0.2).unwrap();
+        assert!((share - 0.4).abs() < 1e-12 && !sides.apart(), "{share}");
+        let Phases { a, b, c } = next.legs();
+        assert_eq!([a, b, c], [1.0, 1.0, -1.0]);
+        let (share, next) = next.change(start, end, 0.2).unwrap();
+        assert!((share - 0.7).abs() < 1e-12 && next.legs().a == 0.0, "{share}, {next:?}");
+        assert!(Sides::of(start, 0.2).change(start, phases(2.0, 0.1), 0.2).is_none());
+    }
+}
