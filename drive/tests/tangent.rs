@@ -149,8 +149,9 @@ fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
     if point % 7 < 3 {
         let thermal = &mut par.thermal;
         (thermal.mode, thermal.alpha_R, thermal.alpha_psi) = (ThermalMode::Imposed, 3.93e-3, -1.1e-3);
-        let T = 293.15 + 30.0 * f64::from(point % 4);
-        block.model.inputs.thermal.imposed = Temperatures { winding: T + 50.0, stator: T, magnet: T, inverter: 310.0 };
+        let warm = 293.15 + 30.0 * f64::from(point % 4);
+        block.model.inputs.thermal.imposed =
+            Temperatures { winding: warm + 50.0, stator: warm, magnet: warm, inverter: 310.0 };
         kinds.warm += 1;
     }
     let psi_m = par.thermal.motor(&par.motor, &block.model.inputs.thermal.imposed).psi_M;
@@ -206,7 +207,7 @@ fn the_tangent_of_the_plant_is_its_derivative() {
     // The row of the efficiency: a value that no other unknown has.
     let mut marked = Block::<PmsmPlant>::default();
     marked.out.efficiency = 0.123;
-    let efficiency = unknowns([0.0; 4], &mut marked).iter().position(|x| *x == 0.123).unwrap();
+    let efficiency = unknowns([0.0; 4], &mut marked).iter().position(|x| x.to_bits() == 0.123_f64.to_bits()).unwrap();
     for point in 0..100 {
         let base = draw(&mut numbers, point, &mut kinds);
         let value = evaluate(&base);
@@ -294,11 +295,12 @@ fn the_tangent_of_the_drive_is_that_of_its_plant() {
         change(&mut inputs.tau_load, 0.7);
         change(&mut inputs.u_dc, 20.0);
         change(&mut inputs.speed_ref, 5.0);
-        let T = &mut inputs.thermal.imposed;
-        for (T, by) in
-            [&mut T.winding, &mut T.stator, &mut T.magnet, &mut T.inverter].into_iter().zip([10.0, 3.0, -7.0, 2.0])
+        let imposed = &mut inputs.thermal.imposed;
+        for (value, by) in [&mut imposed.winding, &mut imposed.stator, &mut imposed.magnet, &mut imposed.inverter]
+            .into_iter()
+            .zip([10.0, 3.0, -7.0, 2.0])
         {
-            change(T, by);
+            change(value, by);
         }
         change(&mut inputs.thermal.coolant, 5.0);
         for (state, by) in PmsmDrive::STATES.iter().zip([0.02, -0.03, 10.0, 0.3]) {

@@ -128,7 +128,7 @@ impl Point {
         let par = &mut controller.model.parameters;
         (par.motor, par.estimator, par.speed_loop.torque_mode) = (self.motor.clone(), Kind::Sensored, true);
         par.limit = Limits { i: 400.0, i_q: 400.0, tau: 1e4 };
-        par.current = CurrentLoop { mtpa: true, ..CurrentLoop::default() };
+        par.current = CurrentLoop { mtpa: true, active_resistance: true, ..CurrentLoop::default() };
         drive.model.inputs.u_dc = self.u_dc;
         drive
     }
@@ -470,10 +470,9 @@ fn model_exchange_has_no_network() {
         drive.pair.plant.model.parameters.thermal.mode = mode;
         drive.validate_for(Interface::ModelExchange).unwrap();
     }
-    let mut dx = [0.0; 4];
     let mut block = imposed(20.0, 20.0);
     block.initialize();
     block.model.inputs.thermal.imposed.winding = 1.0;
-    let fault = block.model.derivatives(Elapsed::ZERO, &mut dx).unwrap_err();
+    let fault = block.model.event(Elapsed::ZERO).unwrap_err();
     assert!(fault.message().contains("T_winding_imposed = 1 K"), "{fault}");
 }

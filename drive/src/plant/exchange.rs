@@ -100,9 +100,6 @@ impl PmsmPlant {
 
     /// [`ContinuousTime::derivatives`] under these `inputs`.
     pub(crate) fn derivatives_under(&self, inputs: &PlantInputs, dx: &mut [f64]) -> Result<(), Fault> {
-        if self.parameters.thermal.mode == ThermalMode::Imposed {
-            self.judge_temperatures(inputs)?;
-        }
         let slopes = self.slopes(inputs, &self.present(inputs));
         if !crate::math::all_finite(slopes) {
             return Err(Fault::new(format!("the machine has no finite derivatives at {}", self.state.tell())));
@@ -201,6 +198,9 @@ impl Events for PmsmPlant {
     }
 
     fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+        if self.parameters.thermal.mode == ThermalMode::Imposed {
+            self.judge_temperatures(&self.inputs)?;
+        }
         let Instant { psi, speed, angle, axis, .. } = self.present(&self.inputs);
         let mut state = super::model::State { psi, speed, angle, axis };
         if !state.is_finite() {

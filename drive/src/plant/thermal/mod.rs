@@ -215,28 +215,32 @@ impl Thermal {
     ///
     /// # Errors
     /// Names the temperature, its effect and what to do.
+    #[inline]
     pub fn check(&self, motor: &Motor, at: &Temperatures, names: [&str; 2], remedy: &str) -> Result<(), Fault> {
-        let hot = self.motor(motor, at);
-        for (name, T, what, value, unit, coefficient) in [
-            (names[0], at.winding, "resistance", hot.R_s, "Ohm", THERMAL.tell(self, |p| &mut p.alpha_R)),
-            (
-                names[1],
-                at.magnet,
-                "permanent-magnet flux linkage",
-                hot.psi_M,
-                "Wb",
-                THERMAL.tell(self, |p| &mut p.alpha_psi),
-            ),
-        ] {
-            if !(value > 0.0 && value.is_finite()) {
-                let T_ref = THERMAL.tell(self, |p| &mut p.T_ref);
-                return Err(Fault::new(format!(
-                    "{name} = {T} K with {coefficient} and {T_ref} makes the {what} {value} {unit}, which must be greater \
-                     than 0: {remedy}"
-                )));
-            }
+        let Motor { R_s, psi_M, .. } = self.motor(motor, at);
+        let works = |x: f64| x > 0.0 && x.is_finite();
+        if !works(R_s) {
+            return Err(self.refused(
+                names[0],
+                at.winding,
+                |p| &mut p.alpha_R,
+                &format!("resistance {R_s} Ohm"),
+                remedy,
+            ));
+        }
+        if !works(psi_M) {
+            let effect = format!("permanent-magnet flux linkage {psi_M} Wb");
+            return Err(self.refused(names[1], at.magnet, |p| &mut p.alpha_psi, &effect, remedy));
         }
         Ok(())
+    }
+
+    #[cold]
+    fn refused(&self, name: &str, T: f64, alpha: fn(&mut Self) -> &mut f64, effect: &str, remedy: &str) -> Fault {
+        let [alpha, T_ref] = [THERMAL.tell(self, alpha), THERMAL.tell(self, |p| &mut p.T_ref)];
+        Fault::new(format!(
+            "{name} = {T} K with {alpha} and {T_ref} makes the {effect}, which must be greater than 0: {remedy}"
+        ))
     }
 }
 
