@@ -5,10 +5,10 @@
 //! p_loss = p_cu + p_iron + p_cond + p_sw + p_friction
 //! ```
 //!
-//! [`iron`](crate::plant::iron), [`conduction`] and [`switching`] have the equations, [`flow`] joins them at an instant, and
-//! [`region`] over a step. The efficiency is p_mech / p_in of
-//! a motor, p_in / p_mech of a generator, and 0 elsewhere: where power comes in from both sides, where p_mech is below
-//! 1 uW, and where the ratio is above 1 because stored energy supplies the power.
+//! [`iron`](crate::plant::iron), [`conduction`] and [`switching`] have the equations; [`flow`] joins them at an instant,
+//! [`region`] over a step. The efficiency is p_mech / p_in of a motor, p_in / p_mech of a generator, and 0 elsewhere: where
+//! power comes in from both sides, where p_mech is below 1 uW, and where the ratio is above 1 because stored energy supplies
+//! the power.
 
 pub mod conduction;
 #[cfg(test)]

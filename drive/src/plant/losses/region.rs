@@ -46,6 +46,7 @@ impl Sides {
 
     /// Where in a step, as a share of it, the first current changes its side, if one does: the currents go from `start` (A)
     /// to `end` (A). The side changes to that in the second value there.
+    #[expect(clippy::float_cmp, reason = "sides are exact")]
     #[inline]
     pub fn change(&self, start: AlphaBeta, end: AlphaBeta, zone: f64) -> Option<(f64, Self)> {
         let next = Self::of(end, zone);

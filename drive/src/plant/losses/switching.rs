@@ -32,6 +32,7 @@ pub struct Last {
 
 impl Last {
     /// Loss in W per ampere with switching legs at the DC-link voltage `u_dc` (V).
+    #[expect(clippy::float_cmp, reason = "the same voltage, bit for bit")]
     pub fn per_ampere(&mut self, inverter: &Inverter, u_dc: f64) -> f64 {
         match self.known {
             Some((known, sw)) if known == u_dc => sw,
