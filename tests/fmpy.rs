@@ -17,7 +17,7 @@ fn fmpy_validates_and_cosimulates() {
 
 #[test]
 fn losses_and_temperatures() {
-    pytest("fmpy", "losses", &["test_losses_and_temperature.py"], &[]);
+    pytest("fmpy", "losses", &["test_losses_and_temperature.py", "test_drive_cycle.py"], &[]);
 }
 
 #[test]
