@@ -14,9 +14,11 @@ use crate::frame::{Axis, Phases, Rotor, Vector};
 use crate::modulation::limit_to_hexagon;
 use crate::plant::machine::{self, Machine};
 use crate::plant::mechanics::Shaft;
-use crate::plant::model::{Held, Instant, PmsmPlant, Rates};
+use crate::plant::model::PmsmPlant;
 use crate::plant::power::{Powers, dc_current};
+use crate::plant::rates::{Held, Rates};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
+use crate::plant::state::Instant;
 use crate::plant::tables::PlantParameters;
 use crate::plant::thermal::ThermalMode;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
@@ -202,7 +204,7 @@ impl Events for PmsmPlant {
             self.judge_temperatures(&self.inputs)?;
         }
         let Instant { psi, speed, angle, axis, .. } = self.present(&self.inputs);
-        let mut state = super::model::State { psi, speed, angle, axis };
+        let mut state = crate::plant::state::State { psi, speed, angle, axis };
         if !state.is_finite() {
             return Err(Fault::new(format!("the machine's state is not finite: {}", state.tell())));
         }

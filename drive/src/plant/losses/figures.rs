@@ -12,7 +12,8 @@ use crate::plant::losses::efficiency;
 use crate::plant::losses::switching;
 use crate::plant::machine::{Machine, flux};
 use crate::plant::mechanics::Shaft;
-use crate::plant::model::{Held, PmsmPlant, Rates};
+use crate::plant::model::PmsmPlant;
+use crate::plant::rates::{Held, Rates};
 use crate::plant::tables::PlantParameters;
 use std::f64::consts::{PI, TAU};
 

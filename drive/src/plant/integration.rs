@@ -1,0 +1,201 @@
+//! The integration of the currents and the shaft: Runge-Kutta steps, which end at the kinks of the inverter's voltages.
+
+use crate::frame::{AlphaBeta, Dq, Turn};
+use crate::motor::Motor;
+use crate::plant::legs::Legs;
+use crate::plant::losses::Losses;
+use crate::plant::losses::flow::{self, Lossy};
+use crate::plant::losses::region::Sides;
+use crate::plant::machine::Machine;
+use crate::plant::mechanics::Shaft;
+use crate::plant::model::PmsmPlant;
+use crate::plant::power::Energy;
+use crate::plant::rates::{Between, Circuit, Held, Passed, Rates};
+use crate::plant::state::{State, axis_at};
+use crate::plant::tables::PlantParameters;
+
+/// Longest integration step in s without a voltage that depends on the sign of a current: at 4500 rpm of the reference
+/// motor, the current error is less than 2e-6 A.
+pub(super) const LONGEST_SUBSTEP: f64 = 100e-6;
+
+/// The same with such a voltage, which has kinks where a current changes its sign.
+const LONGEST_SUBSTEP_WITH_KINKS: f64 = 50e-6;
+
+/// Shortest integration step at a kink, as a share of the longest within the zone.
+const SHORTEST_SHARE: f64 = 0.01;
+
+/// Largest electrical angle in rad that the rotor turns in an integration step.
+pub(super) const LARGEST_TURN: f64 = 0.25;
+
+impl PmsmPlant {
+    /// One integration step of `h` (s) under the voltage `u` (V), with the classical Runge-Kutta method ([`rk4`]): the
+    /// flux linkage in stator axes, and the angle as the deviation from a motion at constant speed.
+    ///
+    /// In stator axes, the flux linkage is the integral of the held voltage minus R_s i. Only this small resistive part
+    /// follows the rotor, so a step is more exact than two of half its length in rotor axes.
+    #[expect(clippy::inline_always, reason = "as a call, it passes the state through memory: 10 % of a period")]
+    #[inline(always)]
+    fn drive<const LOSSY: bool>(&self, start: &State, h: f64, circuit: &impl Circuit) -> (State, Passed) {
+        let motor = &self.warm.motor;
+        let (n_p, half, speed) = (f64::from(motor.n_p), 0.5 * h, start.speed);
+        let psi = circuit.machine().to_stator(start.axis, start.psi);
+        let turn = Turn::new(n_p * half * speed);
+        let middle = start.axis.ahead(turn);
+
+        let k_1 = circuit.rates_in_stator(start.axis, psi, speed);
+        let k_2 = circuit.rates_in_stator(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
+        let axis = middle.ahead(Turn::tiny(n_p * half * half * k_1.acceleration));
+        let k_3 = circuit.rates_in_stator(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
+        let axis = middle.ahead(turn).ahead(Turn::tiny(n_p * half * h * k_2.acceleration));
+        let k_4 = circuit.rates_in_stator(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
+
+        let sixth = h / 6.0;
+        let psi = psi + (k_1.d_psi + (k_2.d_psi + k_3.d_psi) * 2.0 + k_4.d_psi) * sixth;
+        let acceleration = k_2.acceleration + k_3.acceleration;
+        let angle = start.angle + h * (speed + sixth * (k_1.acceleration + acceleration));
+        let speed = speed + sixth * (k_1.acceleration + 2.0 * acceleration + k_4.acceleration);
+        let over = |power: fn(&Rates) -> f64| sixth * (power(&k_1) + 2.0 * (power(&k_2) + power(&k_3)) + power(&k_4));
+        let energy = Energy { r#in: over(|k| k.p_in), mech: over(|k| k.p_mech), loss: over(|k| k.p_loss) };
+        let friction = over(|k| k.losses.friction);
+        let losses = if LOSSY {
+            let [cu, iron] = [over(|k| k.losses.cu), over(|k| k.losses.iron)];
+            Losses { cu, iron, cond: over(|k| k.losses.cond), sw: over(|k| k.losses.sw), friction }
+        } else {
+            Losses { cu: energy.loss - friction, friction, ..Losses::none() }
+        };
+        let axis = axis_at(motor, angle);
+        (State { psi: circuit.machine().from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
+    }
+
+    /// [`drive`](Self::drive) under the voltage `u` (V).
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
+    pub(super) fn drive_held<const LOSSY: bool>(
+        &self,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+        legs: &Legs,
+        lossy: Option<&Lossy<'_>>,
+    ) -> (State, Passed) {
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
+        let held = Held {
+            machine: Machine::new(&self.warm.motor, saturation),
+            u,
+            legs: legs.drop().then_some(legs),
+            // Known to the compiler, so that a step without them takes no time for them.
+            lossy: if LOSSY { lossy } else { None },
+            shaft: if LOSSY { shaft } else { shaft.without_windage() },
+        };
+        self.drive::<LOSSY>(start, h, &held)
+    }
+
+    /// The same with losses besides that of a constant resistance.
+    #[inline(never)]
+    pub(super) fn drive_lossy(
+        &self,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+        legs: &Legs,
+        lossy: Option<&Lossy<'_>>,
+    ) -> (State, Passed) {
+        self.drive_held::<true>(start, h, u, legs, lossy)
+    }
+
+    /// [`drive`](Self::drive) while the currents keep their sides; a function of its own has registers enough.
+    #[inline(never)]
+    fn drive_between(&self, start: &State, h: f64, circuit: &Between<'_>) -> (State, Passed) {
+        self.drive::<true>(start, h, circuit)
+    }
+
+    /// Integration steps over `h` (s) from `state` on with switching legs and losses, and the current (A) by the iron at
+    /// their end. A step ends where a current enters or leaves the zone of the kinks: across a kink, the method loses its
+    /// order.
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
+    pub(super) fn switch(
+        &self,
+        state: &mut State,
+        h: f64,
+        u: AlphaBeta,
+        legs: &Legs,
+        lossy: &Lossy<'_>,
+    ) -> (Passed, Dq) {
+        let PlantParameters { saturation, inverter, mechanics, .. } = &self.parameters;
+        let (motor, zone) = (&self.warm.motor, legs.i_zone());
+        let machine = Machine::new(motor, saturation);
+        let (R_s, n_p) = (machine.resistance(), f64::from(motor.n_p));
+        let kinks = legs.drop() || lossy.kinks();
+        let within = if kinks { Self::within_the_zone(motor, legs, inverter.devices.threshold()) } else { 0.0 };
+        let guide = flow::guide(lossy.circuit(R_s, n_p * state.speed), u);
+        let guide = |state: &State| guide(state.axis.to_stator(machine.current(state.psi)));
+        let (mut passed, mut left, mut start) = (Passed::default(), h, guide(state));
+        let mut sides = Sides::of(start, zone);
+        // A step that is known to end at a kink: its length, and the sides from there on.
+        let mut to_kink = None;
+        loop {
+            let apart = !kinks || sides.apart();
+            let longest = if apart { LONGEST_SUBSTEP } else { within };
+            let w = (n_p * state.speed).abs();
+            let (h, then) = match to_kink.take() {
+                Some((h, then)) => (h, Some(then)),
+                None if left <= longest && w * left <= LARGEST_TURN => (left, None),
+                None => (left / (left / longest.min(LARGEST_TURN / w) - 1e-9).ceil().max(1.0), None),
+            };
+            let between = apart.then(|| {
+                let shaft = Shaft::new(mechanics, self.inputs.tau_load, state.speed);
+                let tau_e = machine.torque(state.psi, machine.current(state.psi));
+                // Resistance and conductance of the middle of the step.
+                let speed = state.speed + 0.5 * h * shaft.motion(state.speed, tau_e).acceleration;
+                let region = lossy.region(lossy.circuit(R_s, n_p * speed), u, legs, &sides);
+                Between { machine, region, shaft }
+            });
+            let (next, step) = match &between {
+                Some(between) => self.drive_between(state, h, between),
+                None => self.drive_lossy(state, h, u, legs, Some(lossy)),
+            };
+            let end = guide(&next);
+            if let Some(then) = then {
+                sides = then;
+            } else if kinks && let Some((share, then)) = sides.change(start, end, zone) {
+                if share < 0.99 {
+                    to_kink = Some(((h * share).max(SHORTEST_SHARE * within).min(h), then));
+                    continue;
+                }
+                sides = then;
+            }
+            start = end;
+            passed.energy.add(&step.energy);
+            passed.losses.add(&step.losses);
+            *state = next;
+            left -= h;
+            if left <= 1e-9 * h {
+                let i = state.axis.to_stator(machine.current(state.psi));
+                let emf = match &between {
+                    Some(between) => between.region.emf(i),
+                    None => self.emf(state, i, u, legs, lossy),
+                };
+                let (_, G) = lossy.circuit(R_s, n_p * state.speed);
+                return (passed, state.axis.from_stator(emf * G));
+            }
+        }
+    }
+
+    /// Voltage (V) behind the resistance with the current `i` (A) of the flux linkage and the voltage `u` (V) of the legs.
+    #[inline(never)]
+    fn emf(&self, state: &State, i: AlphaBeta, u: AlphaBeta, legs: &Legs, lossy: &Lossy<'_>) -> AlphaBeta {
+        let machine = Machine::new(&self.warm.motor, &self.parameters.saturation);
+        let steady = lossy.steady(state.psi, machine.current(state.psi), state.speed);
+        let u = if legs.drop() { u - legs.loss(state.axis.to_stator(steady)) } else { u };
+        lossy.flow(machine.resistance(), u, i, state.speed).d_psi
+    }
+
+    /// Longest integration step in s with a current in the zone where the voltages of the legs and of devices with this
+    /// `threshold` (V) fall linearly.
+    #[inline]
+    pub(super) fn within_the_zone(motor: &Motor, legs: &Legs, threshold: f64) -> f64 {
+        LONGEST_SUBSTEP_WITH_KINKS.min(0.5 * legs.time(motor, threshold))
+    }
+}

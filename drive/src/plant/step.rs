@@ -1,0 +1,191 @@
+//! A communication step of the plant: the shaft, the number of integration steps, the gates, the means.
+
+use crate::frame::AlphaBeta;
+use crate::integrate::rk4;
+use crate::modulation::limit_to_hexagon;
+use crate::plant::integration::{LARGEST_TURN, LONGEST_SUBSTEP};
+use crate::plant::legs::Legs;
+use crate::plant::losses::Losses;
+use crate::plant::losses::flow::Lossy;
+use crate::plant::machine::{self, Machine};
+use crate::plant::mechanics::Shaft;
+use crate::plant::model::PmsmPlant;
+use crate::plant::power::{Energy, Powers};
+use crate::plant::rates::{Held, Passed};
+use crate::plant::signals::PlantInputs;
+use crate::plant::state::{State, axis_at};
+use crate::plant::tables::PlantParameters;
+use crate::plant::thermal::ThermalMode;
+use fmu_core::{Fault, Step};
+use nalgebra::SVector;
+
+/// Maximum number of substeps in one communication step: 1000 s of simulated time.
+const MAX_SUBSTEPS: f64 = 1e7;
+
+impl PmsmPlant {
+    /// The state at the beginning of a step and the energy needed to reach it: an imposed shaft takes the angle of the
+    /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
+    /// linkage, which cannot jump; the magnetic field then does work on the shaft.
+    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[inline(always)]
+    fn at_the_shaft(&self) -> (State, Energy) {
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
+        if !mechanics.imposed {
+            return (self.state, Energy::default());
+        }
+        let motor = &self.warm.motor;
+        let axis = axis_at(motor, angle_shaft);
+        let machine = Machine::new(motor, saturation);
+        let psi = machine.from_stator(axis, machine.to_stator(self.state.axis, self.state.psi));
+        let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
+        let energy = Energy { mech: stored(self.state.psi) - stored(psi), ..Energy::default() };
+        (State { psi, speed: speed_shaft, angle: angle_shaft, axis }, energy)
+    }
+
+    /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s).
+    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[inline(always)]
+    fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
+        let PlantParameters { motor, inverter, .. } = &self.parameters;
+        let w = (f64::from(motor.n_p) * speed).abs();
+        let threshold = if lossy { inverter.devices.threshold() } else { 0.0 };
+        let longest = if legs.drop() || threshold > 0.0 {
+            Self::within_the_zone(motor, legs, threshold)
+        } else {
+            LONGEST_SUBSTEP
+        };
+        if h <= longest && w * h <= LARGEST_TURN {
+            return Ok(1.0);
+        }
+        Self::count(h, longest.min(LARGEST_TURN / w))
+    }
+
+    /// Number of integration steps of at most `longest` (s) in `h` (s).
+    #[inline(never)]
+    fn count(h: f64, longest: f64) -> Result<f64, Fault> {
+        let count = (h / longest - 1e-9).ceil().max(1.0);
+        if count > MAX_SUBSTEPS {
+            let limit = MAX_SUBSTEPS * longest;
+            return Err(Fault::value("the step size", format!("{h} s"), format!("at most {limit} s")));
+        }
+        Ok(count)
+    }
+
+    /// One integration step of `h` (s) with the gates off.
+    #[inline(never)]
+    fn coast(&self, start: &State, h: f64, legs: &Legs, lossy: Option<&Lossy<'_>>) -> (State, Passed) {
+        let Some(lost) = self.remaining(start, legs) else {
+            return match lossy {
+                None => self.drive_held::<false>(start, h, AlphaBeta::ZERO, legs, None),
+                lossy => self.drive_lossy(start, h, AlphaBeta::ZERO, legs, lossy),
+            };
+        };
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let motor = &self.warm.motor;
+        let held = Held {
+            machine: Machine::new(motor, saturation),
+            u: AlphaBeta::ZERO,
+            legs: None,
+            lossy: None,
+            shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
+        };
+        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost, 0.0]), h, |x| {
+            let i = self.idle_current(motor, x[0]);
+            let rates = held.idle_rates(machine::flux(motor, i), i, x[0]);
+            SVector::from([rates.acceleration, x[0], rates.p_mech, rates.p_loss, rates.losses.iron])
+        });
+        let state = State::new(motor, self.idle_flux(motor, x[0]), x[0], x[1]);
+        let losses = Losses { cu: lost, iron: x[4], friction: x[3] - lost - x[4], ..Losses::none() };
+        (state, Passed { energy: Energy { r#in: 0.0, mech: x[2], loss: x[3] }, losses })
+    }
+
+    /// A communication step; `LOSSY`: with the gates off or with losses besides that of a constant resistance.
+    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[inline(always)]
+    pub(super) fn step<const LOSSY: bool>(&mut self, step: &Step) -> Result<(), Fault> {
+        let PlantInputs { enable, u_dc, .. } = self.inputs;
+        let legs = self.legs(&self.inputs);
+        let lossy = if LOSSY {
+            let sw = if enable { self.sw.per_ampere(&self.parameters.inverter, u_dc) } else { 0.0 };
+            Lossy::new(&self.parameters, enable, u_dc, legs.i_zone(), sw)
+        } else {
+            None
+        };
+        let (mut state, mut energy) = self.at_the_shaft();
+        let mut losses = Losses::none();
+        let mut left = self.substeps(step.h, state.speed, &legs, lossy.is_some())?;
+        let h = step.h / left;
+        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
+        let mut by_iron = None;
+        if LOSSY
+            && self.inputs.enable
+            && let Some(lossy) = &lossy
+        {
+            let (passed, current) = self.switch(&mut state, step.h, u, &legs, lossy);
+            energy.add(&passed.energy);
+            (losses, by_iron, left) = (passed.losses, Some(current), 0.0);
+        }
+        while left > 0.0 {
+            let (next, passed) = match (LOSSY, self.inputs.enable, lossy.as_ref()) {
+                (false, ..) => self.drive_held::<false>(&state, h, u, &legs, None),
+                (true, true, lossy) => self.drive_lossy(&state, h, u, &legs, lossy),
+                (true, false, lossy) => self.coast(&state, h, &legs, lossy),
+            };
+            state = next;
+            energy.add(&passed.energy);
+            if LOSSY {
+                losses.add(&passed.losses);
+            } else {
+                losses.friction += passed.losses.friction;
+            }
+            left -= 1.0;
+        }
+        let lost = if !LOSSY || self.inputs.enable { None } else { self.remaining(&state, &legs) };
+        if let Some(lost) = lost {
+            state.psi = self.idle_flux(&self.warm.motor, state.speed);
+            energy.loss += lost;
+            losses.cu += lost;
+        }
+        if !LOSSY {
+            losses.cu = energy.loss - losses.friction;
+        }
+        if !(state.is_finite() && energy.is_finite()) {
+            return Err(Fault::new(format!(
+                "the machine's state left the finite numbers within a step of {} s; the step before it ended with {}",
+                step.h,
+                self.state.tell()
+            )));
+        }
+        (self.state, self.blocked) = (state, lost.is_some());
+        self.energy.add(&energy);
+        if LOSSY && !self.parameters.iron.is_none() {
+            self.by_iron = by_iron.unwrap_or_else(|| self.current_by_iron());
+        }
+        self.powers = Powers::mean(&energy, losses, step.h, &self.inputs, &legs, || self.currents());
+        Ok(())
+    }
+
+    /// [`step`](Self::step) with losses and temperatures, out of the way of a step without them.
+    #[inline(never)]
+    pub(super) fn step_with_losses(&mut self, step: &Step) -> Result<(), Fault> {
+        let mode = self.parameters.thermal.mode;
+        if mode == ThermalMode::Imposed {
+            self.impose()?;
+        }
+        self.step::<true>(step)?;
+        if mode == ThermalMode::Network {
+            self.warm_up(step.h)?;
+        }
+        Ok(())
+    }
+
+    /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.
+    fn remaining(&self, state: &State, legs: &Legs) -> Option<f64> {
+        let (motor, saturation) = (&self.warm.motor, &self.parameters.saturation);
+        let i = machine::current(motor, saturation, state.psi) - self.idle_current(motor, state.speed);
+        let blocked = legs.block(motor, state.axis, i, f64::from(motor.n_p) * state.speed);
+        let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
+        blocked.then(|| stored(state.psi) - stored(self.idle_flux(motor, state.speed)))
+    }
+}
