@@ -1,16 +1,31 @@
-//! The torque-speed plane of the reference drive, drawn for the documentation page: what the equations allow, and what the
-//! running drive gave.
+//! The torque-speed plane and the losses of the reference drive, drawn for the documentation page: curves from the
+//! equations of the steady state, dots from the running drive.
 //!
 //! A [`Panel`] holds curves over the speed; filled curves reach down to zero. To stack quantities, fill their sums, the
 //! greatest first.
+//!
+//! Steady state of a drive whose controller gets the torque `tau` and knows the machine but no losses: i is the current for
+//! `tau` under the voltage of field weakening at the samples. The voltage is held over T_s while the rotor turns, so that the
+//! mean current is i_s. With g = G w
+//!
+//! ```text
+//! i_s = i + j w u T_s^2 / (12 L)
+//! i_s = i_m + j g psi(i_m)    p_cu = 1.5 R |i_s|^2    p_iron = 1.5 g w |psi|^2    tau_e = 1.5 n_p psi x i_m
+//! p_cond = 3 ((2/pi) u_on |i_s| + r_on |i_s|^2 / 2)         p_sw = 3 (2/pi) |i_s| k
+//! ```
+//!
+//! u_on, r_on of transistor and diode alike, so the duty cycle has no influence; k is the switching loss per ampere.
 
 use crate::plot::drawing;
 use crate::reproduce::plots::tick;
 use crate::runner;
 use anyhow::{Result, anyhow};
 use drive::Pair;
-use drive::control::envelope::{Envelope, Warm};
+use drive::control::envelope::{Envelope, Limit, Warm};
 use drive::estimator::Kind;
+use drive::frame::{Dq, DqHat};
+use drive::plant::losses::{Losses, efficiency, switching};
+use drive::plant::machine;
 use plotters::prelude::*;
 use std::f64::consts::PI;
 
@@ -19,6 +34,9 @@ const RPM: f64 = PI / 30.0;
 const SIZE: (u32, u32) = (820, 360);
 const BLUE_INK: RGBColor = RGBColor(0, 114, 178);
 const RED_INK: RGBColor = RGBColor(213, 94, 0);
+const GREEN_INK: RGBColor = RGBColor(0, 158, 115);
+const ORANGE_INK: RGBColor = RGBColor(230, 159, 0);
+const SKY_INK: RGBColor = RGBColor(86, 180, 233);
 const GRAY: RGBColor = RGBColor(120, 120, 120);
 
 /// A curve over the speed.
@@ -28,8 +46,8 @@ pub struct Curve {
     pub name: &'static str,
     /// Its color.
     pub color: RGBColor,
-    /// Whether the area between it and zero is filled.
-    pub filled: bool,
+    /// Opacity of the area between it and zero, 0..1.
+    pub fill: f64,
     /// Speed in rpm and value.
     pub points: Vec<(f64, f64)>,
 }
@@ -47,6 +65,8 @@ pub struct Panel {
     pub dots: Vec<(f64, f64)>,
     /// Speeds in rpm with a label each.
     pub marks: Vec<(f64, String)>,
+    /// Where the legend hides no curve.
+    pub legend: SeriesLabelPosition,
 }
 
 /// Draws panels, one below the other.
@@ -82,9 +102,9 @@ pub fn svg(panels: &[Panel]) -> Result<String> {
                 .label_style(("sans-serif", 15))
                 .draw()
                 .map_err(drawing)?;
-            for Curve { name, color, filled, points } in &panel.curves {
-                if *filled {
-                    let area = AreaSeries::new(points.iter().copied(), 0.0, color.mix(0.15));
+            for Curve { name, color, fill, points } in &panel.curves {
+                if *fill > 0.0 {
+                    let area = AreaSeries::new(points.iter().copied(), 0.0, color.mix(*fill));
                     chart.draw_series(area).map_err(drawing)?;
                 }
                 let style = color.stroke_width(2);
@@ -104,7 +124,7 @@ pub fn svg(panels: &[Panel]) -> Result<String> {
             }
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::MiddleLeft)
+                .position(panel.legend.clone())
                 .background_style(WHITE.mix(0.8))
                 .border_style(GRAY)
                 .label_font(("sans-serif", 15))
@@ -116,35 +136,150 @@ pub fn svg(panels: &[Panel]) -> Result<String> {
     Ok(text)
 }
 
-/// The reference drive with field weakening, exact estimates and a sensor, on a shaft that turns at an imposed speed.
-fn reference() -> Pair {
-    let mut pair = Pair::default();
-    let plant = &mut pair.plant.model.parameters;
-    plant.mechanics.imposed = true;
-    let par = &mut pair.controller.model.parameters;
-    par.motor.clone_from(&plant.motor);
-    par.estimator = Kind::Sensored;
-    (par.speed_loop.torque_mode, par.weakening.used) = (true, true);
-    (par.limit.i_q, par.limit.tau) = (par.limit.i, 1000.0);
-    pair
+/// The drive in steady state.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Point {
+    /// Speed in rpm.
+    pub rpm: f64,
+    /// Torque that the controller is asked for, in N.m.
+    pub tau: f64,
+    /// Electromagnetic torque in N.m.
+    pub tau_e: f64,
+    /// Torque at the shaft in N.m.
+    pub tau_shaft: f64,
+    /// Losses in W.
+    pub losses: Losses,
+    /// Efficiency.
+    pub efficiency: f64,
 }
 
-/// The torque (N.m) of the running drive at `rpm` if it is asked for `tau` (N.m): the mean of the last tenth of 0.5 s.
-///
-/// # Errors
-/// A step fails.
-pub fn torque(rpm: f64, tau: f64) -> Result<f64> {
-    let (mut pair, mut sum, mut n) = (reference(), 0.0, 0.0);
-    let survived = runner::run_in_steps(&mut pair, 1e-4, 0.5, |t, pair| {
-        let plant = &mut pair.plant.model.inputs;
-        (plant.speed_shaft, plant.angle_shaft) = (rpm * RPM, rpm * RPM * t);
-        pair.controller.model.inputs.tau_ref = tau;
-        if t > 0.45 {
-            (sum, n) = (sum + pair.plant.out.tau_e, n + 1.0);
+/// The reference drive with field weakening, exact estimates and a sensor, on a shaft that turns at an imposed speed.
+struct Reference {
+    pair: Pair,
+    envelope: Envelope,
+    /// Voltage in V that field weakening uses.
+    U: f64,
+}
+
+impl Reference {
+    fn new() -> Self {
+        let mut pair = Pair::default();
+        let plant = &mut pair.plant.model.parameters;
+        plant.mechanics.imposed = true;
+        let par = &mut pair.controller.model.parameters;
+        par.motor.clone_from(&plant.motor);
+        par.estimator = Kind::Sensored;
+        (par.speed_loop.torque_mode, par.weakening.used) = (true, true);
+        (par.limit.i_q, par.limit.tau) = (par.limit.i, 1000.0);
+        let (envelope, u_dc) = (Envelope::new(&par.motor, par.limit.i), pair.plant.model.inputs.u_dc);
+        let U = par.weakening.k_u * u_dc / 3.0_f64.sqrt();
+        Self { pair, envelope, U }
+    }
+
+    /// The same with losses of iron and inverter; the values are assumed.
+    fn lossy() -> Self {
+        let mut drive = Self::new();
+        let plant = &mut drive.pair.plant.model.parameters;
+        (plant.iron.G_e, plant.iron.G_h) = (1.3e-4, 0.12);
+        let devices = &mut plant.inverter.devices;
+        (devices.u_transistor, devices.r_transistor, devices.u_diode, devices.r_diode) = (0.8, 0.08, 0.8, 0.08);
+        (devices.E_sw, devices.i_sw, devices.u_sw, devices.k_sw) = (0.5e-3, 10.0, 300.0, 1.3);
+        drive
+    }
+
+    /// Electrical speed in rad/s.
+    fn electrical(&self, rpm: f64) -> f64 {
+        f64::from(self.pair.plant.model.parameters.motor.n_p) * rpm * RPM
+    }
+
+    /// The limit of the sign `s`.
+    fn limit(&self, rpm: f64, s: f64) -> Limit {
+        let mut warm = Warm::default();
+        let limits = (0..8).map(|_| self.envelope.limit(self.electrical(rpm), s, self.U, &mut warm));
+        limits.last().unwrap_or_default()
+    }
+
+    /// The current (A) for `tau` (N.m): i_d = 0 where the voltage suffices, because L_d = L_q.
+    fn current(&self, rpm: f64, tau: f64) -> DqHat {
+        let (envelope, w) = (&self.envelope, self.electrical(rpm));
+        let limit = self.limit(rpm, tau.signum());
+        let i = DqHat::new(0.0, envelope.i_q(tau, 0.0));
+        if tau.abs() >= limit.tau {
+            limit.i
+        } else if envelope.excess(i, w, self.U) <= 0.0 {
+            i
+        } else {
+            let i_d = envelope.i_d(tau, w, self.U, 0.0, 8).unwrap_or(f64::NAN);
+            DqHat::new(i_d, envelope.i_q(tau, i_d))
         }
-    })
-    .map_err(|fault| anyhow!("{fault}"))?;
-    if survived { Ok(sum / n) } else { Err(anyhow!("a step failed at {rpm} rpm")) }
+    }
+
+    /// The steady state by the equations, for the torque `tau` (N.m) of the controller.
+    fn steady(&self, rpm: f64, tau: f64) -> Point {
+        let plant = &self.pair.plant.model;
+        let (par, motor) = (&plant.parameters, &plant.parameters.motor);
+        let (sampled, w) = (self.current(rpm, tau), self.electrical(rpm));
+        let (u_d, u_q) = (
+            motor.R_s * sampled.d() - w * motor.L_q * sampled.q(),
+            motor.R_s * sampled.q() + w * (motor.psi_M + motor.L_d * sampled.d()),
+        );
+        let held = w * self.pair.controller.model.parameters.T_s.powi(2) / 12.0;
+        let i = Dq::new(sampled.d() - held * u_q / motor.L_d, sampled.q() + held * u_d / motor.L_q);
+        let g = par.iron.conductance(w) * w;
+        let i_d = (i.d() + g * motor.L_q * (i.q() - g * motor.psi_M)) / (1.0 + g * g * motor.L_d * motor.L_q);
+        let i_m = Dq::new(i_d, i.q() - g * (motor.psi_M + motor.L_d * i_d));
+        let psi = machine::flux(motor, i_m);
+        let tau_e = 1.5 * f64::from(motor.n_p) * (psi.d() * i_m.q() - psi.q() * i_m.d());
+        let (devices, friction) = (&par.inverter.devices, par.mechanics.friction(rpm * RPM));
+        let (peak, mean) = (i.magnitude(), 2.0 / PI * i.magnitude());
+        let losses = Losses {
+            cu: 1.5 * motor.R_s * peak * peak,
+            iron: 1.5 * g * w * psi.dot(psi),
+            cond: 3.0 * (devices.u_transistor * mean + 0.5 * devices.r_transistor * peak * peak),
+            sw: 3.0 * mean * switching::per_ampere(devices, par.inverter.T_pwm, plant.inputs.u_dc),
+            friction: friction * rpm * RPM,
+        };
+        let (tau_shaft, p_mech) = (tau_e - friction, (tau_e - friction) * rpm * RPM);
+        Point { rpm, tau, tau_e, tau_shaft, losses, efficiency: efficiency(p_mech + losses.sum(), p_mech) }
+    }
+
+    /// The steady state with the torque `wanted` (N.m) at the shaft, or else with the greatest one of this sign.
+    fn at_shaft(&self, rpm: f64, wanted: f64) -> Point {
+        let end = |s: f64| s * self.limit(rpm, s).tau;
+        self.steady(rpm, bisect(end(-1.0), end(1.0), |tau| self.steady(rpm, tau).tau_shaft < wanted))
+    }
+
+    /// The steady state of the running drive: means of the last tenth of 0.5 s.
+    fn run(&self, rpm: f64, tau: f64) -> Result<Point> {
+        let (mut pair, mut n, mut torque, mut p_in, mut p_mech) = (self.pair.clone(), 0.0, 0.0, 0.0, 0.0);
+        let mut losses = Losses::none();
+        let survived = runner::run_in_steps(&mut pair, 1e-4, 0.5, |t, pair| {
+            let plant = &mut pair.plant.model.inputs;
+            (plant.speed_shaft, plant.angle_shaft) = (rpm * RPM, rpm * RPM * t);
+            pair.controller.model.inputs.tau_ref = tau;
+            if t > 0.45 {
+                let (out, powers) = (&pair.plant.out, &pair.plant.out.powers);
+                (n, torque) = (n + 1.0, torque + out.tau_e);
+                (p_in, p_mech) = (p_in + powers.p_in, p_mech + powers.p_mech);
+                losses.add(&powers.losses);
+            }
+        })
+        .map_err(|fault| anyhow!("{fault}"))?;
+        if !survived {
+            return Err(anyhow!("a step failed at {rpm} rpm"));
+        }
+        let (tau_shaft, efficiency) = (p_mech / n / (rpm * RPM), efficiency(p_in, p_mech));
+        Ok(Point { rpm, tau, tau_e: torque / n, tau_shaft, losses: losses.map(|sum| sum / n), efficiency })
+    }
+}
+
+/// Where `holds` ends to be true, between `low` and `high`.
+fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..60 {
+        let mid = 0.5 * (low + high);
+        *(if holds(mid) { &mut low } else { &mut high }) = mid;
+    }
+    low
 }
 
 /// The envelope of the reference drive.
@@ -161,38 +296,99 @@ pub struct Plane {
 /// The envelope of the reference drive: its curves, and the torque of the running drive at the speeds of `measured` (rpm).
 ///
 /// # Errors
-/// As [`torque`].
+/// A step fails.
 pub fn envelope(measured: &[f64]) -> Result<Plane> {
-    let pair = reference();
-    let (par, u_dc) = (&pair.controller.model.parameters, pair.plant.model.inputs.u_dc);
-    let (envelope, U) = (Envelope::new(&par.motor, par.limit.i), par.weakening.k_u * u_dc / 3.0_f64.sqrt());
-    let electrical = f64::from(par.motor.n_p) * RPM;
-    let limit = |rpm: f64, s: f64| {
-        let mut warm = Warm::default();
-        (0..8).map(|_| s * envelope.limit(rpm * electrical, s, U, &mut warm).tau).last().unwrap_or_default()
-    };
-    let base = envelope.base_speed(U) / electrical;
-    let (mut end, mut beyond) = (base, 10.0 * base);
-    while beyond - end > 1e-6 {
-        let mid = 0.5 * (end + beyond);
-        *(if limit(mid, 1.0) > 0.0 { &mut end } else { &mut beyond }) = mid;
-    }
+    let drive = Reference::new();
+    let (limit, u_dc) = (&drive.pair.controller.model.parameters.limit, drive.pair.plant.model.inputs.u_dc);
+    let base = drive.envelope.base_speed(drive.U) / drive.electrical(1.0);
+    let end = bisect(base, 10.0 * base, |rpm| drive.limit(rpm, 1.0).tau > 0.0);
     let curve = |name, color, s: f64| {
         let speeds = (0..=200).map(|k| end * f64::from(k) / 200.0);
-        Curve { name, color, filled: true, points: speeds.map(|rpm| (rpm, limit(rpm, s))).collect() }
+        Curve { name, color, fill: 0.15, points: speeds.map(|rpm| (rpm, s * drive.limit(rpm, s).tau)).collect() }
     };
     let mut dots = Vec::new();
     for &rpm in measured {
         for tau in [20.0, -20.0] {
-            dots.push((rpm, torque(rpm, tau)?));
+            dots.push((rpm, drive.run(rpm, tau)?.tau_e));
         }
     }
     let panel = Panel {
-        title: format!("reference motor, {} A, {u_dc} V", par.limit.i),
+        title: format!("reference motor, {} A, {u_dc} V", limit.i),
         unit: "torque [N.m]",
         curves: vec![curve("motoring", BLUE_INK, 1.0), curve("generating", RED_INK, -1.0)],
         dots,
         marks: vec![(base, format!("base speed {base:.0} rpm"))],
+        legend: SeriesLabelPosition::MiddleLeft,
     };
     Ok(Plane { base, end, panel })
+}
+
+/// The losses of the reference drive at one torque over the speed.
+#[derive(Clone, Debug)]
+pub struct Split {
+    /// Speed in rpm above which the voltage takes field weakening at this torque.
+    pub onset: f64,
+    /// Speed in rpm above which the drive has less than this torque.
+    pub end: f64,
+    /// Losses, stacked, and efficiency.
+    pub panels: [Panel; 2],
+    /// By the equations and of the running drive, at each speed that was measured.
+    pub points: Vec<[Point; 2]>,
+}
+
+/// The losses of the reference drive with `torque` (N.m) at the shaft, or the greatest torque where this is less, up to
+/// `highest` (rpm): curves by the equations, dots of the running drive at the speeds of `measured` (rpm).
+///
+/// # Errors
+/// A step fails.
+pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
+    let drive = Reference::lossy();
+    let (limit, u_dc) = (drive.pair.controller.model.parameters.limit.i, drive.pair.plant.model.inputs.u_dc);
+    let title = |what| format!("reference motor, {u_dc} V, {torque} N.m at the shaft: {what}");
+    let at = |rpm| drive.at_shaft(rpm, torque);
+    let end = bisect(0.0, highest, |rpm| at(rpm).tau_shaft.abs() > 0.9999 * torque.abs());
+    let onset = bisect(0.0, highest, |rpm| drive.current(rpm, at(rpm).tau).d() == 0.0);
+    let mut points = Vec::new();
+    for &rpm in measured {
+        // The reference as the page writes it.
+        let tau = (at(rpm).tau * 1e3).round() / 1e3;
+        points.push([at(rpm), drive.run(rpm, tau)?]);
+    }
+    let curves: Vec<Point> = (0..=200).map(|k| at(highest * f64::from(k) / 200.0)).collect();
+    // From the axis up.
+    let sums = |p: &Point| {
+        let Losses { cu, iron, cond, sw, .. } = p.losses;
+        [cu, cu + iron, cu + iron + cond, cu + iron + cond + sw, p.losses.sum()]
+    };
+    let names = ["p_cu", "p_iron", "p_cond", "p_sw", "p_friction"];
+    let colors = [ORANGE_INK, BLUE_INK, GREEN_INK, RED_INK, SKY_INK];
+    let area = |k: usize| Curve {
+        name: names[k],
+        color: colors[k],
+        fill: 1.0,
+        points: curves.iter().map(|p| (p.rpm, sums(p)[k])).collect(),
+    };
+    let stacked = Panel {
+        title: title("losses"),
+        unit: "losses, stacked [W]",
+        curves: (0..5).rev().map(area).collect(),
+        dots: points.iter().flat_map(|[_, run]| sums(run).map(|sum| (run.rpm, sum))).collect(),
+        marks: vec![(onset, "field weakening".into()), (end, format!("{limit} A"))],
+        legend: SeriesLabelPosition::UpperLeft,
+    };
+    let percent = |p: &Point| (p.rpm, 100.0 * p.efficiency);
+    let efficiency = Panel {
+        title: title("efficiency"),
+        unit: "efficiency [%]",
+        curves: vec![Curve {
+            name: "p_mech / p_in",
+            color: BLUE_INK,
+            fill: 0.0,
+            points: curves.iter().map(percent).collect(),
+        }],
+        dots: points.iter().map(|[_, run]| percent(run)).collect(),
+        marks: stacked.marks.clone(),
+        legend: SeriesLabelPosition::LowerMiddle,
+    };
+    Ok(Split { onset, end, panels: [stacked, efficiency], points })
 }

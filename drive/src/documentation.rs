@@ -1,7 +1,7 @@
 //! The bodies of the models' documentation pages: fragments of HTML and SVG in `drive/docs`, joined at compile time.
 //!
 //! Content that two models share (the reference plots, torque over speed, the limits, the tuning) has its own file. `fmu
-//! reproduce` draws the reference plots, and the numbers and the other plot come from runs; tests check both.
+//! reproduce` draws the reference plots, and the numbers and the other plots come from runs; tests check both.
 
 /// Joins files from `drive/docs`.
 macro_rules! joined {
@@ -23,5 +23,6 @@ pub const CONTROLLER: &str = joined!(
 /// Documentation of [`PmsmDrive`](crate::PmsmDrive).
 pub const DRIVE: &str = joined!(
     "pmsm_drive.svg" "pmsm_drive.html"
-    "reference.html" "figure-4.svg" "figure-5.svg" "envelope.html" "envelope.svg" "limits.html" "tuning.html"
+    "reference.html" "figure-4.svg" "figure-5.svg" "envelope.html" "envelope.svg"
+    "losses.html" "losses.svg" "limits.html" "tuning.html"
 );
