@@ -2,6 +2,7 @@
 
 use super::fmu_file::FmuFile;
 use super::session::{NotDetermined, Session};
+use fmu_import::guard::Allowance;
 use model_description::FmiVersion;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -125,6 +126,8 @@ pub struct Options {
     pub only: Vec<String>,
     /// Time limit for one probe of the binary; `None` for 10 s.
     pub timeout: Option<Duration>,
-    /// Program with the hidden command `probe`; `None` for the running one.
+    /// Program with the hidden command `probe` that plays the guard ([`fmu_import::guard::serve`]); `None` for the running one.
     pub program: Option<PathBuf>,
+    /// What a probe may use.
+    pub allowance: Allowance,
 }

@@ -3,6 +3,7 @@
 use crate::{self as check, Options, report};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use fmu_import::{guard, printable_lines};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -37,6 +38,12 @@ pub struct Check {
     /// Time limit for one probe of the binary, in seconds [default: 10]
     #[arg(long, alias = "patience", value_name = "S")]
     pub timeout: Option<f64>,
+    /// Address space of one probe, in GiB; 0 for no limit
+    #[arg(long, value_name = "GIB", default_value_t = guard::Allowance::default().memory >> 30, value_parser = clap::value_parser!(u64).range(..=1 << 20))]
+    pub memory: u64,
+    /// Run the probes without network (Linux with user namespaces; refused elsewhere)
+    #[arg(long)]
+    pub sandbox: bool,
     /// Exit with status 1 unless every applicable check passes
     #[arg(long)]
     pub strict: bool,
@@ -80,10 +87,11 @@ pub fn run(args: &Check) -> Result<bool> {
         Some(s) => Some(Duration::try_from_secs_f64(s).map_err(|e| anyhow::anyhow!("--timeout {s}: {e}"))?),
         None => None,
     };
-    let options = Options { only: args.only.clone(), timeout, program: None };
+    let allowance = guard::Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Default::default() };
+    let options = Options { only: args.only.clone(), timeout, program: None, allowance };
     let report = check::run(file, &options)?;
     match args.format {
-        Format::Text => print!("{}", report.text(args.verbose)),
+        Format::Text => print!("{}", printable_lines(&report.text(args.verbose))),
         Format::Json => println!("{}", report.json()?),
         Format::Html => print!("{}", report.html()),
     }

@@ -4,6 +4,7 @@ use crate::check::Run;
 use crate::checks::GROUPS;
 pub use crate::session::ProbeArguments;
 use crate::session::{Line, NotDetermined, Session};
+use fmu_import::guard;
 use std::fs;
 use std::path::Path;
 
@@ -15,6 +16,7 @@ const VIOLATED_WHEN_BLOCKED: [&str; 3] = ["B00", "L00", "E00"];
 /// # Errors
 /// There is no such check, or the folder is not readable.
 pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
+    guard::end_with_guard();
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == args.id);
     let Some(Run::Probe(probe) | Run::Silent(probe) | Run::Twice(probe) | Run::Exchange(probe)) = check.map(|c| c.run)
     else {

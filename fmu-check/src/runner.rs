@@ -8,12 +8,13 @@ use crate::check::{Check, Options, Run, Verdict};
 use crate::checks::GROUPS;
 use crate::fmu_file::FmuFile;
 use crate::session::Line;
-use model_description::Interface;
+use fmu_import::guard::{self, Allowance, End, Guarded};
+use model_description::{Interface, limits};
 use std::collections::VecDeque;
 use std::fs::{self, File};
+use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Default time limit of a probe.
@@ -22,6 +23,8 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 const WITHOUT_MINIMAL_RUN: [&str; 4] = ["B00", "L00", "E00", "X02b"];
 /// Checks with `Run::Probe` that make no instance, so that they apply to every interface.
 const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
+/// The check that processes which outlive a probe count for.
+const LEFT_BEHIND: &str = "B08p";
 /// Maximum number of restarts of a probe whose cases crash it.
 const MAX_RESTARTS: usize = 12;
 
@@ -58,7 +61,21 @@ pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Ve
         }
     });
     let lost = || Verdict::NotDetermined("the probe did not report a result".into());
-    verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect()
+    let mut verdicts: Vec<_> = verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect();
+    let left = runner.map(|r| r.left.into_inner().unwrap_or_else(PoisonError::into_inner)).unwrap_or_default();
+    for (check, verdict) in checks.iter().zip(&mut verdicts).filter(|(check, _)| check.id == LEFT_BEHIND) {
+        charge(check, verdict, &left);
+    }
+    verdicts
+}
+
+/// Adds what outlived the probes, whichever it was, to the check that is about it.
+fn charge(check: &Check, verdict: &mut Verdict, left: &[String]) {
+    match verdict {
+        _ if left.is_empty() => {}
+        Verdict::Violated(found) => found.extend(left.iter().filter(|l| l.contains(check.id)).cloned()),
+        _ => *verdict = Verdict::Violated(left.to_vec()),
+    }
 }
 
 fn is_exchange(check: &Check) -> bool {
@@ -89,7 +106,7 @@ fn store(place: &Mutex<Option<Verdict>>, verdict: Verdict) {
     }
 }
 
-/// Settings that all probes of a file share.
+/// Settings that all probes of a file share, and what they left behind.
 struct Runner {
     program: PathBuf,
     dir: PathBuf,
@@ -97,12 +114,9 @@ struct Runner {
     simulation: Option<PathBuf>,
     exchange: Option<PathBuf>,
     timeout: Duration,
-}
-
-/// How a child process ended.
-enum Outcome {
-    Exit(ExitStatus),
-    TimedOut,
+    allowance: Allowance,
+    /// Processes that outlived a probe.
+    left: Mutex<Vec<String>>,
 }
 
 impl Runner {
@@ -122,6 +136,8 @@ impl Runner {
             simulation,
             exchange,
             timeout: options.timeout.unwrap_or(TIMEOUT),
+            allowance: Allowance { file: limits::PROBE_FILE, ..options.allowance },
+            left: Mutex::default(),
         })
     }
 
@@ -163,7 +179,7 @@ impl Runner {
                 break;
             }
             let last_call = fs::read_to_string(out.with_extension("call")).unwrap_or_default();
-            crashes.push((end.describe(self.timeout), last_call.trim().to_owned()));
+            crashes.push((self.describe(&end), last_call.trim().to_owned()));
             let last = lines.iter().rev().find_map(|l| if let Line::Case(n) = l { Some(*n) } else { None });
             match last {
                 // Continue with the next case, within a limit of restarts and time.
@@ -181,9 +197,10 @@ impl Runner {
         Ok(verdict)
     }
 
-    fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> std::io::Result<Outcome> {
+    fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> std::io::Result<End> {
         let console = File::options().create(true).append(true).open(folder.join("console"))?;
-        let mut child = Command::new(&self.program)
+        let mut command = guard::command(&self.program, self.allowance);
+        command
             .args(["probe", "--id", check.id, "--from", &from.to_string()])
             .args(["--seconds", &self.timeout.as_secs_f64().to_string()])
             .arg("--dir")
@@ -193,44 +210,28 @@ impl Runner {
             .arg("--out")
             .arg(folder.join("out"))
             .current_dir(folder.join("home"))
-            .stdin(Stdio::null())
             .stdout(console.try_clone()?)
-            .stderr(console)
-            .spawn()?;
+            .stderr(console);
         let began = Instant::now();
-        loop {
-            if let Some(status) = child.try_wait()? {
-                return Ok(Outcome::Exit(status));
+        let report = Guarded::start(command)?.wait(|| began.elapsed() > self.timeout)?;
+        match report.end {
+            End::Refused(why) => return Err(std::io::Error::other(why)),
+            // What the checker itself has ended could not clean up.
+            End::Ended(status) if status.success() => {
+                let left = report.left.iter().map(|process| {
+                    format!("after {}, the process {process} was left behind", check.id)
+                });
+                self.left.lock().unwrap_or_else(PoisonError::into_inner).extend(left);
             }
-            if began.elapsed() > self.timeout {
-                child.kill()?;
-                child.wait()?;
-                return Ok(Outcome::TimedOut);
-            }
-            let pause = if began.elapsed() < Duration::from_millis(50) { 1 } else { 5 };
-            std::thread::sleep(Duration::from_millis(pause));
+            _ => {}
         }
+        Ok(report.end)
     }
-}
 
-impl Outcome {
-    fn describe(&self, timeout: Duration) -> String {
-        match self {
-            Self::TimedOut => format!("did not return within {} s", timeout.as_secs_f64()),
-            Self::Exit(status) => {
-                #[cfg(unix)]
-                if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(status) {
-                    let name = match signal {
-                        4 => " (illegal instruction)",
-                        6 => " (abort)",
-                        7 | 11 => " (invalid memory access)",
-                        8 => " (arithmetic exception)",
-                        _ => "",
-                    };
-                    return format!("ended the process with signal {signal}{name}");
-                }
-                format!("ended the process ({status})")
-            }
+    fn describe(&self, end: &End) -> String {
+        match end {
+            End::Stopped => format!("did not return within {} s", self.timeout.as_secs_f64()),
+            end => end.describe(),
         }
     }
 }
@@ -242,7 +243,10 @@ fn read(out: &Path) -> Vec<Line> {
 
 /// Unwanted console output and files of the process.
 fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
-    let console = fs::read(folder.join("console")).unwrap_or_default();
+    let mut console = Vec::new();
+    if let Ok(file) = File::open(folder.join("console")) {
+        let _ = file.take(64 << 10).read_to_end(&mut console);
+    }
     let console = String::from_utf8_lossy(&console);
     let mut findings: Vec<_> = console.lines().take(5).map(|l| format!("wrote to the console: {l}")).collect();
     let files = fs::read_dir(working_directory).into_iter().flatten().flatten().take(5);

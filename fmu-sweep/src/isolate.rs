@@ -179,20 +179,7 @@ impl Drop for Running {
 fn how(status: ExitStatus) -> String {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        let name = match signal {
-            4 => "SIGILL",
-            5 => "SIGTRAP",
-            6 => "SIGABRT",
-            8 => "SIGFPE",
-            9 => "SIGKILL",
-            11 => "SIGSEGV",
-            15 => "SIGTERM",
-            // The one number of these that systems disagree on.
-            7 if cfg!(target_os = "linux") => "SIGBUS",
-            10 if cfg!(target_os = "macos") => "SIGBUS",
-            _ => return format!("killed by signal {signal}"),
-        };
-        return format!("killed by {name}");
+        return format!("killed by {}", fmu_import::guard::signal_name(signal).0);
     }
     status.code().map_or_else(|| "ended".into(), |code| format!("ended with exit status {code}"))
 }

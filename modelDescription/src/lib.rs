@@ -12,6 +12,7 @@
 mod date;
 mod description;
 mod error;
+pub mod limits;
 mod number;
 mod read;
 mod terminals;

@@ -28,6 +28,7 @@ pub fn check_within(path: &Path, only: &[&str], seconds: u64) -> Report {
         only: only.iter().map(ToString::to_string).collect(),
         timeout: Some(Duration::from_secs(seconds)),
         program: Some(env!("CARGO_BIN_EXE_fmu").into()),
+        ..Options::default()
     };
     fmu_check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -3,6 +3,7 @@
 use crate::check::{Check, Levels, Run};
 use crate::session::{NotDetermined, Session};
 use crate::trajectory::difference;
+use fmu_import::guard;
 use fmu_import::raw::{Raw, Simple, float_control};
 use std::ffi::OsString;
 use std::fs;
@@ -13,7 +14,7 @@ use std::time::Duration;
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "B06", requirement: "The binary loads and runs in a secondary thread with a stack of 256 KiB.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(small_stack) },
     Check { id: "B08f", requirement: "Neither loading nor any call changes the floating-point control (rounding, exceptions, flushing to zero).", clause: "hardening", levels: Levels::HARD, run: Run::Probe(floating_point) },
-    Check { id: "B08p", requirement: "A complete run, from loading to unloading, leaves the process unchanged: threads, open files, working directory, environment, umask, signals and the folder of the FMU.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(surroundings) },
+    Check { id: "B08p", requirement: "A complete run, from loading to unloading, leaves the process unchanged: threads, child processes, open files, working directory, environment, umask, signals and the folder of the FMU.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(surroundings) },
     Check { id: "Z09", requirement: "The FMU runs from a folder whose path has blanks, '%', '#', non-ASCII letters and more than 200 characters, and that contains only its binaries and resources.", clause: "2.0.5, 2.1.5 and 2.3; 3.0.2, 2.3.1 and 2.5", levels: Levels::SHOULD, run: Run::Probe(unusual_path) },
 ];
 
@@ -123,6 +124,8 @@ struct Surroundings {
     files: Vec<PathBuf>,
     folder: Option<PathBuf>,
     environment: Vec<(OsString, OsString)>,
+    /// Processes that this one has started.
+    children: Vec<String>,
     /// Lines of `/proc/self/status`.
     status: Vec<String>,
     /// Files below the unpacked FMU with size and time.
@@ -160,6 +163,7 @@ impl Surroundings {
             files,
             folder: std::env::current_dir().ok(),
             environment,
+            children: guard::children(),
             status: status.lines().filter(|l| fields.iter().any(|t| l.starts_with(t))).map(str::to_owned).collect(),
             fmu_folder: found,
         }
@@ -178,6 +182,8 @@ impl Surroundings {
         let changed = after.environment.iter().chain(&self.environment);
         let changed = changed.filter(|v| !self.environment.contains(v) || !after.environment.contains(v));
         found.extend(changed.map(|(name, _)| format!("the environment variable {} changed", name.to_string_lossy())));
+        let children = after.children.iter().filter(|c| !self.children.contains(c));
+        found.extend(children.map(|c| format!("the process {c} was left behind")));
         for (old, new) in self.status.iter().zip(&after.status).filter(|(old, new)| old != new) {
             found.push(format!("{:?} became {:?}", old.replace('\t', " "), new.replace('\t', " ")));
         }
