@@ -25,13 +25,14 @@ pub use checks::GROUPS;
 pub use fmu_file::{FmuFile, Unusable};
 
 use std::path::Path;
+use std::sync::Arc;
 
 /// Checks a file.
 ///
 /// # Errors
 /// The file cannot be read, or is not an FMU of FMI 2.0 or 3.0.
 pub fn run(path: &Path, options: &Options) -> Result<report::Report, Unusable> {
-    let fmu = FmuFile::open(path)?;
+    let fmu = Arc::new(FmuFile::open(path)?);
     let version = fmu.version;
     let wanted = |group: &Group, check: &Check| {
         let named = |name: &String| name.eq_ignore_ascii_case(check.id) || name.eq_ignore_ascii_case(group.name);

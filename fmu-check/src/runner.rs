@@ -14,7 +14,8 @@ use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Default time limit of a probe.
@@ -29,15 +30,17 @@ const LEFT_BEHIND: &str = "B08p";
 const MAX_RESTARTS: usize = 12;
 
 /// The verdicts of checks, in their order.
-pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Vec<Verdict> {
+pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) -> Vec<Verdict> {
     let verdicts: Vec<Mutex<Option<Verdict>>> = checks.iter().map(|_| Mutex::new(None)).collect();
     let mut queue = VecDeque::new();
+    let mut of_file = Vec::new();
     for (check, verdict) in checks.iter().zip(&verdicts) {
         match check.run {
-            Run::File(check_file) => store(verdict, check_file(fmu)),
+            Run::File(check_file) => of_file.push((check_file, verdict)),
             _ => queue.push_back((*check, verdict)),
         }
     }
+    check_file(fmu, &of_file);
     let runner = Runner::new(fmu, options);
     let [simulates, exchanges] = [false, true].map(|exchange| {
         let mut checks = queue.iter().filter(|(check, _)| exchange == is_exchange(check));
@@ -75,6 +78,27 @@ fn charge(check: &Check, verdict: &mut Verdict, left: &[String]) {
         _ if left.is_empty() => {}
         Verdict::Violated(found) => found.extend(left.iter().filter(|l| l.contains(check.id)).cloned()),
         _ => *verdict = Verdict::Violated(left.to_vec()),
+    }
+}
+
+/// A check of the file, and the place for its verdict.
+type OfFile<'a> = (fn(&FmuFile) -> Verdict, &'a Mutex<Option<Verdict>>);
+
+/// Runs the checks of the file for [`limits::STATIC_SECONDS`] at most, whatever an author of hostile files has thought of.
+fn check_file(fmu: &Arc<FmuFile>, checks: &[OfFile<'_>]) {
+    let (send, receive) = mpsc::channel();
+    let functions: Vec<_> = checks.iter().map(|(function, _)| *function).collect();
+    let fmu = fmu.clone();
+    // A thread cannot be ended from outside: one that takes too long ends with the process.
+    std::thread::spawn(move || functions.into_iter().try_for_each(|function| send.send(function(&fmu))));
+    let end = Instant::now() + Duration::from_secs(limits::STATIC_SECONDS);
+    for (_, place) in checks {
+        let verdict = receive.recv_timeout(end.saturating_duration_since(Instant::now()));
+        let why = |e| match e {
+            RecvTimeoutError::Timeout => format!("the checks of the file take more than {} s", limits::STATIC_SECONDS),
+            RecvTimeoutError::Disconnected => "the checker failed in this check or one before it".into(),
+        };
+        store(place, verdict.unwrap_or_else(|e| Verdict::NotDetermined(why(e))));
     }
 }
 

@@ -208,6 +208,20 @@ pub fn signal_name(signal: i32) -> (String, &'static str) {
     (name.into(), meaning)
 }
 
+/// Called by a process under a guard: it ends with its guard.
+pub fn end_with_guard() {
+    #[cfg(target_os = "linux")]
+    let _ = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
+}
+
+/// The processes that this one has started and not waited for, with number and name; none but on Linux.
+pub fn children() -> Vec<String> {
+    #[cfg(unix)]
+    return unix::children();
+    #[cfg(not(unix))]
+    return Vec::new();
+}
+
 /// Standard output for this process alone: what FMUs print goes to standard error from now on.
 ///
 /// # Errors

@@ -44,6 +44,7 @@ pub use abi::library::describe;
 pub use abi::log::{Message, Status};
 pub use abi::raw;
 pub use error::Error;
+pub use folder::Folder;
 pub use instance::{CompletedStep, Instance, State, Stepped, Update};
 pub use standard::Kind;
 pub use text::{printable, printable_lines};

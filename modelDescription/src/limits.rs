@@ -56,6 +56,8 @@ pub const VALUES: Limit = Limit::new("has variables of", 10_000_000, "values in 
 /// Communication points of a simulation.
 pub const STEPS: Limit = Limit::new("takes", 1 << 31, "steps");
 
+/// Time for the checks of a file that do not run it, in s.
+pub const STATIC_SECONDS: u64 = 15;
 /// Address space of a process that runs FMUs, in bytes.
 pub const PROCESS_MEMORY: u64 = 4 << 30;
 /// Open files of a process that runs FMUs.

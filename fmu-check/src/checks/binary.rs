@@ -67,7 +67,11 @@ fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>)
     }
     let mut findings = Vec::new();
     for binary in libraries {
-        match object::File::parse(&*binary.bytes) {
+        let bytes = match binary.bytes() {
+            Ok(bytes) => bytes,
+            Err(why) => return Verdict::NotDetermined(why),
+        };
+        match object::File::parse(&*bytes) {
             Ok(file) => findings.extend(rule(binary, &file).into_iter().map(|f| format!("{}: {f}", binary.name))),
             Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
         }
@@ -79,7 +83,11 @@ fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>)
 fn elf(fmu: &FmuFile, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<String>, object::Error>) -> Verdict {
     let (mut findings, mut found_elf) = (Vec::new(), false);
     for binary in libraries(fmu) {
-        let Ok(file) = ElfFile64::parse(&*binary.bytes) else { continue };
+        let bytes = match binary.bytes() {
+            Ok(bytes) => bytes,
+            Err(why) => return Verdict::NotDetermined(why),
+        };
+        let Ok(file) = ElfFile64::parse(&*bytes) else { continue };
         found_elf = true;
         match rule(binary, &file) {
             Ok(found) => findings.extend(found.into_iter().map(|f| format!("{}: {f}", binary.name))),
@@ -121,7 +129,11 @@ fn format(fmu: &FmuFile) -> Verdict {
             }
         };
         let Some((format, architecture)) = expected else { continue };
-        match object::File::parse(&*binary.bytes) {
+        let bytes = match binary.bytes() {
+            Ok(bytes) => bytes,
+            Err(why) => return Verdict::NotDetermined(why),
+        };
+        match object::File::parse(&*bytes) {
             Err(e) => findings.push(format!("{}: is not a binary: {e}", binary.name)),
             Ok(file) => {
                 if (file.format(), file.architecture()) != (format, architecture) {

@@ -7,15 +7,12 @@ use crate::session::{NotDetermined, Session};
 use crate::trajectory::{difference, trajectory};
 use crate::zip_headers;
 use fmu_import::raw::Raw;
-use model_description::{Causality, Element, FmiVersion, Terminal, TerminalsAndIcons, read_terminals};
+use model_description::{Causality, Element, FmiVersion, Terminal, TerminalsAndIcons, limits, read_terminals};
 use std::path::Path;
 
 const CLAUSE: &str = "2.0.5, 2.3; 3.0.2, 2.4.9";
 const FOLDER: &str = "terminalsAndIcons";
 const FILE: &str = "terminalsAndIcons/terminalsAndIcons.xml";
-
-/// Maximum size of the XML in bytes.
-const LIMIT: u64 = 64 << 20;
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
@@ -28,7 +25,7 @@ pub(super) const CHECKS: &[Check] = &[
 
 /// The file's text; `None` where there is none.
 fn text(fmu: &FmuFile) -> Option<Result<String, String>> {
-    let bytes = zip_headers::contents(&fmu.bytes, fmu.zip.find(FILE)?, LIMIT);
+    let bytes = zip_headers::contents(&fmu.source, fmu.zip.find(FILE)?, limits::XML.most);
     Some(bytes.and_then(|bytes| String::from_utf8(bytes).map_err(|_| "is not UTF-8".to_owned())))
 }
 
@@ -169,7 +166,7 @@ fn pictures(fmu: &FmuFile) -> Verdict {
     let png = |base: &str| -> Option<String> {
         let path = format!("{FOLDER}/{base}.png");
         let Some(entry) = fmu.zip.find(&path) else { return Some(format!("{path} is missing")) };
-        let bytes = zip_headers::contents(&fmu.bytes, entry, LIMIT).unwrap_or_default();
+        let bytes = zip_headers::contents(&fmu.source, entry, limits::XML.most).unwrap_or_default();
         (!bytes.starts_with(SIGNATURE)).then(|| format!("{path} is not a PNG"))
     };
     read(fmu, |file| {
