@@ -16,7 +16,7 @@ const VIOLATED_WHEN_BLOCKED: [&str; 3] = ["B00", "L00", "E00"];
 /// # Errors
 /// There is no such check, or the folder is not readable.
 pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
-    guard::end_with_guard();
+    guard::end_with_parent();
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == args.id);
     let Some(Run::Probe(probe) | Run::Silent(probe) | Run::Twice(probe) | Run::Exchange(probe)) = check.map(|c| c.run)
     else {

@@ -198,6 +198,9 @@ pub(super) fn copy(file: &File, entry: &Entry, limit: u64, out: &mut impl Write)
             break;
         }
         written += n as u64;
+        if written > u64::from(entry.central.size) {
+            return Err(format!("{name}: {}", limits::Limit::lie(entry.central.size.into())));
+        }
         if written > limit {
             return Err(format!("{name}: {}", limits::UNPACKED.exceeded(format!("more than {limit}"))));
         }

@@ -3,7 +3,7 @@
 use super::Error;
 use crate::folder::Folder;
 use crate::platform::Platform;
-use model_description::limits::{self, UNPACKED, XML};
+use model_description::limits::{self, Limit, UNPACKED, XML};
 use model_description::{FmiVersion, Interface, ModelDescription, TerminalsAndIcons};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -129,17 +129,18 @@ impl Archive {
 
     /// Every file, with its name.
     pub(super) fn files(&mut self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
-        let (mut files, mut left) = (BTreeMap::new(), UNPACKED.most);
+        let mut files = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
             let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, format!("{name}: {cause}"));
             let entry = self.zip.by_index(index).map_err(|e| wrong(&e))?;
             if entry.is_dir() {
                 continue;
             }
-            let mut bytes = Vec::new();
-            entry.take(left + 1).read_to_end(&mut bytes).map_err(|e| wrong(&e))?;
-            let size = u64::try_from(bytes.len()).unwrap_or(u64::MAX);
-            left = left.checked_sub(size).ok_or_else(|| wrong(&too_much()))?;
+            let (mut bytes, claimed) = (Vec::new(), entry.size());
+            entry.take(claimed + 1).read_to_end(&mut bytes).map_err(|e| wrong(&e))?;
+            if bytes.len() as u64 > claimed {
+                return Err(wrong(&Limit::lie(claimed)));
+            }
             if files.insert(name.clone(), bytes).is_some() {
                 return Err(wrong(&"occurs twice in the archive"));
             }
@@ -149,7 +150,7 @@ impl Archive {
 
     /// Extracts what begins with one of the prefixes; returns the number of files.
     fn extract_into(&mut self, dir: &Path, prefixes: &[String]) -> io::Result<usize> {
-        let (mut left, mut files) = (UNPACKED.most, 0);
+        let mut files = 0;
         for (index, name) in self.names.iter().enumerate() {
             if !prefixes.iter().any(|p| name.starts_with(p.as_str())) {
                 continue;
@@ -164,10 +165,13 @@ impl Archive {
                 fs::create_dir_all(parent)?;
             }
             let mut out = io::BufWriter::new(File::create(&target)?);
-            // A size that lies ends here, not with a full disk.
-            let copied = io::copy(&mut (&mut entry).take(left + 1), &mut out)
+            // A size that lies ends here, not with a full disk: what the headers claim is within the limits.
+            let claimed = entry.size();
+            let copied = io::copy(&mut (&mut entry).take(claimed + 1), &mut out)
                 .map_err(|e| io::Error::other(format!("{name}: {e}")))?;
-            left = left.checked_sub(copied).ok_or_else(|| io::Error::other(format!("{name}: {}", too_much())))?;
+            if copied > claimed {
+                return Err(io::Error::other(format!("{name}: {}", Limit::lie(claimed))));
+            }
             out.flush()?;
             files += 1;
         }
@@ -183,11 +187,6 @@ impl Archive {
         let standard = if self.description.version == FmiVersion::V2 { "FMI 2.0" } else { "FMI 3.0" };
         format!("has no binaries/{folder}/{name} for this platform ({standard}); it has {there}")
     }
-}
-
-/// For an entry that unpacks to more than its headers claim.
-fn too_much() -> String {
-    UNPACKED.exceeded(format!("more than {}", UNPACKED.most))
 }
 
 /// The contents of an entry with an XML document; `None` if no entry has this name.

@@ -208,8 +208,16 @@ pub fn signal_name(signal: i32) -> (String, &'static str) {
     (name.into(), meaning)
 }
 
-/// Called by a process under a guard: it ends with its guard.
-pub fn end_with_guard() {
+/// What the process of this command sends to its process group reaches no other; it calls [`end_with_parent`] itself. On Linux.
+pub fn own_group(command: &mut Command) {
+    #[cfg(target_os = "linux")]
+    std::os::unix::process::CommandExt::process_group(command, 0);
+    #[cfg(not(target_os = "linux"))]
+    let _ = command;
+}
+
+/// This process ends when the thread that started it ends: on Linux.
+pub fn end_with_parent() {
     #[cfg(target_os = "linux")]
     let _ = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
 }

@@ -18,6 +18,11 @@ impl Limit {
         Self { before, after, most }
     }
 
+    /// The message for an entry that holds more than its headers claim.
+    pub fn lie(claimed: u64) -> String {
+        format!("unpacks to more than the {claimed} bytes that its headers claim")
+    }
+
     /// Compares a number with the limit.
     ///
     /// # Errors
@@ -33,28 +38,41 @@ impl Limit {
     }
 }
 
-/// Size of an archive.
-pub const ARCHIVE: Limit = Limit::new("has", 2 << 30, "bytes");
-/// Entries of an archive.
-pub const ENTRIES: Limit = Limit::new("has", 100_000, "entries");
-/// Size of the directory at the end of an archive.
-pub const DIRECTORY: Limit = Limit::new("has a directory of", 32 << 20, "bytes");
-/// All entries of an archive together, unpacked.
-pub const UNPACKED: Limit = Limit::new("unpacks to", 2 << 30, "bytes");
-/// A library whose symbols are read.
-pub const LIBRARY: Limit = Limit::new("has", 256 << 20, "bytes");
-/// An XML document.
-pub const XML: Limit = Limit::new("has", 64 << 20, "bytes");
-/// Elements and attributes of an XML document.
-pub const NODES: Limit = Limit::new("has", 2_000_000, "elements and attributes");
-/// Levels of elements: both standards need 5, annotations of tools a few more. Trees are dropped recursively.
-pub const LEVELS: Limit = Limit::new("has", 200, "levels of elements");
-/// Variables of an FMU.
-pub const VARIABLES: Limit = Limit::new("has", 200_000, "variables");
-/// Values of all variables of an FMU: an array has as many as elements.
-pub const VALUES: Limit = Limit::new("has variables of", 10_000_000, "values in all");
-/// Communication points of a simulation.
-pub const STEPS: Limit = Limit::new("takes", 1 << 31, "steps");
+macro_rules! limits {
+    ($(#[doc = $doc:literal] $name:ident = $before:literal, $most:expr, $after:literal;)*) => {
+        $(#[doc = $doc] pub const $name: Limit = Limit::new($before, $most, $after);)*
+
+        /// Every limit on a file, with what it is on.
+        pub const ALL: &[(&str, Limit)] = &[$(($doc, $name),)*];
+    };
+}
+
+limits! {
+    /// Size of an archive.
+    ARCHIVE = "has", 2 << 30, "bytes";
+    /// Entries of an archive.
+    ENTRIES = "has", 100_000, "entries";
+    /// Size of the directory at the end of an archive.
+    DIRECTORY = "has a directory of", 32 << 20, "bytes";
+    /// All entries of an archive together, unpacked.
+    UNPACKED = "unpacks to", 2 << 30, "bytes";
+    /// A library whose symbols are read.
+    LIBRARY = "has", 256 << 20, "bytes";
+    /// An XML document.
+    XML = "has", 64 << 20, "bytes";
+    /// Elements and attributes of an XML document.
+    NODES = "has", 2_000_000, "elements and attributes";
+    /// Nested elements of an XML document; both standards need 5.
+    LEVELS = "has", 200, "levels of elements";
+    /// Variables of an FMU.
+    VARIABLES = "has", 200_000, "variables";
+    /// Values of all variables of an FMU: an array has as many as elements.
+    VALUES = "has variables of", 10_000_000, "values in all";
+    /// Dependencies of a list of the model structure, or words for their kinds.
+    DEPENDENCIES = "has", 2_000_000, "dependencies in one list";
+    /// Communication points of a simulation.
+    STEPS = "takes", 1 << 31, "steps";
+}
 
 /// Time for the checks of a file that do not run it, in s.
 pub const STATIC_SECONDS: u64 = 15;
@@ -66,6 +84,26 @@ pub const PROCESS_FILES: u64 = 1024;
 pub const PROCESS_THREADS: u64 = 1024;
 /// A file that a probe of the checker writes, in bytes.
 pub const PROBE_FILE: u64 = 1 << 30;
+
+/// The limits as a Markdown table.
+pub fn list() -> String {
+    let grouped = |n: u64| {
+        let digits = n.to_string();
+        let groups: Vec<&str> =
+            digits.as_bytes().rchunks(3).rev().map(|g| std::str::from_utf8(g).unwrap_or_default()).collect();
+        groups.join(" ")
+    };
+    let row = |what: &str, most: u64, unit: &str| format!("| {} | {} {unit} |\n", what.trim().trim_end_matches('.'), grouped(most));
+    let files: String = ALL.iter().map(|(what, limit)| row(what, limit.most, limit.after)).collect();
+    let processes = [
+        row("Time for the checks of a file that do not run it", STATIC_SECONDS, "s"),
+        row("Address space of a process that runs FMUs (`--memory`)", PROCESS_MEMORY >> 30, "GiB"),
+        row("Open files of a process that runs FMUs", PROCESS_FILES, "files"),
+        row("Threads and processes that a process that runs FMUs may add to those of the system", PROCESS_THREADS, "threads"),
+        row("A file that a probe of `fmu check` writes", PROBE_FILE >> 30, "GiB"),
+    ];
+    format!("| what | limit |\n|---|---|\n{files}{}", processes.concat())
+}
 
 #[cfg(test)]
 mod tests {

@@ -222,7 +222,7 @@ fn guarded(args: &Simulate) -> Result<()> {
 
 /// The worker: leaves its status and its error in a file, because an FMU may have closed everything else.
 fn work(args: &Simulate) -> Result<()> {
-    guard::end_with_guard();
+    guard::end_with_parent();
     let folder = std::env::temp_dir();
     journal::open(&folder)?;
     #[cfg(unix)]
