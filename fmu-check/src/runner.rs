@@ -64,7 +64,8 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
         }
     });
     let lost = || Verdict::NotDetermined("the probe did not report a result".into());
-    let mut verdicts: Vec<_> = verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect();
+    let mut verdicts: Vec<_> =
+        verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect();
     let left = runner.map(|r| r.left.into_inner().unwrap_or_else(PoisonError::into_inner)).unwrap_or_default();
     for (check, verdict) in checks.iter().zip(&mut verdicts).filter(|(check, _)| check.id == LEFT_BEHIND) {
         charge(check, verdict, &left);
@@ -90,15 +91,21 @@ fn check_file(fmu: &Arc<FmuFile>, checks: &[OfFile<'_>]) {
     let functions: Vec<_> = checks.iter().map(|(function, _)| *function).collect();
     let fmu = fmu.clone();
     // A thread cannot be ended from outside: one that takes too long ends with the process.
-    std::thread::spawn(move || functions.into_iter().try_for_each(|function| send.send(function(&fmu))));
+    let thread = std::thread::spawn(move || functions.into_iter().try_for_each(|function| send.send(function(&fmu))));
     let end = Instant::now() + Duration::from_secs(limits::STATIC_SECONDS);
+    let mut in_time = true;
     for (_, place) in checks {
         let verdict = receive.recv_timeout(end.saturating_duration_since(Instant::now()));
         let why = |e| match e {
             RecvTimeoutError::Timeout => format!("the checks of the file take more than {} s", limits::STATIC_SECONDS),
             RecvTimeoutError::Disconnected => "the checker failed in this check or one before it".into(),
         };
+        in_time &= verdict.is_ok();
         store(place, verdict.unwrap_or_else(|e| Verdict::NotDetermined(why(e))));
+    }
+    if in_time {
+        // Its hold on the file ends before the caller's: the last one removes the unpacked archive.
+        let _ = thread.join();
     }
 }
 
@@ -242,9 +249,10 @@ impl Runner {
             End::Refused(why) => return Err(std::io::Error::other(why)),
             // What the checker itself has ended could not clean up.
             End::Ended(status) if status.success() => {
-                let left = report.left.iter().map(|process| {
-                    format!("after {}, the process {process} was left behind", check.id)
-                });
+                let left = report
+                    .left
+                    .iter()
+                    .map(|process| format!("after {}, the process {process} was left behind", check.id));
                 self.left.lock().unwrap_or_else(PoisonError::into_inner).extend(left);
             }
             _ => {}

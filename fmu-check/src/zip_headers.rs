@@ -199,7 +199,7 @@ pub(super) fn copy(file: &File, entry: &Entry, limit: u64, out: &mut impl Write)
         }
         written += n as u64;
         if written > u64::from(entry.central.size) {
-            return Err(format!("{name}: {}", limits::Limit::lie(entry.central.size.into())));
+            return Err(format!("{name}: is larger than the {} bytes that its headers claim", entry.central.size));
         }
         if written > limit {
             return Err(format!("{name}: {}", limits::UNPACKED.exceeded(format!("more than {limit}"))));

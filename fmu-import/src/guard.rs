@@ -12,13 +12,16 @@ use std::ffi::OsString;
 use std::io;
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, ExitStatus};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+#[cfg(unix)]
+use std::time::Instant;
 
 /// First argument of a guard.
 const GUARD: &str = "@guard";
 /// How often a caller looks at its clock.
 const LOOK: Duration = Duration::from_millis(5);
 /// Time for a guard to end its child.
+#[cfg(unix)]
 const GRACE: Duration = Duration::from_secs(5);
 
 /// What a guarded process may use.
@@ -184,7 +187,9 @@ pub fn how(status: ExitStatus) -> String {
         let (name, meaning) = signal_name(signal);
         return format!("ended the process by {name}{meaning}");
     }
-    status.code().map_or_else(|| "ended the process".into(), |code| format!("ended the process with exit status {code}"))
+    status
+        .code()
+        .map_or_else(|| "ended the process".into(), |code| format!("ended the process with exit status {code}"))
 }
 
 /// Name of a signal, and what it mostly means: `SIGSEGV` and ` (invalid memory access)`.
@@ -281,7 +286,8 @@ mod unix {
             return ExitCode::from(2);
         };
         let caller = getppid();
-        let report = guard(arguments, &channel).unwrap_or_else(|why| Report { end: End::Refused(why), left: Vec::new() });
+        let report =
+            guard(arguments, &channel).unwrap_or_else(|why| Report { end: End::Refused(why), left: Vec::new() });
         let _ = (&channel).write_all(write_report(&report).as_bytes());
         if getppid() != caller
             && let Some(folder) = std::env::var_os("TMPDIR")
@@ -294,7 +300,8 @@ mod unix {
 
     fn guard(arguments: &[OsString], channel: &UnixStream) -> Result<Report, String> {
         let text = |index: usize| arguments.get(index).and_then(|a| a.to_str()).unwrap_or_default();
-        let number = |index: usize| text(index).parse().map_err(|_| format!("argument {index} of {GUARD} is no number"));
+        let number =
+            |index: usize| text(index).parse().map_err(|_| format!("argument {index} of {GUARD} is no number"));
         let allowance = Allowance { memory: number(0)?, file: number(1)?, sandbox: text(2) == "sandbox" };
         // Fails only for a process that leads its group already, which then has a group of its own.
         let _ = setsid();

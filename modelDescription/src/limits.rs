@@ -18,11 +18,6 @@ impl Limit {
         Self { before, after, most }
     }
 
-    /// The message for an entry that holds more than its headers claim.
-    pub fn lie(claimed: u64) -> String {
-        format!("unpacks to more than the {claimed} bytes that its headers claim")
-    }
-
     /// Compares a number with the limit.
     ///
     /// # Errors
@@ -93,13 +88,19 @@ pub fn list() -> String {
             digits.as_bytes().rchunks(3).rev().map(|g| std::str::from_utf8(g).unwrap_or_default()).collect();
         groups.join(" ")
     };
-    let row = |what: &str, most: u64, unit: &str| format!("| {} | {} {unit} |\n", what.trim().trim_end_matches('.'), grouped(most));
+    let row = |what: &str, most: u64, unit: &str| {
+        format!("| {} | {} {unit} |\n", what.trim().trim_end_matches('.'), grouped(most))
+    };
     let files: String = ALL.iter().map(|(what, limit)| row(what, limit.most, limit.after)).collect();
     let processes = [
         row("Time for the checks of a file that do not run it", STATIC_SECONDS, "s"),
         row("Address space of a process that runs FMUs (`--memory`)", PROCESS_MEMORY >> 30, "GiB"),
         row("Open files of a process that runs FMUs", PROCESS_FILES, "files"),
-        row("Threads and processes that a process that runs FMUs may add to those of the system", PROCESS_THREADS, "threads"),
+        row(
+            "Threads and processes that a process that runs FMUs may add to those of the system",
+            PROCESS_THREADS,
+            "threads",
+        ),
         row("A file that a probe of `fmu check` writes", PROBE_FILE >> 30, "GiB"),
     ];
     format!("| what | limit |\n|---|---|\n{files}{}", processes.concat())

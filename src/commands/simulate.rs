@@ -204,7 +204,8 @@ fn guarded(args: &Simulate) -> Result<()> {
     let result = std::fs::read_to_string(folder.join(RESULT)).ok();
     let result = result.as_deref().and_then(|text| text.split_once(' '));
     match (&report.end, result) {
-        (End::Ended(status), Some((code, cause))) if status.code().is_some_and(|c| c.to_string() == code) => match code {
+        (End::Ended(status), Some((code, cause))) if status.code().is_some_and(|c| c.to_string() == code) => match code
+        {
             "0" => Ok(()),
             "1" => Err(Failed(cause.into()).into()),
             _ => Err(anyhow!("{cause}")),

@@ -17,11 +17,15 @@ fn xml_attacks() {
         described(&xml.replace("modelName=\"Hostile\"", "modelName=\"&b;\"")).is_refused(doctype, 1, "line 2: ");
     }
     with("modelName=\"Hostile\"", "modelName=\"&b;\"").is_refused("an entity that is not declared", 1, "line 2: ");
-    with("<ModelStructure>", &format!("<ModelStructure>{}", "<a>".repeat(100_000))).is_refused("depth", 1, "levels of elements");
+    with("<ModelStructure>", &format!("<ModelStructure>{}", "<a>".repeat(100_000))).is_refused(
+        "depth",
+        1,
+        "levels of elements",
+    );
     with("</fmiModelDescription>", "").is_refused("an open end", 1, "is not closed");
     let name = "n".repeat(1 << 20);
     let long = with("name=\"y\"", &format!("name=\"{name}\"")).runs("simulate", &[]);
-    assert!(long.status == 0 || library().is_none(), "{}", long.errors.len());
+    assert!(long.status == 0 || library().is_none(), "{:.300}", long.errors);
 }
 
 #[test]
@@ -30,7 +34,8 @@ fn encodings_are_named() {
         let bytes = |x: u16| if big { x.to_be_bytes() } else { x.to_le_bytes() };
         std::iter::once(0xfeff).chain(XML.encode_utf16()).flat_map(bytes).collect::<Vec<u8>>()
     };
-    let utf32: Vec<u8> = std::iter::once('\u{feff}').chain(XML.chars()).flat_map(|c| u32::from(c).to_le_bytes()).collect();
+    let utf32: Vec<u8> =
+        std::iter::once('\u{feff}').chain(XML.chars()).flat_map(|c| u32::from(c).to_le_bytes()).collect();
     for (bytes, part) in [
         (utf16(false), "the encoding is UTF-16, expected UTF-8"),
         (utf16(true), "the encoding is UTF-16, expected UTF-8"),
@@ -50,17 +55,27 @@ fn encodings_are_named() {
 fn numbers_are_not_believed() {
     let variable = |k: usize| format!("<ScalarVariable name=\"v{k}\" valueReference=\"{k}\"><Real/></ScalarVariable>");
     let many: String = (2..200_102).map(variable).collect();
-    with("<ModelVariables>", &format!("<ModelVariables>{many}"))
-        .is_refused("variables", 2, "has 200101 variables; the limit is 200000");
-    with("<ModelVariables>", &format!("<ModelVariables>{}", "<a/>".repeat(2_000_000)))
-        .is_refused("elements", 2, "elements and attributes; the limit is 2000000");
+    with("<ModelVariables>", &format!("<ModelVariables>{many}")).is_refused(
+        "variables",
+        2,
+        "has 200101 variables; the limit is 200000",
+    );
+    with("<ModelVariables>", &format!("<ModelVariables>{}", "<a/>".repeat(2_000_000))).is_refused(
+        "elements",
+        2,
+        "elements and attributes; the limit is 2000000",
+    );
     let three = r#"<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="Hostile" instantiationToken="g"><CoSimulation modelIdentifier="Hostile"/><ModelVariables>
 <Float64 name="time" valueReference="0" causality="independent"/>
 <Float64 name="y" valueReference="1" causality="output">EXTENT</Float64></ModelVariables>
 <ModelStructure><Output valueReference="1"/></ModelStructure></fmiModelDescription>"#;
     let dimension = r#"<Dimension start="1000000000"/>"#;
-    described(&three.replace("EXTENT", dimension)).is_refused("a dimension", 2, "y: has variables of 1000000000 values in all");
+    described(&three.replace("EXTENT", dimension)).is_refused(
+        "a dimension",
+        2,
+        "y: has variables of 1000000000 values in all",
+    );
     // The product is beyond 64 bits.
     described(&three.replace("EXTENT", &dimension.repeat(3))).is_refused("dimensions", 2, "the limit is 10000000");
     let dependencies = format!("<Unknown index=\"1\" dependencies=\"{}\"/>", "1 ".repeat(2_000_001));
@@ -99,7 +114,10 @@ fn names_are_escaped() {
 #[test]
 fn an_identifier_that_is_a_path() {
     for identifier in ["../../../../tmp/x", "/lib/x86_64-linux-gnu/libm", "", "a b", &"x".repeat(10_000)] {
-        with("modelIdentifier=\"Hostile\"", &format!("modelIdentifier=\"{identifier}\""))
-            .is_refused("identifier", 1, "for this platform");
+        with("modelIdentifier=\"Hostile\"", &format!("modelIdentifier=\"{identifier}\"")).is_refused(
+            "identifier",
+            1,
+            "for this platform",
+        );
     }
 }

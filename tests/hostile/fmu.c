@@ -1,6 +1,5 @@
 /* An FMU of FMI 2.0 that misbehaves: the variable HOSTILE of the environment says how and where, as "PLACE ACT". */
 #define _GNU_SOURCE
-#include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,11 +27,6 @@ static int deeper(volatile int *n) {
     return deeper(n) + page[0];
 }
 
-static void *wait_for_ever(void *unused) {
-    (void)unused;
-    for (;;) pause();
-}
-
 static void act(const char *where) {
     const char *what = getenv("HOSTILE");
     if (!what || strncmp(what, where, strlen(where))) return;
@@ -42,7 +36,7 @@ static void act(const char *where) {
     if (!strcmp(what, "exit3")) exit(3);
     if (!strcmp(what, "terminate-group")) { kill(0, SIGTERM); pause(); }
     if (!strcmp(what, "kill-group")) { kill(0, SIGKILL); pause(); }
-    if (!strcmp(what, "kill-guard")) { kill(getppid(), SIGKILL); pause(); }
+    if (!strcmp(what, "kill-guard")) { prctl(PR_SET_PDEATHSIG, 0); kill(getppid(), SIGKILL); pause(); }
     if (!strcmp(what, "crash")) *(volatile int *)8 = 1;
     if (!strcmp(what, "abort")) abort();
     if (!strcmp(what, "recurse")) { volatile int n = 0; deeper(&n); }
@@ -76,11 +70,6 @@ static void act(const char *where) {
         FILE *litter = fopen(path, "w");
         if (litter) fclose(litter);
     }
-    if (!strcmp(what, "thread")) {
-        pthread_t thread;
-        pthread_create(&thread, NULL, wait_for_ever, NULL);
-    }
-    if (!strcmp(what, "unlimited")) prctl(PR_SET_PDEATHSIG, 0);
 }
 
 __attribute__((constructor)) static void load(void) { act("load"); }

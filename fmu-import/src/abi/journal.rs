@@ -83,9 +83,8 @@ mod unix {
         let file = File::options().read(true).write(true).create(true).truncate(true).open(folder.join(CALL))?;
         file.set_len(BYTES as u64)?;
         // SAFETY: a new mapping, at an address that the system chooses, takes nothing from anybody.
-        let page = unsafe {
-            mmap(ptr::null_mut(), BYTES, ProtFlags::READ | ProtFlags::WRITE, MapFlags::SHARED, &file, 0)
-        }?;
+        let page =
+            unsafe { mmap(ptr::null_mut(), BYTES, ProtFlags::READ | ProtFlags::WRITE, MapFlags::SHARED, &file, 0) }?;
         // SAFETY: the mapping is aligned to pages, larger than three words, and never undone. Atomic words may be read and
         // written by anybody at any time; whoever cuts the file short ends this process by a signal.
         let page = unsafe { &*page.cast::<[AtomicU64; 3]>() };

@@ -36,10 +36,15 @@ impl Settings {
         let whole = if (count - count.round()).abs() < 1e-6 * count.max(1.0) { count.round() } else { count.ceil() };
         if whole < 1.0 {
             let duration = stop - start;
-            return Err(format!("the step {step:e} s is longer than the simulation of {duration} s; give a shorter one"));
+            return Err(format!(
+                "the step {step:e} s is longer than the simulation of {duration} s; give a shorter one"
+            ));
         }
         if whole > f64::from(u32::try_from(STEPS.most).unwrap_or(u32::MAX)) {
-            return Err(format!("a step of {step} s from {start} s to {stop} s {}", STEPS.exceeded(format!("{whole:e}"))));
+            return Err(format!(
+                "a step of {step} s from {start} s to {stop} s {}",
+                STEPS.exceeded(format!("{whole:e}"))
+            ));
         }
         #[expect(
             clippy::cast_possible_truncation,
