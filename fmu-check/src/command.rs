@@ -11,8 +11,8 @@ use std::time::Duration;
 ///
 /// Every check has an id, a clause of the standard, and a level: must (the standard requires it), should (the standard
 /// recommends it) or hard (the standard leaves it open, but a robust FMU does it). Each probe of the binary runs in its own
-/// process, so a crash or a hang is a finding. The code of the FMU runs on this computer with your rights: check only FMUs
-/// that you would run.
+/// process, with limits, so a crash or a hang is a finding. The code of the FMU runs on this computer with your rights: check
+/// only FMUs that you would run. --sandbox takes the network away from it.
 ///
 /// Exit status: 0 if no must is violated, 1 if one is, 2 if the file is not an FMU. With --strict, a violated should or hard
 /// and a check that is not determined count like a must.
@@ -22,6 +22,7 @@ use std::time::Duration;
 ///   fmu check other.fmu --only lifecycle,X01b
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
+#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub struct Check {
     /// FMU to check
     #[arg(value_name = "FILE.fmu", required_unless_present = "list")]

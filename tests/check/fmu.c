@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
@@ -141,6 +142,19 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 #endif
 #ifdef FAULT_B08p
     socket(AF_UNIX, SOCK_STREAM, 0);
+#endif
+#ifdef FAULT_B08p_child
+    if (fork() == 0) for (;;) pause();
+#endif
+#ifdef FAULT_B08p_daemon
+    // Its parent ends at once and is waited for: nobody is left who knows it.
+    pid_t parent = fork();
+    if (parent == 0) {
+        setsid();
+        if (fork() == 0) for (;;) pause();
+        _exit(0);
+    }
+    waitpid(parent, NULL, 0);
 #endif
 #ifdef FAULT_HANG
     for (volatile int spin = 1; spin;) {}

@@ -1,5 +1,5 @@
 //! Hostile files and libraries, generated here: no crash, no hang, nothing outside, nothing left, one line and the right status.
-#![allow(missing_docs, unreachable_pub)]
+#![allow(missing_docs, unreachable_pub, clippy::missing_panics_doc, clippy::new_without_default)]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 #[path = "../check/zip.rs"]
