@@ -106,6 +106,11 @@ impl FmuFile {
         self.dir.path()
     }
 
+    /// Removes what was unpacked, although a check that takes too long still has this.
+    pub(super) fn discard(&self) {
+        let _ = fs::remove_dir_all(self.dir());
+    }
+
     fn unpack(&mut self) -> io::Result<()> {
         fs::create_dir(self.dir().join("resources"))?;
         fs::write(self.dir().join(DESCRIPTION), &self.xml)?;

@@ -52,7 +52,11 @@ pub fn run(path: &Path, options: &Options) -> Result<report::Report, Unusable> {
         level: *level,
         verdict,
     });
-    Ok(report::Report::new(&fmu, findings.collect()))
+    let report = report::Report::new(&fmu, findings.collect());
+    if Arc::strong_count(&fmu) > 1 {
+        fmu.discard();
+    }
+    Ok(report)
 }
 
 #[cfg(test)]

@@ -1,10 +1,12 @@
 /* An FMU of FMI 2.0 that misbehaves: the variable HOSTILE of the environment says how and where, as "PLACE ACT". */
 #define _GNU_SOURCE
+#include <netinet/in.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #define EXPORT __attribute__((visibility("default")))
@@ -64,6 +66,10 @@ static void act(const char *where) {
     if (!strcmp(what, "close"))
         for (int i = 0; i < 4096; i++) close(i);
     if (!strcmp(what, "chdir")) chdir("/");
+    if (!strncmp(what, "network:", 8)) {
+        struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(atoi(what + 8)), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+        if (connect(socket(AF_INET, SOCK_STREAM, 0), (struct sockaddr *)&to, sizeof to) == 0) exit(7);
+    }
     if (!strcmp(what, "temporary")) {
         char path[4096];
         snprintf(path, sizeof path, "%s/litter", getenv("TMPDIR"));

@@ -121,3 +121,19 @@ fn the_group_of_the_caller_survives() {
         assert_eq!(said.trim(), format!("the shell saw {status}"), "{output:?}");
     }
 }
+
+/// The FMU connects to this test, and with `--sandbox` it does not, or the command says that there is none.
+#[test]
+fn a_sandbox_has_no_network() {
+    if library().is_none() {
+        return;
+    }
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let how = format!("step network:{}", listener.local_addr().unwrap().port());
+    let open = described(XML).run("simulate", &[], &how);
+    assert!(open.errors.contains("exit status 7"), "{open:?}");
+    let sandbox = described(XML).run("simulate", &["--sandbox"], &how);
+    let refused = sandbox.status == 2 && sandbox.errors.contains("--sandbox is not available here: ");
+    assert!(sandbox.status == 0 || refused, "{sandbox:?}");
+    assert_eq!(sandbox.errors.lines().count(), usize::from(refused), "{sandbox:?}");
+}
