@@ -1,6 +1,6 @@
 //! Every limit on what a file may ask for and on what a process that runs an FMU may use: one place, one message each.
 //!
-//! They hold for all commands alike. The static checks of a file at these limits take at most 512 MB and 20 s.
+//! They hold for all commands alike, and are such that the static checks of a file take at most 512 MB and 20 s.
 
 use std::fmt::Display;
 
