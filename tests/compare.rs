@@ -1,7 +1,7 @@
 //! The grid of estimators and scenarios: its reduced form against the golden copy, its figures, its command line.
 #![allow(missing_docs)]
 
-use drive_study::compare::candidate::Entry;
+use drive_study::compare::candidate::{Class, Entry};
 use drive_study::compare::measure::Measure;
 use drive_study::compare::scenario::{Effort, SCENARIOS};
 use drive_study::compare::{self, Cell, Selection, html, table};
@@ -125,11 +125,16 @@ fn the_limits_of_the_estimators_are_those_of_the_grid() {
 /// The results page shows what the command prints.
 #[test]
 fn the_results_page_shows_what_is_printed() {
-    let estimators = ["Rasmussen", "ExtendedEmf", "VoltageModel", "SquareWaveInjection", "Sensored"];
-    let text = table::text(&of(grid(), &estimators, &["load-0", "load-0.1", "load-0.5", "load-1"]));
-    let (printed, _) = text.split_once("\n  load-0: ").unwrap();
     let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results.md")).unwrap();
-    assert!(page.contains(printed), "docs/results.md shows another table than\n{printed}");
+    let load_steps = ["Rasmussen", "ExtendedEmf", "VoltageModel", "SquareWaveInjection", "Sensored"];
+    let beyond: Vec<_> = Entry::all().iter().filter(|e| e.kind.class() != Class::Injection).map(|e| e.name).collect();
+    for (estimators, scenarios) in
+        [(&load_steps[..], &["load-0", "load-0.1", "load-0.5", "load-1"][..]), (&beyond, &["weakening"])]
+    {
+        let text = table::text(&of(grid(), estimators, scenarios));
+        let (printed, _) = text.split_once(&format!("\n  {}: ", scenarios[0])).unwrap();
+        assert!(page.contains(printed), "docs/results.md shows another table than\n{printed}");
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod common;
 
 use common::Native;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController, documentation as fragments};
+use drive_study::plane;
 use drive_study::reproduce::plots;
 use drive_study::reproduce::scenario::{
     ClosedLoop, LOAD_0, LOAD_1000, START, STEP_20, STEP_500, STEP_1000, STEP_1500, Scenario, Trace,
@@ -26,17 +27,45 @@ fn the_plots_are_those_of_a_run() {
     let run = |s: &Scenario| -> Trace { Native.run(s, 1e-4).unwrap() };
     let figure_4 = plots::figure_4(&run(&START), [&STEP_20, &STEP_500, &STEP_1000, &STEP_1500].map(run).each_ref());
     let figure_5 = plots::figure_5(&run(&LOAD_0), &run(&LOAD_1000));
-    for (name, drawn) in [("figure-4.svg", figure_4.unwrap()), ("figure-5.svg", figure_5.unwrap())] {
-        let path = root().join("drive/docs").join(name);
-        if std::env::var_os("UPDATE_GOLDEN").is_some() {
-            std::fs::write(&path, &drawn).unwrap();
-            continue;
-        }
-        let kept = std::fs::read_to_string(&path).unwrap();
-        let line = kept.lines().zip(drawn.lines()).position(|(a, b)| a != b).map(|k| k + 1);
-        assert!(kept == drawn, "drive/docs/{name} differs from line {line:?} on; UPDATE_GOLDEN=1 accepts");
-        assert!(fragments::CONTROLLER.contains(&drawn) && fragments::DRIVE.contains(&drawn), "{name} is in both pages");
+    keep("figure-4.svg", &figure_4.unwrap());
+    keep("figure-5.svg", &figure_5.unwrap());
+}
+
+/// Torque over speed on the pages: every number and every dot is that of a run, and on the curves.
+#[test]
+fn the_envelope_is_that_of_the_running_drive() {
+    let plane = plane::envelope(&[1000.0, 2000.0, 3000.0, 3500.0, 4000.0, 4500.0, 5000.0, 5300.0]).unwrap();
+    let text = include_str!("../drive/docs/envelope.html");
+    let [motoring, generating] = &plane.panel.curves[..] else { panic!() };
+    for (k, &(rpm, torque)) in plane.panel.dots.iter().enumerate() {
+        let points = if k % 2 == 0 { &motoring.points } else { &generating.points };
+        let after = points.partition_point(|p| p.0 < rpm);
+        let ((x, y), (x_1, y_1)) = (points[after - 1], points[after]);
+        let figure = y + (y_1 - y) * (rpm - x) / (x_1 - x);
+        assert!((torque / figure - 1.0).abs() < 0.01, "{rpm} rpm: {torque} N.m, not {figure}");
     }
+    for pair in plane.panel.dots.chunks(2).filter(|pair| [3000.0, 4000.0, 4500.0, 5000.0].contains(&pair[0].0)) {
+        let row =
+            format!("<tr><td>{} rpm</td><td>{:.2} N.m</td><td>{:.2} N.m</td></tr>", pair[0].0, pair[0].1, pair[1].1);
+        let row = row.replace('-', "−");
+        assert!(text.contains(&row), "drive/docs/envelope.html has another row than\n{row}");
+    }
+    for part in [format!("base speed, {:.0} rpm", plane.base), format!("above {:.0} rpm", plane.end)] {
+        assert!(text.contains(&part), "{part}");
+    }
+    keep("envelope.svg", &plane::svg(&[plane.panel]).unwrap());
+}
+
+/// The plot `drawn` is the one that `drive/docs` keeps, and in the pages of controller and drive.
+fn keep(name: &str, drawn: &str) {
+    let path = root().join("drive/docs").join(name);
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        return std::fs::write(&path, drawn).unwrap();
+    }
+    let kept = std::fs::read_to_string(&path).unwrap();
+    let line = kept.lines().zip(drawn.lines()).position(|(a, b)| a != b).map(|k| k + 1);
+    assert!(kept == drawn, "drive/docs/{name} differs from line {line:?} on; UPDATE_GOLDEN=1 accepts");
+    assert!(fragments::CONTROLLER.contains(drawn) && fragments::DRIVE.contains(drawn), "{name} is in both pages");
 }
 
 /// A page opens without a network: no address but those of the SVG name space and of the licenses beside it.

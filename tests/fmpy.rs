@@ -16,6 +16,11 @@ fn fmpy_validates_and_cosimulates() {
 }
 
 #[test]
+fn losses_and_temperatures() {
+    pytest("fmpy", "losses", &["test_losses_and_temperature.py", "test_drive_cycle.py"], &[]);
+}
+
+#[test]
 fn model_exchange_and_events() {
     pytest("fmpy", "exchange", &["test_model_exchange.py", "test_casadi.py"], &[]);
 }

@@ -24,7 +24,7 @@ fn machines() -> Vec<Machine> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("motors");
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
-    assert!(files.len() >= 4, "{files:?}");
+    assert!(files.len() >= 5, "{files:?}");
     let read = |path: &Path| {
         let rating = MotorFile::parse(&std::fs::read_to_string(path).unwrap(), path).unwrap().data.rating;
         let (speed, torque) = (*rating.speed.get_ref(), *rating.torque.get_ref());

@@ -79,7 +79,7 @@ pub fn svg(recording: &Recording) -> Result<String> {
     Ok(text)
 }
 
-fn drawing(error: impl std::fmt::Display) -> anyhow::Error {
+pub(crate) fn drawing(error: impl std::fmt::Display) -> anyhow::Error {
     anyhow!("drawing: {error}")
 }
 

@@ -1,7 +1,9 @@
 //! Parameters tuned on a running drive: no bump at the next sample, the new gains after it, a bad combination refused.
-#![allow(missing_docs)]
+#![allow(missing_docs, non_snake_case)]
 
+use drive::control::envelope::{Envelope, Warm};
 use drive::control::signals::ControllerOutputs;
+use drive::control::start::StartMode;
 use drive::estimator::Kind::{
     self, CurrentModel, DirectEmf, EmfObserver, ExtendedEmf, Hybrid, KalmanFilter, VoltageFeedback, VoltageModel,
 };
@@ -10,6 +12,7 @@ use drive_study::runner;
 use drive_study::tune::motor::MotorFile;
 use drive_study::tune::rules::{self, Tuned};
 use fmu_core::{Block, Elapsed, Fault, Model, Slot, Step, Variability};
+use std::f64::consts::PI;
 use std::path::Path;
 
 const T_S: f64 = 1e-4;
@@ -294,13 +297,79 @@ fn field_weakening_is_tuned_where_the_rating_needs_it() {
 }
 
 #[test]
-fn two_machines_need_it_at_their_rated_point() {
+fn three_machines_need_it_at_their_rated_point() {
     // The 2.2 kW machine takes 0.9504 u_dc / sqrt(3) at 1500 rpm and 14 N.m with maximum torque per ampere.
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors");
-    for (name, needed) in [("reference", false), ("servo-6.6kw", false), ("ipmsm-2.2kw", true), ("pmsyrm-5.5kw", true)]
-    {
+    for (name, needed) in [
+        ("reference", false),
+        ("servo-6.6kw", false),
+        ("ipmsm-2.2kw", true),
+        ("pmsyrm-5.5kw", true),
+        ("traction-63kw", true),
+    ] {
         let tuned = drive_study::tune::tune(&folder.join(format!("{name}.toml"))).unwrap();
         assert_eq!(tuned.controller.iter().any(|s| s.name == "weakening.use"), needed, "{name}");
         tuned.pair().start().unwrap();
+    }
+}
+
+/// The tuned traction drive at 2.5 times its base speed: a ramp from standstill, two thirds of the envelope as load, then more
+/// than the envelope, which slows it down.
+#[test]
+fn the_traction_drive_reaches_two_and_a_half_times_its_base_speed() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors/traction-63kw.toml");
+    let tuned = drive_study::tune::tune(&path).unwrap();
+    for kind in [Kind::Sensored, ExtendedEmf, EmfObserver] {
+        let mut pair = tuned.pair();
+        let par = &mut pair.controller.model.parameters;
+        par.estimator = kind;
+        if kind == Kind::Sensored {
+            par.start.mode = StartMode::Direct;
+        }
+        assert!(par.weakening.used);
+        let u_dc = pair.plant.model.inputs.u_dc;
+        let (motor, U) = (&pair.plant.model.parameters.motor, 0.95 * u_dc / 3.0_f64.sqrt());
+        let (envelope, n_p) = (Envelope::new(motor, par.limit.i), f64::from(motor.n_p));
+        let most = |speed: f64| {
+            let mut warm = Warm::default();
+            (0..8).map(|_| envelope.limit(n_p * speed, 1.0, U, &mut warm).tau).last().unwrap()
+        };
+        let top = 2.5 * envelope.base_speed(U) / n_p;
+        assert!((top * 30.0 / PI / 2.5 - 3075.23).abs() < 0.01);
+        pair.start().unwrap();
+        let (mut worst, mut current, mut highest) = (0.0_f64, 0.0_f64, 0.0_f64);
+        // Speed reference, load and samples of each part.
+        let mut part = |pair: &mut Pair, from: f64, to: f64, load: f64, samples: u32| {
+            for k in 1..=samples {
+                let speed_ref = from + (to - from) * f64::from(k) / f64::from(samples);
+                pair.set_inputs(speed_ref, load, u_dc);
+                pair.step(T_S).unwrap();
+                let out = &pair.plant.out;
+                current = current.max(out.i_d.hypot(out.i_q));
+                highest = highest.max(out.speed);
+                if out.speed > 0.3 * top {
+                    worst = worst.max(runner::rotor_ahead(pair).abs());
+                }
+            }
+        };
+        part(&mut pair, 0.0, 0.0, 0.0, 6000);
+        part(&mut pair, 0.0, top, 0.0, 30_000);
+        part(&mut pair, top, top, 0.0, 5000);
+        part(&mut pair, top, top, 0.66 * most(top), 10_000);
+        let reached = pair.plant.out.speed;
+        let weakens = pair.controller.out.weakens;
+        part(&mut pair, top, top, 1.1 * most(top), 30_000);
+        let share = pair.plant.out.tau_e / most(pair.plant.out.speed);
+        println!(
+            "{}: {reached} of {top} rad/s, at most {highest}; {worst} deg, {current} A; {share} of the envelope at {} rad/s",
+            kind.name(),
+            pair.plant.out.speed
+        );
+        assert!(weakens && (reached / top - 1.0).abs() < 0.002, "{reached} of {top} rad/s");
+        assert!(
+            highest < 1.01 * top && worst < 15.0 && current < 1.02 * 240.0,
+            "{highest} rad/s, {worst} deg, {current} A"
+        );
+        assert!(pair.plant.out.speed < 0.98 * top && (share - 1.0).abs() < 0.01, "{share} at {}", pair.plant.out.speed);
     }
 }

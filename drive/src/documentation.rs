@@ -1,7 +1,7 @@
 //! The bodies of the models' documentation pages: fragments of HTML and SVG in `drive/docs`, joined at compile time.
 //!
-//! Content that two models share (the reference plots, the limits, the tuning) has its own file. `fmu reproduce` draws
-//! the plots, and the numbers in the limits come from runs; tests check both.
+//! Content that two models share (the reference plots, torque over speed, the limits, the tuning) has its own file. `fmu
+//! reproduce` draws the reference plots, and the numbers and the other plot come from runs; tests check both.
 
 /// Joins files from `drive/docs`.
 macro_rules! joined {
@@ -16,10 +16,12 @@ pub const PLANT: &str = joined!("pmsm_plant.svg" "pmsm_plant.html");
 /// Documentation of [`SensorlessController`](crate::SensorlessController).
 pub const CONTROLLER: &str = joined!(
     "sensorless_controller.svg" "sensorless_controller.html"
-    "reference.html" "figure-4.svg" "figure-5.svg" "limits.html" "tuning.html"
+    "reference.html" "figure-4.svg" "figure-5.svg" "envelope.html" "envelope.svg" "limits.html"
+    "tuning.html"
 );
 
 /// Documentation of [`PmsmDrive`](crate::PmsmDrive).
 pub const DRIVE: &str = joined!(
-    "pmsm_drive.svg" "pmsm_drive.html" "reference.html" "figure-4.svg" "figure-5.svg" "limits.html" "tuning.html"
+    "pmsm_drive.svg" "pmsm_drive.html"
+    "reference.html" "figure-4.svg" "figure-5.svg" "envelope.html" "envelope.svg" "limits.html" "tuning.html"
 );

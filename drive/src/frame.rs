@@ -318,11 +318,13 @@ pub struct Phases<S = f64> {
     pub c: S,
 }
 
+/// The square root of 3.
+pub const SQRT_3: f64 = 1.732_050_807_568_877_2;
+
 impl<S: Scalar> Phases<S> {
     /// Amplitude-invariant Clarke transform; a common part of the three phases has no effect.
     #[inline]
     pub fn to_stator(self) -> Vector<Stator, S> {
-        const SQRT_3: f64 = 1.732_050_807_568_877_2;
         let Self { a, b, c } = self;
         Vector::new((a * 2.0 - b - c) / S::from(3.0), (b - c) / S::from(SQRT_3))
     }

@@ -1,6 +1,14 @@
 //! Elementary functions, from the `libm` crate or, where a period needs them, by series of basic operations: identical
 //! bits on every platform; the C library does not guarantee this.
 
+use fmu_core::Scalar;
+
+/// Magnitude of `x`.
+#[inline]
+pub fn abs<S: Scalar>(x: S) -> S {
+    x.chain(x.value().abs(), if x.value() == 0.0 { 0.0 } else { 1.0_f64.copysign(x.value()) })
+}
+
 /// Sine and cosine of `x` (rad).
 #[inline]
 pub fn sin_cos(x: f64) -> (f64, f64) {

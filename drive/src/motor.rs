@@ -4,19 +4,19 @@ use fmu_core::unit::{HENRY, OHM, WEBER};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// A permanent-magnet synchronous machine, salient in general.
+/// A permanent-magnet synchronous machine, salient in general; what a temperature changes is an `S`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Motor {
+pub struct Motor<S = f64> {
     /// Number of pole pairs (Z_p in Rasmussen).
     pub n_p: i32,
     /// Stator resistance in Ohm, > 0.
-    pub R_s: f64,
+    pub R_s: S,
     /// d-axis inductance in H, > 0.
     pub L_d: f64,
     /// q-axis inductance in H, > 0.
     pub L_q: f64,
     /// Permanent-magnet flux linkage in Wb, peak-valued, > 0.
-    pub psi_M: f64,
+    pub psi_M: S,
 }
 
 impl Default for Motor {

@@ -17,7 +17,8 @@ use crate::control::weakening::WEAKENING;
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
-use crate::plant::{power::Powers, tables as plant};
+use crate::plant::thermal::{THERMAL_INPUTS, THERMAL_OUTPUTS, ThermalInputs};
+use crate::plant::{power::Powers, tables as plant, tables::PlantParameters};
 use fmu_core::events::{bounded, grid};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, RADIAN, SPEED, VOLT};
@@ -47,6 +48,8 @@ pub struct DriveInputs {
     pub tau_ref: f64,
     /// The drive operates; false: the controller stays in its initial state and the gates are off.
     pub enable: bool,
+    /// Temperatures in K.
+    pub thermal: ThermalInputs,
 }
 
 impl Default for DriveInputs {
@@ -59,6 +62,7 @@ impl Default for DriveInputs {
             angle_shaft: 0.0,
             tau_ref: 0.0,
             enable: true,
+            thermal: ThermalInputs::default(),
         }
     }
 }
@@ -79,6 +83,8 @@ pub struct PmsmDrive {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,
+    /// Model Exchange: voltages of the plant, and whether its gates switch, since the last sample.
+    before: (Phases, bool),
     period: Period,
 }
 
@@ -110,16 +116,17 @@ impl PmsmDrive {
         let Self { inputs, pair, .. } = self;
         pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
         let plant = &mut pair.plant.model.inputs;
-        (plant.speed_shaft, plant.angle_shaft) = (inputs.speed_shaft, inputs.angle_shaft);
+        (plant.speed_shaft, plant.angle_shaft, plant.thermal) =
+            (inputs.speed_shaft, inputs.angle_shaft, inputs.thermal);
         let controller = &mut pair.controller.model.inputs;
         (controller.tau_ref, controller.enable) = (inputs.tau_ref, inputs.enable);
     }
 
     /// The plant's inputs: those of the drive, and the voltages that the controller shows.
     fn plant_inputs(&self) -> PlantInputs {
-        let DriveInputs { tau_load, u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
+        let DriveInputs { tau_load, u_dc, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
         let PlantInputs { u, enable, .. } = self.pair.plant.model.inputs;
-        PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable }
+        PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, thermal }
     }
 
     /// The outputs of the controller's last sample become visible and act on the plant.
@@ -148,7 +155,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 7;
+    const STATE_VERSION: u16 = 8;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -157,10 +164,11 @@ impl Model for PmsmDrive {
 
     fn validate(&self) -> Result<(), Fault> {
         self.pair.plant.model.validate().map_err(|fault| in_part("plant", &fault))?;
-        self.pair.controller.model.validate().map_err(|fault| in_part("controller", &fault))
+        self.pair.controller.model.validate_on(self.inputs.u_dc).map_err(|fault| in_part("controller", &fault))
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
+        self.pair.plant.model.validate_for(interface).map_err(|fault| in_part("plant", &fault))?;
         self.pair.controller.model.validate_for(interface).map_err(|fault| in_part("controller", &fault))
     }
 
@@ -168,16 +176,18 @@ impl Model for PmsmDrive {
         self.set_inputs();
         self.pair.initialize();
         self.period = Period { last: self.pair.plant.out.powers, ..Period::default() };
+        self.before = (self.pair.plant.model.inputs.u, self.pair.plant.model.inputs.enable);
     }
 
     fn output(&self, _now: Elapsed, out: &mut DriveOutputs) {
-        out.plant = PlantOutputs { powers: self.period.last, ..self.pair.plant.out.clone() };
+        let (Block { model, out: plant }, powers) = (&self.pair.plant, self.period.last);
+        out.plant = plant.with(powers, model.heat(&model.inputs, &plant.temperatures, &powers.losses));
         out.controller.clone_from(&self.pair.controller.out);
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         self.set_inputs();
-        let Self { inputs, pair, period } = self;
+        let Self { inputs, pair, period, .. } = self;
         let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
         let end = step.end();
         if step.h > MAX_SAMPLES * grid.period {
@@ -266,10 +276,16 @@ impl Events for PmsmDrive {
         let grid = grid(&self.pair.controller.model);
         while grid.reached(self.pair.controller.model.samples(), now) {
             self.show(now);
+            // With iron loss, the currents depend on the voltages: the controller samples them before they change.
+            let shown = self.pair.plant.model.inputs.clone();
             let Pair { plant, controller, .. } = &mut self.pair;
+            (plant.model.inputs.u, plant.model.inputs.enable) = self.before;
             plant.model.observe(now, &mut plant.out);
+            plant.model.inputs = shown;
             controller.model.inputs.measure(&plant.out);
             controller.model.sample()?;
+            let PlantInputs { u, enable, .. } = plant.model.inputs;
+            self.before = (u, enable);
         }
         self.pair.plant.model.event(now)
     }
@@ -337,9 +353,17 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 &Part { table: WEAKENING, lens: |m| &mut m.model.pair.controller.model.parameters.weakening },
             ),
             V::part("", &Part { table: LATER_OUTPUTS, lens: |m| &mut m.out.controller }),
+            V::part("", &Part { table: plant::LOSS_OUTPUTS, lens: |m| &mut m.out.plant }),
+            V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
+            V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
+            V::part("", &Part { table: THERMAL_OUTPUTS, lens: |m| &mut m.out.plant }),
         ]
     },
 );
+
+/// The plant's parameters of losses and temperatures.
+const LOSS_PARAMETERS: &Table<PlantParameters> =
+    &Table::new(const { &[Row::part("plant.", &Part { table: plant::LOSS_PARAMETERS, lens: |p| p })] });
 
 type O = Row<ControllerOutputs>;
 

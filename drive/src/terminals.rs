@@ -3,7 +3,7 @@
 //! `phases` and `sensor` exist twice, on the plant and mirrored on the controller: members with the same name connect.
 //! The inverter is inside the plant, so the phases carry references and measured values, and a connection makes them
 //! equal (signals). At the shaft and the DC link, where power leaves the model, torque and current are flows: they sum
-//! to zero with those of the connected component.
+//! to zero with those of the connected component. Heat is positive out of the model.
 
 use fmu_core::{Member, Terminal};
 
@@ -24,6 +24,11 @@ pub(crate) const PLANT: &[Terminal] = &[
     SHAFT,
     SHAFT_IMPOSED,
     DC_LINK,
+    COOLANT,
+    HEAT_WINDING,
+    HEAT_IRON,
+    HEAT_MAGNET,
+    HEAT_INVERTER,
 ];
 
 /// Terminals of `SensorlessController`.
@@ -43,7 +48,22 @@ pub(crate) const CONTROLLER: &[Terminal] = &[
 ];
 
 /// Terminals of `PmsmDrive`.
-pub(crate) const DRIVE: &[Terminal] = &[SHAFT, SHAFT_IMPOSED, DC_LINK];
+pub(crate) const DRIVE: &[Terminal] = &[
+    Terminal::plug(
+        "torque_request",
+        "Torque reference of a vehicle controller (controller.speed_loop.torque_mode), and the torque limits to it",
+        &[Member::signal("tau_ref"), Member::signal("tau_max"), Member::signal("tau_min")],
+    )
+    .drawn(&icon::TORQUE_REQUEST, -100.0, 40.0),
+    SHAFT,
+    SHAFT_IMPOSED,
+    DC_LINK,
+    COOLANT,
+    HEAT_WINDING,
+    HEAT_IRON,
+    HEAT_MAGNET,
+    HEAT_INVERTER,
+];
 
 /// Signals between controller and inverter.
 const fn phases(enable: Member) -> [Member; 7] {
@@ -85,6 +105,42 @@ const DC_LINK: Terminal = Terminal::plug(
 )
 .drawn(&icon::DC_LINK, 0.0, 100.0);
 
+/// The coolant, with `thermal.mode` = Network; with Constant, all losses flow to it at once.
+const COOLANT: Terminal = Terminal::plug(
+    "coolant",
+    "Coolant of machine and inverter: its temperature, and the heat to it",
+    &[Member::signal("T").of("T_coolant"), Member::outflow("Q").of("Q_coolant")],
+)
+.drawn(&icon::COOLANT, 0.0, -100.0);
+
+const HEAT_WINDING: Terminal = Terminal::plug(
+    "heat_winding",
+    "The winding in a thermal model outside (thermal.mode = Imposed): its temperature, and the heat out of it",
+    &[Member::signal("T").of("T_winding_imposed"), Member::outflow("Q").of("Q_winding")],
+)
+.drawn(&icon::HEAT, -80.0, -100.0);
+
+const HEAT_IRON: Terminal = Terminal::plug(
+    "heat_iron",
+    "The stator iron in a thermal model outside (thermal.mode = Imposed): its temperature, and the heat out of it",
+    &[Member::signal("T").of("T_stator_imposed"), Member::outflow("Q").of("Q_iron")],
+)
+.drawn(&icon::HEAT, -40.0, -100.0);
+
+const HEAT_MAGNET: Terminal = Terminal::plug(
+    "heat_magnet",
+    "Rotor and magnets in a thermal model outside (thermal.mode = Imposed): their temperature, and the heat out of them",
+    &[Member::signal("T").of("T_magnet_imposed"), Member::outflow("Q").of("Q_magnet")],
+)
+.drawn(&icon::HEAT, 40.0, -100.0);
+
+const HEAT_INVERTER: Terminal = Terminal::plug(
+    "heat_inverter",
+    "The inverter in a thermal model outside (thermal.mode = Imposed): its temperature, and the heat out of it",
+    &[Member::signal("T").of("T_inverter_imposed"), Member::outflow("Q").of("Q_inverter")],
+)
+.drawn(&icon::HEAT, 80.0, -100.0);
+
 /// Icons of the terminals.
 mod icon {
     use fmu_core::Icon;
@@ -96,6 +152,11 @@ mod icon {
     pub(super) const SHAFT: Icon = Icon { name: "shaft", svg: include_str!("../icons/shaft.svg"), color: [73, 80, 87] };
     pub(super) const DC_LINK: Icon =
         Icon { name: "dc_link", svg: include_str!("../icons/dc_link.svg"), color: [24, 100, 171] };
+    pub(super) const COOLANT: Icon =
+        Icon { name: "coolant", svg: include_str!("../icons/coolant.svg"), color: [11, 114, 133] };
+    pub(super) const HEAT: Icon = Icon { name: "heat", svg: include_str!("../icons/heat.svg"), color: [201, 42, 42] };
+    pub(super) const TORQUE_REQUEST: Icon =
+        Icon { name: "torque_request", svg: include_str!("../icons/torque_request.svg"), color: [95, 61, 196] };
 }
 
 #[cfg(test)]
@@ -112,9 +173,11 @@ mod tests {
         let [plant, controller, drive] =
             [described::<PmsmPlant>(), described::<SensorlessController>(), described::<PmsmDrive>()];
         let names = |d: &Description| d.terminals.iter().map(|t| t.name.clone()).collect::<Vec<_>>();
-        assert_eq!(names(&plant), ["phases", "sensor", "shaft", "shaft_imposed", "dc_link"]);
+        let power = ["shaft", "shaft_imposed", "dc_link"];
+        let heat = ["coolant", "heat_winding", "heat_iron", "heat_magnet", "heat_inverter"];
+        assert_eq!(names(&plant), [&["phases", "sensor"][..], &power, &heat].concat());
         assert_eq!(names(&controller), ["phases", "sensor"]);
-        assert_eq!(names(&drive), ["shaft", "shaft_imposed", "dc_link"]);
+        assert_eq!(names(&drive), [&["torque_request"][..], &power, &heat].concat());
         assert!([plant, controller, drive].iter().all(|d| d.icon.is_some()));
     }
 
@@ -140,6 +203,7 @@ mod tests {
     #[test]
     fn plant_and_drive_have_the_same_power_terminals() {
         let (plant, drive) = (described::<PmsmPlant>(), described::<PmsmDrive>());
-        assert!(drive.terminals.iter().all(|t| plant.terminals.contains(t)));
+        let power = drive.terminals.iter().filter(|t| t.name != "torque_request");
+        assert!(power.clone().count() == 8 && power.into_iter().all(|t| plant.terminals.contains(t)));
     }
 }

@@ -18,6 +18,7 @@ fn controller(kind: Kind) -> SensorlessController {
     (par.estimator, par.motor, par.s_2) = (kind, Motor::IPMSM_2_2_KW, 40.0);
     (par.limit.i, par.limit.i_q) = (15.0, 15.0);
     par.current.reference_feed_forward = kind == Kind::VoltageFeedback;
+    controller.inputs.u_dc = 540.0;
     controller.validate().unwrap();
     controller
 }
@@ -148,6 +149,22 @@ fn field_weakening_with_an_estimator_that_cannot() {
         (p.weakening.used, p.motor.L_d, p.motor.L_q) = (true, p.motor.L_q, 0.2 * p.motor.L_d);
     };
     refused(Kind::ExtendedEmf, reversed, &["limit.i = 15 A", "L_q < L_d", "9.954"]);
+    // Below the onset, with the 150 V of the injection off 0.95 u_dc / sqrt(3): 126 rad/s; without injection 299 rad/s.
+    let injecting = |p: &mut ControllerParameters| {
+        (p.weakening.used, p.current.mtpa, p.limit.tau) = (true, true, 1e3);
+        p.estimators.hybrid.w_high = 130.0;
+    };
+    let parts = ["hybrid.w_high = 130 rad/s", "at most 126.", "square_wave.voltage = 150 V", "540 V", "lower it"];
+    refused(Kind::Hybrid, injecting, &parts);
+    let mut quieter = controller(Kind::Hybrid);
+    injecting(&mut quieter.parameters);
+    quieter.parameters.estimators.square_wave.voltage = 140.0;
+    quieter.validate().unwrap();
+    // The low-speed law's positive i_d, too, must leave torque to i_q: psi_M / (L_q - L_d) = 36.3 A.
+    let strong = |p: &mut ControllerParameters| {
+        (p.weakening.used, p.zero_speed.i_0, p.limit.i) = (true, 30.0, 40.0);
+    };
+    refused(Kind::Rasmussen, strong, &["zero_speed.i_0 = 30 A", "weakening.use = true", "29.066"]);
     // The others work, and these two within their limits.
     for &kind in Kind::ALL.iter().filter(|kind| kind.class() != Class::Injection) {
         let mut controller = controller(kind);

@@ -146,6 +146,8 @@ fn the_base_speed() {
             let base = Machine::last_speed(fits);
             println!("base speed {base} rpm, {figure}");
             assert!(figure.is_nan() || (base - figure).abs() < 6e-3, "{base} rpm, not {figure}");
+            let closed = machine.envelope().base_speed(machine.U(k_u)) / machine.w(1.0);
+            assert!((closed - base).abs() < 1e-9 * base, "{closed} rpm, not {base}");
         }
     }
 }
@@ -187,7 +189,7 @@ fn currents(machine: &Machine, rpm: f64, tau: f64) -> (DqHat, Weakening) {
     let mut i = DqHat::ZERO;
     for k in 0..8 {
         state.limits(&gains, &par.weakening, (w, machine.u_dc, 0.0), most / par.motor.torque_constant(), k);
-        i = state.currents(&gains, tau, w, today, machine.i);
+        i = state.currents(&gains, tau, w, machine.i, true, || today);
     }
     (i, state)
 }
@@ -216,6 +218,27 @@ fn points_inside() {
     }
 }
 
+#[test]
+fn an_injected_voltage_is_taken_off() {
+    let (machine, rpm, injected) = (a(), 1500.0, 40.0);
+    let (par, w) = (machine.parameters(), machine.w(rpm));
+    let k = par.motor.torque_constant();
+    let gains = WeakeningGains::new(&par, machine.limit(100.0, 1.0)[1].tau, true);
+    let mut state = Weakening::default();
+    let both =
+        (0..9).map(|n| state.limits(&gains, &par.weakening, (w, machine.u_dc, injected), 1e3, n)).last().unwrap();
+    for (i, s) in [(both.1, 1.0), (both.0, -1.0)] {
+        let mut warm = Warm::default();
+        let mut limit = || machine.envelope().limit(w, s, machine.U(0.95) - injected, &mut warm).tau;
+        let figure = (0..9).map(|_| limit()).last().unwrap();
+        assert!(
+            (i * k - figure).abs() < 1e-6 && figure < machine.limit(rpm, s)[1].tau - 2.0,
+            "{} N.m, {figure}",
+            i * k
+        );
+    }
+}
+
 /// A drive with a sensor and exact estimates; its shaft turns at an imposed speed.
 struct Drive {
     pair: Pair,
@@ -239,6 +262,7 @@ impl Drive {
         (plant.motor, plant.mechanics.J) = (machine.motor.clone(), machine.J);
         pair.controller.model.parameters = machine.parameters();
         set(&mut pair);
+        pair.set_inputs(0.0, 0.0, machine.u_dc);
         pair.start().unwrap();
         Self { pair, angle: 0.0, machine: machine.clone() }
     }
@@ -351,6 +375,35 @@ fn with_wrong(set: Wrong, n: f64) -> (f64, f64) {
 }
 
 #[test]
+fn injection_ends_before_field_weakening_begins() {
+    // Hybrid with the highest w_high that is accepted: 126.6 rad/s beside 150 V of injection.
+    let machine = a();
+    for s in [1.0, -1.0] {
+        let mut drive = Drive::imposed(&machine, |p| {
+            p.estimator = Kind::Hybrid;
+            p.estimators.tracker.bandwidth = TAU * 40.0;
+            (p.estimators.hybrid.w_low, p.estimators.hybrid.w_high) = (63.0, 126.0);
+        });
+        let (mut rpm, mut weakest) = (0.0, f64::INFINITY);
+        drive.settle(0.2, rpm, 0.0);
+        while rpm < 2500.0 {
+            drive.step(rpm, s * 1e3, machine.u_dc);
+            let out = &drive.pair.controller.out;
+            if out.weakens {
+                weakest = weakest.min(3.0 * out.speed_est.abs());
+            }
+            rpm += 400.0 / RPM * T_S;
+        }
+        // On the ramp, the tracker is a few degrees behind.
+        drive.settle(0.5, rpm, s * 1e3);
+        let share = s * drive.torque() / machine.limit(rpm, s)[1].tau;
+        println!("{s}: weakens from {weakest} rad/s on, {share} of the envelope at {rpm} rpm");
+        assert!(weakest > 126.0 && weakest < 450.0, "{weakest} rad/s");
+        assert!((share - 1.0).abs() < 0.01, "{share} of the envelope");
+    }
+}
+
+#[test]
 fn wrong_estimates() {
     let figures: [(&str, Wrong, [f64; 2], bool); 6] = [
         ("R 0.9", |m| m.R_s *= 0.9, [1.016, 1.020], false),
@@ -423,18 +476,20 @@ fn a_speed_step_to_two_and_a_half_times_base_speed() {
 #[test]
 fn a_clipped_request_is_told() {
     // a at 2000 rpm gives 24.9058 N.m; 24 N.m are within.
-    for (tau, told) in [(24.0, false), (100.0, true), (-100.0, true)] {
+    for (tau, seconds, clipped, told) in
+        [(24.0, 1.1, false, false), (100.0, 0.9, true, false), (100.0, 1.1, true, true), (-100.0, 1.1, true, true)]
+    {
         let mut drive = Drive::imposed(&a(), |_| ());
-        drive.settle(0.2, 2000.0, tau);
+        drive.settle(seconds, 2000.0, tau);
         let (out, mut messages) = (&drive.pair.controller.out, Vec::new());
         let mut sink = |key: &'static str, message: &dyn Fn() -> String| messages.push((key, message()));
         drive.pair.controller.model.warn(&mut Warnings::to(&mut sink));
         assert!((out.tau_max - 24.9058).abs() < 1e-3 && (out.tau_min + 32.8101).abs() < 1e-3, "{out:?}");
         assert!(out.weakens && (out.u_share - 0.95).abs() < 2e-3, "{out:?}");
-        assert_eq!(out.current_limited, told, "{tau} N.m");
+        assert_eq!(out.current_limited, clipped, "{tau} N.m");
         assert_eq!(messages.iter().any(|(key, _)| *key == "tau_ref"), told, "{tau} N.m: {messages:?}");
         if told {
-            assert!(messages[0].1.contains(&format!("tau_ref = {tau} N.m is clipped")), "{messages:?}");
+            assert!(messages[0].1.contains(&format!("tau_ref = {tau} N.m has been clipped")), "{messages:?}");
         }
     }
 }

@@ -38,6 +38,11 @@ impl Exponents {
         Self { kg, m, s, ampere, ..Self::NONE }
     }
 
+    /// The same with an exponent of the kelvin.
+    pub const fn with_kelvin(self, kelvin: i8) -> Self {
+        Self { kelvin, ..self }
+    }
+
     /// The same with an exponent of the radian.
     pub const fn with_rad(self, rad: i8) -> Self {
         Self { rad, ..self }
@@ -100,6 +105,8 @@ const RAD_PER_S_UNIT: Unit = Unit::si("rad/s", Exponents::mechanical(0, 0, -1, 0
 
 /// Degrees.
 pub const DEGREE: DisplayUnit = DisplayUnit { name: "deg", factor: 180.0 / std::f64::consts::PI, offset: 0.0 };
+/// Degrees Celsius.
+pub const CELSIUS: DisplayUnit = DisplayUnit { name: "degC", factor: 1.0, offset: -273.15 };
 /// Revolutions per minute.
 pub const RPM: DisplayUnit = DisplayUnit { name: "rpm", factor: 30.0 / std::f64::consts::PI, offset: 0.0 };
 
@@ -111,6 +118,11 @@ pub const VOLT: Quantity = Quantity::new("Voltage", Unit::si("V", Exponents::mec
 pub const AMPERE: Quantity = Quantity::new("Current", Unit::si("A", Exponents::mechanical(0, 0, 0, 1)));
 /// Resistance in Ohm.
 pub const OHM: Quantity = Quantity::new("Resistance", Unit::si("Ohm", Exponents::mechanical(1, 2, -3, -2)));
+/// Conductance in S.
+pub const SIEMENS: Quantity = Quantity::new("Conductance", Unit::si("S", Exponents::mechanical(-1, -2, 3, 2)));
+/// Reciprocal inductance in 1/H.
+pub const PER_HENRY: Quantity =
+    Quantity::new("ReciprocalInductance", Unit::si("1/H", Exponents::mechanical(-1, -2, 2, 2)));
 /// Inductance in H.
 pub const HENRY: Quantity = Quantity::new("Inductance", Unit::si("H", Exponents::mechanical(1, 2, -2, -2)));
 /// Flux linkage in Wb.
@@ -121,11 +133,29 @@ pub const NEWTON_METER: Quantity = Quantity::new("Torque", Unit::si("N.m", Expon
 pub const WATT: Quantity = Quantity::new("Power", Unit::si("W", Exponents::mechanical(1, 2, -3, 0)));
 /// Energy in J.
 pub const JOULE: Quantity = Quantity::new("Energy", Unit::si("J", Exponents::mechanical(1, 2, -2, 0)));
+/// Temperature in K, shown in degrees Celsius.
+pub const KELVIN: Quantity =
+    Quantity::new("Temperature", Unit::si("K", Exponents::NONE.with_kelvin(1))).shown_in(CELSIUS);
+/// Temperature coefficient in 1/K.
+pub const PER_KELVIN: Quantity =
+    Quantity::new("TemperatureCoefficient", Unit::si("1/K", Exponents::NONE.with_kelvin(-1)));
+/// Heat capacity in J/K.
+pub const JOULE_PER_KELVIN: Quantity =
+    Quantity::new("HeatCapacity", Unit::si("J/K", Exponents::mechanical(1, 2, -2, 0).with_kelvin(-1)));
+/// Thermal conductance in W/K.
+pub const WATT_PER_KELVIN: Quantity =
+    Quantity::new("ThermalConductance", Unit::si("W/K", Exponents::mechanical(1, 2, -3, 0).with_kelvin(-1)));
 /// Moment of inertia in kg.m2.
 pub const KG_M2: Quantity = Quantity::new("Inertia", Unit::si("kg.m2", Exponents::mechanical(1, 2, 0, 0)));
 /// Viscous friction in N.m.s/rad.
 pub const NM_S_PER_RAD: Quantity =
     Quantity::new("ViscousFriction", Unit::si("N.m.s/rad", Exponents::mechanical(1, 2, -1, 0).with_rad(-1)));
+/// Windage coefficient in N.m.s2/rad2.
+pub const NM_S2_PER_RAD2: Quantity =
+    Quantity::new("Windage", Unit::si("N.m.s2/rad2", Exponents::mechanical(1, 2, 0, 0).with_rad(-2)));
+/// Coefficient of the square of a speed in s2/rad2.
+pub const S2_PER_RAD2: Quantity =
+    Quantity::new("PerSquareOfSpeed", Unit::si("s2/rad2", Exponents::mechanical(0, 0, 2, 0).with_rad(-2)));
 /// Angle in rad, shown in degrees.
 pub const RADIAN: Quantity = Quantity::new("Angle", Unit::si("rad", Exponents::NONE.with_rad(1))).shown_in(DEGREE);
 /// Speed of rotation in rad/s, shown in rpm.

@@ -12,6 +12,8 @@ n_p, R_s, L, psi_M, J, B, tau_coulomb, w_coulomb = 3, 2.0, 6e-3, 0.15, 1.5e-3, 2
 STANDARDS = pytest.mark.parametrize("standard", [2, 3], ids=["fmi2", "fmi3"])
 STATES = ("speed", "angle", "psi_d", "psi_q")
 INPUTS = {"u_a": 30.0, "u_b": -10.0, "u_c": -20.0, "u_dc": 325.0, "tau_load": 0.7, "speed_shaft": 0.0, "angle_shaft": 0.0}
+# Read with other values of thermal.mode only.
+INPUTS |= {f"T_{name}": 293.15 for name in ("coolant", *(f"{part}_imposed" for part in ("winding", "stator", "magnet", "inverter")))}
 POINTS = np.random.default_rng(1).uniform(
     [-150.0, -3.0, 0.1, -0.05], [150.0, 3.0, 0.2, 0.05], (20, 4)
 )

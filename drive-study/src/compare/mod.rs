@@ -16,6 +16,7 @@ mod running;
 pub mod scenario;
 mod signal;
 pub mod table;
+mod weakening;
 
 use anyhow::{Context, Result};
 use candidate::{Candidate, Entry};

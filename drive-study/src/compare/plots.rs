@@ -23,7 +23,7 @@ pub struct Plot {
 /// When drawing fails.
 pub fn all(cells: &[Cell]) -> Result<Vec<Plot>> {
     let mut plots = Vec::new();
-    for id in ["ramp", "reversal", "load-0", "load-0.1", "load-0.5", "load-1"] {
+    for id in ["ramp", "reversal", "load-0", "load-0.1", "load-0.5", "load-1", "weakening"] {
         let with_trace: Vec<&Cell> = cells.iter().filter(|c| c.scenario.id == id && c.trace().is_some()).collect();
         if !with_trace.is_empty() {
             plots.push(together(id, &with_trace)?);

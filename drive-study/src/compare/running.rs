@@ -10,7 +10,7 @@ use fmu_core::Fault;
 use std::f64::consts::TAU;
 
 /// Linear ramp from `a` at time `from` to `b` at time `to`, constant outside.
-fn line(t: f64, from: f64, a: f64, to: f64, b: f64) -> f64 {
+pub(super) fn line(t: f64, from: f64, a: f64, to: f64, b: f64) -> f64 {
     a + (b - a) * ((t - from) / (to - from)).clamp(0.0, 1.0)
 }
 

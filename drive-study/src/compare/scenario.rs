@@ -1,7 +1,7 @@
 //! The scenarios. Each one is a row here; its function runs a drive and measures numbers.
 
 use super::candidate::Candidate;
-use super::{Outcome, parameters, running, signal};
+use super::{Outcome, parameters, running, signal, weakening};
 use fmu_core::Fault;
 
 /// Extent of the grid. The reduced grid is for a test that runs in seconds.
@@ -31,6 +31,7 @@ const LOAD: &str = "Load steps";
 const RATED: &str = "Rated load held";
 const LOWEST: &str = "Lowest speed at rated load";
 const GENERATING: &str = "Rated load that drives, at low speed";
+const WEAKENING: &str = "Field weakening";
 const WRONG: &str = "Wrong parameters: mean angle error";
 const DEAD: &str = "Dead time of 2 us";
 const BANDWIDTH: &str = "Bandwidth of the speed loop";
@@ -79,6 +80,13 @@ pub static SCENARIOS: &[Scenario] = &[
     row("generating-0.02", GENERATING, "applied within 0.3 s at 0.02 pu", |s, _| running::generating(s, 0.02)),
     row("generating-0.05", GENERATING, "applied within 0.3 s at 0.05 pu", |s, _| running::generating(s, 0.05)),
     row("generating-0.1", GENERATING, "applied within 0.3 s at 0.1 pu", |s, _| running::generating(s, 0.1)),
+    row(
+        "weakening",
+        WEAKENING,
+        "0.5 pu to 2.5 times the base speed n_b (Rasmussen 1.5: its machine ends at 1.62), then 1.1 times the load of the \
+         envelope there; VoltageModel with 0.7 psi_M/L_d, VoltageFeedback with k_u = 0.9",
+        |s, _| weakening::run(s),
+    ),
     row("wrong-r", WRONG, "R at rated load and 0.1 pu", |s, _| parameters::wrong(s, 0.1, |m| &mut m.R_s)),
     row("wrong-l-q", WRONG, "L_q at rated load and 0.5 pu (injection 0.1)", |s, _| {
         parameters::wrong(s, 0.5, |m| &mut m.L_q)

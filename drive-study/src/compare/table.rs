@@ -24,7 +24,7 @@ pub fn number(m: &Measure) -> String {
         return if m.name == "settling time" { "never" } else { "lost" }.into();
     }
     let decimals = match m.unit {
-        "deg" | "pu" | "s" | "W" | "A" => 3 - usize::from(m.unit == "deg" || m.unit == "s"),
+        "deg" | "pu" | "n_b" | "1" | "s" | "W" | "A" => 3 - usize::from(m.unit == "deg" || m.unit == "s"),
         "Hz" => 1,
         _ => 0,
     };

@@ -112,7 +112,7 @@ fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -
 
 /// A tick's number in its shortest form.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that plotters requires")]
-fn tick(x: &f64) -> String {
+pub(crate) fn tick(x: &f64) -> String {
     ((x * 1e6).round() / 1e6).to_string()
 }
 

@@ -3,7 +3,7 @@
 use crate::control::lock::Lock;
 use crate::control::model::SensorlessController;
 use crate::control::signals::ControllerOutputs;
-use crate::control::state::{Command, Mode, context};
+use crate::control::state::{Command, Mode, References, context};
 use crate::control::weakening::share;
 use crate::estimator::{Estimate, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
@@ -34,7 +34,8 @@ impl SensorlessController {
         let sample = self.measure();
         let (frame, mode) = self.estimate(&sample, tuned);
         let speed = frame.w / f64::from(self.parameters.motor.n_p);
-        let (i_ref, current_limited) = self.reference(mode, speed, frame.injection, tuned);
+        let References { i: i_ref, limited: current_limited, tau: (low, high), weakens } =
+            self.reference(mode, speed, frame.injection, tuned);
         let (u, voltage_limited, u_share) = self.modulate(mode, &frame, i_ref, tuned);
         let lock_lost = self.lock(mode, &frame, &sample);
         self.keep(&sample, i_ref, frame.i);
@@ -49,10 +50,10 @@ impl SensorlessController {
             enabled: true,
             voltage_limited,
             current_limited,
-            tau_max: self.state.tau.1,
-            tau_min: -self.state.tau.0,
+            tau_max: high,
+            tau_min: -low,
             u_share,
-            weakens: self.state.weakening.weakens,
+            weakens,
         }
     }
 
@@ -96,14 +97,13 @@ impl SensorlessController {
         (Frame { axis, theta, w, i: axis.from_stator(i), injection }, mode)
     }
 
-    /// Current references in A at the estimated mechanical `speed` (rad/s) beside an `injection`, and whether a limit reduced
-    /// them.
+    /// The references at the estimated mechanical `speed` (rad/s) beside an `injection`.
     #[inline]
-    fn reference(&mut self, mode: Mode, speed: f64, injection: Injection, tuned: bool) -> (DqHat, bool) {
+    fn reference(&mut self, mode: Mode, speed: f64, injection: Injection, tuned: bool) -> References {
         let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
         match mode {
-            Mode::Current(i_ref) => (i_ref, false),
-            Mode::Voltage(_) => (DqHat::ZERO, false),
+            Mode::Current(i) => References { i, ..References::default() },
+            Mode::Voltage(_) => References::default(),
             Mode::AfterStart | Mode::AfterSearch | Mode::ClosedLoop => {
                 let old = (tuned && mode == Mode::ClosedLoop).then_some(&last_gains.speed);
                 state.references(par.estimator, gains, old, par, inputs, speed, injection)

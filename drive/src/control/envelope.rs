@@ -52,13 +52,6 @@ pub struct Warm {
     u: [f64; 2],
 }
 
-impl Warm {
-    /// Nothing is known from the last sample.
-    pub fn is_cold(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
 impl Envelope {
     /// For the estimates `motor` and the current limit `I` (A).
     pub fn new(motor: &Motor, I: f64) -> Self {
@@ -85,14 +78,28 @@ impl Envelope {
         Limit { i, tau: self.torque(i).abs() }
     }
 
+    /// Currents (A) on the circle.
+    #[inline]
+    fn on_circle(&self, x: f64, s: f64) -> DqHat {
+        let r = self.I / (1.0 + x * x);
+        DqHat::new(-r * (1.0 - x * x), s * 2.0 * r * x)
+    }
+
+    /// The base speed (electrical, rad/s) under the voltage `U` (V): up to it, the machine gives its greatest torque.
+    pub fn base_speed(&self, U: f64) -> f64 {
+        let i = self.on_circle(self.x_mtpa, 1.0);
+        let (psi_d, psi_q) = (self.psi_M + self.L_d * i.d(), self.L_q * i.q());
+        let flux = psi_d * psi_d + psi_q * psi_q;
+        let half = self.R * (self.psi_M - self.dL * i.d()) * i.q();
+        let free = U * U - self.R * self.R * i.dot(i);
+        ((half * half + flux * free).max(0.0).sqrt() - half).max(0.0) / flux
+    }
+
     /// The limit of the sign `s` at |w| = `w` (rad/s) under the voltage `U` (V).
     #[inline]
     pub fn limit(&self, w: f64, s: f64, U: f64, warm: &mut Warm) -> Limit {
         let p = self.quartic(w, s, U);
-        let on_circle = |x: f64| {
-            let r = self.I / (1.0 + x * x);
-            DqHat::new(-r * (1.0 - x * x), s * 2.0 * r * x)
-        };
+        let on_circle = |x: f64| self.on_circle(x, s);
         let mut left = 0.0;
         if value(&p, self.x_mtpa) <= 0.0 {
             *warm = Warm::default();
@@ -182,6 +189,12 @@ impl Envelope {
             i_d -= (g * l * l + e) * l / slope;
         }
         Some(i_d)
+    }
+
+    /// Whether i_d is less than that of maximum torque per ampere at the same torque.
+    #[inline]
+    pub fn beyond_mtpa(&self, i: DqHat) -> bool {
+        i.d() * (self.psi_M - self.dL * i.d()) + self.dL * i.q() * i.q() < 0.0
     }
 
     /// i_q (A) for the torque `tau` (N.m) beside `i_d` (A).

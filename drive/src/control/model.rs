@@ -66,8 +66,8 @@ impl SensorlessController {
     fn rest(&mut self) -> ControllerOutputs {
         let Self { parameters: par, state, .. } = self;
         let new = State::new(par, false);
-        let out = new.computed.clone();
-        *state = State { samples: state.samples, shown: state.shown.clone(), ..new };
+        let out = new.computed;
+        *state = State { samples: state.samples, shown: state.shown, ..new };
         out
     }
 
@@ -84,11 +84,40 @@ impl SensorlessController {
             k: state.k,
             estimator,
             lock: Lock::lost(),
-            computed: state.computed.clone(),
-            shown: state.shown.clone(),
+            computed: state.computed,
+            shown: state.shown,
             ..State::default()
         };
         ControllerOutputs { theta_est: theta, lock_lost: LOST, enabled: true, ..ControllerOutputs::default() }
+    }
+
+    /// Checks that the parameters fit together, with a DC link of `u_dc` (V) at the start.
+    ///
+    /// # Errors
+    /// States which parameters do not fit together, and what to do.
+    pub(crate) fn validate_on(&self, u_dc: f64) -> Result<(), Fault> {
+        let par = &self.parameters;
+        let ControllerParameters { limit, zero_speed, estimator, start, .. } = par;
+        if start.mode == StartMode::CurrentFrequency && start.i > limit.i {
+            return Err(above_limit(par, |p| &mut p.start.i));
+        }
+        if start.mode == StartMode::Injection {
+            if !estimator.class().injects() {
+                return Err(Fault::new(format!(
+                    "{} and {}: the start by injection needs an estimator that injects",
+                    PARAMETERS.tell(par, |p| &mut p.start.mode),
+                    PARAMETERS.tell(par, |p| &mut p.estimator)
+                )));
+            }
+            polarity::validate(par)?;
+        }
+        estimator.validate(par)?;
+        // A running drive has to live with its DC link.
+        weakening::validate(par, if self.state.samples == 0 { u_dc } else { 0.0 })?;
+        if zero_speed.i_0 > limit.i {
+            return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
+        }
+        Ok(())
     }
 }
 
@@ -139,27 +168,7 @@ impl Model for SensorlessController {
     }
 
     fn validate(&self) -> Result<(), Fault> {
-        let par = &self.parameters;
-        let ControllerParameters { limit, zero_speed, estimator, start, .. } = par;
-        if start.mode == StartMode::CurrentFrequency && start.i > limit.i {
-            return Err(above_limit(par, |p| &mut p.start.i));
-        }
-        if start.mode == StartMode::Injection {
-            if !estimator.class().injects() {
-                return Err(Fault::new(format!(
-                    "{} and {}: the start by injection needs an estimator that injects",
-                    PARAMETERS.tell(par, |p| &mut p.start.mode),
-                    PARAMETERS.tell(par, |p| &mut p.estimator)
-                )));
-            }
-            polarity::validate(par)?;
-        }
-        estimator.validate(par)?;
-        weakening::validate(par)?;
-        if zero_speed.i_0 > limit.i {
-            return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
-        }
-        Ok(())
+        self.validate_on(self.inputs.u_dc)
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
@@ -211,10 +220,10 @@ impl Warns for SensorlessController {
     fn warn(&self, log: &mut Warnings<'_>) {
         let (out, par, tau_ref) = (&self.state.shown, &self.parameters, self.inputs.tau_ref);
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
-        if par.weakening.used && par.speed_loop.torque_mode && out.current_limited && beyond {
+        if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
             log.warn("tau_ref", || {
                 format!(
-                    "tau_ref = {tau_ref} N.m is clipped: at this speed and u_dc, the drive gives {} to {} N.m (tau_min, tau_max)",
+                    "tau_ref = {tau_ref} N.m has been clipped for a second: at this speed and u_dc, the drive gives {} to {} N.m (tau_min, tau_max)",
                     out.tau_min, out.tau_max
                 )
             });

@@ -53,7 +53,7 @@ impl Default for ControllerInputs {
 }
 
 /// Outputs: the results of sample k, visible from t_k + T_s on.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a variable")]
 pub struct ControllerOutputs {
     /// Stator voltage references in V, inside the hexagon of u_dc.

@@ -89,6 +89,19 @@ pub(super) enum Mode {
     ClosedLoop,
 }
 
+/// The references of a sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct References {
+    /// Currents in A.
+    pub(super) i: DqHat,
+    /// Whether a limit reduced them.
+    pub(super) limited: bool,
+    /// Greatest magnitude of negative and of positive torque in N.m.
+    pub(super) tau: (f64, f64),
+    /// Whether field weakening lowers i_d.
+    pub(super) weakens: bool,
+}
+
 /// Values passed from one sample to the next.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
@@ -116,8 +129,8 @@ pub(super) struct State {
     pub(super) u_pi: DqHat,
     pub(super) lock: Lock,
     pub(super) weakening: Weakening,
-    /// Greatest magnitude of negative and of positive torque at the last sample in N.m.
-    pub(super) tau: (f64, f64),
+    /// Time in s for which a limit has reduced the references, while field weakening is in use.
+    pub(super) limited_for: f64,
     /// Outputs of the last sample, hidden until the next instant.
     pub(super) computed: ControllerOutputs,
     /// Outputs visible now.
@@ -128,13 +141,7 @@ impl State {
     /// Before the first sample.
     pub(super) fn new(par: &ControllerParameters, enabled: bool) -> Self {
         let shown = ControllerOutputs { theta_est: wrap(par.theta_est), enabled, ..ControllerOutputs::default() };
-        Self {
-            leader: Leader::of(par.start.mode),
-            w_ref: par.speed_est,
-            computed: shown.clone(),
-            shown,
-            ..Self::default()
-        }
+        Self { leader: Leader::of(par.start.mode), w_ref: par.speed_est, computed: shown, shown, ..Self::default() }
     }
 
     /// Changes from the I-f start's frame at `theta_frame` (rad) to the estimated one at `theta` (rad), which turns at
@@ -202,8 +209,8 @@ impl State {
         }
     }
 
-    /// The current references (A) at the estimated mechanical `speed` (rad/s) beside an `injection`, and whether
-    /// a limit reduced them; `old` are the gains of a speed loop that is retuned at this sample.
+    /// The references at the estimated mechanical `speed` (rad/s) beside an `injection`; `old` are the gains of a speed loop
+    /// that is retuned at this sample.
     #[inline]
     #[expect(clippy::too_many_arguments, reason = "parameters, inputs and estimate, each of its own kind")]
     pub(super) fn references(
@@ -215,7 +222,7 @@ impl State {
         inputs: &ControllerInputs,
         speed: f64,
         injection: Injection,
-    ) -> (DqHat, bool) {
+    ) -> References {
         self.w_ref = par.speed_loop.ramped(self.w_ref, inputs.speed_ref, par.T_s);
         let w_ref = self.w_ref;
         if let Some(old) = old {
@@ -229,34 +236,53 @@ impl State {
         } else {
             (0.0, gains.i_tau)
         };
-        let w = f64::from(par.motor.n_p) * speed;
-        let (mut low, mut high) = (limit, limit);
+        let salient = par.current.mtpa && !observes_flux;
+        let today = |i_q_ref: f64| {
+            if salient { max_torque_per_ampere(&par.motor, gains.k * i_q_ref) } else { DqHat::new(i_d_ref, i_q_ref) }
+        };
         if par.weakening.used {
-            let at = (w, inputs.u_dc, injection.magnitude());
-            (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, limit, self.k);
+            return self.weakened(gains, par, inputs, (speed, w_ref), limit, injection, salient, today);
         }
-        self.tau = (gains.k * low, gains.k * high);
+        let (i_q_ref, requested) = if par.speed_loop.torque_mode {
+            let requested = inputs.tau_ref / gains.k;
+            (requested.clamp(-limit, limit), requested)
+        } else {
+            self.speed.update(&gains.speed, w_ref, speed, (-limit, limit), par.T_s)
+        };
+        let tau = gains.k * limit;
+        References { i: today(i_q_ref), limited: requested.abs() > limit, tau: (tau, tau), weakens: false }
+    }
+
+    /// [`references`](Self::references) with field weakening.
+    #[inline(never)]
+    #[expect(clippy::too_many_arguments, reason = "what the references have computed")]
+    fn weakened(
+        &mut self,
+        gains: &Gains,
+        par: &ControllerParameters,
+        inputs: &ControllerInputs,
+        (speed, w_ref): (f64, f64),
+        limit: f64,
+        injection: Injection,
+        salient: bool,
+        today: impl Fn(f64) -> DqHat,
+    ) -> References {
+        let w = f64::from(par.motor.n_p) * speed;
+        let at = (w, inputs.u_dc, injection.magnitude());
+        let (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, limit, self.k);
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
             (requested.clamp(-low, high), requested)
         } else {
             let (limited, wanted) = self.speed.update(&gains.speed, w_ref, speed, (-low, high), par.T_s);
-            if par.weakening.used {
-                self.speed.follow(par.speed_loop.bandwidth, limited - wanted, par.T_s);
-            }
+            self.speed.follow(par.speed_loop.bandwidth, limited - wanted, par.T_s);
             (limited, wanted)
         };
         let limited = requested > high || requested < -low;
-        let i_ref = if par.current.mtpa && !observes_flux {
-            max_torque_per_ampere(&par.motor, gains.k * i_q_ref)
-        } else {
-            DqHat::new(i_d_ref, i_q_ref)
-        };
-        if par.weakening.used {
-            let tau = gains.k * i_q_ref;
-            return (self.weakening.currents(&gains.weakening, tau, w, i_ref, par.limit.i_q), limited);
-        }
-        (i_ref, limited)
+        self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
+        let tau = gains.k * i_q_ref;
+        let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, salient, || today(i_q_ref));
+        References { i, limited, tau: (gains.k * low, gains.k * high), weakens: self.weakening.weakens }
     }
 
     /// The north pole is known: the estimator supplies the angle, and both loops start at rest.

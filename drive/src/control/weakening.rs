@@ -11,11 +11,10 @@
 //! The speed loop's limits are those of the torque. They fall as the speed rises, so while one acts, the integrator
 //! follows: dI/dt = w_s (limited - wanted), besides the hold of [`speed`](crate::control::speed).
 //!
-//! The limit of the sign that the drive uses is computed at every sample while it acts, else at every other one, and that
-//! of the other sign at every eighth.
+//! A limit is computed at every sample while it acts, else at every eighth one and when the voltage has changed by 1 %.
 
 use crate::control::envelope::{Envelope, Limit, Warm};
-use crate::control::reference::max_torque_per_ampere;
+use crate::control::reference::{max_torque, max_torque_per_ampere};
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
 use crate::estimator::{Class, Kind};
 use crate::frame::DqHat;
@@ -31,6 +30,11 @@ const LEAST_SHARE: f64 = 0.05;
 
 /// Greatest trim, as a share of u_dc / sqrt 3.
 const GREATEST_TRIM: f64 = 0.3;
+
+/// Samples after which a limit that does not act is computed again, and the change of the voltage, as a share, after which
+/// both are.
+const EVERY: u64 = 8;
+const LEAST_CHANGE: f64 = 0.01;
 
 /// Least electrical speed in rad/s that the limits are computed for.
 const LEAST_SPEED: f64 = 1e-3;
@@ -93,6 +97,15 @@ impl WeakeningGains {
     }
 }
 
+impl WeakeningGains {
+    /// Electrical speed in rad/s below which all of today's references fit the voltage `U` (V).
+    pub fn onset(&self, U: f64) -> f64 {
+        let [copper, cross, flux] = self.voltage;
+        let free = U * U - copper;
+        if U <= 0.0 || free <= 0.0 { 0.0 } else { 2.0 * free / (cross + (cross * cross + 4.0 * flux * free).sqrt()) }
+    }
+}
+
 /// State from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "answers of the last sample, each on its own")]
@@ -101,6 +114,8 @@ pub struct Weakening {
     trim: f64,
     /// Voltage in V for the references of this sample.
     U: f64,
+    /// Voltage in V at the last sample that had to compute both limits.
+    U_then: f64,
     /// Some of today's references does not fit the voltage.
     near: bool,
     /// Motoring, generating.
@@ -145,60 +160,76 @@ impl Weakening {
     }
 
     /// The limits (A), motoring and generating, where today's references may not fit; at most `i`.
-    #[inline(never)]
     fn limits_near(&mut self, gains: &WeakeningGains, w: f64, i: f64, k: u64) -> [f64; 2] {
-        let mut allowed = [i; 2];
-        for (side, s) in [1.0, -1.0].into_iter().enumerate() {
-            let end = DqHat::new(gains.end.d(), s * gains.end.q());
-            if gains.envelope.excess(end, w, self.U) <= 0.0 {
-                self.warm[side] = Warm::default();
-                self.limits[side] = Limit { i: DqHat::new(gains.least, 0.0), tau: f64::INFINITY };
-                continue;
-            }
-            let every = if self.generates != (side == 1) {
-                8
-            } else if self.clipped {
-                1
-            } else {
-                2
-            };
-            if k.is_multiple_of(every) || self.warm[side].is_cold() {
-                self.limits[side] = gains.envelope.limit(w, s, self.U, &mut self.warm[side]);
-            }
-            // Not a number if the speed is none: no torque then.
-            allowed[side] = (self.limits[side].tau * gains.per_torque).max(0.0).min(i);
+        let moved = (self.U - self.U_then).abs() > LEAST_CHANGE * self.U;
+        if moved {
+            self.U_then = self.U;
         }
-        allowed
+        for (side, (s, turn)) in [(1.0, 0), (-1.0, EVERY / 2)].into_iter().enumerate() {
+            let acts = self.clipped && self.generates == (side == 1);
+            if moved || acts || (k + turn).is_multiple_of(EVERY) {
+                self.limits[side] = self.limit(gains, side, s, w);
+            }
+        }
+        // Not a number if the speed is none: no torque then.
+        self.limits.map(|limit| (limit.tau * gains.per_torque).max(0.0).min(i))
     }
 
-    /// Currents (A) for the torque `tau` (N.m) at the electrical speed `w` (rad/s): `today`'s, or on the voltage limit; |i_q|
-    /// at most `i_q_max`.
+    fn limit(&mut self, gains: &WeakeningGains, side: usize, s: f64, w: f64) -> Limit {
+        let end = DqHat::new(gains.end.d(), s * gains.end.q());
+        if gains.envelope.excess(end, w, self.U) <= 0.0 {
+            self.warm[side] = Warm::default();
+            return Limit { i: DqHat::new(gains.least, 0.0), tau: f64::INFINITY };
+        }
+        gains.envelope.limit(w, s, self.U, &mut self.warm[side])
+    }
+
+    /// Currents (A) for the torque `tau` (N.m) at the electrical speed `w` (rad/s): `today`'s, of maximum torque per ampere
+    /// if `mtpa`, or on the voltage limit; |i_q| at most `i_q_max`.
     #[inline]
-    pub fn currents(&mut self, gains: &WeakeningGains, tau: f64, w: f64, today: DqHat, i_q_max: f64) -> DqHat {
-        if self.near { self.currents_near(gains, tau, w, today, i_q_max) } else { today }
-    }
-
-    #[inline(never)]
-    fn currents_near(&mut self, gains: &WeakeningGains, tau: f64, w: f64, today: DqHat, i_q_max: f64) -> DqHat {
+    pub fn currents(
+        &mut self,
+        gains: &WeakeningGains,
+        tau: f64,
+        w: f64,
+        i_q_max: f64,
+        mtpa: bool,
+        today: impl Fn() -> DqHat,
+    ) -> DqHat {
+        if !self.near {
+            return today();
+        }
         self.generates = tau * w < 0.0;
         let limit = self.limits[usize::from(self.generates)];
-        if gains.envelope.excess(today, w, self.U) <= 0.0 {
-            self.weakens = false;
-            return today;
-        }
         self.clipped = tau.abs() >= limit.tau * (1.0 - 1e-9);
-        let i = if self.clipped {
-            // At the limit, the root is double on MTPV: its currents are known already.
-            DqHat::new(limit.i.d(), limit.i.q().abs().copysign(tau))
-        } else {
-            let solve = |i_d, steps| gains.envelope.i_d(tau, w, self.U, i_d, steps);
-            let warm = if self.weakens { solve(self.i_d, 2) } else { None };
-            let i_d = warm.or_else(|| solve(today.d(), 8)).unwrap_or(limit.i.d()).max(limit.i.d());
+        let solve = |i_d, steps| gains.envelope.i_d(tau, w, self.U, i_d, steps);
+        let on_the_limit = |i_d: f64| {
+            let i_d = i_d.max(limit.i.d());
             DqHat::new(i_d, gains.envelope.i_q(tau, i_d))
         };
-        self.i_d = i.d();
-        self.weakens = i.d() < today.d();
-        if self.weakens { DqHat::new(i.d(), i.q().clamp(-i_q_max, i_q_max)) } else { today }
+        // While weakening, the root is near the last one, and left of maximum torque per ampere.
+        let warm = || solve(self.i_d, 2).map(on_the_limit).filter(|&i| gains.envelope.beyond_mtpa(i));
+        let i = if self.clipped {
+            // The root is double on MTPV, but its currents are known already.
+            DqHat::new(limit.i.d(), limit.i.q().abs().copysign(tau))
+        } else if let Some(i) = if self.weakens && mtpa { warm() } else { None } {
+            i
+        } else {
+            let today = today();
+            if gains.envelope.excess(today, w, self.U) <= 0.0 {
+                self.weakens = false;
+                return today;
+            }
+            let warm = if self.weakens && !mtpa { solve(self.i_d, 2) } else { None };
+            let i = on_the_limit(warm.or_else(|| solve(today.d(), 8)).unwrap_or(limit.i.d()));
+            if i.d() >= today.d() {
+                self.weakens = false;
+                return today;
+            }
+            i
+        };
+        (self.i_d, self.weakens) = (i.d(), true);
+        DqHat::new(i.d(), i.q().clamp(-i_q_max, i_q_max))
     }
 
     /// Integrates the trim over one sample of `T_s` (s) with the voltage `u` (V) that the current loop requests.
@@ -215,12 +246,12 @@ pub fn share(u: f64, u_dc: f64) -> f64 {
     if u_dc > 1e-3 { u * SQRT_3 / u_dc } else { 0.0 }
 }
 
-/// Checks that field weakening can work with the other parameters.
+/// Checks that field weakening can work with the other parameters, on a DC link of `u_dc` (V).
 ///
 /// # Errors
 /// States which parameters do not fit together, and what to do.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let ControllerParameters { weakening: own, motor, limit, estimator, .. } = par;
+pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
+    let ControllerParameters { weakening: own, motor, limit, estimator, zero_speed, .. } = par;
     if !own.used {
         return Ok(());
     }
@@ -237,6 +268,19 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
             "{use_is} with {estimator_is}: injection leaves no voltage for field weakening; choose Hybrid, or set the first \
              to false"
         )));
+    }
+    if *estimator == Kind::Hybrid && u_dc > 0.0 {
+        // Above this speed the references may need field weakening; an injection leaves them less voltage.
+        let gains = WeakeningGains::new(par, max_torque(motor, limit, par.current.mtpa), par.current.mtpa);
+        let onset = gains.onset(own.k_u * u_dc * INVERSE_SQRT_3 - par.estimators.square_wave.voltage);
+        if par.estimators.hybrid.w_high > onset {
+            let injected = table.tell(par, |p| &mut p.estimators.square_wave.voltage);
+            let allowed = format!(
+                "at most {onset:.4} rad/s, where field weakening begins with {use_is}, {injected} and a DC link of {u_dc} V; \
+                 lower it or the injected voltage, or raise the DC link's"
+            );
+            return Err(table.fault(par, |p| &mut p.estimators.hybrid.w_high, allowed));
+        }
     }
     if *estimator == Kind::VoltageFeedback && (own.k_u > 0.9 || own.k_t > own.k_u) {
         return Err(Fault::new(format!(
@@ -258,6 +302,16 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
         return Err(Fault::new(format!(
             "{limit_is} with {use_is} and L_q < L_d: the torque of i_q vanishes at the current -psi_M / (L_d - L_q); at most \
              {most:.4} A (0.8 psi_M / (L_d - L_q))"
+        )));
+    }
+    if estimator.class() == Class::FluxObserver
+        && zero_speed.i_0 * (motor.L_q - motor.L_d) > (1.0 - LEAST_TORQUE) * motor.psi_M
+    {
+        return Err(Fault::new(format!(
+            "{} with {use_is} and L_q > L_d: the torque of i_q vanishes at the current psi_M / (L_q - L_d); at most {:.4} A \
+             (0.8 psi_M / (L_q - L_d))",
+            table.tell(par, |p| &mut p.zero_speed.i_0),
+            -most
         )));
     }
     Ok(())

@@ -10,7 +10,7 @@
 //! this ends, or begins: the greatest current over the zone of [`legs`](crate::plant::legs), and the line-to-line back
 //! EMF over the DC-link voltage, both less 1.
 
-use crate::frame::{Axis, Dq, Phases, Rotor, Vector};
+use crate::frame::{Axis, Phases, Rotor, Vector};
 use crate::modulation::limit_to_hexagon;
 use crate::plant::machine::{self, Machine};
 use crate::plant::mechanics::Shaft;
@@ -18,6 +18,7 @@ use crate::plant::model::{Held, Instant, PmsmPlant, Rates};
 use crate::plant::power::{Powers, dc_current};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::PlantParameters;
+use crate::plant::thermal::ThermalMode;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
 use fmu_core::{ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar, State};
 
@@ -28,16 +29,20 @@ impl PmsmPlant {
     /// The state of flux linkage (Wb), speed (rad/s) and angle (rad) as the equations see it under these `inputs`.
     #[inline]
     fn instant<S: Scalar>(&self, inputs: &PlantInputs<S>, (psi, speed, angle): (Vector<Rotor, S>, S, S)) -> Instant<S> {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let PlantParameters { saturation, mechanics, iron, thermal, .. } = &self.parameters;
+        let motor = &self.motor(inputs);
         let theta = |angle: S| angle * f64::from(motor.n_p);
         let (speed, angle, axis) = if mechanics.imposed {
             (inputs.speed_shaft, inputs.angle_shaft, Axis::at(theta(inputs.angle_shaft)))
         } else {
             (speed, angle, self.state.axis.with(theta(angle)))
         };
-        let without = self.blocked && !inputs.enable;
-        let i = if without { Vector::fixed(Dq::ZERO) } else { Machine::new(motor, saturation).current(psi) };
-        Instant { psi, i, speed, angle, axis }
+        let idle = self.blocked && !inputs.enable;
+        // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
+        let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
+        let psi = if follows { self.idle_flux(motor, speed) } else { psi };
+        let i = if idle { self.idle_current(motor, speed) } else { Machine::new(motor, saturation).current(psi) };
+        Instant { psi, i, speed, angle, axis, idle }
     }
 
     /// The present instant under these `inputs`.
@@ -55,16 +60,18 @@ impl PmsmPlant {
 
     /// Derivatives and powers at an instant.
     #[inline]
-    fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
-        let legs = self.legs(inputs);
+    pub(super) fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let (motor, legs) = (&self.motor(inputs), self.legs(inputs));
+        let lossy = self.lossy(inputs, &legs);
         let held = Held {
             machine: Machine::new(motor, saturation),
             u: if inputs.enable { limit_to_hexagon(inputs.u, inputs.u_dc) } else { Vector::fixed(Vector::ZERO) },
             legs: legs.drop().then_some(&legs),
+            lossy: lossy.as_ref(),
             shaft: Shaft::new(mechanics, inputs.tau_load, at.speed.value()),
         };
-        held.rates(at.axis, at.psi, at.i, at.speed)
+        if at.idle { held.idle_rates(at.psi, at.i, at.speed) } else { held.rates(at.axis, at.psi, at.i, at.speed) }
     }
 
     /// The derivatives of the states at an instant.
@@ -82,12 +89,13 @@ impl PmsmPlant {
 
     /// The outputs at an instant; their powers are those of the instant.
     fn outputs<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> PlantOutputs<S> {
-        let Rates { p_in, p_mech, p_loss, .. } = self.rates(inputs, at);
+        let Rates { p_in, p_mech, p_loss, losses, i, .. } = self.rates(inputs, at);
+        let i = if self.parameters.iron.is_none() { at.i } else { at.axis.from_stator(i) };
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let p_in = p_in + 0.0.into();
-        let currents = || Phases::from_stator(at.axis.to_stator(at.i));
+        let currents = || Phases::from_stator(at.axis.to_stator(i));
         let i_dc = dc_current(p_in, inputs, &self.legs(inputs), currents);
-        self.shown(at, inputs.tau_load, Powers { i_dc, p_in, p_mech, p_loss })
+        self.shown(inputs, at, i, self.temperatures(inputs), Powers { i_dc, p_in, p_mech, p_loss, losses })
     }
 
     /// [`ContinuousTime::derivatives`] under these `inputs`.
@@ -132,9 +140,10 @@ impl PmsmPlant {
 
     /// Whether diodes block the current that the flux linkage has, and by how much this is exceeded.
     fn diodes(&self, inputs: &PlantInputs) -> (bool, [f64; 2]) {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
+        let (motor, saturation) = (&self.motor(inputs), &self.parameters.saturation);
         let Instant { psi, speed, axis, .. } = self.present(inputs);
-        let (legs, i) = (self.legs(inputs), machine::current(motor, saturation, psi));
+        let idle = self.idle_current(motor, speed);
+        let (legs, i) = (self.legs(inputs), machine::current(motor, saturation, psi) - idle);
         let w = f64::from(motor.n_p) * speed;
         (legs.block(motor, axis, i, w), legs.excess(motor, axis, i, w))
     }
@@ -189,6 +198,9 @@ impl Events for PmsmPlant {
     }
 
     fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+        if self.parameters.thermal.mode == ThermalMode::Imposed {
+            self.judge_temperatures(&self.inputs)?;
+        }
         let Instant { psi, speed, angle, axis, .. } = self.present(&self.inputs);
         let mut state = super::model::State { psi, speed, angle, axis };
         if !state.is_finite() {
@@ -196,7 +208,7 @@ impl Events for PmsmPlant {
         }
         self.blocked = self.blocks(&self.inputs);
         if self.blocked {
-            state.psi = machine::flux(&self.parameters.motor, Dq::ZERO);
+            state.psi = self.idle_flux(&self.motor(&self.inputs), state.speed);
         }
         let states_changed = state != self.state;
         self.state = state;

@@ -7,6 +7,7 @@
 //! [`modulation`](crate::modulation) computes the voltages. The dead-time model is the field's usual mean-value model;
 //! neither paper contains it. u in V, i in A, times in s.
 
+use crate::plant::losses::conduction::Devices;
 use fmu_core::unit::{AMPERE, SECOND};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
@@ -20,11 +21,13 @@ pub struct Inverter {
     pub T_pwm: f64,
     /// Current in A below which the error falls linearly, > 0.
     pub i_zero: f64,
+    /// Losses of transistors and diodes.
+    pub devices: Devices,
 }
 
 impl Default for Inverter {
     fn default() -> Self {
-        Self { dead_time: 0.0, T_pwm: 1e-4, i_zero: 0.1 }
+        Self { dead_time: 0.0, T_pwm: 1e-4, i_zero: 0.1, devices: Devices::default() }
     }
 }
 

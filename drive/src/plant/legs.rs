@@ -11,7 +11,7 @@
 //! Derived here from the ideal diode bridge; `drive-study/tests/gates_off.rs` compares it with such a bridge in stator axes.
 //! u in V, i in A.
 
-use crate::frame::{Axis, Dq, Phases, Rotor, Stator, Vector};
+use crate::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Stator, Vector};
 use crate::modulation::{clamp_unit, dead_time_loss};
 use crate::motor::Motor;
 use crate::plant::inverter::Inverter;
@@ -29,6 +29,8 @@ pub struct Legs<S = f64> {
     u: S,
     /// Current in A below which the drop falls linearly.
     i_zone: S,
+    /// Threshold voltage of the diode in V, which the back EMF must exceed besides the link.
+    u_diode: f64,
 }
 
 impl<S: Scalar> Legs<S> {
@@ -36,14 +38,20 @@ impl<S: Scalar> Legs<S> {
     #[inline]
     pub fn switching(inverter: &Inverter, u_dc: S) -> Self {
         let share = if inverter.dead_time > 0.0 { inverter.dead_time / inverter.T_pwm } else { 0.0 };
-        Self { share, u: u_dc * share, i_zone: inverter.i_zero.into() }
+        Self { share, u: u_dc * share, i_zone: inverter.i_zero.into(), u_diode: inverter.devices.u_diode }
     }
 
     /// For legs with the gates off.
     pub fn off(inverter: &Inverter, motor: &Motor, u_dc: S) -> Self {
         let narrowest = u_dc * SHORTEST_SUBSTEP / S::from(motor.L_d.min(motor.L_q));
         let i_zone = if narrowest.value() > inverter.i_zero { narrowest } else { inverter.i_zero.into() };
-        Self { share: 0.5, u: u_dc * 0.5, i_zone }
+        Self { share: 0.5, u: u_dc * 0.5, i_zone, u_diode: inverter.devices.u_diode }
+    }
+
+    /// Current in A below which the drop falls linearly.
+    #[inline]
+    pub fn i_zone(&self) -> S {
+        self.i_zone
     }
 
     /// Whether the legs drop a voltage.
@@ -69,16 +77,28 @@ impl<S: Scalar> Legs<S> {
 }
 
 impl Legs {
-    /// Time constant in s of a current within the zone, where the legs act as resistances; infinite without a voltage.
+    /// Voltage (V) lost at the stator with currents of these `signs` beyond the zone.
     #[inline]
-    pub fn time(&self, motor: &Motor) -> f64 {
-        self.i_zone * motor.L_d.min(motor.L_q) / self.u
+    pub fn loss_beyond(&self, signs: Phases) -> AlphaBeta {
+        signs.to_stator() * self.u
+    }
+
+    /// Time constant in s of a current within the zone, where the legs, which drop `threshold` (V) in their devices, act
+    /// as resistances; infinite without a voltage.
+    #[inline]
+    pub fn time(&self, motor: &Motor, threshold: f64) -> f64 {
+        self.i_zone * motor.L_d.min(motor.L_q) / (self.u + threshold)
+    }
+
+    /// Line-to-line back EMF in V above which diodes conduct.
+    fn opening(&self) -> f64 {
+        2.0 * (self.u + self.u_diode)
     }
 
     /// Whether diodes block the current `i` (A) of a machine that turns at the electrical speed `w` (rad/s).
     pub fn block(&self, motor: &Motor, axis: Axis<Rotor>, i: Dq, w: f64) -> bool {
         let (greatest, span) = Self::extent(motor, axis, i, w);
-        greatest <= self.i_zone && span < 2.0 * self.u
+        greatest <= self.i_zone && span < self.opening()
     }
 
     /// What opens blocking diodes, each above 0: the greatest current over the zone, and the line-to-line back EMF over
@@ -86,7 +106,7 @@ impl Legs {
     pub fn excess(&self, motor: &Motor, axis: Axis<Rotor>, i: Dq, w: f64) -> [f64; 2] {
         let (greatest, span) = Self::extent(motor, axis, i, w);
         // Without a DC link the diodes never block.
-        [greatest / self.i_zone - 1.0, if self.drop() { (span / (2.0 * self.u) - 1.0).min(1.0) } else { 1.0 }]
+        [greatest / self.i_zone - 1.0, if self.drop() { (span / self.opening() - 1.0).min(1.0) } else { 1.0 }]
     }
 
     /// The greatest phase current (A) and the greatest line-to-line back EMF (V).

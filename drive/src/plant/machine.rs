@@ -12,8 +12,8 @@ use fmu_core::Scalar;
 
 /// Flux linkage (Wb) for the current `i` (A) without saturation.
 #[inline]
-pub fn flux(motor: &Motor, i: Dq) -> Dq {
-    Dq::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q())
+pub fn flux<S: Scalar>(motor: &Motor<S>, i: Vector<Rotor, S>) -> Vector<Rotor, S> {
+    Vector::new(i.d() * motor.L_d + motor.psi_M, i.q() * motor.L_q)
 }
 
 /// Current (A) for the flux linkage `psi` (Wb).
@@ -31,22 +31,22 @@ pub fn magnetic_energy(motor: &Motor, saturation: &Saturation, psi: Dq) -> f64 {
 
 /// The machine with constants for many evaluations.
 #[derive(Clone, Copy, Debug)]
-pub struct Machine<'a> {
-    motor: &'a Motor,
+pub struct Machine<'a, S = f64> {
+    motor: &'a Motor<S>,
     /// `None` for a linear machine.
     saturation: Option<&'a Saturation>,
-    psi_M: f64,
-    R_s: f64,
+    psi_M: S,
+    R_s: S,
     by_L_d: f64,
     by_L_q: f64,
     /// 1.5 n_p.
     torque: f64,
 }
 
-impl<'a> Machine<'a> {
+impl<'a, S: Scalar> Machine<'a, S> {
     /// From the parameters.
     #[inline]
-    pub fn new(motor: &'a Motor, saturation: &'a Saturation) -> Self {
+    pub fn new(motor: &'a Motor<S>, saturation: &'a Saturation) -> Self {
         let Motor { n_p, R_s, L_d, L_q, psi_M } = *motor;
         let saturation = (!saturation.is_none()).then_some(saturation);
         let (by_L_d, by_L_q) = (reciprocal(L_d), reciprocal(L_q));
@@ -55,11 +55,37 @@ impl<'a> Machine<'a> {
 
     /// Current (A) for the flux linkage `psi` (Wb).
     #[inline]
-    pub fn current<S: Scalar>(&self, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
-        let linear = Vector::new((psi.d() - S::from(self.psi_M)) * self.by_L_d, psi.q() * self.by_L_q);
+    pub fn current(&self, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
+        let linear = Vector::new((psi.d() - self.psi_M) * self.by_L_d, psi.q() * self.by_L_q);
         self.saturation.map_or(linear, |saturation| linear + saturation.current(self.motor, psi))
     }
 
+    /// Resistance (Ohm) of the stator.
+    #[inline]
+    pub fn resistance(&self) -> S {
+        self.R_s
+    }
+
+    /// Derivative of the flux linkage (V) in stator axes at the voltage `u` (V) and the current `i` (A).
+    #[inline]
+    pub fn flux_derivative(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Vector<Stator, S> {
+        u - i.scaled(self.R_s)
+    }
+
+    /// Copper loss in W at the current `i` (A).
+    #[inline]
+    pub fn copper_loss(&self, i: Vector<Stator, S>) -> S {
+        i.dot(i) * (self.R_s * 1.5)
+    }
+
+    /// Electromagnetic torque in N.m at the flux linkage `psi` (Wb) and the current `i` (A).
+    #[inline]
+    pub fn torque<T: Scalar>(&self, psi: Vector<Rotor, T>, i: Vector<Rotor, T>) -> T {
+        psi.cross(i) * self.torque
+    }
+}
+
+impl Machine<'_> {
     /// Flux linkage (Wb) in stator axes with the magnet on `axis`. The part of the magnet is transformed separately, both
     /// ways, so that a machine without current has none after a transformation either.
     #[inline]
@@ -71,24 +97,6 @@ impl<'a> Machine<'a> {
     #[inline]
     pub fn from_stator(&self, axis: Axis<Rotor>, psi: AlphaBeta) -> Dq {
         axis.from_stator(psi - axis.along(self.psi_M)) + Dq::new(self.psi_M, 0.0)
-    }
-
-    /// Derivative of the flux linkage (V) in stator axes at the voltage `u` (V) and the current `i` (A).
-    #[inline]
-    pub fn flux_derivative<S: Scalar>(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Vector<Stator, S> {
-        u - i * self.R_s
-    }
-
-    /// Copper loss in W at the current `i` (A).
-    #[inline]
-    pub fn copper_loss<S: Scalar>(&self, i: Vector<Stator, S>) -> S {
-        i.dot(i) * (1.5 * self.R_s)
-    }
-
-    /// Electromagnetic torque in N.m at the flux linkage `psi` (Wb) and the current `i` (A).
-    #[inline]
-    pub fn torque<S: Scalar>(&self, psi: Vector<Rotor, S>, i: Vector<Rotor, S>) -> S {
-        psi.cross(i) * self.torque
     }
 }
 

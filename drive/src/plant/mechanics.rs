@@ -1,6 +1,6 @@
-//! The rotor and its coupled load: one inertia with viscous and Coulomb friction.
+//! The rotor and its coupled load: one inertia with viscous and Coulomb friction and windage.
 //!
-//! J d speed/dt = tau_e - tau_load - B speed - tau_coulomb tanh(speed / w_coulomb).
+//! J d speed/dt = tau_e - tau_load - B speed - k_w speed |speed| - tau_coulomb tanh(speed / w_coulomb).
 //!
 //! With an imposed speed, the external drive train integrates the motion: speed and angle are inputs, tau_e minus
 //! friction is an output, and J belongs to the drive train.
@@ -8,7 +8,7 @@
 //! Rasmussen 2006 gives the torque but not the load; the friction is that of the assumed machine. J in kg.m2, B in
 //! N.m.s/rad, torques in N.m, speeds in rad/s (mechanical).
 
-use crate::math::{reciprocal, tanh, tanh_beside};
+use crate::math::{abs, reciprocal, tanh, tanh_beside};
 use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, SPEED};
 use fmu_core::{Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
@@ -20,6 +20,8 @@ pub struct Mechanics {
     pub J: f64,
     /// Viscous friction in N.m.s/rad, >= 0.
     pub B: f64,
+    /// Windage in N.m.s2/rad2, >= 0.
+    pub k_w: f64,
     /// Coulomb friction torque in N.m, >= 0.
     pub tau_coulomb: f64,
     /// Speed in rad/s over which the Coulomb torque changes sign, > 0.
@@ -30,7 +32,7 @@ pub struct Mechanics {
 
 impl Default for Mechanics {
     fn default() -> Self {
-        Self { J: 1.5e-3, B: 2e-4, tau_coulomb: 0.03, w_coulomb: 0.3, imposed: false }
+        Self { J: 1.5e-3, B: 2e-4, k_w: 0.0, tau_coulomb: 0.03, w_coulomb: 0.3, imposed: false }
     }
 }
 
@@ -38,7 +40,7 @@ impl Mechanics {
     /// Friction torque in N.m at `speed` in rad/s, positive against positive speed.
     #[inline]
     pub fn friction<S: Scalar>(&self, speed: S) -> S {
-        speed * self.B + self.coulomb(speed, tanh(speed.value() / self.w_coulomb))
+        speed * viscous(self.B, self.k_w, speed) + self.coulomb(speed, tanh(speed.value() / self.w_coulomb))
     }
 
     /// Coulomb torque in N.m at `speed` (rad/s), where tanh(speed / w_coulomb) is `share`.
@@ -54,11 +56,19 @@ impl Mechanics {
     }
 }
 
+/// Viscous friction and windage over the `speed` (rad/s), in N.m.s/rad.
+#[inline]
+fn viscous<S: Scalar>(B: f64, k_w: f64, speed: S) -> S {
+    // A branch, so that a machine without windage does not wait for the sum.
+    if k_w > 0.0 { abs(speed) * k_w + B.into() } else { B.into() }
+}
+
 /// The shaft with constants for many evaluations at almost the same speed.
 #[derive(Clone, Copy, Debug)]
 pub struct Shaft<'a, S = f64> {
     mechanics: &'a Mechanics,
     B: f64,
+    k_w: f64,
     /// 1/J in 1/(kg.m2).
     by_J: f64,
     /// Load torque in N.m.
@@ -92,8 +102,15 @@ impl<'a, S: Scalar> Shaft<'a, S> {
         // From here on, the nearest number to tanh is +-1.
         let full = 20.0 * mechanics.w_coulomb;
         let share = if speed.abs() > full { sign } else { tanh(speed / mechanics.w_coulomb) };
-        let (B, by_J, tau_full) = (mechanics.B, reciprocal(mechanics.J), sign * mechanics.tau_coulomb);
-        Self { mechanics, B, by_J, tau_load, speed, share, sign, full, tau_full }
+        let (B, k_w, by_J, tau_full) =
+            (mechanics.B, mechanics.k_w, reciprocal(mechanics.J), sign * mechanics.tau_coulomb);
+        Self { mechanics, B, k_w, by_J, tau_load, speed, share, sign, full, tau_full }
+    }
+
+    /// The same without windage.
+    #[inline]
+    pub fn without_windage(self) -> Self {
+        Self { k_w: 0.0, ..self }
     }
 
     /// The motion at `speed` (rad/s) and the torque `tau_e` (N.m).
@@ -104,7 +121,7 @@ impl<'a, S: Scalar> Shaft<'a, S> {
         } else {
             self.mechanics.coulomb(speed, self.share(speed.value()))
         };
-        let friction = speed * self.B + coulomb;
+        let friction = speed * viscous(self.B, self.k_w, speed) + coulomb;
         let p_friction = friction * speed;
         if self.mechanics.imposed {
             return Motion { acceleration: 0.0.into(), p_shaft: (tau_e - friction) * speed, p_friction };
@@ -152,11 +169,13 @@ mod tests {
         let m = Mechanics::default();
         assert!((m.friction(10.0) - (2e-3 + 0.03)).abs() < 1e-9);
         assert_eq!(m.friction(-0.2).to_bits(), (-m.friction(0.2)).to_bits());
+        let windy = Mechanics { k_w: 2e-7, ..m };
+        assert!((windy.friction(-800.0) - m.friction(-800.0) + 0.128).abs() < 1e-12, "against the motion");
     }
 
     #[test]
     fn the_shaft_near_a_speed_moves_as_its_equation_says() {
-        let m = Mechanics::default();
+        let m = Mechanics { k_w: 1e-5, ..Mechanics::default() };
         for start in [-50.0, -6.01, -0.2, 0.0, 1e-3, 0.4, 5.9, 30.0] {
             let shaft = Shaft::new(&m, 0.4, start);
             for speed in [start, start + 0.1, start - 0.14, start + 3.0, -start, start * 2.0] {

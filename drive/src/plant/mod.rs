@@ -2,7 +2,9 @@
 
 pub mod exchange;
 pub mod inverter;
+pub mod iron;
 pub mod legs;
+pub mod losses;
 pub mod machine;
 pub mod mechanics;
 pub mod model;
@@ -10,3 +12,4 @@ pub mod power;
 pub mod saturation;
 pub mod signals;
 pub mod tables;
+pub mod thermal;

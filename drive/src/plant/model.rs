@@ -5,13 +5,19 @@ use crate::integrate::rk4;
 use crate::math::{all_finite, wrap};
 use crate::modulation::limit_to_hexagon;
 use crate::motor::Motor;
+use crate::plant::inverter::Inverter;
 use crate::plant::legs::Legs;
+use crate::plant::losses::flow::{self, Flow, Lossy};
+use crate::plant::losses::region::{Region, Sides};
+use crate::plant::losses::{self, Losses, efficiency, switching};
 use crate::plant::machine::{self, Machine};
 use crate::plant::mechanics::{Motion, Shaft};
 use crate::plant::power::{Energy, Powers};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::tables::{PlantParameters, TABLE};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Scalar, Step, Table, Terminal};
+use crate::plant::thermal::warm::Warm;
+use crate::plant::thermal::{Temperatures, ThermalMode};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +27,9 @@ const LONGEST_SUBSTEP: f64 = 100e-6;
 
 /// The same with such a voltage, which has kinks where a current changes its sign.
 const LONGEST_SUBSTEP_WITH_KINKS: f64 = 50e-6;
+
+/// Shortest integration step at a kink, as a share of the longest within the zone.
+const SHORTEST_SHARE: f64 = 0.01;
 
 /// Largest electrical angle in rad that the rotor turns in an integration step.
 const LARGEST_TURN: f64 = 0.25;
@@ -68,7 +77,7 @@ fn axis_at(motor: &Motor, angle: f64) -> Axis<Rotor> {
 pub(super) struct Instant<S = f64> {
     /// Stator flux linkage in Wb.
     pub(super) psi: Vector<Rotor, S>,
-    /// Its current in A.
+    /// Its current in A; with iron loss, that at the terminals differs.
     pub(super) i: Vector<Rotor, S>,
     /// Mechanical speed in rad/s.
     pub(super) speed: S,
@@ -76,15 +85,19 @@ pub(super) struct Instant<S = f64> {
     pub(super) angle: S,
     /// The rotor's d-axis at this angle.
     pub(super) axis: Axis<Rotor, S>,
+    /// The diodes block: there is no current at the terminals.
+    pub(super) idle: bool,
 }
 
 /// What stays over an integration step.
 pub(super) struct Held<'a, S = f64> {
-    pub(super) machine: Machine<'a>,
+    pub(super) machine: Machine<'a, S>,
     /// Stator voltage without the drop of the legs, in V.
     pub(super) u: Vector<Stator, S>,
     /// Legs with a voltage drop.
     pub(super) legs: Option<&'a Legs<S>>,
+    /// Losses of inverter and machine besides that of a constant resistance.
+    pub(super) lossy: Option<&'a Lossy<'a, S>>,
     pub(super) shaft: Shaft<'a, S>,
 }
 
@@ -98,6 +111,18 @@ pub(super) struct Rates<S = f64> {
     pub(super) p_in: S,
     pub(super) p_mech: S,
     pub(super) p_loss: S,
+    /// Each loss in W.
+    pub(super) losses: Losses<S>,
+    /// Current at the terminals in A.
+    pub(super) i: Vector<Stator, S>,
+}
+
+/// What passes in a step.
+#[derive(Clone, Copy, Debug, Default)]
+struct Passed {
+    energy: Energy,
+    /// In J.
+    losses: Losses,
 }
 
 impl<S: Scalar> Held<'_, S> {
@@ -107,21 +132,89 @@ impl<S: Scalar> Held<'_, S> {
     #[inline(always)]
     pub(super) fn rates(&self, axis: Axis<Rotor, S>, psi: Vector<Rotor, S>, i: Vector<Rotor, S>, speed: S) -> Rates<S> {
         let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
+        let applied = |i| self.legs.map_or(self.u, |legs| self.u - legs.loss(i));
+        if let Some(lossy) = self.lossy {
+            let u = applied(axis.to_stator(lossy.steady(psi, i, speed)));
+            let Flow { i, d_psi, p_in, losses } = lossy.flow(self.machine.resistance(), u, axis.to_stator(i), speed);
+            let losses = Losses { friction: p_friction, ..losses };
+            return Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i };
+        }
         let i = axis.to_stator(i);
-        let u = self.legs.map_or(self.u, |legs| self.u - legs.loss(i));
-        let p_loss = self.machine.copper_loss(i) + p_friction;
+        let u = applied(i);
+        let losses = Losses { cu: self.machine.copper_loss(i), friction: p_friction, ..Losses::none() };
         let d_psi = self.machine.flux_derivative(u, i);
-        Rates { d_psi, acceleration, p_in: u.dot(i) * 1.5, p_mech: p_shaft, p_loss }
+        Rates { d_psi, acceleration, p_in: u.dot(i) * 1.5, p_mech: p_shaft, p_loss: losses.cu + p_friction, losses, i }
+    }
+
+    /// The same while the diodes block: the current `i` (A) of the flux linkage `psi` (Wb) flows through the iron only,
+    /// which brakes with its loss.
+    pub(super) fn idle_rates(&self, psi: Vector<Rotor, S>, i: Vector<Rotor, S>, speed: S) -> Rates<S> {
+        let tau_e = self.machine.torque(psi, i);
+        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, tau_e);
+        let losses = Losses { iron: S::from(0.0) - tau_e * speed, friction: p_friction, ..Losses::none() };
+        let none = Vector::fixed(Vector::ZERO);
+        Rates {
+            d_psi: none,
+            acceleration,
+            p_in: 0.0.into(),
+            p_mech: p_shaft,
+            p_loss: losses.iron + p_friction,
+            losses,
+            i: none,
+        }
     }
 }
 
-impl Held<'_> {
+/// What [`PmsmPlant::drive`] integrates.
+trait Circuit {
+    fn machine(&self) -> &Machine<'_>;
+
+    /// Derivatives and powers with the d-axis on `axis`, the flux linkage `psi` (Wb), its current `i` (A) and the `speed`
+    /// (rad/s).
+    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates;
+
     /// The same with the flux linkage `psi` (Wb) in stator axes.
-    #[expect(clippy::inline_always, reason = "as for `rates`")]
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
     #[inline(always)]
     fn rates_in_stator(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> Rates {
-        let psi = self.machine.from_stator(axis, psi);
-        self.rates(axis, psi, self.machine.current(psi), speed)
+        let psi = self.machine().from_stator(axis, psi);
+        self.rates(axis, psi, self.machine().current(psi), speed)
+    }
+}
+
+impl Circuit for Held<'_> {
+    #[inline]
+    fn machine(&self) -> &Machine<'_> {
+        &self.machine
+    }
+
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+    #[inline(always)]
+    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates {
+        Held::rates(self, axis, psi, i, speed)
+    }
+}
+
+/// Inverter, machine and shaft while the currents keep their sides.
+struct Between<'a> {
+    machine: Machine<'a>,
+    region: Region,
+    shaft: Shaft<'a>,
+}
+
+impl Circuit for Between<'_> {
+    #[inline]
+    fn machine(&self) -> &Machine<'_> {
+        &self.machine
+    }
+
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+    #[inline(always)]
+    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates {
+        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
+        let Flow { i, d_psi, p_in, losses } = self.region.flow(axis.to_stator(i));
+        let losses = Losses { friction: p_friction, ..losses };
+        Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i }
     }
 }
 
@@ -137,9 +230,15 @@ pub struct PmsmPlant {
     /// a step.
     pub(super) blocked: bool,
     /// Means over the last step.
-    powers: Powers,
+    pub(super) powers: Powers,
     /// Since the start.
     pub(super) energy: Energy,
+    /// Temperatures and the machine at them, held over a step.
+    pub(super) warm: Warm,
+    /// Current (A) at the terminals less that of the flux linkage, at the end of a step.
+    by_iron: Dq,
+    /// The switching loss at the last link voltage.
+    sw: switching::Last,
 }
 
 impl PmsmPlant {
@@ -151,12 +250,73 @@ impl PmsmPlant {
         if inputs.enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
     }
 
-    /// The outputs with the load torque `tau_load` (N.m) and these `powers`.
+    /// The current (A) that the flux linkage of this `motor` has while the diodes block, at the mechanical `speed` (rad/s).
     #[inline]
-    pub(super) fn shown<S: Scalar>(&self, at: &Instant<S>, tau_load: S, powers: Powers<S>) -> PlantOutputs<S> {
+    pub(super) fn idle_current<S: Scalar>(&self, motor: &Motor<S>, speed: S) -> Vector<Rotor, S> {
+        let iron = &self.parameters.iron;
+        if iron.is_none() {
+            return Vector::fixed(Dq::ZERO);
+        }
+        iron.idle_current(motor, speed * f64::from(motor.n_p))
+    }
+
+    /// The flux linkage (Wb) of [`idle_current`](Self::idle_current).
+    pub(super) fn idle_flux<S: Scalar>(&self, motor: &Motor<S>, speed: S) -> Vector<Rotor, S> {
+        machine::flux(motor, self.idle_current(motor, speed))
+    }
+
+    /// The losses besides that of a constant resistance, with the voltage drop of these `legs`.
+    #[inline]
+    pub(super) fn lossy<S: Scalar>(&self, inputs: &PlantInputs<S>, legs: &Legs<S>) -> Option<Lossy<'_, S>> {
+        let Inverter { devices, T_pwm, .. } = &self.parameters.inverter;
+        let sw = if inputs.enable { switching::per_ampere(devices, *T_pwm, inputs.u_dc) } else { 0.0.into() };
+        Lossy::new(&self.parameters, inputs.enable, inputs.u_dc, legs.i_zone(), sw)
+    }
+
+    /// The present instant, at the end of a step.
+    #[inline]
+    fn reached(&self) -> Instant {
+        let (motor, saturation) = (&self.warm.motor, &self.parameters.saturation);
+        let State { psi, speed, angle, axis } = self.state;
+        let i = machine::current(motor, saturation, psi);
+        Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable }
+    }
+
+    /// The same with iron loss, and the current (A) at the terminals.
+    fn reached_with_iron(&self) -> (Instant, Dq) {
+        let at = self.reached();
+        let at = if at.idle { Instant { i: self.idle_current(&self.warm.motor, at.speed), ..at } } else { at };
+        let i = at.axis.from_stator(self.rates(&self.inputs, &at).i);
+        (at, i)
+    }
+
+    /// The current (A) at the terminals less that of the flux linkage.
+    fn current_by_iron(&self) -> Dq {
+        let (_, i) = self.reached_with_iron();
+        i - self.reached().i
+    }
+
+    /// The outputs with iron loss.
+    #[inline(never)]
+    fn output_with_iron(&self, out: &mut PlantOutputs) {
+        let at = self.reached();
+        *out = self.shown(&self.inputs, &at, at.i + self.by_iron, self.warm.at, self.powers);
+    }
+
+    /// The outputs under these `inputs` with the current `i` (A) at the terminals, the `temperatures` (K) and these `powers`.
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
+    pub(super) fn shown<S: Scalar>(
+        &self,
+        inputs: &PlantInputs<S>,
+        at: &Instant<S>,
+        i: Vector<Rotor, S>,
+        temperatures: Temperatures<S>,
+        powers: Powers<S>,
+    ) -> PlantOutputs<S> {
         let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
-        let &Instant { psi, i, speed, angle, axis } = at;
-        let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::new(motor, saturation).torque(psi, i));
+        let &Instant { psi, speed, angle, axis, .. } = at;
+        let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::new(motor, saturation).torque(psi, at.i));
         let friction = if mechanics.imposed { mechanics.friction(speed) } else { 0.0.into() };
         PlantOutputs {
             i: Phases::from_stator(axis.to_stator(i)),
@@ -167,27 +327,33 @@ impl PmsmPlant {
             i_d: i.d(),
             i_q: i.q(),
             powers,
-            tau_shaft: mechanics.tau_shaft(tau_e, tau_load, friction),
+            tau_shaft: mechanics.tau_shaft(tau_e, inputs.tau_load, friction),
             energy: self.energy,
+            efficiency: efficiency(powers.p_in, powers.p_mech),
+            temperatures,
+            heat: self.heat(inputs, &temperatures, &powers.losses),
         }
     }
 
     /// Stator currents in A.
+    #[inline(never)]
     fn currents(&self) -> Phases {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
-        Phases::from_stator(self.state.axis.to_stator(machine::current(motor, saturation, self.state.psi)))
+        let (at, i) = self.reached_with_iron();
+        Phases::from_stator(at.axis.to_stator(i))
     }
 
     /// The state at the beginning of a step and the energy needed to reach it: an imposed shaft takes the angle of the
     /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
     /// linkage, which cannot jump; the magnetic field then does work on the shaft.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
     fn at_the_shaft(&self) -> (State, Energy) {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         if !mechanics.imposed {
             return (self.state, Energy::default());
         }
+        let motor = &self.warm.motor;
         let axis = axis_at(motor, angle_shaft);
         let machine = Machine::new(motor, saturation);
         let psi = machine.from_stator(axis, machine.to_stator(self.state.axis, self.state.psi));
@@ -197,15 +363,26 @@ impl PmsmPlant {
     }
 
     /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s).
-    fn substeps(&self, h: f64, speed: f64, legs: &Legs) -> Result<f64, Fault> {
-        let motor = &self.parameters.motor;
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
+    fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
+        let PlantParameters { motor, inverter, .. } = &self.parameters;
         let w = (f64::from(motor.n_p) * speed).abs();
-        let longest =
-            if legs.drop() { LONGEST_SUBSTEP_WITH_KINKS.min(0.5 * legs.time(motor)) } else { LONGEST_SUBSTEP };
+        let threshold = if lossy { inverter.devices.threshold() } else { 0.0 };
+        let longest = if legs.drop() || threshold > 0.0 {
+            Self::within_the_zone(motor, legs, threshold)
+        } else {
+            LONGEST_SUBSTEP
+        };
         if h <= longest && w * h <= LARGEST_TURN {
             return Ok(1.0);
         }
-        let longest = longest.min(LARGEST_TURN / w);
+        Self::count(h, longest.min(LARGEST_TURN / w))
+    }
+
+    /// Number of integration steps of at most `longest` (s) in `h` (s).
+    #[inline(never)]
+    fn count(h: f64, longest: f64) -> Result<f64, Fault> {
         let count = (h / longest - 1e-9).ceil().max(1.0);
         if count > MAX_SUBSTEPS {
             let limit = MAX_SUBSTEPS * longest;
@@ -221,25 +398,19 @@ impl PmsmPlant {
     /// follows the rotor, so a step is more exact than two of half its length in rotor axes.
     #[expect(clippy::inline_always, reason = "as a call, it passes the state through memory: 10 % of a period")]
     #[inline(always)]
-    fn drive(&self, start: &State, h: f64, u: AlphaBeta, legs: &Legs) -> (State, Energy) {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
-        let held = Held {
-            machine: Machine::new(motor, saturation),
-            u,
-            legs: legs.drop().then_some(legs),
-            shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
-        };
+    fn drive<const LOSSY: bool>(&self, start: &State, h: f64, circuit: &impl Circuit) -> (State, Passed) {
+        let motor = &self.warm.motor;
         let (n_p, half, speed) = (f64::from(motor.n_p), 0.5 * h, start.speed);
-        let psi = held.machine.to_stator(start.axis, start.psi);
+        let psi = circuit.machine().to_stator(start.axis, start.psi);
         let turn = Turn::new(n_p * half * speed);
         let middle = start.axis.ahead(turn);
 
-        let k_1 = held.rates_in_stator(start.axis, psi, speed);
-        let k_2 = held.rates_in_stator(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
+        let k_1 = circuit.rates_in_stator(start.axis, psi, speed);
+        let k_2 = circuit.rates_in_stator(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
         let axis = middle.ahead(Turn::tiny(n_p * half * half * k_1.acceleration));
-        let k_3 = held.rates_in_stator(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
+        let k_3 = circuit.rates_in_stator(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
         let axis = middle.ahead(turn).ahead(Turn::tiny(n_p * half * h * k_2.acceleration));
-        let k_4 = held.rates_in_stator(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
+        let k_4 = circuit.rates_in_stator(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
 
         let sixth = h / 6.0;
         let psi = psi + (k_1.d_psi + (k_2.d_psi + k_3.d_psi) * 2.0 + k_4.d_psi) * sixth;
@@ -248,31 +419,257 @@ impl PmsmPlant {
         let speed = speed + sixth * (k_1.acceleration + 2.0 * acceleration + k_4.acceleration);
         let over = |power: fn(&Rates) -> f64| sixth * (power(&k_1) + 2.0 * (power(&k_2) + power(&k_3)) + power(&k_4));
         let energy = Energy { r#in: over(|k| k.p_in), mech: over(|k| k.p_mech), loss: over(|k| k.p_loss) };
+        let friction = over(|k| k.losses.friction);
+        let losses = if LOSSY {
+            let [cu, iron] = [over(|k| k.losses.cu), over(|k| k.losses.iron)];
+            Losses { cu, iron, cond: over(|k| k.losses.cond), sw: over(|k| k.losses.sw), friction }
+        } else {
+            Losses { cu: energy.loss - friction, friction, ..Losses::none() }
+        };
         let axis = axis_at(motor, angle);
-        (State { psi: held.machine.from_stator(axis, psi), speed, angle, axis }, energy)
+        (State { psi: circuit.machine().from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
+    }
+
+    /// [`drive`](Self::drive) under the voltage `u` (V).
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
+    fn drive_held<const LOSSY: bool>(
+        &self,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+        legs: &Legs,
+        lossy: Option<&Lossy<'_>>,
+    ) -> (State, Passed) {
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
+        let held = Held {
+            machine: Machine::new(&self.warm.motor, saturation),
+            u,
+            legs: legs.drop().then_some(legs),
+            // Known to the compiler, so that a step without them takes no time for them.
+            lossy: if LOSSY { lossy } else { None },
+            shaft: if LOSSY { shaft } else { shaft.without_windage() },
+        };
+        self.drive::<LOSSY>(start, h, &held)
+    }
+
+    /// The same with losses besides that of a constant resistance.
+    #[inline(never)]
+    fn drive_lossy(
+        &self,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+        legs: &Legs,
+        lossy: Option<&Lossy<'_>>,
+    ) -> (State, Passed) {
+        self.drive_held::<true>(start, h, u, legs, lossy)
+    }
+
+    /// [`drive`](Self::drive) while the currents keep their sides; a function of its own has registers enough.
+    #[inline(never)]
+    fn drive_between(&self, start: &State, h: f64, circuit: &Between<'_>) -> (State, Passed) {
+        self.drive::<true>(start, h, circuit)
+    }
+
+    /// Integration steps over `h` (s) from `state` on with switching legs and losses, and the current (A) by the iron at
+    /// their end. A step ends where a current enters or leaves the zone of the kinks: across a kink, the method loses its
+    /// order.
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
+    fn switch(&self, state: &mut State, h: f64, u: AlphaBeta, legs: &Legs, lossy: &Lossy<'_>) -> (Passed, Dq) {
+        let PlantParameters { saturation, inverter, mechanics, .. } = &self.parameters;
+        let (motor, zone) = (&self.warm.motor, legs.i_zone());
+        let machine = Machine::new(motor, saturation);
+        let (R_s, n_p) = (machine.resistance(), f64::from(motor.n_p));
+        let kinks = legs.drop() || lossy.kinks();
+        let within = if kinks { Self::within_the_zone(motor, legs, inverter.devices.threshold()) } else { 0.0 };
+        let guide = flow::guide(lossy.circuit(R_s, n_p * state.speed), u);
+        let guide = |state: &State| guide(state.axis.to_stator(machine.current(state.psi)));
+        let (mut passed, mut left, mut start) = (Passed::default(), h, guide(state));
+        let mut sides = Sides::of(start, zone);
+        // A step that is known to end at a kink: its length, and the sides from there on.
+        let mut to_kink = None;
+        loop {
+            let apart = !kinks || sides.apart();
+            let longest = if apart { LONGEST_SUBSTEP } else { within };
+            let w = (n_p * state.speed).abs();
+            let (h, then) = match to_kink.take() {
+                Some((h, then)) => (h, Some(then)),
+                None if left <= longest && w * left <= LARGEST_TURN => (left, None),
+                None => (left / (left / longest.min(LARGEST_TURN / w) - 1e-9).ceil().max(1.0), None),
+            };
+            let between = apart.then(|| {
+                let shaft = Shaft::new(mechanics, self.inputs.tau_load, state.speed);
+                let tau_e = machine.torque(state.psi, machine.current(state.psi));
+                // Resistance and conductance of the middle of the step.
+                let speed = state.speed + 0.5 * h * shaft.motion(state.speed, tau_e).acceleration;
+                let region = lossy.region(lossy.circuit(R_s, n_p * speed), u, legs, &sides);
+                Between { machine, region, shaft }
+            });
+            let (next, step) = match &between {
+                Some(between) => self.drive_between(state, h, between),
+                None => self.drive_lossy(state, h, u, legs, Some(lossy)),
+            };
+            let end = guide(&next);
+            if let Some(then) = then {
+                sides = then;
+            } else if kinks && let Some((share, then)) = sides.change(start, end, zone) {
+                if share < 0.99 {
+                    to_kink = Some(((h * share).max(SHORTEST_SHARE * within).min(h), then));
+                    continue;
+                }
+                sides = then;
+            }
+            start = end;
+            passed.energy.add(&step.energy);
+            passed.losses.add(&step.losses);
+            *state = next;
+            left -= h;
+            if left <= 1e-9 * h {
+                let i = state.axis.to_stator(machine.current(state.psi));
+                let emf = match &between {
+                    Some(between) => between.region.emf(i),
+                    None => self.emf(state, i, u, legs, lossy),
+                };
+                let (_, G) = lossy.circuit(R_s, n_p * state.speed);
+                return (passed, state.axis.from_stator(emf * G));
+            }
+        }
+    }
+
+    /// Voltage (V) behind the resistance with the current `i` (A) of the flux linkage and the voltage `u` (V) of the legs.
+    #[inline(never)]
+    fn emf(&self, state: &State, i: AlphaBeta, u: AlphaBeta, legs: &Legs, lossy: &Lossy<'_>) -> AlphaBeta {
+        let machine = Machine::new(&self.warm.motor, &self.parameters.saturation);
+        let steady = lossy.steady(state.psi, machine.current(state.psi), state.speed);
+        let u = if legs.drop() { u - legs.loss(state.axis.to_stator(steady)) } else { u };
+        lossy.flow(machine.resistance(), u, i, state.speed).d_psi
+    }
+
+    /// Longest integration step in s with a current in the zone where the voltages of the legs and of devices with this
+    /// `threshold` (V) fall linearly.
+    #[inline]
+    fn within_the_zone(motor: &Motor, legs: &Legs, threshold: f64) -> f64 {
+        LONGEST_SUBSTEP_WITH_KINKS.min(0.5 * legs.time(motor, threshold))
     }
 
     /// One integration step of `h` (s) with the gates off.
-    fn coast(&self, start: &State, h: f64, legs: &Legs) -> (State, Energy) {
+    #[inline(never)]
+    fn coast(&self, start: &State, h: f64, legs: &Legs, lossy: Option<&Lossy<'_>>) -> (State, Passed) {
         let Some(lost) = self.remaining(start, legs) else {
-            return self.drive(start, h, AlphaBeta::ZERO, legs);
+            return match lossy {
+                None => self.drive_held::<false>(start, h, AlphaBeta::ZERO, legs, None),
+                lossy => self.drive_lossy(start, h, AlphaBeta::ZERO, legs, lossy),
+            };
         };
-        let PlantParameters { motor, mechanics, .. } = &self.parameters;
-        let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
-        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost]), h, |x| {
-            let Motion { acceleration, p_shaft, p_friction } = shaft.motion(x[0], 0.0);
-            SVector::from([acceleration, x[0], p_shaft, p_friction])
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let motor = &self.warm.motor;
+        let held = Held {
+            machine: Machine::new(motor, saturation),
+            u: AlphaBeta::ZERO,
+            legs: None,
+            lossy: None,
+            shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
+        };
+        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost, 0.0]), h, |x| {
+            let i = self.idle_current(motor, x[0]);
+            let rates = held.idle_rates(machine::flux(motor, i), i, x[0]);
+            SVector::from([rates.acceleration, x[0], rates.p_mech, rates.p_loss, rates.losses.iron])
         });
-        let state = State::new(motor, machine::flux(motor, Dq::ZERO), x[0], x[1]);
-        (state, Energy { r#in: 0.0, mech: x[2], loss: x[3] })
+        let state = State::new(motor, self.idle_flux(motor, x[0]), x[0], x[1]);
+        let losses = Losses { cu: lost, iron: x[4], friction: x[3] - lost - x[4], ..Losses::none() };
+        (state, Passed { energy: Energy { r#in: 0.0, mech: x[2], loss: x[3] }, losses })
+    }
+
+    /// A communication step; `LOSSY`: with the gates off or with losses besides that of a constant resistance.
+    #[expect(clippy::inline_always, reason = "as for `drive`")]
+    #[inline(always)]
+    fn step<const LOSSY: bool>(&mut self, step: &Step) -> Result<(), Fault> {
+        let PlantInputs { enable, u_dc, .. } = self.inputs;
+        let legs = self.legs(&self.inputs);
+        let lossy = if LOSSY {
+            let sw = if enable { self.sw.per_ampere(&self.parameters.inverter, u_dc) } else { 0.0 };
+            Lossy::new(&self.parameters, enable, u_dc, legs.i_zone(), sw)
+        } else {
+            None
+        };
+        let (mut state, mut energy) = self.at_the_shaft();
+        let mut losses = Losses::none();
+        let mut left = self.substeps(step.h, state.speed, &legs, lossy.is_some())?;
+        let h = step.h / left;
+        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
+        let mut by_iron = None;
+        if LOSSY
+            && self.inputs.enable
+            && let Some(lossy) = &lossy
+        {
+            let (passed, current) = self.switch(&mut state, step.h, u, &legs, lossy);
+            energy.add(&passed.energy);
+            (losses, by_iron, left) = (passed.losses, Some(current), 0.0);
+        }
+        while left > 0.0 {
+            let (next, passed) = match (LOSSY, self.inputs.enable, lossy.as_ref()) {
+                (false, ..) => self.drive_held::<false>(&state, h, u, &legs, None),
+                (true, true, lossy) => self.drive_lossy(&state, h, u, &legs, lossy),
+                (true, false, lossy) => self.coast(&state, h, &legs, lossy),
+            };
+            state = next;
+            energy.add(&passed.energy);
+            if LOSSY {
+                losses.add(&passed.losses);
+            } else {
+                losses.friction += passed.losses.friction;
+            }
+            left -= 1.0;
+        }
+        let lost = if !LOSSY || self.inputs.enable { None } else { self.remaining(&state, &legs) };
+        if let Some(lost) = lost {
+            state.psi = self.idle_flux(&self.warm.motor, state.speed);
+            energy.loss += lost;
+            losses.cu += lost;
+        }
+        if !LOSSY {
+            losses.cu = energy.loss - losses.friction;
+        }
+        if !(state.is_finite() && energy.is_finite()) {
+            return Err(Fault::new(format!(
+                "the machine's state left the finite numbers within a step of {} s; the step before it ended with {}",
+                step.h,
+                self.state.tell()
+            )));
+        }
+        (self.state, self.blocked) = (state, lost.is_some());
+        self.energy.add(&energy);
+        if LOSSY && !self.parameters.iron.is_none() {
+            self.by_iron = by_iron.unwrap_or_else(|| self.current_by_iron());
+        }
+        self.powers = Powers::mean(&energy, losses, step.h, &self.inputs, &legs, || self.currents());
+        Ok(())
+    }
+
+    /// [`step`](Self::step) with losses and temperatures, out of the way of a step without them.
+    #[inline(never)]
+    fn step_with_losses(&mut self, step: &Step) -> Result<(), Fault> {
+        let mode = self.parameters.thermal.mode;
+        if mode == ThermalMode::Imposed {
+            self.impose()?;
+        }
+        self.step::<true>(step)?;
+        if mode == ThermalMode::Network {
+            self.warm_up(step.h)?;
+        }
+        Ok(())
     }
 
     /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.
     fn remaining(&self, state: &State, legs: &Legs) -> Option<f64> {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
-        let i = machine::current(motor, saturation, state.psi);
+        let (motor, saturation) = (&self.warm.motor, &self.parameters.saturation);
+        let i = machine::current(motor, saturation, state.psi) - self.idle_current(motor, state.speed);
         let blocked = legs.block(motor, state.axis, i, f64::from(motor.n_p) * state.speed);
-        blocked.then(|| machine::magnetic_energy(motor, saturation, state.psi))
+        let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
+        blocked.then(|| stored(state.psi) - stored(self.idle_flux(motor, state.speed)))
     }
 }
 
@@ -293,62 +690,59 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 6;
+    const STATE_VERSION: u16 = 8;
+
+    fn derive(&mut self) {
+        self.sw = switching::Last::default();
+        self.take(self.warm.at);
+    }
+
+    fn validate(&self) -> Result<(), Fault> {
+        self.parameters.thermal.validate()?;
+        self.judge_temperatures(&self.inputs)
+    }
+
+    fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
+        self.validate_network(interface)
+    }
 
     fn initialize(&mut self) {
-        let PlantParameters { motor, mechanics, initial, .. } = &self.parameters;
+        self.start_temperatures();
+        let PlantParameters { mechanics, initial, .. } = &self.parameters;
+        let motor = &self.warm.motor;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         let (speed, angle) = if mechanics.imposed {
             (speed_shaft, angle_shaft)
         } else {
             (initial.speed, initial.theta_e / f64::from(motor.n_p))
         };
-        self.state = State::new(motor, machine::flux(motor, Dq::ZERO), speed, angle);
+        let psi = if self.inputs.enable { machine::flux(motor, Dq::ZERO) } else { self.idle_flux(motor, speed) };
+        self.state = State::new(motor, psi, speed, angle);
         self.energy = Energy::default();
         self.blocked = self.blocks(&self.inputs);
+        self.by_iron = self.current_by_iron();
         // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
         let tau_shaft = mechanics.tau_shaft(0.0, self.inputs.tau_load, friction);
-        self.powers = Powers { p_mech: tau_shaft * speed, p_loss: friction * speed, ..Powers::default() };
+        let losses = Losses { friction: friction * speed, ..Losses::default() };
+        self.powers = Powers { p_mech: tau_shaft * speed, p_loss: losses.friction, losses, ..Powers::default() };
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
-        let State { psi, speed, angle, axis } = self.state;
-        let i = machine::current(motor, saturation, psi);
-        *out = self.shown(&Instant { psi, i, speed, angle, axis }, self.inputs.tau_load, self.powers);
+        if !self.parameters.iron.is_none() {
+            return self.output_with_iron(out);
+        }
+        let at = self.reached();
+        *out = self.shown(&self.inputs, &at, at.i, self.warm.at, self.powers);
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        let motor = &self.parameters.motor;
-        let legs = self.legs(&self.inputs);
-        let (mut state, mut energy) = self.at_the_shaft();
-        let mut left = self.substeps(step.h, state.speed, &legs)?;
-        let h = step.h / left;
-        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
-        while left > 0.0 {
-            let (next, passed) =
-                if self.inputs.enable { self.drive(&state, h, u, &legs) } else { self.coast(&state, h, &legs) };
-            state = next;
-            energy.add(&passed);
-            left -= 1.0;
+        let PlantParameters { thermal, .. } = &self.parameters;
+        if self.inputs.enable && thermal.mode == ThermalMode::Constant && !losses::any(&self.parameters) {
+            self.step::<false>(step)
+        } else {
+            self.step_with_losses(step)
         }
-        let lost = if self.inputs.enable { None } else { self.remaining(&state, &legs) };
-        if let Some(lost) = lost {
-            state.psi = machine::flux(motor, Dq::ZERO);
-            energy.loss += lost;
-        }
-        if !(state.is_finite() && energy.is_finite()) {
-            return Err(Fault::new(format!(
-                "the machine's state left the finite numbers within a step of {} s; the step before it ended with {}",
-                step.h,
-                self.state.tell()
-            )));
-        }
-        (self.state, self.blocked) = (state, lost.is_some());
-        self.energy.add(&energy);
-        self.powers = Powers::mean(&energy, step.h, &self.inputs, &legs, || self.currents());
-        Ok(())
     }
 }
 

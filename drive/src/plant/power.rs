@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! i_dc   = sum of m_x i_x over the legs, m_x = u_x / u_dc the mean switching state      p_in = u_dc i_dc
-//! p_loss = 1.5 R_s (i_d^2 + i_q^2) + friction(speed) speed                              p_mech = tau_shaft speed
+//! p_loss = p_cu + p_iron + p_cond + p_sw + p_friction                                   p_mech = tau_shaft speed
 //! p_in   = p_loss + p_mech + d/dt (magnetic energy + J speed^2 / 2)
 //! ```
 //!
 //! u_x is the voltage that the leg supplies on average over a PWM period, after the hexagon limit and the dead-time
-//! loss, or the voltage of its diodes while the gates are off; switches and diodes are lossless. The magnetic energy is
+//! loss, or the voltage of its diodes while the gates are off, but before the drop of its devices
+//! ([`losses`](crate::plant::losses)). With a switching loss, i_dc is greater by p_sw / u_dc. The magnetic energy is
 //! 0.75 (L_d i_d^2 + L_q i_q^2) without saturation. With an imposed speed, tau_shaft is tau_e minus friction and the
 //! kinetic energy belongs to the drive train; otherwise tau_shaft is tau_load, and J stores the rest.
 //!
@@ -28,6 +29,7 @@
 use crate::frame::Phases;
 use crate::math::all_finite;
 use crate::plant::legs::Legs;
+use crate::plant::losses::Losses;
 use crate::plant::signals::PlantInputs;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
 use fmu_core::{Row, Scalar, Table};
@@ -42,19 +44,28 @@ pub struct Powers<S = f64> {
     pub p_in: S,
     /// Power at the shaft to the load in W.
     pub p_mech: S,
-    /// Copper loss and friction in W.
+    /// All losses in W.
     pub p_loss: S,
+    /// Each loss in W.
+    pub losses: Losses<S>,
 }
 
 impl Powers {
-    /// Means over a step of `h` (s) in which `energy` passed; `i` gives the stator currents (A) at its end.
+    /// Means over a step of `h` (s) in which `energy` passed, with its `losses`; `i` gives the stator currents (A) at its end.
     #[inline]
-    pub fn mean(energy: &Energy, h: f64, inputs: &PlantInputs, legs: &Legs, i: impl FnOnce() -> Phases) -> Self {
+    pub fn mean(
+        energy: &Energy,
+        losses: Losses,
+        h: f64,
+        inputs: &PlantInputs,
+        legs: &Legs,
+        i: impl FnOnce() -> Phases,
+    ) -> Self {
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let rate = 1.0 / h;
         let p_in = energy.r#in * rate + 0.0;
         let i_dc = dc_current(p_in, inputs, legs, i);
-        Self { i_dc, p_in, p_mech: energy.mech * rate, p_loss: energy.loss * rate }
+        Self { i_dc, p_in, p_mech: energy.mech * rate, p_loss: energy.loss * rate, losses: losses.map(|e| e * rate) }
     }
 
     /// The mean of this value and `last`, which has the weight `share` (0..1).
@@ -66,6 +77,7 @@ impl Powers {
             p_in: mean(self.p_in, last.p_in),
             p_mech: mean(self.p_mech, last.p_mech),
             p_loss: mean(self.p_loss, last.p_loss),
+            losses: self.losses.with(&last.losses, mean),
         }
     }
 }
@@ -93,7 +105,7 @@ pub struct Energy {
     pub r#in: f64,
     /// To the load at the shaft.
     pub mech: f64,
-    /// Lost: copper and friction.
+    /// Lost: copper, iron, inverter, friction.
     pub loss: f64,
 }
 
@@ -149,7 +161,7 @@ pub const POWERS: &Table<Powers> = &Table::new(
             P::output(
                 "p_loss",
                 &WATT,
-                "Copper loss of the stator and friction, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
+                "All losses, p_cu + p_iron + p_cond + p_sw + p_friction, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_loss,
             )
             .mean(),

@@ -46,8 +46,8 @@ impl Saturation {
 
     /// The current (A) beyond the linear machine's at the flux linkage `psi` (Wb).
     #[inline]
-    pub fn current<S: Scalar>(&self, motor: &Motor, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
-        let (x, q) = (psi.d() - S::from(motor.psi_M), psi.q());
+    pub fn current<S: Scalar>(&self, motor: &Motor<S>, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
+        let (x, q) = (psi.d() - motor.psi_M, psi.q());
         Vector::new((x * self.s_3 + S::from(self.s_2)) * x * x + q * (0.5 * self.s_dq) * q, x * self.s_dq * q)
     }
 

@@ -1,7 +1,9 @@
 //! Inputs and outputs of the plant.
 
 use crate::frame::Phases;
+use crate::plant::losses::efficiency;
 use crate::plant::power::{Energy, Powers};
+use crate::plant::thermal::{Heat, Temperatures, ThermalInputs};
 use fmu_core::Dual;
 use serde::{Deserialize, Serialize};
 
@@ -20,12 +22,14 @@ pub struct PlantInputs<S = f64> {
     pub angle_shaft: S,
     /// Whether the gates switch; false: only the diodes conduct.
     pub enable: bool,
+    /// Temperatures in K.
+    pub thermal: ThermalInputs<S>,
 }
 
 impl Default for PlantInputs {
     fn default() -> Self {
-        let u = Phases::default();
-        Self { u, u_dc: 325.0, tau_load: 0.0, speed_shaft: 0.0, angle_shaft: 0.0, enable: true }
+        let (u, thermal) = (Phases::default(), ThermalInputs::default());
+        Self { u, u_dc: 325.0, tau_load: 0.0, speed_shaft: 0.0, angle_shaft: 0.0, enable: true, thermal }
     }
 }
 
@@ -40,6 +44,7 @@ impl PlantInputs {
             speed_shaft: Dual::new(self.speed_shaft, along.speed_shaft),
             angle_shaft: Dual::new(self.angle_shaft, along.angle_shaft),
             enable: self.enable,
+            thermal: self.thermal.changing(&along.thermal),
         }
     }
 }
@@ -67,6 +72,19 @@ pub struct PlantOutputs<S = f64> {
     pub tau_shaft: S,
     /// Energy since the start.
     pub energy: Energy,
+    /// Efficiency of the powers.
+    pub efficiency: S,
+    /// Temperatures in K.
+    pub temperatures: Temperatures<S>,
+    /// Heat in W, of the powers.
+    pub heat: Heat<S>,
+}
+
+impl PlantOutputs {
+    /// These outputs with other `powers` and their `heat`.
+    pub fn with(&self, powers: Powers, heat: Heat) -> Self {
+        Self { powers, heat, efficiency: efficiency(powers.p_in, powers.p_mech), ..self.clone() }
+    }
 }
 
 impl PlantOutputs<Dual> {
@@ -86,9 +104,13 @@ impl PlantOutputs<Dual> {
                 p_in: powers.p_in.change,
                 p_mech: powers.p_mech.change,
                 p_loss: powers.p_loss.change,
+                losses: powers.losses.map(|p| p.change),
             },
             tau_shaft: self.tau_shaft.change,
             energy: Energy::default(),
+            efficiency: self.efficiency.change,
+            temperatures: self.temperatures.map(|T| T.change),
+            heat: self.heat.map(|Q| Q.change),
         }
     }
 }

@@ -2,12 +2,16 @@
 
 use crate::motor::{MOTOR, Motor};
 use crate::plant::inverter::{INVERTER, Inverter};
+use crate::plant::iron::{IRON, Iron};
+use crate::plant::losses::LOSSES;
+use crate::plant::losses::conduction::DEVICES;
 use crate::plant::mechanics::{MECHANICS, Mechanics};
 use crate::plant::model::PmsmPlant;
 use crate::plant::power::{ENERGY, POWERS};
 use crate::plant::saturation::{SATURATION, Saturation};
 use crate::plant::signals::PlantOutputs;
-use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT, WEBER};
+use crate::plant::thermal::{THERMAL, THERMAL_INPUTS, THERMAL_OUTPUTS, Thermal};
+use fmu_core::unit::{AMPERE, NEWTON_METER, NM_S2_PER_RAD2, ONE, RADIAN, S2_PER_RAD2, SPEED, VOLT, WEBER};
 use fmu_core::{Block, Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +28,19 @@ pub struct PlantParameters {
     pub mechanics: Mechanics,
     /// State at the start.
     pub initial: Initial,
+    /// Iron loss of the machine.
+    pub iron: Iron,
+    /// The winding beyond its resistance.
+    pub winding: Winding,
+    /// Temperatures and heat.
+    pub thermal: Thermal,
+}
+
+/// The winding beyond its resistance.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Winding {
+    /// Growth of the resistance with the square of the electrical speed, in s2/rad2: R = R_s (1 + k_ac w^2), >= 0.
+    pub k_ac: f64,
 }
 
 /// Initial position and speed of the rotor.
@@ -82,6 +99,47 @@ pub const PARAMETERS: &Table<PlantParameters> = &Table::new(
     },
 );
 
+/// The outputs of the losses, which follow the older variables: a value reference never moves.
+pub const LOSS_OUTPUTS: &Table<PlantOutputs> = &Table::new(
+    const {
+        &[
+            O::part("", &Part { table: LOSSES, lens: |o| &mut o.powers.losses }),
+            O::output(
+                "efficiency",
+                &ONE,
+                "p_mech / p_in of a motor, p_in / p_mech of a generator, else 0; of the means (Model Exchange: at the instant)",
+                |o| &mut o.efficiency,
+            )
+            .mean(),
+        ]
+    },
+);
+
+/// The parameters of losses and temperatures, which follow the older variables.
+pub const LOSS_PARAMETERS: &Table<PlantParameters> = &Table::new(
+    const {
+        &[
+            P::part("iron.", &Part { table: IRON, lens: |p| &mut p.iron }),
+            P::part("inverter.", &Part { table: DEVICES, lens: |p| &mut p.inverter.devices }),
+            P::parameter(
+                "mechanics.k_w",
+                &NM_S2_PER_RAD2,
+                "Windage: torque over the square of the speed; 0: none",
+                |p| &mut p.mechanics.k_w,
+            )
+            .at_least(0.0),
+            P::parameter(
+                "winding.k_ac",
+                &S2_PER_RAD2,
+                "Growth of the resistance with the square of the electrical speed, R_s (1 + k_ac w^2); 0: none",
+                |p| &mut p.winding.k_ac,
+            )
+            .at_least(0.0),
+            P::part("", &Part { table: THERMAL, lens: |p| &mut p.thermal }),
+        ]
+    },
+);
+
 type S = Row<PmsmPlant>;
 
 /// States that are no outputs; of the plant and of `PmsmDrive`.
@@ -122,6 +180,10 @@ pub const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
             V::part("", &Part { table: STATES, lens: |m| &mut m.model }),
+            V::part("", &Part { table: LOSS_OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.parameters }),
+            V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
+            V::part("", &Part { table: THERMAL_OUTPUTS, lens: |m| &mut m.out }),
         ]
     },
 );

@@ -1,0 +1,104 @@
+//! Field weakening: to a multiple of the base speed, and there more load than the machine can carry.
+//!
+//! Base speed n_b: of the true machine at its greatest current and 0.95 u_dc / sqrt 3. Envelope: of the true machine too, under
+//! the limits of each estimator.
+
+use super::Outcome;
+use super::candidate::{Candidate, Class};
+use super::measure::{Follow, Measure};
+use super::running::line;
+use crate::runner::{self, RATED_SPEED, Statistics};
+use drive::control::envelope::{Envelope, Warm};
+use drive::estimator::Kind;
+use fmu_core::Fault;
+
+/// The candidate with field weakening, the whole current and no other limit of the torque.
+fn weakening(candidate: &Candidate) -> Candidate {
+    candidate.with(|p| {
+        let par = &mut p.controller.model.parameters;
+        par.weakening.used = true;
+        match par.estimator {
+            // Its gain has no bound near the current -psi_M / L_d.
+            Kind::VoltageModel => par.limit.i = 0.7 * par.motor.psi_M / par.motor.L_d,
+            // A saturated hexagon is an angle error to it.
+            Kind::VoltageFeedback => (par.weakening.k_u, par.weakening.k_t) = (0.9, 0.9),
+            _ => {}
+        }
+        (par.limit.i_q, par.limit.tau) = (par.limit.i, 1e3);
+    })
+}
+
+/// The true machine under the controller's limits.
+struct Truth {
+    envelope: Envelope,
+    U: f64,
+    n_p: f64,
+}
+
+impl Truth {
+    fn new(candidate: &Candidate) -> Self {
+        let (plant, par) = (&candidate.pair.plant.model, &candidate.pair.controller.model.parameters);
+        Self {
+            envelope: Envelope::new(&plant.parameters.motor, par.limit.i),
+            U: par.weakening.k_u * plant.inputs.u_dc / 3.0_f64.sqrt(),
+            n_p: f64::from(plant.parameters.motor.n_p),
+        }
+    }
+
+    /// Base speed in pu.
+    fn base_speed(&self) -> f64 {
+        self.envelope.base_speed(self.U) / self.n_p / RATED_SPEED
+    }
+
+    /// Greatest torque (N.m) at `speed` (pu).
+    fn torque(&self, speed: f64) -> f64 {
+        let mut warm = Warm::default();
+        let mut limit = || self.envelope.limit(speed * RATED_SPEED * self.n_p, 1.0, self.U, &mut warm).tau;
+        (0..8).map(|_| limit()).last().unwrap_or_default()
+    }
+}
+
+/// A ramp of the reference to a multiple of the base speed, then a tenth more load than the envelope has there: the drive slows
+/// down along the envelope to where it carries the load.
+pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
+    const FROM: f64 = 0.5;
+    if let Some(why) = candidate.no_speed(1.0) {
+        return Ok(Outcome::NotApplicable(why));
+    }
+    // The envelope of Rasmussen's machine ends at 1.62 times its base speed.
+    let times = if candidate.class == Class::FluxObserver { 1.5 } else { 2.5 };
+    let base = Truth::new(candidate).base_speed();
+    let (candidate, target) = (weakening(candidate).turning(FROM), times * base);
+    let truth = Truth::new(&candidate);
+    let load = 1.1 * truth.torque(target) / candidate.torque;
+    let mut follow = Follow::default();
+    let [mut fast, mut slow, mut torque] = [Statistics::default(); 3];
+    let survived = candidate.run(3.5, |t, p| {
+        let reference = line(t, 0.5, FROM, 1.0, target);
+        candidate.set(p, reference, line(t, 1.5, 0.0, 1.8, load));
+        follow.trace(t, reference, p);
+        if t > 0.5 {
+            follow.add(t, reference, p);
+        }
+        let speed = runner::speed(p);
+        if t <= 1.5 {
+            fast.peak = fast.peak.max(speed);
+        }
+        if t > 1.4 && t <= 1.5 {
+            fast.add(speed);
+        }
+        if t > 3.3 {
+            slow.add(speed);
+            torque.add(p.plant.out.tau_e);
+        }
+    })?;
+    let lost = !survived || follow.lost();
+    let or_lost = |x: f64| if lost { f64::INFINITY } else { x };
+    let measures = vec![
+        Measure::new("reached speed", "n_b", or_lost(fast.mean() / base)),
+        Measure::new("overshoot", "n_b", or_lost((fast.peak - target).max(0.0) / base)),
+        follow.peak(),
+        Measure::new("torque over envelope", "1", or_lost(torque.mean() / truth.torque(slow.mean()))),
+    ];
+    Ok(Outcome::Measured(measures, Some(follow.into_trace())))
+}

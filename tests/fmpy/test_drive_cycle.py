@@ -1,0 +1,120 @@
+"""A vehicle on a drive cycle with the packed drive, and full torque from standstill to far above base speed.
+
+The machine and its losses are those of test_losses_and_temperature.py. The vehicle is assumed: 1300 kg, rolling
+resistance 0.010 of its weight, c_d A 0.60 m2, wheels of 0.30 m, a gear of 9.0 without loss. A cascaded torque correction
+stands for the driver: the drive controls the current, and iron and friction reduce the torque at the shaft.
+"""
+
+import numpy as np
+import pytest
+
+from pair import Unit
+from scenarios import RPM
+from test_losses_and_temperature import DRIVE, FRICTION, INVERTER, MACHINE, NETWORK
+
+STANDARDS = pytest.mark.parametrize("standard", [2, 3], ids=["fmi2", "fmi3"])
+H, KWH, SENSORED = 1e-3, 3.6e6, 13
+I_MAX, U_DC, COOLANT = 240.0, 400.0, 338.15
+# Corners of the cycle: time in s, speed in km/h.
+TIME = [0, 10, 22, 45, 55, 70, 90, 140, 155, 170, 240, 262, 280, 310, 390, 420, 470, 545, 575, 600, 610]
+SPEED = [0, 0, 32, 32, 0, 0, 50, 50, 20, 60, 60, 0, 0, 80, 80, 100, 130, 130, 80, 0, 0]
+MASS, ROLLING, DRAG, RHO, WHEEL, GEAR, J_ROTOR = 1300.0, 0.010, 0.60, 1.2, 0.30, 9.0, 0.03883
+# An independent calculation: steady operating points in the middle of each second, sinusoidal currents. In kWh.
+ENERGY, DRAWN, RETURNED = 1.322449, 1.497219, -0.174770
+LOSSES = {"p_cu": 0.015373, "p_iron": 0.027246, "p_cond": 0.014992, "p_sw": 0.013319, "p_friction": 0.053891}
+CAPACITIES = {"winding": 2500.0, "stator": 12000.0, "rotor": 6000.0, "inverter": 500.0}
+CONDUCTANCES = {"ws": 60.0, "sc": 150.0, "sr": 8.0, "inverter": 20.0}
+
+PARAMETERS = {name: value for name, value in DRIVE.items() if isinstance(value, float)}
+PARAMETERS |= {f"plant.inverter.{name}": value for name, value in INVERTER.items()}
+PARAMETERS |= {f"plant.mechanics.{name}": value for name, value in FRICTION.items()}
+PARAMETERS |= {f"plant.thermal.C_{name}": value for name, value in CAPACITIES.items()}
+PARAMETERS |= {f"plant.thermal.G_{name}": value for name, value in CONDUCTANCES.items()}
+PARAMETERS |= {"controller.T_s": 1e-4, "controller.limit.i": I_MAX, "controller.limit.i_q": I_MAX}
+PARAMETERS |= {"u_dc": U_DC, "T_coolant": COOLANT, "plant.thermal.T_start": COOLANT, "controller.zero_speed.i_0": 0.0}
+INTEGERS = {"controller.estimator": SENSORED, "plant.thermal.mode": NETWORK}
+BOOLEANS = {name: value for name, value in DRIVE.items() if value is True} | {"controller.weakening.use": True}
+
+
+def run(archive, speed, torque, names, correct):
+    """Steps the drive on a shaft of this speed (rad/s) with the torque reference (N.m), and returns the outputs."""
+    drive = Unit(archive, PARAMETERS, INTEGERS, BOOLEANS)
+    inputs, outputs = drive.of("speed_shaft", "angle_shaft", "tau_ref"), drive.of(*names)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * H)])
+    rows, more = np.empty((len(speed) - 1, len(names))), 0.0
+    for k, row in enumerate(rows):
+        drive.set_reals(inputs, [speed[k], angle[k], torque[k] + more])
+        drive.slave.doStep(k * H, H)
+        row[:] = drive.get_reals(outputs)
+        if correct:
+            more += 0.02 * (torque[k] - row[0])
+    drive.close()
+    return dict(zip(names, rows.T))
+
+
+def heated(loss, held_for=0.1):
+    """Temperatures (K) of winding, stator and rotor at the end, by the exact solution for each tenth of a second."""
+    w, s, r = (CAPACITIES[name] for name in ("winding", "stator", "rotor"))
+    g_ws, g_sc, g_sr = (CONDUCTANCES[name] for name in ("ws", "sc", "sr"))
+    a = np.array([[-g_ws / w, g_ws / w, 0], [g_ws / s, -(g_ws + g_sc + g_sr) / s, g_sr / s], [0, g_sr / r, -g_sr / r]])
+    rates, modes = np.linalg.eig(a)
+    grows = (modes * np.exp(rates * held_for)) @ np.linalg.inv(modes)
+    held = np.linalg.solve(a, grows - np.eye(3))
+    power = {name: p.reshape(-1, round(held_for / H)).mean(axis=1) for name, p in loss.items()}
+    heat = np.array([power["p_cu"] / w, (0.9 * power["p_iron"] + power["p_friction"]) / s, 0.1 * power["p_iron"] / r])
+    above = np.zeros(3)
+    for column in heat.T:
+        above = grows @ above + held @ column
+    return COOLANT + above
+
+
+@STANDARDS
+def test_cycle(archives, standard):
+    t = np.arange(round(TIME[-1] / H) + 1) * H
+    v = np.interp(t, TIME, np.array(SPEED) / 3.6)
+    a = np.append(np.diff(v) / H, 0.0)
+    force = MASS * (a + ROLLING * 9.81 * (v > 0.0)) + 0.5 * RHO * DRAG * v**2
+    speed = v * GEAR / WHEEL
+    torque = force * WHEEL / GEAR + J_ROTOR * a * GEAR / WHEEL
+    temperatures = ["T_winding", "T_stator", "T_magnet"]
+    names = ["tau_shaft", "p_in", *LOSSES, "energy.in", "energy.mech", "energy.loss", "u_share", *temperatures]
+    result = run(archives / f"fmi{standard}" / "PmsmDrive.fmu", speed, torque, names, correct=True)
+
+    assert speed.max() > 3.3 * 3075.0 * RPM  # base speed
+    assert result["u_share"].max() < 0.96
+    assert np.sqrt(np.mean((result["tau_shaft"] - torque[:-1]) ** 2)) < 0.1
+    p_in = result["p_in"] * H / KWH
+    assert result["energy.in"][-1] / KWH == pytest.approx(ENERGY, rel=1e-3)
+    assert p_in.clip(min=0.0).sum() == pytest.approx(DRAWN, rel=1e-3)
+    assert p_in.clip(max=0.0).sum() == pytest.approx(RETURNED, rel=2e-3)
+    # A voltage that is held for 0.1 ms while the rotor turns by x = 0.33 rad has the fundamental sin(x/2) / (x/2), 0.4 %
+    # less: weakening goes that much deeper, which moves iron loss to copper and inverter.
+    for name, energy in LOSSES.items():
+        assert result[name].sum() * H / KWH == pytest.approx(energy, rel=0.01), name
+    assert result["p_friction"].sum() * H / KWH == pytest.approx(LOSSES["p_friction"], rel=1e-4)
+    # No current flows at either end: nothing is stored.
+    balance = result["energy.in"][-1] - result["energy.mech"][-1] - result["energy.loss"][-1]
+    assert abs(balance) < 1e-7 * (DRAWN - RETURNED) * KWH
+    expected = heated({name: result[name] for name in LOSSES})
+    assert [result[name][-1] for name in temperatures] == pytest.approx(expected, abs=0.01)
+    assert result["T_winding"].max() > COOLANT + 5.0
+
+
+@STANDARDS
+def test_full_torque(archives, standard):
+    """On a ramp to 12000 rpm in 12 s, the torque is the greatest that current and voltage allow."""
+    speed = np.linspace(500.0, 12000.0, 12001) * RPM
+    names = ["tau_e", "tau_max"]
+    archive = archives / f"fmi{standard}" / "PmsmDrive.fmu"
+    result = run(archive, speed, np.full(len(speed), 500.0), names, correct=False)
+    n_p, r, l_d, l_q, psi = (MACHINE[name] for name in ("n_p", "R_s", "L_d", "L_q", "psi_M"))
+    # Currents on the limit circle, from the least current at full torque on.
+    angle = np.linspace(0.0, 0.5 * np.pi, 20001)
+    i_d, i_q = -I_MAX * np.sin(angle), I_MAX * np.cos(angle)
+    tau = 1.5 * n_p * (psi - (l_q - l_d) * i_d) * i_q
+    for k in range(200, 12000, 200):
+        w = n_p * 0.5 * (speed[k] + speed[k + 1])
+        u = np.hypot(r * i_d - w * l_q * i_q, r * i_q + w * (psi + l_d * i_d))
+        limit = tau[u <= 0.95 * U_DC / np.sqrt(3.0)].max()
+        assert result["tau_max"][k] == pytest.approx(limit, rel=1e-3)
+        assert result["tau_e"][k - 5 : k + 5].mean() == pytest.approx(limit, rel=0.01), speed[k] / RPM
