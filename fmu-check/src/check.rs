@@ -3,12 +3,12 @@
 use super::fmu_file::FmuFile;
 use super::session::{NotDetermined, Session};
 use model_description::FmiVersion;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::time::Duration;
 
 /// How binding a requirement is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     /// The standard requires it.
@@ -93,6 +93,22 @@ pub enum Verdict {
     NotDetermined(String),
 }
 
+/// A verdict with what only a probe knows about it.
+#[derive(Clone, Debug)]
+pub(super) struct Judgement {
+    pub(super) verdict: Verdict,
+    /// The level of the finding, if it is lower than that of the check.
+    pub(super) lower: Option<Level>,
+    /// A call crashed the process or did not return: an importer would have gone down with it.
+    pub(super) fatal: bool,
+}
+
+impl From<Verdict> for Judgement {
+    fn from(verdict: Verdict) -> Self {
+        Self { verdict, lower: None, fatal: false }
+    }
+}
+
 impl Verdict {
     /// A pass if there are no findings, otherwise a violation.
     pub(super) fn of(findings: Vec<String>) -> Self {
@@ -111,8 +127,10 @@ pub struct Finding {
     pub requirement: &'static str,
     /// Where the standards say so.
     pub clause: &'static str,
-    /// Level for the standard of this FMU.
+    /// Level of the check for the standard of this FMU, or of the finding, if that is lower.
     pub level: Level,
+    /// A call of the FMU crashed the process or did not return.
+    pub fatal: bool,
     /// Result.
     #[serde(flatten)]
     pub verdict: Verdict,

@@ -45,6 +45,8 @@ pub struct FmuFile {
     pub(super) binaries: Vec<Binary>,
     /// Entries that could not be unpacked.
     pub(super) unpack_errors: Vec<String>,
+    /// Entries that this computer could not store, for example because of their long names.
+    pub(super) own_errors: Vec<String>,
     dir: TempDir,
 }
 
@@ -81,6 +83,7 @@ impl FmuFile {
             description,
             binaries: Vec::new(),
             unpack_errors: Vec::new(),
+            own_errors: Vec::new(),
             dir,
         };
         fmu.unpack().map_err(|e| unusable(e.to_string()))?;
@@ -111,7 +114,7 @@ impl FmuFile {
                     let target = self.dir.path().join(&name);
                     let made = target.parent().map_or(Ok(()), fs::create_dir_all);
                     if let Err(e) = made.and_then(|()| fs::write(&target, &bytes)) {
-                        self.unpack_errors.push(format!("{name}: {e}"));
+                        self.own_errors.push(format!("{name}: {e}"));
                         continue;
                     }
                     if let Some((folder, file)) = name.strip_prefix("binaries/").and_then(|n| n.split_once('/')) {

@@ -93,6 +93,11 @@ impl Report {
         )
     }
 
+    /// The ids of the findings that would have taken an importer down with them.
+    pub fn fatal(&self) -> Vec<&'static str> {
+        self.violated().filter(|f| f.fatal).map(|f| f.id).collect()
+    }
+
     fn heading(&self) -> String {
         let model = self.model.as_deref().unwrap_or("?");
         let tool = self.generation_tool.as_deref().unwrap_or("an unnamed tool");
@@ -130,6 +135,9 @@ impl Report {
             }
         }
         let _ = writeln!(out, "\n{}", self.summary());
+        if !self.fatal().is_empty() {
+            let _ = writeln!(out, "An importer would have crashed or hung in: {}.", self.fatal().join(", "));
+        }
         let end = match (self.conforms(), self.violated().count()) {
             (true, 0) => "All requirements hold.",
             (true, _) => "No requirement of the standard (must) is violated.",
@@ -162,7 +170,8 @@ impl Report {
             out.push_str("<ul>\n");
             for f in self.violated() {
                 let (level, requirement) = (level(f.level), escape(f.requirement));
-                let _ = writeln!(out, "<li><a href=\"#{0}\">{0}</a> ({level}): {requirement}</li>", f.id);
+                let fatal = if f.fatal { ", takes the importer down" } else { "" };
+                let _ = writeln!(out, "<li><a href=\"#{0}\">{0}</a> ({level}{fatal}): {requirement}</li>", f.id);
             }
             out.push_str("</ul>\n");
         }
@@ -206,6 +215,9 @@ pub(super) fn level(level: Level) -> &'static str {
 fn verdict_text(finding: &Finding) -> (&'static str, Vec<&str>) {
     match &finding.verdict {
         Verdict::Pass(evidence) => ("pass", evidence.iter().map(String::as_str).collect()),
+        Verdict::Violated(evidence) if finding.fatal => {
+            ("VIOLATED, takes the importer down", evidence.iter().map(String::as_str).collect())
+        }
         Verdict::Violated(evidence) => ("VIOLATED", evidence.iter().map(String::as_str).collect()),
         Verdict::NotApplicable(reason) => ("not applicable", vec![reason]),
         Verdict::NotDetermined(reason) => ("not determined", vec![reason]),

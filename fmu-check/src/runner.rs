@@ -4,10 +4,11 @@
 //! and writes the call that it is about to make to another file. When the child dies, the parent knows what was found and which
 //! call ended it. A probe with several cases is restarted after the case that ended it.
 
-use crate::check::{Check, Options, Run, Verdict};
+use crate::check::{Check, Judgement, Level, Options, Run, Verdict};
 use crate::checks::GROUPS;
 use crate::fmu_file::FmuFile;
 use crate::session::Line;
+use crate::watch::{State, Watch};
 use model_description::Interface;
 use std::collections::VecDeque;
 use std::fs::{self, File};
@@ -26,12 +27,12 @@ const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
 const MAX_RESTARTS: usize = 12;
 
 /// The verdicts of checks, in their order.
-pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Vec<Verdict> {
-    let verdicts: Vec<Mutex<Option<Verdict>>> = checks.iter().map(|_| Mutex::new(None)).collect();
+pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Vec<Judgement> {
+    let verdicts: Vec<Mutex<Option<Judgement>>> = checks.iter().map(|_| Mutex::new(None)).collect();
     let mut queue = VecDeque::new();
     for (check, verdict) in checks.iter().zip(&verdicts) {
         match check.run {
-            Run::File(check_file) => store(verdict, check_file(fmu)),
+            Run::File(check_file) => store(verdict, check_file(fmu).into()),
             _ => queue.push_back((*check, verdict)),
         }
     }
@@ -48,8 +49,8 @@ pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Ve
                 while let Some((check, verdict)) = take(&queue) {
                     let why = if is_exchange(check) { &exchanges } else { &simulates };
                     let found = match (&runner, why) {
-                        (Err(cause), _) => Verdict::NotDetermined(cause.clone()),
-                        (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone(),
+                        (Err(cause), _) => Verdict::NotDetermined(cause.clone()).into(),
+                        (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone().into(),
                         (Ok(runner), _) => runner.run(check),
                     };
                     store(verdict, found);
@@ -57,7 +58,7 @@ pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Ve
             });
         }
     });
-    let lost = || Verdict::NotDetermined("the probe did not report a result".into());
+    let lost = || Verdict::NotDetermined("the probe did not report a result".into()).into();
     verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect()
 }
 
@@ -69,7 +70,7 @@ fn is_exchange(check: &Check) -> bool {
 /// Exchange.
 fn why_no_run_succeeds(runner: &Result<Runner, String>, id: &str) -> Option<Verdict> {
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == id)?;
-    match runner.as_ref().ok()?.run(check) {
+    match runner.as_ref().ok()?.run(check).verdict {
         Verdict::Violated(found) => Some(Verdict::NotDetermined(format!(
             "a minimal run fails ({id}): {}",
             found.first().map_or("", String::as_str)
@@ -83,7 +84,7 @@ fn take<T>(queue: &Mutex<VecDeque<T>>) -> Option<T> {
     queue.lock().ok()?.pop_front()
 }
 
-fn store(place: &Mutex<Option<Verdict>>, verdict: Verdict) {
+fn store(place: &Mutex<Option<Judgement>>, verdict: Judgement) {
     if let Ok(mut place) = place.lock() {
         *place = Some(verdict);
     }
@@ -103,6 +104,7 @@ struct Runner {
 enum Outcome {
     Exit(ExitStatus),
     TimedOut,
+    Slow,
 }
 
 impl Runner {
@@ -125,35 +127,37 @@ impl Runner {
         })
     }
 
-    fn run(&self, check: &Check) -> Verdict {
+    fn run(&self, check: &Check) -> Judgement {
         let binary = match (is_exchange(check), &self.simulation, &self.exchange) {
-            (true, _, None) => return Verdict::NotApplicable("the FMU has no interface for Model Exchange".into()),
+            (true, _, None) => return Verdict::NotApplicable("the FMU has no interface for Model Exchange".into()).into(),
             (true, _, Some(binary)) | (false, Some(binary), _) => binary,
             (false, None, Some(binary)) if WITHOUT_INSTANCE.contains(&check.id) => binary,
-            (false, None, _) => return Verdict::NotApplicable("the FMU has no interface for co-simulation".into()),
+            (false, None, _) => return Verdict::NotApplicable("the FMU has no interface for co-simulation".into()).into(),
         };
         let run = || {
             self.attempt(check, binary)
-                .unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be started: {e}")))
+                .unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be started: {e}")).into())
         };
-        let verdict = run();
-        if !matches!((check.run, &verdict), (Run::Twice(_), Verdict::Pass(_))) {
-            return verdict;
+        let found = run();
+        if !matches!((check.run, &found.verdict), (Run::Twice(_), Verdict::Pass(_))) {
+            return found;
         }
-        match (verdict, run()) {
+        let second = run();
+        match (found.verdict, second.verdict) {
             (Verdict::Pass(first), Verdict::Pass(second)) if first != second => Verdict::Violated(vec![
                 format!("first process: {}", first.join(", ")),
                 format!("second process: {}", second.join(", ")),
-            ]),
-            (_, second) => second,
+            ])
+            .into(),
+            (_, verdict) => Judgement { verdict, ..second },
         }
     }
 
-    fn attempt(&self, check: &Check, binary: &Path) -> std::io::Result<Verdict> {
+    fn attempt(&self, check: &Check, binary: &Path) -> std::io::Result<Judgement> {
         let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
         let (out, working_directory) = (folder.path().join("out"), folder.path().join("home"));
         fs::create_dir(&working_directory)?;
-        let mut crashes = Vec::new();
+        let (mut crashes, mut slow) = (Vec::new(), None);
         let mut from = 0;
         let began = Instant::now();
         loop {
@@ -163,6 +167,16 @@ impl Runner {
                 break;
             }
             let last_call = fs::read_to_string(out.with_extension("call")).unwrap_or_default();
+            if matches!(end, Outcome::Slow) {
+                let call = last_call.lines().next().unwrap_or_default();
+                let call = call.trim_start_matches(|c| c == 'C' || c == 'P').trim();
+                slow = Some(format!(
+                    "the probe is too slow here for a limit of {} s for each call; it was in {call} (see --timeout)",
+                    self.timeout.as_secs_f64()
+                ));
+                break;
+            }
+            let last_call = last_call.lines().next().unwrap_or_default();
             crashes.push((end.describe(self.timeout), last_call.trim().to_owned()));
             let last = lines.iter().rev().find_map(|l| if let Line::Case(n) = l { Some(*n) } else { None });
             match last {
@@ -171,14 +185,14 @@ impl Runner {
                 _ => break,
             }
         }
-        let mut verdict = verdict_of(check.id, read(&out), crashes);
-        if matches!(check.run, Run::Silent(_)) && matches!(verdict, Verdict::Pass(_)) {
+        let mut found = judge(check.id, read(&out), crashes, slow);
+        if matches!(check.run, Run::Silent(_)) && matches!(found.verdict, Verdict::Pass(_)) {
             let side_effects = side_effects(folder.path(), &working_directory);
             if !side_effects.is_empty() {
-                verdict = Verdict::Violated(side_effects);
+                found = Verdict::Violated(side_effects).into();
             }
         }
-        Ok(verdict)
+        Ok(found)
     }
 
     fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> std::io::Result<Outcome> {
@@ -198,14 +212,16 @@ impl Runner {
             .stderr(console)
             .spawn()?;
         let began = Instant::now();
+        let mut watch = Watch::new(child.id(), folder.join("out").with_extension("call"), self.timeout);
         loop {
             if let Some(status) = child.try_wait()? {
                 return Ok(Outcome::Exit(status));
             }
-            if began.elapsed() > self.timeout {
+            let state = watch.look();
+            if state != State::Runs {
                 child.kill()?;
                 child.wait()?;
-                return Ok(Outcome::TimedOut);
+                return Ok(if state == State::Hangs { Outcome::TimedOut } else { Outcome::Slow });
             }
             let pause = if began.elapsed() < Duration::from_millis(50) { 1 } else { 5 };
             std::thread::sleep(Duration::from_millis(pause));
@@ -216,7 +232,7 @@ impl Runner {
 impl Outcome {
     fn describe(&self, timeout: Duration) -> String {
         match self {
-            Self::TimedOut => format!("did not return within {} s", timeout.as_secs_f64()),
+            Self::TimedOut | Self::Slow => format!("did not return within {} s", timeout.as_secs_f64()),
             Self::Exit(status) => {
                 #[cfg(unix)]
                 if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(status) {
@@ -252,11 +268,17 @@ fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
 }
 
 /// The verdict from the lines of the probe and from its crashes (how, and in which call).
-fn verdict_of(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>) -> Verdict {
-    let (mut violated, mut notes, mut not_determined, mut not_applicable) = (Vec::new(), Vec::new(), None, None);
+fn judge(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Option<String>) -> Judgement {
+    let (mut violated, mut notes, mut not_determined, mut not_applicable) = (Vec::new(), Vec::new(), slow, None);
+    let (mut lesser, mut lower, mut fatal) = (Vec::new(), None, false);
     for line in lines {
         match line {
             Line::Violated(text) => violated.push(text),
+            Line::Lesser(level, text) => {
+                // The more binding level is the smaller one.
+                lower = Some(lower.map_or(level, |other: Level| other.min(level)));
+                lesser.push(text);
+            }
             Line::Note(text) => notes.push(text),
             Line::NotDetermined(why) => not_determined = not_determined.or(Some(why)),
             Line::NotApplicable(why) => not_applicable = not_applicable.or(Some(why)),
@@ -266,20 +288,25 @@ fn verdict_of(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>) -> Ver
     for (how, call) in crashes {
         if let Some(call) = call.strip_prefix("C ") {
             violated.push(format!("{call} {how}"));
+            fatal = true;
             continue;
         }
         // Preparing the probe failed: another check reports that.
         let call = call.strip_prefix("P ").unwrap_or("the start");
         if id == "B00" || (["L00", "E00"].contains(&id) && !call.starts_with("loading")) {
             violated.push(format!("{call} {how}"));
+            fatal = true;
         } else {
             not_determined = not_determined.or(Some(format!("{call} {how}, before the probe began")));
         }
     }
-    match (violated.is_empty(), not_determined, not_applicable) {
+    let lower = lower.filter(|_| violated.is_empty());
+    violated.extend(lesser);
+    let verdict = match (violated.is_empty(), not_determined, not_applicable) {
         (false, ..) => Verdict::Violated(violated),
         (_, Some(why), _) => Verdict::NotDetermined(why),
         (_, _, Some(why)) => Verdict::NotApplicable(why),
         _ => Verdict::Pass(notes),
-    }
+    };
+    Judgement { verdict, lower, fatal }
 }

@@ -3,6 +3,7 @@
 //! Every finding is written at once and every call is written before it is made, so that nothing is lost if the FMU crashes the
 //! process. `Err(NotDetermined)` ends a probe that cannot decide.
 
+use crate::check::Level;
 use crate::encoding::bits;
 use clap::Args;
 use fmu_import::file_uri;
@@ -22,6 +23,14 @@ use std::time::{Duration, Instant};
 #[derive(Debug)]
 pub(super) struct NotDetermined(pub(super) String);
 
+/// Why a probe has no session.
+pub(super) enum NotOpened {
+    /// Something failed on this computer, which is no fault of the FMU.
+    Here(String),
+    /// The binary does not load.
+    Load(String),
+}
+
 /// One line of a probe's output.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -30,6 +39,8 @@ pub(super) enum Line {
     Case(usize),
     /// A violation.
     Violated(String),
+    /// A violation of this level, lower than that of the check.
+    Lesser(Level, String),
     /// Evidence for a pass.
     Note(String),
     /// The requirement does not apply to this FMU.
@@ -80,24 +91,34 @@ pub(super) struct Session {
     violations: Cell<usize>,
     instances_made: Cell<usize>,
     began: Instant,
+    /// When `show_progress` last wrote.
+    shown: Cell<Instant>,
     timeout: Duration,
+    /// The working directory at the start: temporary, and the FMU may leave it.
+    pub(super) home: PathBuf,
+    /// The file of `journal`.
+    calls: PathBuf,
 }
 
+/// How an end begins that the FMU asked for, as it may at any time.
+pub(super) const ENDED: &str = "the FMU ended the simulation";
 /// Maximum number of violations that one probe reports.
 const MAX_VIOLATIONS: usize = 25;
 
 impl Session {
     /// Loads the FMU.
-    pub(super) fn open(args: &ProbeArguments) -> Result<Self, NotDetermined> {
-        let lost = |e: &dyn std::fmt::Display| NotDetermined(e.to_string());
+    pub(super) fn open(args: &ProbeArguments) -> Result<Self, NotOpened> {
+        let lost = |e: &dyn std::fmt::Display| NotOpened::Here(e.to_string());
+        let home = std::env::current_dir().map_err(|e| lost(&e))?;
         let xml = std::fs::read(args.dir.join("modelDescription.xml")).map_err(|e| lost(&e))?;
         let description = model_description::read(&xml).map_err(|e| lost(&e))?;
         let create = |path: &Path| File::options().create(true).append(true).open(path).map_err(|e| lost(&e));
         let lines = create(&args.out)?;
-        let mut journal = File::create(args.out.with_extension("call")).map_err(|e| lost(&e))?;
+        let calls = args.out.with_extension("call");
+        let mut journal = File::create(&calls).map_err(|e| lost(&e))?;
         let _ = journal.write_all(b"P loading the binary");
         let raw = Raw::open(&args.binary, description.version)
-            .map_err(|e| NotDetermined(format!("the binary does not load: {e}")))?;
+            .map_err(|e| NotOpened::Load(format!("the binary does not load: {e}")))?;
         Ok(Self {
             raw,
             description,
@@ -112,6 +133,9 @@ impl Session {
             violations: Cell::new(0),
             instances_made: Cell::new(0),
             began: Instant::now(),
+            shown: Cell::new(Instant::now()),
+            home,
+            calls,
             timeout: Duration::from_secs_f64(args.seconds),
         })
     }
@@ -129,14 +153,16 @@ impl Session {
 
     /// The same, unpacked to another folder.
     pub(super) fn duplicate_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, NotDetermined> {
-        let scratch = || tempfile::tempfile().map_err(|e| NotDetermined(e.to_string()));
+        let lost = |e: std::io::Error| NotDetermined(e.to_string());
+        // It writes nothing but progress there.
+        let journal = File::options().append(true).open(&self.calls).map_err(lost)?;
         Ok(Self {
             raw,
             description: self.description.clone(),
             binary: self.binary.clone(),
             dir: dir.into(),
-            lines: RefCell::new(scratch()?),
-            journal: RefCell::new(scratch()?),
+            lines: RefCell::new(tempfile::tempfile().map_err(lost)?),
+            journal: RefCell::new(journal),
             preparing: Cell::new(false),
             silent: Cell::new(true),
             from: 0,
@@ -144,6 +170,9 @@ impl Session {
             violations: Cell::new(0),
             instances_made: Cell::new(1000 * (number + 1)),
             began: self.began,
+            shown: Cell::new(Instant::now()),
+            home: self.home.clone(),
+            calls: self.calls.clone(),
             timeout: self.timeout,
         })
     }
@@ -170,6 +199,20 @@ impl Session {
         self.violations.set(self.violations.get() + 1);
         if self.violations.get() <= MAX_VIOLATIONS {
             self.write(&Line::Violated(text.into()));
+        }
+    }
+
+    /// Reports a violation of a lower level than that of the check.
+    pub(super) fn lesser(&self, level: Level, text: impl Into<String>) {
+        self.write(&Line::Lesser(level, text.into()));
+    }
+
+    /// Reports a call that should have succeeded, as a violation; an end that the FMU asked for is none.
+    pub(super) fn failed(&self, what: &str, NotDetermined(why): NotDetermined) {
+        if why.starts_with(ENDED) {
+            self.write(&Line::NotDetermined(why));
+        } else {
+            self.violated(format!("{what}: {why}"));
         }
     }
 
@@ -213,7 +256,7 @@ impl Session {
     /// Writes the next call to the journal.
     pub(super) fn record_call(&self, call: &str) {
         if self.silent.get() {
-            return;
+            return self.show_progress();
         }
         let mut journal = self.journal.borrow_mut();
         let mark = if self.preparing.get() { "P" } else { "C" };
@@ -221,6 +264,16 @@ impl Session {
         let _ = journal.write_all(format!("{mark} {call}\n").as_bytes());
         let end = journal.stream_position().unwrap_or(0);
         let _ = journal.set_len(end);
+    }
+
+    /// Tells the parent, from time to time, that calls without entries of their own return.
+    fn show_progress(&self) {
+        if self.shown.get().elapsed() < Duration::from_millis(100) {
+            return;
+        }
+        self.shown.set(Instant::now());
+        let mut journal = self.journal.borrow_mut();
+        let _ = journal.seek(SeekFrom::End(0)).and_then(|_| writeln!(journal, "and others"));
     }
 
     /// Makes many calls with one journal entry.
@@ -264,6 +317,12 @@ impl Session {
             early_return: false,
             environment: 0x5000 + 0x10 * self.instances_made.get(),
         }
+    }
+
+    /// The relative deviation below which two runs are the same to the standards, which nowhere say bit for bit: the
+    /// tolerance of the default experiment, at least 1e-6.
+    pub(super) fn tolerance(&self) -> f64 {
+        self.description.default_experiment.tolerance.filter(|t| t.is_finite()).unwrap_or(0.0).max(1e-6)
     }
 
     /// Start time of the default experiment.

@@ -12,10 +12,10 @@ use object::{Architecture, BinaryFormat, Object, ObjectSection, ObjectSymbol};
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "B00", requirement: "The archive contains a binary for this platform, and it loads.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::Probe(loads) },
+    Check { id: "B00", requirement: "The archive contains a binary for this platform, and it loads (should, if it lacks a shared library of this machine).", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::Probe(loads) },
     Check { id: "B10", requirement: "Every binary is a shared library for the platform of its folder.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(format) },
     Check { id: "B01", requirement: "Every binary exports all functions of the standard; in FMI 2.0, those of its interface types.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(exports) },
-    Check { id: "B02a", requirement: "No other exported symbol begins with fmi3.", clause: "3.0.2, 2.5", levels: Levels(None, Some(Level::Must)), run: Run::File(reserved) },
+    Check { id: "B02a", requirement: "No other exported symbol begins with fmi3.", clause: "3.0.2, 2.5", levels: Levels(None, Some(Level::Should)), run: Run::File(reserved) },
     Check { id: "B02b", requirement: "A binary exports only functions of the standards and at most two symbols of the tool.", clause: "hardening", levels: Levels::HARD, run: Run::File(only_standard_functions) },
     Check { id: "B02c", requirement: "The binary can be unloaded: it has no unique symbols and no NODELETE flag.", clause: "hardening", levels: Levels::HARD, run: Run::File(unloadable) },
     Check { id: "B03", requirement: "A binary needs only C system libraries; the archive contains all others.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(needed) },
@@ -23,7 +23,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "B04", requirement: "Linux binaries need at most version 2.17 (2012) of the GNU C library, so that they load on old systems.", clause: "hardening", levels: Levels::HARD, run: Run::File(c_library) },
     Check { id: "B05", requirement: "Linux binaries have no text relocations and no executable stack.", clause: "hardening", levels: Levels::HARD, run: Run::File(no_dangerous_flags) },
     Check { id: "B11", requirement: "A binary for x86_64 Linux requires no instruction set beyond x86-64-v1 (according to its note).", clause: "hardening", levels: Levels::HARD, run: Run::File(processor) },
-    Check { id: "X02b", requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels::MUST, run: Run::Probe(versions) },
+    Check { id: "X02b", requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(versions) },
     Check { id: "B08", requirement: "A complete run writes nothing to the console and creates no file in the working directory.", clause: "hardening", levels: Levels::HARD, run: Run::Silent(complete_run) },
 ];
 

@@ -3,8 +3,7 @@
 use super::derivatives::{input_derivatives, output_derivatives, slopes};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session};
-use crate::trajectory::difference;
+use crate::session::{ENDED, NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::StepStatus;
 use model_description::{BaseType, Causality, CoSimulation};
@@ -16,12 +15,12 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "T01a", requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6.", clause: STEP, levels: Levels::SHOULD, run: Run::Probe(start_times) },
     Check { id: "T01b", requirement: "A communication point other than the end of the last step gives Error.", clause: STEP, levels: Levels::HARD, run: Run::Probe(gap) },
     Check { id: "T01c", requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps.", clause: STEP, levels: Levels::MUST, run: Run::Probe(accumulated) },
-    Check { id: "T02a", requirement: "A step size of 0 or less gives Error.", clause: STEP, levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(non_positive_step) },
+    Check { id: "T02a", requirement: "A step size of 0 or less gives Error.", clause: STEP, levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(non_positive_step) },
     Check { id: "T02b", requirement: "A step size or time that is NaN or infinite gives Error and returns promptly.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(non_finite_step) },
     Check { id: "T03", requirement: "Halving the communication step gives approximately the same results with inputs held.", clause: STEP, levels: Levels::HARD, run: Run::Probe(halves) },
-    Check { id: "T04", requirement: "With canHandleVariableCommunicationStepSize, steps of any size succeed.", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::MUST, run: Run::Probe(variable) },
+    Check { id: "T04", requirement: "With canHandleVariableCommunicationStepSize, steps of 0.05 to 3 times the usual size succeed.", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::SHOULD, run: Run::Probe(variable) },
     Check { id: "T05", requirement: "noSetFMUStatePriorToCurrentPoint changes no result, and the state at the current point can still be saved and set.", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(no_set_state_before) },
-    Check { id: "T06a", requirement: "After OK, lastSuccessfulTime is t + h unless the step returned early, which must be allowed; Booleans are 0 or 1.", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results) },
+    Check { id: "T06a", requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has not returned early without permission (should: lastSuccessfulTime is less than a step from t + h).", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results) },
     Check { id: "T06b", requirement: "The independent variable equals the time of the last communication point.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent) },
     Check { id: "T06c", requirement: "NULL pointers for results do no harm.", clause: "3.0.2, 2.2.1", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(null_results) },
     Check { id: "T07", requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), run: Run::Probe(statuses) },
@@ -38,8 +37,8 @@ fn start_times(session: &Session) -> Result<(), NotDetermined> {
             let instance = session.fresh()?;
             instance.experiment(start, None);
             let life = instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(20, session.h()));
-            if let Err(NotDetermined(why)) = life {
-                session.violated(format!("startTime={start}: {why}"));
+            if let Err(why) = life {
+                session.failed(&format!("startTime={start}"), why);
             }
             Ok(())
         });
@@ -75,7 +74,8 @@ fn accumulated(session: &Session) -> Result<(), NotDetermined> {
                 session.note(format!("the FMU ended the simulation after {k} steps"));
                 return Ok(());
             }
-            if !status.is_ok() && inside {
+            // A part of a step may be all that the model can do (Discard).
+            if !status.is_ok() && status != Status::DISCARD && inside {
                 session.violated(format!("step {k}, DoStep(t={:?}, h={h:?}), returned {status}", instance.time.get()));
                 return Ok(());
             }
@@ -176,7 +176,9 @@ fn variable(session: &Session) -> Result<(), NotDetermined> {
             break;
         }
         if !status.is_ok() {
-            session.violated(format!("DoStep(t={t:?}, h={part:?}) returned {status}"));
+            if status != Status::DISCARD {
+                session.violated(format!("DoStep(t={t:?}, h={part:?}) returned {status}"));
+            }
             break;
         }
     }
@@ -206,8 +208,14 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
         session.require(step_results.early == 0, || {
             format!("DoStep(t={t}, h={h}) returned early although that was not allowed")
         });
-        let is_close = (step_results.last - (t + h)).abs() <= 1e-9 * h + 4.0 * f64::EPSILON * t.abs();
-        session.require(is_close, || format!("DoStep(t={t}, h={h}) gave lastSuccessfulTime={}", step_results.last));
+        // A step may end a little elsewhere: a fixed-step integrator cannot reach every time.
+        let last = step_results.last;
+        let text = format!("DoStep(t={t}, h={h}) gave lastSuccessfulTime={last}");
+        if !last.is_finite() {
+            session.violated(text);
+        } else if step_results.early == 0 && step_results.terminate == 0 && (last - (t + h)).abs() >= h {
+            session.lesser(Level::Should, text);
+        }
         if step_results.terminate == 1 {
             break;
         }
@@ -291,9 +299,7 @@ fn determinism(session: &Session) -> Result<(), NotDetermined> {
             .collect::<Result<Vec<_>, _>>()
     };
     let (first, second) = (run()?, run()?);
-    if let Some((k, i)) = difference(&first, &second) {
-        session.violated(format!("{} differs after {} steps", session.watched()[i].name, k + 1));
-    }
+    session.compare("the second run", &first, &second);
     Ok(())
 }
 
@@ -319,10 +325,10 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
         for k in from..from + 10 {
             instance.change_inputs(k)?;
             let (t, h) = (instance.time.get(), session.h());
-            let status = instance
-                .call(&format!("DoStep(t={t}, h={h}, noSetFMUStatePriorToCurrentPoint={no_prior})"), |raw| {
-                    raw.do_step(instance.handle, t, h, no_prior, [true; 4]).map(|(s, _)| s)
-                })?;
+            let status = instance.step_with(t, h, no_prior)?;
+            if instance.over.get() {
+                return Err(NotDetermined(format!("{ENDED} at {t}")));
+            }
             session.require(status.is_ok(), || {
                 format!("with noSetFMUStatePriorToCurrentPoint={no_prior} DoStep(t={t}) returned {status}")
             });
@@ -336,13 +342,7 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
     }
     let (unrestricted, restricted) = (session.stepping()?, session.stepping()?);
     let (a, b) = (run(&unrestricted, 0, false)?, run(&restricted, 0, true)?);
-    if let Some((step, i)) = difference(&a, &b) {
-        session.violated(format!(
-            "{} differs after {} steps with noSetFMUStatePriorToCurrentPoint",
-            session.watched()[i].name,
-            step + 1
-        ));
-    }
+    session.compare("with noSetFMUStatePriorToCurrentPoint", &a, &b);
     if !saves {
         session.note("the FMU does not save states");
         return Ok(());
@@ -354,8 +354,6 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
             .violated(format!("restoring the current point after a step with noSetFMUStatePriorToCurrentPoint: {why}"));
         return Ok(());
     }
-    if let Some((step, i)) = difference(&first, &run(&restricted, 10, true)?) {
-        session.violated(format!("{} differs {} steps after the state was set", session.watched()[i].name, step + 1));
-    }
+    session.compare("after the state was set", &first, &run(&restricted, 10, true)?);
     Ok(())
 }
