@@ -51,7 +51,18 @@ pub struct Check {
     pub clause: &'static str,
     /// How binding it is.
     pub levels: Levels,
+    /// What the check reads or which calls it makes, in one sentence.
+    pub tried: &'static str,
+    /// The usual fix, in one sentence.
+    pub fix: &'static str,
     pub(super) run: Run,
+}
+
+impl Check {
+    /// Whether it calls the binary.
+    pub(super) fn is_probe(&self) -> bool {
+        !matches!(self.run, Run::File(_))
+    }
 }
 
 /// How a check runs.
@@ -101,11 +112,13 @@ pub(super) struct Judgement {
     pub(super) lower: Option<Level>,
     /// A call crashed the process or did not return: an importer would have gone down with it.
     pub(super) fatal: bool,
+    /// The calls that led to the finding, with what they returned.
+    pub(super) calls: Vec<String>,
 }
 
 impl From<Verdict> for Judgement {
     fn from(verdict: Verdict) -> Self {
-        Self { verdict, lower: None, fatal: false }
+        Self { verdict, lower: None, fatal: false, calls: Vec::new() }
     }
 }
 
@@ -131,6 +144,11 @@ pub struct Finding {
     pub level: Level,
     /// A call of the FMU crashed the process or did not return.
     pub fatal: bool,
+    /// `--allow` or the baseline knows it: it does not count.
+    pub known: bool,
+    /// The calls of a probe that led to the finding, with what they returned; `--replay` repeats them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub calls: Vec<String>,
     /// Result.
     #[serde(flatten)]
     pub verdict: Verdict,
@@ -141,7 +159,9 @@ pub struct Finding {
 pub struct Options {
     /// Ids of checks or names of groups; empty for all.
     pub only: Vec<String>,
-    /// Time limit for one probe of the binary; `None` for 10 s.
+    /// Time limit for one call of the binary; `None` for 10 s.
+    pub patience: Option<Duration>,
+    /// Time limit for everything; what has not run by then is not determined.
     pub timeout: Option<Duration>,
     /// Program with the hidden command `probe`; `None` for the running one.
     pub program: Option<PathBuf>,

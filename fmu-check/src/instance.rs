@@ -25,6 +25,7 @@ impl Session {
     pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<Instance<'_>>, NotDetermined> {
         self.record_call(&format!("{}({:?})", self.instantiation(), arguments.name.as_deref().unwrap_or_default()));
         let handle = self.raw.instantiate(arguments).map_err(NotDetermined)?;
+        self.record_result(&if handle.is_some() { "an instance" } else { "NULL" });
         Ok(handle.map(|handle| Instance::new(self, handle, arguments.event_mode)))
     }
 
@@ -77,7 +78,9 @@ impl Instance<'_> {
         self.session.record_call(&name);
         let missing =
             || NotDetermined(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
-        function(&self.session.raw).ok_or_else(missing)
+        let status = function(&self.session.raw).ok_or_else(missing)?;
+        self.session.record_result(&status);
+        Ok(status)
     }
 
     /// A function without arguments.

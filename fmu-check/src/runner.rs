@@ -7,14 +7,14 @@
 use crate::check::{Check, Judgement, Level, Options, Run, Verdict};
 use crate::checks::GROUPS;
 use crate::fmu_file::FmuFile;
-use crate::session::Line;
+use crate::session::{FOUND, Line};
 use crate::watch::{State, Watch};
 use model_description::Interface;
 use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Default time limit of a probe.
@@ -23,6 +23,7 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 const WITHOUT_MINIMAL_RUN: [&str; 4] = ["B00", "L00", "E00", "X02b"];
 /// Checks with `Run::Probe` that make no instance, so that they apply to every interface.
 const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
+const OUT_OF_TIME: &str = "the time limit of the run was used up (see --timeout)";
 /// Maximum number of restarts of a probe whose cases crash it.
 const MAX_RESTARTS: usize = 12;
 
@@ -70,7 +71,12 @@ fn is_exchange(check: &Check) -> bool {
 /// Exchange.
 fn why_no_run_succeeds(runner: &Result<Runner, String>, id: &str) -> Option<Verdict> {
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == id)?;
-    match runner.as_ref().ok()?.run(check).verdict {
+    let runner = runner.as_ref().ok()?;
+    let began = Instant::now();
+    let verdict = runner.run(check).verdict;
+    let least = Duration::from_secs(2).min(runner.timeout);
+    let _ = runner.wild.set((20 * began.elapsed()).clamp(least, runner.timeout));
+    match verdict {
         Verdict::Violated(found) => Some(Verdict::NotDetermined(format!(
             "a minimal run fails ({id}): {}",
             found.first().map_or("", String::as_str)
@@ -91,24 +97,33 @@ fn store(place: &Mutex<Option<Judgement>>, verdict: Judgement) {
 }
 
 /// Settings that all probes of a file share.
-struct Runner {
+pub(super) struct Runner {
     program: PathBuf,
     dir: PathBuf,
     /// The binaries for co-simulation and for Model Exchange; mostly the same one.
     simulation: Option<PathBuf>,
     exchange: Option<PathBuf>,
+    /// Of one call.
     timeout: Duration,
+    /// Of a call with arguments that a real importer never passes: known after a minimal run.
+    wild: OnceLock<Duration>,
+    /// Of the whole run.
+    deadline: Option<Instant>,
 }
+
+/// Checks whose calls have wild arguments: a hang shows sooner there.
+const WILD: [&str; 4] = ["T02b", "G07a", "E09", "F04c"];
 
 /// How a child process ended.
 enum Outcome {
     Exit(ExitStatus),
     TimedOut,
     Slow,
+    OutOfTime,
 }
 
 impl Runner {
-    fn new(fmu: &FmuFile, options: &Options) -> Result<Self, String> {
+    pub(super) fn new(fmu: &FmuFile, options: &Options) -> Result<Self, String> {
         let description = fmu.description.as_ref().map_err(|_| "the description cannot be read")?;
         let binary = |interface: &Option<Interface>| {
             interface.as_ref().map(|i| Ok::<_, String>(fmu.dir().join(&fmu.host_binary(i)?.name))).transpose()
@@ -123,11 +138,22 @@ impl Runner {
             dir: fmu.dir().to_owned(),
             simulation,
             exchange,
-            timeout: options.timeout.unwrap_or(TIMEOUT),
+            timeout: options.patience.unwrap_or(TIMEOUT),
+            wild: OnceLock::new(),
+            deadline: options.timeout.map(|left| Instant::now() + left),
         })
     }
 
+    /// The time limit of a call of a check.
+    fn limit(&self, id: &str) -> Duration {
+        let wild = self.wild.get().filter(|_| WILD.contains(&id));
+        wild.copied().unwrap_or(self.timeout)
+    }
+
     fn run(&self, check: &Check) -> Judgement {
+        if self.deadline.is_some_and(|end| Instant::now() > end) {
+            return Verdict::NotDetermined(OUT_OF_TIME.into()).into();
+        }
         let binary = match (is_exchange(check), &self.simulation, &self.exchange) {
             (true, _, None) => return Verdict::NotApplicable("the FMU has no interface for Model Exchange".into()).into(),
             (true, _, Some(binary)) | (false, Some(binary), _) => binary,
@@ -167,17 +193,25 @@ impl Runner {
                 break;
             }
             let last_call = fs::read_to_string(out.with_extension("call")).unwrap_or_default();
+            if matches!(end, Outcome::OutOfTime) {
+                slow = Some(OUT_OF_TIME.to_owned());
+                break;
+            }
             if matches!(end, Outcome::Slow) {
                 let call = last_call.lines().next().unwrap_or_default();
                 let call = call.trim_start_matches(|c| c == 'C' || c == 'P').trim();
                 slow = Some(format!(
-                    "the probe is too slow here for a limit of {} s for each call; it was in {call} (see --timeout)",
+                    "the probe is too slow here for a limit of {} s for each call; it was in {call} (see --patience)",
                     self.timeout.as_secs_f64()
                 ));
                 break;
             }
             let last_call = last_call.lines().next().unwrap_or_default();
-            crashes.push((end.describe(self.timeout), last_call.trim().to_owned()));
+            crashes.push((end.describe(self.limit(check.id)), last_call.trim().to_owned()));
+            if matches!(end, Outcome::TimedOut) {
+                // One hang is enough to know; the other cases would cost as much time again.
+                break;
+            }
             let last = lines.iter().rev().find_map(|l| if let Line::Case(n) = l { Some(*n) } else { None });
             match last {
                 // Continue with the next case, within a limit of restarts and time.
@@ -186,6 +220,9 @@ impl Runner {
             }
         }
         let mut found = judge(check.id, read(&out), crashes, slow);
+        if matches!(found.verdict, Verdict::Violated(_)) {
+            found.calls = calls(&fs::read_to_string(out.with_extension("log")).unwrap_or_default());
+        }
         if matches!(check.run, Run::Silent(_)) && matches!(found.verdict, Verdict::Pass(_)) {
             let side_effects = side_effects(folder.path(), &working_directory);
             if !side_effects.is_empty() {
@@ -195,9 +232,10 @@ impl Runner {
         Ok(found)
     }
 
-    fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> std::io::Result<Outcome> {
-        let console = File::options().create(true).append(true).open(folder.join("console"))?;
-        let mut child = Command::new(&self.program)
+    /// The probe's process.
+    fn command(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> Command {
+        let mut command = Command::new(&self.program);
+        command
             .args(["probe", "--id", check.id, "--from", &from.to_string()])
             .args(["--seconds", &self.timeout.as_secs_f64().to_string()])
             .arg("--dir")
@@ -207,17 +245,66 @@ impl Runner {
             .arg("--out")
             .arg(folder.join("out"))
             .current_dir(folder.join("home"))
-            .stdin(Stdio::null())
+            .stdin(Stdio::null());
+        command
+    }
+
+    /// Runs a probe, or one case of it, in a process that prints its calls; returns what was found.
+    pub(super) fn replay(&self, check: &Check, case: Option<usize>) -> std::io::Result<Judgement> {
+        let binary = match (is_exchange(check), &self.simulation, &self.exchange) {
+            (true, _, Some(binary)) | (false, Some(binary), _) | (false, None, Some(binary)) => binary,
+            _ => return Ok(Verdict::NotApplicable("the FMU has no such interface".into()).into()),
+        };
+        let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
+        fs::create_dir(folder.path().join("home"))?;
+        let out = folder.path().join("out");
+        let mut command = self.command(check, binary, folder.path(), case.unwrap_or(0));
+        command.arg("--trace");
+        if case.is_some() {
+            command.arg("--one");
+        }
+        let mut child = command.spawn()?;
+        let mut watch = Watch::new(child.id(), out.with_extension("call"), self.timeout);
+        let end = loop {
+            if let Some(status) = child.try_wait()? {
+                break Outcome::Exit(status);
+            }
+            if watch.look() != State::Runs {
+                child.kill()?;
+                child.wait()?;
+                break Outcome::TimedOut;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        let lines = read(&out);
+        let mut crashes = Vec::new();
+        if !lines.iter().any(|l| matches!(l, Line::Done)) {
+            let call = fs::read_to_string(out.with_extension("call")).unwrap_or_default();
+            crashes.push((end.describe(self.timeout), call.lines().next().unwrap_or_default().trim().to_owned()));
+        }
+        Ok(judge(check.id, lines, crashes, None))
+    }
+
+    fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> std::io::Result<Outcome> {
+        let console = File::options().create(true).append(true).open(folder.join("console"))?;
+        let mut child = self
+            .command(check, binary, folder, from)
             .stdout(console.try_clone()?)
             .stderr(console)
             .spawn()?;
         let began = Instant::now();
-        let mut watch = Watch::new(child.id(), folder.join("out").with_extension("call"), self.timeout);
+        let mut watch = Watch::new(child.id(), folder.join("out").with_extension("call"), self.limit(check.id));
         loop {
             if let Some(status) = child.try_wait()? {
                 return Ok(Outcome::Exit(status));
             }
             let state = watch.look();
+            let late = self.deadline.is_some_and(|end| Instant::now() > end);
+            if late {
+                child.kill()?;
+                child.wait()?;
+                return Ok(Outcome::OutOfTime);
+            }
             if state != State::Runs {
                 child.kill()?;
                 child.wait()?;
@@ -232,7 +319,7 @@ impl Runner {
 impl Outcome {
     fn describe(&self, timeout: Duration) -> String {
         match self {
-            Self::TimedOut | Self::Slow => format!("did not return within {} s", timeout.as_secs_f64()),
+            Self::TimedOut | Self::Slow | Self::OutOfTime => format!("did not return within {} s", timeout.as_secs_f64()),
             Self::Exit(status) => {
                 #[cfg(unix)]
                 if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(status) {
@@ -254,6 +341,22 @@ impl Outcome {
 fn read(out: &Path) -> Vec<Line> {
     let text = fs::read_to_string(out).unwrap_or_default();
     text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+}
+
+/// The calls of the first case with a finding: that with the mark, or the last one.
+fn calls(log: &str) -> Vec<String> {
+    const MOST: usize = 60;
+    let cases: Vec<&str> = log.split("# case ").collect();
+    let found = cases.iter().find(|case| case.contains(FOUND)).or(cases.last());
+    let lines: Vec<_> = found.map_or("", |case| case).lines().filter(|l| !l.is_empty() && *l != FOUND).collect();
+    // The number of the case is the first line of all but the first part.
+    let first = usize::from(cases.len() > 1 && found.is_some_and(|f| !std::ptr::eq(*f, cases[0])));
+    let calls: Vec<String> = lines.iter().skip(first).map(|l| (*l).to_owned()).collect();
+    if calls.len() <= MOST {
+        return calls;
+    }
+    let left_out = format!("({} calls)", calls.len() - MOST);
+    [&calls[..MOST / 2], &[left_out], &calls[calls.len() - MOST / 2..]].concat()
 }
 
 /// Unwanted console output and files of the process.
@@ -308,5 +411,5 @@ fn judge(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Optio
         (_, _, Some(why)) => Verdict::NotApplicable(why),
         _ => Verdict::Pass(notes),
     };
-    Judgement { verdict, lower, fatal }
+    Judgement { verdict, lower, fatal, calls: Vec::new() }
 }

@@ -69,6 +69,12 @@ pub struct ProbeArguments {
     /// Number of the first case.
     #[arg(long, default_value_t = 0)]
     pub from: usize,
+    /// Only this case.
+    #[arg(long)]
+    pub one: bool,
+    /// Print every call with what it returned.
+    #[arg(long)]
+    pub trace: bool,
     /// Time that it may take, in seconds.
     #[arg(long, default_value_t = 10.0)]
     pub seconds: f64,
@@ -86,7 +92,10 @@ pub(super) struct Session {
     journal: RefCell<File>,
     preparing: Cell<bool>,
     pub(super) silent: Cell<bool>,
+    log: RefCell<File>,
+    trace: bool,
     from: usize,
+    one: bool,
     next: Cell<usize>,
     violations: Cell<usize>,
     instances_made: Cell<usize>,
@@ -100,6 +109,8 @@ pub(super) struct Session {
     calls: PathBuf,
 }
 
+/// Stands in the log of calls where something was found.
+pub(super) const FOUND: &str = "# found";
 /// How an end begins that the FMU asked for, as it may at any time.
 pub(super) const ENDED: &str = "the FMU ended the simulation";
 /// Maximum number of violations that one probe reports.
@@ -116,6 +127,7 @@ impl Session {
         let lines = create(&args.out)?;
         let calls = args.out.with_extension("call");
         let mut journal = File::create(&calls).map_err(|e| lost(&e))?;
+        let log = create(&args.out.with_extension("log"))?;
         let _ = journal.write_all(b"P loading the binary");
         let raw = Raw::open(&args.binary, description.version)
             .map_err(|e| NotOpened::Load(format!("the binary does not load: {e}")))?;
@@ -128,7 +140,10 @@ impl Session {
             journal: RefCell::new(journal),
             preparing: Cell::new(false),
             silent: Cell::new(false),
+            log: RefCell::new(log),
+            trace: args.trace,
             from: args.from,
+            one: args.one,
             next: Cell::new(0),
             violations: Cell::new(0),
             instances_made: Cell::new(0),
@@ -165,7 +180,10 @@ impl Session {
             journal: RefCell::new(journal),
             preparing: Cell::new(false),
             silent: Cell::new(true),
+            log: RefCell::new(tempfile::tempfile().map_err(lost)?),
+            trace: false,
             from: 0,
+            one: false,
             next: Cell::new(0),
             violations: Cell::new(0),
             instances_made: Cell::new(1000 * (number + 1)),
@@ -200,11 +218,13 @@ impl Session {
         if self.violations.get() <= MAX_VIOLATIONS {
             self.write(&Line::Violated(text.into()));
         }
+        self.note_call(&format!("\n{FOUND}\n"));
     }
 
     /// Reports a violation of a lower level than that of the check.
     pub(super) fn lesser(&self, level: Level, text: impl Into<String>) {
         self.write(&Line::Lesser(level, text.into()));
+        self.note_call(&format!("\n{FOUND}\n"));
     }
 
     /// Reports a call that should have succeeded, as a violation; an end that the FMU asked for is none.
@@ -239,10 +259,11 @@ impl Session {
     pub(super) fn case(&self, case: impl FnOnce() -> Result<(), NotDetermined>) {
         let number = self.next.get();
         self.next.set(number + 1);
-        if number < self.from {
+        if number < self.from || (self.one && number > self.from) {
             return;
         }
         self.write(&Line::Case(number));
+        self.note_call(&format!("\n# case {number}\n"));
         if let Err(NotDetermined(why)) = case() {
             self.write(&Line::NotDetermined(why));
         }
@@ -258,12 +279,32 @@ impl Session {
         if self.silent.get() {
             return self.show_progress();
         }
+        if !call.starts_with('(') {
+            self.note_call(&format!("\n{call}"));
+        }
         let mut journal = self.journal.borrow_mut();
         let mark = if self.preparing.get() { "P" } else { "C" };
         let _ = journal.seek(SeekFrom::Start(0));
         let _ = journal.write_all(format!("{mark} {call}\n").as_bytes());
         let end = journal.stream_position().unwrap_or(0);
         let _ = journal.set_len(end);
+    }
+
+    /// Adds to the log of calls.
+    fn note_call(&self, text: &str) {
+        if self.silent.get() {
+            return;
+        }
+        let _ = self.log.borrow_mut().write_all(text.as_bytes());
+        if self.trace {
+            print!("{text}");
+            let _ = std::io::stdout().flush();
+        }
+    }
+
+    /// Adds what the last call returned.
+    pub(super) fn record_result(&self, result: &dyn std::fmt::Display) {
+        self.note_call(&format!(" -> {result}"));
     }
 
     /// Tells the parent, from time to time, that calls without entries of their own return.
