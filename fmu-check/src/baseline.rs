@@ -72,7 +72,9 @@ impl Baseline {
 
     /// The text of a baseline that knows all findings of these reports.
     pub fn text(reports: &[Report]) -> String {
-        let mut out = String::from("# What `fmu check --baseline` knows: it fails on other findings. --write-baseline writes it.\n");
+        let mut out = String::from(
+            "# What `fmu check --baseline` knows: it fails on other findings. --write-baseline writes it.\n",
+        );
         let mut of_model: BTreeMap<String, Vec<&Report>> = BTreeMap::new();
         for report in reports {
             of_model.entry(key(report)).or_default().push(report);

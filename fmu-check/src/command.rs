@@ -106,7 +106,9 @@ pub fn run(args: &Check) -> Result<bool> {
         return Ok(true);
     }
     if let Some(id) = &args.explain {
-        let Some(text) = report::explain(id) else { bail!("--explain {id}: there is no such check; --list shows them") };
+        let Some(text) = report::explain(id) else {
+            bail!("--explain {id}: there is no such check; --list shows them")
+        };
         print!("{text}");
         return Ok(true);
     }
@@ -141,7 +143,9 @@ pub fn run(args: &Check) -> Result<bool> {
         reports.push(report);
     }
     match (args.format, reports.as_slice()) {
-        (Format::Text, reports) => print!("{}{}", report::texts(reports, args.verbose), news(baseline.as_ref(), reports)),
+        (Format::Text, reports) => {
+            print!("{}{}", report::texts(reports, args.verbose), news(baseline.as_ref(), reports))
+        }
         (Format::Json, [report]) => println!("{}", report.json()?),
         (Format::Json, reports) => println!("{}", serde_json::to_string_pretty(reports)?),
         (Format::Html, reports) => print!("{}", report::html(reports)),

@@ -79,7 +79,12 @@ mod tests {
                 let of: Vec<_> = clauses.iter().filter(|(v, _)| *v == version).collect();
                 let single = of.iter().all(|(_, clause)| clause.bytes().all(|b| b.is_ascii_digit() || b == b'.'));
                 assert!(single && of.len() <= 1, "{}: {}", check.id, check.clause);
-                assert!(level != Some(Level::Must) || of.len() == 1, "{} must in {version}, by {}", check.id, check.clause);
+                assert!(
+                    level != Some(Level::Must) || of.len() == 1,
+                    "{} must in {version}, by {}",
+                    check.id,
+                    check.clause
+                );
             };
             one("2.0.5", check.levels.0);
             one("3.0.2", check.levels.1);

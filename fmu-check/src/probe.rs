@@ -38,9 +38,15 @@ pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
             let line = match why {
                 NotOpened::Load(why) if args.id == "B00" && !needs_tool(&args.dir) => {
                     // A library or a version of it is missing on this computer: the standards only recommend to avoid that.
-                    if ["cannot open shared object file", "not found", "GetLastError 126", "code: 126", "Library not loaded"]
-                        .iter()
-                        .any(|sign| why.contains(sign))
+                    if [
+                        "cannot open shared object file",
+                        "not found",
+                        "GetLastError 126",
+                        "code: 126",
+                        "Library not loaded",
+                    ]
+                    .iter()
+                    .any(|sign| why.contains(sign))
                     {
                         Line::Lesser(Level::Should, why)
                     } else {

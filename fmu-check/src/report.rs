@@ -128,27 +128,29 @@ impl Report {
     /// Text for a terminal: violated and undetermined checks; with `verbose` also all others.
     pub fn text(&self, verbose: bool) -> String {
         let mut out = format!("{}\n", self.heading());
+        // A reason that checks share is printed once, at the end.
+        let mut shared: Vec<(&str, Vec<&str>)> = Vec::new();
+        for f in self.findings.iter().filter(|_| !verbose) {
+            let Verdict::NotDetermined(reason) = &f.verdict else { continue };
+            match shared.iter_mut().find(|(other, _)| *other == reason.as_str()) {
+                Some((_, ids)) => ids.push(f.id),
+                None => shared.push((reason, vec![f.id])),
+            }
+        }
+        shared.retain(|(_, ids)| ids.len() > 1);
         for (title, findings) in self.groups() {
             let passed = findings.iter().filter(|f| matches!(f.verdict, Verdict::Pass(_))).count();
             let _ = writeln!(out, "\n{title} ({passed} of {} passed)", findings.len());
-            // Print a reason that checks share only once.
-            let mut shown_reasons: Vec<&str> = Vec::new();
             for f in &findings {
                 match &f.verdict {
                     Verdict::Pass(_) | Verdict::NotApplicable(_) if !verbose => {}
-                    Verdict::NotDetermined(reason) if !verbose => {
-                        let same = |f: &&&Finding| f.verdict == Verdict::NotDetermined(reason.clone());
-                        let ids: Vec<_> = findings.iter().filter(same).map(|f| f.id).collect();
-                        if ids.len() == 1 {
-                            line(&mut out, f, verbose);
-                        } else if !shown_reasons.contains(&reason.as_str()) {
-                            shown_reasons.push(reason);
-                            let _ = writeln!(out, "  not determined: {}\n         - {reason}", ids.join(", "));
-                        }
-                    }
+                    Verdict::NotDetermined(_) if shared.iter().any(|(_, ids)| ids.contains(&f.id)) => {}
                     _ => line(&mut out, f, verbose),
                 }
             }
+        }
+        for (reason, ids) in shared {
+            let _ = writeln!(out, "\nNot determined, {} checks: {reason}\n  {}", ids.len(), ids.join(", "));
         }
         let _ = writeln!(out, "\n{}", self.summary());
         if !self.fatal().is_empty() {

@@ -155,10 +155,14 @@ impl Runner {
             return Verdict::NotDetermined(OUT_OF_TIME.into()).into();
         }
         let binary = match (is_exchange(check), &self.simulation, &self.exchange) {
-            (true, _, None) => return Verdict::NotApplicable("the FMU has no interface for Model Exchange".into()).into(),
+            (true, _, None) => {
+                return Verdict::NotApplicable("the FMU has no interface for Model Exchange".into()).into();
+            }
             (true, _, Some(binary)) | (false, Some(binary), _) => binary,
             (false, None, Some(binary)) if WITHOUT_INSTANCE.contains(&check.id) => binary,
-            (false, None, _) => return Verdict::NotApplicable("the FMU has no interface for co-simulation".into()).into(),
+            (false, None, _) => {
+                return Verdict::NotApplicable("the FMU has no interface for co-simulation".into()).into();
+            }
         };
         let run = || {
             self.attempt(check, binary)
@@ -287,11 +291,8 @@ impl Runner {
 
     fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> std::io::Result<Outcome> {
         let console = File::options().create(true).append(true).open(folder.join("console"))?;
-        let mut child = self
-            .command(check, binary, folder, from)
-            .stdout(console.try_clone()?)
-            .stderr(console)
-            .spawn()?;
+        let mut child =
+            self.command(check, binary, folder, from).stdout(console.try_clone()?).stderr(console).spawn()?;
         let began = Instant::now();
         let mut watch = Watch::new(child.id(), folder.join("out").with_extension("call"), self.limit(check.id));
         loop {
@@ -319,7 +320,9 @@ impl Runner {
 impl Outcome {
     fn describe(&self, timeout: Duration) -> String {
         match self {
-            Self::TimedOut | Self::Slow | Self::OutOfTime => format!("did not return within {} s", timeout.as_secs_f64()),
+            Self::TimedOut | Self::Slow | Self::OutOfTime => {
+                format!("did not return within {} s", timeout.as_secs_f64())
+            }
             Self::Exit(status) => {
                 #[cfg(unix)]
                 if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(status) {

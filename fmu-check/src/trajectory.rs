@@ -36,11 +36,7 @@ fn number(base: BaseType, bits: u64) -> f64 {
 }
 
 /// Where two trajectories of these variables differ.
-pub(super) fn difference(
-    variables: &[&ModelVariable],
-    a: &[Vec<Vec<u64>>],
-    b: &[Vec<Vec<u64>>],
-) -> Option<Difference> {
+pub(super) fn difference(variables: &[&ModelVariable], a: &[Vec<Vec<u64>>], b: &[Vec<Vec<u64>>]) -> Option<Difference> {
     if a.len() != b.len() {
         return Some(Difference { step: a.len().min(b.len()), variable: 0, largest: f64::INFINITY });
     }

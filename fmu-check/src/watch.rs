@@ -69,7 +69,8 @@ impl Watch {
 #[cfg(target_os = "linux")]
 fn processor(pid: u32) -> Option<(Duration, bool)> {
     // The name of the program stands in parentheses and may contain anything.
-    let fields = |text: String| Some(text.rsplit_once(')')?.1.split_whitespace().map(str::to_owned).collect::<Vec<_>>());
+    let fields =
+        |text: String| Some(text.rsplit_once(')')?.1.split_whitespace().map(str::to_owned).collect::<Vec<_>>());
     let stat = fields(fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)?;
     // utime and stime; the kernel reports hundredths of a second on every system that we know.
     let ticks = stat.get(11)?.parse::<u64>().ok()? + stat.get(12)?.parse::<u64>().ok()?;

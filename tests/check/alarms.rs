@@ -30,7 +30,11 @@ fn an_fmu_may_end_itself() {
         let Some(report) = small(dir.path(), version, "ENDS", &[]) else { return };
         assert!(violated(&report).is_empty(), "FMI {version}: {}", told(&report));
         for id in ["L00", "T01c", "T04"] {
-            assert!(matches!(verdict(&report, id), Verdict::Pass(_)), "FMI {version}: {id}: {:?}", verdict(&report, id));
+            assert!(
+                matches!(verdict(&report, id), Verdict::Pass(_)),
+                "FMI {version}: {id}: {:?}",
+                verdict(&report, id)
+            );
         }
         assert!(matches!(verdict(&report, "F02a"), Verdict::NotDetermined(_)), "{:?}", verdict(&report, "F02a"));
     }
@@ -126,7 +130,12 @@ fn a_missing_library() {
     let binary = compile(dir.path(), 2, "NONE", &more).unwrap();
     std::fs::remove_file(&library).unwrap();
     let report = check(&pack(dir.path(), 2, "library", &binary), &["binary"]);
-    assert_eq!((at(&report, Level::Must), at(&report, Level::Should)), (vec![], vec!["B00", "B03"]), "{}", told(&report));
+    assert_eq!(
+        (at(&report, Level::Must), at(&report, Level::Should)),
+        (vec![], vec!["B00", "B03"]),
+        "{}",
+        told(&report)
+    );
     let binary = compile(dir.path(), 2, "UNDEFINED", &[]).unwrap();
     let report = check(&pack(dir.path(), 2, "symbol", &binary), &["B00"]);
     assert_eq!(at(&report, Level::Must), ["B00"], "{}", told(&report));
@@ -159,7 +168,11 @@ fn rounding_is_no_must() {
         assert!(at(&report, Level::Must).is_empty(), "{property}: {}", told(&report));
         let hard = at(&report, Level::Hard);
         assert!(ids.iter().all(|id| hard.contains(id)), "{property}: {}", told(&report));
-        assert!(told(&report).contains("e-13, within 1e-6") || told(&report).contains("e-12, within 1e-6"), "{}", told(&report));
+        assert!(
+            told(&report).contains("e-13, within 1e-6") || told(&report).contains("e-12, within 1e-6"),
+            "{}",
+            told(&report)
+        );
     }
     let report = small(dir.path(), 2, "T05", &["T05"]).unwrap();
     assert_eq!(at(&report, Level::Must), ["T05"], "{}", told(&report));

@@ -54,7 +54,9 @@ fn known_findings_do_not_count() {
     let (code, text, _) = fmu_check(&[worse.to_str().unwrap(), "--only", STATIC, "--baseline", baseline]);
     assert!(code == Some(1) && text.contains("new: X06"), "{text}");
     // What has been mended is named.
-    let better = archive(dir.path(), "better.fmu", |xml| two_faults(xml).replace("<Outputs>", "<Outputs><Unknown index=\"4\"/>"));
+    let better = archive(dir.path(), "better.fmu", |xml| {
+        two_faults(xml).replace("<Outputs>", "<Outputs><Unknown index=\"4\"/>")
+    });
     let (code, text, _) = fmu_check(&[better.to_str().unwrap(), "--only", STATIC, "--baseline", baseline]);
     assert!(code == Some(0) && text.contains("no longer needed in the baseline: S01"), "{text}");
     // A finding that was a should is new as a must.
@@ -69,12 +71,12 @@ fn known_findings_do_not_count() {
 fn formats_for_a_ci() {
     let dir = tempfile::tempdir().unwrap();
     let path = archive(dir.path(), "x & y.fmu", two_faults);
-    let run = |format: &str| {
-        fmu_check(&[path.to_str().unwrap(), "--only", STATIC, "--allow", "X08", "--format", format])
-    };
+    let run =
+        |format: &str| fmu_check(&[path.to_str().unwrap(), "--only", STATIC, "--allow", "X08", "--format", format]);
     let (code, junit, _) = run("junit");
     let suite = model_description::Element::parse(&junit).unwrap();
-    let (suite, number) = (&suite.children[0], |name: &str| suite.children[0].get(name).unwrap().parse::<usize>().unwrap());
+    let (suite, number) =
+        (&suite.children[0], |name: &str| suite.children[0].get(name).unwrap().parse::<usize>().unwrap());
     assert!(code == Some(1) && suite.get("name").unwrap().ends_with("x & y.fmu"), "{junit}");
     assert_eq!((number("tests"), number("failures")), (suite.children.len(), 1), "{junit}");
     let with = |kind: &str| suite.children.iter().filter(|c| c.child(kind).is_some()).collect::<Vec<_>>();
@@ -84,7 +86,8 @@ fn formats_for_a_ci() {
     let sarif: serde_json::Value = serde_json::from_str(&sarif).unwrap();
     assert_eq!(sarif["version"], "2.1.0");
     let run = &sarif["runs"][0];
-    let ids: Vec<_> = run["tool"]["driver"]["rules"].as_array().unwrap().iter().map(|r| r["id"].as_str().unwrap()).collect();
+    let ids: Vec<_> =
+        run["tool"]["driver"]["rules"].as_array().unwrap().iter().map(|r| r["id"].as_str().unwrap()).collect();
     let results = run["results"].as_array().unwrap();
     assert!(results.iter().all(|r| ids.contains(&r["ruleId"].as_str().unwrap())));
     let of = |id: &str| results.iter().find(|r| r["ruleId"] == id).unwrap();
@@ -110,13 +113,13 @@ fn several_files_have_one_summary() {
     let dir = tempfile::tempdir().unwrap();
     let good = archive(dir.path(), "good.fmu", str::to_owned);
     let one = archive(dir.path(), "one.fmu", two_faults);
-    let two = archive(dir.path(), "two.fmu", |xml| two_faults(xml).replace("fmiVersion=\"2.0\"", "fmiVersion=\"2.0.5\""));
+    let two = archive(dir.path(), "two.fmu", |xml| two_faults(xml).replace(" license=\"MIT\"", ""));
     let files = [good.to_str().unwrap(), one.to_str().unwrap(), two.to_str().unwrap(), "--only", STATIC];
     let (code, text, _) = fmu_check(&files);
     assert_eq!(code, Some(1));
     assert_eq!(text.matches("S01 ").count(), 1, "{text}");
     assert!(text.contains("S01    VIOLATED (must) in 2 of 3 files, one.fmu, two.fmu: "), "{text}");
-    assert_eq!(text.matches("X02a ").count(), 1, "{text}");
+    assert_eq!(text.matches("X06 ").count(), 1, "{text}");
     assert!(text.ends_with("3 files, 2 of which violate requirements of the standard (must).\n"), "{text}");
     let (_, json, _) = fmu_check(&[&files[..], &["--format", "json"]].concat());
     assert_eq!(serde_json::from_str::<serde_json::Value>(&json).unwrap().as_array().unwrap().len(), 3);
@@ -124,12 +127,22 @@ fn several_files_have_one_summary() {
     assert_eq!((html.matches("<h1>").count(), html.matches("<html").count()), (3, 1));
 }
 
+/// A reason that many checks share is told once.
+#[test]
+fn a_common_reason_has_one_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let report = check(&pack(dir.path(), 2, "text", b"no library"), &[]);
+    let text = report.text(false);
+    assert_eq!(text.matches("the binary does not load").count(), 2, "B00, and the others:\n{text}");
+    assert!(text.contains("\nNot determined, "), "{text}");
+}
+
 /// A hang of one case is enough: the others of the probe are not waited for.
 #[test]
 fn a_second_hang_is_not_waited_for() {
     let dir = tempfile::tempdir().unwrap();
     let Some(binary) = compile(dir.path(), 2, "T02b", &[]) else { return };
-    // Without the first, three of five cases hang.
+    // Two of five cases hang.
     let path = pack(dir.path(), 2, "hang", &binary);
     let began = Instant::now();
     let report = check_within(&path, &["T02b"], 20);
@@ -158,7 +171,7 @@ fn calls_are_told_and_repeated() {
     let path = pack(dir.path(), 2, "calls", &binary);
     let calls = check(&path, &["G01a"]).finding("G01a").unwrap().calls.clone();
     assert!(calls[0].starts_with("fmi2Instantiate") && calls[0].ends_with("-> an instance"), "{calls:?}");
-    assert_eq!(calls.last().unwrap(), "fmi2Get(Float64, NULL, 0, NULL, 0) -> Error", "{calls:?}");
+    assert!(calls.iter().any(|call| call == "fmi2Get(Float64, NULL, 0, NULL, 0) -> Error"), "{calls:?}");
     let (code, text, _) = fmu_check(&[path.to_str().unwrap(), "--replay", "g01a#0"]);
     assert!(code == Some(1) && calls.iter().all(|call| text.contains(call.as_str())), "{text}");
     assert!(text.contains("# case 0") && !text.contains("# case 1"), "{text}");

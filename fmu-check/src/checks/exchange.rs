@@ -338,8 +338,7 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
     }
     let compare = |mode: &str, first: &[Vec<f64>], second: &[Vec<f64>]| {
         if let Some((k, largest)) = deviation(first, second) {
-            session
-                .deviates(largest, &format!("restored in {mode}: the run differs from the first after {k} steps"));
+            session.deviates(largest, &format!("restored in {mode}: the run differs from the first after {k} steps"));
         }
     };
     session.case(|| {

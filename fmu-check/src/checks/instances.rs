@@ -62,10 +62,7 @@ fn threads(session: &Session) -> Result<(), NotDetermined> {
     session.record_call("4 threads, each with an instance, 40 steps");
     let results: Vec<Result<Vec<Vec<Vec<u64>>>, NotDetermined>> = std::thread::scope(|scope| {
         let run = |duplicate: &Session| trajectory(&duplicate.stepping()?, 40);
-        let workers: Vec<_> = duplicates
-            .into_iter()
-            .map(|duplicate| scope.spawn(move || run(&duplicate)))
-            .collect();
+        let workers: Vec<_> = duplicates.into_iter().map(|duplicate| scope.spawn(move || run(&duplicate))).collect();
         let panicked = || Err(NotDetermined("the thread panicked".into()));
         workers.into_iter().map(|w| w.join().unwrap_or_else(|_| panicked())).collect()
     });

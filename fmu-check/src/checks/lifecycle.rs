@@ -256,9 +256,7 @@ fn recovery(session: &Session) -> Result<(), NotDetermined> {
         return Ok(());
     }
     instance.experiment(session.start(), None);
-    if let Err(why) =
-        instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(5, session.h()))
-    {
+    if let Err(why) = instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(5, session.h())) {
         session.failed(&format!("after {how} had returned Error and Reset had succeeded"), why);
     }
     Ok(())

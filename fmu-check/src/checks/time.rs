@@ -205,7 +205,7 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
             .require([step_results.event, step_results.terminate, step_results.early].iter().all(|b| *b <= 1), || {
                 format!("DoStep(t={t}, h={h}) gave {step_results:?}: a Boolean is not 0 or 1, or was not written")
             });
-        session.require(step_results.early == 0, || {
+        session.require(step_results.early != 1, || {
             format!("DoStep(t={t}, h={h}) returned early although that was not allowed")
         });
         // A step may end a little elsewhere: a fixed-step integrator cannot reach every time.
