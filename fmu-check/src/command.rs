@@ -144,7 +144,7 @@ pub fn run(args: &Check) -> Result<bool> {
     }
     match (args.format, reports.as_slice()) {
         (Format::Text, reports) => {
-            print!("{}{}", report::texts(reports, args.verbose), news(baseline.as_ref(), reports))
+            print!("{}{}", report::texts(reports, args.verbose), news(baseline.as_ref(), reports));
         }
         (Format::Json, [report]) => println!("{}", report.json()?),
         (Format::Json, reports) => println!("{}", serde_json::to_string_pretty(reports)?),

@@ -26,7 +26,9 @@ pub(super) fn run(path: &Path, what: &str, options: &Options) -> Result<bool> {
     println!("\n");
     match found.verdict {
         Verdict::Violated(evidence) => {
-            evidence.iter().for_each(|text| println!("{id}: {text}"));
+            for text in evidence {
+                println!("{id}: {text}");
+            }
             return Ok(false);
         }
         Verdict::NotDetermined(why) | Verdict::NotApplicable(why) => println!("{id}: {why}"),

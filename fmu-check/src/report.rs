@@ -316,7 +316,9 @@ fn line(out: &mut String, finding: &Finding, calls: bool) {
     }
     if calls && !finding.calls.is_empty() {
         let _ = writeln!(out, "         calls:");
-        finding.calls.iter().for_each(|call| _ = writeln!(out, "           {call}"));
+        for call in &finding.calls {
+            let _ = writeln!(out, "           {call}");
+        }
     }
 }
 

@@ -203,7 +203,7 @@ impl Runner {
             }
             if matches!(end, Outcome::Slow) {
                 let call = last_call.lines().next().unwrap_or_default();
-                let call = call.trim_start_matches(|c| c == 'C' || c == 'P').trim();
+                let call = call.trim_start_matches(['C', 'P']).trim();
                 slow = Some(format!(
                     "the probe is too slow here for a limit of {} s for each call; it was in {call} (see --patience)",
                     self.timeout.as_secs_f64()
@@ -255,9 +255,9 @@ impl Runner {
 
     /// Runs a probe, or one case of it, in a process that prints its calls; returns what was found.
     pub(super) fn replay(&self, check: &Check, case: Option<usize>) -> std::io::Result<Judgement> {
-        let binary = match (is_exchange(check), &self.simulation, &self.exchange) {
-            (true, _, Some(binary)) | (false, Some(binary), _) | (false, None, Some(binary)) => binary,
-            _ => return Ok(Verdict::NotApplicable("the FMU has no such interface".into()).into()),
+        let (exchange, simulation) = (self.exchange.as_deref(), self.simulation.as_deref());
+        let Some(binary) = (if is_exchange(check) { exchange } else { simulation.or(exchange) }) else {
+            return Ok(Verdict::NotApplicable("the FMU has no such interface".into()).into());
         };
         let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
         fs::create_dir(folder.path().join("home"))?;

@@ -40,10 +40,8 @@ pub(super) fn difference(variables: &[&ModelVariable], a: &[Vec<Vec<u64>>], b: &
     if a.len() != b.len() {
         return Some(Difference { step: a.len().min(b.len()), variable: 0, largest: f64::INFINITY });
     }
-    let differs = |(step, (x, y)): (usize, (&Vec<Vec<u64>>, &Vec<Vec<u64>>))| {
-        Some((step, x.iter().zip(y).position(|(x, y)| x != y)?))
-    };
-    let (step, variable) = a.iter().zip(b).enumerate().find_map(differs)?;
+    let mut rows = a.iter().zip(b).enumerate();
+    let (step, variable) = rows.find_map(|(step, (x, y))| Some((step, x.iter().zip(y).position(|(x, y)| x != y)?)))?;
     let of = |(i, v): (usize, &&ModelVariable)| {
         let pairs = || a.iter().zip(b).filter_map(move |(x, y)| Some((x.get(i)?, y.get(i)?)));
         if !v.base.is_float() || pairs().any(|(x, y)| x.len() != y.len()) {

@@ -228,7 +228,7 @@ fn base_names(fmu: &FmuFile) -> Verdict {
             fmu.binaries.iter().any(|b| b.name == name)
         };
         // Another interface may come as sources.
-        if sources && identifiers.iter().any(|identifier| present(identifier)) {
+        if sources && identifiers.iter().any(present) {
             continue;
         }
         for identifier in &identifiers {

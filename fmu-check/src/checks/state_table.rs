@@ -136,10 +136,9 @@ pub(super) fn allowed(session: &Session) -> Result<(), NotDetermined> {
 fn is_ambiguous(session: &Session, call: &str, state: State) -> bool {
     let v2 = session.description.version == FmiVersion::V2;
     match (call, state) {
-        ("Get(output)", Instantiated) => true,
         ("Set(input)", Instantiated) => v2,
         // For debugging; and a tunable parameter may be set, which `access` looks at.
-        ("Get(output)" | "GetFMUState", Error) | ("Set(parameter)", Step) => true,
+        ("Get(output)", Instantiated | Error) | ("GetFMUState", Error) | ("Set(parameter)", Step) => true,
         _ => false,
     }
 }
