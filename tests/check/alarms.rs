@@ -13,7 +13,7 @@ fn at(report: &Report, level: Level) -> Vec<&'static str> {
 }
 
 fn verdict(report: &Report, id: &str) -> Verdict {
-    report.finding(id).map(|f| f.verdict.clone()).unwrap_or_else(|| panic!("{id} did not run"))
+    report.finding(id).map_or_else(|| panic!("{id} did not run"), |f| f.verdict.clone())
 }
 
 /// The report on the small FMU with one property.
