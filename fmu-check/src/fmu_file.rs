@@ -55,6 +55,8 @@ pub struct FmuFile {
     pub(super) binaries: Vec<Binary>,
     /// Entries that could not be unpacked.
     pub(super) unpack_errors: Vec<String>,
+    /// Entries that this computer could not store, for example because of their long names.
+    pub(super) own_errors: Vec<String>,
     dir: Folder,
 }
 
@@ -94,6 +96,7 @@ impl FmuFile {
             description,
             binaries: Vec::new(),
             unpack_errors: Vec::new(),
+            own_errors: Vec::new(),
             dir,
         };
         fmu.unpack().map_err(|e| unusable(e.to_string()))?;
@@ -122,28 +125,26 @@ impl FmuFile {
             }
             let folder = name.split('/').next().unwrap_or_default();
             let wanted = ["binaries", "resources", "terminalsAndIcons", "extra"].contains(&folder);
-            let target = self.dir.path().join(&name);
-            let mut out: Box<dyn io::Write> = Box::new(io::sink());
-            if wanted {
-                let made = target.parent().map_or(Ok(()), fs::create_dir_all);
-                match made.and_then(|()| File::create(&target)) {
-                    Ok(file) => out = Box::new(file),
-                    Err(e) => self.unpack_errors.push(format!("{name}: {e}")),
-                }
+            let path = self.dir.path().join(&name);
+            let made = || path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| File::create(&path));
+            let mut target = Target(wanted.then(made));
+            let copied = copy(&self.source, entry, left, &mut target);
+            if let Some(Err(e)) = &target.0 {
+                self.own_errors.push(format!("{name}: {e}"));
             }
-            match copy(&self.source, entry, left, &mut out) {
+            match copied {
                 Err(cause) => {
                     self.unpack_errors.push(cause);
                     if wanted {
-                        let _ = fs::remove_file(&target);
+                        let _ = fs::remove_file(&path);
                     }
                 }
                 Ok(bytes) => {
                     left -= bytes;
                     if let Some((folder, file)) = name.strip_prefix("binaries/").and_then(|n| n.split_once('/')) {
                         let library = [".so", ".dll", ".dylib"].iter().any(|extension| file.ends_with(extension));
-                        if library && !file.contains('/') {
-                            self.binaries.push(Binary { folder: folder.into(), name: name.clone(), path: target });
+                        if library && !file.contains('/') && matches!(target.0, Some(Ok(_))) {
+                            self.binaries.push(Binary { folder: folder.into(), name: name.clone(), path });
                         }
                     }
                 }
@@ -173,6 +174,24 @@ impl FmuFile {
             .iter()
             .find(fits)
             .ok_or_else(|| format!("the archive has no binary for this platform: binaries/{}/{file}", folders[0]))
+    }
+}
+
+/// Where an entry goes: to a file, or nowhere if none is wanted or this computer cannot store it.
+struct Target(Option<io::Result<File>>);
+
+impl io::Write for Target {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if let Some(Ok(file)) = &mut self.0
+            && let Err(e) = file.write_all(bytes)
+        {
+            self.0 = Some(Err(e));
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 

@@ -109,12 +109,13 @@ impl Guarded {
         self.folder.path()
     }
 
-    /// Waits until the process has ended, or `over` says that its time is over.
+    /// Waits until the process has ended, or `over` says that its time is over. `over` gets the number of the process as soon as
+    /// the guard has started it.
     ///
     /// # Errors
     /// The system does not tell.
     #[cfg(unix)]
-    pub fn wait(&mut self, mut over: impl FnMut() -> bool) -> io::Result<Report> {
+    pub fn wait(&mut self, mut over: impl FnMut(Option<u32>) -> bool) -> io::Result<Report> {
         use std::io::Read;
         let mut stopped = None;
         let mut told = Vec::new();
@@ -125,7 +126,7 @@ impl Guarded {
                 Ok(0) => break,
                 Ok(n) => told.extend_from_slice(&bytes[..n]),
                 Err(e) if matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => match stopped {
-                    None if over() => {
+                    None if over(unix::read_id(&told)) => {
                         stopped = Some(Instant::now());
                         self.channel.shutdown(std::net::Shutdown::Write)?;
                     }
@@ -148,17 +149,17 @@ impl Guarded {
         Ok(Report { end: if stopped.is_some() { End::Stopped } else { end }, left })
     }
 
-    /// Waits until the process has ended, or `over` says that its time is over.
+    /// Waits until the process has ended, or `over` says that its time is over. `over` gets the number of the process.
     ///
     /// # Errors
     /// The system does not tell.
     #[cfg(not(unix))]
-    pub fn wait(&mut self, mut over: impl FnMut() -> bool) -> io::Result<Report> {
+    pub fn wait(&mut self, mut over: impl FnMut(Option<u32>) -> bool) -> io::Result<Report> {
         loop {
             if let Some(status) = self.child.try_wait()? {
                 return Ok(Report { end: End::Ended(status), left: Vec::new() });
             }
-            if over() {
+            if over(Some(self.child.id())) {
                 self.child.kill()?;
                 self.child.wait()?;
                 return Ok(Report { end: End::Stopped, left: Vec::new() });
@@ -276,6 +277,8 @@ mod unix {
     use std::sync::{Mutex, PoisonError};
     use std::time::{Duration, Instant};
 
+    /// How the line with the number of the child begins: the first that the guard writes, before its report.
+    const STARTED: &str = "started ";
     /// Time that helpers of a process that ended by itself may take to end as well.
     const FAREWELL: Duration = Duration::from_millis(100);
 
@@ -315,6 +318,7 @@ mod unix {
         command.args(&arguments[3..]).stdin(Stdio::null()).process_group(0);
         let mut child = command.spawn().map_err(|e| e.to_string())?;
         let id = Pid::from_child(&child);
+        let _ = (&*channel).write_all(format!("{STARTED}{}\n", child.id()).as_bytes());
         // Until the child is reaped, its number is its own.
         let running = Mutex::new(true);
         let is_running = || running.lock().unwrap_or_else(PoisonError::into_inner);
@@ -439,6 +443,11 @@ mod unix {
         })
     }
 
+    pub(super) fn read_id(told: &[u8]) -> Option<u32> {
+        let line = std::str::from_utf8(told).ok()?.strip_prefix(STARTED)?.split_once('\n')?.0;
+        line.parse().ok()
+    }
+
     /// A line for the end, and one for each process that was left.
     fn write_report(report: &Report) -> String {
         let end = match &report.end {
@@ -451,7 +460,7 @@ mod unix {
     }
 
     pub(super) fn read_report(text: &str) -> Option<Report> {
-        let mut lines = text.strip_suffix('\n')?.lines();
+        let mut lines = text.strip_suffix('\n')?.lines().skip_while(|line| line.starts_with(STARTED));
         let (word, rest) = lines.next()?.split_once(' ')?;
         let end = match word {
             "ended" => End::Ended(ExitStatus::from_raw(rest.parse().ok()?)),

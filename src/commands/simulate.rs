@@ -190,7 +190,7 @@ fn guarded(args: &Simulate) -> Result<()> {
     let mut worker = Guarded::start(command)?;
     let folder = worker.folder().to_owned();
     let (mut since, mut progress) = (Instant::now(), None);
-    let report = worker.wait(|| {
+    let report = worker.wait(|_| {
         let last = journal::read(&folder);
         let now = last.as_ref().map(|last| last.progress);
         if now != progress || last.is_some_and(|last| last.call == journal::Call::Write) {

@@ -137,7 +137,7 @@ fn libraries_that_are_cut_short() {
         let place = Place::new();
         let library = Entry::new("binaries/linux64/Hostile.so", &library[..at]);
         write(&place.fmu(), &[Entry::new("modelDescription.xml", XML.as_bytes()), library]);
-        place.runs("check", &["--only", "binary", "--timeout", "90"]);
+        place.runs("check", &["--only", "binary", "--patience", "90"]);
         // What is missing at the end of a library is not always needed.
         assert!(place.runs("simulate", &["--timeout", "90"]).status != 1, "{at}");
     });
@@ -171,7 +171,7 @@ fn bytes_that_are_changed() {
             whole[at] ^= bit;
             fs::write(place.fmu(), whole).unwrap();
         }
-        place.runs("check", &["--only", STATIC, "--timeout", "20"]);
+        place.runs("check", &["--only", STATIC, "--patience", "20"]);
         place.runs("simulate", &["--timeout", "20"]);
     });
 }

@@ -90,7 +90,7 @@ fn check_survives() {
     each(&cases, |(how, id, call, part)| {
         let fmu = described(XML);
         let seconds = if part.contains("return") { "3" } else { "90" };
-        let more = ["--only", "B00,L00,B08p", "--timeout", seconds, "--memory", "1"];
+        let more = ["--only", "B00,L00,B08p", "--patience", seconds, "--memory", "1"];
         let ended = fmu.run("check", &more, how);
         let status = i32::from(*id != "B08p");
         assert_eq!(ended.status, status, "{how}: {ended:?}");
