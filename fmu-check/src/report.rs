@@ -158,6 +158,7 @@ impl Report {
         }
         let end = match (self.conforms(), self.unknown().count()) {
             (true, 0) if self.counts().known > 0 => "All findings are known.",
+            (true, 0) if self.counts().not_determined > 0 => "What could be determined holds.",
             (true, 0) => "All requirements hold.",
             (true, _) => "No requirement of the standard (must) is violated.",
             (false, _) => "Requirements of the standard (must) are violated.",
