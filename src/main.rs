@@ -5,6 +5,7 @@
 use clap::{Parser, Subcommand};
 use fmu::commands::{build, compare, merge, reproduce, simulate, ssp, sweep, tune};
 use fmu_check::{command as check, probe};
+use fmu_import::printable_lines;
 use std::process::ExitCode;
 
 /// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.
@@ -35,7 +36,13 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
+    if let Some(status) = fmu_import::guard::serve() {
+        return status;
+    }
+    let command = Cli::parse().command;
+    // The process that started a worker tells its error.
+    let is_worker = matches!(&command, Command::Simulate(args) if args.worker);
+    let outcome = match command {
         Command::Build(args) => build::run(&args).map(|files| {
             for file in files {
                 println!("{}", file.display());
@@ -54,7 +61,9 @@ fn main() -> ExitCode {
         Command::Compare(args) => compare::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
     };
     outcome.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        if !is_worker {
+            eprintln!("error: {}", printable_lines(&format!("{error:#}")));
+        }
         ExitCode::from(fmu::exit_status(&error))
     })
 }

@@ -34,12 +34,12 @@ fn numbers(text: &str) -> Vec<(usize, &str)> {
     found
 }
 
-/// Two dots or more, as in 4.2.4; not a release of a standard, a clause of ZIP's, or a table's cell with a version.
+/// Two dots or more, as in 4.2.4; not a release of a standard, which has a 0 somewhere, a clause of ZIP's, or a table's cell with a version.
 fn is_bare_clause(before: &str, number: &str, after: &str) -> bool {
     let cell = before.ends_with("| ") && after.starts_with(" |");
     number.matches('.').count() >= 2
         && number.starts_with(['2', '3', '4', '5'])
-        && !number[1..].starts_with(".0.")
+        && !number.split('.').any(|part| part == "0")
         && !before.ends_with("APPNOTE ")
         && !cell
 }

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// `fmu simulate` for `stop` seconds of the plant, with its temporary files below `temporary`.
 fn simulate(fmu: &Path, stop: &str, temporary: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fmu"));
-    command.arg("simulate").arg(fmu).args(["--step", "1e-4", "--stop", stop, "--record", "p.speed"]);
+    command.arg("simulate").arg(fmu).args(["--step", "1e-4", "--stop", stop, "--record", "p.speed", "--in-process"]);
     command.env("TMPDIR", temporary).stdout(Stdio::null()).stderr(Stdio::null());
     command
 }
@@ -27,6 +27,35 @@ fn wait(until: impl Fn() -> bool, what: &str) {
         assert!(begun.elapsed() < Duration::from_secs(60), "{what}");
         std::thread::sleep(Duration::from_millis(5));
     }
+}
+
+/// The processes whose temporary files are below this folder.
+#[cfg(target_os = "linux")]
+fn users(temporary: &Path) -> Vec<String> {
+    let variable = [b"TMPDIR=", temporary.as_os_str().as_encoded_bytes()].concat();
+    let uses = |entry: &fs::DirEntry| {
+        let environment = fs::read(entry.path().join("environ")).unwrap_or_default();
+        environment.split(|&b| b == 0).any(|v| v.starts_with(&variable))
+    };
+    let all = fs::read_dir("/proc").unwrap().flatten().filter(uses);
+    all.map(|e| e.file_name().into_string().unwrap()).collect()
+}
+
+/// `fmu simulate` is killed: its worker ends, and what they have unpacked is gone.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_worker_ends_with_its_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let fmu = format!("p={}", common::archives().join("fmi3/PmsmPlant.fmu").display());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fmu"));
+    command.args(["simulate", &fmu, "--step", "1e-4", "--stop", "1e5", "--record", "p.speed"]);
+    let mut killed = command.env("TMPDIR", dir.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let loaded = |id: &String| fs::read_to_string(format!("/proc/{id}/maps")).is_ok_and(|m| m.contains("PmsmPlant.so"));
+    wait(|| users(dir.path()).iter().any(loaded), "no worker loads the FMU");
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    wait(|| users(dir.path()).is_empty(), "the worker or its guard outlives the command");
+    assert_eq!(names(dir.path()), Vec::<String>::new());
 }
 
 /// Waits until the process has loaded the FMU.

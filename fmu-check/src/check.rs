@@ -2,13 +2,14 @@
 
 use super::fmu_file::FmuFile;
 use super::session::{NotDetermined, Session};
+use fmu_import::guard::Allowance;
 use model_description::FmiVersion;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How binding a requirement is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     /// The standard requires it.
@@ -51,7 +52,18 @@ pub struct Check {
     pub clause: &'static str,
     /// How binding it is.
     pub levels: Levels,
+    /// What the check reads or which calls it makes, in one sentence.
+    pub tried: &'static str,
+    /// The usual fix, in one sentence.
+    pub fix: &'static str,
     pub(super) run: Run,
+}
+
+impl Check {
+    /// Whether it calls the binary.
+    pub(super) fn is_probe(&self) -> bool {
+        !matches!(self.run, Run::File(_))
+    }
 }
 
 /// How a check runs.
@@ -93,6 +105,24 @@ pub enum Verdict {
     NotDetermined(String),
 }
 
+/// A verdict with what only a probe knows about it.
+#[derive(Clone, Debug)]
+pub(super) struct Judgement {
+    pub(super) verdict: Verdict,
+    /// The level of the finding, if it is lower than that of the check.
+    pub(super) lower: Option<Level>,
+    /// A call crashed the process or did not return: an importer would have gone down with it.
+    pub(super) fatal: bool,
+    /// The calls that led to the finding, with what they returned.
+    pub(super) calls: Vec<String>,
+}
+
+impl From<Verdict> for Judgement {
+    fn from(verdict: Verdict) -> Self {
+        Self { verdict, lower: None, fatal: false, calls: Vec::new() }
+    }
+}
+
 impl Verdict {
     /// A pass if there are no findings, otherwise a violation.
     pub(super) fn of(findings: Vec<String>) -> Self {
@@ -111,8 +141,15 @@ pub struct Finding {
     pub requirement: &'static str,
     /// Where the standards say so.
     pub clause: &'static str,
-    /// Level for the standard of this FMU.
+    /// Level of the check for the standard of this FMU, or of the finding, if that is lower.
     pub level: Level,
+    /// A call of the FMU crashed the process or did not return.
+    pub fatal: bool,
+    /// `--allow` or the baseline knows it: it does not count.
+    pub known: bool,
+    /// The calls of a probe that led to the finding, with what they returned; `--replay` repeats them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub calls: Vec<String>,
     /// Result.
     #[serde(flatten)]
     pub verdict: Verdict,
@@ -123,8 +160,19 @@ pub struct Finding {
 pub struct Options {
     /// Ids of checks or names of groups; empty for all.
     pub only: Vec<String>,
-    /// Time limit for one probe of the binary; `None` for 10 s.
+    /// Time limit for one call of the binary; `None` for 10 s.
+    pub patience: Option<Duration>,
+    /// Time limit for everything; what has not run by then is not determined.
     pub timeout: Option<Duration>,
-    /// Program with the hidden command `probe`; `None` for the running one.
+    /// Program with the hidden command `probe` that plays the guard ([`fmu_import::guard::serve`]); `None` for the running one.
     pub program: Option<PathBuf>,
+    /// What a probe may use.
+    pub allowance: Allowance,
+}
+
+impl Options {
+    /// When the time for everything is over, if it begins now.
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        Instant::now().checked_add(self.timeout?)
+    }
 }

@@ -1,8 +1,12 @@
 //! The command `fmu check`: checks whether an FMU conforms to its standard.
 
-use crate::{self as check, Options, report};
+use crate::baseline::Baseline;
+use crate::report::Report;
+use crate::{self as check, Options, formats, replay, report};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use fmu_import::{guard, printable_lines};
+use std::fmt::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -10,39 +14,68 @@ use std::time::Duration;
 ///
 /// Every check has an id, a clause of the standard, and a level: must (the standard requires it), should (the standard
 /// recommends it) or hard (the standard leaves it open, but a robust FMU does it). Each probe of the binary runs in its own
-/// process, so a crash or a hang is a finding. The code of the FMU runs on this computer with your rights: check only FMUs
-/// that you would run.
+/// process, with limits, so a crash or a hang is a finding. The code of the FMU runs on this computer with your rights: check
+/// only FMUs that you would run. --sandbox takes the network away from it.
 ///
-/// Exit status: 0 if no must is violated, 1 if one is, 2 if the file is not an FMU. With --strict, a violated should or hard
-/// and a check that is not determined count like a must.
+/// Exit status: 0 if no must is violated, 1 if one is, 2 if a file is not an FMU. With --strict, a violated should or hard
+/// and a check that is not determined count like a must. With --baseline, every violated check that the file does not have
+/// counts, whatever its level.
 ///
 ///   fmu check target/fmu/fmi3/PmsmPlant.fmu
 ///   fmu check other.fmu --format html > report.html
 ///   fmu check other.fmu --only lifecycle,X01b
+///   fmu check build/*.fmu --baseline fmu-check.toml --format junit > check.xml
+///   fmu check --explain S02a
+///   fmu check other.fmu --replay T02b
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
+#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub struct Check {
-    /// FMU to check
-    #[arg(value_name = "FILE.fmu", required_unless_present = "list")]
-    pub file: Option<PathBuf>,
+    /// FMUs to check
+    #[arg(value_name = "FILE.fmu", required_unless_present_any = ["list", "explain"])]
+    pub files: Vec<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
     /// Run only these checks: ids or group names
     #[arg(long, value_name = "ID,GROUP", value_delimiter = ',')]
     pub only: Vec<String>,
+    /// Findings of these checks do not count
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    pub allow: Vec<String>,
+    /// File with known findings, for example fmu-check.toml: exit with status 1 only for others
+    #[arg(long, value_name = "FILE.toml")]
+    pub baseline: Option<PathBuf>,
+    /// Write all findings to this file, as a baseline
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "baseline")]
+    pub write_baseline: Option<PathBuf>,
     /// Also show checks that passed and checks that do not apply
     #[arg(long, short)]
     pub verbose: bool,
-    /// Time limit for one probe of the binary, in seconds [default: 10]
-    #[arg(long, alias = "patience", value_name = "S")]
+    /// Time limit for everything, in seconds; what has not run by then is not determined
+    #[arg(long, value_name = "S")]
     pub timeout: Option<f64>,
+    /// Time limit for one call of the binary, in seconds [default: 10]
+    #[arg(long, value_name = "S")]
+    pub patience: Option<f64>,
+    /// Address space of one probe, in GiB; 0 for no limit
+    #[arg(long, value_name = "GIB", default_value_t = guard::Allowance::default().memory >> 30, value_parser = clap::value_parser!(u64).range(..=1 << 20))]
+    pub memory: u64,
+    /// Run the probes without network (Linux with user namespaces; refused elsewhere)
+    #[arg(long)]
+    pub sandbox: bool,
     /// Exit with status 1 unless every applicable check passes
     #[arg(long)]
     pub strict: bool,
     /// List all checks and exit
     #[arg(long)]
     pub list: bool,
+    /// Explain a check: what is required and where, how it is tried, the usual fix
+    #[arg(long, value_name = "ID")]
+    pub explain: Option<String>,
+    /// Repeat one check of the binary and print its calls with what they return; ID#N for its case N alone
+    #[arg(long, value_name = "ID[#N]")]
+    pub replay: Option<String>,
 }
 
 /// Output formats.
@@ -51,41 +84,106 @@ pub enum Format {
     /// Text for a terminal.
     #[default]
     Text,
-    /// JSON for a program.
+    /// JSON for a program: a report, or a list of reports for several files.
     Json,
     /// One HTML page for a browser.
     Html,
+    /// JUnit XML for a CI.
+    Junit,
+    /// SARIF 2.1.0 for a code host.
+    Sarif,
+}
+
+/// Whether a name is that of a check, or of a group.
+fn is_check(name: &str) -> bool {
+    check::GROUPS.iter().any(|g| g.checks.iter().any(|c| c.id.eq_ignore_ascii_case(name)))
+}
+
+fn seconds(name: &str, s: Option<f64>) -> Result<Option<Duration>> {
+    let duration = |s| Duration::try_from_secs_f64(s).map_err(|e| anyhow::anyhow!("{name} {s}: {e}"));
+    s.map(duration).transpose()
 }
 
 /// Runs the command. Returns whether no must is violated, or with `strict` whether every applicable check passes.
 ///
 /// # Errors
-/// The file is not an FMU, or an id does not exist.
+/// A file is not an FMU, or an id does not exist.
 pub fn run(args: &Check) -> Result<bool> {
     if args.list {
         print!("{}", report::list());
         return Ok(true);
     }
-    let known = |name: &String| {
-        check::GROUPS
-            .iter()
-            .any(|g| g.name.eq_ignore_ascii_case(name) || g.checks.iter().any(|c| c.id.eq_ignore_ascii_case(name)))
-    };
-    if let Some(name) = args.only.iter().find(|name| !known(name)) {
+    if let Some(id) = &args.explain {
+        let Some(text) = report::explain(id) else {
+            bail!("--explain {id}: there is no such check; --list shows them")
+        };
+        print!("{text}");
+        return Ok(true);
+    }
+    let group = |name: &str| check::GROUPS.iter().any(|g| g.name.eq_ignore_ascii_case(name));
+    if let Some(name) = args.only.iter().find(|name| !is_check(name) && !group(name)) {
         let groups: Vec<_> = check::GROUPS.iter().map(|g| g.name).collect();
         bail!("--only {name}: is neither a check (--list shows them) nor a group: {}", groups.join(", "));
     }
-    let Some(file) = &args.file else { bail!("no file is given") };
-    let timeout = match args.timeout {
-        Some(s) => Some(Duration::try_from_secs_f64(s).map_err(|e| anyhow::anyhow!("--timeout {s}: {e}"))?),
-        None => None,
-    };
-    let options = Options { only: args.only.clone(), timeout, program: None };
-    let report = check::run(file, &options)?;
-    match args.format {
-        Format::Text => print!("{}", report.text(args.verbose)),
-        Format::Json => println!("{}", report.json()?),
-        Format::Html => print!("{}", report.html()),
+    if let Some(name) = args.allow.iter().find(|name| !is_check(name)) {
+        bail!("--allow {name}: there is no such check; --list shows them");
     }
-    Ok(if args.strict { report.is_clean() } else { report.conforms() })
+    let options = Options {
+        only: args.only.clone(),
+        patience: seconds("--patience", args.patience)?,
+        timeout: seconds("--timeout", args.timeout)?,
+        program: None,
+        allowance: guard::Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Default::default() },
+    };
+    if let Some(what) = &args.replay {
+        let [file] = args.files.as_slice() else { bail!("--replay takes one file") };
+        return replay::run(file, what, &options);
+    }
+    let baseline = args.baseline.as_deref().map(Baseline::read).transpose()?;
+    let began = std::time::Instant::now();
+    let mut reports: Vec<Report> = Vec::new();
+    for file in &args.files {
+        let left = options.timeout.map(|all| all.saturating_sub(began.elapsed()));
+        let mut report = check::run(file, &Options { timeout: left, ..options.clone() })?;
+        report.allow(&args.allow);
+        if let Some(baseline) = &baseline {
+            baseline.apply(&mut report);
+        }
+        reports.push(report);
+    }
+    match (args.format, reports.as_slice()) {
+        (Format::Text, reports) => {
+            let text = report::texts(reports, args.verbose) + &news(baseline.as_ref(), reports);
+            print!("{}", printable_lines(&text));
+        }
+        (Format::Json, [report]) => println!("{}", report.json()?),
+        (Format::Json, reports) => println!("{}", serde_json::to_string_pretty(reports)?),
+        (Format::Html, reports) => print!("{}", report::html(reports)),
+        (Format::Junit, reports) => print!("{}", formats::junit(reports)),
+        (Format::Sarif, reports) => println!("{}", serde_json::to_string_pretty(&formats::sarif(reports))?),
+    }
+    if let Some(path) = &args.write_baseline {
+        std::fs::write(path, Baseline::text(&reports)).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))?;
+    }
+    let holds = |report: &Report| match (args.strict, &baseline) {
+        (true, _) => report.is_clean(),
+        (false, Some(_)) => report.unknown().next().is_none(),
+        (false, None) => report.conforms(),
+    };
+    Ok(reports.iter().all(holds))
+}
+
+/// What a baseline does not know, and what it need not know any more.
+fn news(baseline: Option<&Baseline>, reports: &[Report]) -> String {
+    let mut out = String::new();
+    for report in baseline.map_or(&[][..], |_| reports) {
+        let new: Vec<_> = report.unknown().map(|f| f.id).collect();
+        let gone = baseline.map(|b| b.mended(report)).unwrap_or_default();
+        for (what, ids) in [("new", new.join(", ")), ("mended, no longer needed in the baseline", gone.join(", "))] {
+            if !ids.is_empty() {
+                let _ = writeln!(out, "{}: {what}: {ids}", report.file);
+            }
+        }
+    }
+    out
 }

@@ -1,15 +1,14 @@
 //! The file under check: archive, description as XML tree and as parsed, and the unpacked folders.
 
-use crate::zip_headers::{Archive, contents, is_inside};
+use crate::zip_headers::{Archive, contents, copy, is_inside};
+use fmu_import::Folder;
 use fmu_import::platform::Platform;
-use model_description::{Element, FmiVersion, Interface, ModelDescription};
-use std::fs;
+use model_description::{Element, Error, FmiVersion, Interface, ModelDescription, limits};
+use std::fs::{self, File};
+use std::io;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 
-/// Maximum size in bytes of a description, and of everything that is unpacked.
-const MAX_XML_BYTES: u64 = 256 << 20;
-const MAX_BYTES: u64 = 2 << 30;
+const DESCRIPTION: &str = "modelDescription.xml";
 
 /// A file that cannot be checked at all: exit status 2.
 #[derive(Debug, thiserror::Error)]
@@ -25,15 +24,26 @@ pub(super) struct Binary {
     pub(super) name: String,
     /// Folder below `binaries/`.
     pub(super) folder: String,
-    /// Contents.
-    pub(super) bytes: Vec<u8>,
+    /// Where it was unpacked to.
+    path: PathBuf,
+}
+
+impl Binary {
+    /// Its contents.
+    pub(super) fn bytes(&self) -> Result<Vec<u8>, String> {
+        let read = || {
+            limits::LIBRARY.check(fs::metadata(&self.path).map_err(|e| e.to_string())?.len())?;
+            fs::read(&self.path).map_err(|e| e.to_string())
+        };
+        read().map_err(|cause| format!("{}: {cause}", self.name))
+    }
 }
 
 /// An FMU to be checked.
 pub struct FmuFile {
     /// Path of the `.fmu` file.
     pub path: PathBuf,
-    pub(super) bytes: Vec<u8>,
+    pub(super) source: File,
     pub(super) zip: Archive,
     pub(super) xml: Vec<u8>,
     /// The standard that it claims to follow.
@@ -45,7 +55,9 @@ pub struct FmuFile {
     pub(super) binaries: Vec<Binary>,
     /// Entries that could not be unpacked.
     pub(super) unpack_errors: Vec<String>,
-    dir: TempDir,
+    /// Entries that this computer could not store, for example because of their long names.
+    pub(super) own_errors: Vec<String>,
+    dir: Folder,
 }
 
 impl FmuFile {
@@ -59,21 +71,24 @@ impl FmuFile {
         if !size.is_file() {
             return Err(unusable("is not a file".into()));
         }
-        if size.len() > MAX_BYTES {
-            return Err(unusable(format!("has {} bytes, more than the limit of {MAX_BYTES}", size.len())));
-        }
-        let bytes = fs::read(path).map_err(|e| unusable(e.to_string()))?;
-        let zip = Archive::read(&bytes).map_err(&unusable)?;
-        let entry = zip.find("modelDescription.xml").ok_or_else(|| unusable("has no modelDescription.xml".into()))?;
-        let xml = contents(&bytes, entry, MAX_XML_BYTES).map_err(&unusable)?;
+        limits::ARCHIVE.check(size.len()).map_err(&unusable)?;
+        let source = File::open(path).map_err(|e| unusable(e.to_string()))?;
+        let zip = Archive::read(&source, size.len()).map_err(&unusable)?;
+        let entry = zip.find(DESCRIPTION).ok_or_else(|| unusable(format!("has no {DESCRIPTION}")))?;
+        let in_description = |cause: String| unusable(format!("{DESCRIPTION}: {cause}"));
+        limits::XML.check(entry.central.size.into()).map_err(in_description)?;
+        let xml = contents(&source, entry, limits::XML.most).map_err(&unusable)?;
         let version = version(&xml).map_err(&unusable)?;
-        let text = std::str::from_utf8(&xml).map_err(|_| "modelDescription.xml is not UTF-8".to_owned());
-        let tree = text.and_then(|text| Element::parse(text).map_err(|e| e.to_string()));
-        let description = model_description::read(&xml).map_err(|e| e.to_string());
-        let dir = tempfile::Builder::new().prefix("fmu-check-").tempdir().map_err(|e| unusable(e.to_string()))?;
+        let tree = model_description::decode(&xml).and_then(Element::parse);
+        let description = tree.as_ref().map_err(Clone::clone).and_then(model_description::read_element);
+        if let Err(Error::Limit(cause)) = &description {
+            return Err(in_description(cause.clone()));
+        }
+        let (tree, description) = (tree.map_err(|e| e.to_string()), description.map_err(|e| e.to_string()));
+        let dir = Folder::new().map_err(|e| unusable(e.to_string()))?;
         let mut fmu = Self {
             path: path.into(),
-            bytes,
+            source,
             zip,
             xml,
             version,
@@ -81,6 +96,7 @@ impl FmuFile {
             description,
             binaries: Vec::new(),
             unpack_errors: Vec::new(),
+            own_errors: Vec::new(),
             dir,
         };
         fmu.unpack().map_err(|e| unusable(e.to_string()))?;
@@ -93,35 +109,45 @@ impl FmuFile {
         self.dir.path()
     }
 
-    fn unpack(&mut self) -> std::io::Result<()> {
+    /// Removes what was unpacked, although a check that takes too long still has this.
+    pub(super) fn discard(&self) {
+        let _ = fs::remove_dir_all(self.dir());
+    }
+
+    fn unpack(&mut self) -> io::Result<()> {
         fs::create_dir(self.dir().join("resources"))?;
-        fs::write(self.dir().join("modelDescription.xml"), &self.xml)?;
-        let mut left = MAX_BYTES;
+        fs::write(self.dir().join(DESCRIPTION), &self.xml)?;
+        let mut left = limits::UNPACKED.most;
         for entry in &self.zip.entries {
             let name = entry.name();
-            let folder = name.split('/').next().unwrap_or_default();
-            let wanted = ["binaries", "resources", "terminalsAndIcons", "extra"].contains(&folder);
-            if name.ends_with('/') || entry.is_link() || !is_inside(&name) || (name == "modelDescription.xml") {
+            if name.ends_with('/') || entry.is_link() || !is_inside(&name) || (name == DESCRIPTION) {
                 continue;
             }
-            match contents(&self.bytes, entry, left) {
-                Err(cause) => self.unpack_errors.push(cause),
-                Ok(bytes) if wanted => {
-                    left = left.saturating_sub(bytes.len() as u64).max(1);
-                    let target = self.dir.path().join(&name);
-                    let made = target.parent().map_or(Ok(()), fs::create_dir_all);
-                    if let Err(e) = made.and_then(|()| fs::write(&target, &bytes)) {
-                        self.unpack_errors.push(format!("{name}: {e}"));
-                        continue;
+            let folder = name.split('/').next().unwrap_or_default();
+            let wanted = ["binaries", "resources", "terminalsAndIcons", "extra"].contains(&folder);
+            let path = self.dir.path().join(&name);
+            let made = || path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| File::create(&path));
+            let mut target = Target(wanted.then(made));
+            let copied = copy(&self.source, entry, left, &mut target);
+            if let Some(Err(e)) = &target.0 {
+                self.own_errors.push(format!("{name}: {e}"));
+            }
+            match copied {
+                Err(cause) => {
+                    self.unpack_errors.push(cause);
+                    if wanted {
+                        let _ = fs::remove_file(&path);
                     }
+                }
+                Ok(bytes) => {
+                    left -= bytes;
                     if let Some((folder, file)) = name.strip_prefix("binaries/").and_then(|n| n.split_once('/')) {
                         let library = [".so", ".dll", ".dylib"].iter().any(|extension| file.ends_with(extension));
-                        if library && !file.contains('/') {
-                            self.binaries.push(Binary { folder: folder.into(), name: name.clone(), bytes });
+                        if library && !file.contains('/') && matches!(target.0, Some(Ok(_))) {
+                            self.binaries.push(Binary { folder: folder.into(), name: name.clone(), path });
                         }
                     }
                 }
-                Ok(_) => {}
             }
         }
         Ok(())
@@ -151,9 +177,29 @@ impl FmuFile {
     }
 }
 
+/// Where an entry goes: to a file, or nowhere if none is wanted or this computer cannot store it.
+struct Target(Option<io::Result<File>>);
+
+impl io::Write for Target {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if let Some(Ok(file)) = &mut self.0
+            && let Err(e) = file.write_all(bytes)
+        {
+            self.0 = Some(Err(e));
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// The standard, from the text: the XML may be broken.
 fn version(xml: &[u8]) -> Result<FmiVersion, String> {
-    let text = String::from_utf8_lossy(xml);
+    // Null bytes are those of UTF-16 and UTF-32, which X01a reports.
+    let head: Vec<u8> = xml.iter().copied().filter(|b| *b != 0).take(1 << 16).collect();
+    let text = String::from_utf8_lossy(&head);
     let value = text.split_once("fmiVersion").map(|(_, rest)| rest.trim_start_matches([' ', '=', '"', '\'', '\n']));
     let value = value.map(|v| v.split(['"', '\'']).next().unwrap_or_default());
     match value {

@@ -1,7 +1,7 @@
 //! An instance under test.
 
 use crate::encoding::show;
-use crate::session::{NotDetermined, Session};
+use crate::session::{ENDED, NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::{Arguments, Buffer, Handle, Raw, SavedState, Simple, StepStatus};
 use model_description::{FmiVersion, ModelVariable};
@@ -25,6 +25,7 @@ impl Session {
     pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<Instance<'_>>, NotDetermined> {
         self.record_call(&format!("{}({:?})", self.instantiation(), arguments.name.as_deref().unwrap_or_default()));
         let handle = self.raw.instantiate(arguments).map_err(NotDetermined)?;
+        self.record_result(&if handle.is_some() { "an instance" } else { "NULL" });
         Ok(handle.map(|handle| Instance::new(self, handle, arguments.event_mode)))
     }
 
@@ -77,7 +78,9 @@ impl Instance<'_> {
         self.session.record_call(&name);
         let missing =
             || NotDetermined(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
-        function(&self.session.raw).ok_or_else(missing)
+        let status = function(&self.session.raw).ok_or_else(missing)?;
+        self.session.record_result(&status);
+        Ok(status)
     }
 
     /// A function without arguments.
@@ -153,10 +156,16 @@ impl Instance<'_> {
 
     /// A step from any time.
     pub(super) fn step_at(&self, t: f64, h: f64) -> Result<Status, NotDetermined> {
-        let call = if self.session.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?})") };
+        self.step_with(t, h, false)
+    }
+
+    /// The same with a value of noSetFMUStatePriorToCurrentPoint.
+    pub(super) fn step_with(&self, t: f64, h: f64, no_prior: bool) -> Result<Status, NotDetermined> {
+        let mark = if no_prior { ", noSetFMUStatePriorToCurrentPoint=true" } else { "" };
+        let call = if self.session.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?}{mark})") };
         let v2 = self.session.description.version == FmiVersion::V2;
         let status = self.call(&call, |raw| {
-            let (status, stepped) = raw.do_step(self.handle, t, h, false, [true; 4])?;
+            let (status, stepped) = raw.do_step(self.handle, t, h, no_prior, [true; 4])?;
             // fmi2Terminated is 3.
             let ends = || raw.step_status(StepStatus::GetBooleanStatus, self.handle, 3);
             let over = if v2 {
@@ -177,7 +186,12 @@ impl Instance<'_> {
     /// Steps that must succeed.
     pub(super) fn steps(&self, n: usize, h: f64) -> Result<(), NotDetermined> {
         for _ in 0..n {
-            self.must("DoStep", self.step(h)?)?;
+            let status = self.step(h)?;
+            // A legal end; what comes after it is open.
+            if self.over.get() {
+                return Err(NotDetermined(format!("{ENDED} at {}", self.time.get())));
+            }
+            self.must("DoStep", status)?;
         }
         Ok(())
     }

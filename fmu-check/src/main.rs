@@ -22,13 +22,16 @@ enum Hidden {
 }
 
 fn main() -> ExitCode {
+    if let Some(status) = fmu_import::guard::serve() {
+        return status;
+    }
     let Cli { check, probe } = Cli::parse();
     let outcome = match probe {
         Some(Hidden::Probe(args)) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         None => command::run(&check).map(|holds| ExitCode::from(u8::from(!holds))),
     };
     outcome.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        eprintln!("error: {}", fmu_import::printable_lines(&format!("{error:#}")));
         ExitCode::from(2)
     })
 }

@@ -1,9 +1,10 @@
 //! One probe: runs one check of the binary in this process and writes its findings to a file for the parent.
 
-use crate::check::Run;
+use crate::check::{Level, Run};
 use crate::checks::GROUPS;
 pub use crate::session::ProbeArguments;
-use crate::session::{Line, NotDetermined, Session};
+use crate::session::{Line, NotDetermined, NotOpened, Session};
+use fmu_import::guard;
 use std::fs;
 use std::path::Path;
 
@@ -15,6 +16,7 @@ const VIOLATED_WHEN_BLOCKED: [&str; 3] = ["B00", "L00", "E00"];
 /// # Errors
 /// There is no such check, or the folder is not readable.
 pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
+    guard::end_with_parent();
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == args.id);
     let Some(Run::Probe(probe) | Run::Silent(probe) | Run::Twice(probe) | Run::Exchange(probe)) = check.map(|c| c.run)
     else {
@@ -34,9 +36,27 @@ pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
             session.record_call("(the process ends)");
             std::mem::forget(session);
         }
-        Err(NotDetermined(why)) => {
-            let tool = needs_tool(&args.dir);
-            let line = if args.id == "B00" && !tool { Line::Violated(why) } else { Line::NotDetermined(why) };
+        Err(why) => {
+            let line = match why {
+                NotOpened::Load(why) if args.id == "B00" && !needs_tool(&args.dir) => {
+                    // A library or a version of it is missing on this computer: the standards only recommend to avoid that.
+                    if [
+                        "cannot open shared object file",
+                        "not found",
+                        "GetLastError 126",
+                        "code: 126",
+                        "Library not loaded",
+                    ]
+                    .iter()
+                    .any(|sign| why.contains(sign))
+                    {
+                        Line::Lesser(Level::Should, why)
+                    } else {
+                        Line::Violated(why)
+                    }
+                }
+                NotOpened::Load(why) | NotOpened::Here(why) => Line::NotDetermined(why),
+            };
             let text = [line, Line::Done].iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>()?;
             fs::write(&args.out, text.join("\n"))?;
         }

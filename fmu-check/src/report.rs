@@ -32,6 +32,8 @@ pub struct Counts {
     pub not_applicable: usize,
     /// Not determined.
     pub not_determined: usize,
+    /// Violated, but known.
+    pub known: usize,
 }
 
 impl Report {
@@ -56,14 +58,26 @@ impl Report {
         self.findings.iter().filter(|f| matches!(f.verdict, Verdict::Violated(_)))
     }
 
-    /// Whether no requirement of the standard is violated.
+    /// The violated checks that neither `--allow` nor the baseline knows.
+    pub fn unknown(&self) -> impl Iterator<Item = &Finding> {
+        self.violated().filter(|f| !f.known)
+    }
+
+    /// Whether no requirement of the standard is violated, except for what is known.
     pub fn conforms(&self) -> bool {
-        self.violated().all(|f| f.level != Level::Must)
+        self.unknown().all(|f| f.level != Level::Must)
+    }
+
+    /// Marks the findings of these checks as known.
+    pub fn allow(&mut self, ids: &[String]) {
+        for finding in &mut self.findings {
+            finding.known |= ids.iter().any(|id| id.eq_ignore_ascii_case(finding.id));
+        }
     }
 
     /// Whether every requirement that applies holds.
     pub fn is_clean(&self) -> bool {
-        let is_clean = |f: &Finding| matches!(f.verdict, Verdict::Pass(_) | Verdict::NotApplicable(_));
+        let is_clean = |f: &Finding| f.known || matches!(f.verdict, Verdict::Pass(_) | Verdict::NotApplicable(_));
         self.findings.iter().all(is_clean)
     }
 
@@ -73,6 +87,7 @@ impl Report {
         for finding in &self.findings {
             match &finding.verdict {
                 Verdict::Pass(_) => counts.passed += 1,
+                Verdict::Violated(_) if finding.known => counts.known += 1,
                 Verdict::Violated(_) => counts.violated[finding.level as usize] += 1,
                 Verdict::NotApplicable(_) => counts.not_applicable += 1,
                 Verdict::NotDetermined(_) => counts.not_determined += 1,
@@ -81,11 +96,12 @@ impl Report {
         counts
     }
 
-    fn summary(&self) -> String {
+    pub(super) fn summary(&self) -> String {
         let c = self.counts();
         let [must, should, hard] = c.violated;
+        let known = if c.known > 0 { format!(", {} known", c.known) } else { String::new() };
         format!(
-            "{} checks: {} passed; violated: {must} must, {should} should, {hard} hard; {} not applicable, {} not determined",
+            "{} checks: {} passed; violated: {must} must, {should} should, {hard} hard{known}; {} not applicable, {} not determined",
             self.findings.len(),
             c.passed,
             c.not_applicable,
@@ -93,7 +109,12 @@ impl Report {
         )
     }
 
-    fn heading(&self) -> String {
+    /// The ids of the findings that would have taken an importer down with them.
+    pub fn fatal(&self) -> Vec<&'static str> {
+        self.violated().filter(|f| f.fatal).map(|f| f.id).collect()
+    }
+
+    pub(super) fn heading(&self) -> String {
         let model = self.model.as_deref().unwrap_or("?");
         let tool = self.generation_tool.as_deref().unwrap_or("an unnamed tool");
         format!("{}: {model}, FMI {}, made by {tool}", self.file, self.fmi_version)
@@ -107,30 +128,37 @@ impl Report {
     /// Text for a terminal: violated and undetermined checks; with `verbose` also all others.
     pub fn text(&self, verbose: bool) -> String {
         let mut out = format!("{}\n", self.heading());
+        // A reason that checks share is printed once, at the end.
+        let mut shared: Vec<(&str, Vec<&str>)> = Vec::new();
+        for f in self.findings.iter().filter(|_| !verbose) {
+            let Verdict::NotDetermined(reason) = &f.verdict else { continue };
+            match shared.iter_mut().find(|(other, _)| *other == reason.as_str()) {
+                Some((_, ids)) => ids.push(f.id),
+                None => shared.push((reason, vec![f.id])),
+            }
+        }
+        shared.retain(|(_, ids)| ids.len() > 1);
         for (title, findings) in self.groups() {
             let passed = findings.iter().filter(|f| matches!(f.verdict, Verdict::Pass(_))).count();
             let _ = writeln!(out, "\n{title} ({passed} of {} passed)", findings.len());
-            // Print a reason that checks share only once.
-            let mut shown_reasons: Vec<&str> = Vec::new();
             for f in &findings {
                 match &f.verdict {
                     Verdict::Pass(_) | Verdict::NotApplicable(_) if !verbose => {}
-                    Verdict::NotDetermined(reason) if !verbose => {
-                        let same = |f: &&&Finding| f.verdict == Verdict::NotDetermined(reason.clone());
-                        let ids: Vec<_> = findings.iter().filter(same).map(|f| f.id).collect();
-                        if ids.len() == 1 {
-                            line(&mut out, f);
-                        } else if !shown_reasons.contains(&reason.as_str()) {
-                            shown_reasons.push(reason);
-                            let _ = writeln!(out, "  not determined: {}\n         - {reason}", ids.join(", "));
-                        }
-                    }
-                    _ => line(&mut out, f),
+                    Verdict::NotDetermined(_) if shared.iter().any(|(_, ids)| ids.contains(&f.id)) => {}
+                    _ => line(&mut out, f, verbose),
                 }
             }
         }
+        for (reason, ids) in shared {
+            let _ = writeln!(out, "\nNot determined, {} checks: {reason}\n  {}", ids.len(), ids.join(", "));
+        }
         let _ = writeln!(out, "\n{}", self.summary());
-        let end = match (self.conforms(), self.violated().count()) {
+        if !self.fatal().is_empty() {
+            let _ = writeln!(out, "An importer would have crashed or hung in: {}.", self.fatal().join(", "));
+        }
+        let end = match (self.conforms(), self.unknown().count()) {
+            (true, 0) if self.counts().known > 0 => "All findings are known.",
+            (true, 0) if self.counts().not_determined > 0 => "What could be determined holds.",
             (true, 0) => "All requirements hold.",
             (true, _) => "No requirement of the standard (must) is violated.",
             (false, _) => "Requirements of the standard (must) are violated.",
@@ -148,21 +176,18 @@ impl Report {
 
     /// A self-contained HTML page.
     pub fn html(&self) -> String {
-        let mut out = format!(
-            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title><style>\
-             body{{font:16px/1.4 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}}table{{border-collapse:collapse;width:100%}}\
-             td,th{{border-top:1px solid #ccc;padding:.3em .6em;text-align:left;vertical-align:top}}td:first-child{{white-space:nowrap}}\
-             .violated{{background:#fdd}}.violated.hard,.violated.should{{background:#fec}}.not{{color:#666}}small{{color:#555}}\
-             code{{overflow-wrap:anywhere}}</style></head><body>\n<h1>{0}</h1>\n<p>{1}</p>\n",
-            escape(&self.heading()),
-            escape(&self.summary())
-        );
+        html(std::slice::from_ref(self))
+    }
+
+    fn section(&self) -> String {
+        let mut out = format!("<h1>{}</h1>\n<p>{}</p>\n", escape(&self.heading()), escape(&self.summary()));
         // Violations first.
         if self.violated().next().is_some() {
             out.push_str("<ul>\n");
             for f in self.violated() {
                 let (level, requirement) = (level(f.level), escape(f.requirement));
-                let _ = writeln!(out, "<li><a href=\"#{0}\">{0}</a> ({level}): {requirement}</li>", f.id);
+                let fatal = if f.fatal { ", takes the importer down" } else { "" };
+                let _ = writeln!(out, "<li><a href=\"#{0}\">{0}</a> ({level}{fatal}): {requirement}</li>", f.id);
             }
             out.push_str("</ul>\n");
         }
@@ -189,8 +214,65 @@ impl Report {
             }
             out.push_str("</table>\n");
         }
-        out + "</body></html>\n"
+        out
     }
+}
+
+/// One HTML page for several files.
+pub fn html(reports: &[Report]) -> String {
+    let title: Vec<_> = reports.iter().map(Report::heading).collect();
+    let head = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title><style>\
+         body{{font:16px/1.4 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}}table{{border-collapse:collapse;width:100%}}\
+         td,th{{border-top:1px solid #ccc;padding:.3em .6em;text-align:left;vertical-align:top}}td:first-child{{white-space:nowrap}}\
+         .violated{{background:#fdd}}.violated.hard,.violated.should{{background:#fec}}.not{{color:#666}}small{{color:#555}}\
+         code{{overflow-wrap:anywhere}}</style></head><body>\n",
+        escape(&title.join("; "))
+    );
+    reports.iter().map(Report::section).fold(head, |page, section| page + &section) + "</body></html>\n"
+}
+
+/// Text for several files: what several have in common once, with the files; then what only one has; then a line for each.
+pub fn texts(reports: &[Report], verbose: bool) -> String {
+    if let [report] = reports {
+        return report.text(verbose);
+    }
+    let mut out = String::new();
+    let violated = |r: &Report, id: &str| r.violated().find(|f| f.id == id).cloned();
+    let name = |r: &Report| r.file.rsplit(['/', '\\']).next().unwrap_or_default().to_owned();
+    let mut common = Vec::new();
+    for check in GROUPS.iter().flat_map(|g| g.checks) {
+        let hits: Vec<_> = reports.iter().filter_map(|r| Some((r, violated(r, check.id)?))).collect();
+        let [(_, first), _, ..] = hits.as_slice() else { continue };
+        common.push(check.id);
+        let (word, _) = verdict_text(first);
+        let level = level(hits.iter().map(|(_, f)| f.level).min().unwrap_or(first.level));
+        let files: Vec<_> = hits.iter().map(|(r, _)| name(r)).collect();
+        let (id, requirement) = (check.id, check.requirement);
+        let counts = format!("{} of {} files", hits.len(), reports.len());
+        let _ = writeln!(out, "  {id:<6} {word} ({level}) in {counts}, {}: {requirement}", files.join(", "));
+    }
+    if !common.is_empty() {
+        out = format!("In several files:\n{out}\n");
+    }
+    for report in reports {
+        let mut own = report.clone();
+        own.findings.retain(|f| !common.contains(&f.id) || !matches!(f.verdict, Verdict::Violated(_)));
+        if verbose || own.violated().next().is_some() {
+            let _ = writeln!(out, "{}", report.heading());
+            for finding in own.findings.iter().filter(|f| verbose || matches!(f.verdict, Verdict::Violated(_))) {
+                line(&mut out, finding, verbose);
+            }
+            out.push('\n');
+        }
+    }
+    for report in reports {
+        let fatal = report.fatal();
+        let fatal = if fatal.is_empty() { String::new() } else { format!("; crash or hang: {}", fatal.join(", ")) };
+        let _ = writeln!(out, "{}: {}{fatal}", report.file, report.summary());
+    }
+    let bad = reports.iter().filter(|r| !r.conforms()).count();
+    out + &format!("{} files, {bad} of which violate requirements of the standard (must).\n", reports.len())
 }
 
 /// The word for a level.
@@ -206,6 +288,9 @@ pub(super) fn level(level: Level) -> &'static str {
 fn verdict_text(finding: &Finding) -> (&'static str, Vec<&str>) {
     match &finding.verdict {
         Verdict::Pass(evidence) => ("pass", evidence.iter().map(String::as_str).collect()),
+        Verdict::Violated(evidence) if finding.fatal => {
+            ("VIOLATED, takes the importer down", evidence.iter().map(String::as_str).collect())
+        }
         Verdict::Violated(evidence) => ("VIOLATED", evidence.iter().map(String::as_str).collect()),
         Verdict::NotApplicable(reason) => ("not applicable", vec![reason]),
         Verdict::NotDetermined(reason) => ("not determined", vec![reason]),
@@ -215,9 +300,10 @@ fn verdict_text(finding: &Finding) -> (&'static str, Vec<&str>) {
 /// Pieces of evidence in the text.
 const MAX_EVIDENCE: usize = 8;
 
-fn line(out: &mut String, finding: &Finding) {
+fn line(out: &mut String, finding: &Finding, calls: bool) {
     let (word, evidence) = verdict_text(finding);
-    let _ = writeln!(out, "  {:<6} {word} ({}): {}", finding.id, level(finding.level), finding.requirement);
+    let known = if finding.known { ", known" } else { "" };
+    let _ = writeln!(out, "  {:<6} {word} ({}{known}): {}", finding.id, level(finding.level), finding.requirement);
     if matches!(finding.verdict, Verdict::Violated(_)) {
         let clause = finding.clause;
         let _ =
@@ -229,10 +315,34 @@ fn line(out: &mut String, finding: &Finding) {
     if evidence.len() > MAX_EVIDENCE {
         let _ = writeln!(out, "         - and {} more; --format json shows them", evidence.len() - MAX_EVIDENCE);
     }
+    if calls && !finding.calls.is_empty() {
+        let _ = writeln!(out, "         calls:");
+        for call in &finding.calls {
+            let _ = writeln!(out, "           {call}");
+        }
+    }
 }
 
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// What a check is about, for `--explain`.
+pub(super) fn explain(id: &str) -> Option<String> {
+    let mut all = GROUPS.iter().flat_map(|g| g.checks.iter().map(move |c| (g, c)));
+    let (group, c) = all.find(|(_, c)| c.id.eq_ignore_ascii_case(id))?;
+    let of = |name: &str, l: Option<Level>| l.map(|l| format!("{} in FMI {name}", level(l)));
+    let levels: Vec<_> = [of("2.0", c.levels.0), of("3.0", c.levels.1)].into_iter().flatten().collect();
+    Some(format!(
+        "{} ({}): {}\n\nRequirement, in our words\n  {}\n\nClause\n  {}\n\nHow it is tried\n  {}\n\nUsual fix\n  {}\n",
+        c.id,
+        group.name,
+        levels.join(", "),
+        c.requirement,
+        c.clause,
+        c.tried,
+        c.fix
+    ))
 }
 
 /// The list of all checks: one Markdown table per group.

@@ -4,16 +4,20 @@
 //! and writes the call that it is about to make to another file. When the child dies, the parent knows what was found and which
 //! call ended it. A probe with several cases is restarted after the case that ended it.
 
-use crate::check::{Check, Options, Run, Verdict};
+use crate::check::{Check, Judgement, Level, Options, Run, Verdict};
 use crate::checks::GROUPS;
 use crate::fmu_file::FmuFile;
-use crate::session::Line;
-use model_description::Interface;
+use crate::session::{FOUND, Line};
+use crate::watch::{State, Watch};
+use fmu_import::guard::{self, Allowance, End, Guarded};
+use model_description::{Interface, limits};
 use std::collections::VecDeque;
 use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
-use std::sync::Mutex;
+use std::process::Command;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Default time limit of a probe.
@@ -22,20 +26,25 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 const WITHOUT_MINIMAL_RUN: [&str; 4] = ["B00", "L00", "E00", "X02b"];
 /// Checks with `Run::Probe` that make no instance, so that they apply to every interface.
 const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
+/// The check that processes which outlive a probe count for.
+const LEFT_BEHIND: &str = "B08p";
+const OUT_OF_TIME: &str = "the time limit of the run was used up (see --timeout)";
 /// Maximum number of restarts of a probe whose cases crash it.
 const MAX_RESTARTS: usize = 12;
 
 /// The verdicts of checks, in their order.
-pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Vec<Verdict> {
-    let verdicts: Vec<Mutex<Option<Verdict>>> = checks.iter().map(|_| Mutex::new(None)).collect();
+pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) -> Vec<Judgement> {
+    let verdicts: Vec<Mutex<Option<Judgement>>> = checks.iter().map(|_| Mutex::new(None)).collect();
     let mut queue = VecDeque::new();
+    let mut of_file = Vec::new();
     for (check, verdict) in checks.iter().zip(&verdicts) {
         match check.run {
-            Run::File(check_file) => store(verdict, check_file(fmu)),
+            Run::File(check_file) => of_file.push((check_file, verdict)),
             _ => queue.push_back((*check, verdict)),
         }
     }
     let runner = Runner::new(fmu, options);
+    check_file(fmu, &of_file, options.deadline());
     let [simulates, exchanges] = [false, true].map(|exchange| {
         let mut checks = queue.iter().filter(|(check, _)| exchange == is_exchange(check));
         checks.next().and_then(|_| why_no_run_succeeds(&runner, if exchange { "E00" } else { "L00" }))
@@ -48,8 +57,8 @@ pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Ve
                 while let Some((check, verdict)) = take(&queue) {
                     let why = if is_exchange(check) { &exchanges } else { &simulates };
                     let found = match (&runner, why) {
-                        (Err(cause), _) => Verdict::NotDetermined(cause.clone()),
-                        (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone(),
+                        (Err(cause), _) => Verdict::NotDetermined(cause.clone()).into(),
+                        (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone().into(),
                         (Ok(runner), _) => runner.run(check),
                     };
                     store(verdict, found);
@@ -57,8 +66,44 @@ pub(super) fn run_all(fmu: &FmuFile, checks: &[&Check], options: &Options) -> Ve
             });
         }
     });
-    let lost = || Verdict::NotDetermined("the probe did not report a result".into());
-    verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect()
+    let lost = || Verdict::NotDetermined("the probe did not report a result".into()).into();
+    let mut found: Vec<_> = verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect();
+    if let Ok(runner) = &runner {
+        checks.iter().zip(&mut found).for_each(|(check, found)| runner.charge(check, found));
+    }
+    found
+}
+
+/// A check of the file, and the place for its verdict.
+type OfFile<'a> = (fn(&FmuFile) -> Verdict, &'a Mutex<Option<Judgement>>);
+
+/// Runs the checks of the file until the deadline, and for [`limits::STATIC_SECONDS`] at most, whatever an author of hostile files
+/// has thought of.
+fn check_file(fmu: &Arc<FmuFile>, checks: &[OfFile<'_>], deadline: Option<Instant>) {
+    let (send, receive) = mpsc::channel();
+    let functions: Vec<_> = checks.iter().map(|(function, _)| *function).collect();
+    let fmu = fmu.clone();
+    // A thread cannot be ended from outside: one that takes too long ends with the process.
+    let thread = std::thread::spawn(move || functions.into_iter().try_for_each(|function| send.send(function(&fmu))));
+    let end = Instant::now() + Duration::from_secs(limits::STATIC_SECONDS);
+    let (end, over) = match deadline {
+        Some(deadline) if deadline < end => (deadline, OUT_OF_TIME.to_owned()),
+        _ => (end, format!("the checks of the file take more than {} s", limits::STATIC_SECONDS)),
+    };
+    let mut in_time = true;
+    for (_, place) in checks {
+        let verdict = receive.recv_timeout(end.saturating_duration_since(Instant::now()));
+        let why = |e| match e {
+            RecvTimeoutError::Timeout => over.clone(),
+            RecvTimeoutError::Disconnected => "the checker failed in this check or one before it".into(),
+        };
+        in_time &= verdict.is_ok();
+        store(place, verdict.unwrap_or_else(|e| Verdict::NotDetermined(why(e))).into());
+    }
+    if in_time {
+        // Its hold on the file ends before the caller's: the last one removes the unpacked archive.
+        let _ = thread.join();
+    }
 }
 
 fn is_exchange(check: &Check) -> bool {
@@ -69,7 +114,12 @@ fn is_exchange(check: &Check) -> bool {
 /// Exchange.
 fn why_no_run_succeeds(runner: &Result<Runner, String>, id: &str) -> Option<Verdict> {
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == id)?;
-    match runner.as_ref().ok()?.run(check) {
+    let runner = runner.as_ref().ok()?;
+    let began = Instant::now();
+    let verdict = runner.run(check).verdict;
+    let least = Duration::from_secs(2).min(runner.timeout);
+    let _ = runner.wild.set((20 * began.elapsed()).clamp(least, runner.timeout));
+    match verdict {
         Verdict::Violated(found) => Some(Verdict::NotDetermined(format!(
             "a minimal run fails ({id}): {}",
             found.first().map_or("", String::as_str)
@@ -83,30 +133,45 @@ fn take<T>(queue: &Mutex<VecDeque<T>>) -> Option<T> {
     queue.lock().ok()?.pop_front()
 }
 
-fn store(place: &Mutex<Option<Verdict>>, verdict: Verdict) {
+fn store(place: &Mutex<Option<Judgement>>, verdict: Judgement) {
     if let Ok(mut place) = place.lock() {
         *place = Some(verdict);
     }
 }
 
-/// Settings that all probes of a file share.
-struct Runner {
+/// Settings that all probes of a file share, and what they left behind.
+pub(super) struct Runner {
     program: PathBuf,
     dir: PathBuf,
     /// The binaries for co-simulation and for Model Exchange; mostly the same one.
     simulation: Option<PathBuf>,
     exchange: Option<PathBuf>,
+    /// Of one call.
     timeout: Duration,
+    allowance: Allowance,
+    /// Processes that outlived a probe.
+    left: Mutex<Vec<String>>,
+    /// Of a call with arguments that a real importer never passes: known after a minimal run.
+    wild: OnceLock<Duration>,
+    /// Of the whole run.
+    deadline: Option<Instant>,
 }
 
-/// How a child process ended.
+/// Checks whose calls have wild arguments: a hang shows sooner there.
+const WILD: [&str; 4] = ["T02b", "G07a", "E09", "F04c"];
+
+/// How a probe's process ended.
 enum Outcome {
-    Exit(ExitStatus),
-    TimedOut,
+    /// By itself, or in a call that hangs.
+    End(End),
+    /// It was too slow, and no call hangs.
+    Slow,
+    /// The time of the whole run was over.
+    OutOfTime,
 }
 
 impl Runner {
-    fn new(fmu: &FmuFile, options: &Options) -> Result<Self, String> {
+    pub(super) fn new(fmu: &FmuFile, options: &Options) -> Result<Self, String> {
         let description = fmu.description.as_ref().map_err(|_| "the description cannot be read")?;
         let binary = |interface: &Option<Interface>| {
             interface.as_ref().map(|i| Ok::<_, String>(fmu.dir().join(&fmu.host_binary(i)?.name))).transpose()
@@ -121,39 +186,58 @@ impl Runner {
             dir: fmu.dir().to_owned(),
             simulation,
             exchange,
-            timeout: options.timeout.unwrap_or(TIMEOUT),
+            timeout: options.patience.unwrap_or(TIMEOUT),
+            allowance: Allowance { file: limits::PROBE_FILE, ..options.allowance },
+            left: Mutex::default(),
+            wild: OnceLock::new(),
+            deadline: options.deadline(),
         })
     }
 
-    fn run(&self, check: &Check) -> Verdict {
+    /// The time limit of a call of a check.
+    fn limit(&self, id: &str) -> Duration {
+        let wild = self.wild.get().filter(|_| WILD.contains(&id));
+        wild.copied().unwrap_or(self.timeout)
+    }
+
+    fn run(&self, check: &Check) -> Judgement {
+        if self.deadline.is_some_and(|end| Instant::now() > end) {
+            return Verdict::NotDetermined(OUT_OF_TIME.into()).into();
+        }
         let binary = match (is_exchange(check), &self.simulation, &self.exchange) {
-            (true, _, None) => return Verdict::NotApplicable("the FMU has no interface for Model Exchange".into()),
+            (true, _, None) => {
+                return Verdict::NotApplicable("the FMU has no interface for Model Exchange".into()).into();
+            }
             (true, _, Some(binary)) | (false, Some(binary), _) => binary,
             (false, None, Some(binary)) if WITHOUT_INSTANCE.contains(&check.id) => binary,
-            (false, None, _) => return Verdict::NotApplicable("the FMU has no interface for co-simulation".into()),
+            (false, None, _) => {
+                return Verdict::NotApplicable("the FMU has no interface for co-simulation".into()).into();
+            }
         };
         let run = || {
             self.attempt(check, binary)
-                .unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be started: {e}")))
+                .unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be started: {e}")).into())
         };
-        let verdict = run();
-        if !matches!((check.run, &verdict), (Run::Twice(_), Verdict::Pass(_))) {
-            return verdict;
+        let found = run();
+        if !matches!((check.run, &found.verdict), (Run::Twice(_), Verdict::Pass(_))) {
+            return found;
         }
-        match (verdict, run()) {
+        let second = run();
+        match (found.verdict, second.verdict) {
             (Verdict::Pass(first), Verdict::Pass(second)) if first != second => Verdict::Violated(vec![
                 format!("first process: {}", first.join(", ")),
                 format!("second process: {}", second.join(", ")),
-            ]),
-            (_, second) => second,
+            ])
+            .into(),
+            (_, verdict) => Judgement { verdict, ..second },
         }
     }
 
-    fn attempt(&self, check: &Check, binary: &Path) -> std::io::Result<Verdict> {
+    fn attempt(&self, check: &Check, binary: &Path) -> io::Result<Judgement> {
         let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
         let (out, working_directory) = (folder.path().join("out"), folder.path().join("home"));
         fs::create_dir(&working_directory)?;
-        let mut crashes = Vec::new();
+        let (mut crashes, mut slow) = (Vec::new(), None);
         let mut from = 0;
         let began = Instant::now();
         loop {
@@ -162,8 +246,17 @@ impl Runner {
             if lines.iter().any(|l| matches!(l, Line::Done)) {
                 break;
             }
-            let last_call = fs::read_to_string(out.with_extension("call")).unwrap_or_default();
-            crashes.push((end.describe(self.timeout), last_call.trim().to_owned()));
+            match self.crash(check, &end, &out) {
+                Ok(crash) => crashes.push(crash),
+                Err(why) => {
+                    slow = Some(why);
+                    break;
+                }
+            }
+            if matches!(end, Outcome::End(End::Stopped)) {
+                // One hang is enough to know; the other cases would cost as much time again.
+                break;
+            }
             let last = lines.iter().rev().find_map(|l| if let Line::Case(n) = l { Some(*n) } else { None });
             match last {
                 // Continue with the next case, within a limit of restarts and time.
@@ -171,19 +264,23 @@ impl Runner {
                 _ => break,
             }
         }
-        let mut verdict = verdict_of(check.id, read(&out), crashes);
-        if matches!(check.run, Run::Silent(_)) && matches!(verdict, Verdict::Pass(_)) {
+        let mut found = judge(check.id, read(&out), crashes, slow);
+        if matches!(found.verdict, Verdict::Violated(_)) {
+            found.calls = calls(&fs::read_to_string(out.with_extension("log")).unwrap_or_default());
+        }
+        if matches!(check.run, Run::Silent(_)) && matches!(found.verdict, Verdict::Pass(_)) {
             let side_effects = side_effects(folder.path(), &working_directory);
             if !side_effects.is_empty() {
-                verdict = Verdict::Violated(side_effects);
+                found = Verdict::Violated(side_effects).into();
             }
         }
-        Ok(verdict)
+        Ok(found)
     }
 
-    fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> std::io::Result<Outcome> {
-        let console = File::options().create(true).append(true).open(folder.join("console"))?;
-        let mut child = Command::new(&self.program)
+    /// The probe's process.
+    fn command(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> Command {
+        let mut command = guard::command(&self.program, self.allowance);
+        command
             .args(["probe", "--id", check.id, "--from", &from.to_string()])
             .args(["--seconds", &self.timeout.as_secs_f64().to_string()])
             .arg("--dir")
@@ -192,45 +289,98 @@ impl Runner {
             .arg(binary)
             .arg("--out")
             .arg(folder.join("out"))
-            .current_dir(folder.join("home"))
-            .stdin(Stdio::null())
-            .stdout(console.try_clone()?)
-            .stderr(console)
-            .spawn()?;
-        let began = Instant::now();
-        loop {
-            if let Some(status) = child.try_wait()? {
-                return Ok(Outcome::Exit(status));
+            .current_dir(folder.join("home"));
+        command
+    }
+
+    /// Runs a probe, or one case of it, in a process that prints its calls; returns what was found.
+    pub(super) fn replay(&self, check: &Check, case: Option<usize>) -> io::Result<Judgement> {
+        let (exchange, simulation) = (self.exchange.as_deref(), self.simulation.as_deref());
+        let Some(binary) = (if is_exchange(check) { exchange } else { simulation.or(exchange) }) else {
+            return Ok(Verdict::NotApplicable("the FMU has no such interface".into()).into());
+        };
+        let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
+        fs::create_dir(folder.path().join("home"))?;
+        let out = folder.path().join("out");
+        let mut command = self.command(check, binary, folder.path(), case.unwrap_or(0));
+        command.arg("--trace");
+        if case.is_some() {
+            command.arg("--one");
+        }
+        let end = self.guarded(check, command, &out)?;
+        let lines = read(&out);
+        let (mut crashes, mut slow) = (Vec::new(), None);
+        if !lines.iter().any(|l| matches!(l, Line::Done)) {
+            match self.crash(check, &end, &out) {
+                Ok(crash) => crashes.push(crash),
+                Err(why) => slow = Some(why),
             }
-            if began.elapsed() > self.timeout {
-                child.kill()?;
-                child.wait()?;
-                return Ok(Outcome::TimedOut);
+        }
+        let mut found = judge(check.id, lines, crashes, slow);
+        self.charge(check, &mut found);
+        Ok(found)
+    }
+
+    fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> io::Result<Outcome> {
+        let console = File::options().create(true).append(true).open(folder.join("console"))?;
+        let mut command = self.command(check, binary, folder, from);
+        command.stdout(console.try_clone()?).stderr(console);
+        self.guarded(check, command, &folder.join("out"))
+    }
+
+    /// Runs a command of [`Self::command`] to its end.
+    fn guarded(&self, check: &Check, command: Command, out: &Path) -> io::Result<Outcome> {
+        let (mut watch, mut state, mut late) = (None, State::Runs, false);
+        let new = |id| Watch::new(id, out.with_extension("call"), self.limit(check.id));
+        let report = Guarded::start(command)?.wait(|id| {
+            late = self.deadline.is_some_and(|end| Instant::now() > end);
+            if let Some(id) = id {
+                state = watch.get_or_insert_with(|| new(id)).look();
             }
-            let pause = if began.elapsed() < Duration::from_millis(50) { 1 } else { 5 };
-            std::thread::sleep(Duration::from_millis(pause));
+            late || state != State::Runs
+        })?;
+        match report.end {
+            End::Refused(why) => return Err(io::Error::other(why)),
+            End::Stopped if late => return Ok(Outcome::OutOfTime),
+            End::Stopped if state == State::Slow => return Ok(Outcome::Slow),
+            // What the checker itself has ended could not clean up.
+            End::Ended(status) if status.success() => {
+                let left = report
+                    .left
+                    .iter()
+                    .map(|process| format!("after {}, the process {process} was left behind", check.id));
+                self.left.lock().unwrap_or_else(PoisonError::into_inner).extend(left);
+            }
+            _ => {}
+        }
+        Ok(Outcome::End(report.end))
+    }
+
+    /// How and in which call a process ended that has not finished its probe, or why its end is no finding.
+    fn crash(&self, check: &Check, end: &Outcome, out: &Path) -> Result<(String, String), String> {
+        let journal = fs::read_to_string(out.with_extension("call")).unwrap_or_default();
+        let call = journal.lines().next().unwrap_or_default().trim();
+        let limit = self.limit(check.id).as_secs_f64();
+        match end {
+            Outcome::OutOfTime => Err(OUT_OF_TIME.into()),
+            Outcome::Slow => Err(format!(
+                "the probe is too slow here for a limit of {limit} s for each call; it was in {} (see --patience)",
+                call.trim_start_matches(['C', 'P']).trim()
+            )),
+            Outcome::End(End::Stopped) => Ok((format!("did not return within {limit} s"), call.into())),
+            Outcome::End(end) => Ok((end.describe(), call.into())),
         }
     }
-}
 
-impl Outcome {
-    fn describe(&self, timeout: Duration) -> String {
-        match self {
-            Self::TimedOut => format!("did not return within {} s", timeout.as_secs_f64()),
-            Self::Exit(status) => {
-                #[cfg(unix)]
-                if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(status) {
-                    let name = match signal {
-                        4 => " (illegal instruction)",
-                        6 => " (abort)",
-                        7 | 11 => " (invalid memory access)",
-                        8 => " (arithmetic exception)",
-                        _ => "",
-                    };
-                    return format!("ended the process with signal {signal}{name}");
-                }
-                format!("ended the process ({status})")
-            }
+    /// Adds what outlived the probes, whichever it was, to the check that is about it.
+    fn charge(&self, check: &Check, found: &mut Judgement) {
+        let left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        if check.id != LEFT_BEHIND || left.is_empty() {
+            return;
+        }
+        match &mut found.verdict {
+            Verdict::Violated(found) => found.extend(left.iter().filter(|l| l.contains(check.id)).cloned()),
+            _ => *found = Verdict::Violated(left.clone()).into(),
         }
     }
 }
@@ -240,9 +390,28 @@ fn read(out: &Path) -> Vec<Line> {
     text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
 }
 
+/// The calls of the first case with a finding: that with the mark, or the last one.
+fn calls(log: &str) -> Vec<String> {
+    const MOST: usize = 60;
+    let cases: Vec<&str> = log.split("# case ").collect();
+    let found = cases.iter().find(|case| case.contains(FOUND)).or(cases.last());
+    let lines: Vec<_> = found.map_or("", |case| case).lines().filter(|l| !l.is_empty() && *l != FOUND).collect();
+    // The number of the case is the first line of all but the first part.
+    let first = usize::from(cases.len() > 1 && found.is_some_and(|f| !std::ptr::eq(*f, cases[0])));
+    let calls: Vec<String> = lines.iter().skip(first).map(|l| (*l).to_owned()).collect();
+    if calls.len() <= MOST {
+        return calls;
+    }
+    let left_out = format!("({} calls)", calls.len() - MOST);
+    [&calls[..MOST / 2], &[left_out], &calls[calls.len() - MOST / 2..]].concat()
+}
+
 /// Unwanted console output and files of the process.
 fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
-    let console = fs::read(folder.join("console")).unwrap_or_default();
+    let mut console = Vec::new();
+    if let Ok(file) = File::open(folder.join("console")) {
+        let _ = file.take(64 << 10).read_to_end(&mut console);
+    }
     let console = String::from_utf8_lossy(&console);
     let mut findings: Vec<_> = console.lines().take(5).map(|l| format!("wrote to the console: {l}")).collect();
     let files = fs::read_dir(working_directory).into_iter().flatten().flatten().take(5);
@@ -252,11 +421,17 @@ fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
 }
 
 /// The verdict from the lines of the probe and from its crashes (how, and in which call).
-fn verdict_of(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>) -> Verdict {
-    let (mut violated, mut notes, mut not_determined, mut not_applicable) = (Vec::new(), Vec::new(), None, None);
+fn judge(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Option<String>) -> Judgement {
+    let (mut violated, mut notes, mut not_determined, mut not_applicable) = (Vec::new(), Vec::new(), slow, None);
+    let (mut lesser, mut lower, mut fatal) = (Vec::new(), None, false);
     for line in lines {
         match line {
             Line::Violated(text) => violated.push(text),
+            Line::Lesser(level, text) => {
+                // The more binding level is the smaller one.
+                lower = Some(lower.map_or(level, |other: Level| other.min(level)));
+                lesser.push(text);
+            }
             Line::Note(text) => notes.push(text),
             Line::NotDetermined(why) => not_determined = not_determined.or(Some(why)),
             Line::NotApplicable(why) => not_applicable = not_applicable.or(Some(why)),
@@ -266,20 +441,25 @@ fn verdict_of(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>) -> Ver
     for (how, call) in crashes {
         if let Some(call) = call.strip_prefix("C ") {
             violated.push(format!("{call} {how}"));
+            fatal = true;
             continue;
         }
         // Preparing the probe failed: another check reports that.
         let call = call.strip_prefix("P ").unwrap_or("the start");
         if id == "B00" || (["L00", "E00"].contains(&id) && !call.starts_with("loading")) {
             violated.push(format!("{call} {how}"));
+            fatal = true;
         } else {
             not_determined = not_determined.or(Some(format!("{call} {how}, before the probe began")));
         }
     }
-    match (violated.is_empty(), not_determined, not_applicable) {
+    let lower = lower.filter(|_| violated.is_empty());
+    violated.extend(lesser);
+    let verdict = match (violated.is_empty(), not_determined, not_applicable) {
         (false, ..) => Verdict::Violated(violated),
         (_, Some(why), _) => Verdict::NotDetermined(why),
         (_, _, Some(why)) => Verdict::NotApplicable(why),
         _ => Verdict::Pass(notes),
-    }
+    };
+    Judgement { verdict, lower, fatal, calls: Vec::new() }
 }

@@ -3,10 +3,11 @@
 //! Every finding is written at once and every call is written before it is made, so that nothing is lost if the FMU crashes the
 //! process. `Err(NotDetermined)` ends a probe that cannot decide.
 
+use crate::check::Level;
 use crate::encoding::bits;
 use clap::Args;
-use fmu_import::file_uri;
 use fmu_import::raw::{Arguments, Interface, Raw};
+use fmu_import::{file_uri, printable_lines};
 use model_description::{
     BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, ModelVariable, Variability,
 };
@@ -22,6 +23,14 @@ use std::time::{Duration, Instant};
 #[derive(Debug)]
 pub(super) struct NotDetermined(pub(super) String);
 
+/// Why a probe has no session.
+pub(super) enum NotOpened {
+    /// Something failed on this computer, which is no fault of the FMU.
+    Here(String),
+    /// The binary does not load.
+    Load(String),
+}
+
 /// One line of a probe's output.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -30,6 +39,8 @@ pub(super) enum Line {
     Case(usize),
     /// A violation.
     Violated(String),
+    /// A violation of this level, lower than that of the check.
+    Lesser(Level, String),
     /// Evidence for a pass.
     Note(String),
     /// The requirement does not apply to this FMU.
@@ -58,6 +69,12 @@ pub struct ProbeArguments {
     /// Number of the first case.
     #[arg(long, default_value_t = 0)]
     pub from: usize,
+    /// Only this case.
+    #[arg(long)]
+    pub one: bool,
+    /// Print every call with what it returned.
+    #[arg(long)]
+    pub trace: bool,
     /// Time that it may take, in seconds.
     #[arg(long, default_value_t = 10.0)]
     pub seconds: f64,
@@ -75,29 +92,45 @@ pub(super) struct Session {
     journal: RefCell<File>,
     preparing: Cell<bool>,
     pub(super) silent: Cell<bool>,
+    log: RefCell<File>,
+    trace: bool,
     from: usize,
+    one: bool,
     next: Cell<usize>,
     violations: Cell<usize>,
     instances_made: Cell<usize>,
     began: Instant,
+    /// When `show_progress` last wrote.
+    shown: Cell<Instant>,
     timeout: Duration,
+    /// The working directory at the start: temporary, and the FMU may leave it.
+    pub(super) home: PathBuf,
+    /// The file of `journal`.
+    calls: PathBuf,
 }
 
+/// Stands in the log of calls where something was found.
+pub(super) const FOUND: &str = "# found";
+/// How an end begins that the FMU asked for, as it may at any time.
+pub(super) const ENDED: &str = "the FMU ended the simulation";
 /// Maximum number of violations that one probe reports.
 const MAX_VIOLATIONS: usize = 25;
 
 impl Session {
     /// Loads the FMU.
-    pub(super) fn open(args: &ProbeArguments) -> Result<Self, NotDetermined> {
-        let lost = |e: &dyn std::fmt::Display| NotDetermined(e.to_string());
+    pub(super) fn open(args: &ProbeArguments) -> Result<Self, NotOpened> {
+        let lost = |e: &dyn std::fmt::Display| NotOpened::Here(e.to_string());
+        let home = std::env::current_dir().map_err(|e| lost(&e))?;
         let xml = std::fs::read(args.dir.join("modelDescription.xml")).map_err(|e| lost(&e))?;
         let description = model_description::read(&xml).map_err(|e| lost(&e))?;
         let create = |path: &Path| File::options().create(true).append(true).open(path).map_err(|e| lost(&e));
         let lines = create(&args.out)?;
-        let mut journal = File::create(args.out.with_extension("call")).map_err(|e| lost(&e))?;
+        let calls = args.out.with_extension("call");
+        let mut journal = File::create(&calls).map_err(|e| lost(&e))?;
+        let log = create(&args.out.with_extension("log"))?;
         let _ = journal.write_all(b"P loading the binary");
         let raw = Raw::open(&args.binary, description.version)
-            .map_err(|e| NotDetermined(format!("the binary does not load: {e}")))?;
+            .map_err(|e| NotOpened::Load(format!("the binary does not load: {e}")))?;
         Ok(Self {
             raw,
             description,
@@ -107,11 +140,17 @@ impl Session {
             journal: RefCell::new(journal),
             preparing: Cell::new(false),
             silent: Cell::new(false),
+            log: RefCell::new(log),
+            trace: args.trace,
             from: args.from,
+            one: args.one,
             next: Cell::new(0),
             violations: Cell::new(0),
             instances_made: Cell::new(0),
             began: Instant::now(),
+            shown: Cell::new(Instant::now()),
+            home,
+            calls,
             timeout: Duration::from_secs_f64(args.seconds),
         })
     }
@@ -129,21 +168,29 @@ impl Session {
 
     /// The same, unpacked to another folder.
     pub(super) fn duplicate_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, NotDetermined> {
-        let scratch = || tempfile::tempfile().map_err(|e| NotDetermined(e.to_string()));
+        let lost = |e: std::io::Error| NotDetermined(e.to_string());
+        // It writes nothing but progress there.
+        let journal = File::options().append(true).open(&self.calls).map_err(lost)?;
         Ok(Self {
             raw,
             description: self.description.clone(),
             binary: self.binary.clone(),
             dir: dir.into(),
-            lines: RefCell::new(scratch()?),
-            journal: RefCell::new(scratch()?),
+            lines: RefCell::new(tempfile::tempfile().map_err(lost)?),
+            journal: RefCell::new(journal),
             preparing: Cell::new(false),
             silent: Cell::new(true),
+            log: RefCell::new(tempfile::tempfile().map_err(lost)?),
+            trace: false,
             from: 0,
+            one: false,
             next: Cell::new(0),
             violations: Cell::new(0),
             instances_made: Cell::new(1000 * (number + 1)),
             began: self.began,
+            shown: Cell::new(Instant::now()),
+            home: self.home.clone(),
+            calls: self.calls.clone(),
             timeout: self.timeout,
         })
     }
@@ -171,6 +218,22 @@ impl Session {
         if self.violations.get() <= MAX_VIOLATIONS {
             self.write(&Line::Violated(text.into()));
         }
+        self.note_call(&format!("\n{FOUND}\n"));
+    }
+
+    /// Reports a violation of a lower level than that of the check.
+    pub(super) fn lesser(&self, level: Level, text: impl Into<String>) {
+        self.write(&Line::Lesser(level, text.into()));
+        self.note_call(&format!("\n{FOUND}\n"));
+    }
+
+    /// Reports a call that should have succeeded, as a violation; an end that the FMU asked for is none.
+    pub(super) fn failed(&self, what: &str, NotDetermined(why): NotDetermined) {
+        if why.starts_with(ENDED) {
+            self.write(&Line::NotDetermined(why));
+        } else {
+            self.violated(format!("{what}: {why}"));
+        }
     }
 
     /// Reports a violation unless `holds`.
@@ -196,10 +259,11 @@ impl Session {
     pub(super) fn case(&self, case: impl FnOnce() -> Result<(), NotDetermined>) {
         let number = self.next.get();
         self.next.set(number + 1);
-        if number < self.from {
+        if number < self.from || (self.one && number > self.from) {
             return;
         }
         self.write(&Line::Case(number));
+        self.note_call(&format!("\n# case {number}\n"));
         if let Err(NotDetermined(why)) = case() {
             self.write(&Line::NotDetermined(why));
         }
@@ -213,7 +277,10 @@ impl Session {
     /// Writes the next call to the journal.
     pub(super) fn record_call(&self, call: &str) {
         if self.silent.get() {
-            return;
+            return self.show_progress();
+        }
+        if !call.starts_with('(') {
+            self.note_call(&format!("\n{call}"));
         }
         let mut journal = self.journal.borrow_mut();
         let mark = if self.preparing.get() { "P" } else { "C" };
@@ -221,6 +288,33 @@ impl Session {
         let _ = journal.write_all(format!("{mark} {call}\n").as_bytes());
         let end = journal.stream_position().unwrap_or(0);
         let _ = journal.set_len(end);
+    }
+
+    /// Adds to the log of calls.
+    fn note_call(&self, text: &str) {
+        if self.silent.get() {
+            return;
+        }
+        let _ = self.log.borrow_mut().write_all(text.as_bytes());
+        if self.trace {
+            print!("{}", printable_lines(text));
+            let _ = std::io::stdout().flush();
+        }
+    }
+
+    /// Adds what the last call returned.
+    pub(super) fn record_result(&self, result: &dyn std::fmt::Display) {
+        self.note_call(&format!(" -> {result}"));
+    }
+
+    /// Tells the parent, from time to time, that calls without entries of their own return.
+    fn show_progress(&self) {
+        if self.shown.get().elapsed() < Duration::from_millis(100) {
+            return;
+        }
+        self.shown.set(Instant::now());
+        let mut journal = self.journal.borrow_mut();
+        let _ = journal.seek(SeekFrom::End(0)).and_then(|_| writeln!(journal, "and others"));
     }
 
     /// Makes many calls with one journal entry.
@@ -264,6 +358,12 @@ impl Session {
             early_return: false,
             environment: 0x5000 + 0x10 * self.instances_made.get(),
         }
+    }
+
+    /// The relative deviation below which two runs are the same to the standards, which nowhere say bit for bit: the
+    /// tolerance of the default experiment, at least 1e-6.
+    pub(super) fn tolerance(&self) -> f64 {
+        self.description.default_experiment.tolerance.filter(|t| t.is_finite()).unwrap_or(0.0).max(1e-6)
     }
 
     /// Start time of the default experiment.

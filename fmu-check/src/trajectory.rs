@@ -1,7 +1,9 @@
-//! Trajectories: the watched variables after each step.
+//! Trajectories: the watched variables after each step, and how far two of them are apart.
 
+use crate::check::Level;
 use crate::instance::Instance;
-use crate::session::NotDetermined;
+use crate::session::{NotDetermined, Session};
+use model_description::{BaseType, ModelVariable};
 
 /// Steps `n` times with changing inputs and returns all watched variables after each step.
 pub(super) fn trajectory(instance: &Instance<'_>, n: u32) -> Result<Vec<Vec<Vec<u64>>>, NotDetermined> {
@@ -15,10 +17,91 @@ pub(super) fn trajectory(instance: &Instance<'_>, n: u32) -> Result<Vec<Vec<Vec<
         .collect()
 }
 
-/// The first place where two trajectories differ: step and variable.
-pub(super) fn difference(a: &[Vec<Vec<u64>>], b: &[Vec<Vec<u64>>]) -> Option<(usize, usize)> {
-    if a.len() != b.len() {
-        return Some((a.len().min(b.len()), 0));
+/// Where two trajectories differ, and by how much.
+pub(super) struct Difference {
+    /// First step that differs, from 0.
+    pub(super) step: usize,
+    /// The variable that differs first.
+    pub(super) variable: usize,
+    /// The largest deviation of a floating-point variable, relative to its largest value; infinite for another one.
+    pub(super) largest: f64,
+}
+
+/// A value of a floating-point type.
+fn number(base: BaseType, bits: u64) -> f64 {
+    match base {
+        BaseType::Float32 => f64::from(f32::from_bits(u32::try_from(bits & 0xffff_ffff).unwrap_or(0))),
+        _ => f64::from_bits(bits),
     }
-    a.iter().zip(b).enumerate().find_map(|(k, (x, y))| Some((k, x.iter().zip(y).position(|(x, y)| x != y)?)))
+}
+
+/// Where two trajectories of these variables differ.
+pub(super) fn difference(variables: &[&ModelVariable], a: &[Vec<Vec<u64>>], b: &[Vec<Vec<u64>>]) -> Option<Difference> {
+    if a.len() != b.len() {
+        return Some(Difference { step: a.len().min(b.len()), variable: 0, largest: f64::INFINITY });
+    }
+    let mut rows = a.iter().zip(b).enumerate();
+    let (step, variable) = rows.find_map(|(step, (x, y))| Some((step, x.iter().zip(y).position(|(x, y)| x != y)?)))?;
+    let of = |(i, v): (usize, &&ModelVariable)| {
+        let pairs = || a.iter().zip(b).filter_map(move |(x, y)| Some((x.get(i)?, y.get(i)?)));
+        if !v.base.is_float() || pairs().any(|(x, y)| x.len() != y.len()) {
+            return if pairs().all(|(x, y)| x == y) { 0.0 } else { f64::INFINITY };
+        }
+        let values = |x: &[u64]| x.iter().map(|bits| number(v.base, *bits)).collect::<Vec<_>>();
+        let (mut scale, mut gap) = (f64::MIN_POSITIVE, 0.0_f64);
+        for (x, y) in pairs().flat_map(|(x, y)| values(x).into_iter().zip(values(y))) {
+            if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
+                scale = scale.max(x.abs());
+            } else if (x - y).is_finite() {
+                (scale, gap) = (scale.max(x.abs()).max(y.abs()), gap.max((x - y).abs()));
+            } else {
+                gap = f64::INFINITY;
+            }
+        }
+        gap / scale
+    };
+    let largest = variables.iter().enumerate().map(of).fold(0.0, f64::max);
+    Some(Difference { step, variable, largest })
+}
+
+impl Session {
+    /// Reports a difference between two runs that ought to be the same: below the tolerance it is a matter of robustness.
+    pub(super) fn compare(&self, what: &str, a: &[Vec<Vec<u64>>], b: &[Vec<Vec<u64>>]) {
+        let watched = self.watched();
+        self.compare_variables(&watched, what, a, b);
+    }
+
+    /// The same for other variables.
+    pub(super) fn compare_variables(
+        &self,
+        variables: &[&ModelVariable],
+        what: &str,
+        a: &[Vec<Vec<u64>>],
+        b: &[Vec<Vec<u64>>],
+    ) {
+        let Some(found) = difference(variables, a, b) else { return };
+        let name = variables.get(found.variable).map_or("an output", |v| v.name.as_str());
+        let after = if a.len() > 1 { format!(" after {} steps", found.step + 1) } else { String::new() };
+        let text = format!("{what}: {name} differs{after}");
+        self.deviates(found.largest, &text);
+    }
+
+    /// Reports a value that is not the expected one.
+    pub(super) fn value_deviates(&self, v: &ModelVariable, expected: &[u64], found: Vec<u64>, text: &str) {
+        if let Some(found) = difference(&[v], &[vec![expected.to_vec()]], &[vec![found]]) {
+            self.deviates(found.largest, text);
+        }
+    }
+
+    /// Reports a deviation, relative to the largest value.
+    pub(super) fn deviates(&self, largest: f64, text: &str) {
+        let tolerance = self.tolerance();
+        if largest <= tolerance {
+            self.lesser(Level::Hard, format!("{text}; relative deviation {largest:.1e}, within {tolerance:e}"));
+        } else if largest.is_finite() {
+            self.violated(format!("{text}; relative deviation {largest:.1e}, above {tolerance:e}"));
+        } else {
+            self.violated(text);
+        }
+    }
 }

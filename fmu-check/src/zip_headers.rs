@@ -1,10 +1,9 @@
 //! The raw headers of a ZIP archive, without the corrections of a tolerant reader (APPNOTE 6.3).
 
 use flate2::bufread::DeflateDecoder;
-use std::io::Read;
-
-/// Maximum number of entries that are read.
-const MAX_ENTRIES: usize = 100_000;
+use model_description::limits;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 
 /// One header, local or central.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -27,7 +26,7 @@ pub(super) struct Entry {
     pub(super) made_by: u16,
     pub(super) attributes: u32,
     pub(super) disk: u16,
-    start: usize,
+    start: u64,
 }
 
 impl Entry {
@@ -63,23 +62,38 @@ fn slice(bytes: &[u8], at: usize, len: usize) -> Option<Vec<u8>> {
     Some(bytes.get(at..at.checked_add(len)?)?.to_vec())
 }
 
+/// Bytes of a file; fewer at its end.
+fn bytes_at(file: &File, at: u64, len: u64) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let mut file = file;
+    file.seek(SeekFrom::Start(at)).and_then(|_| file.take(len).read_to_end(&mut bytes)).map_err(|e| e.to_string())?;
+    Ok(bytes)
+}
+
 impl Archive {
-    /// Reads the directory of an archive.
-    pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
-        let end = end_record(bytes).ok_or("not a ZIP archive, or truncated: it has no end record")?;
+    /// Reads the directory of an archive of this size.
+    pub(super) fn read(file: &File, size: u64) -> Result<Self, String> {
+        // The comment of the end record may be 64 KiB long; a record of ZIP64 may be before it.
+        let tail_at = size.saturating_sub(20 + 22 + 0xffff);
+        let tail = bytes_at(file, tail_at, size)?;
+        let end = end_record(&tail).ok_or("not a ZIP archive, or truncated: it has no end record")?;
         let truncated = || "the end record is truncated".to_owned();
-        let field = |at| u16_at(bytes, end + at).ok_or_else(truncated);
+        let field = |at| u16_at(&tail, end + at).ok_or_else(truncated);
         let split = [4, 6].iter().try_fold(false, |any, at| Ok::<_, String>(any || field(*at)? != 0))?;
         let count = usize::from(field(10)?);
-        let offset = u32_at(bytes, end + 16).ok_or_else(truncated)?;
-        let zip64 = (end >= 20 && u32_at(bytes, end - 20) == Some(0x0706_4b50)) || count == 0xffff;
-        let mut at = usize::try_from(offset).map_err(|e| e.to_string())?;
-        let mut entries = Vec::new();
-        while entries.len() < count && entries.len() < MAX_ENTRIES {
-            let entry = entry(bytes, &mut at)
+        let offset = u64::from(u32_at(&tail, end + 16).ok_or_else(truncated)?);
+        let zip64 = (end >= 20 && u32_at(&tail, end - 20) == Some(0x0706_4b50)) || count == 0xffff;
+        let length = (tail_at + end as u64).saturating_sub(offset);
+        limits::DIRECTORY.check(length)?;
+        let directory = bytes_at(file, offset, length)?;
+        let (mut entries, mut at) = (Vec::new(), 0);
+        while entries.len() < count {
+            let entry = entry(file, &directory, &mut at)
                 .ok_or_else(|| format!("entry {} of {count} in the directory cannot be read", entries.len() + 1))?;
             entries.push(entry);
         }
+        let unpacked = entries.iter().map(|e| u64::from(e.central.size)).sum();
+        limits::UNPACKED.check(unpacked)?;
         Ok(Self { entries, split, zip64 })
     }
 
@@ -99,7 +113,7 @@ fn end_record(bytes: &[u8]) -> Option<usize> {
     (first..=last).rev().find(|&at| u32_at(bytes, at) == Some(0x0605_4b50))
 }
 
-fn entry(bytes: &[u8], at: &mut usize) -> Option<Entry> {
+fn entry(file: &File, bytes: &[u8], at: &mut usize) -> Option<Entry> {
     let here = *at;
     if u32_at(bytes, here)? != 0x0201_4b50 {
         return None;
@@ -116,8 +130,8 @@ fn entry(bytes: &[u8], at: &mut usize) -> Option<Entry> {
         name: slice(bytes, here + 46, name)?,
         extra: slice(bytes, here + 46 + name, extra)?,
     };
-    let offset = usize::try_from(u32_at(bytes, here + 42)?).ok()?;
-    let (local, start) = local(bytes, offset).map_or((None, 0), |(header, start)| (Some(header), start));
+    let offset = u64::from(u32_at(bytes, here + 42)?);
+    let (local, start) = local(file, offset).map_or((None, 0), |(header, start)| (Some(header), start));
     *at = here + 46 + name + extra + comment;
     Some(Entry {
         central,
@@ -129,55 +143,75 @@ fn entry(bytes: &[u8], at: &mut usize) -> Option<Entry> {
     })
 }
 
-fn local(bytes: &[u8], at: usize) -> Option<(Header, usize)> {
-    if u32_at(bytes, at)? != 0x0403_4b50 {
+/// A local header, and where its data begin.
+fn local(file: &File, at: u64) -> Option<(Header, u64)> {
+    let fixed = bytes_at(file, at, 30).ok()?;
+    if u32_at(&fixed, 0)? != 0x0403_4b50 {
         return None;
     }
-    let (name, extra) = (usize::from(u16_at(bytes, at + 26)?), usize::from(u16_at(bytes, at + 28)?));
+    let (name, extra) = (usize::from(u16_at(&fixed, 26)?), usize::from(u16_at(&fixed, 28)?));
+    let names = bytes_at(file, at + 30, (name + extra) as u64).ok()?;
     let header = Header {
-        needed: u16_at(bytes, at + 4)?,
-        flags: u16_at(bytes, at + 6)?,
-        method: u16_at(bytes, at + 8)?,
-        crc: u32_at(bytes, at + 14)?,
-        packed: u32_at(bytes, at + 18)?,
-        size: u32_at(bytes, at + 22)?,
-        name: slice(bytes, at + 30, name)?,
-        extra: slice(bytes, at + 30 + name, extra)?,
+        needed: u16_at(&fixed, 4)?,
+        flags: u16_at(&fixed, 6)?,
+        method: u16_at(&fixed, 8)?,
+        crc: u32_at(&fixed, 14)?,
+        packed: u32_at(&fixed, 18)?,
+        size: u32_at(&fixed, 22)?,
+        name: slice(&names, 0, name)?,
+        extra: slice(&names, name, extra)?,
     };
-    Some((header, at + 30 + name + extra))
+    Some((header, at + 30 + (name + extra) as u64))
 }
 
 /// The contents of an entry, at most `limit` bytes, checked against its checksum.
-pub(super) fn contents(bytes: &[u8], entry: &Entry, limit: u64) -> Result<Vec<u8>, String> {
+pub(super) fn contents(file: &File, entry: &Entry, limit: u64) -> Result<Vec<u8>, String> {
+    let mut out = Vec::new();
+    copy(file, entry, limit, &mut out)?;
+    Ok(out)
+}
+
+/// Writes the contents of an entry, at most `limit` bytes, and checks them against its checksum; returns their number.
+pub(super) fn copy(file: &File, entry: &Entry, limit: u64, out: &mut impl Write) -> Result<u64, String> {
     let name = entry.name();
     if entry.local.is_none() {
         return Err(format!("{name}: its local header cannot be read"));
     }
-    let packed = usize::try_from(entry.central.packed).map_err(|e| e.to_string())?;
-    let end = entry.start.checked_add(packed).filter(|&end| end <= bytes.len());
-    let data = end.map(|end| &bytes[entry.start..end]).ok_or_else(|| format!("{name}: its data are truncated"))?;
-    let mut out = Vec::new();
-    match entry.central.method {
-        0 => out.extend_from_slice(&data[..data.len().min(usize::try_from(limit).unwrap_or(usize::MAX))]),
-        8 => {
-            let mut inflated = DeflateDecoder::new(data).take(limit);
-            inflated.read_to_end(&mut out).map_err(|e| format!("{name}: {e}"))?;
-        }
+    let failed = |e: std::io::Error| format!("{name}: {e}");
+    let mut raw = file;
+    let size = raw.seek(SeekFrom::End(0)).map_err(failed)?;
+    let packed = u64::from(entry.central.packed);
+    if entry.start + packed > size {
+        return Err(format!("{name}: its data are truncated"));
+    }
+    raw.seek(SeekFrom::Start(entry.start)).map_err(failed)?;
+    let packed = BufReader::with_capacity(1 << 16, raw.take(packed));
+    let mut data: Box<dyn Read + '_> = match entry.central.method {
+        0 => Box::new(packed),
+        8 => Box::new(DeflateDecoder::new(packed)),
         other => return Err(format!("{name}: the compression method {other} is not supported")),
+    };
+    let (mut crc, mut written, mut buffer) = (flate2::Crc::new(), 0, vec![0; 1 << 16]);
+    loop {
+        let n = data.read(&mut buffer).map_err(failed)?;
+        if n == 0 {
+            break;
+        }
+        written += n as u64;
+        if written > u64::from(entry.central.size) {
+            return Err(format!("{name}: is larger than the {} bytes that its headers claim", entry.central.size));
+        }
+        if written > limit {
+            return Err(format!("{name}: {}", limits::UNPACKED.exceeded(format!("more than {limit}"))));
+        }
+        crc.update(&buffer[..n]);
+        out.write_all(&buffer[..n]).map_err(failed)?;
     }
-    if out.len() as u64 >= limit {
-        return Err(format!("{name}: unpacks to {limit} bytes or more"));
+    let (found, expected) = (crc.sum(), entry.central.crc);
+    if found != expected {
+        return Err(format!("{name}: the checksum of its contents is {found:08x}, not {expected:08x}"));
     }
-    let mut crc = flate2::Crc::new();
-    crc.update(&out);
-    if crc.sum() != entry.central.crc {
-        return Err(format!(
-            "{name}: the checksum of its contents is {:08x}, not {:08x}",
-            crc.sum(),
-            entry.central.crc
-        ));
-    }
-    Ok(out)
+    Ok(written)
 }
 
 /// Whether a name stays below the folder that it is joined to, on every system.

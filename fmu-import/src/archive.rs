@@ -3,6 +3,7 @@
 use super::Error;
 use crate::folder::Folder;
 use crate::platform::Platform;
+use model_description::limits::{self, UNPACKED, XML};
 use model_description::{FmiVersion, Interface, ModelDescription, TerminalsAndIcons};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -10,11 +11,6 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zip::ZipArchive;
-
-/// Maximum number of unpacked bytes, also for an archive whose headers claim less.
-const LIMIT: u64 = 4 << 30;
-/// Maximum number of entries.
-const ENTRIES: usize = 100_000;
 
 /// Where an archive is read from: a file, or memory.
 trait Source: Read + Seek + Send {}
@@ -63,6 +59,8 @@ impl Archive {
             return Err(wrong(&"is a directory, expected an .fmu file"));
         }
         let file = File::open(path).map_err(|e| wrong(&e))?;
+        let size = file.metadata().map_err(|e| wrong(&e))?.len();
+        limits::ARCHIVE.check(size).map_err(|cause| wrong(&cause))?;
         Self::read(path, Box::new(file))
     }
 
@@ -75,9 +73,8 @@ impl Archive {
         let wrong = |cause: &dyn std::fmt::Display| Error::file(path, cause);
         let mut zip = ZipArchive::new(source).map_err(|e| wrong(&format!("not a ZIP archive, or cut short: {e}")))?;
         let names = check_entries(&mut zip).map_err(|cause| wrong(&cause))?;
-        let xml = contents(&mut zip, "modelDescription.xml").map_err(|cause| wrong(&cause))?;
+        let xml = document(&mut zip, "modelDescription.xml").map_err(|cause| wrong(&cause))?;
         let xml = xml.ok_or_else(|| wrong(&"has no modelDescription.xml"))?;
-        let xml = String::from_utf8(xml).map_err(|_| wrong(&"modelDescription.xml is not UTF-8"))?;
         let description = model_description::read(&xml).map_err(|e| wrong(&format!("modelDescription.xml: {e}")))?;
         Ok(Self { path: path.into(), zip, names, description: Arc::new(description) })
     }
@@ -86,7 +83,7 @@ impl Archive {
     pub(super) fn terminals(&mut self) -> Result<Option<TerminalsAndIcons>, Error> {
         const NAME: &str = "terminalsAndIcons/terminalsAndIcons.xml";
         let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, cause);
-        let xml = contents(&mut self.zip, NAME).map_err(|cause| wrong(&cause))?;
+        let xml = document(&mut self.zip, NAME).map_err(|cause| wrong(&cause))?;
         let read = |xml| model_description::read_terminals(xml).map_err(|e| wrong(&format!("{NAME}: {e}")));
         xml.map(read).transpose()
     }
@@ -132,17 +129,16 @@ impl Archive {
 
     /// Every file, with its name.
     pub(super) fn files(&mut self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
-        let (mut files, mut left) = (BTreeMap::new(), LIMIT);
+        let mut files = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
             let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, format!("{name}: {cause}"));
             let entry = self.zip.by_index(index).map_err(|e| wrong(&e))?;
             if entry.is_dir() {
                 continue;
             }
-            let mut bytes = Vec::new();
-            entry.take(left + 1).read_to_end(&mut bytes).map_err(|e| wrong(&e))?;
-            let size = u64::try_from(bytes.len()).unwrap_or(u64::MAX);
-            left = left.checked_sub(size).ok_or_else(|| wrong(&format!("unpacks to more than {LIMIT} bytes")))?;
+            let (mut entry, mut bytes) = (entry, Vec::new());
+            // It ends where it holds more than its headers claim, which is within the limits.
+            entry.read_to_end(&mut bytes).map_err(|e| wrong(&e))?;
             if files.insert(name.clone(), bytes).is_some() {
                 return Err(wrong(&"occurs twice in the archive"));
             }
@@ -152,7 +148,7 @@ impl Archive {
 
     /// Extracts what begins with one of the prefixes; returns the number of files.
     fn extract_into(&mut self, dir: &Path, prefixes: &[String]) -> io::Result<usize> {
-        let (mut left, mut files) = (LIMIT, 0);
+        let mut files = 0;
         for (index, name) in self.names.iter().enumerate() {
             if !prefixes.iter().any(|p| name.starts_with(p.as_str())) {
                 continue;
@@ -167,11 +163,8 @@ impl Archive {
                 fs::create_dir_all(parent)?;
             }
             let mut out = io::BufWriter::new(File::create(&target)?);
-            // A size that lies ends here, not with a full disk.
-            let copied = io::copy(&mut (&mut entry).take(left + 1), &mut out)
-                .map_err(|e| io::Error::other(format!("{name}: {e}")))?;
-            let too_much = || io::Error::other(format!("{name}: unpacks to more than {LIMIT} bytes"));
-            left = left.checked_sub(copied).ok_or_else(too_much)?;
+            // It ends where it holds more than its headers claim, which is within the limits.
+            io::copy(&mut entry, &mut out).map_err(|e| io::Error::other(format!("{name}: {e}")))?;
             out.flush()?;
             files += 1;
         }
@@ -189,22 +182,23 @@ impl Archive {
     }
 }
 
-/// The contents of an entry; `None` if no entry has this name.
-fn contents(zip: &mut Zip, name: &str) -> Result<Option<Vec<u8>>, String> {
+/// The contents of an entry with an XML document; `None` if no entry has this name.
+pub(crate) fn document<R: Read + Seek>(zip: &mut ZipArchive<R>, name: &str) -> Result<Option<Vec<u8>>, String> {
     let mut bytes = Vec::new();
     match zip.by_name(name) {
-        Ok(entry) => entry.take(LIMIT).read_to_end(&mut bytes).map_err(|e| format!("{name}: {e}"))?,
+        Ok(entry) => entry.take(XML.most + 1).read_to_end(&mut bytes).map_err(|e| format!("{name}: {e}"))?,
         Err(zip::result::ZipError::FileNotFound) => return Ok(None),
         Err(e) => return Err(format!("{name}: {e}")),
     };
+    if bytes.len() as u64 > XML.most {
+        return Err(format!("{name}: {}", XML.exceeded(format!("more than {}", XML.most))));
+    }
     Ok(Some(bytes))
 }
 
 /// The names of the entries; refuses names that lead outside, links, and sizes that no FMU has.
-fn check_entries(zip: &mut Zip) -> Result<Vec<String>, String> {
-    if zip.len() > ENTRIES {
-        return Err(format!("has {} entries, more than {ENTRIES}", zip.len()));
-    }
+pub(crate) fn check_entries<R: Read + Seek>(zip: &mut ZipArchive<R>) -> Result<Vec<String>, String> {
+    limits::ENTRIES.check(zip.len() as u64)?;
     let (mut names, mut size) = (Vec::new(), 0_u64);
     for index in 0..zip.len() {
         let entry = zip.by_index_raw(index).map_err(|e| format!("entry {index}: {e}"))?;
@@ -218,7 +212,8 @@ fn check_entries(zip: &mut Zip) -> Result<Vec<String>, String> {
         size = size.saturating_add(entry.size());
         names.push(name);
     }
-    if size > LIMIT { Err(format!("unpacks to {size} bytes, more than {LIMIT}")) } else { Ok(names) }
+    UNPACKED.check(size)?;
+    Ok(names)
 }
 
 /// Whether a name stays below the folder it is joined to, on every system.

@@ -10,8 +10,8 @@ const PREFIX: &str = "fmu-";
 /// to guess from the number in the name whether that process lives, perhaps in another container or on another machine.
 const LOCK: &str = ".lock";
 
-/// A folder `fmu-PID-XXXXXX` for temporary files.
-pub(crate) struct Folder {
+/// A folder `fmu-PID-XXXXXX` for temporary files. Dropping it removes it.
+pub struct Folder {
     path: PathBuf,
     owner: u32,
     lock: Option<File>,
@@ -19,7 +19,10 @@ pub(crate) struct Folder {
 
 impl Folder {
     /// Makes a folder, and removes those that killed processes have left.
-    pub(crate) fn new() -> io::Result<Self> {
+    ///
+    /// # Errors
+    /// The system makes none.
+    pub fn new() -> io::Result<Self> {
         remove_abandoned();
         let owner = process::id();
         loop {
@@ -36,7 +39,8 @@ impl Folder {
         }
     }
 
-    pub(crate) fn path(&self) -> &Path {
+    /// Where it is.
+    pub fn path(&self) -> &Path {
         &self.path
     }
 }

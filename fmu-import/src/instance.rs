@@ -6,6 +6,7 @@ pub use equations::{CompletedStep, Stepped, Update};
 
 use super::standard::{Experiment, Kind, Outcome, Refusal, Standard};
 use super::{Error, Values, explain};
+use crate::abi::journal::{self, Call};
 use crate::abi::log::{Log, Message, Status};
 use crate::abi::shared::Handle;
 use model_description::{BaseType, Dimension, ModelDescription, ModelVariable};
@@ -19,6 +20,8 @@ pub struct State(usize);
 /// An instance of an FMU, which may go from thread to thread. Dropping it frees it.
 pub struct Instance {
     name: String,
+    /// Its number in the journal.
+    id: u32,
     description: Arc<ModelDescription>,
     standard: Box<dyn Standard + Send>,
     kind: Kind,
@@ -31,12 +34,13 @@ pub struct Instance {
 impl Instance {
     pub(super) fn new(
         name: &str,
+        id: u32,
         description: Arc<ModelDescription>,
         standard: Box<dyn Standard + Send>,
         kind: Kind,
         log: Arc<Log>,
     ) -> Self {
-        Self { name: name.into(), description, standard, kind, states: Vec::new(), dead: false, log }
+        Self { name: name.into(), id, description, standard, kind, states: Vec::new(), dead: false, log }
     }
 
     /// The name that the instance was given.
@@ -91,12 +95,12 @@ impl Instance {
 
     /// Reads a variable whose place is known.
     pub(super) fn read(&mut self, base: BaseType, reference: u32, count: usize) -> Result<Values, Error> {
-        self.call(|s| s.get(base, reference, count))
+        self.call(Call::Get, |s| s.get(base, reference, count))
     }
 
     /// Writes a variable whose place and size are known.
     pub(super) fn write(&mut self, base: BaseType, reference: u32, values: &Values) -> Result<(), Error> {
-        self.call(|s| s.set(base, reference, values))
+        self.call(Call::Set, |s| s.set(base, reference, values))
     }
 
     /// Writes a variable as a user writes it: `3.3`, `true`, `Rasmussen`, or elements with commas between them.
@@ -122,7 +126,7 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Error> {
-        self.call(|s| s.get_reals(references, values))
+        self.call(Call::Get, |s| s.get_reals(references, values))
     }
 
     /// Writes real scalars by value reference: the fast way.
@@ -131,7 +135,7 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Result<(), Error> {
-        self.call(|s| s.set_reals(references, values))
+        self.call(Call::Set, |s| s.set_reals(references, values))
     }
 
     /// Reads `count` elements of the variable with this base type and value reference.
@@ -139,7 +143,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn get_at(&mut self, base: BaseType, reference: u32, count: usize) -> Result<Values, Error> {
-        self.call(|s| s.get(base, reference, count))
+        self.call(Call::Get, |s| s.get(base, reference, count))
     }
 
     /// Writes the variable with this base type and value reference.
@@ -147,7 +151,7 @@ impl Instance {
     /// # Errors
     /// The values do not fit, or the FMU refuses.
     pub fn set_at(&mut self, base: BaseType, reference: u32, values: &Values) -> Result<(), Error> {
-        self.call(|s| s.set(base, reference, values))
+        self.call(Call::Set, |s| s.set(base, reference, values))
     }
 
     /// Switches logging on or off; errors are always logged.
@@ -155,7 +159,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn set_debug_logging(&mut self, on: bool) -> Result<(), Error> {
-        self.call(|s| s.set_debug_logging(on))
+        self.call(Call::Evaluation, |s| s.set_debug_logging(on))
     }
 
     /// Says when the simulation starts and, if that is known, ends.
@@ -171,7 +175,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn setup_with(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result<(), Error> {
-        self.call(|s| s.setup(Experiment { start, stop, tolerance }))
+        self.call(Call::Setup, |s| s.setup(Experiment { start, stop, tolerance }))
     }
 
     /// Initialization begins: parameters and inputs are set, outputs may be read.
@@ -179,7 +183,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_initialization(&mut self) -> Result<(), Error> {
-        self.call(|s| s.enter_initialization())
+        self.call(Call::EnterInitialization, |s| s.enter_initialization())
     }
 
     /// Initialization ends.
@@ -187,7 +191,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses, for example parameters that do not fit together.
     pub fn exit_initialization(&mut self) -> Result<(), Error> {
-        self.call(|s| s.shared().exit_initialization())
+        self.call(Call::ExitInitialization, |s| s.shared().exit_initialization())
     }
 
     /// Steps from `t` to `t + h`; breaks when the FMU asks to end the simulation.
@@ -196,7 +200,7 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<ControlFlow<()>, Error> {
-        let stepped = self.call(|s| s.do_step(t, h))?;
+        let stepped = self.call(Call::Step, |s| s.do_step(t, h))?;
         Ok(if stepped.terminate { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
@@ -205,7 +209,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses, or does not tell.
     pub fn last_successful_time(&mut self) -> Result<f64, Error> {
-        self.call(|s| s.last_successful_time())
+        self.call(Call::Evaluation, |s| s.last_successful_time())
     }
 
     /// Ends the simulation; variables can still be read.
@@ -213,7 +217,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn terminate(&mut self) -> Result<(), Error> {
-        self.call(|s| s.shared().terminate())
+        self.call(Call::Terminate, |s| s.shared().terminate())
     }
 
     /// Restores the state after instantiation.
@@ -221,7 +225,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn reset(&mut self) -> Result<(), Error> {
-        self.call(|s| s.shared().reset())
+        self.call(Call::Reset, |s| s.shared().reset())
     }
 
     /// Saves the state.
@@ -229,7 +233,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses, or cannot.
     pub fn get_state(&mut self) -> Result<State, Error> {
-        let state = self.call(|s| s.shared().get_state())?;
+        let state = self.call(Call::State, |s| s.shared().get_state())?;
         self.states.push(Some(state));
         Ok(State(self.states.len() - 1))
     }
@@ -240,7 +244,7 @@ impl Instance {
     /// The FMU refuses, or the state was freed.
     pub fn set_state(&mut self, state: State) -> Result<(), Error> {
         let state = self.state(state)?;
-        self.call(|s| s.shared().set_state(state))
+        self.call(Call::State, |s| s.shared().set_state(state))
     }
 
     /// Frees a saved state. Those that remain are freed with the instance.
@@ -250,7 +254,7 @@ impl Instance {
     pub fn free_state(&mut self, state: State) -> Result<(), Error> {
         let raw = self.state(state)?;
         self.states[state.0] = None;
-        self.call(|s| s.shared().free_state(raw))
+        self.call(Call::State, |s| s.shared().free_state(raw))
     }
 
     /// A saved state as bytes.
@@ -259,7 +263,7 @@ impl Instance {
     /// The FMU refuses, or cannot, or the state was freed.
     pub fn serialize_state(&mut self, state: State) -> Result<Vec<u8>, Error> {
         let state = self.state(state)?;
-        self.call(|s| s.shared().serialize(state))
+        self.call(Call::State, |s| s.shared().serialize(state))
     }
 
     /// A saved state from bytes; it is not yet set.
@@ -267,7 +271,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses, or cannot.
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<State, Error> {
-        let state = self.call(|s| s.shared().deserialize(bytes))?;
+        let state = self.call(Call::State, |s| s.shared().deserialize(bytes))?;
         self.states.push(Some(state));
         Ok(State(self.states.len() - 1))
     }
@@ -313,10 +317,11 @@ impl Instance {
 
     /// The one way to the FMU.
     #[inline]
-    fn call<T>(&mut self, call: impl FnOnce(&mut dyn Standard) -> Outcome<T>) -> Result<T, Error> {
+    fn call<T>(&mut self, what: Call, call: impl FnOnce(&mut dyn Standard) -> Outcome<T>) -> Result<T, Error> {
         if self.dead {
             return Err(Error::usage(&self.name, "had a fatal error before, and takes no more calls"));
         }
+        journal::note(self.id, what);
         call(&mut *self.standard).map_err(|refusal| {
             if matches!(refusal, Refusal::Status(_, Status::FATAL)) {
                 self.abandon();
@@ -328,9 +333,10 @@ impl Instance {
 
 impl Drop for Instance {
     fn drop(&mut self) {
+        journal::note(self.id, Call::Free);
         for state in std::mem::take(&mut self.states).into_iter().flatten() {
             // Nobody is left to hear of a refusal.
-            let _ = self.call(|s| s.shared().free_state(state));
+            let _ = self.call(Call::Free, |s| s.shared().free_state(state));
         }
     }
 }

@@ -4,6 +4,7 @@
 //! - [`Fmu`] and [`Instance`]: one FMU with valid calls only; [`raw`]: single calls, valid or not, for a checker.
 //! - [`cosimulation`]: several FMUs connected; [`ssp`]: systems of FMUs from files.
 //! - [`elf`], [`platform`]: requirements and platforms of binaries.
+//! - [`guard`]: processes of their own for FMUs of unknown origin.
 //!
 //! `abi` is the only module with `unsafe` code: every pointer that goes to an FMU points to memory of the size that the standard
 //! asks for. What no importer can check is the FMU itself: its code runs in this process with all of its rights.
@@ -29,22 +30,28 @@ pub mod cosimulation;
 pub mod elf;
 mod error;
 mod folder;
+pub mod guard;
 mod instance;
 mod integration;
 pub mod platform;
 pub mod ssp;
 mod standard;
+mod text;
 mod value;
 
+pub use abi::journal;
 pub use abi::library::describe;
 pub use abi::log::{Message, Status};
 pub use abi::raw;
 pub use error::Error;
+pub use folder::Folder;
 pub use instance::{CompletedStep, Instance, State, Stepped, Update};
 pub use standard::Kind;
+pub use text::{printable, printable_lines};
 pub use value::Values;
 
 use abi::Functions;
+use abi::journal::Call;
 use abi::log::Log;
 use archive::{Archive, Extracted};
 use model_description::{FmiVersion, Interface, ModelDescription, TerminalsAndIcons};
@@ -111,6 +118,7 @@ impl Fmu {
         let folder = Arc::new(folder);
         let (terminals, description) = (Arc::new(archive.terminals()), archive.description.clone());
         let (path, resources) = (archive.path.clone(), folder.path().join("resources"));
+        journal::note(journal::name(&path.to_string_lossy()), Call::Load);
         // A binary that is loaded needs its file no more, except on Windows: then a kill leaves nothing behind.
         let kept = (cfg!(windows) || files > 1).then(|| folder.clone());
         let load = |binary: &Path, kind| {
@@ -178,8 +186,10 @@ impl Fmu {
             FmiVersion::V3 => format!("{}{}", self.resources.display(), std::path::MAIN_SEPARATOR),
         };
         let resources = text(name, &resources)?;
+        let id = journal::name(name);
+        journal::note(id, Call::Instantiate);
         match functions.instantiate(&c_name, &token, &resources, &log, logging, kind) {
-            Ok(standard) => Ok(Instance::new(name, self.description.clone(), standard, kind, log)),
+            Ok(standard) => Ok(Instance::new(name, id, self.description.clone(), standard, kind, log)),
             Err(refusal) => Err(explain(name, refusal, log.reason())),
         }
     }

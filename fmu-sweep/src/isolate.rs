@@ -5,6 +5,7 @@
 
 use crate::sweep::Writer;
 use crate::{Definition, Error, Outcome, Sweep};
+use fmu_import::guard;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader, Write};
@@ -116,12 +117,10 @@ impl<'a> Process<'a> {
     fn started(&mut self) -> Result<&mut Running, Error> {
         if self.running.is_none() {
             let Isolation { program, arguments } = self.command;
-            let mut child = Command::new(program)
-                .args(arguments)
-                .stdin(Stdio::piped())
-                .stdout(Stdio::piped())
-                .spawn()
-                .map_err(|e| Error::file(program, e))?;
+            let mut command = Command::new(program);
+            command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
+            guard::own_group(&mut command);
+            let mut child = command.spawn().map_err(|e| Error::file(program, e))?;
             let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
                 return Err(Error::file(program, "has no standard input or output"));
             };
@@ -179,20 +178,7 @@ impl Drop for Running {
 fn how(status: ExitStatus) -> String {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        let name = match signal {
-            4 => "SIGILL",
-            5 => "SIGTRAP",
-            6 => "SIGABRT",
-            8 => "SIGFPE",
-            9 => "SIGKILL",
-            11 => "SIGSEGV",
-            15 => "SIGTERM",
-            // The one number of these that systems disagree on.
-            7 if cfg!(target_os = "linux") => "SIGBUS",
-            10 if cfg!(target_os = "macos") => "SIGBUS",
-            _ => return format!("killed by signal {signal}"),
-        };
-        return format!("killed by {name}");
+        return format!("killed by {}", guard::signal_name(signal).0);
     }
     status.code().map_or_else(|| "ended".into(), |code| format!("ended with exit status {code}"))
 }
@@ -202,6 +188,7 @@ fn how(status: ExitStatus) -> String {
 /// # Errors
 /// The input is none of a parent, or cannot be read.
 pub fn serve() -> Result<(), Error> {
+    guard::end_with_parent();
     let wrong = |e: io::Error| Error::Invalid(format!("standard input: {e}"));
     let mut requests = io::stdin().lock().lines();
     let Some(job) = requests.next().transpose().map_err(wrong)? else { return Ok(()) };

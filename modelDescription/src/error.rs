@@ -12,6 +12,9 @@ pub enum Error {
         /// Message of the parser.
         reason: String,
     },
+    /// The document is larger than any reader here takes: one of [`limits`](crate::limits).
+    #[error("{0}")]
+    Limit(String),
     /// An XML document of another kind.
     #[error("line {line}: the root element is <{found}>, expected <{expected}>")]
     OtherRoot {

@@ -12,6 +12,7 @@
 mod date;
 mod description;
 mod error;
+pub mod limits;
 mod number;
 mod read;
 mod terminals;
@@ -25,7 +26,7 @@ pub use date::date_from_epoch;
 pub use description::{CoSimulation, Experiment, Interface, LogCategory, ModelDescription, Unknown};
 pub use error::Error;
 pub use number::{format as format_number, parse as parse_number};
-pub use read::{read, read_terminals};
+pub use read::{decode, read, read_element, read_terminals};
 pub use terminals::{Area, CoordinateSystem, Member, StreamMember, Terminal, TerminalPicture, TerminalsAndIcons};
 pub use units::{BaseUnit, DisplayUnit, Item, TypeDefinition, Unit};
 pub use variable::{Alias, BaseType, Causality, Dimension, Initial, ModelVariable, Variability};

@@ -23,36 +23,44 @@ use attributes::{boolean, integer, number, owned, required};
 /// # Errors
 /// Gives the line, what was found and what was expected.
 pub fn read(xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
-    let root = tree(xml.as_ref(), "fmiModelDescription")?;
-    let version = version(&root)?;
+    read_element(&parse(decode(xml.as_ref())?)?)
+}
+
+/// Reads the elements of modelDescription.xml.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_element(root: &Element) -> Result<ModelDescription, Error> {
+    of_kind(root, "fmiModelDescription")?;
+    let version = version(root)?;
     let token = match version {
         FmiVersion::V2 => "guid",
         FmiVersion::V3 => "instantiationToken",
     };
-    let types = types::definitions(&root, version)?;
-    let structure = element(&root, "ModelStructure")?;
+    let types = types::definitions(root, version)?;
+    let structure = element(root, "ModelStructure")?;
     Ok(ModelDescription {
         version,
-        fmi_version: required(&root, "fmiVersion")?.into(),
-        model_name: required(&root, "modelName")?.into(),
-        token: required(&root, token)?.into(),
-        description: owned(&root, "description"),
-        author: owned(&root, "author"),
-        model_version: owned(&root, "version"),
-        copyright: owned(&root, "copyright"),
-        license: owned(&root, "license"),
-        generation_tool: owned(&root, "generationTool"),
-        generation_date_and_time: owned(&root, "generationDateAndTime"),
+        fmi_version: required(root, "fmiVersion")?.into(),
+        model_name: required(root, "modelName")?.into(),
+        token: required(root, token)?.into(),
+        description: owned(root, "description"),
+        author: owned(root, "author"),
+        model_version: owned(root, "version"),
+        copyright: owned(root, "copyright"),
+        license: owned(root, "license"),
+        generation_tool: owned(root, "generationTool"),
+        generation_date_and_time: owned(root, "generationDateAndTime"),
         structured_names: root.get("variableNamingConvention") == Some("structured"),
-        co_simulation: interface(&root, "CoSimulation")?,
-        model_exchange: interface(&root, "ModelExchange")?,
-        scheduled_execution: interface(&root, "ScheduledExecution")?,
-        number_of_event_indicators: integer(&root, "numberOfEventIndicators")?,
+        co_simulation: interface(root, "CoSimulation")?,
+        model_exchange: interface(root, "ModelExchange")?,
+        scheduled_execution: interface(root, "ScheduledExecution")?,
+        number_of_event_indicators: integer(root, "numberOfEventIndicators")?,
         default_experiment: root.child("DefaultExperiment").map_or(Ok(Experiment::default()), experiment)?,
-        units: types::units(&root)?,
-        variables: variables::variables(element(&root, "ModelVariables")?, version, &types)?,
+        units: types::units(root)?,
+        variables: variables::variables(element(root, "ModelVariables")?, version, &types)?,
         types,
-        log_categories: log_categories(&root)?,
+        log_categories: log_categories(root)?,
         outputs: structure::unknowns(structure, version, "Outputs", "Output")?,
         derivatives: structure::unknowns(structure, version, "Derivatives", "ContinuousStateDerivative")?,
         initial_unknowns: structure::unknowns(structure, version, "InitialUnknowns", "InitialUnknown")?,
@@ -63,14 +71,30 @@ pub fn read(xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
     })
 }
 
-/// The elements of a document whose root has this name.
-fn tree(bytes: &[u8], expected: &'static str) -> Result<Element, Error> {
-    let text = std::str::from_utf8(bytes).map_err(|e| {
+/// The text of a document, which both standards want in UTF-8.
+///
+/// # Errors
+/// It is in another encoding: names UTF-16 and UTF-32, which have a byte order mark or null bytes.
+pub fn decode(bytes: &[u8]) -> Result<&str, Error> {
+    let other = match bytes {
+        [0xff, 0xfe, 0, 0, ..] | [0, 0, 0xfe, 0xff, ..] => Some("UTF-32"),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] | [b'<', 0, ..] | [0, b'<', ..] => Some("UTF-16"),
+        _ => None,
+    };
+    if let Some(other) = other {
+        return Err(Error::NotXml { line: 1, reason: format!("the encoding is {other}, expected UTF-8") });
+    }
+    std::str::from_utf8(bytes).map_err(|e| {
         let line = bytes[..e.valid_up_to()].split(|&b| b == b'\n').count();
         Error::NotXml { line, reason: "not UTF-8".into() }
-    })?;
-    let root = parse(text)?;
-    if root.name == expected { Ok(root) } else { Err(Error::OtherRoot { line: root.line, found: root.name, expected }) }
+    })
+}
+
+fn of_kind(root: &Element, expected: &'static str) -> Result<(), Error> {
+    if root.name == expected {
+        return Ok(());
+    }
+    Err(Error::OtherRoot { line: root.line, found: root.name.clone(), expected })
 }
 
 /// The version, before anything else: FMI 1.0 has the same root element and other attributes.

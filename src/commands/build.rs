@@ -1,6 +1,6 @@
 //! `fmu build`: compiles models and packs them.
 
-use crate::compile::{Library, compile};
+use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
 use crate::pack::{self, Moment};
@@ -36,6 +36,8 @@ use std::path::{Path, PathBuf};
 /// With cargo-zigbuild in PATH, Linux binaries need glibc 2.17 (2012). Otherwise this computer's linker decides, and the command
 /// prints what they need. CARGO_TARGET_TRIPLE_LINKER, in Cargo's spelling, selects another linker.
 ///
+/// --release-dir DIR builds the program fmu-check to give away: with cargo-zigbuild it needs glibc 2.17 and no other library.
+///
 /// With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
@@ -58,7 +60,13 @@ pub struct Build {
     /// Target to build for instead of this computer; separate several with commas or repeat the option
     #[arg(long, value_name = "TRIPLE", value_delimiter = ',', conflicts_with = "library")]
     pub target: Vec<String>,
+    /// Build the checker's program for this folder instead of FMUs
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["fmus", "package", "library", "target", "out", "fmi"])]
+    pub release_dir: Option<PathBuf>,
 }
+
+/// The package of the checker, and its program.
+const CHECKER: &str = "fmu-check";
 
 /// A compiled model, ready to be packed.
 struct Model {
@@ -72,6 +80,9 @@ struct Model {
 /// # Errors
 /// A name is not an FMU, the compiler fails, a library was not made by `export!`, or a folder cannot be written.
 pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
+    if let Some(folder) = &args.release_dir {
+        return Ok(vec![release(folder)?]);
+    }
     let moment = Moment::of_environment()?;
     let versions = match args.fmi.as_deref() {
         None => vec![FmiVersion::V2, FmiVersion::V3],
@@ -100,6 +111,23 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
         }
     }
     Ok(written)
+}
+
+/// Compiles the checker's program; returns where it is.
+fn release(folder: &Path) -> Result<PathBuf> {
+    let built = program(&Workspace::find()?, CHECKER, &Tools::find()?.host())?;
+    let bytes = fs::read(&built).with_context(|| built.display().to_string())?;
+    if let Ok(needs) = Needs::of(&bytes)
+        && !needs.are_modest()
+    {
+        eprintln!(
+            "note: {CHECKER} needs {needs} where it runs; built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most"
+        );
+    }
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let path = folder.join(built.file_name().unwrap_or_default());
+    fs::copy(&built, &path).with_context(|| path.display().to_string())?;
+    Ok(path)
 }
 
 fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {

@@ -6,12 +6,13 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use drive_study::plot;
 use fmu_import::cosimulation::{Integration, Method, Point, Recording, Schedule, Settings, Solver, System};
+use fmu_import::guard::{self, Allowance, End, Guarded};
 use fmu_import::ssp::load::Loaded;
 use fmu_import::ssp::{ssv, values};
-use fmu_import::{Fmu, Kind, Message};
+use fmu_import::{Fmu, Kind, Message, journal, printable, printable_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use model_description::ModelVariable;
-use std::io::{self, BufWriter, IsTerminal};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -31,6 +32,11 @@ use std::time::{Duration, Instant};
 ///
 /// After the run, warnings on standard error list inputs that kept their start values because nothing feeds or sets them, and a
 /// step that is longer than the DefaultExperiment of an FMU.
+///
+/// The FMUs run in a process of their own, with limits on memory, open files and new processes. When they crash it, hang it or end it,
+/// the command names the FMU and the call, removes their temporary files and has exit status 2. What they print goes to standard
+/// error. --in-process runs them in the process of the command: it starts some milliseconds sooner, and an FMU that crashes
+/// takes the command with it.
 ///
 /// Start the motor and turn it at 1000 rpm (104.7 rad/s):
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
@@ -111,6 +117,21 @@ pub struct Simulate {
     /// Show all messages that the FMUs log
     #[arg(long)]
     pub logging: bool,
+    /// Longest time that loading, initialization or the way to the next communication point may take, in s; 0 for no limit
+    #[arg(long, value_name = "S", default_value_t = 300.0)]
+    pub timeout: f64,
+    /// Address space of the process of the FMUs, in GiB; 0 for no limit
+    #[arg(long, value_name = "GIB", default_value_t = Allowance::default().memory >> 30, value_parser = clap::value_parser!(u64).range(..=1 << 20))]
+    pub memory: u64,
+    /// Run the FMUs without network (Linux with user namespaces; refused elsewhere)
+    #[arg(long)]
+    pub sandbox: bool,
+    /// Run the FMUs in this process, without limits: for FMUs that you trust
+    #[arg(long, conflicts_with = "sandbox")]
+    pub in_process: bool,
+    /// This is the process of the FMUs
+    #[arg(long, hide = true)]
+    pub worker: bool,
 }
 
 /// Integrators of Model Exchange.
@@ -143,11 +164,83 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
     Method::ModelExchange(Integration { solver, ..Integration::default() })
 }
 
-/// Runs the command.
+/// Runs the command, which is the first argument of this process.
 ///
 /// # Errors
-/// A file is not an FMU that runs here, a name is wrong, or an FMU fails.
+/// A file is not an FMU that runs here, a name is wrong, an FMU fails, or it ends its process.
 pub fn run(args: &Simulate) -> Result<()> {
+    if args.worker {
+        return work(args);
+    }
+    if args.in_process {
+        return simulate(args, io::stdout());
+    }
+    guarded(args)
+}
+
+/// File for the status and the error of the worker, below its folder for temporary files.
+const RESULT: &str = "result";
+
+/// Runs the same command as a worker.
+fn guarded(args: &Simulate) -> Result<()> {
+    let timeout = Duration::try_from_secs_f64(args.timeout).map_err(|e| anyhow!("--timeout {}: {e}", args.timeout))?;
+    let allowance = Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Allowance::default() };
+    let mut command = guard::command(&std::env::current_exe()?, allowance);
+    command.args(["simulate", "--worker"]).args(std::env::args_os().skip(2));
+    let mut worker = Guarded::start(command)?;
+    let folder = worker.folder().to_owned();
+    let (mut since, mut progress) = (Instant::now(), None);
+    let report = worker.wait(|_| {
+        let last = journal::read(&folder);
+        let now = last.as_ref().map(|last| last.progress);
+        if now != progress || last.is_some_and(|last| last.call == journal::Call::Write) {
+            (since, progress) = (Instant::now(), now);
+        }
+        !timeout.is_zero() && since.elapsed() > timeout
+    })?;
+    if !report.left.is_empty() {
+        eprintln!("warning: the FMUs left processes behind, which are ended now: {}", report.left.join(", "));
+    }
+    let result = std::fs::read_to_string(folder.join(RESULT)).ok();
+    let result = result.as_deref().and_then(|text| text.split_once(' '));
+    match (&report.end, result) {
+        (End::Ended(status), Some((code, cause))) if status.code().is_some_and(|c| c.to_string() == code) => match code
+        {
+            "0" => Ok(()),
+            "1" => Err(Failed(cause.into()).into()),
+            _ => Err(anyhow!("{cause}")),
+        },
+        (end, _) => {
+            let last = journal::read(&folder).map_or_else(|| "the process of the FMUs".into(), |last| last.describe());
+            match end {
+                End::Refused(_) => bail!("the process of the FMUs {}", end.describe()),
+                End::Stopped => bail!("{last} did not return within {} s; --timeout changes the limit", args.timeout),
+                _ => bail!("{last} {}", end.describe()),
+            }
+        }
+    }
+}
+
+/// The worker: leaves its status and its error in a file, because an FMU may have closed everything else.
+fn work(args: &Simulate) -> Result<()> {
+    guard::end_with_parent();
+    let folder = std::env::temp_dir();
+    journal::open(&folder)?;
+    #[cfg(unix)]
+    let outcome = simulate(args, guard::keep_stdout()?);
+    #[cfg(not(unix))]
+    let outcome = simulate(args, io::stdout());
+    let (status, text) = match &outcome {
+        Ok(()) => (0, String::new()),
+        Err(error) => (crate::exit_status(error), format!("{error:#}")),
+    };
+    std::fs::write(folder.join(RESULT), format!("{status} {text}"))?;
+    outcome
+}
+
+fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
+    // An FMU may change it; the files of the command are named from here.
+    let home = std::env::current_dir()?;
     let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, |fmus| method(args, fmus))?;
     let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
     if steps && (args.solver.is_some() || args.rtol.is_some()) {
@@ -156,7 +249,8 @@ pub fn run(args: &Simulate) -> Result<()> {
     if args.solver == Some(SolverName::Rk4) && args.rtol.is_some() {
         bail!("--rtol is for --solver dopri; --solver rk4 takes the steps of --step");
     }
-    loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    std::env::set_current_dir(&home)?;
+    loaded.notes.iter().for_each(|note| eprintln!("note: {}", printable(note)));
     let settings = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
     let mut progress = Progress::new(settings);
@@ -165,6 +259,7 @@ pub fn run(args: &Simulate) -> Result<()> {
             show(&point.take_messages());
         }
         progress.at(point.time);
+        journal::reached(point.time);
         Ok(ControlFlow::Continue(()))
     };
     let outcome = system.run(&settings, &mut hook);
@@ -172,9 +267,12 @@ pub fn run(args: &Simulate) -> Result<()> {
     if args.logging {
         show(&system.take_messages());
     }
-    let written = write(&outcome?, args);
+    let recording = outcome?;
+    journal::writes();
+    std::env::set_current_dir(&home)?;
+    let written = write(&recording, args, out);
     for text in warnings(&system, &settings) {
-        eprintln!("warning: {text}");
+        eprintln!("warning: {}", printable(&text));
     }
     written
 }
@@ -218,7 +316,7 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
     for text in &args.terminal {
         let (one, other) = halves(text, "--terminal INSTANCE.TERMINAL=INSTANCE.TERMINAL")?;
         for (from, to) in system.connect_terminals(one, other)? {
-            eprintln!("connected {from} -> {to}");
+            eprintln!("connected {} -> {}", printable(&from), printable(&to));
         }
     }
     for text in &args.input {
@@ -238,7 +336,7 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
     }
     if args.auto_connect {
         for (from, to) in loaded.system.connect_by_name()? {
-            eprintln!("connected {from} -> {to}");
+            eprintln!("connected {} -> {}", printable(&from), printable(&to));
         }
     }
     for text in &args.parameters {
@@ -258,12 +356,12 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
     Ok(loaded.settings(args.start, args.stop, args.step, args.sequential))
 }
 
-fn write(recording: &Recording, args: &Simulate) -> Result<()> {
+fn write(recording: &Recording, args: &Simulate, mut out: impl Write) -> Result<()> {
     let mut to_stdout = false;
     match args.csv.as_deref() {
         Some(path) if path == Path::new("-") => {
             to_stdout = true;
-            match recording.write_csv(&mut BufWriter::new(io::stdout().lock())) {
+            match recording.write_csv(&mut BufWriter::new(&mut out)) {
                 // A reader such as `head` closes the pipe early.
                 Err(e) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
                 other => other.context("standard output")?,
@@ -283,10 +381,11 @@ fn write(recording: &Recording, args: &Simulate) -> Result<()> {
     if let Some(name) = &recording.ended_by {
         table = format!("{table}\n{name} asked to end the simulation");
     }
+    let table = printable_lines(&table);
     if to_stdout {
         eprintln!("{table}");
     } else {
-        println!("{table}");
+        writeln!(out, "{table}").context("standard output")?;
     }
     let bad = recording.columns.iter().find(|c| c.values.last().is_some_and(|x| !x.is_finite()));
     match bad {
@@ -301,7 +400,7 @@ fn halves<'a>(text: &'a str, form: &str) -> Result<(&'a str, &'a str)> {
 
 fn show(messages: &[(String, Message)]) {
     for (instance, Message { status, category, text }) in messages {
-        eprintln!("{instance}: {status} [{category}] {text}");
+        eprintln!("{instance}: {status} [{}] {}", printable(category), printable_lines(text));
     }
 }
 

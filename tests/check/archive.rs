@@ -40,14 +40,6 @@ fn each_fault_is_found_by_its_check() {
         ("odd platform", &["Z03"], |e| e.push(Entry::new("binaries/My Computer/x", b""))),
         ("extra", &["Z06"], |e| e.push(Entry::new("extra/stuff/x", b""))),
         ("header", &["Z07"], |e| e.push(Entry::new("sources/fmi2Functions.h", b""))),
-        ("manifest", &["I03"], |e| {
-            let xml = b"<fmiLayeredStandardManifest xmlns:a='http://fmi-standard.org/fmi-ls-manifest' a:fmi-ls-name='org.x' a:fmi-ls-version='1'/>";
-            e.push(Entry::new("extra/org.x/fmi-ls-manifest.xml", xml));
-        }),
-        ("good manifest", &[], |e| {
-            let xml = b"<fmiLayeredStandardManifest xmlns:a='http://fmi-standard.org/fmi-ls-manifest' a:fmi-ls-name='org.x' a:fmi-ls-version='1' a:fmi-ls-description='x'/>";
-            e.push(Entry::new("extra/org.x/fmi-ls-manifest.xml", xml));
-        }),
         ("other name of the binary", &["X03", "B10"], |e| e.push(Entry::new("binaries/linux64/Other.so", b"x"))),
     ];
     let dir = tempfile::tempdir().unwrap();

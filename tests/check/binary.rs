@@ -75,6 +75,8 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("B06", &["B06"]),
     ("B08f", &["B08f"]),
     ("B08p", &["B08p"]),
+    ("B08p_child", &["B08p"]),
+    ("B08p_daemon", &["B08p"]),
     ("G06", &["G06"]),
     ("L11", &["L11"]),
     ("T05", &["T05"]),
@@ -113,7 +115,7 @@ const FAULTS3: &[(&str, &[&str])] = &[
 ];
 
 /// Compiles the small FMU; `None` without a compiler.
-fn compile(dir: &Path, version: u8, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
+pub fn compile(dir: &Path, version: u8, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
     let source = if version == 2 { "tests/check/fmu.c" } else { "tests/check/fmu3.c" };
     compile_source(dir, source, version, fault, more)
 }
@@ -129,7 +131,7 @@ pub fn compile_source(dir: &Path, source: &str, version: u8, fault: &str, more: 
     std::fs::read(out).ok()
 }
 
-fn pack(dir: &Path, version: u8, fault: &str, binary: &[u8]) -> std::path::PathBuf {
+pub fn pack(dir: &Path, version: u8, fault: &str, binary: &[u8]) -> std::path::PathBuf {
     let xml = if version == 2 { include_str!("fmu.xml") } else { include_str!("fmu3.xml") };
     pack_with(dir, &format!("{version}-{fault}"), xml, binary)
 }

@@ -78,7 +78,7 @@ fn faults_of_fmi_2() {
                 "<Unknown index=\"5\"/><Unknown index=\"4\"/>",
             ),
             (&["S03a"], "index=\"4\" dependencies=\"\"", "index=\"4\" dependencies=\"99\""),
-            (&["S03a"], "index=\"4\" dependencies=\"\"", "index=\"4\" dependencies=\"5\""),
+            (&["S03k"], "index=\"4\" dependencies=\"\"", "index=\"4\" dependencies=\"5\""),
             (
                 &["S03b"],
                 "index=\"4\" dependencies=\"\"",

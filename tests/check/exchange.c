@@ -355,6 +355,12 @@ static int save(const M *m, M **to) {
 
 static int drop(M **state) { return free(*state), *state = NULL, OK; }
 
+#ifdef ALL_OF_EXCHANGE
+#define NONE(name) EXPORT int fmi2##name(M *m) { return m ? fail(m) : ERROR; }
+NONE(GetBoolean) NONE(GetString) NONE(SetInteger) NONE(SetBoolean) NONE(SetString)
+NONE(SerializedFMUstateSize) NONE(SerializeFMUstate) NONE(DeSerializeFMUstate)
+#endif
+
 #ifndef FMI3
 typedef struct { int again, terminate, nominals, states, defined; double next; } EventInfo;
 

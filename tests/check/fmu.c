@@ -8,7 +8,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
@@ -111,6 +113,19 @@ static void fresh(Data *d) {
 #endif
 }
 
+/* What is legal or beside the point, and no violation of a must. */
+#ifdef FAULT_CHDIR
+__attribute__((constructor)) static void leave(void) { chdir("/"); }
+#endif
+#ifdef FAULT_FEWFILES
+__attribute__((constructor)) static void starve(void) { setrlimit(RLIMIT_NOFILE, &(struct rlimit){8, 8}); }
+#endif
+
+#ifdef FAULT_UNDEFINED
+extern int nowhere(void);
+int (*missing)(void) = nowhere;
+#endif
+
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 #ifdef FAULT_X02b
 EXPORT const char *fmi2GetVersion(void) { return "2.0.5"; }
@@ -141,6 +156,19 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 #endif
 #ifdef FAULT_B08p
     socket(AF_UNIX, SOCK_STREAM, 0);
+#endif
+#ifdef FAULT_B08p_child
+    if (fork() == 0) for (;;) pause();
+#endif
+#ifdef FAULT_B08p_daemon
+    // Its parent ends at once and is waited for: nobody is left who knows it.
+    pid_t parent = fork();
+    if (parent == 0) {
+        setsid();
+        if (fork() == 0) for (;;) pause();
+        _exit(0);
+    }
+    waitpid(parent, NULL, 0);
 #endif
 #ifdef FAULT_HANG
     for (volatile int spin = 1; spin;) {}
@@ -453,7 +481,10 @@ EXPORT int fmi2SetFMUstate(void *c, void *state) {
 #ifndef FAULT_F03b
     if (!state) return fail(f, "NULL");
 #endif
-#ifdef FAULT_F02
+#ifdef FAULT_F02s
+    f->data = *(Data *)state;
+    f->data.y *= 1 + 1e-12;
+#elif defined FAULT_F02
     int32_t n = f->data.n;
     f->data = *(Data *)state;
     f->data.n = n;
@@ -551,6 +582,12 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     if (d->steps > 400) return fail(f, "no more");
 #endif
     if (!isfinite(d->u)) return fail(f, "u is not finite");
+#if defined FAULT_ENDS && !defined FMI3
+    if (d->steps >= 5) return DISCARD;
+#endif
+#ifdef FAULT_WAIT
+    if (!isfinite(d->u) || d->steps == 3) pause();
+#endif
 #ifdef FAULT_B06
     volatile char large[400000];
     for (size_t i = 0; i < sizeof large; i += 512) large[i] = 1;
@@ -559,7 +596,10 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040);
 #endif
 #ifdef FAULT_T05
-    if (no_prior) d->y += 1e-9;
+    if (no_prior) d->y += 1e-2;
+#endif
+#ifdef FAULT_T05s
+    if (no_prior) d->y *= 1 + 1e-12;
 #endif
 #ifdef FAULT_MEAN
     d->y = (pow(t + 1 + h, 3) - pow(t + 1, 3)) / (3 * h);
@@ -595,6 +635,9 @@ EXPORT int fmi2GetRealOutputDerivatives(void *c, const unsigned *vr, size_t n, c
 #ifdef FAULT_T09e
         return fail(f, "no derivatives");
 #endif
+#ifdef ORDER_ZERO
+        if (o[i] == 0) continue;
+#endif
 #ifndef FAULT_T09o
         if (o[i] != 1) return fail(f, "no such order");
 #endif
@@ -629,7 +672,13 @@ EXPORT int fmi2GetRealStatus(void *c, int kind, double *value) {
     return status(c, kind);
 }
 EXPORT int fmi2GetIntegerStatus(void *c, int kind, int *value) { (void)value; return status(c, kind); }
-EXPORT int fmi2GetBooleanStatus(void *c, int kind, int *value) { (void)value; return status(c, kind); }
+EXPORT int fmi2GetBooleanStatus(void *c, int kind, int *value) {
+#ifdef FAULT_ENDS
+    if (c && kind == 3 && value) { *value = ((Fmu *)c)->data.steps >= 5; return OK; }
+#endif
+    (void)value;
+    return status(c, kind);
+}
 #ifndef FAULT_B01
 EXPORT int fmi2GetStringStatus(void *c, int kind, const char **value) { (void)value; return status(c, kind); }
 #endif

@@ -115,7 +115,16 @@ EXPORT int fmi3DoStep(void *c, double t, double h, bool no_prior, bool *event, b
     *event = *terminate = *early = false;
     *last = t + h;
 #ifdef FAULT_T06a
+    *early = true;
+#endif
+#ifdef FAULT_LATE
+    *last += 0.3 * h;
+#endif
+#ifdef FAULT_STANDS
     *last = t;
+#endif
+#ifdef FAULT_ENDS
+    *terminate = ((Fmu *)c)->data.steps >= 5;
 #endif
     return OK;
 }

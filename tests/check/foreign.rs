@@ -19,6 +19,23 @@ class Counter(Fmi2Slave):
         return True
 "#;
 
+const COUNTER3: &str = r#"
+from pythonfmu3 import Float64, Fmi3Causality, Fmi3Slave
+
+class Counter3(Fmi3Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.time, self.u, self.y = 0.0, 0.0, 0.0
+        self.register_variable(Float64("time", causality=Fmi3Causality.independent))
+        self.register_variable(Float64("u", causality=Fmi3Causality.input))
+        self.register_variable(Float64("y", causality=Fmi3Causality.output))
+
+    def do_step(self, t, dt):
+        self.y += self.u * dt
+        self.time = t + dt
+        return True
+"#;
+
 const PAIR: &str = "rule;from_fmu;from_port;to_fmu;to_port
 FMU;PmsmPlant.fmu;;;
 FMU;SensorlessController.fmu;;;
@@ -52,8 +69,20 @@ fn pythonfmu() {
     assert_eq!(must, ["S02a"], "{}", told(&report));
 }
 
-/// It hangs with an infinite step (T02b), and its memory grows meanwhile, so a probe has 20 s only. It steps beyond the stop
-/// time (FMI 2.0.5, 2.1.6); all else that it does not do the standard leaves open.
+/// Nor does it describe the Python that it needs, which FMI 3.0 demands (3.0.2, 2.5.1.1).
+#[test]
+fn pythonfmu3() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("counter3.py"), COUNTER3).unwrap();
+    run(tool("pythonfmu3").args(["build", "-f", "counter3.py"]).current_dir(dir.path()));
+    let report = check(&dir.path().join("Counter3.fmu"), &[]);
+    let must: Vec<_> = report.violated().filter(|f| f.level == fmu_check::Level::Must).map(|f| f.id).collect();
+    assert_eq!(must, ["Z04c"], "{}", told(&report));
+}
+
+/// It hangs with an infinite step (T02b), and its memory grows meanwhile, so a call has 20 s only. It steps beyond the stop
+/// time (FMI 2.0.5, 2.1.6) and has no Error for a wrong value reference (2.0.5, 2.1.2); all else that it does not do the
+/// standard leaves open.
 #[test]
 fn fmucontainer() {
     let dir = tempfile::tempdir().unwrap();
@@ -65,6 +94,6 @@ fn fmucontainer() {
     run(container.args(["-container", "pair.csv:0.0001", "-no-auto-link", "-fmu-directory"]).arg(dir.path()));
     let report = check_within(&dir.path().join("pair.fmu"), &[], 20);
     let must: Vec<_> = report.violated().filter(|f| f.level == fmu_check::Level::Must).map(|f| f.id).collect();
-    assert_eq!(must, ["L12"], "{}", told(&report));
-    assert!(violated(&report).contains(&"L08n"));
+    assert_eq!(must, ["L12", "G02", "V12"], "{}", told(&report));
+    assert!(violated(&report).contains(&"L08n") && report.fatal().contains(&"G02"));
 }

@@ -4,8 +4,10 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod alarms;
 mod archive;
 mod binary;
+mod ci;
 mod description;
 mod exchange;
 mod foreign;
@@ -26,8 +28,10 @@ pub fn check(path: &Path, only: &[&str]) -> Report {
 pub fn check_within(path: &Path, only: &[&str], seconds: u64) -> Report {
     let options = Options {
         only: only.iter().map(ToString::to_string).collect(),
-        timeout: Some(Duration::from_secs(seconds)),
+        patience: Some(Duration::from_secs(seconds)),
+        timeout: None,
         program: Some(env!("CARGO_BIN_EXE_fmu").into()),
+        ..Options::default()
     };
     fmu_check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -12,23 +12,23 @@ const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.7.2";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "V07", requirement: "A start value in the description equals the value in the binary.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7", levels: Levels::MUST, run: Run::Probe(start_values) },
-    Check { id: "V06b", requirement: "Integer and enumeration outputs always lie between min and max.", clause: "3.0.2, 2.2.7.3", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(ranges) },
-    Check { id: "G01a", requirement: "Getting and setting zero variables succeeds, even with NULL pointers.", clause: GET, levels: Levels::HARD, run: Run::Probe(zero_variables) },
-    Check { id: "G01b", requirement: "A NULL array gives Error.", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(null_arrays) },
-    Check { id: "G01c", requirement: "A wrong number of values gives Error, and the FMU writes nothing past the values.", clause: GET, levels: Levels(None, Some(Level::Must)), run: Run::Probe(wrong_counts) },
-    Check { id: "G02", requirement: "A value reference that does not exist gives Error.", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(unknown_reference) },
-    Check { id: "V12", requirement: "A getter or setter for another type than that of the variable gives Error.", clause: "3.0.2, 2.2.7.2", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(wrong_type) },
-    Check { id: "G03a", requirement: "Setting a constant gives Error.", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(constants) },
-    Check { id: "G03b", requirement: "Setting a variable that cannot be set (output, time, fixed parameter after initialization) gives Error and changes nothing.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(not_settable) },
-    Check { id: "G03c", requirement: "A set call for several variables that fails changes none of them.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(all_or_nothing) },
-    Check { id: "G04", requirement: "A value that is set before the end of initialization reads back bit for bit.", clause: GET, levels: Levels::MUST, run: Run::Probe(round_trip) },
-    Check { id: "G05", requirement: "The FMU copies strings that are set: the importer may overwrite its own.", clause: GET, levels: Levels::MUST, run: Run::Probe(strings) },
-    Check { id: "G06", requirement: "A tunable parameter can be set between steps and keeps its value.", clause: "2.0.5, 2.2.7 and 4.2.4; 3.0.2, 2.4.7.4 and 4.2.1", levels: Levels::MUST, run: Run::Probe(tunable) },
-    Check { id: "L11", requirement: "Initialization can be iterated: values set and read in between leave no trace.", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Probe(iterated_initialization) },
-    Check { id: "G07a", requirement: "NaN, infinities and huge numbers in an input cause no hang, no crash and no disturbance of another instance.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(not_a_number) },
-    Check { id: "G07b", requirement: "A parameter outside min and max is refused, at the latest at the end of initialization.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(out_of_range) },
-    Check { id: "G08", requirement: "A Boolean other than 0 and 1 does no harm.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(booleans) },
+    Check { id: "V07", requirement: "A start value in the description equals the value in the binary.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, tried: "Reads every variable with a start value from a new instance and compares.", fix: "Generate both from one table.", run: Run::Probe(start_values) },
+    Check { id: "V06b", requirement: "Integer and enumeration outputs always lie between min and max.", clause: "3.0.2, 2.2.7.3", levels: Levels(Some(Level::Should), Some(Level::Must)), tried: "Reads integer outputs with limits over 50 steps.", fix: "Saturate the output, or correct min and max.", run: Run::Probe(ranges) },
+    Check { id: "G01a", requirement: "Getting and setting zero variables succeeds, even with NULL pointers.", clause: GET, levels: Levels::HARD, tried: "Gets and sets no variables, with NULL arrays.", fix: "Return OK before looking at the arrays.", run: Run::Probe(zero_variables) },
+    Check { id: "G01b", requirement: "A NULL array gives Error.", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Gets and sets one variable with NULL arrays.", fix: "Check the pointers if the number is above 0.", run: Run::Probe(null_arrays) },
+    Check { id: "G01c", requirement: "A wrong number of values gives Error, and the FMU writes nothing past the values.", clause: "3.0.2, 2.2.4", levels: Levels(None, Some(Level::Should)), tried: "Passes too few and too many values.", fix: "Compare nValues with the sizes of the variables before copying.", run: Run::Probe(wrong_counts) },
+    Check { id: "G02", requirement: "A value reference that does not exist gives Error.", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, tried: "Gets and sets a reference that no variable has.", fix: "Return Error in the default branch, also of setters.", run: Run::Probe(unknown_reference) },
+    Check { id: "V12", requirement: "A getter or setter for another type than that of the variable gives Error.", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, tried: "Gets and sets variables with the functions of another type.", fix: "Look references up by type.", run: Run::Probe(wrong_type) },
+    Check { id: "G03a", requirement: "Setting a constant gives Error.", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, tried: "Sets a constant.", fix: "Return Error for variables with variability constant.", run: Run::Probe(constants) },
+    Check { id: "G03b", requirement: "Setting a variable that cannot be set (output, time, fixed parameter after initialization) gives Error and changes nothing.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, tried: "Sets an output, the time and a fixed parameter between steps, and reads back.", fix: "Compare causality, variability and state before assigning, and return Error.", run: Run::Probe(not_settable) },
+    Check { id: "G03c", requirement: "A set call for several variables that fails changes none of them.", clause: "hardening", levels: Levels::HARD, tried: "Sets an input together with a reference that does not exist.", fix: "Check all references before assigning any.", run: Run::Probe(all_or_nothing) },
+    Check { id: "G04", requirement: "A value that is set before the end of initialization reads back.", clause: GET, levels: Levels::MUST, tried: "Sets every settable number in Initialization Mode and reads it.", fix: "Store the value as it came.", run: Run::Probe(round_trip) },
+    Check { id: "G05", requirement: "The FMU copies strings that are set: the importer may overwrite its own.", clause: GET, levels: Levels::MUST, tried: "Sets strings, overwrites them, and reads back.", fix: "Copy the string.", run: Run::Probe(strings) },
+    Check { id: "G06", requirement: "A tunable parameter can be set between steps and keeps its value.", clause: "2.0.5, 4.2.4; 3.0.2, 4.2.1", levels: Levels::MUST, tried: "Sets each tunable parameter between steps, makes two, and reads it.", fix: "Accept variability tunable in step mode.", run: Run::Probe(tunable) },
+    Check { id: "L11", requirement: "Initialization can be iterated: values set and read in between leave no trace.", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.3", levels: Levels::MUST, tried: "Sets values once in one instance, twice with reading in between in another, and compares.", fix: "Compute outputs from values when they are read, without leaving anything in the state.", run: Run::Probe(iterated_initialization) },
+    Check { id: "G07a", requirement: "NaN, infinities and huge numbers in an input cause no hang, no crash and no disturbance of another instance.", clause: "hardening", levels: Levels::HARD, tried: "Sets NaN, infinities and huge numbers at each input and makes 3 steps.", fix: "Check inputs for finiteness, and bound every loop.", run: Run::Probe(not_a_number) },
+    Check { id: "G07b", requirement: "A parameter outside min and max is refused, at the latest at the end of initialization.", clause: "hardening", levels: Levels::HARD, tried: "Sets parameters outside min and max.", fix: "Compare with min and max, and refuse at the latest in ExitInitializationMode.", run: Run::Probe(out_of_range) },
+    Check { id: "G08", requirement: "A Boolean other than 0 and 1 does no harm.", clause: "hardening", levels: Levels::HARD, tried: "Sets Booleans of 2, 255 and all bits.", fix: "Compare with 0.", run: Run::Probe(booleans) },
 ];
 
 /// The start values of a variable as bits; `None` for a form that is none of the type.
@@ -57,15 +57,12 @@ fn start_values(session: &Session) -> Result<(), NotDetermined> {
         let (status, found) = instance.get(v)?;
         compared += 1;
         session.require(status.is_ok(), || format!("line {}: Get({}) returned {status}", v.line, v.name));
-        session.require(!status.is_ok() || same(v, session.description.version, &expected, &found), || {
-            format!(
-                "line {}: {}: start={:?}, but the binary has {}",
-                v.line,
-                v.name,
-                v.start.as_deref().unwrap_or_default(),
-                show(v, session.description.version, &found)
-            )
-        });
+        if status.is_ok() && !same(v, session.description.version, &expected, &found) {
+            let (start, found_text) =
+                (v.start.as_deref().unwrap_or_default(), show(v, session.description.version, &found));
+            let text = format!("line {}: {}: start={start:?}, but the binary has {found_text}", v.line, v.name);
+            session.value_deviates(v, &expected, found, &text);
+        }
     }
     let fits = |v: &&ModelVariable| v.base == BaseType::String && !v.is_array() && v.start.is_some();
     for v in session.description.variables.iter().filter(fits) {
@@ -243,7 +240,13 @@ fn must_be_refused(
             raw.get(instance.handle, base, Some(&[reference]), 1, place, 1)
         }
     })?;
-    session.require(status == Status::ERROR, || format!("{call}, {what}, returned {status}"));
+    let text = format!("{call}, {what}, returned {status}");
+    if status == Status::FATAL {
+        // Refused, but with more than is wrong: it gives up all instances.
+        session.lesser(Level::Should, text);
+    } else {
+        session.require(status == Status::ERROR, || text);
+    }
     Ok(())
 }
 

@@ -11,28 +11,28 @@ const STRUCTURE: &str = "2.0.5, 2.3; 3.0.2, 2.5.1";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "Z01a", requirement: "The file extension is .fmu.", clause: ZIP, levels: Levels::MUST, run: Run::File(extension) },
-    Check { id: "Z01b", requirement: "Entries have relative names with forward slashes and stay inside the archive.", clause: "2.0.5, 2.3; 3.0.2, 2.5; APPNOTE 4.4.17", levels: Levels::MUST, run: Run::File(names) },
-    Check { id: "Z01c", requirement: "Entry names are ASCII.", clause: ZIP, levels: Levels::SHOULD, run: Run::File(ascii) },
-    Check { id: "Z01d", requirement: "Entries are stored or deflated (method 0 or 8).", clause: ZIP, levels: Levels::MUST, run: Run::File(methods) },
-    Check { id: "Z01e", requirement: "A data descriptor (general purpose bit 3) occurs only with deflate.", clause: ZIP, levels: Levels::MUST, run: Run::File(descriptors) },
-    Check { id: "Z01f", requirement: "The version needed to extract is at most 2.0, so ZIP64 is not used.", clause: ZIP, levels: Levels::MUST, run: Run::File(needed) },
-    Check { id: "Z01g", requirement: "No entry is encrypted.", clause: ZIP, levels: Levels::MUST, run: Run::File(encryption) },
-    Check { id: "Z01h", requirement: "The archive is neither split nor spanned.", clause: ZIP, levels: Levels::MUST, run: Run::File(split) },
-    Check { id: "Z01i", requirement: "The archive contains no symbolic links.", clause: ZIP, levels: Levels::MUST, run: Run::File(links) },
-    Check { id: "Z01j", requirement: "Every entry unpacks and matches its checksum.", clause: "APPNOTE 4.4.7", levels: Levels::MUST, run: Run::File(contents) },
-    Check { id: "Z01k", requirement: "Entry names are unique, and local and central headers agree.", clause: "APPNOTE 4.3", levels: Levels::HARD, run: Run::File(headers) },
-    Check { id: "Z02a", requirement: "The archive contains at least one implementation: binaries or sources.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(implementation) },
-    Check { id: "Z02b", requirement: "The root contains only the entries of the standard.", clause: STRUCTURE, levels: Levels::SHOULD, run: Run::File(root) },
-    Check { id: "Z03", requirement: "Folders below binaries/ have the platform names of the standard.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(platforms) },
-    Check { id: "X03", requirement: "Every platform folder contains a library named after modelIdentifier.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(base_names) },
-    Check { id: "Z04a", requirement: "The archive contains documentation/index.html.", clause: STRUCTURE, levels: Levels::SHOULD, run: Run::File(documentation) },
-    Check { id: "Z04b", requirement: "documentation/licenses contains license.txt or license.html (in FMI 3.0 also license.spdx) as its entry point.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(licenses) },
-    Check { id: "Z04c", requirement: "An FMU that needs an execution tool describes it in documentation/externalDependencies.txt or .html.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(dependencies) },
-    Check { id: "Z05", requirement: "Every SVG icon or diagram is accompanied by a PNG.", clause: "3.0.2, 2.5.1", levels: Levels(None, Some(Level::Must)), run: Run::File(pictures) },
-    Check { id: "Z06", requirement: "Folders below extra/ have reverse domain names.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.6", levels: Levels::SHOULD, run: Run::File(extra) },
-    Check { id: "Z07", requirement: "Sources include sources/buildDescription.xml and exclude the headers of the standard.", clause: "3.0.2, 2.5.1.3", levels: Levels(Some(Level::Should), Some(Level::Should)), run: Run::File(sources) },
-    Check { id: "I03", requirement: "A manifest of a layered standard (extra/*/fmi-ls-manifest.xml) is well-formed and gives name, version and description in its namespace.", clause: "3.0.2, 2.6; fmi3LayeredStandardManifest.xsd", levels: Levels::MUST, run: Run::File(manifests) },
+    Check { id: "Z01a", requirement: "The file extension is .fmu.", clause: ZIP, levels: Levels::MUST, tried: "Reads the name of the file.", fix: "Name the archive NAME.fmu.", run: Run::File(extension) },
+    Check { id: "Z01b", requirement: "Entries have relative names with forward slashes and stay inside the archive.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Reads the names of all entries in both headers.", fix: "Write entry names relative to the root of the FMU, with forward slashes and without `.` and `..`.", run: Run::File(names) },
+    Check { id: "Z01c", requirement: "Entry names are ASCII.", clause: ZIP, levels: Levels::SHOULD, tried: "Reads the names of all entries.", fix: "Use ASCII names; keep other letters inside the files.", run: Run::File(ascii) },
+    Check { id: "Z01d", requirement: "Entries are stored or deflated (method 0 or 8).", clause: ZIP, levels: Levels::MUST, tried: "Reads the compression methods in both headers of every entry.", fix: "Tell the ZIP library to deflate or to store.", run: Run::File(methods) },
+    Check { id: "Z01e", requirement: "A data descriptor (general purpose bit 3) occurs only with deflate.", clause: ZIP, levels: Levels::MUST, tried: "Reads the general purpose bits in both headers of every entry.", fix: "Let the ZIP library write to a file it can seek in, or deflate every entry.", run: Run::File(descriptors) },
+    Check { id: "Z01f", requirement: "The version needed to extract is at most 2.0, so ZIP64 is not used.", clause: ZIP, levels: Levels::MUST, tried: "Reads the version needed in both headers of every entry, and the end records.", fix: "Switch ZIP64 off, and write the version 2.0 into the headers.", run: Run::File(needed) },
+    Check { id: "Z01g", requirement: "No entry is encrypted.", clause: ZIP, levels: Levels::MUST, tried: "Reads the general purpose bits of every entry.", fix: "Write the archive without a password.", run: Run::File(encryption) },
+    Check { id: "Z01h", requirement: "The archive is neither split nor spanned.", clause: ZIP, levels: Levels::MUST, tried: "Reads the disk numbers of the end record and of every entry.", fix: "Write the archive as one file.", run: Run::File(split) },
+    Check { id: "Z01i", requirement: "The archive contains no symbolic links.", clause: ZIP, levels: Levels::MUST, tried: "Reads the file attributes of every entry.", fix: "Pack the file that the link points to.", run: Run::File(links) },
+    Check { id: "Z01j", requirement: "Every entry unpacks and matches its checksum.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Unpacks every entry and compares its size and checksum with the headers.", fix: "Write the archive again; check the disk and the transfer if it was whole before.", run: Run::File(contents) },
+    Check { id: "Z01k", requirement: "Entry names are unique, and local and central headers agree.", clause: "APPNOTE 4.3", levels: Levels::HARD, tried: "Compares the names of all entries, and the central header of each with its local header.", fix: "Add every file once, and let one library write both headers.", run: Run::File(headers) },
+    Check { id: "Z02a", requirement: "The archive contains at least one implementation: binaries or sources.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Looks for files below binaries/ and sources/.", fix: "Pack the library below binaries/PLATFORM/, or the sources with buildDescription.xml.", run: Run::File(implementation) },
+    Check { id: "Z02b", requirement: "The root contains only the entries of the standard.", clause: STRUCTURE, levels: Levels::SHOULD, tried: "Reads the first part of every entry's name.", fix: "Move other files to extra/REVERSE.DOMAIN/ or to resources/.", run: Run::File(root) },
+    Check { id: "Z03", requirement: "Folders below binaries/ have the platform names of the standard.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4.1", levels: Levels::SHOULD, tried: "Reads the names of the folders below binaries/.", fix: "Name them win64, linux64 or darwin64 in FMI 2.0, x86_64-windows, x86_64-linux, aarch64-darwin and so on in FMI 3.0.", run: Run::File(platforms) },
+    Check { id: "X03", requirement: "Every platform folder contains a library named after modelIdentifier, a C identifier.", clause: "2.0.5, 2.3; 3.0.2, 2.2.2", levels: Levels::MUST, tried: "Compares modelIdentifier of every interface with the libraries in each platform folder.", fix: "Name the library modelIdentifier.so, .dll or .dylib, and use letters, digits and underscores only.", run: Run::File(base_names) },
+    Check { id: "Z04a", requirement: "The archive contains documentation/index.html.", clause: STRUCTURE, levels: Levels::SHOULD, tried: "Looks for documentation/index.html.", fix: "Add a page that says what the model is and what its variables mean.", run: Run::File(documentation) },
+    Check { id: "Z04b", requirement: "documentation/licenses contains license.txt or license.html (in FMI 3.0 also license.spdx) as its entry point.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), tried: "Looks for the entry point of documentation/licenses.", fix: "Add license.txt, license.html or in FMI 3.0 license.spdx.", run: Run::File(licenses) },
+    Check { id: "Z04c", requirement: "An FMU that needs an execution tool describes it in documentation/externalDependencies.txt or .html.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), tried: "Reads needsExecutionTool and looks for documentation/externalDependencies.", fix: "Describe which tool is needed, in which version, and how the FMU finds it.", run: Run::File(dependencies) },
+    Check { id: "Z05", requirement: "documentation/diagram.svg and terminalsAndIcons/icon.svg are accompanied by a PNG.", clause: "3.0.2, 2.5.1", levels: Levels(None, Some(Level::Must)), tried: "Looks for the PNG beside each of the two SVG files.", fix: "Render the SVG and pack both.", run: Run::File(pictures) },
+    Check { id: "Z06", requirement: "Folders below extra/ have reverse domain names.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.6", levels: Levels::SHOULD, tried: "Reads the names of the folders below extra/.", fix: "Name the folder after a domain of yours, reversed, for example extra/org.example.", run: Run::File(extra) },
+    Check { id: "Z07", requirement: "Sources include sources/buildDescription.xml and exclude the headers of the standard.", clause: "3.0.2, 2.5.1.3", levels: Levels(Some(Level::Should), Some(Level::Should)), tried: "Reads the names of the entries below sources/.", fix: "Add buildDescription.xml, and leave out the headers of the standard, which the importer has.", run: Run::File(sources) },
+    Check { id: "I03", requirement: "A manifest of a layered standard (extra/*/fmi-ls-manifest.xml) is well-formed and gives name, version and description in its namespace.", clause: "3.0.2, 2.6", levels: Levels(None, Some(Level::Should)), tried: "Parses every extra/*/fmi-ls-manifest.xml.", fix: "Give the root element fmi-ls-name, fmi-ls-version and fmi-ls-description in the namespace of manifests.", run: Run::File(manifests) },
 ];
 
 /// A finding for each entry that the rule refuses.
@@ -112,7 +112,10 @@ fn links(fmu: &FmuFile) -> Verdict {
 }
 
 fn contents(fmu: &FmuFile) -> Verdict {
-    Verdict::of(fmu.unpack_errors.clone())
+    match (fmu.unpack_errors.is_empty(), fmu.own_errors.first()) {
+        (true, Some(cause)) => Verdict::NotDetermined(format!("this computer could not store an entry: {cause}")),
+        _ => Verdict::of(fmu.unpack_errors.clone()),
+    }
 }
 
 fn headers(fmu: &FmuFile) -> Verdict {
@@ -200,6 +203,7 @@ fn base_names(fmu: &FmuFile) -> Verdict {
     if fmu.binaries.is_empty() {
         return Verdict::NotApplicable("there are no shared libraries".into());
     }
+    let sources = fmu.zip.names().iter().any(|n| n.starts_with("sources/") && !n.ends_with('/'));
     let mut findings = Vec::new();
     for identifier in &identifiers {
         let c_name = identifier.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
@@ -219,6 +223,14 @@ fn base_names(fmu: &FmuFile) -> Verdict {
         } else {
             "so"
         };
+        let present = |identifier: &&str| {
+            let name = format!("binaries/{folder}/{identifier}.{extension}");
+            fmu.binaries.iter().any(|b| b.name == name)
+        };
+        // Another interface may come as sources.
+        if sources && identifiers.iter().any(present) {
+            continue;
+        }
         for identifier in &identifiers {
             let name = format!("binaries/{folder}/{identifier}.{extension}");
             if !fmu.binaries.iter().any(|b| b.name == name) {
@@ -277,7 +289,7 @@ fn pictures(fmu: &FmuFile) -> Verdict {
             .strip_suffix(".svg")
             .filter(|n| !n.starts_with("extra/") && !n.starts_with("resources/"))
             .map(|n| format!("{n}.png"))?;
-        let known = png.starts_with("terminalsAndIcons/") || png == "documentation/diagram.png";
+        let known = png == "terminalsAndIcons/icon.png" || png == "documentation/diagram.png";
         (known && fmu.zip.find(&png).is_none()).then(|| format!("{png} is missing"))
     })
 }

@@ -12,19 +12,19 @@ use object::{Architecture, BinaryFormat, Object, ObjectSection, ObjectSymbol};
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "B00", requirement: "The archive contains a binary for this platform, and it loads.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::Probe(loads) },
-    Check { id: "B10", requirement: "Every binary is a shared library for the platform of its folder.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(format) },
-    Check { id: "B01", requirement: "Every binary exports all functions of the standard; in FMI 2.0, those of its interface types.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(exports) },
-    Check { id: "B02a", requirement: "No other exported symbol begins with fmi3.", clause: "3.0.2, 2.5", levels: Levels(None, Some(Level::Must)), run: Run::File(reserved) },
-    Check { id: "B02b", requirement: "A binary exports only functions of the standards and at most two symbols of the tool.", clause: "hardening", levels: Levels::HARD, run: Run::File(only_standard_functions) },
-    Check { id: "B02c", requirement: "The binary can be unloaded: it has no unique symbols and no NODELETE flag.", clause: "hardening", levels: Levels::HARD, run: Run::File(unloadable) },
-    Check { id: "B03", requirement: "A binary needs only C system libraries; the archive contains all others.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(needed) },
-    Check { id: "B03r", requirement: "Every library search path is $ORIGIN or below.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(rpath) },
-    Check { id: "B04", requirement: "Linux binaries need at most version 2.17 (2012) of the GNU C library, so that they load on old systems.", clause: "hardening", levels: Levels::HARD, run: Run::File(c_library) },
-    Check { id: "B05", requirement: "Linux binaries have no text relocations and no executable stack.", clause: "hardening", levels: Levels::HARD, run: Run::File(no_dangerous_flags) },
-    Check { id: "B11", requirement: "A binary for x86_64 Linux requires no instruction set beyond x86-64-v1 (according to its note).", clause: "hardening", levels: Levels::HARD, run: Run::File(processor) },
-    Check { id: "X02b", requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels::MUST, run: Run::Probe(versions) },
-    Check { id: "B08", requirement: "A complete run writes nothing to the console and creates no file in the working directory.", clause: "hardening", levels: Levels::HARD, run: Run::Silent(complete_run) },
+    Check { id: "B00", requirement: "The archive contains a binary for this platform, and it loads (should, if it lacks a shared library of this machine).", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, tried: "Loads the binary for this platform in a process of its own.", fix: "Link helpers statically or pack them beside the library, with the search path $ORIGIN; ldd shows what is missing.", run: Run::Probe(loads) },
+    Check { id: "B10", requirement: "Every binary is a shared library for the platform of its folder.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, tried: "Reads the format and the processor of every library.", fix: "Build each platform with its own compiler target, as a shared library.", run: Run::File(format) },
+    Check { id: "B01", requirement: "Every binary exports all functions of the standard; in FMI 2.0, those of its interface types.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Compares the exported symbols with the functions of the interfaces.", fix: "Export every function of the standard; those that are not supported return Error.", run: Run::File(exports) },
+    Check { id: "B02a", requirement: "No other exported symbol begins with fmi3.", clause: "3.0.2, 2.5", levels: Levels(None, Some(Level::Should)), tried: "Looks for exported symbols that begin with fmi3 and are not in the standard.", fix: "Rename or hide helper functions.", run: Run::File(reserved) },
+    Check { id: "B02b", requirement: "A binary exports only functions of the standards and at most two symbols of the tool.", clause: "hardening", levels: Levels::HARD, tried: "Lists exported symbols.", fix: "Compile with -fvisibility=hidden and export the functions of the standard.", run: Run::File(only_standard_functions) },
+    Check { id: "B02c", requirement: "The binary can be unloaded: it has no unique symbols and no NODELETE flag.", clause: "hardening", levels: Levels::HARD, tried: "Reads the dynamic section and the unique symbols.", fix: "Link without -z nodelete, and compile C++ with -fno-gnu-unique.", run: Run::File(unloadable) },
+    Check { id: "B03", requirement: "A binary needs only C system libraries; the archive contains all others.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, tried: "Reads the libraries that the binary needs.", fix: "Link them statically (-static-libgcc -static-libstdc++, /MT), or pack them beside the binary.", run: Run::File(needed) },
+    Check { id: "B03r", requirement: "Every library search path is $ORIGIN or below.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, tried: "Reads the search paths of the binary.", fix: "Set the search path to $ORIGIN, and strip those of the build machine.", run: Run::File(rpath) },
+    Check { id: "B04", requirement: "Linux binaries need at most version 2.17 (2012) of the GNU C library, so that they load on old systems.", clause: "hardening", levels: Levels::HARD, tried: "Reads the versions of symbols that the binary needs.", fix: "Build on an old system, or with `zig cc -target x86_64-linux-gnu.2.17`.", run: Run::File(c_library) },
+    Check { id: "B05", requirement: "Linux binaries have no text relocations and no executable stack.", clause: "hardening", levels: Levels::HARD, tried: "Reads the program headers.", fix: "Compile with -fPIC, and assembler files with .note.GNU-stack.", run: Run::File(no_dangerous_flags) },
+    Check { id: "B11", requirement: "A binary for x86_64 Linux requires no instruction set beyond x86-64-v1 (according to its note).", clause: "hardening", levels: Levels::HARD, tried: "Reads the note .note.gnu.property.", fix: "Build for x86-64, not with -march=native.", run: Run::File(processor) },
+    Check { id: "X02b", requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels(Some(Level::Should), Some(Level::Must)), tried: "Calls GetVersion, and in FMI 2.0 GetTypesPlatform.", fix: "Return the constants of the official headers.", run: Run::Probe(versions) },
+    Check { id: "B08", requirement: "A complete run writes nothing to the console and creates no file in the working directory.", clause: "hardening", levels: Levels::HARD, tried: "Runs 20 steps and watches console and working directory.", fix: "Send messages to the log callback, and write files only where a parameter says so.", run: Run::Silent(complete_run) },
 ];
 
 const COMMON2: &str = "GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment EnterInitializationMode ExitInitializationMode Terminate Reset GetReal GetInteger GetBoolean GetString SetReal SetInteger SetBoolean SetString GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate GetDirectionalDerivative";
@@ -67,7 +67,11 @@ fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>)
     }
     let mut findings = Vec::new();
     for binary in libraries {
-        match object::File::parse(&*binary.bytes) {
+        let bytes = match binary.bytes() {
+            Ok(bytes) => bytes,
+            Err(why) => return Verdict::NotDetermined(why),
+        };
+        match object::File::parse(&*bytes) {
             Ok(file) => findings.extend(rule(binary, &file).into_iter().map(|f| format!("{}: {f}", binary.name))),
             Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
         }
@@ -79,7 +83,11 @@ fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>)
 fn elf(fmu: &FmuFile, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<String>, object::Error>) -> Verdict {
     let (mut findings, mut found_elf) = (Vec::new(), false);
     for binary in libraries(fmu) {
-        let Ok(file) = ElfFile64::parse(&*binary.bytes) else { continue };
+        let bytes = match binary.bytes() {
+            Ok(bytes) => bytes,
+            Err(why) => return Verdict::NotDetermined(why),
+        };
+        let Ok(file) = ElfFile64::parse(&*bytes) else { continue };
         found_elf = true;
         match rule(binary, &file) {
             Ok(found) => findings.extend(found.into_iter().map(|f| format!("{}: {f}", binary.name))),
@@ -121,7 +129,11 @@ fn format(fmu: &FmuFile) -> Verdict {
             }
         };
         let Some((format, architecture)) = expected else { continue };
-        match object::File::parse(&*binary.bytes) {
+        let bytes = match binary.bytes() {
+            Ok(bytes) => bytes,
+            Err(why) => return Verdict::NotDetermined(why),
+        };
+        match object::File::parse(&*bytes) {
             Err(e) => findings.push(format!("{}: is not a binary: {e}", binary.name)),
             Ok(file) => {
                 if (file.format(), file.architecture()) != (format, architecture) {

@@ -35,12 +35,13 @@ pub(super) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
         for (((unknown, dependencies), old), new) in unknowns.iter().zip(&before).zip(&after) {
             let named =
                 dependencies.iter().any(|d| session.description.referenced(*d).is_some_and(|v| v.name == known.name));
-            session.require(named || old == new || old.is_empty() || new.is_empty(), || {
-                format!(
+            if !named && old != new && !old.is_empty() && !new.is_empty() {
+                let text = format!(
                     "line {}: {} changes with {}, which is not among its dependencies",
                     unknown.line, unknown.name, known.name
-                )
-            });
+                );
+                session.value_deviates(unknown, old, new.clone(), &text);
+            }
         }
         let _ = one.free();
     }
@@ -71,12 +72,13 @@ pub(super) fn exchange_dependencies(session: &Session) -> Result<(), NotDetermin
             let named = same(unknown) || dependencies.iter().any(|r| d.referenced(*r).is_some_and(same));
             let reals = |bits: &[u64]| bits.iter().map(|b| f64::from_bits(*b)).collect::<Vec<_>>();
             let changed = if unknown.base == BaseType::Float64 { differ(&reals(old), &reals(new)) } else { old != new };
-            session.require(named || !changed || old.is_empty() || new.is_empty(), || {
-                format!(
+            if !named && changed && !old.is_empty() && !new.is_empty() {
+                let text = format!(
                     "line {}: {} changes with {}, which is not among its dependencies",
                     unknown.line, unknown.name, known.name
-                )
-            });
+                );
+                session.value_deviates(unknown, old, new.clone(), &text);
+            }
         }
     };
     let instance = session.excited()?;

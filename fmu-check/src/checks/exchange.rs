@@ -10,28 +10,28 @@ use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
 
-const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2.1";
+const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "E00", requirement: "A minimal run of Model Exchange succeeds: initialization, event iteration, integrator steps, termination.", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(minimal_run) },
-    Check { id: "E01", requirement: "Every call that the state of a Model Exchange instance allows succeeds.", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(allowed) },
-    Check { id: "E01i", requirement: "States, derivatives, event indicators and nominals can be read in Initialization Mode.", clause: "2.0.5, 3.2.3; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(allowed_early) },
-    Check { id: "E02", requirement: "Every call that the state of a Model Exchange instance does not allow returns Error.", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Exchange(refused) },
-    Check { id: "E03", requirement: "States, derivatives, event indicators and nominals are as many as the description has, and nothing is written past them.", clause: "2.0.5, 3.2.2; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(counts) },
-    Check { id: "E04a", requirement: "The nominals of the continuous states are above 0.", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Exchange(positive_nominals) },
-    Check { id: "E04b", requirement: "The nominals of the continuous states are those of the description, or 1 where it has none.", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(declared_nominals) },
-    Check { id: "E05", requirement: "Continuous states that are set can be read back, as a vector and as variables.", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(round_trip) },
-    Check { id: "E06a", requirement: "Derivatives depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls.", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure) },
-    Check { id: "E06b", requirement: "The same time, states and inputs give the same derivatives bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(same_bits) },
-    Check { id: "E07", requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states nor derivatives.", clause: "2.0.5, 3.2.2; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(completed_step) },
-    Check { id: "E08", requirement: "The independent variable is the time that SetTime set.", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(independent) },
-    Check { id: "E09", requirement: "States that are NaN, infinite or huge cause no crash, no hang and no Error, but Discard at most: with valid ones the derivatives are those of before.", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wild_states) },
-    Check { id: "E10", requirement: "A vector of the wrong length is refused with Error.", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wrong_length) },
-    Check { id: "E11", requirement: "An output or derivative changes only with the states and inputs among its dependencies.", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(exchange_dependencies) },
-    Check { id: "E12", requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset) },
-    Check { id: "E13", requirement: "An FMU state saved in Event Mode or in Continuous-Time Mode restores the run from there.", clause: "2.0.5, 2.1.8; 3.0.2, 2.2.7.4", levels: Levels::MUST, run: Run::Exchange(saved_states) },
-    Check { id: "E14", requirement: "A state of a Model Exchange instance does no harm to an instance for co-simulation, nor the reverse.", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(foreign_states) },
+    Check { id: "E00", requirement: "A minimal run of Model Exchange succeeds: initialization, event iteration, integrator steps, termination.", clause: TABLE, levels: Levels::MUST, tried: "Initializes, iterates events, integrates with Euler's method, terminates.", fix: "Look at the call that is named; the other checks of Model Exchange rest on this run.", run: Run::Exchange(minimal_run) },
+    Check { id: "E01", requirement: "Every call that the state of a Model Exchange instance allows succeeds.", clause: TABLE, levels: Levels::MUST, tried: "Makes every allowed call in every state of Model Exchange.", fix: "Extend the table of allowed states by the call that is named.", run: Run::Exchange(allowed) },
+    Check { id: "E01i", requirement: "States, derivatives, event indicators and nominals can be read in Initialization Mode.", clause: "2.0.5, 3.2.3; 3.0.2, 2.3.3", levels: Levels::SHOULD, tried: "Reads the vectors in Initialization Mode.", fix: "Compute them when they are read.", run: Run::Exchange(allowed_early) },
+    Check { id: "E02", requirement: "Every call that the state of a Model Exchange instance does not allow returns Error.", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Makes every call in every state that does not allow it.", fix: "Check the state at the beginning of every function, log and return Error.", run: Run::Exchange(refused) },
+    Check { id: "E03", requirement: "States, derivatives, event indicators and nominals are as many as the description has, and nothing is written past them.", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, tried: "Reads the vectors with guards behind them, and in FMI 3.0 the numbers.", fix: "Take the sizes from ModelStructure and numberOfEventIndicators.", run: Run::Exchange(counts) },
+    Check { id: "E04a", requirement: "The nominals of the continuous states are above 0.", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::MUST, tried: "Reads the nominals.", fix: "Return 1 where nothing is known.", run: Run::Exchange(positive_nominals) },
+    Check { id: "E04b", requirement: "The nominals of the continuous states are those of the description, or 1 where it has none.", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, tried: "Compares the nominals with the description.", fix: "Generate both from one table.", run: Run::Exchange(declared_nominals) },
+    Check { id: "E05", requirement: "Continuous states that are set can be read back, as a vector and as variables.", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, tried: "Sets the states and reads them.", fix: "Store the states as they came, and mark what depends on them as old.", run: Run::Exchange(round_trip) },
+    Check { id: "E06a", requirement: "Derivatives depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls.", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, tried: "Evaluates derivatives in other orders, repeatedly and in another instance, and compares.", fix: "Mark cached results as old in every Set function.", run: Run::Exchange(pure) },
+    Check { id: "E06b", requirement: "The same time, states and inputs give the same derivatives bit for bit.", clause: "hardening", levels: Levels::HARD, tried: "Compares the same evaluations bit for bit.", fix: "Start iterations from a fixed guess, and initialize memory.", run: Run::Exchange(same_bits) },
+    Check { id: "E07", requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states nor derivatives.", clause: "2.0.5, 3.2.2; 3.0.2, 3.2.1", levels: Levels::SHOULD, tried: "Completes steps without an event and compares.", fix: "Return false for both flags, and change nothing.", run: Run::Exchange(completed_step) },
+    Check { id: "E08", requirement: "The independent variable is the time that SetTime set.", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::SHOULD, tried: "Sets the time and reads the independent variable.", fix: "Assign the argument of SetTime to it.", run: Run::Exchange(independent) },
+    Check { id: "E09", requirement: "States that are NaN, infinite or huge cause no crash, no hang and no Error, but Discard at most: with valid ones the derivatives are those of before.", clause: "hardening", levels: Levels::HARD, tried: "Sets states of NaN, infinity and 1e300, reads derivatives, then sets good ones.", fix: "Return Discard, and keep nothing of the bad evaluation.", run: Run::Exchange(wild_states) },
+    Check { id: "E10", requirement: "A vector of the wrong length is refused with Error.", clause: "hardening", levels: Levels::HARD, tried: "Passes vectors that are too long by one.", fix: "Compare the length with the number of states or indicators.", run: Run::Exchange(wrong_length) },
+    Check { id: "E11", requirement: "An output or derivative changes only with the states and inputs among its dependencies.", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, tried: "Changes states and inputs one at a time and reads outputs and derivatives that do not name them.", fix: "Add them to dependencies, or leave dependencies out.", run: Run::Exchange(exchange_dependencies) },
+    Check { id: "E12", requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, tried: "Resets in every state, runs again, and compares.", fix: "Assign everything that instantiation assigns, including the event iteration.", run: Run::Exchange(reset) },
+    Check { id: "E13", requirement: "An FMU state saved in Event Mode or in Continuous-Time Mode restores the run from there.", clause: "2.0.5, 2.1.8; 3.0.2, 2.2.7.4", levels: Levels::MUST, tried: "Saves in Event Mode and Continuous-Time Mode, restores, runs, and compares.", fix: "Save event counters, next event times and the mode too.", run: Run::Exchange(saved_states) },
+    Check { id: "E14", requirement: "A state of a Model Exchange instance does no harm to an instance for co-simulation, nor the reverse.", clause: "hardening", levels: Levels::HARD, tried: "Sets a state of one kind of instance into the other.", fix: "Store the kind, and return Error.", run: Run::Exchange(foreign_states) },
 ];
 
 fn counts(session: &Session) -> Result<(), NotDetermined> {
@@ -195,7 +195,7 @@ fn pure(session: &Session) -> Result<(), NotDetermined> {
     let (_, first) = &found[0];
     for (what, values) in &found[1..] {
         if let Some((_, largest)) = deviation(std::slice::from_ref(first), std::slice::from_ref(values)) {
-            session.violated(format!("the derivatives are {first:?}; {what}, {values:?} (relative {largest:e})"));
+            session.deviates(largest, &format!("the derivatives are {first:?}; {what}, {values:?}"));
         }
     }
     Ok(())
@@ -323,9 +323,8 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
             instance.experiment(session.start(), None);
             instance.bring_to(Mode::Event)?;
             if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
-                session.violated(format!(
-                    "Reset after {mode:?}: the run differs from that of a new instance after {k} steps (relative {largest:e})"
-                ));
+                let text = format!("Reset after {mode:?}: the run differs from that of a new instance after {k} steps");
+                session.deviates(largest, &text);
             }
             Ok(())
         });
@@ -339,9 +338,7 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
     }
     let compare = |mode: &str, first: &[Vec<f64>], second: &[Vec<f64>]| {
         if let Some((k, largest)) = deviation(first, second) {
-            session.violated(format!(
-                "restored in {mode}: the run differs from the first after {k} steps (relative {largest:e})"
-            ));
+            session.deviates(largest, &format!("restored in {mode}: the run differs from the first after {k} steps"));
         }
     };
     session.case(|| {

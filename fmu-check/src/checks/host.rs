@@ -2,7 +2,7 @@
 
 use crate::check::{Check, Levels, Run};
 use crate::session::{NotDetermined, Session};
-use crate::trajectory::difference;
+use fmu_import::guard;
 use fmu_import::raw::{Raw, Simple, float_control};
 use std::ffi::OsString;
 use std::fs;
@@ -11,10 +11,10 @@ use std::time::Duration;
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "B06", requirement: "The binary loads and runs in a secondary thread with a stack of 256 KiB.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(small_stack) },
-    Check { id: "B08f", requirement: "Neither loading nor any call changes the floating-point control (rounding, exceptions, flushing to zero).", clause: "hardening", levels: Levels::HARD, run: Run::Probe(floating_point) },
-    Check { id: "B08p", requirement: "A complete run, from loading to unloading, leaves the process unchanged: threads, open files, working directory, environment, umask, signals and the folder of the FMU.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(surroundings) },
-    Check { id: "Z09", requirement: "The FMU runs from a folder whose path has blanks, '%', '#', non-ASCII letters and more than 200 characters, and that contains only its binaries and resources.", clause: "2.0.5, 2.1.5 and 2.3; 3.0.2, 2.3.1 and 2.5", levels: Levels::SHOULD, run: Run::Probe(unusual_path) },
+    Check { id: "B06", requirement: "The binary loads and runs in a secondary thread with a stack of 256 KiB.", clause: "hardening", levels: Levels::HARD, tried: "Loads and runs in a thread with 256 KiB.", fix: "Put large arrays on the heap.", run: Run::Probe(small_stack) },
+    Check { id: "B08f", requirement: "Neither loading nor any call changes the floating-point control (rounding, exceptions, flushing to zero).", clause: "hardening", levels: Levels::HARD, tried: "Reads the control registers after each call.", fix: "Restore them before returning; avoid -ffast-math when linking.", run: Run::Probe(floating_point) },
+    Check { id: "B08p", requirement: "A complete run, from loading to unloading, leaves the process unchanged: threads, child processes, open files, working directory, environment, umask, signals and the folder of the FMU.", clause: "hardening", levels: Levels::HARD, tried: "Compares the process before loading and after unloading.", fix: "Close files, end threads and processes, and leave directory, environment and signals alone.", run: Run::Probe(surroundings) },
+    Check { id: "Z09", requirement: "The FMU runs from a folder whose path has blanks, '%', '#', non-ASCII letters and more than 200 characters, and that contains only its binaries and resources.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, tried: "Runs from such a folder and compares.", fix: "Decode the URI in FMI 2.0, and use paths of any length.", run: Run::Probe(unusual_path) },
 ];
 
 /// Stack in bytes of the smallest thread that an importer may run the FMU in.
@@ -43,7 +43,7 @@ fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
 
 /// A copy of the binary below the working directory, which is temporary; under the new path it is loaded again.
 fn second_binary(session: &Session, folder: &str) -> Result<PathBuf, NotDetermined> {
-    let folder_of_run = std::env::current_dir().map_err(|e| failed(&e))?.join(folder);
+    let folder_of_run = session.home.join(folder);
     copy(session.binary.parent().unwrap_or(&folder_of_run), &folder_of_run).map_err(|e| failed(&e))?;
     Ok(folder_of_run.join(session.binary.file_name().unwrap_or_default()))
 }
@@ -67,7 +67,7 @@ fn small_stack(session: &Session) -> Result<(), NotDetermined> {
     let thread = std::thread::Builder::new().stack_size(STACK).spawn(work).map_err(|e| failed(&e))?;
     match thread.join() {
         Ok(Ok(())) => {}
-        Ok(Err(NotDetermined(why))) => session.violated(why),
+        Ok(Err(why)) => session.failed("in that thread", why),
         Err(_) => session.violated("the thread panicked"),
     }
     Ok(())
@@ -123,6 +123,8 @@ struct Surroundings {
     files: Vec<PathBuf>,
     folder: Option<PathBuf>,
     environment: Vec<(OsString, OsString)>,
+    /// Processes that this one has started.
+    children: Vec<String>,
     /// Lines of `/proc/self/status`.
     status: Vec<String>,
     /// Files below the unpacked FMU with size and time.
@@ -160,6 +162,7 @@ impl Surroundings {
             files,
             folder: std::env::current_dir().ok(),
             environment,
+            children: guard::children(),
             status: status.lines().filter(|l| fields.iter().any(|t| l.starts_with(t))).map(str::to_owned).collect(),
             fmu_folder: found,
         }
@@ -178,6 +181,8 @@ impl Surroundings {
         let changed = after.environment.iter().chain(&self.environment);
         let changed = changed.filter(|v| !self.environment.contains(v) || !after.environment.contains(v));
         found.extend(changed.map(|(name, _)| format!("the environment variable {} changed", name.to_string_lossy())));
+        let children = after.children.iter().filter(|c| !self.children.contains(c));
+        found.extend(children.map(|c| format!("the process {c} was left behind")));
         for (old, new) in self.status.iter().zip(&after.status).filter(|(old, new)| old != new) {
             found.push(format!("{:?} became {:?}", old.replace('\t', " "), new.replace('\t', " ")));
         }
@@ -195,6 +200,8 @@ impl Surroundings {
 fn surroundings(session: &Session) -> Result<(), NotDetermined> {
     let binary = second_binary(session, "guest")?;
     let fmu_folder = session.binary.ancestors().nth(3).unwrap_or(&session.binary).to_owned();
+    // The first loading may have left it already.
+    std::env::set_current_dir(&session.home).map_err(|e| failed(&e))?;
     let before = Surroundings::current(&fmu_folder);
     session.record_call("loading, a complete run, unloading");
     {
@@ -230,9 +237,8 @@ fn unusual_path(session: &Session) -> Result<(), NotDetermined> {
         instance.run(10, session.h())
     };
     let plain = run(session)?;
-    let folder_of_run = std::env::current_dir().map_err(|e| failed(&e))?;
     let folder_of_run =
-        folder_of_run.join(format!("an FMU %41 #1 \u{e4}\u{4e2d} {}", "x".repeat(120))).join("y".repeat(120));
+        session.home.join(format!("an FMU %41 #1 \u{e4}\u{4e2d} {}", "x".repeat(120))).join("y".repeat(120));
     let platform = session.binary.parent().ok_or_else(|| NotDetermined("the binary has no folder".into()))?;
     let binaries = folder_of_run.join("binaries").join(platform.file_name().unwrap_or_default());
     copy(platform, &binaries).map_err(|e| failed(&e))?;
@@ -252,12 +258,8 @@ fn unusual_path(session: &Session) -> Result<(), NotDetermined> {
     let mut duplicate = session.duplicate_with(raw, 63)?;
     duplicate.move_to(&folder_of_run);
     match run(&duplicate) {
-        Err(NotDetermined(why)) => session.violated(format!("in {}: {why}", folder_of_run.display())),
-        Ok(rows) => {
-            if let Some((step, i)) = difference(&plain, &rows) {
-                session.violated(format!("{} differs after {} steps", session.watched()[i].name, step + 1));
-            }
-        }
+        Err(why) => session.failed(&format!("in {}", folder_of_run.display()), why),
+        Ok(rows) => session.compare("from there", &plain, &rows),
     }
     Ok(())
 }

@@ -3,19 +3,17 @@
 use crate::check::{Check, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
-use crate::trajectory::{difference, trajectory};
+use crate::trajectory::trajectory;
 use fmu_import::raw::Raw;
-
-const ONCE: &str = "2.0.5, 2.1 and 4.3.1; 3.0.2, 2.2.1 and 2.4.2";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "L04a", requirement: "Interleaved instances give the same results as each alone, bit for bit.", clause: ONCE, levels: Levels::MUST, run: Run::Probe(interleaved) },
-    Check { id: "L04b", requirement: "Instances in several threads give the same results as each alone, bit for bit.", clause: ONCE, levels: Levels::MUST, run: Run::Probe(threads) },
-    Check { id: "L04c", requirement: "An instance can be created in one thread, used in another and freed in a third.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(moving_between_threads) },
-    Check { id: "B05d", requirement: "Two copies of the binary, loaded with their symbols visible to each other, do not interfere.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(copies) },
-    Check { id: "B07a", requirement: "Creating and freeing instances leaks no memory.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(leaks) },
-    Check { id: "B07b", requirement: "The binary can be loaded and unloaded repeatedly and does not stay loaded.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(reloads) },
+    Check { id: "L04a", requirement: "Interleaved instances give the same results as each alone.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, tried: "Runs 8 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics.", run: Run::Probe(interleaved) },
+    Check { id: "L04b", requirement: "Instances in several threads give the same results as each alone.", clause: "2.0.5, 2.1; 3.0.2, 2.2.1", levels: Levels::SHOULD, tried: "Runs 4 instances in 4 threads and compares each with one alone.", fix: "Keep all data in the instance; protect what instances share.", run: Run::Probe(threads) },
+    Check { id: "L04c", requirement: "An instance can be created in one thread, used in another and freed in a third.", clause: "hardening", levels: Levels::HARD, tried: "Steps in a second thread, frees in a third.", fix: "Use no thread-local data.", run: Run::Probe(moving_between_threads) },
+    Check { id: "B05d", requirement: "Two copies of the binary, loaded with their symbols visible to each other, do not interfere.", clause: "hardening", levels: Levels::HARD, tried: "Loads two copies with their symbols visible to each other and compares.", fix: "Hide all symbols but those of the standard, or link with -Bsymbolic.", run: Run::Probe(copies) },
+    Check { id: "B07a", requirement: "Creating and freeing instances leaks no memory.", clause: "hardening", levels: Levels::HARD, tried: "Creates and frees 300 instances and measures memory.", fix: "Free in FreeInstance what Instantiate allocated; a sanitizer finds it.", run: Run::Probe(leaks) },
+    Check { id: "B07b", requirement: "The binary can be loaded and unloaded repeatedly and does not stay loaded.", clause: "hardening", levels: Levels::HARD, tried: "Loads and unloads 20 times.", fix: "End threads and unregister handlers when the library is unloaded.", run: Run::Probe(reloads) },
 ];
 
 fn only_once(session: &Session) -> bool {
@@ -48,9 +46,7 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
         }
     }
     for (k, (instance, rows)) in all.into_iter().enumerate() {
-        if let Some((step, i)) = difference(&alone, &rows) {
-            session.violated(format!("instance {k}: {} differs after {} steps", session.watched()[i].name, step + 1));
-        }
+        session.compare(&format!("instance {k}"), &alone, &rows);
         instance.free()?;
     }
     Ok(())
@@ -62,32 +58,18 @@ fn threads(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable(ONLY_ONCE);
     }
     let alone = trajectory(&session.stepping()?, 40)?;
+    let duplicates = (0..4).map(|k| session.duplicate(k)).collect::<Result<Vec<_>, _>>()?;
     session.record_call("4 threads, each with an instance, 40 steps");
-    let results: Vec<Result<Vec<Vec<Vec<u64>>>, String>> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..4)
-            .map(|k| {
-                let duplicate = session.duplicate(k);
-                scope.spawn(move || {
-                    duplicate
-                        .and_then(|duplicate| trajectory(&duplicate.stepping()?, 40))
-                        .map_err(|NotDetermined(why)| why)
-                })
-            })
-            .collect();
-        workers.into_iter().map(|w| w.join().unwrap_or_else(|_| Err("the thread panicked".into()))).collect()
+    let results: Vec<Result<Vec<Vec<Vec<u64>>>, NotDetermined>> = std::thread::scope(|scope| {
+        let run = |duplicate: &Session| trajectory(&duplicate.stepping()?, 40);
+        let workers: Vec<_> = duplicates.into_iter().map(|duplicate| scope.spawn(move || run(&duplicate))).collect();
+        let panicked = || Err(NotDetermined("the thread panicked".into()));
+        workers.into_iter().map(|w| w.join().unwrap_or_else(|_| panicked())).collect()
     });
     for (k, rows) in results.into_iter().enumerate() {
         match rows {
-            Err(why) => session.violated(format!("thread {k}: {why}")),
-            Ok(rows) => {
-                if let Some((step, i)) = difference(&alone, &rows) {
-                    session.violated(format!(
-                        "thread {k}: {} differs after {} steps",
-                        session.watched()[i].name,
-                        step + 1
-                    ));
-                }
-            }
+            Err(why) => session.failed(&format!("thread {k}"), why),
+            Ok(rows) => session.compare(&format!("thread {k}"), &alone, &rows),
         }
     }
     Ok(())
@@ -125,7 +107,7 @@ fn copies(session: &Session) -> Result<(), NotDetermined> {
     let mut duplicates = Vec::new();
     for k in 0..2 {
         // Below the working directory of the probe, which is temporary.
-        let target = std::env::current_dir().map_err(failed)?.join(format!("copy {k} %23 \u{e4}"));
+        let target = session.home.join(format!("copy {k} %23 \u{e4}"));
         std::fs::create_dir_all(&target).map_err(failed)?;
         for file in std::fs::read_dir(folder).map_err(failed)?.flatten() {
             if file.path().is_file() {
@@ -147,9 +129,7 @@ fn copies(session: &Session) -> Result<(), NotDetermined> {
         }
     }
     for rows in rows {
-        if let Some((step, i)) = difference(&alone, &rows) {
-            session.violated(format!("a copy: {} differs after {} steps", session.watched()[i].name, step + 1));
-        }
+        session.compare("a copy", &alone, &rows);
     }
     drop(instances);
     // Two copies stay loaded until the process ends.
@@ -199,9 +179,8 @@ fn leaks(session: &Session) -> Result<(), NotDetermined> {
 fn reloads(session: &Session) -> Result<(), NotDetermined> {
     let name = session.binary.file_name().unwrap_or_default();
     // Another path, so that the session's own copy does not keep it loaded.
-    let working_directory = std::env::current_dir().map_err(|e| NotDetermined(e.to_string()))?;
-    let target = working_directory.join("reloaded");
-    let folder = session.binary.parent().unwrap_or(&working_directory);
+    let target = session.home.join("reloaded");
+    let folder = session.binary.parent().unwrap_or(&session.home);
     std::fs::create_dir_all(&target).map_err(|e| NotDetermined(e.to_string()))?;
     for file in std::fs::read_dir(folder).into_iter().flatten().flatten().filter(|f| f.path().is_file()) {
         std::fs::copy(file.path(), target.join(file.file_name())).map_err(|e| NotDetermined(e.to_string()))?;

@@ -3,7 +3,7 @@
 use crate::check::Verdict;
 use crate::fmu_file::FmuFile;
 use crate::zip_headers::contents;
-use model_description::Element;
+use model_description::{Element, limits};
 
 /// Namespace of the attributes of a manifest.
 const NAMESPACE: &str = "http://fmi-standard.org/fmi-ls-manifest";
@@ -17,7 +17,7 @@ pub(super) fn manifests(fmu: &FmuFile) -> Verdict {
             continue;
         }
         any = true;
-        let text = contents(&fmu.bytes, entry, 16 << 20);
+        let text = contents(&fmu.source, entry, limits::XML.most);
         let text = text.and_then(|t| String::from_utf8(t).map_err(|_| "is not UTF-8".to_owned()));
         match text.and_then(|t| Element::parse(&t).map_err(|e| e.to_string())) {
             Err(cause) => findings.push(format!("{name}: {cause}")),

@@ -1,10 +1,9 @@
 //! Saved states (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
 
 use super::lifecycle_states::{State, in_state};
-use crate::check::{Check, Levels, Run};
+use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
-use crate::trajectory::difference;
 use fmu_import::Status;
 use fmu_import::raw::SavedState;
 use model_description::{CoSimulation, ModelVariable};
@@ -13,17 +12,17 @@ const STATE: &str = "2.0.5, 2.1.8; 3.0.2, 2.2.7.4";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "F01a", requirement: "A state can be read, set repeatedly and freed in every state of the life cycle; freeing it returns NULL.", clause: STATE, levels: Levels::MUST, run: Run::Probe(in_every_state) },
-    Check { id: "F01b", requirement: "Reading a state into an existing one overwrites it, and freeing NULL is ignored.", clause: STATE, levels: Levels::MUST, run: Run::Probe(overwrite) },
-    Check { id: "F02a", requirement: "A run from a restored state equals the run from the time of saving, bit for bit.", clause: STATE, levels: Levels::MUST, run: Run::Probe(rerun_from_state) },
-    Check { id: "F02b", requirement: "A restored state restores all variables: parameters, inputs and outputs.", clause: STATE, levels: Levels::MUST, run: Run::Probe(variables) },
-    Check { id: "F02c", requirement: "After an Error, a state saved earlier restores a working instance.", clause: "2.0.5, 4.2.4; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(after_error) },
-    Check { id: "F03a", requirement: "A state can be set into another instance of the FMU.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(other_instance) },
-    Check { id: "F03b", requirement: "A NULL state and a NULL pointer to a state give Error.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(null_states) },
-    Check { id: "F04a", requirement: "A serialized state can be restored in another instance: the run from it is equal bit for bit.", clause: STATE, levels: Levels::MUST, run: Run::Probe(serialized) },
-    Check { id: "F04b", requirement: "Equal states give equal bytes: no addresses and no uninitialized memory.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(equal_bytes) },
-    Check { id: "F04c", requirement: "Bytes that are not a state (empty, truncated, altered) give Error and never crash the process.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(corrupted) },
-    Check { id: "F04d", requirement: "A buffer of the wrong size gives Error, and the FMU writes nothing past it.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(wrong_size) },
+    Check { id: "F01a", requirement: "A state can be read, set repeatedly and freed in every state of the life cycle; freeing it returns NULL.", clause: STATE, levels: Levels::MUST, tried: "Gets, sets twice and frees a state in each state of the life cycle.", fix: "Allow the calls in all these states, and write NULL after freeing.", run: Run::Probe(in_every_state) },
+    Check { id: "F01b", requirement: "Reading a state into an existing one overwrites it, and freeing NULL is ignored.", clause: STATE, levels: Levels::MUST, tried: "Gets a state into an existing one, runs, restores, and compares; frees NULL.", fix: "Overwrite the memory that the pointer has; return OK for NULL.", run: Run::Probe(overwrite) },
+    Check { id: "F02a", requirement: "A run from a restored state equals the run from the time of saving.", clause: STATE, levels: Levels::MUST, tried: "Saves, runs 50 steps, restores twice, and compares.", fix: "Save everything that a step reads: solver memory, buffers, counters, file positions.", run: Run::Probe(rerun_from_state) },
+    Check { id: "F02b", requirement: "A restored state restores all variables: parameters, inputs and outputs.", clause: STATE, levels: Levels::MUST, tried: "Saves, changes inputs and parameters, steps, restores, and compares all variables.", fix: "Save parameters, inputs and outputs too.", run: Run::Probe(variables) },
+    Check { id: "F02c", requirement: "After an Error, a state saved earlier restores a working instance.", clause: "2.0.5, 2.1.3; 3.0.2, 2.2.4", levels: Levels(Some(Level::Should), Some(Level::Must)), tried: "Saves, provokes an Error, restores, runs, and compares.", fix: "Allow SetFMUState in the state Error, and save the state of the life cycle.", run: Run::Probe(after_error) },
+    Check { id: "F03a", requirement: "A state can be set into another instance of the FMU.", clause: "hardening", levels: Levels::HARD, tried: "Sets a state into another instance, runs, and compares.", fix: "Keep no pointer to the instance in the state.", run: Run::Probe(other_instance) },
+    Check { id: "F03b", requirement: "A NULL state and a NULL pointer to a state give Error.", clause: "hardening", levels: Levels::HARD, tried: "Passes NULL states and NULL pointers.", fix: "Check the pointers.", run: Run::Probe(null_states) },
+    Check { id: "F04a", requirement: "A serialized state can be restored in another instance: the run from it is the same.", clause: STATE, levels: Levels::MUST, tried: "Serializes, deserializes in another instance, runs, and compares.", fix: "Write every member by value.", run: Run::Probe(serialized) },
+    Check { id: "F04b", requirement: "Equal states give equal bytes: no addresses and no uninitialized memory.", clause: "hardening", levels: Levels::HARD, tried: "Serializes two instances after the same run and compares.", fix: "Write no addresses, and clear padding.", run: Run::Probe(equal_bytes) },
+    Check { id: "F04c", requirement: "Bytes that are not a state (empty, truncated, altered) give Error and never crash the process.", clause: "hardening", levels: Levels::HARD, tried: "Deserializes truncated, altered and random bytes, and steps if they are accepted.", fix: "Begin with a mark, a version and a length, and end with a checksum.", run: Run::Probe(corrupted) },
+    Check { id: "F04d", requirement: "A buffer of the wrong size gives Error, and the FMU writes nothing past it.", clause: "hardening", levels: Levels::HARD, tried: "Serializes into buffers that are too small.", fix: "Compare the size before writing.", run: Run::Probe(wrong_size) },
 ];
 
 fn can(session: &Session, flag: fn(&CoSimulation) -> bool) -> bool {
@@ -105,15 +104,8 @@ fn running_instance(session: &Session) -> Result<Instance<'_>, NotDetermined> {
 /// Repeats the run from a restored state; a step that fails now, but did not before, counts as a difference.
 fn rerun(instance: &Instance<'_>, first: &[Vec<Vec<u64>>], what: &str) {
     match instance.run(first.len(), instance.session.h()) {
-        Ok(second) => report_difference(instance.session, first, &second, what),
-        Err(NotDetermined(why)) => instance.session.violated(format!("{what}: {why}")),
-    }
-}
-
-fn report_difference(session: &Session, first: &[Vec<Vec<u64>>], second: &[Vec<Vec<u64>>], what: &str) {
-    if let Some((k, i)) = difference(first, second) {
-        let name = session.watched().get(i).map_or("an output", |v| v.name.as_str()).to_owned();
-        session.violated(format!("{what}: {name} differs after {} steps", k + 1));
+        Ok(second) => instance.session.compare(what, first, &second),
+        Err(why) => instance.session.failed(what, why),
     }
 }
 
@@ -146,8 +138,8 @@ fn variables(session: &Session) -> Result<(), NotDetermined> {
     }
     instance.steps(5, h)?;
     instance.restore(state, time)?;
-    for (v, (old, new)) in all.iter().zip(before.iter().zip(instance.snapshot(&all)?)) {
-        session.require(*old == new, || format!("{} differs from its value at the time of saving", v.name));
+    for (v, (old, new)) in all.iter().zip(before.into_iter().zip(instance.snapshot(&all)?)) {
+        session.compare_variables(&[*v], "compared with the time of saving", &[vec![old]], &[vec![new]]);
     }
     Ok(())
 }

@@ -84,8 +84,12 @@ fn calls<'b>(session: &'b Session) -> Vec<Call<'b>> {
         }),
     );
     if let Some(v) = scalar(session, |v| v.causality == Causality::Output) {
-        let states: &[State] =
-            if v2 { &[Initialization, Step, Terminated] } else { &[Instantiated, Initialization, Step, Terminated] };
+        // FMI 3.0 allows start values to be read in Instantiated; most outputs have none.
+        let states: &[State] = if v2 || v.start.is_none() {
+            &[Initialization, Step, Terminated]
+        } else {
+            &[Instantiated, Initialization, Step, Terminated]
+        };
         add("Get(output)", states, Box::new(move |instance| instance.get(v).map(|(s, _)| s)));
     }
     if let Some((v, values)) = scalar(session, |v| v.causality == Causality::Input && v.base.is_float())
@@ -132,9 +136,9 @@ pub(super) fn allowed(session: &Session) -> Result<(), NotDetermined> {
 fn is_ambiguous(session: &Session, call: &str, state: State) -> bool {
     let v2 = session.description.version == FmiVersion::V2;
     match (call, state) {
-        ("Get(output)" | "Set(input)", Instantiated) => v2,
+        ("Set(input)", Instantiated) => v2,
         // For debugging; and a tunable parameter may be set, which `access` looks at.
-        ("Get(output)" | "GetFMUState", Error) | ("Set(parameter)", Step) => true,
+        ("Get(output)", Instantiated | Error) | ("GetFMUState", Error) | ("Set(parameter)", Step) => true,
         _ => false,
     }
 }

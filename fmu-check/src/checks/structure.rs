@@ -14,14 +14,15 @@ const CLAUSE: &str = "2.0.5, 2.2.8; 3.0.2, 2.4.8";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "S01", requirement: "Outputs lists every variable with causality output exactly once, and nothing else.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(outputs) },
-    Check { id: "S02a", requirement: "InitialUnknowns lists exactly the outputs, calculated parameters, states and state derivatives whose initial is calculated or approx.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(initial_unknowns) },
-    Check { id: "S02b", requirement: "InitialUnknowns are sorted by index.", clause: "2.0.5, 2.2.8", levels: Levels(Some(Level::Must), None), run: Run::File(sorted) },
-    Check { id: "S03a", requirement: "Every dependency exists and is a known of its list.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(knowns) },
-    Check { id: "S03b", requirement: "dependenciesKind has one word for each dependency; initial unknowns use only dependent and constant.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(kinds) },
-    Check { id: "S04", requirement: "A variable that is not a dependency of an initial unknown does not change it.", clause: CLAUSE, levels: Levels::MUST, run: Run::Probe(dependencies_hold) },
-    Check { id: "S05", requirement: "A state derivative refers to its state with the attribute derivative.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(derivatives) },
-    Check { id: "S06", requirement: "A clocked state is a discrete variable on a clock and refers to its previous value with the attribute previous; no two share one.", clause: "3.0.2, 2.4.8 and 2.4.7", levels: Levels(None, Some(Level::Must)), run: Run::File(clocked_states) },
+    Check { id: "S01", requirement: "Outputs lists every variable with causality output exactly once, and nothing else.", clause: CLAUSE, levels: Levels::MUST, tried: "Compares Outputs with the variables.", fix: "Write the list from the variables, each output once.", run: Run::File(outputs) },
+    Check { id: "S02a", requirement: "InitialUnknowns lists exactly the outputs, calculated parameters, states and state derivatives whose initial is calculated or approx.", clause: CLAUSE, levels: Levels::MUST, tried: "Computes the list from the variables and compares.", fix: "List outputs and calculated parameters, and states and derivatives unless their initial is exact; an empty list is right only without these.", run: Run::File(initial_unknowns) },
+    Check { id: "S02b", requirement: "InitialUnknowns are sorted by index.", clause: "2.0.5, 2.2.8", levels: Levels(Some(Level::Must), None), tried: "Compares the indices of neighbors.", fix: "Sort the list by index before writing it.", run: Run::File(sorted) },
+    Check { id: "S03a", requirement: "Every dependency exists.", clause: CLAUSE, levels: Levels::MUST, tried: "Looks every dependency up among the variables.", fix: "Refer to indices from 1 in FMI 2.0, to value references in FMI 3.0.", run: Run::File(dependencies_exist) },
+    Check { id: "S03k", requirement: "Every dependency is a known of its list and is named once.", clause: CLAUSE, levels: Levels::SHOULD, tried: "Compares dependencies with the knowns that the standard lists.", fix: "Leave out fixed parameters: only inputs, states and the independent variable count, initially also variables with initial exact.", run: Run::File(knowns) },
+    Check { id: "S03b", requirement: "dependenciesKind has one word for each dependency; initial unknowns use only dependent and constant.", clause: CLAUSE, levels: Levels::MUST, tried: "Counts dependenciesKind and reads its words.", fix: "Write one word for each dependency, or leave the attribute out.", run: Run::File(kinds) },
+    Check { id: "S04", requirement: "A variable that is not a dependency of an initial unknown does not change it.", clause: CLAUSE, levels: Levels::MUST, tried: "Changes one known at a time in Initialization Mode and reads the unknowns that do not name it.", fix: "Add the known to dependencies, or leave dependencies out, which means all.", run: Run::Probe(dependencies_hold) },
+    Check { id: "S05", requirement: "A state derivative refers to its state with the attribute derivative.", clause: CLAUSE, levels: Levels::MUST, tried: "Follows the attribute derivative of every listed derivative.", fix: "Let derivative refer to the state, by index in FMI 2.0, by value reference in FMI 3.0.", run: Run::File(derivatives) },
+    Check { id: "S06", requirement: "A clocked state is a discrete variable on a clock and refers to its previous value with the attribute previous; no two share one.", clause: "3.0.2, 2.4.8", levels: Levels(None, Some(Level::Must)), tried: "Follows the attribute previous of every clocked state.", fix: "Give the state clocks and previous, and a variable of its own for the previous value.", run: Run::File(clocked_states) },
 ];
 
 fn name(d: &ModelDescription, reference: u32) -> String {
@@ -92,6 +93,19 @@ fn lists(d: &ModelDescription) -> [(&'static str, &[Unknown]); 3] {
     [("output", &d.outputs), ("derivative", &d.derivatives), ("initial unknown", &d.initial_unknowns)]
 }
 
+fn dependencies_exist(fmu: &FmuFile) -> Verdict {
+    with_description(fmu, |d| {
+        let mut findings = Vec::new();
+        for (kind, unknown) in lists(d).iter().flat_map(|(kind, unknowns)| unknowns.iter().map(move |u| (kind, u))) {
+            for reference in unknown.dependencies.iter().flatten().filter(|r| d.referenced(**r).is_none()) {
+                let (line, name) = (unknown.line, name(d, unknown.reference));
+                findings.push(format!("line {line}: {kind} {name}: the dependency {reference} does not exist"));
+            }
+        }
+        findings
+    })
+}
+
 fn knowns(fmu: &FmuFile) -> Verdict {
     with_description(fmu, |d| {
         let states: Vec<&str> = states_and_derivatives(d).iter().map(|v| v.name.as_str()).collect();
@@ -105,10 +119,7 @@ fn knowns(fmu: &FmuFile) -> Verdict {
                     if deps[..i].contains(&reference) {
                         findings.push(format!("{at}: the dependency {reference} occurs twice"));
                     }
-                    let Some(v) = d.referenced(reference) else {
-                        findings.push(format!("{at}: the dependency {reference} does not exist"));
-                        continue;
-                    };
+                    let Some(v) = d.referenced(reference) else { continue };
                     if !is_known(d, v, initial, &states) {
                         findings
                             .push(format!("{at}: {} is not a known here ({}, {})", v.name, v.causality, v.variability));
@@ -125,7 +136,10 @@ fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &[&s
     match v.causality {
         Causality::Input | Causality::Independent => true,
         _ if initial => exact || (v.base == BaseType::Clock),
-        Causality::Parameter | Causality::StructuralParameter => d.version == FmiVersion::V3,
+        // In FMI 2.0 the functions have tunable parameters as arguments, but the list of the knowns lacks them.
+        Causality::Parameter | Causality::StructuralParameter => {
+            d.version == FmiVersion::V3 || v.variability == Variability::Tunable
+        }
         _ => states.contains(&v.name.as_str()) || !v.clocks.is_empty() || v.base == BaseType::Clock,
     }
 }

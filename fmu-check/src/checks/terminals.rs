@@ -4,31 +4,28 @@ use super::schema;
 use crate::check::{Check, Levels, Run, Verdict};
 use crate::fmu_file::FmuFile;
 use crate::session::{NotDetermined, Session};
-use crate::trajectory::{difference, trajectory};
+use crate::trajectory::trajectory;
 use crate::zip_headers;
 use fmu_import::raw::Raw;
-use model_description::{Causality, Element, FmiVersion, Terminal, TerminalsAndIcons, read_terminals};
+use model_description::{Causality, Element, FmiVersion, Terminal, TerminalsAndIcons, limits, read_terminals};
 use std::path::Path;
 
-const CLAUSE: &str = "2.0.5, 2.3; 3.0.2, 2.4.9";
+const TERMINALS: &str = "2.0.5, 2.3.2; 3.0.2, 2.4.9.2";
 const FOLDER: &str = "terminalsAndIcons";
 const FILE: &str = "terminalsAndIcons/terminalsAndIcons.xml";
 
-/// Maximum size of the XML in bytes.
-const LIMIT: u64 = 64 << 20;
-
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "I01", requirement: "terminalsAndIcons.xml has the elements and version of the standard and names variables that exist.", clause: CLAUSE, levels: Levels::MUST, run: Run::File(elements) },
-    Check { id: "I01n", requirement: "Terminal names are present and unique, and so are member names wherever members are matched by name.", clause: "3.0.2, 2.4.9.2", levels: Levels::MUST, run: Run::File(names) },
-    Check { id: "I01k", requirement: "Members are inputs, outputs or parameters; inflows and outflows are scalar; vendor-specific matching rules have reverse domain names.", clause: "3.0.2, 2.4.9.2", levels: Levels::MUST, run: Run::File(kinds) },
-    Check { id: "I01p", requirement: "Pictures are available as PNG, and the corners of the coordinate system are in order.", clause: "3.0.2, 2.4.9.1 and 2.4.9.2.5", levels: Levels::MUST, run: Run::File(pictures) },
-    Check { id: "I02", requirement: "Without terminalsAndIcons/ and extra/ the FMU gives the same results, bit for bit.", clause: "3.0.2, 2.4.9 and 2.5.1.6", levels: Levels::MUST, run: Run::Probe(stripped) },
+    Check { id: "I01", requirement: "terminalsAndIcons.xml has the elements and version of the standard and names variables that exist.", clause: "2.0.5, 2.3.2; 3.0.2, 2.4.9", levels: Levels::MUST, tried: "Compares the file with rules that have the content of the schema, and looks variable names up.", fix: "Correct the line that is named; fmiVersion is 3.0 in both standards.", run: Run::File(elements) },
+    Check { id: "I01n", requirement: "Terminal names are present and unique, and so are member names wherever members are matched by name.", clause: TERMINALS, levels: Levels::MUST, tried: "Compares the names of terminals and members.", fix: "Give each terminal and, for plug and bus, each member a name of its own.", run: Run::File(names) },
+    Check { id: "I01k", requirement: "Members are inputs, outputs or parameters; inflows and outflows are scalar; vendor-specific matching rules have reverse domain names.", clause: TERMINALS, levels: Levels::MUST, tried: "Looks up what the members are, and the matching rules.", fix: "Use inputs, outputs and parameters as members, and reverse domain names for rules of your own.", run: Run::File(kinds) },
+    Check { id: "I01p", requirement: "Pictures are available as PNG, and the corners of the coordinate system are in order.", clause: "2.0.5, 2.3.2; 3.0.2, 2.4.9.1", levels: Levels::MUST, tried: "Looks for the PNG of every icon and reads the coordinate system.", fix: "Pack the PNG of every iconBaseName; x1 < x2 and y1 < y2.", run: Run::File(pictures) },
+    Check { id: "I02", requirement: "Without terminalsAndIcons/ and extra/ the FMU gives the same results.", clause: "2.0.5, 2.3.1; 3.0.2, 2.5.1.6", levels: Levels::MUST, tried: "Runs 20 steps from a copy of the folder without them, and compares.", fix: "Read at run time from resources/ only.", run: Run::Probe(stripped) },
 ];
 
 /// The file's text; `None` where there is none.
 fn text(fmu: &FmuFile) -> Option<Result<String, String>> {
-    let bytes = zip_headers::contents(&fmu.bytes, fmu.zip.find(FILE)?, LIMIT);
+    let bytes = zip_headers::contents(&fmu.source, fmu.zip.find(FILE)?, limits::XML.most);
     Some(bytes.and_then(|bytes| String::from_utf8(bytes).map_err(|_| "is not UTF-8".to_owned())))
 }
 
@@ -169,7 +166,7 @@ fn pictures(fmu: &FmuFile) -> Verdict {
     let png = |base: &str| -> Option<String> {
         let path = format!("{FOLDER}/{base}.png");
         let Some(entry) = fmu.zip.find(&path) else { return Some(format!("{path} is missing")) };
-        let bytes = zip_headers::contents(&fmu.bytes, entry, LIMIT).unwrap_or_default();
+        let bytes = zip_headers::contents(&fmu.source, entry, limits::XML.most).unwrap_or_default();
         (!bytes.starts_with(SIGNATURE)).then(|| format!("{path} is not a PNG"))
     };
     read(fmu, |file| {
@@ -199,18 +196,14 @@ fn stripped(session: &Session) -> Result<(), NotDetermined> {
     let whole = trajectory(&session.stepping()?, 20)?;
     let failed = |e: std::io::Error| NotDetermined(e.to_string());
     // Below the working directory of the probe, which is temporary.
-    let target = std::env::current_dir().map_err(failed)?.join("stripped");
+    let target = session.home.join("stripped");
     copy(&session.dir, &target, &EXTRAS).map_err(failed)?;
     let inside = session.binary.strip_prefix(&session.dir).map_err(|e| NotDetermined(e.to_string()))?;
     let raw = Raw::open(&target.join(inside), session.description.version).map_err(NotDetermined)?;
     let duplicate = session.duplicate_at(&target, raw, 30)?;
     match duplicate.stepping().and_then(|instance| trajectory(&instance, 20)) {
-        Err(NotDetermined(why)) => session.violated(format!("without {}: {why}", EXTRAS.join("/ and "))),
-        Ok(rows) => {
-            if let Some((step, i)) = difference(&whole, &rows) {
-                session.violated(format!("{} differs after {} steps", session.watched()[i].name, step + 1));
-            }
-        }
+        Err(why) => session.failed(&format!("without {}", EXTRAS.join("/ and ")), why),
+        Ok(rows) => session.compare("without them", &whole, &rows),
     }
     Ok(())
 }

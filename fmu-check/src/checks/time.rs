@@ -3,8 +3,7 @@
 use super::derivatives::{input_derivatives, output_derivatives, slopes};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session};
-use crate::trajectory::difference;
+use crate::session::{ENDED, NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::StepStatus;
 use model_description::{BaseType, Causality, CoSimulation};
@@ -13,23 +12,23 @@ const STEP: &str = "2.0.5, 4.2.2; 3.0.2, 4.2.1";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "T01a", requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6.", clause: STEP, levels: Levels::SHOULD, run: Run::Probe(start_times) },
-    Check { id: "T01b", requirement: "A communication point other than the end of the last step gives Error.", clause: STEP, levels: Levels::HARD, run: Run::Probe(gap) },
-    Check { id: "T01c", requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps.", clause: STEP, levels: Levels::MUST, run: Run::Probe(accumulated) },
-    Check { id: "T02a", requirement: "A step size of 0 or less gives Error.", clause: STEP, levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(non_positive_step) },
-    Check { id: "T02b", requirement: "A step size or time that is NaN or infinite gives Error and returns promptly.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(non_finite_step) },
-    Check { id: "T03", requirement: "Halving the communication step gives approximately the same results with inputs held.", clause: STEP, levels: Levels::HARD, run: Run::Probe(halves) },
-    Check { id: "T04", requirement: "With canHandleVariableCommunicationStepSize, steps of any size succeed.", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::MUST, run: Run::Probe(variable) },
-    Check { id: "T05", requirement: "noSetFMUStatePriorToCurrentPoint changes no result, and the state at the current point can still be saved and set.", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(no_set_state_before) },
-    Check { id: "T06a", requirement: "After OK, lastSuccessfulTime is t + h unless the step returned early, which must be allowed; Booleans are 0 or 1.", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results) },
-    Check { id: "T06b", requirement: "The independent variable equals the time of the last communication point.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent) },
-    Check { id: "T06c", requirement: "NULL pointers for results do no harm.", clause: "3.0.2, 2.2.1", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(null_results) },
-    Check { id: "T07", requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), run: Run::Probe(statuses) },
-    Check { id: "T09", requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::MUST, run: Run::Probe(output_derivatives) },
-    Check { id: "T09s", requirement: "First derivatives of outputs match the slopes, to 10 %; orders above the maximum give Error.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::SHOULD, run: Run::Probe(slopes) },
-    Check { id: "T11", requirement: "With canInterpolateInputs, first derivatives of continuous inputs can be set.", clause: "2.0.5, 4.2.1", levels: Levels(Some(Level::Must), None), run: Run::Probe(input_derivatives) },
-    Check { id: "T10", requirement: "Two consecutive runs with the same inputs are equal bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Probe(determinism) },
-    Check { id: "T10p", requirement: "Two processes with different addresses give the same results bit for bit.", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes) },
+    Check { id: "T01a", requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6.", clause: STEP, levels: Levels::SHOULD, tried: "Runs 20 steps from each start time.", fix: "Use startTime instead of 0.", run: Run::Probe(start_times) },
+    Check { id: "T01b", requirement: "A communication point other than the end of the last step gives Error.", clause: STEP, levels: Levels::HARD, tried: "Makes a step that does not begin where the last ended.", fix: "Compare currentCommunicationPoint with the time of the FMU, with room for rounding.", run: Run::Probe(gap) },
+    Check { id: "T01c", requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps.", clause: STEP, levels: Levels::MUST, tried: "Makes up to 100000 steps within the default experiment, with t = t + h.", fix: "Compare times with a tolerance relative to the step, and count steps in integers.", run: Run::Probe(accumulated) },
+    Check { id: "T02a", requirement: "A step size of 0 or less gives Error.", clause: STEP, levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Makes steps of 0 and of -h.", fix: "Return Error unless the step is above 0.", run: Run::Probe(non_positive_step) },
+    Check { id: "T02b", requirement: "A step size or time that is NaN or infinite gives Error and returns promptly.", clause: "hardening", levels: Levels::HARD, tried: "Makes steps of NaN, infinity and 1e300, and from times of NaN and infinity.", fix: "Write the condition so that NaN fails it: !(h > 0 && h < limit).", run: Run::Probe(non_finite_step) },
+    Check { id: "T03", requirement: "Halving the communication step gives approximately the same results with inputs held.", clause: STEP, levels: Levels::HARD, tried: "Runs 40 steps whole and in halves, and compares to 10 %.", fix: "Integrate with internal steps; note an output that is a mean.", run: Run::Probe(halves) },
+    Check { id: "T04", requirement: "With canHandleVariableCommunicationStepSize, steps of 0.05 to 3 times the usual size succeed.", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::SHOULD, tried: "Makes 200 steps of random sizes.", fix: "Divide the step into internal ones, the last of them shorter.", run: Run::Probe(variable) },
+    Check { id: "T05", requirement: "noSetFMUStatePriorToCurrentPoint changes no result, and the state at the current point can still be saved and set.", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1", levels: Levels::MUST, tried: "Runs with and without the flag, saves and restores, and compares.", fix: "Treat the flag as a hint for result buffers only.", run: Run::Probe(no_set_state_before) },
+    Check { id: "T06a", requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has not returned early without permission (should: lastSuccessfulTime is less than a step from t + h).", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), tried: "Makes 20 steps and looks at the four results.", fix: "Write all four results before returning OK.", run: Run::Probe(step_results) },
+    Check { id: "T06b", requirement: "The independent variable equals the time of the last communication point.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, tried: "Reads the independent variable after steps.", fix: "Assign t + h to it at the end of a step.", run: Run::Probe(independent) },
+    Check { id: "T06c", requirement: "NULL pointers for results do no harm.", clause: "3.0.2, 2.2.1", levels: Levels(None, Some(Level::Hard)), tried: "Passes NULL for each result.", fix: "Check the pointers before writing.", run: Run::Probe(null_results) },
+    Check { id: "T07", requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), tried: "Asks each function for each kind of status.", fix: "Return Discard for what is not available.", run: Run::Probe(statuses) },
+    Check { id: "T09", requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::MUST, tried: "Reads first derivatives of all continuous outputs.", fix: "Implement the function, or set maxOutputDerivativeOrder to 0.", run: Run::Probe(output_derivatives) },
+    Check { id: "T09s", requirement: "First derivatives of outputs match the slopes, to 10 %; orders above the maximum give Error.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::SHOULD, tried: "Compares derivatives with slopes over short steps, and asks for other orders.", fix: "Return the derivative at the end of the step, and Error for orders beyond the maximum.", run: Run::Probe(slopes) },
+    Check { id: "T11", requirement: "With canInterpolateInputs, first derivatives of continuous inputs can be set.", clause: "2.0.5, 4.2.1", levels: Levels(Some(Level::Must), None), tried: "Sets a derivative of an input of order 1.", fix: "Implement the function, or set canInterpolateInputs to false.", run: Run::Probe(input_derivatives) },
+    Check { id: "T10", requirement: "Two consecutive runs with the same inputs are equal bit for bit.", clause: "hardening", levels: Levels::HARD, tried: "Runs twice in one process and compares bits.", fix: "Initialize all memory.", run: Run::Probe(determinism) },
+    Check { id: "T10p", requirement: "Two processes with different addresses give the same results bit for bit.", clause: "hardening", levels: Levels::HARD, tried: "Runs in two processes and compares hashes.", fix: "Let nothing depend on addresses, time or the process.", run: Run::Twice(two_processes) },
 ];
 
 fn start_times(session: &Session) -> Result<(), NotDetermined> {
@@ -38,8 +37,8 @@ fn start_times(session: &Session) -> Result<(), NotDetermined> {
             let instance = session.fresh()?;
             instance.experiment(start, None);
             let life = instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(20, session.h()));
-            if let Err(NotDetermined(why)) = life {
-                session.violated(format!("startTime={start}: {why}"));
+            if let Err(why) = life {
+                session.failed(&format!("startTime={start}"), why);
             }
             Ok(())
         });
@@ -75,7 +74,8 @@ fn accumulated(session: &Session) -> Result<(), NotDetermined> {
                 session.note(format!("the FMU ended the simulation after {k} steps"));
                 return Ok(());
             }
-            if !status.is_ok() && inside {
+            // A part of a step may be all that the model can do (Discard).
+            if !status.is_ok() && status != Status::DISCARD && inside {
                 session.violated(format!("step {k}, DoStep(t={:?}, h={h:?}), returned {status}", instance.time.get()));
                 return Ok(());
             }
@@ -176,7 +176,9 @@ fn variable(session: &Session) -> Result<(), NotDetermined> {
             break;
         }
         if !status.is_ok() {
-            session.violated(format!("DoStep(t={t:?}, h={part:?}) returned {status}"));
+            if status != Status::DISCARD {
+                session.violated(format!("DoStep(t={t:?}, h={part:?}) returned {status}"));
+            }
             break;
         }
     }
@@ -203,11 +205,17 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
             .require([step_results.event, step_results.terminate, step_results.early].iter().all(|b| *b <= 1), || {
                 format!("DoStep(t={t}, h={h}) gave {step_results:?}: a Boolean is not 0 or 1, or was not written")
             });
-        session.require(step_results.early == 0, || {
+        session.require(step_results.early != 1, || {
             format!("DoStep(t={t}, h={h}) returned early although that was not allowed")
         });
-        let is_close = (step_results.last - (t + h)).abs() <= 1e-9 * h + 4.0 * f64::EPSILON * t.abs();
-        session.require(is_close, || format!("DoStep(t={t}, h={h}) gave lastSuccessfulTime={}", step_results.last));
+        // A step may end a little elsewhere: a fixed-step integrator cannot reach every time.
+        let last = step_results.last;
+        let text = format!("DoStep(t={t}, h={h}) gave lastSuccessfulTime={last}");
+        if !last.is_finite() {
+            session.violated(text);
+        } else if step_results.early == 0 && step_results.terminate == 0 && (last - (t + h)).abs() >= h {
+            session.lesser(Level::Should, text);
+        }
         if step_results.terminate == 1 {
             break;
         }
@@ -291,9 +299,7 @@ fn determinism(session: &Session) -> Result<(), NotDetermined> {
             .collect::<Result<Vec<_>, _>>()
     };
     let (first, second) = (run()?, run()?);
-    if let Some((k, i)) = difference(&first, &second) {
-        session.violated(format!("{} differs after {} steps", session.watched()[i].name, k + 1));
-    }
+    session.compare("the second run", &first, &second);
     Ok(())
 }
 
@@ -319,10 +325,10 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
         for k in from..from + 10 {
             instance.change_inputs(k)?;
             let (t, h) = (instance.time.get(), session.h());
-            let status = instance
-                .call(&format!("DoStep(t={t}, h={h}, noSetFMUStatePriorToCurrentPoint={no_prior})"), |raw| {
-                    raw.do_step(instance.handle, t, h, no_prior, [true; 4]).map(|(s, _)| s)
-                })?;
+            let status = instance.step_with(t, h, no_prior)?;
+            if instance.over.get() {
+                return Err(NotDetermined(format!("{ENDED} at {t}")));
+            }
             session.require(status.is_ok(), || {
                 format!("with noSetFMUStatePriorToCurrentPoint={no_prior} DoStep(t={t}) returned {status}")
             });
@@ -336,13 +342,7 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
     }
     let (unrestricted, restricted) = (session.stepping()?, session.stepping()?);
     let (a, b) = (run(&unrestricted, 0, false)?, run(&restricted, 0, true)?);
-    if let Some((step, i)) = difference(&a, &b) {
-        session.violated(format!(
-            "{} differs after {} steps with noSetFMUStatePriorToCurrentPoint",
-            session.watched()[i].name,
-            step + 1
-        ));
-    }
+    session.compare("with noSetFMUStatePriorToCurrentPoint", &a, &b);
     if !saves {
         session.note("the FMU does not save states");
         return Ok(());
@@ -354,8 +354,6 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
             .violated(format!("restoring the current point after a step with noSetFMUStatePriorToCurrentPoint: {why}"));
         return Ok(());
     }
-    if let Some((step, i)) = difference(&first, &run(&restricted, 10, true)?) {
-        session.violated(format!("{} differs {} steps after the state was set", session.watched()[i].name, step + 1));
-    }
+    session.compare("after the state was set", &first, &run(&restricted, 10, true)?);
     Ok(())
 }

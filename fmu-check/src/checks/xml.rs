@@ -7,16 +7,17 @@ use model_description::{Element, FmiVersion, Interface, ModelDescription};
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "X01a", requirement: "modelDescription.xml is well-formed XML in UTF-8 and declares UTF-8 in its first line.", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(well_formed) },
-    Check { id: "X01b", requirement: "Elements and attributes are those of the standard, in its order and with values of its types; capability flags are spelled as in the standard.", clause: "2.0.5, 2.2 and 4.3.1; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(valid) },
-    Check { id: "X02a", requirement: "fmiVersion is 2.0 or 3.0, without a patch release.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::MUST, run: Run::File(version) },
-    Check { id: "X05", requirement: "generationDateAndTime has the form YYYY-MM-DDThh:mm:ssZ.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::SHOULD, run: Run::File(date) },
-    Check { id: "X06", requirement: "The attributes description, author, version, copyright, license and generationTool are given.", clause: "fmi-guides, 3", levels: Levels::SHOULD, run: Run::File(metadata) },
-    Check { id: "X08", requirement: "Every capability flag that requires another flag is accompanied by it.", clause: "2.0.5, 4.3.1; 3.0.2, 2.4.2 and 4.4", levels: Levels::MUST, run: Run::File(flags) },
-    Check { id: "X10", requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, and the tolerance is not negative.", clause: "2.0.5, 2.2.5; 3.0.2, 2.4.6", levels: Levels::SHOULD, run: Run::File(experiment) },
-    Check { id: "X11", requirement: "An FMU without model exchange does not use the attribute reinit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(reinit) },
-    Check { id: "X12", requirement: "Numbers are finite and spelled as xs:double.", clause: "2.0.5, 2.2", levels: Levels(Some(Level::Must), None), run: Run::File(numbers) },
-    Check { id: "G-L1a", requirement: "Log categories have unique names.", clause: "2.0.5, 2.2.4; 3.0.2, 2.4.5", levels: Levels::MUST, run: Run::File(categories) },
+    Check { id: "X01a", requirement: "modelDescription.xml is well-formed XML in UTF-8 and declares UTF-8 in its first line.", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, tried: "Parses the file and reads its first line.", fix: "Begin with <?xml version=\"1.0\" encoding=\"UTF-8\"?> and write UTF-8.", run: Run::File(well_formed) },
+    Check { id: "X01m", requirement: "modelDescription.xml does not start with a byte order mark, which some importers cannot read.", clause: "hardening", levels: Levels::HARD, tried: "Reads the first three bytes.", fix: "Write UTF-8 without a mark; in .NET, new UTF8Encoding(false).", run: Run::File(no_mark) },
+    Check { id: "X01b", requirement: "Elements and attributes are those of the standard, in its order and with values of its types; capability flags are spelled as in the standard.", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, tried: "Compares elements, attributes and values with rules that have the content of the official schema.", fix: "Validate the file against the XSD of the standard while you develop, and correct the line that is named.", run: Run::File(valid) },
+    Check { id: "X02a", requirement: "fmiVersion is 2.0 or 3.0, without a patch release.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::MUST, tried: "Reads the attribute fmiVersion.", fix: "Write 2.0 or 3.0.", run: Run::File(version) },
+    Check { id: "X05", requirement: "generationDateAndTime has the form YYYY-MM-DDThh:mm:ssZ.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::SHOULD, tried: "Reads the attribute generationDateAndTime.", fix: "Write UTC with a Z, for example 2026-01-02T03:04:05Z, without fractions and offset.", run: Run::File(date) },
+    Check { id: "X06", requirement: "The attributes description, author, version, copyright, license and generationTool are given.", clause: "fmi-guides, 3", levels: Levels::SHOULD, tried: "Reads the attributes of the root element.", fix: "Let users of the exporter give these texts, and write them.", run: Run::File(metadata) },
+    Check { id: "X08", requirement: "Every capability flag that requires another flag is accompanied by it.", clause: "2.0.5, 4.3.1; 3.0.2, 2.4.2", levels: Levels::MUST, tried: "Reads the capability flags of the interfaces.", fix: "Set the flag that is required too, or drop the one that requires it.", run: Run::File(flags) },
+    Check { id: "X10", requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, and the tolerance is not negative.", clause: "2.0.5, 2.2.5; 3.0.2, 2.4.6", levels: Levels::SHOULD, tried: "Reads DefaultExperiment.", fix: "Correct the numbers, or leave out those that are not known.", run: Run::File(experiment) },
+    Check { id: "X11", requirement: "An FMU without model exchange does not use the attribute reinit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), tried: "Looks for the attribute reinit where the FMU has no ModelExchange.", fix: "Write reinit only for continuous states of Model Exchange.", run: Run::File(reinit) },
+    Check { id: "X12", requirement: "Numbers are finite and spelled as xs:double.", clause: "2.0.5, 2.2", levels: Levels(Some(Level::Must), None), tried: "Reads all numbers of the file.", fix: "Leave out a limit that does not exist instead of writing INF or NaN.", run: Run::File(numbers) },
+    Check { id: "G-L1a", requirement: "Log categories have unique names.", clause: "2.0.5, 2.2.4; 3.0.2, 2.4.5", levels: Levels::MUST, tried: "Reads LogCategories.", fix: "List each category once.", run: Run::File(categories) },
 ];
 
 /// A check of the elements.
@@ -47,9 +48,6 @@ pub(super) fn all(root: &Element) -> Vec<&Element> {
 
 fn well_formed(fmu: &FmuFile) -> Verdict {
     let mut findings: Vec<_> = fmu.tree.as_ref().err().cloned().into_iter().collect();
-    if fmu.xml.starts_with(b"\xef\xbb\xbf") {
-        findings.push("line 1: starts with a byte order mark".into());
-    }
     let text = String::from_utf8_lossy(&fmu.xml);
     let first = text.lines().next().unwrap_or_default().trim_start_matches('\u{feff}');
     let declaration = first.split("?>").next().unwrap_or_default();
@@ -59,6 +57,11 @@ fn well_formed(fmu: &FmuFile) -> Verdict {
         findings.push(format!("line 1: {declaration}?> does not declare encoding=\"UTF-8\""));
     }
     Verdict::of(findings)
+}
+
+fn no_mark(fmu: &FmuFile) -> Verdict {
+    let mark = fmu.xml.starts_with(b"\xef\xbb\xbf");
+    Verdict::of(mark.then(|| "line 1: starts with a byte order mark".into()).into_iter().collect())
 }
 
 fn valid(fmu: &FmuFile) -> Verdict {
@@ -116,9 +119,9 @@ fn flags(fmu: &FmuFile) -> Verdict {
         let Some(i) = &description.co_simulation else { return findings };
         if description.version == FmiVersion::V3 {
             let early = !i.flag("canReturnEarlyAfterIntermediateUpdate") || i.flag("providesIntermediateUpdate");
-            implies(i, early, "canReturnEarlyAfterIntermediateUpdate without providesIntermediateUpdate");
+            implies(i, early, "canReturnEarlyAfterIntermediateUpdate without providesIntermediateUpdate (4.4)");
             let clocked = description.variables.iter().any(|v| v.base == model_description::BaseType::Clock);
-            implies(i, !clocked || i.has_event_mode(), "there are clocks, but hasEventMode is false");
+            implies(i, !clocked || i.has_event_mode(), "there are clocks, but hasEventMode is false (4.4)");
         }
         findings
     })

@@ -2,9 +2,12 @@
 
 pub(crate) mod fmi2;
 pub(crate) mod fmi3;
+pub mod journal;
 pub(crate) mod library;
 pub(crate) mod log;
 pub mod raw;
+#[cfg(unix)]
+pub(crate) mod sandbox;
 pub(crate) mod shared;
 mod signatures;
 

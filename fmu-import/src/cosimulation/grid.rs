@@ -1,5 +1,7 @@
 //! Communication points, counted in integers.
 
+use model_description::limits::STEPS;
+
 /// When to start and stop, and how to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -32,8 +34,17 @@ impl Settings {
         let count = (stop - start) / step;
         // A millionth of a step is rounding, more is a shorter last step.
         let whole = if (count - count.round()).abs() < 1e-6 * count.max(1.0) { count.round() } else { count.ceil() };
-        if !(1.0..f64::from(u32::MAX)).contains(&whole) {
-            return Err(format!("{whole} steps are too many"));
+        if whole < 1.0 {
+            let duration = stop - start;
+            return Err(format!(
+                "the step {step:e} s is longer than the simulation of {duration} s; give a shorter one"
+            ));
+        }
+        if whole > f64::from(u32::try_from(STEPS.most).unwrap_or(u32::MAX)) {
+            return Err(format!(
+                "a step of {step} s from {start} s to {stop} s {}",
+                STEPS.exceeded(format!("{whole:e}"))
+            ));
         }
         #[expect(
             clippy::cast_possible_truncation,
@@ -102,5 +113,8 @@ mod tests {
         {
             assert!(grid(start, stop, step).is_err(), "{start} {stop} {step}");
         }
+        let told = |step| grid(0.0, 1.0, step).unwrap_err();
+        assert_eq!(told(1e308), "the step 1e308 s is longer than the simulation of 1 s; give a shorter one");
+        assert!(told(1e-10).ends_with("takes 1e10 steps; the limit is 2147483648"), "{}", told(1e-10));
     }
 }

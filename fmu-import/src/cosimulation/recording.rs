@@ -59,7 +59,8 @@ impl Recording {
 
     /// The last values as a table, with the display unit where there is one.
     pub fn last_values(&self) -> String {
-        let width = self.columns.iter().map(|c| c.name.len()).max().unwrap_or(0);
+        // Longer names of other tools break their own row alone.
+        let width = self.columns.iter().map(|c| c.name.len()).max().unwrap_or(0).min(200);
         let row = |c: &Column| {
             let x = c.values.last().copied().unwrap_or(f64::NAN);
             let shown = c.display.as_ref().map(|d| format!("  = {} {}", six(d.show(x)), d.name));

@@ -2,6 +2,7 @@
 
 use super::Instance;
 use crate::Error;
+use crate::abi::journal::Call;
 use crate::abi::shared::Vector;
 use crate::standard::Sensitivity;
 
@@ -49,7 +50,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn advance(&mut self, t: f64, h: f64) -> Result<Stepped, Error> {
-        self.call(|s| s.do_step(t, h))
+        self.call(Call::Step, |s| s.do_step(t, h))
     }
 
     /// Enters event mode: from continuous-time mode, or from step mode of an instance that uses event mode.
@@ -57,7 +58,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_event_mode(&mut self) -> Result<(), Error> {
-        self.call(|s| s.shared().enter_event_mode())
+        self.call(Call::Events, |s| s.shared().enter_event_mode())
     }
 
     /// Updates the discrete states once, in event mode (`fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`).
@@ -65,7 +66,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn update_discrete_states(&mut self) -> Result<Update, Error> {
-        self.call(|s| s.update_discrete_states())
+        self.call(Call::Events, |s| s.update_discrete_states())
     }
 
     /// Leaves event mode for continuous-time mode (Model Exchange).
@@ -73,7 +74,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_continuous_time_mode(&mut self) -> Result<(), Error> {
-        self.call(|s| s.shared().enter_continuous_time_mode())
+        self.call(Call::Events, |s| s.shared().enter_continuous_time_mode())
     }
 
     /// Leaves event mode for step mode (Co-Simulation of FMI 3.0).
@@ -81,7 +82,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_step_mode(&mut self) -> Result<(), Error> {
-        self.call(|s| s.shared().enter_step_mode())
+        self.call(Call::Events, |s| s.shared().enter_step_mode())
     }
 
     /// Numbers of continuous states and of event indicators. FMI 3.0 asks the FMU, FMI 2.0 the description.
@@ -89,7 +90,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn state_and_indicator_counts(&mut self) -> Result<(usize, usize), Error> {
-        let counts = self.call(|s| s.counts())?;
+        let counts = self.call(Call::Evaluation, |s| s.counts())?;
         let indicators = || self.description.number_of_event_indicators.unwrap_or(0) as usize;
         Ok(counts.unwrap_or_else(|| (self.description.derivatives.len(), indicators())))
     }
@@ -100,7 +101,7 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn set_time(&mut self, t: f64) -> Result<(), Error> {
-        self.call(|s| s.shared().set_time(t))
+        self.call(Call::Evaluation, |s| s.shared().set_time(t))
     }
 
     /// Sets all continuous states.
@@ -109,7 +110,7 @@ impl Instance {
     /// The FMU refuses; a state that it does not take in a trial step is discarded: see [`Error::is_discard`].
     #[inline]
     pub fn set_continuous_states(&mut self, x: &[f64]) -> Result<(), Error> {
-        if x.is_empty() { Ok(()) } else { self.call(|s| s.shared().set_states(x)) }
+        if x.is_empty() { Ok(()) } else { self.call(Call::Evaluation, |s| s.shared().set_states(x)) }
     }
 
     /// Reads all continuous states.
@@ -150,7 +151,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn completed_integrator_step(&mut self) -> Result<CompletedStep, Error> {
-        self.call(|s| s.completed_integrator_step())
+        self.call(Call::Events, |s| s.completed_integrator_step())
     }
 
     /// Partial derivatives of the unknowns in the direction of the seed of the knowns, both by value reference.
@@ -164,7 +165,7 @@ impl Instance {
         seed: &[f64],
         sensitivity: &mut [f64],
     ) -> Result<(), Error> {
-        self.call(|s| s.directional_derivative(Sensitivity { unknowns, knowns, seed }, sensitivity))
+        self.call(Call::Evaluation, |s| s.directional_derivative(Sensitivity { unknowns, knowns, seed }, sensitivity))
     }
 
     /// The seed of the unknowns times the partial derivatives: one number for each of the knowns (FMI 3.0 only).
@@ -178,7 +179,7 @@ impl Instance {
         seed: &[f64],
         sensitivity: &mut [f64],
     ) -> Result<(), Error> {
-        self.call(|s| s.adjoint_derivative(Sensitivity { unknowns, knowns, seed }, sensitivity))
+        self.call(Call::Evaluation, |s| s.adjoint_derivative(Sensitivity { unknowns, knowns, seed }, sensitivity))
     }
 
     /// Derivatives of outputs with respect to time at the end of the last step (Co-Simulation).
@@ -186,7 +187,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses or has none, or the arrays have different lengths.
     pub fn output_derivatives(&mut self, references: &[u32], orders: &[i32], values: &mut [f64]) -> Result<(), Error> {
-        self.call(|s| s.output_derivatives(references, orders, values))
+        self.call(Call::Evaluation, |s| s.output_derivatives(references, orders, values))
     }
 
     /// Derivatives of inputs with respect to time at the beginning of the next step (Co-Simulation of FMI 2.0 only).
@@ -194,12 +195,12 @@ impl Instance {
     /// # Errors
     /// The FMU refuses or takes none, or the arrays have different lengths.
     pub fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Result<(), Error> {
-        self.call(|s| s.set_input_derivatives(references, orders, values))
+        self.call(Call::Evaluation, |s| s.set_input_derivatives(references, orders, values))
     }
 
     /// An FMU without states or indicators is not asked for them.
     #[inline]
     fn vector(&mut self, which: Vector, values: &mut [f64]) -> Result<(), Error> {
-        if values.is_empty() { Ok(()) } else { self.call(|s| s.shared().get_vector(which, values)) }
+        if values.is_empty() { Ok(()) } else { self.call(Call::Evaluation, |s| s.shared().get_vector(which, values)) }
     }
 }

@@ -3,17 +3,14 @@
 use super::ssv::{self, Parameter};
 use super::structure::{Binding, Connection, Connector, End, Structure, Values};
 use super::{DESCRIPTION, values};
-use crate::Fmu;
 use crate::cosimulation::{Method, Schedule, Settings, System};
+use crate::{Fmu, archive};
 use anyhow::{Context, Result, anyhow, bail};
-use model_description::Experiment;
+use model_description::{Experiment, decode, limits};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use zip::ZipArchive;
-
-/// Most bytes of one file of the archive.
-const LIMIT: u64 = 2 << 30;
 
 /// A system from files, ready to run.
 #[derive(Default)]
@@ -77,8 +74,9 @@ impl Package<'_> {
     fn bytes(&mut self, name: &str) -> Result<Vec<u8>> {
         let of = || self.path.display().to_string();
         let mut bytes = Vec::new();
+        // What the headers claim is within the limits: see `check_entries`.
         match self.zip.by_name(name) {
-            Ok(entry) => entry.take(LIMIT).read_to_end(&mut bytes).with_context(of)?,
+            Ok(entry) => entry.take(limits::UNPACKED.most).read_to_end(&mut bytes).with_context(of)?,
             Err(zip::result::ZipError::FileNotFound) => bail!("{}: has no {name}", of()),
             Err(e) => bail!("{}: {name}: {e}", of()),
         };
@@ -86,7 +84,11 @@ impl Package<'_> {
     }
 
     fn text(&mut self, name: &str) -> Result<String> {
-        String::from_utf8(self.bytes(name)?).map_err(|_| anyhow!("{}: {name} is not UTF-8", self.path.display()))
+        let of = |cause: String| anyhow!("{}: {cause}", self.path.display());
+        let bytes = archive::document(&mut self.zip, name).map_err(of)?;
+        let bytes = bytes.ok_or_else(|| of(format!("has no {name}")))?;
+        let text = decode(&bytes).map_err(|e| of(format!("{name}: {e}")))?;
+        Ok(text.to_owned())
     }
 }
 
@@ -150,7 +152,10 @@ impl Loaded {
     fn open_with(path: &Path, logging: bool, method: impl FnOnce(&[(String, Fmu)]) -> Method) -> Result<Self> {
         let of = || path.display().to_string();
         let file = File::open(path).with_context(of)?;
-        let zip = ZipArchive::new(file).map_err(|e| anyhow!("{}: not a ZIP archive, or cut short: {e}", of()))?;
+        let within = |cause: String| anyhow!("{}: {cause}", of());
+        limits::ARCHIVE.check(file.metadata().with_context(of)?.len()).map_err(within)?;
+        let mut zip = ZipArchive::new(file).map_err(|e| anyhow!("{}: not a ZIP archive, or cut short: {e}", of()))?;
+        archive::check_entries(&mut zip).map_err(within)?;
         let mut package = Package { path, zip };
         let text = package.text(DESCRIPTION)?;
         let in_description = |cause: String| anyhow!("{}: {DESCRIPTION}: {cause}", of());

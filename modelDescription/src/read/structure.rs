@@ -3,6 +3,7 @@
 use super::attributes::{integers, owned, required_integer};
 use crate::description::Unknown;
 use crate::error::Error;
+use crate::limits;
 use crate::version::FmiVersion;
 use crate::xml::Element;
 
@@ -13,13 +14,15 @@ pub(super) fn unknowns(
     list: &str,
     single: &str,
 ) -> Result<Vec<Unknown>, Error> {
-    match version {
-        FmiVersion::V2 => {
-            let list = structure.child(list).into_iter().flat_map(|list| list.all("Unknown"));
-            list.map(|e| unknown(e, "index")).collect()
-        }
-        FmiVersion::V3 => structure.all(single).map(|e| unknown(e, "valueReference")).collect(),
+    let (elements, reference): (Vec<&Element>, _) = match version {
+        FmiVersion::V2 => (structure.child(list).into_iter().flat_map(|list| list.all("Unknown")).collect(), "index"),
+        FmiVersion::V3 => (structure.all(single).collect(), "valueReference"),
+    };
+    for words in ["dependencies", "dependenciesKind"] {
+        let count = |e: &&Element| e.get(words).map_or(0, |text| text.split_ascii_whitespace().count() as u64);
+        limits::DEPENDENCIES.check(elements.iter().map(count).sum()).map_err(Error::Limit)?;
     }
+    elements.into_iter().map(|e| unknown(e, reference)).collect()
 }
 
 fn unknown(element: &Element, reference: &str) -> Result<Unknown, Error> {

@@ -1,10 +1,10 @@
 //! terminalsAndIcons.xml.
 
 use super::attributes::{number, owned, required, wrong};
-use super::tree;
+use super::{decode, of_kind};
 use crate::error::Error;
 use crate::terminals::{Area, CoordinateSystem, Member, StreamMember, Terminal, TerminalPicture, TerminalsAndIcons};
-use crate::xml::Element;
+use crate::xml::{Element, parse};
 
 /// Reads terminalsAndIcons.xml of an FMU of either standard; the bytes must be UTF-8.
 ///
@@ -13,7 +13,8 @@ use crate::xml::Element;
 /// # Errors
 /// Gives the line, what was found and what was expected.
 pub fn read_terminals(xml: impl AsRef<[u8]>) -> Result<TerminalsAndIcons, Error> {
-    let root = tree(xml.as_ref(), "fmiTerminalsAndIcons")?;
+    let root = parse(decode(xml.as_ref())?)?;
+    of_kind(&root, "fmiTerminalsAndIcons")?;
     let picture = root.child("GraphicalRepresentation");
     let system = picture.and_then(|p| p.child("CoordinateSystem"));
     Ok(TerminalsAndIcons {

@@ -3,10 +3,12 @@
 use super::attributes::{boolean, integer, integers, number, owned, required, required_integer, word, wrong};
 use super::types::base_type_2;
 use crate::error::Error;
+use crate::limits;
 use crate::units::TypeDefinition;
 use crate::variable::{Alias, BaseType, Causality, Dimension, Initial, ModelVariable, Variability};
 use crate::version::FmiVersion;
 use crate::xml::Element;
+use std::collections::BTreeMap;
 
 /// Every variable, in the order of the file.
 pub(super) fn variables(
@@ -14,6 +16,8 @@ pub(super) fn variables(
     version: FmiVersion,
     types: &[TypeDefinition],
 ) -> Result<Vec<ModelVariable>, Error> {
+    limits::VARIABLES.check(list.children.len() as u64).map_err(Error::Limit)?;
+    let types = types.iter().map(|t| (t.name.as_str(), t)).rev().collect();
     let mut variables = Vec::new();
     for element in &list.children {
         match version {
@@ -23,17 +27,39 @@ pub(super) fn variables(
                     parent: element.name.clone(),
                     element: "Real, Integer, Boolean, String or Enumeration".into(),
                 })?;
-                variables.push(variable(element, base, typed, version, types)?);
+                variables.push(variable(element, base, typed, version, &types)?);
             }
             FmiVersion::V2 => {}
             FmiVersion::V3 => {
                 if let Some(base) = BaseType::from_word(&element.name) {
-                    variables.push(variable(element, base, element, version, types)?);
+                    variables.push(variable(element, base, element, version, &types)?);
                 }
             }
         }
     }
+    values(&variables)?;
     Ok(variables)
+}
+
+/// The number of values of all variables, which whoever reads them keeps in memory.
+fn values(variables: &[ModelVariable]) -> Result<(), Error> {
+    let arrays = || variables.iter().filter(|v| v.is_array());
+    let sizes: BTreeMap<u32, u64> = if arrays().next().is_none() {
+        BTreeMap::new()
+    } else {
+        let size = |v: &ModelVariable| Some((v.value_reference, v.start.as_deref()?.trim().parse().ok()?));
+        variables.iter().filter(|v| !v.is_array()).filter_map(size).collect()
+    };
+    let mut all = 0_u64;
+    for v in arrays() {
+        let extent = |d: &Dimension| match d {
+            Dimension::Fixed(n) => *n,
+            Dimension::Variable(reference) => sizes.get(reference).copied().unwrap_or(1),
+        };
+        all = all.saturating_add(v.dimensions.iter().map(extent).fold(1, u64::saturating_mul));
+        limits::VALUES.check(all).map_err(|e| Error::Limit(format!("line {}: {}: {e}", v.line, v.name)))?;
+    }
+    Ok(())
 }
 
 /// A variable: `element` has its identity, `typed` what depends on its base type (the same element in FMI 3.0).
@@ -42,12 +68,12 @@ fn variable(
     base: BaseType,
     typed: &Element,
     version: FmiVersion,
-    types: &[TypeDefinition],
+    types: &BTreeMap<&str, &TypeDefinition>,
 ) -> Result<ModelVariable, Error> {
     let causality = word(element, "causality", Causality::ALL, Causality::as_str)?.unwrap_or(Causality::Local);
     let variability = word(element, "variability", Variability::ALL, Variability::as_str)?;
     let declared_type = owned(typed, "declaredType");
-    let declared = types.iter().find(|t| Some(&t.name) == declared_type.as_ref());
+    let declared = declared_type.as_deref().and_then(|name| types.get(name).copied());
     let unit = owned(typed, "unit");
     // A display unit belongs to a unit: the type's does not suit a variable that has another unit.
     let same_unit = unit.is_none() || unit.as_ref() == declared.and_then(|t| t.unit.as_ref());

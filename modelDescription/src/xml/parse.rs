@@ -3,19 +3,19 @@
 
 use super::Element;
 use crate::error::Error;
+use crate::limits;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
-/// Deeper trees are refused; both standards need 5 levels, annotations of tools a few more. Trees are dropped recursively.
-const DEEPEST: usize = 200;
-
 /// The root element of an XML document.
 pub(crate) fn parse(text: &str) -> Result<Element, Error> {
+    limits::XML.check(text.len() as u64).map_err(Error::Limit)?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut reader = Reader::from_str(text);
     let mut lines = Lines { text, offset: 0, line: 1 };
     let mut open: Vec<Element> = Vec::new();
     let mut root = None;
+    let mut nodes = 0;
     loop {
         let event = reader.read_event();
         let line = lines.at(match &event {
@@ -45,10 +45,10 @@ pub(crate) fn parse(text: &str) -> Result<Element, Error> {
         if root.is_some() {
             return Err(wrong(&"a second root element"));
         }
-        if open.len() >= DEEPEST {
-            return Err(wrong(&format!("more than {DEEPEST} levels of elements")));
-        }
+        limits::LEVELS.check(open.len() as u64 + 1).map_err(|e| wrong(&e))?;
         let mut element = start(&tag).map_err(|e| wrong(&e))?;
+        nodes += 1 + element.attributes.len() as u64;
+        limits::NODES.check(nodes).map_err(Error::Limit)?;
         // The position is after the tag, which may contain line breaks between its attributes.
         element.line = line - tag.matches('\n').count();
         if empty {
@@ -79,6 +79,8 @@ fn start(tag: &BytesStart<'_>) -> Result<Element, quick_xml::Error> {
         let value = attribute.normalized_value(XmlVersion::Implicit1_0)?;
         element.attributes.push((attribute.key.as_ref().into(), value.into_owned()));
     }
+    // A description is mostly this.
+    element.attributes.shrink_to_fit();
     Ok(element)
 }
 

@@ -1,0 +1,39 @@
+//! `--replay`: one probe, or one case of it, once more, with all its calls and what they return.
+
+use crate::check::{Options, Verdict};
+use crate::checks::GROUPS;
+use crate::fmu_file::FmuFile;
+use crate::runner::Runner;
+use anyhow::{Result, bail};
+use fmu_import::printable_lines;
+use std::path::Path;
+
+/// Prints the calls of a check, `ID` or `ID#CASE`. Returns whether it found nothing.
+pub(super) fn run(path: &Path, what: &str, options: &Options) -> Result<bool> {
+    let (id, case) = match what.split_once('#') {
+        Some((id, case)) => match case.parse() {
+            Ok(case) => (id, Some(case)),
+            Err(_) => bail!("--replay {what}: {case} is not the number of a case"),
+        },
+        None => (what, None),
+    };
+    let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id.eq_ignore_ascii_case(id));
+    let Some(check) = check.filter(|c| c.is_probe()) else {
+        bail!("--replay {id}: there is no such check of the binary; --list shows the checks");
+    };
+    let fmu = FmuFile::open(path)?;
+    let runner = Runner::new(&fmu, options).map_err(anyhow::Error::msg)?;
+    let found = runner.replay(check, case)?;
+    println!("\n");
+    match found.verdict {
+        Verdict::Violated(evidence) => {
+            for text in evidence {
+                println!("{id}: {}", printable_lines(&text));
+            }
+            return Ok(false);
+        }
+        Verdict::NotDetermined(why) | Verdict::NotApplicable(why) => println!("{id}: {}", printable_lines(&why)),
+        Verdict::Pass(_) => println!("{id}: nothing found"),
+    }
+    Ok(true)
+}

@@ -1,0 +1,125 @@
+//! Tells a call that hangs from a probe that is slow: by its progress and by the processor time it uses, not by the clock alone,
+//! so that a busy machine makes no finding.
+
+use std::fs;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// A probe that makes progress is given up after this many time limits.
+const PATIENCE: u32 = 6;
+
+/// What the parent knows about a probe that has not ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// Go on waiting.
+    Runs,
+    /// One call has used the processor for the time limit, or has slept for it.
+    Hangs,
+    /// It makes progress, or gets no processor: neither shows a fault.
+    Slow,
+}
+
+/// Watches one process.
+pub(super) struct Watch {
+    pid: u32,
+    /// The file with the call that it is in.
+    journal: PathBuf,
+    limit: Duration,
+    began: Instant,
+    /// The call, since when, and the processor time then.
+    call: (Vec<u8>, Instant, Option<Duration>),
+    looked: Instant,
+}
+
+impl Watch {
+    pub(super) fn new(pid: u32, journal: PathBuf, limit: Duration) -> Self {
+        let now = Instant::now();
+        Self { pid, journal, limit, began: now, call: (Vec::new(), now, None), looked: now }
+    }
+
+    /// Looks at the process; cheap enough to be called in a loop.
+    pub(super) fn look(&mut self) -> State {
+        if self.looked.elapsed() < self.limit / 100 {
+            return State::Runs;
+        }
+        self.looked = Instant::now();
+        let (used, waits) = processor(self.pid).unzip();
+        let call = fs::read(&self.journal).unwrap_or_default();
+        if call != self.call.0 {
+            self.call = (call, self.looked, used);
+        }
+        let over = self.began.elapsed() > self.limit.saturating_mul(PATIENCE);
+        if self.call.1.elapsed() <= self.limit {
+            return if over { State::Slow } else { State::Runs };
+        }
+        let Some((used, waits)) = used.zip(waits) else { return State::Hangs };
+        let since = used.saturating_sub(self.call.2.unwrap_or_default());
+        // Half of the limit: the processor's clock ticks in steps.
+        if since > self.limit / 2 || (waits && since < self.limit / 20) {
+            State::Hangs
+        } else if over {
+            State::Slow
+        } else {
+            State::Runs
+        }
+    }
+}
+
+/// The processor time that a process has used, and whether all its threads wait for something.
+#[cfg(target_os = "linux")]
+fn processor(pid: u32) -> Option<(Duration, bool)> {
+    // The name of the program stands in parentheses and may contain anything.
+    let fields =
+        |text: String| Some(text.rsplit_once(')')?.1.split_whitespace().map(str::to_owned).collect::<Vec<_>>());
+    let stat = fields(fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)?;
+    // utime and stime; the kernel reports hundredths of a second on every system that we know.
+    let ticks = stat.get(11)?.parse::<u64>().ok()? + stat.get(12)?.parse::<u64>().ok()?;
+    let mut tasks = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
+    let waits = |task: fs::DirEntry| {
+        let stat = fs::read_to_string(task.path().join("stat")).ok().and_then(fields);
+        stat.is_none_or(|stat| stat.first().is_some_and(|state| state == "S"))
+    };
+    Some((Duration::from_millis(10 * ticks), tasks.all(waits)))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn processor(_: u32) -> Option<(Duration, bool)> {
+    None
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+    use std::process::{Child, Command};
+
+    /// What the watch says in the end about a shell command, with its limit.
+    fn end(script: &str, limit: u64, journal: &std::path::Path) -> State {
+        let mut child: Child = Command::new("sh").args(["-c", script]).env("JOURNAL", journal).spawn().unwrap();
+        let mut watch = Watch::new(child.id(), journal.into(), Duration::from_millis(limit));
+        loop {
+            let state = watch.look();
+            if state != State::Runs || child.try_wait().unwrap().is_some() {
+                let _ = child.kill();
+                child.wait().unwrap();
+                return state;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    #[test]
+    fn a_hang_is_no_slow_probe() {
+        let folder = tempfile::tempdir().unwrap();
+        let journal = folder.path().join("call");
+        // One call that computes without end, one that waits without end.
+        assert_eq!(end("while :; do :; done", 400, &journal), State::Hangs);
+        assert_eq!(end("exec sleep 60", 400, &journal), State::Hangs);
+        // Call after call: slow, however long it takes.
+        let calls = "n=0; while :; do n=$((n + 1)); echo \"C call $n\" > \"$JOURNAL\"; done";
+        assert_eq!(end(calls, 400, &journal), State::Slow);
+        // A process that gets no processor (stopped) is not hanging.
+        assert_eq!(end("kill -STOP $$", 200, &journal), State::Slow);
+        // One that ends is left to end.
+        assert_eq!(end("true", 400, &journal), State::Runs);
+    }
+}

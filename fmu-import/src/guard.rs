@@ -1,0 +1,472 @@
+//! Guards the process that runs FMUs of unknown origin, so that nothing they do reaches the process that asked for it.
+//!
+//! The caller starts a guard, which is the same program again ([`command`], [`serve`]), and the guard starts the process that
+//! loads the FMUs. On Unix the guard leads a session of its own, its child a process group of its own: a signal that an FMU
+//! sends to its group ends nobody else. On Linux the guard adopts whatever the child leaves behind, counts it, and ends it.
+//! Guard and caller share a socket: when the caller ends, however it ends, the guard ends everything and removes the folder for
+//! temporary files. Other systems end the child alone.
+
+use crate::folder::Folder;
+use model_description::limits;
+use std::ffi::OsString;
+use std::io;
+use std::path::Path;
+use std::process::{Child, Command, ExitCode, ExitStatus};
+use std::time::Duration;
+#[cfg(unix)]
+use std::time::Instant;
+
+/// First argument of a guard.
+const GUARD: &str = "@guard";
+/// How often a caller looks at its clock.
+const LOOK: Duration = Duration::from_millis(5);
+/// Time for a guard to end its child.
+#[cfg(unix)]
+const GRACE: Duration = Duration::from_secs(5);
+
+/// What a guarded process may use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Allowance {
+    /// Address space in bytes; 0 for no limit. It holds on Unix.
+    pub memory: u64,
+    /// Largest file in bytes that it may write; 0 for no limit. It holds on Unix.
+    pub file: u64,
+    /// Without network: on Linux, where the kernel lets this user have a namespace of its own.
+    pub sandbox: bool,
+}
+
+impl Default for Allowance {
+    fn default() -> Self {
+        Self { memory: limits::PROCESS_MEMORY, file: 0, sandbox: false }
+    }
+}
+
+/// A process with its guard.
+pub struct Guarded {
+    child: Child,
+    #[cfg(unix)]
+    channel: std::os::unix::net::UnixStream,
+    folder: Folder,
+}
+
+/// How a guarded process ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// By itself, or by a signal.
+    Ended(ExitStatus),
+    /// Its time was over.
+    Stopped,
+    /// The guard itself was ended, by whatever ran in its child.
+    Lost,
+    /// The guard could not start it, for this reason.
+    Refused(String),
+}
+
+/// What the guard found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Report {
+    /// How the process ended.
+    pub end: End,
+    /// Processes that it had left behind, with number and name; they are ended.
+    pub left: Vec<String>,
+}
+
+/// A command that runs `program` under a guard. `program` calls [`serve`] first of all.
+pub fn command(program: &Path, allowance: Allowance) -> Command {
+    let mut command = Command::new(program);
+    if cfg!(unix) {
+        let Allowance { memory, file, sandbox } = allowance;
+        command.args([GUARD, &memory.to_string(), &file.to_string(), if sandbox { "sandbox" } else { "open" }]);
+    }
+    command
+}
+
+impl Guarded {
+    /// Starts what [`command`] made. Standard input is the guard's; temporary files go to a folder that is removed at the end.
+    ///
+    /// # Errors
+    /// The process cannot be started.
+    pub fn start(mut command: Command) -> io::Result<Self> {
+        let folder = Folder::new()?;
+        for name in ["TMPDIR", "TMP", "TEMP"] {
+            command.env(name, folder.path());
+        }
+        #[cfg(unix)]
+        {
+            let (channel, other) = std::os::unix::net::UnixStream::pair()?;
+            command.stdin(std::process::Stdio::from(std::os::fd::OwnedFd::from(other)));
+            Ok(Self { child: command.spawn()?, channel, folder })
+        }
+        #[cfg(not(unix))]
+        {
+            command.stdin(std::process::Stdio::null());
+            Ok(Self { child: command.spawn()?, folder })
+        }
+    }
+
+    /// The folder for temporary files.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Waits until the process has ended, or `over` says that its time is over. `over` gets the number of the process as soon as
+    /// the guard has started it.
+    ///
+    /// # Errors
+    /// The system does not tell.
+    #[cfg(unix)]
+    pub fn wait(&mut self, mut over: impl FnMut(Option<u32>) -> bool) -> io::Result<Report> {
+        use std::io::Read;
+        let mut stopped = None;
+        let mut told = Vec::new();
+        self.channel.set_read_timeout(Some(LOOK))?;
+        let mut bytes = [0; 4096];
+        loop {
+            match self.channel.read(&mut bytes) {
+                Ok(0) => break,
+                Ok(n) => told.extend_from_slice(&bytes[..n]),
+                Err(e) if matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => match stopped {
+                    None if over(unix::read_id(&told)) => {
+                        stopped = Some(Instant::now());
+                        self.channel.shutdown(std::net::Shutdown::Write)?;
+                    }
+                    // The FMU has stopped the guard.
+                    Some(since) if Instant::elapsed(&since) > GRACE => break,
+                    _ => {}
+                },
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(_) => break,
+            }
+        }
+        let id = self.child.id();
+        let report = unix::read_report(&String::from_utf8_lossy(&told));
+        if report.is_none() {
+            unix::end_session(id);
+            let _ = self.child.kill();
+        }
+        self.child.wait()?;
+        let Report { end, left } = report.unwrap_or(Report { end: End::Lost, left: Vec::new() });
+        Ok(Report { end: if stopped.is_some() { End::Stopped } else { end }, left })
+    }
+
+    /// Waits until the process has ended, or `over` says that its time is over. `over` gets the number of the process.
+    ///
+    /// # Errors
+    /// The system does not tell.
+    #[cfg(not(unix))]
+    pub fn wait(&mut self, mut over: impl FnMut(Option<u32>) -> bool) -> io::Result<Report> {
+        loop {
+            if let Some(status) = self.child.try_wait()? {
+                return Ok(Report { end: End::Ended(status), left: Vec::new() });
+            }
+            if over(Some(self.child.id())) {
+                self.child.kill()?;
+                self.child.wait()?;
+                return Ok(Report { end: End::Stopped, left: Vec::new() });
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+}
+
+impl End {
+    /// What happened, in words that follow the name of a call: `ended the process by SIGSEGV (invalid memory access)`.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Ended(status) => how(*status),
+            Self::Stopped => "did not return in time".into(),
+            Self::Lost => "ended the process that guards it".into(),
+            Self::Refused(why) => format!("cannot be started: {why}"),
+        }
+    }
+}
+
+/// `ended the process by SIGSEGV (invalid memory access)`, or `ended the process with exit status 3`.
+pub fn how(status: ExitStatus) -> String {
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        let (name, meaning) = signal_name(signal);
+        return format!("ended the process by {name}{meaning}");
+    }
+    status
+        .code()
+        .map_or_else(|| "ended the process".into(), |code| format!("ended the process with exit status {code}"))
+}
+
+/// Name of a signal, and what it mostly means: `SIGSEGV` and ` (invalid memory access)`.
+pub fn signal_name(signal: i32) -> (String, &'static str) {
+    // The one number of these that systems disagree on.
+    let bus = if cfg!(target_os = "macos") { 10 } else { 7 };
+    let (name, meaning) = match signal {
+        4 => ("SIGILL", " (illegal instruction)"),
+        5 => ("SIGTRAP", " (trap)"),
+        6 => ("SIGABRT", " (abort)"),
+        8 => ("SIGFPE", " (arithmetic exception)"),
+        9 => ("SIGKILL", ""),
+        11 => ("SIGSEGV", " (invalid memory access)"),
+        13 => ("SIGPIPE", ""),
+        15 => ("SIGTERM", ""),
+        24 => ("SIGXCPU", " (processor time)"),
+        25 => ("SIGXFSZ", " (size of a file)"),
+        _ if signal == bus => ("SIGBUS", " (a file that is cut short, or invalid memory access)"),
+        _ => return (format!("signal {signal}"), ""),
+    };
+    (name.into(), meaning)
+}
+
+/// What the process of this command sends to its process group reaches no other; it calls [`end_with_parent`] itself. On Linux.
+pub fn own_group(command: &mut Command) {
+    #[cfg(target_os = "linux")]
+    std::os::unix::process::CommandExt::process_group(command, 0);
+    #[cfg(not(target_os = "linux"))]
+    let _ = command;
+}
+
+/// This process ends when the thread that started it ends: on Linux.
+pub fn end_with_parent() {
+    #[cfg(target_os = "linux")]
+    let _ = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
+}
+
+/// The processes that this one has started and not waited for, with number and name; none but on Linux.
+pub fn children() -> Vec<String> {
+    #[cfg(unix)]
+    return unix::children();
+    #[cfg(not(unix))]
+    return Vec::new();
+}
+
+/// Standard output for this process alone: what FMUs print goes to standard error from now on.
+///
+/// # Errors
+/// There is none.
+#[cfg(unix)]
+pub fn keep_stdout() -> io::Result<std::fs::File> {
+    use std::os::fd::AsFd;
+    let kept = io::stdout().as_fd().try_clone_to_owned()?;
+    rustix::stdio::dup2_stdout(io::stderr())?;
+    Ok(kept.into())
+}
+
+/// Plays the guard if this process was started as one: call it before anything else in `main`.
+pub fn serve() -> Option<ExitCode> {
+    let arguments: Vec<OsString> = std::env::args_os().collect();
+    if arguments.get(1).is_none_or(|first| first != GUARD) {
+        return None;
+    }
+    #[cfg(unix)]
+    return Some(unix::serve(&arguments[2..]));
+    #[cfg(not(unix))]
+    return None;
+}
+
+#[cfg(unix)]
+mod unix {
+    use super::{Allowance, End, ExitCode, GRACE, GUARD, OsString, Report, io};
+    use crate::text::printable;
+    use model_description::limits;
+    use rustix::io::Errno;
+    use rustix::process::{Pid, Resource, Rlimit, Signal, WaitId, WaitIdOptions, WaitOptions};
+    use rustix::process::{getppid, getrlimit, kill_process, kill_process_group, setrlimit, setsid, wait, waitid};
+    use std::fs;
+    use std::io::{Read, Write};
+    use std::os::fd::AsFd;
+    use std::os::unix::net::UnixStream;
+    use std::os::unix::process::{CommandExt, ExitStatusExt};
+    use std::process::{Command, ExitStatus, Stdio};
+    use std::sync::{Mutex, PoisonError};
+    use std::time::{Duration, Instant};
+
+    /// How the line with the number of the child begins: the first that the guard writes, before its report.
+    const STARTED: &str = "started ";
+    /// Time that helpers of a process that ended by itself may take to end as well.
+    const FAREWELL: Duration = Duration::from_millis(100);
+
+    /// Arguments: memory, file, sandbox or open, then those of the child, which runs the same program.
+    pub(super) fn serve(arguments: &[OsString]) -> ExitCode {
+        // The caller's end of the socket is all that this process talks to.
+        let Ok(channel) = io::stdin().as_fd().try_clone_to_owned().map(UnixStream::from) else {
+            return ExitCode::from(2);
+        };
+        let caller = getppid();
+        let report =
+            guard(arguments, &channel).unwrap_or_else(|why| Report { end: End::Refused(why), left: Vec::new() });
+        let _ = (&channel).write_all(write_report(&report).as_bytes());
+        if getppid() != caller
+            && let Some(folder) = std::env::var_os("TMPDIR")
+        {
+            // Nobody else is there to remove it.
+            let _ = fs::remove_dir_all(folder);
+        }
+        ExitCode::SUCCESS
+    }
+
+    fn guard(arguments: &[OsString], channel: &UnixStream) -> Result<Report, String> {
+        let text = |index: usize| arguments.get(index).and_then(|a| a.to_str()).unwrap_or_default();
+        let number =
+            |index: usize| text(index).parse().map_err(|_| format!("argument {index} of {GUARD} is no number"));
+        let allowance = Allowance { memory: number(0)?, file: number(1)?, sandbox: text(2) == "sandbox" };
+        // Fails only for a process that leads its group already, which then has a group of its own.
+        let _ = setsid();
+        limit(allowance);
+        if allowance.sandbox {
+            crate::abi::sandbox::enter().map_err(|why| format!("--sandbox is not available here: {why}"))?;
+        }
+        #[cfg(target_os = "linux")]
+        let _ = rustix::process::set_child_subreaper(Some(rustix::process::getpid()));
+        let mut command = Command::new(std::env::current_exe().map_err(|e| e.to_string())?);
+        command.args(&arguments[3..]).stdin(Stdio::null()).process_group(0);
+        let mut child = command.spawn().map_err(|e| e.to_string())?;
+        let id = Pid::from_child(&child);
+        let _ = (&*channel).write_all(format!("{STARTED}{}\n", child.id()).as_bytes());
+        // Until the child is reaped, its number is its own.
+        let running = Mutex::new(true);
+        let is_running = || running.lock().unwrap_or_else(PoisonError::into_inner);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                // The caller says nothing: its end closes when it ends, or when it no longer wants the result.
+                let _ = (&*channel).read(&mut [0]);
+                let running = is_running();
+                if *running {
+                    let _ = kill_process_group(id, Signal::KILL);
+                    let _ = kill_process(id, Signal::KILL);
+                }
+            });
+            while let Err(Errno::INTR) = waitid(WaitId::Pid(id), WaitIdOptions::EXITED | WaitIdOptions::NOWAIT) {}
+            let mut running = is_running();
+            if !cfg!(target_os = "linux") {
+                let _ = kill_process_group(id, Signal::KILL);
+            }
+            *running = false;
+            let status = child.wait().map_err(|e| e.to_string());
+            drop(running);
+            let _ = channel.shutdown(std::net::Shutdown::Read);
+            let status = status?;
+            let farewell = if status.success() { FAREWELL } else { Duration::ZERO };
+            Ok(Report { end: End::Ended(status), left: end_children(farewell) })
+        })
+    }
+
+    fn limit(allowance: Allowance) {
+        let at_most = |resource, most: u64| {
+            let hard = getrlimit(resource).maximum;
+            let most = Some(hard.map_or(most, |hard| hard.min(most)));
+            let _ = setrlimit(resource, Rlimit { current: most, maximum: most });
+        };
+        at_most(Resource::Core, 0);
+        at_most(Resource::Nofile, limits::PROCESS_FILES);
+        // The system counts all threads of this user, and none of root's.
+        if let Some(threads) = threads() {
+            at_most(Resource::Nproc, limits::PROCESS_THREADS + threads);
+        }
+        for (resource, most) in [(Resource::As, allowance.memory), (Resource::Fsize, allowance.file)] {
+            if most > 0 {
+                at_most(resource, most);
+            }
+        }
+    }
+
+    /// Number of threads on this system: `0.20 0.18 0.12 1/80 11206`.
+    fn threads() -> Option<u64> {
+        let text = fs::read_to_string("/proc/loadavg").ok()?;
+        text.split_whitespace().nth(3)?.split_once('/')?.1.parse().ok()
+    }
+
+    /// Ends the children of this process, which are those that it has adopted; returns those that were alive.
+    fn end_children(farewell: Duration) -> Vec<String> {
+        let begun = Instant::now();
+        let mut left: Vec<(Pid, String)> = Vec::new();
+        while begun.elapsed() < GRACE {
+            match wait(WaitOptions::NOHANG) {
+                Err(Errno::INTR) | Ok(Some(_)) => continue,
+                Err(_) => break,
+                Ok(None) if begun.elapsed() >= farewell => {
+                    let me = rustix::process::getpid();
+                    for process in processes().filter(|p| p.parent == me.as_raw_pid() && p.alive) {
+                        let _ = kill_process_group(process.group, Signal::KILL);
+                        let _ = kill_process(process.id, Signal::KILL);
+                        if left.iter().all(|(id, _)| *id != process.id) {
+                            left.push((process.id, process.name));
+                        }
+                    }
+                }
+                Ok(None) => {}
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        left.into_iter().map(|(id, name)| format!("{} ({name})", id.as_raw_pid())).collect()
+    }
+
+    pub(super) fn children() -> Vec<String> {
+        let me = rustix::process::getpid().as_raw_pid();
+        let told = |p: Process| {
+            let state = if p.alive { "" } else { ", which has ended and is not waited for" };
+            format!("{} ({}){state}", p.id.as_raw_pid(), p.name)
+        };
+        processes().filter(|p| p.parent == me).map(told).collect()
+    }
+
+    /// Ends all processes of a session.
+    pub(super) fn end_session(id: u32) {
+        for process in processes().filter(|p| u32::try_from(p.session) == Ok(id)) {
+            let _ = kill_process(process.id, Signal::KILL);
+        }
+    }
+
+    struct Process {
+        id: Pid,
+        name: String,
+        alive: bool,
+        parent: i32,
+        group: Pid,
+        session: i32,
+    }
+
+    /// All processes that can be seen; none but on Linux.
+    fn processes() -> impl Iterator<Item = Process> {
+        fs::read_dir("/proc").into_iter().flatten().flatten().filter_map(|entry| {
+            let id = entry.file_name().to_str()?.parse().ok().and_then(Pid::from_raw)?;
+            // `11206 (a name) S 11205 11206 11206 ...`, where the name may have anything in it.
+            let bytes = fs::read(entry.path().join("stat")).ok()?;
+            let stat = String::from_utf8_lossy(&bytes);
+            let (name, rest) = (stat.find('(')?, stat.rfind(')')?);
+            let fields: Vec<&str> = stat[rest + 1..].split_whitespace().collect();
+            let number = |index: usize| fields.get(index)?.parse::<i32>().ok();
+            Some(Process {
+                id,
+                name: printable(stat.get(name + 1..rest)?).into_owned(),
+                alive: !matches!(*fields.first()?, "Z" | "X"),
+                parent: number(1)?,
+                group: Pid::from_raw(number(2)?)?,
+                session: number(3)?,
+            })
+        })
+    }
+
+    pub(super) fn read_id(told: &[u8]) -> Option<u32> {
+        let line = std::str::from_utf8(told).ok()?.strip_prefix(STARTED)?.split_once('\n')?.0;
+        line.parse().ok()
+    }
+
+    /// A line for the end, and one for each process that was left.
+    fn write_report(report: &Report) -> String {
+        let end = match &report.end {
+            End::Ended(status) => format!("ended {}", status.into_raw()),
+            End::Refused(why) => format!("refused {}", printable(why)),
+            End::Stopped | End::Lost => "lost".into(),
+        };
+        let lines: Vec<&str> = std::iter::once(end.as_str()).chain(report.left.iter().map(String::as_str)).collect();
+        lines.join("\n") + "\n"
+    }
+
+    pub(super) fn read_report(text: &str) -> Option<Report> {
+        let mut lines = text.strip_suffix('\n')?.lines().skip_while(|line| line.starts_with(STARTED));
+        let (word, rest) = lines.next()?.split_once(' ')?;
+        let end = match word {
+            "ended" => End::Ended(ExitStatus::from_raw(rest.parse().ok()?)),
+            "refused" => End::Refused(rest.into()),
+            _ => return None,
+        };
+        Some(Report { end, left: lines.map(str::to_owned).collect() })
+    }
+}

@@ -1,0 +1,46 @@
+//! Text of others, for a terminal.
+
+use std::borrow::Cow;
+use std::fmt::Write;
+
+/// The text with its control characters escaped, `\u{1b}` for ESC: what an FMU says must not command a terminal.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.contains(commands) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if commands(c) {
+            let _ = write!(out, "{}", c.escape_unicode());
+        } else {
+            out.push(c);
+        }
+    }
+    Cow::Owned(out)
+}
+
+/// As [`printable`], for a text of several lines.
+pub fn printable_lines(text: &str) -> Cow<'_, str> {
+    if text.chars().any(|c| c != '\n' && commands(c)) {
+        return Cow::Owned(text.split('\n').map(printable).collect::<Vec<_>>().join("\n"));
+    }
+    Cow::Borrowed(text)
+}
+
+/// Control characters, and those that turn the direction of what follows (Unicode, 9.0, UAX 9).
+fn commands(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_commands_a_terminal_is_escaped() {
+        assert_eq!(printable("\u{1b}[31mred\u{7}"), "\\u{1b}[31mred\\u{7}");
+        assert_eq!(printable("a\nb \u{202e}c"), "a\\u{a}b \\u{202e}c");
+        assert_eq!(printable_lines("a\u{1b}\nb\u{e9}\u{4e2d}\n"), "a\\u{1b}\nb\u{e9}\u{4e2d}\n");
+        assert!(matches!(printable("plain \u{e9}"), Cow::Borrowed(_)));
+    }
+}

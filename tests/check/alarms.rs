@@ -1,0 +1,217 @@
+//! What is legal, or no fault of the FMU, violates no must; and what a must is lesser than it looks is told as that.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+use crate::binary::{compile, compile_source, pack, pack_with};
+use crate::zip::{Entry, write};
+use crate::{check, check_within, told, violated};
+use fmu_check::{Level, Verdict, report::Report};
+use std::path::Path;
+
+/// The violated checks of a level.
+fn at(report: &Report, level: Level) -> Vec<&'static str> {
+    report.violated().filter(|f| f.level == level).map(|f| f.id).collect()
+}
+
+fn verdict(report: &Report, id: &str) -> Verdict {
+    report.finding(id).map_or_else(|| panic!("{id} did not run"), |f| f.verdict.clone())
+}
+
+/// The report on the small FMU with one property.
+fn small(dir: &Path, version: u8, property: &str, only: &[&str]) -> Option<Report> {
+    let binary = compile(dir, version, property, &[])?;
+    Some(check(&pack(dir, version, property, &binary), only))
+}
+
+/// An FMU may end the simulation: Discard with fmi2Terminated (FMI 2.0.5, 4.2.3), terminateSimulation (FMI 3.0.2, 4.2.1).
+#[test]
+fn an_fmu_may_end_itself() {
+    let dir = tempfile::tempdir().unwrap();
+    for version in [2, 3] {
+        let Some(report) = small(dir.path(), version, "ENDS", &[]) else { return };
+        assert!(violated(&report).is_empty(), "FMI {version}: {}", told(&report));
+        for id in ["L00", "T01c", "T04"] {
+            assert!(
+                matches!(verdict(&report, id), Verdict::Pass(_)),
+                "FMI {version}: {id}: {:?}",
+                verdict(&report, id)
+            );
+        }
+        assert!(matches!(verdict(&report, "F02a"), Verdict::NotDetermined(_)), "{:?}", verdict(&report, "F02a"));
+    }
+}
+
+/// With OK and without an early return, lastSuccessfulTime may deviate (FMI 3.0.2, 4.2.1); that time stands still is odd.
+#[test]
+fn a_step_may_end_a_little_elsewhere() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(report) = small(dir.path(), 3, "LATE", &["time"]) else { return };
+    assert!(violated(&report).is_empty(), "{}", told(&report));
+    let report = small(dir.path(), 3, "STANDS", &["time"]).unwrap();
+    assert_eq!((at(&report, Level::Must), at(&report, Level::Should)), (vec![], vec!["T06a"]), "{}", told(&report));
+}
+
+/// An FMU for Model Exchange alone need not have what co-simulation needs: functions (FMI 2.0.5, 2.3) and flags.
+#[test]
+fn model_exchange_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(binary) = compile_source(dir.path(), "tests/check/exchange.c", 2, "NONE", &["-DALL_OF_EXCHANGE"]) else {
+        return;
+    };
+    let xml: Vec<_> = include_str!("exchange2.xml").lines().filter(|line| !line.contains("<CoSimulation")).collect();
+    let path = pack_with(dir.path(), "exchange-only", &xml.join("\n"), &binary);
+    let report = check(&path, &["B01", "X08", "L00", "E00"]);
+    assert!(violated(&report).is_empty(), "{}", told(&report));
+    for id in ["B01", "X08", "E00"] {
+        assert!(matches!(verdict(&report, id), Verdict::Pass(_)), "{id}: {:?}", verdict(&report, id));
+    }
+    assert!(matches!(verdict(&report, "L00"), Verdict::NotApplicable(_)));
+    // One function of Model Exchange less, and it is found.
+    let binary = compile_source(dir.path(), "tests/check/exchange.c", 2, "NONE", &[]).unwrap();
+    let report = check(&pack_with(dir.path(), "exchange-less", &xml.join("\n"), &binary), &["B01"]);
+    assert_eq!(violated(&report), ["B01"]);
+}
+
+/// The manifest of a layered standard is a matter of FMI 3.0 (3.0.2, 2.6), which recommends it.
+#[test]
+fn manifests_are_of_fmi_3() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    let of = |more: &str| {
+        let names = "xmlns:a='http://fmi-standard.org/fmi-ls-manifest' a:fmi-ls-name='org.x' a:fmi-ls-version='1'";
+        format!("<fmiLayeredStandardManifest {names} {more}/>")
+    };
+    let (good, bad) = (of("a:fmi-ls-description='x'"), of(""));
+    let (xml2, xml3) = (include_str!("fmu.xml"), include_str!("fmu3.xml"));
+    for (xml, manifest, expected) in [(xml2, &bad, vec![]), (xml3, &bad, vec!["I03"]), (xml3, &good, vec![])] {
+        let manifest = Entry::new("extra/org.x/fmi-ls-manifest.xml", manifest.as_bytes());
+        write(&path, &[Entry::new("modelDescription.xml", xml.as_bytes()), Entry::new("sources/x.c", b"x"), manifest]);
+        let report = check(&path, &["I03"]);
+        assert_eq!((at(&report, Level::Must), at(&report, Level::Should)), (vec![], expected), "{}", told(&report));
+    }
+}
+
+/// Order 0 is the importer's fault (FMI 2.0.5, 4.2.1): whatever the FMU answers.
+#[test]
+fn order_zero_is_not_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let flag = "canGetAndSetFMUstate=\"true\"";
+    let xml = include_str!("fmu.xml").replace(flag, &format!("{flag} maxOutputDerivativeOrder=\"1\""));
+    for accepts in [false, true] {
+        let more: &[&str] = if accepts { &["-DDERIVATIVES", "-DORDER_ZERO"] } else { &["-DDERIVATIVES"] };
+        let Some(binary) = compile(dir.path(), 2, "NONE", more) else { return };
+        let report = check(&pack_with(dir.path(), "order", &xml, &binary), &["T09", "T09s"]);
+        assert!(violated(&report).is_empty(), "{}", told(&report));
+    }
+}
+
+/// XML may start with a byte order mark.
+#[test]
+fn a_byte_order_mark_is_no_must() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    let xml = format!("\u{feff}{}", include_str!("fmu.xml"));
+    write(&path, &[Entry::new("modelDescription.xml", xml.as_bytes()), Entry::new("sources/x.c", b"x")]);
+    let report = check(&path, &["xml"]);
+    assert_eq!((violated(&report), at(&report, Level::Hard)), (vec!["X01m"], vec!["X01m"]), "{}", told(&report));
+}
+
+/// That a library of this computer is missing is a should (FMI 2.0.5, 2.3); that a symbol of the FMU's own is missing is not.
+#[test]
+fn a_missing_library() {
+    let dir = tempfile::tempdir().unwrap();
+    let library = dir.path().join("libnowhere.so");
+    let empty = dir.path().join("empty.c");
+    std::fs::write(&empty, "int nowhere(void) { return 1; }").unwrap();
+    let built = std::process::Command::new("cc").args(["-shared", "-o"]).arg(&library).arg(&empty).status();
+    if !built.is_ok_and(|status| status.success()) {
+        return;
+    }
+    let more = ["-Wl,--no-as-needed", library.to_str().unwrap()];
+    let binary = compile(dir.path(), 2, "NONE", &more).unwrap();
+    std::fs::remove_file(&library).unwrap();
+    let report = check(&pack(dir.path(), 2, "library", &binary), &["binary"]);
+    assert_eq!(
+        (at(&report, Level::Must), at(&report, Level::Should)),
+        (vec![], vec!["B00", "B03"]),
+        "{}",
+        told(&report)
+    );
+    let binary = compile(dir.path(), 2, "UNDEFINED", &[]).unwrap();
+    let report = check(&pack(dir.path(), 2, "symbol", &binary), &["B00"]);
+    assert_eq!(at(&report, Level::Must), ["B00"], "{}", told(&report));
+}
+
+/// What this computer cannot do is no fault of the FMU: long names, few open files, another working directory.
+#[test]
+fn our_own_errors() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    let long = Entry::new(&format!("resources/{}", "x".repeat(300)), b"x");
+    let xml = Entry::new("modelDescription.xml", include_bytes!("fmu.xml"));
+    write(&path, &[xml, Entry::new("sources/x.c", b"x"), long]);
+    let report = check(&path, &["archive"]);
+    assert!(at(&report, Level::Must).is_empty(), "{}", told(&report));
+    assert!(matches!(verdict(&report, "Z01j"), Verdict::NotDetermined(_)), "{:?}", verdict(&report, "Z01j"));
+    // The side effects themselves are told, by the check for them alone.
+    let Some(report) = small(dir.path(), 2, "CHDIR", &[]) else { return };
+    assert_eq!(violated(&report), ["B08p"], "{}", told(&report));
+    let report = small(dir.path(), 2, "FEWFILES", &[]).unwrap();
+    assert!(at(&report, Level::Must).is_empty() && at(&report, Level::Should).is_empty(), "{}", told(&report));
+}
+
+/// The standards nowhere say bit for bit: a deviation within the tolerance is hard, and its size is told.
+#[test]
+fn rounding_is_no_must() {
+    let dir = tempfile::tempdir().unwrap();
+    for (property, ids) in [("F02s", &["F02a", "F02b", "F04a"][..]), ("T05s", &["T05"])] {
+        let Some(report) = small(dir.path(), 2, property, &["state", "T05"]) else { return };
+        assert!(at(&report, Level::Must).is_empty(), "{property}: {}", told(&report));
+        let hard = at(&report, Level::Hard);
+        assert!(ids.iter().all(|id| hard.contains(id)), "{property}: {}", told(&report));
+        assert!(
+            told(&report).contains("e-13, within 1e-6") || told(&report).contains("e-12, within 1e-6"),
+            "{}",
+            told(&report)
+        );
+    }
+    let report = small(dir.path(), 2, "T05", &["T05"]).unwrap();
+    assert_eq!(at(&report, Level::Must), ["T05"], "{}", told(&report));
+}
+
+/// An FMU that takes the importer down with it stands out.
+#[test]
+fn a_crash_stands_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(binary) = compile(dir.path(), 2, "L08n", &[]) else { return };
+    let path = pack(dir.path(), 2, "L08n", &binary);
+    let report = check(&path, &["lifecycle"]);
+    assert_eq!((violated(&report), report.fatal()), (vec!["L08n"], vec!["L08n"]));
+    let text = report.text(false);
+    assert!(text.contains("L08n   VIOLATED, takes the importer down (hard)"), "{text}");
+    assert!(text.contains("An importer would have crashed or hung in: L08n."), "{text}");
+    assert!(report.json().unwrap().contains("\"fatal\": true"));
+    // One that only answers wrongly does not.
+    let report = small(dir.path(), 2, "G01a", &["G01a"]).unwrap();
+    assert_eq!((violated(&report), report.fatal()), (vec!["G01a"], vec![]));
+    // Nor one that waits, for however long, but it is told.
+    let binary = compile(dir.path(), 2, "WAIT", &[]).unwrap();
+    let report = check_within(&pack(dir.path(), 2, "WAIT", &binary), &["L00"], 2);
+    assert_eq!(report.fatal(), ["L00"], "{}", told(&report));
+}
+
+/// In FMI 2.0 a wrong value reference "has to return with an error" (2.0.5, 2.1.2), and a variable that is not Real says
+/// what it is, because continuous is the default (2.0.5, 2.2.7).
+#[test]
+fn what_fmi_2_requires() {
+    let dir = tempfile::tempdir().unwrap();
+    for fault in ["G02", "V12"] {
+        let Some(report) = small(dir.path(), 2, fault, &["access"]) else { return };
+        assert_eq!(at(&report, Level::Must), [fault], "{}", told(&report));
+    }
+    let path = dir.path().join("x.fmu");
+    let xml = include_str!("fmu.xml").replace("causality=\"output\" variability=\"discrete\"", "causality=\"output\"");
+    write(&path, &[Entry::new("modelDescription.xml", xml.as_bytes()), Entry::new("sources/x.c", b"x")]);
+    let report = check(&path, &["variables"]);
+    assert_eq!(at(&report, Level::Must), ["V05"], "{}", told(&report));
+    assert!(told(&report).contains("variable n: is a continuous Int32 by default"), "{}", told(&report));
+}

@@ -1,0 +1,154 @@
+//! Libraries that hang, crash, end the process, fork, signal, print, allocate, close and change directory, wherever they are
+//! called.
+
+use crate::{XML, described, each, library};
+
+/// What an FMU does, the status of `fmu simulate`, and a part of what it says.
+const ACTS: &[(&str, i32, &str)] = &[
+    ("exit", 2, "ended the process with exit status 0"),
+    ("_exit", 2, "ended the process with exit status 0"),
+    ("exit3", 2, "ended the process with exit status 3"),
+    ("terminate-group", 2, "ended the process by SIGTERM"),
+    ("kill-group", 2, "ended the process by SIGKILL"),
+    ("kill-guard", 2, "ended the process that guards it"),
+    ("crash", 2, "ended the process by SIGSEGV (invalid memory access)"),
+    ("abort", 2, "ended the process by SIGABRT (abort)"),
+    ("recurse", 2, "ended the process by "),
+    ("hang", 2, "did not return within 2 s"),
+    ("spin", 2, "did not return within 2 s"),
+    ("stop", 2, "did not return within 2 s"),
+    ("deaf", 2, "did not return within 2 s"),
+    ("fork", 0, "warning: the FMUs left processes behind, which are ended now: "),
+    ("fork-many", 0, "warning: the FMUs left processes behind, which are ended now: "),
+    ("fork-and-crash", 2, "ended the process by SIGSEGV"),
+    ("print", 0, "hello"),
+    ("allocate", 2, "ended the process by SIGSEGV"),
+    ("files", 2, ""),
+    ("close", 2, ""),
+    ("chdir", 0, ""),
+    ("temporary", 0, ""),
+];
+
+const PLACES: &[(&str, &str)] = &[
+    ("load", "x.fmu: loading the library"),
+    ("instantiate", "x: the instantiation"),
+    ("initialize", "x: entering initialization mode"),
+    ("step", "x: a step at or after t = 0.3"),
+    ("free", "x: freeing the instance or unloading the library"),
+];
+
+#[test]
+fn simulate_says_what_happened() {
+    if library().is_none() {
+        return;
+    }
+    let mut all = Vec::new();
+    for (place, told) in PLACES {
+        // Every act where it is most likely, and the shortest everywhere.
+        let rare = |act: &str| ["exit", "crash", "fork", "hang", "close", "kill-guard"].contains(&act);
+        // What is closed in the end no longer matters.
+        let matters = |act: &str| (*place, act) != ("free", "close");
+        let acts = ACTS.iter().filter(|(act, ..)| (*place == "step" || rare(act)) && matters(act));
+        all.extend(acts.map(|act| (*place, *told, *act)));
+    }
+    each(&all, |(place, told, (act, status, part))| {
+        let fmu = described(XML);
+        let seconds = if part.contains("2 s") { "2" } else { "90" };
+        let how = format!("{place} {act}");
+        let ended = fmu.run("simulate", &["--timeout", seconds, "--memory", "1", "--csv", "out.csv"], &how);
+        assert_eq!(ended.status, *status, "{how}: {ended:?}");
+        assert!(ended.errors.contains(part), "{how}: {ended:?}");
+        assert!(!ended.out.contains("hello"), "the output is the command's alone: {ended:?}");
+        let error: Vec<_> = ended.errors.lines().filter(|l| l.starts_with("error: ")).collect();
+        assert_eq!(error.len(), usize::from(*status == 2), "{how}: {ended:?}");
+        if *status == 2 && !["close", "files"].contains(act) {
+            assert!(error[0].contains(told), "{how}: {ended:?}");
+        }
+    });
+}
+
+/// The checker names the call, or the processes that were left, and its other probes still run.
+#[test]
+fn check_survives() {
+    if library().is_none() {
+        return;
+    }
+    let cases = [
+        ("step exit", "L00", "fmi2DoStep", "with exit status 0"),
+        ("step terminate-group", "L00", "fmi2DoStep", "by SIGTERM"),
+        ("load crash", "B00", "loading the binary", "by SIGSEGV"),
+        ("instantiate hang", "L00", "fmi2Instantiate", "did not return within"),
+        ("instantiate kill-guard", "L00", "fmi2Instantiate", "ended the process that guards it"),
+        ("step allocate", "L00", "fmi2DoStep", "by SIGSEGV"),
+        ("instantiate close", "L00", "", ""),
+        ("load fork", "B08p", "the process", "left behind"),
+        ("step fork", "B08p", "the process", "left behind"),
+        ("free fork-many", "B08p", "the process", "left behind"),
+        ("step chdir", "B08p", "the working directory", "changed"),
+    ];
+    each(&cases, |(how, id, call, part)| {
+        let fmu = described(XML);
+        let seconds = if part.contains("return") { "3" } else { "90" };
+        let more = ["--only", "B00,L00,B08p", "--patience", seconds, "--memory", "1"];
+        let ended = fmu.run("check", &more, how);
+        let status = i32::from(*id != "B08p");
+        assert_eq!(ended.status, status, "{how}: {ended:?}");
+        let found = ended.out.lines().skip_while(|l| !l.trim_start().starts_with(&format!("{id} "))).take(5);
+        let found: Vec<_> = found.collect();
+        let found = found.join("\n");
+        assert!(found.contains("VIOLATED") && found.contains(call) && found.contains(part), "{how}: {ended:?}");
+    });
+}
+
+/// A process that stops itself looks like one that gets no processor, which is no fault; `--strict` counts it.
+#[test]
+fn a_library_that_stops_itself_is_not_determined() {
+    if library().is_none() {
+        return;
+    }
+    let ended = described(XML).run("check", &["--only", "L00", "--patience", "1", "--strict"], "instantiate stop");
+    let found = [
+        "L00    not determined",
+        "too slow here for a limit of 1 s",
+        "it was in fmi2Instantiate",
+        "What could be determined holds.",
+    ];
+    assert!(ended.status == 1 && found.iter().all(|part| ended.out.contains(part)), "{ended:?}");
+}
+
+/// A signal to the group of an FMU ends nobody else: here the shell that has started the command in its own group.
+#[test]
+fn the_group_of_the_caller_survives() {
+    if library().is_none() {
+        return;
+    }
+    for command in ["check", "simulate"] {
+        let fmu = described(XML);
+        let script = format!("\"$0\" {command} \"$1\" > /dev/null 2>&1; echo the shell saw $?");
+        let output = std::process::Command::new("sh")
+            .args(["-c", &script, env!("CARGO_BIN_EXE_fmu")])
+            .arg(fmu.fmu())
+            .env("HOSTILE", "step terminate-group")
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stdout);
+        let status = if command == "check" { 1 } else { 2 };
+        assert_eq!(said.trim(), format!("the shell saw {status}"), "{output:?}");
+    }
+}
+
+/// The FMU connects to this test, and with `--sandbox` it does not, or the command says that there is none.
+#[test]
+fn a_sandbox_has_no_network() {
+    if library().is_none() {
+        return;
+    }
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let how = format!("step network:{}", listener.local_addr().unwrap().port());
+    let open = described(XML).run("simulate", &[], &how);
+    assert!(open.errors.contains("exit status 7"), "{open:?}");
+    let sandbox = described(XML).run("simulate", &["--sandbox"], &how);
+    let refused = sandbox.status == 2 && sandbox.errors.contains("--sandbox is not available here: ");
+    assert!(sandbox.status == 0 || refused, "{sandbox:?}");
+    assert_eq!(sandbox.errors.lines().count(), usize::from(refused), "{sandbox:?}");
+}
