@@ -21,8 +21,8 @@ pub(super) const LONGEST_SUBSTEP: f64 = 100e-6;
 /// The same with such a voltage, which has kinks where a current changes its sign.
 const LONGEST_SUBSTEP_WITH_KINKS: f64 = 50e-6;
 
-/// Shortest integration step at a kink, as a share of the longest within the zone.
-const SHORTEST_SHARE: f64 = 0.01;
+/// Shortest integration step in s at a kink; where the zone asks for shorter ones, as long as those.
+const SHORTEST_AT_KINK: f64 = 0.5e-6;
 
 /// Largest electrical angle in rad that the rotor turns in an integration step.
 pub(super) const LARGEST_TURN: f64 = 0.25;
@@ -161,7 +161,7 @@ impl PmsmPlant {
                 sides = then;
             } else if kinks && let Some((share, then)) = sides.change(start, end, zone) {
                 if share < 0.99 {
-                    to_kink = Some(((h * share).max(SHORTEST_SHARE * within).min(h), then));
+                    to_kink = Some(((h * share).max(SHORTEST_AT_KINK.min(within)).min(h), then));
                     continue;
                 }
                 sides = then;
