@@ -93,9 +93,9 @@ def test_cycle(archives, standard):
     for name, energy in LOSSES.items():
         assert result[name].sum() * H / KWH == pytest.approx(energy, rel=0.01), name
     assert result["p_friction"].sum() * H / KWH == pytest.approx(LOSSES["p_friction"], rel=1e-4)
-    # No current flows at either end: nothing is stored. A step in which the rotor turns up to 0.25 rad leaves 6e-6.
+    # No current flows at either end: nothing is stored.
     balance = result["energy.in"][-1] - result["energy.mech"][-1] - result["energy.loss"][-1]
-    assert abs(balance) < 1e-5 * (DRAWN - RETURNED) * KWH
+    assert abs(balance) < 1e-7 * (DRAWN - RETURNED) * KWH
     expected = heated({name: result[name] for name in LOSSES})
     assert [result[name][-1] for name in temperatures] == pytest.approx(expected, abs=0.01)
     assert result["T_winding"].max() > COOLANT + 5.0

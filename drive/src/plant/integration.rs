@@ -27,6 +27,9 @@ const SHORTEST_AT_KINK: f64 = 0.5e-6;
 /// Largest electrical angle in rad that the rotor turns in an integration step.
 pub(super) const LARGEST_TURN: f64 = 0.25;
 
+/// The same with losses, whose energies are then in balance to 1e-7 over a drive cycle.
+const LARGEST_TURN_WITH_LOSSES: f64 = 0.0625;
+
 impl PmsmPlant {
     /// One integration step of `h` (s) under the voltage `u` (V), with the classical Runge-Kutta method ([`rk4`]): the
     /// flux linkage in stator axes, and the angle as the deviation from a motion at constant speed.
@@ -141,8 +144,8 @@ impl PmsmPlant {
             let w = (n_p * state.speed).abs();
             let (h, then) = match to_kink.take() {
                 Some((h, then)) => (h, Some(then)),
-                None if left <= longest && w * left <= LARGEST_TURN => (left, None),
-                None => (left / (left / longest.min(LARGEST_TURN / w) - 1e-9).ceil().max(1.0), None),
+                None if left <= longest && w * left <= LARGEST_TURN_WITH_LOSSES => (left, None),
+                None => (left / (left / longest.min(LARGEST_TURN_WITH_LOSSES / w) - 1e-9).ceil().max(1.0), None),
             };
             let between = apart.then(|| {
                 let shaft = Shaft::new(mechanics, self.inputs.tau_load, state.speed);
