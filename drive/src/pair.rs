@@ -48,13 +48,46 @@ impl Pair {
     /// Those of [`Model::advance`] of either model.
     #[inline]
     pub fn step(&mut self, h: f64) -> Result<(), Fault> {
-        self.plant.model.inputs.u = self.controller.out.u;
-        self.plant.model.inputs.enable = self.controller.out.enabled;
-        self.controller.model.inputs.measure(&self.plant.out);
+        self.exchange();
+        self.advance(h)?;
+        self.output();
+        Ok(())
+    }
+
+    /// Passes the outputs of each on to the other.
+    #[inline]
+    pub(crate) fn exchange(&mut self) {
+        let Self { plant, controller, .. } = self;
+        plant.model.inputs.apply(&controller.out);
+        controller.model.inputs.measure(plant.out.measured());
+    }
+
+    /// The same where the outputs are those of an earlier step.
+    #[inline]
+    pub(crate) fn exchange_present(&mut self) {
+        let Self { plant, controller, .. } = self;
+        plant.model.inputs.apply(controller.model.shown());
+        controller.model.inputs.measure(plant.model.measured());
+    }
+
+    /// Advances both by `h` (s); the outputs stay.
+    ///
+    /// # Errors
+    /// Those of [`Model::advance`] of either model.
+    #[inline]
+    pub(crate) fn advance(&mut self, h: f64) -> Result<(), Fault> {
         let step = Step { start: self.now, h };
-        self.plant.step(&step)?;
-        self.controller.step(&step)?;
+        self.plant.model.advance(&step)?;
+        self.controller.model.advance(&step)?;
         self.now = step.end();
         Ok(())
+    }
+
+    /// The outputs of both.
+    #[inline]
+    pub(crate) fn output(&mut self) {
+        let Self { plant, controller, now } = self;
+        plant.model.output(*now, &mut plant.out);
+        controller.model.output(*now, &mut controller.out);
     }
 }

@@ -104,9 +104,11 @@ impl Period {
     fn add(&mut self, powers: Powers, h: f64, ends: bool) {
         self.time += h;
         // A step of a whole period is taken unchanged, to the last bit.
-        self.mean = if self.time > h { self.mean.with(powers, h / self.time) } else { powers };
+        let mean = if self.time > h { self.mean.with(powers, h / self.time) } else { powers };
         if ends {
-            (self.last, self.time) = (self.mean, 0.0);
+            (self.last, self.time) = (mean, 0.0);
+        } else {
+            self.mean = mean;
         }
     }
 }
@@ -134,7 +136,7 @@ impl PmsmDrive {
         let Pair { plant, controller, .. } = &mut self.pair;
         controller.model.show();
         controller.model.output(now, &mut controller.out);
-        (plant.model.inputs.u, plant.model.inputs.enable) = (controller.out.u, controller.out.enabled);
+        plant.model.inputs.apply(&controller.out);
     }
 }
 
@@ -195,6 +197,7 @@ impl Model for PmsmDrive {
             return Err(Fault::value("the step size", format!("{} s", step.h), longest));
         }
         pair.now = step.start;
+        let mut outputs_are_present = true;
         while end.since(pair.now) > grid.width() {
             let (left, next) = (end.since(pair.now), to_next_sample(grid, pair.now));
             let before = pair.now;
@@ -202,8 +205,14 @@ impl Model for PmsmDrive {
             pair.plant.model.inputs.angle_shaft = inputs.angle_shaft + inputs.speed_shaft * before.since(step.start);
             let ends = next <= left + grid.width();
             let h = if ends { next } else { left };
-            pair.step(h)?;
-            period.add(pair.plant.out.powers, h, ends);
+            // Between the samples of a step, nobody reads the outputs.
+            if std::mem::take(&mut outputs_are_present) {
+                pair.exchange();
+            } else {
+                pair.exchange_present();
+            }
+            pair.advance(h)?;
+            period.add(pair.plant.model.powers(), h, ends);
             if pair.now == before {
                 return Err(Fault::new(format!(
                     "{} s after the start, T_s is below the resolution of time",
@@ -211,6 +220,7 @@ impl Model for PmsmDrive {
                 )));
             }
         }
+        pair.output();
         Ok(())
     }
 }
@@ -282,7 +292,7 @@ impl Events for PmsmDrive {
             (plant.model.inputs.u, plant.model.inputs.enable) = self.before;
             plant.model.observe(now, &mut plant.out);
             plant.model.inputs = shown;
-            controller.model.inputs.measure(&plant.out);
+            controller.model.inputs.measure(plant.out.measured());
             controller.model.sample()?;
             let PlantInputs { u, enable, .. } = plant.model.inputs;
             self.before = (u, enable);

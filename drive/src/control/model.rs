@@ -40,6 +40,12 @@ pub struct SensorlessController {
 }
 
 impl SensorlessController {
+    /// The outputs, the results of the last sample but one.
+    #[inline]
+    pub(crate) fn shown(&self) -> &ControllerOutputs {
+        &self.state.shown
+    }
+
     /// One sample of the controller: currents in, voltage references out. If a lost estimator makes the state
     /// non-finite, the controller restarts at rest from its last angle and reports the loss.
     fn compute(&mut self) -> ControllerOutputs {

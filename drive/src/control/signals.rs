@@ -2,7 +2,7 @@
 
 use crate::frame::{DqHat, Phases};
 use crate::math::all_finite;
-use crate::plant::signals::PlantOutputs;
+use crate::plant::signals::Measured;
 use serde::{Deserialize, Serialize};
 
 /// Inputs, read at the sample instants.
@@ -27,7 +27,7 @@ pub struct ControllerInputs {
 impl ControllerInputs {
     /// What the sensors at the plant measure.
     #[inline]
-    pub fn measure(&mut self, plant: &PlantOutputs) {
+    pub fn measure(&mut self, plant: Measured) {
         (self.i, self.theta_meas, self.speed_meas) = (plant.i, plant.theta_e, plant.speed);
     }
 

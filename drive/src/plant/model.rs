@@ -10,7 +10,7 @@ use crate::plant::losses::{self, Losses, efficiency, switching};
 use crate::plant::machine::{self, Machine};
 use crate::plant::power::Energy;
 use crate::plant::power::Powers;
-use crate::plant::signals::{PlantInputs, PlantOutputs};
+use crate::plant::signals::{Measured, PlantInputs, PlantOutputs};
 use crate::plant::state::{Instant, State};
 use crate::plant::tables::{PlantParameters, TABLE};
 use crate::plant::thermal::warm::Warm;
@@ -133,6 +133,21 @@ impl PmsmPlant {
             temperatures,
             heat: self.heat(inputs, &temperatures, &powers.losses),
         }
+    }
+
+    /// Mean powers over the last step.
+    #[inline]
+    pub(crate) fn powers(&self) -> Powers {
+        self.powers
+    }
+
+    /// What the sensors of a controller measure: the same as in the outputs, to the last bit.
+    #[inline]
+    pub(crate) fn measured(&self) -> Measured {
+        let Instant { i, speed, angle, axis, .. } = self.reached();
+        let i = if self.parameters.iron.is_none() { i } else { i + self.by_iron };
+        let theta_e = wrap(angle * f64::from(self.parameters.motor.n_p));
+        Measured { i: Phases::from_stator(axis.to_stator(i)), theta_e, speed }
     }
 
     /// Stator currents in A.

@@ -1,5 +1,6 @@
 //! Inputs and outputs of the plant.
 
+use crate::control::signals::ControllerOutputs;
 use crate::frame::Phases;
 use crate::plant::losses::efficiency;
 use crate::plant::power::{Energy, Powers};
@@ -34,6 +35,12 @@ impl Default for PlantInputs {
 }
 
 impl PlantInputs {
+    /// The voltages and the gates that the controller asks for.
+    #[inline]
+    pub fn apply(&mut self, controller: &ControllerOutputs) {
+        (self.u, self.enable) = (controller.u, controller.enabled);
+    }
+
     /// These inputs with the change `along` of the continuous ones.
     pub fn changing(&self, along: &Self) -> PlantInputs<Dual> {
         let (u, v) = (&self.u, &along.u);
@@ -80,7 +87,24 @@ pub struct PlantOutputs<S = f64> {
     pub heat: Heat<S>,
 }
 
+/// What the sensors of a controller measure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// Stator currents in A.
+    pub i: Phases,
+    /// Electrical angle in rad, in (-pi, pi].
+    pub theta_e: f64,
+    /// Mechanical speed in rad/s.
+    pub speed: f64,
+}
+
 impl PlantOutputs {
+    /// What sensors measure of these outputs.
+    #[inline]
+    pub fn measured(&self) -> Measured {
+        Measured { i: self.i, theta_e: self.theta_e, speed: self.speed }
+    }
+
     /// These outputs with other `powers` and their `heat`.
     pub fn with(&self, powers: Powers, heat: Heat) -> Self {
         Self { powers, heat, efficiency: efficiency(powers.p_in, powers.p_mech), ..self.clone() }
