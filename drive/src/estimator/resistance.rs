@@ -109,7 +109,8 @@ impl Resistance {
         self.w_f += T_s * FILTER * (w - self.w_f);
         let Some(speed_ref) = sample.speed_ref else { return Adapted { c_1, v_q: 0.0 } };
         let w_m = self.w_f / n_p;
-        let g = exp(-w_m * w_m);
+        // Beyond 4 rad/s, 1e-7 and less.
+        let g = if w_m.abs() < 4.0 { exp(-w_m * w_m) } else { 0.0 };
         let rest = speed_ref.abs() < STANDSTILL;
         let v_q = if rest || speed_ref * i.q() > 0.0 { par.k_a * motor.R_s * g * i.q() } else { 0.0 };
         if rest {
