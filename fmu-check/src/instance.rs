@@ -3,7 +3,7 @@
 use crate::encoding::show;
 use crate::session::{ENDED, NotDetermined, Session};
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Buffer, Handle, Raw, SavedState, Simple, StepStatus};
+use fmu_import::raw::{Arguments, Buffer, Handle, Interface, Raw, SavedState, Simple, StepStatus};
 use model_description::{FmiVersion, ModelVariable};
 use std::cell::Cell;
 
@@ -23,7 +23,11 @@ pub(super) struct Instance<'b> {
 impl Session {
     /// Instantiates; `None` for NULL.
     pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<Instance<'_>>, NotDetermined> {
-        self.record_call(&format!("{}({:?})", self.instantiation(), arguments.name.as_deref().unwrap_or_default()));
+        let made = match (self.description.version, arguments.interface) {
+            (FmiVersion::V3, Interface::ModelExchange) => "fmi3InstantiateModelExchange",
+            _ => self.instantiation(),
+        };
+        self.record_call(&format!("{made}({:?})", arguments.name.as_deref().unwrap_or_default()));
         let handle = self.raw.instantiate(arguments).map_err(NotDetermined)?;
         self.record_result(&if handle.is_some() { "an instance" } else { "NULL" });
         Ok(handle.map(|handle| Instance::new(self, handle, arguments.event_mode)))

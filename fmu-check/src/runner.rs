@@ -365,7 +365,7 @@ impl Runner {
             Outcome::OutOfTime => Err(OUT_OF_TIME.into()),
             Outcome::Slow => Err(format!(
                 "the probe is too slow here for a limit of {limit} s for each call; it was in {} (see --patience)",
-                call.trim_start_matches(['C', 'P']).trim()
+                call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
             Outcome::End(End::Stopped) => Ok((format!("did not return within {limit} s"), call.into())),
             Outcome::End(end) => Ok((end.describe(), call.into())),
@@ -439,6 +439,15 @@ fn judge(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Optio
         }
     }
     for (how, call) in crashes {
+        if let Some((level, call)) = [(Level::Should, "S "), (Level::Hard, "H ")]
+            .iter()
+            .find_map(|(level, mark)| Some((*level, call.strip_prefix(mark)?)))
+        {
+            lower = Some(lower.map_or(level, |other| other.min(level)));
+            lesser.push(format!("{call} {how}"));
+            fatal = true;
+            continue;
+        }
         if let Some(call) = call.strip_prefix("C ") {
             violated.push(format!("{call} {how}"));
             fatal = true;

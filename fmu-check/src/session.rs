@@ -91,6 +91,8 @@ pub(super) struct Session {
     lines: RefCell<File>,
     journal: RefCell<File>,
     preparing: Cell<bool>,
+    /// The level of a crash, if it is lower than that of the check.
+    lower: Cell<Option<Level>>,
     pub(super) silent: Cell<bool>,
     log: RefCell<File>,
     trace: bool,
@@ -139,6 +141,7 @@ impl Session {
             lines: RefCell::new(lines),
             journal: RefCell::new(journal),
             preparing: Cell::new(false),
+            lower: Cell::new(None),
             silent: Cell::new(false),
             log: RefCell::new(log),
             trace: args.trace,
@@ -179,6 +182,7 @@ impl Session {
             lines: RefCell::new(tempfile::tempfile().map_err(lost)?),
             journal: RefCell::new(journal),
             preparing: Cell::new(false),
+            lower: Cell::new(None),
             silent: Cell::new(true),
             log: RefCell::new(tempfile::tempfile().map_err(lost)?),
             trace: false,
@@ -283,7 +287,12 @@ impl Session {
             self.note_call(&format!("\n{call}"));
         }
         let mut journal = self.journal.borrow_mut();
-        let mark = if self.preparing.get() { "P" } else { "C" };
+        let mark = match (self.preparing.get(), self.lower.get()) {
+            (true, _) => "P",
+            (_, Some(Level::Should)) => "S",
+            (_, Some(Level::Hard)) => "H",
+            _ => "C",
+        };
         let _ = journal.seek(SeekFrom::Start(0));
         let _ = journal.write_all(format!("{mark} {call}\n").as_bytes());
         let end = journal.stream_position().unwrap_or(0);
@@ -315,6 +324,14 @@ impl Session {
         self.shown.set(Instant::now());
         let mut journal = self.journal.borrow_mut();
         let _ = journal.seek(SeekFrom::End(0)).and_then(|_| writeln!(journal, "and others"));
+    }
+
+    /// Makes calls whose crash is of a lower level than the check, because the standard leaves open what they do.
+    pub(super) fn lenient<T>(&self, level: Level, work: impl FnOnce() -> T) -> T {
+        let before = self.lower.replace(Some(level));
+        let result = work();
+        self.lower.set(before);
+        result
     }
 
     /// Makes many calls with one journal entry.

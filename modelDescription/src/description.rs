@@ -106,6 +106,8 @@ pub struct Interface {
     pub model_identifier: String,
     /// Every attribute except the model identifier, as written.
     pub attributes: Vec<(String, String)>,
+    /// The version that spells them.
+    pub version: FmiVersion,
     /// Line of the element.
     pub line: usize,
 }
@@ -126,13 +128,20 @@ impl Interface {
 
     /// The state can be read and set.
     pub fn can_get_and_set_state(&self) -> bool {
-        // The standards spell it differently: FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2.
-        self.flag("canGetAndSetFMUstate") || self.flag("canGetAndSetFMUState")
+        self.flag(self.of("canGetAndSetFMUstate", "canGetAndSetFMUState"))
     }
 
     /// The state can be serialized.
     pub fn can_serialize_state(&self) -> bool {
-        self.flag("canSerializeFMUstate") || self.flag("canSerializeFMUState")
+        self.flag(self.of("canSerializeFMUstate", "canSerializeFMUState"))
+    }
+
+    /// The standards spell some capabilities differently: FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2.
+    const fn of<'a>(&self, two: &'a str, three: &'a str) -> &'a str {
+        match self.version {
+            FmiVersion::V2 => two,
+            FmiVersion::V3 => three,
+        }
     }
 
     /// The FMU needs another program to run.

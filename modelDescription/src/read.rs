@@ -52,9 +52,9 @@ pub fn read_element(root: &Element) -> Result<ModelDescription, Error> {
         generation_tool: owned(root, "generationTool"),
         generation_date_and_time: owned(root, "generationDateAndTime"),
         structured_names: root.get("variableNamingConvention") == Some("structured"),
-        co_simulation: interface(root, "CoSimulation")?,
-        model_exchange: interface(root, "ModelExchange")?,
-        scheduled_execution: interface(root, "ScheduledExecution")?,
+        co_simulation: interface(root, "CoSimulation", version)?,
+        model_exchange: interface(root, "ModelExchange", version)?,
+        scheduled_execution: interface(root, "ScheduledExecution", version)?,
         number_of_event_indicators: integer(root, "numberOfEventIndicators")?,
         default_experiment: root.child("DefaultExperiment").map_or(Ok(Experiment::default()), experiment)?,
         units: types::units(root)?,
@@ -115,7 +115,7 @@ fn element<'a>(parent: &'a Element, name: &str) -> Result<&'a Element, Error> {
     parent.child(name).ok_or_else(missing)
 }
 
-fn interface(root: &Element, name: &str) -> Result<Option<Interface>, Error> {
+fn interface(root: &Element, name: &str, version: FmiVersion) -> Result<Option<Interface>, Error> {
     const IDENTIFIER: &str = "modelIdentifier";
     let Some(element) = root.child(name) else { return Ok(None) };
     for (name, _) in &element.attributes {
@@ -127,6 +127,7 @@ fn interface(root: &Element, name: &str) -> Result<Option<Interface>, Error> {
     Ok(Some(Interface {
         model_identifier: required(element, IDENTIFIER)?.into(),
         attributes: element.attributes.iter().filter(|(name, _)| name != IDENTIFIER).cloned().collect(),
+        version,
         line: element.line,
     }))
 }

@@ -178,6 +178,39 @@ fn rounding_is_no_must() {
     assert_eq!(at(&report, Level::Must), ["T05"], "{}", told(&report));
 }
 
+/// Logging without a callback is undefined (FMI 3.0.2, 2.3.1), and so is a step of -1: a crash there is hard.
+#[test]
+fn logging_to_nowhere_is_no_must() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(report) = small(dir.path(), 3, "L01b", &["L01b"]) else { return };
+    assert_eq!((at(&report, Level::Hard), report.fatal()), (vec!["L01b"], vec!["L01b"]), "{}", told(&report));
+}
+
+/// A state without the time does not lead back. That is one must, and no matter of noSetFMUStatePriorToCurrentPoint or of the
+/// variables: the time of the next step is an argument.
+#[test]
+fn a_state_without_the_time() {
+    let dir = tempfile::tempdir().unwrap();
+    for version in [2, 3] {
+        let Some(report) = small(dir.path(), version, "TIME_STAYS", &["F02a", "F02b", "T05"]) else { return };
+        assert_eq!(violated(&report), ["F02a"], "{}", told(&report));
+        assert!(matches!(verdict(&report, "F02b"), Verdict::Pass(_)), "{:?}", verdict(&report, "F02b"));
+        assert!(matches!(verdict(&report, "T05"), Verdict::NotDetermined(_)), "{:?}", verdict(&report, "T05"));
+    }
+}
+
+/// The schema of FMI 3.0 allows any attribute of an interface (fmi3InterfaceType.xsd of 3.0.2). A misspelled flag is false.
+#[test]
+fn a_misspelled_flag_is_false() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(binary) = compile(dir.path(), 3, "F02", &[]) else { return };
+    let xml = include_str!("fmu3.xml").replace("FMUState=", "FMUstate=");
+    let report = check(&pack_with(dir.path(), "flag", &xml, &binary), &["xml", "state"]);
+    assert_eq!((at(&report, Level::Must), at(&report, Level::Should)), (vec![], vec!["X01s"]), "{}", told(&report));
+    assert!(told(&report).contains("canSerializeFMUstate"), "{}", told(&report));
+    assert!(matches!(verdict(&report, "F02a"), Verdict::NotApplicable(_)), "{:?}", verdict(&report, "F02a"));
+}
+
 /// An FMU that takes the importer down with it stands out.
 #[test]
 fn a_crash_stands_out() {

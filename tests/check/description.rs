@@ -30,7 +30,7 @@ fn faults_of_fmi_2() {
             (&["X01a"], "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", ""),
             (&["X01a"], "encoding=\"UTF-8\"", "encoding=\"latin1\""),
             (&["X01a"], "</ModelStructure>", ""),
-            (&["X01b"], "canGetAndSetFMUstate", "canGetAndSetFMUState"),
+            (&["X01b", "X08"], "canGetAndSetFMUstate", "canGetAndSetFMUState"),
             (&["X01b"], "<Real start=\"0\"/>", "<Real start=\"0\" color=\"red\"/>"),
             (&["X01b"], "<DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"/>", "<Surprise/>"),
             (&["X02a"], "fmiVersion=\"2.0\"", "fmiVersion=\"2.0.5\""),
@@ -99,7 +99,7 @@ fn faults_of_fmi_3() {
     each(
         &xml,
         &[
-            (&["X01b"], "canGetAndSetFMUState", "canGetAndSetFMUstate"),
+            (&["X01s", "X08"], "canGetAndSetFMUState", "canGetAndSetFMUstate"),
             (&["X02a"], "fmiVersion=\"3.0\"", "fmiVersion=\"3.0.2\""),
             (
                 &["X08"],

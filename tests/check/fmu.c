@@ -488,6 +488,10 @@ EXPORT int fmi2SetFMUstate(void *c, void *state) {
     int32_t n = f->data.n;
     f->data = *(Data *)state;
     f->data.n = n;
+#elif defined FAULT_TIME_STAYS
+    double time = f->data.time;
+    f->data = *(Data *)state;
+    f->data.time = time;
 #else
     f->data = *(Data *)state;
 #endif

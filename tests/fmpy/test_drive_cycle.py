@@ -33,7 +33,8 @@ PARAMETERS |= {f"plant.thermal.G_{name}": value for name, value in CONDUCTANCES.
 PARAMETERS |= {"controller.T_s": 1e-4, "controller.limit.i": I_MAX, "controller.limit.i_q": I_MAX}
 PARAMETERS |= {"u_dc": U_DC, "T_coolant": COOLANT, "plant.thermal.T_start": COOLANT, "controller.zero_speed.i_0": 0.0}
 INTEGERS = {"controller.estimator": SENSORED, "plant.thermal.mode": NETWORK}
-BOOLEANS = {name: value for name, value in DRIVE.items() if value is True} | {"controller.weakening.use": True}
+BOOLEANS = {name: value for name, value in DRIVE.items() if value is True}
+BOOLEANS |= {"controller.weakening.use": True, "controller.current.active_resistance": False}
 
 
 def run(archive, speed, torque, names, correct):

@@ -1,9 +1,10 @@
 //! From a machine and bandwidths to parameter values of the FMUs.
 //!
-//! - [`motor`]: the TOML file of a machine; [`rules`]: how values follow from it; [`check`](mod@check): whether the models
-//!   have such variables; [`Tuned::pair`](rules::Tuned::pair): the drive with these values, natively.
+//! - [`motor`]: the TOML file of a machine; [`rules`]: how values follow from it; [`iron`]: iron loss from a drag test;
+//!   [`check`](mod@check): whether the models have such variables; [`Tuned::pair`](rules::Tuned::pair): the drive with these values, natively.
 
 pub mod check;
+pub mod iron;
 pub mod motor;
 mod native;
 pub mod rules;

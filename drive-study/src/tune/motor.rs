@@ -37,6 +37,8 @@ pub struct Data {
     pub bandwidth: Bandwidth,
     /// Saturation of the plant.
     pub saturation: Option<Saturation>,
+    /// Iron loss of the plant.
+    pub iron: Option<Iron>,
     /// Overrides of what the rules choose.
     #[serde(default)]
     pub control: Control,
@@ -116,6 +118,14 @@ pub struct Saturation {
     pub s_3: Option<Number>,
     /// Cross-saturation coefficient.
     pub s_dq: Option<Number>,
+}
+
+/// Iron loss of the plant.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Iron {
+    /// Drag test: pairs of mechanical speed in rad/s and iron loss in W.
+    pub p: Spanned<Vec<[f64; 2]>>,
 }
 
 /// Overrides of what the rules choose.

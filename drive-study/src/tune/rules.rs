@@ -15,6 +15,7 @@
 //! to meet it.
 
 use super::check::check;
+use super::iron;
 use super::motor::{Data, MotorFile, Number};
 use anyhow::{Result, bail};
 use drive::control::envelope::{Envelope, Warm};
@@ -84,13 +85,14 @@ fn real(name: &'static str, x: f64, rule: &str) -> Setting {
 /// Inconsistent values, with their position and a remedy.
 pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     let data = &motor.data;
-    let plant = plant(data);
+    let mut plant = plant(data);
     let estimator = estimator(motor)?;
     let mut notes = Vec::new();
     let mut controller = common(data, &estimator);
     // Check the given values before computing anything from them.
     check(&plant, &controller, motor)?;
     fits(motor, &mut notes)?;
+    plant.extend(iron::fit(motor)?);
     if estimator == "Rasmussen" {
         controller.extend(flux_observer(motor, &mut notes)?);
     } else {

@@ -150,7 +150,8 @@ impl Model for SensorlessController {
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
-        let k = motor.torque_constant();
+        // Finite, so that no current is no torque with any psi_M.
+        let k = motor.torque_constant().min(f64::MAX);
         let observes_flux = estimator.class() == Class::FluxObserver;
         let tau = if observes_flux { limit.tau } else { max_torque(motor, limit, current.mtpa) };
         let weakening = WeakeningGains::new(&self.parameters, tau, current.mtpa && !observes_flux);

@@ -21,11 +21,14 @@ pub(super) const LONGEST_SUBSTEP: f64 = 100e-6;
 /// The same with such a voltage, which has kinks where a current changes its sign.
 const LONGEST_SUBSTEP_WITH_KINKS: f64 = 50e-6;
 
-/// Shortest integration step at a kink, as a share of the longest within the zone.
-const SHORTEST_SHARE: f64 = 0.01;
+/// Shortest integration step in s at a kink; where the zone asks for shorter ones, as long as those.
+const SHORTEST_AT_KINK: f64 = 0.5e-6;
 
 /// Largest electrical angle in rad that the rotor turns in an integration step.
 pub(super) const LARGEST_TURN: f64 = 0.25;
+
+/// The same with losses, whose energies are then in balance to 1e-7 over a drive cycle.
+const LARGEST_TURN_WITH_LOSSES: f64 = 0.0625;
 
 impl PmsmPlant {
     /// One integration step of `h` (s) under the voltage `u` (V), with the classical Runge-Kutta method ([`rk4`]): the
@@ -141,8 +144,8 @@ impl PmsmPlant {
             let w = (n_p * state.speed).abs();
             let (h, then) = match to_kink.take() {
                 Some((h, then)) => (h, Some(then)),
-                None if left <= longest && w * left <= LARGEST_TURN => (left, None),
-                None => (left / (left / longest.min(LARGEST_TURN / w) - 1e-9).ceil().max(1.0), None),
+                None if left <= longest && w * left <= LARGEST_TURN_WITH_LOSSES => (left, None),
+                None => (left / (left / longest.min(LARGEST_TURN_WITH_LOSSES / w) - 1e-9).ceil().max(1.0), None),
             };
             let between = apart.then(|| {
                 let shaft = Shaft::new(mechanics, self.inputs.tau_load, state.speed);
@@ -161,7 +164,7 @@ impl PmsmPlant {
                 sides = then;
             } else if kinks && let Some((share, then)) = sides.change(start, end, zone) {
                 if share < 0.99 {
-                    to_kink = Some(((h * share).max(SHORTEST_SHARE * within).min(h), then));
+                    to_kink = Some(((h * share).max(SHORTEST_AT_KINK.min(within)).min(h), then));
                     continue;
                 }
                 sides = then;

@@ -52,10 +52,26 @@ fn walk(element: &Element, parent: &str, rules: &'static [Rule], findings: &mut 
     }
 }
 
-fn attributes(element: &Element, rule: &Rule, findings: &mut Vec<String>) {
+/// The attributes of the interfaces of FMI 3.0 that the standard does not have, although its schema allows any.
+pub(super) fn unknown_capabilities(root: &Element) -> Vec<String> {
+    let mut findings = Vec::new();
+    for element in
+        root.children.iter().filter(|e| ["ModelExchange", "CoSimulation", "ScheduledExecution"].contains(&&*e.name))
+    {
+        if let Some(rule) = find(V3, &root.name, &element.name) {
+            unknown(element, &words(rule), &mut findings);
+        }
+    }
+    findings
+}
+
+fn words(rule: &Rule) -> Vec<&'static str> {
     let words = rule.attributes.split_whitespace();
-    let all: Vec<&str> =
-        words.flat_map(|w| if w.starts_with('@') { expand(w).split_whitespace().collect() } else { vec![w] }).collect();
+    words.flat_map(|w| if w.starts_with('@') { expand(w).split_whitespace().collect() } else { vec![w] }).collect()
+}
+
+fn attributes(element: &Element, rule: &Rule, findings: &mut Vec<String>) {
+    let all = words(rule);
     let at = format!("line {}: <{}>", element.line, element.name);
     for word in &all {
         let (name, form) = word.split_once(':').unwrap_or((word, "*"));
@@ -67,10 +83,17 @@ fn attributes(element: &Element, rule: &Rule, findings: &mut Vec<String>) {
             _ => {}
         }
     }
+    if !all.contains(&"*") {
+        unknown(element, &all, findings);
+    }
+}
+
+fn unknown(element: &Element, all: &[&str], findings: &mut Vec<String>) {
     for (name, _) in &element.attributes {
         // Names with a prefix belong to other standards.
         let known = name.contains(':') || name == "xmlns" || all.iter().any(|w| w.split(':').next() == Some(name));
         if !known {
+            let at = format!("line {}: <{}>", element.line, element.name);
             findings.push(format!("{at} has an attribute {name} that the standard does not know"));
         }
     }

@@ -3,7 +3,7 @@
 //! One line per element: its path from the root, its attributes with their forms (`!` required), its children in order.
 //! Forms: `s` text, `b` boolean, `i` integer, `u` unsigned integer, `d` number, `t` date and time, `l` list of unsigned
 //! integers, `w` words, `c` color, `*` anything.
-//! `~` before the children: their order is free. Facts of FMI 2.0.5, 2.2 and FMI 3.0.2, 2.4 in our own words.
+//! A lone `*` allows any other attribute. `~` before the children: their order is free. Facts of FMI 2.0.5, 2.2 and FMI 3.0.2, 2.4 in our own words.
 
 /// An element of the standard.
 #[derive(Clone, Copy, Debug)]
@@ -67,9 +67,9 @@ const CLOCK: &str = "canBeDeactivated:b priority:u intervalVariability:s! interv
 pub(super) const V3: &[Rule] = &[
     rule("fmiModelDescription", "fmiVersion:s! modelName:s! instantiationToken:s! description:s author:s version:s copyright:s license:s generationTool:s generationDateAndTime:t variableNamingConvention:s",
         "ModelExchange? CoSimulation? ScheduledExecution? UnitDefinitions? TypeDefinitions? LogCategories? DefaultExperiment? ModelVariables! ModelStructure! Annotations?"),
-    rule("ModelExchange", "@support needsCompletedIntegratorStep:b providesEvaluateDiscreteStates:b", "Annotations?"),
-    rule("CoSimulation", "@support canHandleVariableCommunicationStepSize:b fixedInternalStepSize:d maxOutputDerivativeOrder:u recommendedIntermediateInputSmoothness:i providesIntermediateUpdate:b mightReturnEarlyFromDoStep:b canReturnEarlyAfterIntermediateUpdate:b hasEventMode:b providesEvaluateDiscreteStates:b", "Annotations?"),
-    rule("ScheduledExecution", "@support", "Annotations?"),
+    rule("ModelExchange", "@support needsCompletedIntegratorStep:b providesEvaluateDiscreteStates:b *", "Annotations?"),
+    rule("CoSimulation", "@support canHandleVariableCommunicationStepSize:b fixedInternalStepSize:d maxOutputDerivativeOrder:u recommendedIntermediateInputSmoothness:i providesIntermediateUpdate:b mightReturnEarlyFromDoStep:b canReturnEarlyAfterIntermediateUpdate:b hasEventMode:b providesEvaluateDiscreteStates:b *", "Annotations?"),
+    rule("ScheduledExecution", "@support *", "Annotations?"),
     rule("UnitDefinitions", "", "Unit!"),
     rule("Unit", "name:s!", "BaseUnit? DisplayUnit Annotations?"),
     rule("BaseUnit", "kg:i m:i s:i A:i K:i mol:i cd:i rad:i factor:d offset:d", ""),

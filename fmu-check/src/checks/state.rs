@@ -6,7 +6,7 @@ use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::SavedState;
-use model_description::{CoSimulation, ModelVariable};
+use model_description::{Causality, CoSimulation, ModelVariable};
 
 const STATE: &str = "2.0.5, 2.1.8; 3.0.2, 2.2.7.4";
 
@@ -127,7 +127,9 @@ fn rerun_from_state(session: &Session) -> Result<(), NotDetermined> {
 fn variables(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     let (instance, h) = (running_instance(session)?, session.h());
-    let all: Vec<&ModelVariable> = session.numeric().filter(|v| v.clocks.is_empty()).collect();
+    // The time of the next step is an argument; F02a tells whether it is accepted.
+    let comparable = |v: &&ModelVariable| v.clocks.is_empty() && v.causality != Causality::Independent;
+    let all: Vec<&ModelVariable> = session.numeric().filter(comparable).collect();
     let (state, time) = (instance.save()?, instance.time.get());
     let before = instance.snapshot(&all)?;
     instance.change_inputs(1)?;

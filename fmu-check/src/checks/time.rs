@@ -4,6 +4,7 @@ use super::derivatives::{input_derivatives, output_derivatives, slopes};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
+use crate::trajectory::difference;
 use fmu_import::Status;
 use fmu_import::raw::StepStatus;
 use model_description::{BaseType, Causality, CoSimulation};
@@ -346,6 +347,16 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
     if !saves {
         session.note("the FMU does not save states");
         return Ok(());
+    }
+    // A state that does not lead back without the flag is no matter of the flag: F02a is about that.
+    let (here, time) = (unrestricted.save()?, unrestricted.time.get());
+    let first = unrestricted.run(10, session.h())?;
+    unrestricted.restore(here, time)?;
+    let leads_back = unrestricted.run(10, session.h()).is_ok_and(|again| {
+        difference(&session.watched(), &first, &again).is_none_or(|d| d.largest <= session.tolerance())
+    });
+    if !leads_back {
+        return Err(NotDetermined("without the flag, a state that was set does not lead back either (F02a)".into()));
     }
     let (here, time) = (restricted.save()?, restricted.time.get());
     let first = run(&restricted, 10, false)?;

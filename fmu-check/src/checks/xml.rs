@@ -9,7 +9,8 @@ use model_description::{Element, FmiVersion, Interface, ModelDescription};
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "X01a", requirement: "modelDescription.xml is well-formed XML in UTF-8 and declares UTF-8 in its first line.", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, tried: "Parses the file and reads its first line.", fix: "Begin with <?xml version=\"1.0\" encoding=\"UTF-8\"?> and write UTF-8.", run: Run::File(well_formed) },
     Check { id: "X01m", requirement: "modelDescription.xml does not start with a byte order mark, which some importers cannot read.", clause: "hardening", levels: Levels::HARD, tried: "Reads the first three bytes.", fix: "Write UTF-8 without a mark; in .NET, new UTF8Encoding(false).", run: Run::File(no_mark) },
-    Check { id: "X01b", requirement: "Elements and attributes are those of the standard, in its order and with values of its types; capability flags are spelled as in the standard.", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, tried: "Compares elements, attributes and values with rules that have the content of the official schema.", fix: "Validate the file against the XSD of the standard while you develop, and correct the line that is named.", run: Run::File(valid) },
+    Check { id: "X01b", requirement: "Elements and attributes are those of the standard, in its order and with values of its types.", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, tried: "Compares elements, attributes and values with rules that have the content of the official schema.", fix: "Validate the file against the XSD of the standard while you develop, and correct the line that is named.", run: Run::File(valid) },
+    Check { id: "X01s", requirement: "Capability flags are spelled as in the standard: its schema allows other attributes there, but importers take a misspelled flag for false.", clause: "3.0.2, 2.4.2", levels: Levels(None, Some(Level::Should)), tried: "Compares the attributes of the interfaces with those of the standard.", fix: "Correct the spelling; what is the tool's own belongs into annotations.", run: Run::File(spelling) },
     Check { id: "X02a", requirement: "fmiVersion is 2.0 or 3.0, without a patch release.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::MUST, tried: "Reads the attribute fmiVersion.", fix: "Write 2.0 or 3.0.", run: Run::File(version) },
     Check { id: "X05", requirement: "generationDateAndTime has the form YYYY-MM-DDThh:mm:ssZ.", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::SHOULD, tried: "Reads the attribute generationDateAndTime.", fix: "Write UTC with a Z, for example 2026-01-02T03:04:05Z, without fractions and offset.", run: Run::File(date) },
     Check { id: "X06", requirement: "The attributes description, author, version, copyright, license and generationTool are given.", clause: "fmi-guides, 3", levels: Levels::SHOULD, tried: "Reads the attributes of the root element.", fix: "Let users of the exporter give these texts, and write them.", run: Run::File(metadata) },
@@ -74,6 +75,10 @@ fn valid(fmu: &FmuFile) -> Verdict {
         }
         findings
     })
+}
+
+fn spelling(fmu: &FmuFile) -> Verdict {
+    with_root(fmu, schema::unknown_capabilities)
 }
 
 fn version(fmu: &FmuFile) -> Verdict {

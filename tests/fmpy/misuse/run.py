@@ -8,8 +8,8 @@ SWING = 20.0  # V, A, rad/s or N.m: enough to turn the rotor and to move the est
 
 
 def excite(it, k):
-    """Sets every real input but the DC-link voltage to its own sine at step `k`."""
-    inputs = [v for v in it.fmu.of("input") if v.name != "u_dc"]
+    """Sets every real input but the DC-link voltage and the temperatures to its own sine at step `k`."""
+    inputs = [v for v in it.fmu.of("input") if v.name != "u_dc" and not v.name.startswith("T_")]
     it.reals("Set", inputs, [SWING * math.sin(0.01 * k * (n + 2) + n) for n in range(len(inputs))])
 
 

@@ -288,7 +288,7 @@ pub const THERMAL_INPUTS: &Table<ThermalInputs> = &Table::new(
             I::input("T_coolant", &KELVIN, "Temperature of the coolant; read only with thermal.mode = Network", |i| {
                 &mut i.coolant
             })
-            .above(0.0)
+            .at_least(0.0)
             .nominal(300.0),
             I::input(
                 "T_winding_imposed",
@@ -296,7 +296,7 @@ pub const THERMAL_INPUTS: &Table<ThermalInputs> = &Table::new(
                 "Temperature of the winding; read only with thermal.mode = Imposed",
                 |i| &mut i.imposed.winding,
             )
-            .above(0.0)
+            .at_least(0.0)
             .nominal(300.0),
             I::input(
                 "T_stator_imposed",
@@ -304,7 +304,7 @@ pub const THERMAL_INPUTS: &Table<ThermalInputs> = &Table::new(
                 "Temperature of the stator iron; read only with thermal.mode = Imposed",
                 |i| &mut i.imposed.stator,
             )
-            .above(0.0)
+            .at_least(0.0)
             .nominal(300.0),
             I::input(
                 "T_magnet_imposed",
@@ -312,7 +312,7 @@ pub const THERMAL_INPUTS: &Table<ThermalInputs> = &Table::new(
                 "Temperature of the magnets; read only with thermal.mode = Imposed",
                 |i| &mut i.imposed.magnet,
             )
-            .above(0.0)
+            .at_least(0.0)
             .nominal(300.0),
             I::input(
                 "T_inverter_imposed",
@@ -320,7 +320,7 @@ pub const THERMAL_INPUTS: &Table<ThermalInputs> = &Table::new(
                 "Temperature of the inverter; read only with thermal.mode = Imposed",
                 |i| &mut i.imposed.inverter,
             )
-            .above(0.0)
+            .at_least(0.0)
             .nominal(300.0),
         ]
     },

@@ -198,6 +198,8 @@ def set_and_get_again(fmu):
             real = v.type == REAL[fmu.version]
             if real:
                 value = 0.7 * float(v.start) or 0.1
+                if v.min is not None and value < float(v.min):
+                    value = 1.3 * float(v.start)
             else:
                 value = {"true": 1, "false": 0}.get(v.start) if v.type == "Boolean" else int(v.start)
             assert it.set(v.name, value) == OK, (v.name, it.messages)
