@@ -12,8 +12,9 @@ use crate::PmsmPlant;
 #[cfg(doc)]
 use crate::SensorlessController;
 use crate::control::signals::ControllerOutputs;
-use crate::control::tables::{self, ENABLED, LATER_OUTPUTS, LIMITED, LOCK_LOST};
+use crate::control::tables::{self, ADAPTATION_OUTPUTS, ENABLED, LATER_OUTPUTS, LIMITED, LOCK_LOST};
 use crate::control::weakening::WEAKENING;
+use crate::estimator::resistance::ADAPTATION;
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
@@ -157,7 +158,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 8;
+    const STATE_VERSION: u16 = 9;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -367,6 +368,14 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
             V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
             V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
             V::part("", &Part { table: THERMAL_OUTPUTS, lens: |m| &mut m.out.plant }),
+            V::part(
+                "controller.adaptation.",
+                &Part {
+                    table: ADAPTATION,
+                    lens: |m| &mut m.model.pair.controller.model.parameters.estimators.adaptation,
+                },
+            ),
+            V::part("", &Part { table: ADAPTATION_OUTPUTS, lens: |m| &mut m.out.controller }),
         ]
     },
 );

@@ -178,3 +178,26 @@ fn field_weakening_with_an_estimator_that_cannot() {
         controller.validate().unwrap();
     }
 }
+
+#[test]
+fn resistance_adaptation_where_there_is_none() {
+    let parts = ["adaptation.resistance = true", "estimator = 4 (ExtendedEmf)", "set estimator = Rasmussen"];
+    refused(Kind::ExtendedEmf, |p| p.estimators.adaptation.resistance = true, &parts);
+}
+
+#[test]
+fn clamps_of_the_resistance_that_exclude_the_parameter() {
+    let with = |set: fn(&mut ControllerParameters), parts: &[&str]| {
+        refused(
+            Kind::Rasmussen,
+            |p| {
+                p.estimators.adaptation.resistance = true;
+                set(p);
+            },
+            parts,
+        );
+    };
+    with(|p| p.estimators.adaptation.min = 1.1, &["adaptation.min = 1.1", "at most 1", "lower it"]);
+    with(|p| p.estimators.adaptation.max = 0.95, &["adaptation.max = 0.95", "at least 1", "raise it"]);
+    with(|p| p.estimators.adaptation.start = 0.3, &["adaptation.start = 0.3", "0.4 to 2.5"]);
+}

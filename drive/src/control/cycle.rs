@@ -54,6 +54,7 @@ impl SensorlessController {
             tau_min: -low,
             u_share,
             weakens,
+            R_s_est: self.state.estimator.resistance(&self.in_use.estimators, &self.parameters.motor),
         }
     }
 
@@ -80,6 +81,7 @@ impl SensorlessController {
             theta_meas: inputs.theta_meas,
             w_meas: f64::from(par.motor.n_p) * inputs.speed_meas,
             u_dc: inputs.u_dc,
+            speed_ref: (!par.speed_loop.torque_mode).then_some(inputs.speed_ref),
         }
     }
 

@@ -8,8 +8,9 @@ use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
 use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
-use crate::control::tables::{ControllerParameters, LATER_OUTPUTS, OUTPUTS, PARAMETERS};
+use crate::control::tables::{ADAPTATION_OUTPUTS, ControllerParameters, LATER_OUTPUTS, OUTPUTS, PARAMETERS};
 use crate::control::weakening::{self, WEAKENING, WeakeningGains};
+use crate::estimator::resistance::ADAPTATION;
 use crate::estimator::{Class, Estimator, Sample};
 use crate::motor::Motor;
 use fmu_core::log::Warnings;
@@ -94,7 +95,8 @@ impl SensorlessController {
             shown: state.shown,
             ..State::default()
         };
-        ControllerOutputs { theta_est: theta, lock_lost: LOST, enabled: true, ..ControllerOutputs::default() }
+        let R_s_est = state.estimator.resistance(&par.estimators, &par.motor);
+        ControllerOutputs { theta_est: theta, lock_lost: LOST, enabled: true, R_s_est, ..ControllerOutputs::default() }
     }
 
     /// Checks that the parameters fit together, with a DC link of `u_dc` (V) at the start.
@@ -150,7 +152,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 7;
+    const STATE_VERSION: u16 = 8;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
@@ -242,6 +244,7 @@ impl Warns for SensorlessController {
             theta_est: out.theta_est,
             lock_lost: LOST,
             enabled: true,
+            R_s_est: out.R_s_est,
             ..ControllerOutputs::default()
         };
         if *out == restarted {
@@ -297,6 +300,11 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
             V::part("weakening.", &Part { table: WEAKENING, lens: |m| &mut m.model.parameters.weakening }),
             V::part("", &Part { table: LATER_OUTPUTS, lens: |m| &mut m.out }),
+            V::part(
+                "adaptation.",
+                &Part { table: ADAPTATION, lens: |m| &mut m.model.parameters.estimators.adaptation },
+            ),
+            V::part("", &Part { table: ADAPTATION_OUTPUTS, lens: |m| &mut m.out }),
         ]
     },
 );

@@ -82,6 +82,8 @@ pub struct ControllerOutputs {
     pub u_share: f64,
     /// Field weakening lowers the reference of i_d.
     pub weakens: bool,
+    /// Resistance in Ohm that the estimator uses: adapted, or the controller's estimate.
+    pub R_s_est: f64,
 }
 
 impl ControllerOutputs {

@@ -140,7 +140,12 @@ pub(super) struct State {
 impl State {
     /// Before the first sample.
     pub(super) fn new(par: &ControllerParameters, enabled: bool) -> Self {
-        let shown = ControllerOutputs { theta_est: wrap(par.theta_est), enabled, ..ControllerOutputs::default() };
+        let shown = ControllerOutputs {
+            theta_est: wrap(par.theta_est),
+            enabled,
+            R_s_est: par.motor.R_s,
+            ..ControllerOutputs::default()
+        };
         Self { leader: Leader::of(par.start.mode), w_ref: par.speed_est, computed: shown, shown, ..Self::default() }
     }
 

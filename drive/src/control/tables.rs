@@ -10,10 +10,11 @@ use crate::control::start::{START, StartParameters};
 use crate::control::weakening::{WEAKENING, WeakeningParameters};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::Kind;
+use crate::estimator::resistance::ADAPTATION;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
 use crate::motor::{MOTOR, Motor};
 use crate::plant::saturation::A_PER_WB2;
-use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METER, ONE, RADIAN, SECOND, SPEED, VOLT};
+use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METER, OHM, ONE, RADIAN, SECOND, SPEED, VOLT};
 use fmu_core::{Field, Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -207,6 +208,7 @@ pub const ALL_PARAMETERS: &Table<ControllerParameters> = &Table::new(
         &[
             P::part("", &Part { table: PARAMETERS, lens: |p| p }),
             P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
+            P::part("adaptation.", &Part { table: ADAPTATION, lens: |p| &mut p.estimators.adaptation }),
         ]
     },
 );
@@ -280,5 +282,17 @@ pub const LATER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             ),
             O::boolean_output("weakens", "Field weakening lowers i_d_ref", |o| &mut o.weakens),
         ]
+    },
+);
+
+/// The output of the resistance adaptation, on the controller and on `PmsmDrive`.
+pub const ADAPTATION_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
+    const {
+        &[O::discrete_output(
+            "R_s_est",
+            &OHM,
+            "Stator resistance that the estimator uses: motor.R_s, or what adaptation.resistance makes of it",
+            |o| &mut o.R_s_est,
+        )]
     },
 );

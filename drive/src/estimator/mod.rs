@@ -23,6 +23,7 @@ pub mod kalman;
 pub mod near_pwm;
 pub mod pulsating;
 pub mod rasmussen;
+pub mod resistance;
 pub mod rotating;
 pub mod saliency;
 pub mod sensored;
@@ -68,6 +69,8 @@ pub struct Sample {
     pub w_meas: f64,
     /// DC-link voltage in V.
     pub u_dc: f64,
+    /// Mechanical speed asked for, in rad/s; none in torque mode.
+    pub speed_ref: Option<f64>,
 }
 
 /// An estimator's inputs besides the sample: parameters and the controller's estimates.
@@ -158,6 +161,12 @@ pub trait Estimating: Sized {
         let _ = (old, new);
     }
 
+    /// Stator resistance in Ohm that the estimator uses: the estimate `R_s` of the motor, unless it adapts it.
+    fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
+        let _ = par;
+        motor.R_s
+    }
+
     /// Checks that the controller's parameters suit this estimator.
     ///
     /// # Errors
@@ -222,6 +231,7 @@ macro_rules! estimators {
             /// As for [`Estimating::validate`], or the tracker cannot work.
             pub fn validate(self, par: &ControllerParameters) -> Result<(), Fault> {
                 tracker::validate(par)?;
+                resistance::validate(self, par)?;
                 match self {
                     $(Self::$name => <$state>::validate(par),)*
                 }
@@ -257,6 +267,14 @@ macro_rules! estimators {
             pub fn retune(&mut self, old: &Context, new: &Context) {
                 match self {
                     $(Self::$name(state) => state.retune(old, new),)*
+                }
+            }
+
+            /// See [`Estimating::resistance`].
+            #[inline]
+            pub fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
+                match self {
+                    $(Self::$name(state) => state.resistance(par, motor),)*
                 }
             }
 

@@ -20,6 +20,7 @@
 //! Limits: at w = 0 the angle is not observable (the slow pole is -w^2/c_1 below |w| = c_1/2). A resistance estimate
 //! above the true value diverges at standstill; one below it is safe.
 
+use crate::estimator::resistance::{Adapted, Resistance};
 use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use crate::motor::Motor;
@@ -61,6 +62,8 @@ pub struct Rasmussen {
     theta: f64,
     /// Estimated electrical speed in rad/s.
     w: f64,
+    /// Adaptation of the resistance.
+    resistance: Resistance,
 }
 
 impl Estimating for Rasmussen {
@@ -69,7 +72,8 @@ impl Estimating for Rasmussen {
         let (motor, i) = (context.motor, sample.i);
         let axis = Axis::<Estimated>::at(theta);
         let psi_s = axis.to_stator(DqHat::new(motor.psi_M, 0.0) + inductive(motor, axis.from_stator(i)));
-        (Self { psi_s, i, theta, w, w_i: w, ..Self::default() }, Estimate::new(theta, w, sample))
+        let resistance = Resistance::start(context, sample, w);
+        (Self { psi_s, i, theta, w, w_i: w, resistance, ..Self::default() }, Estimate::new(theta, w, sample))
     }
 
     #[inline]
@@ -79,7 +83,7 @@ impl Estimating for Rasmussen {
         self.theta += turn;
         let axis = Axis::<Estimated>::at(self.theta);
         let half_way = axis.ahead(Turn::new(-0.5 * turn));
-        let resistive = (self.i + sample.i) * (0.5 * motor.R_s);
+        let resistive = (self.i + sample.i) * (0.5 * self.resistance(context.par, motor));
         self.psi_s += (sample.u - resistive + half_way.to_stator(self.v)) * T_s;
         self.i = sample.i;
 
@@ -88,8 +92,24 @@ impl Estimating for Rasmussen {
         let g_1 = par.g_1(motor);
         self.w_i += T_s * g_2 * psi_r.q();
         self.w = g_1 * psi_r.q() + self.w_i;
-        self.v = DqHat::new(-par.c_1 * (psi_r.d() - motor.psi_M), -par.c_2 * psi_r.q());
+        let x = psi_r.d() - motor.psi_M;
+        let Adapted { c_1, v_q } = if context.par.adaptation.resistance {
+            self.resistance.update(context, sample, x, axis.from_stator(sample.i), self.w)
+        } else {
+            Adapted { c_1: par.c_1, v_q: 0.0 }
+        };
+        self.v = DqHat::new(-c_1 * x, v_q - par.c_2 * psi_r.q());
         Estimate { theta: self.theta, axis, w: self.w, i: sample.i, injection: Injection::None }
+    }
+
+    #[inline]
+    fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
+        if par.adaptation.resistance { self.resistance.R } else { motor.R_s }
+    }
+
+    /// What was learned of the resistance stays.
+    fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
+        *self = Self { resistance: self.resistance, ..Self::start(context, sample, theta, w).0 };
     }
 
     /// Keeps w^ = g_1 psi_rq^ + w_I constant when g_1 changes.

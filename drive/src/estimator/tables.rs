@@ -8,6 +8,7 @@ use crate::estimator::kalman::{KALMAN, KalmanParameters};
 use crate::estimator::near_pwm::{NEAR_PWM, NearPwmParameters};
 use crate::estimator::pulsating::{PULSATING, PulsatingParameters};
 use crate::estimator::rasmussen::{RASMUSSEN, RasmussenParameters};
+use crate::estimator::resistance::ResistanceParameters;
 use crate::estimator::square_wave::{SQUARE_WAVE, SquareWaveParameters};
 use crate::estimator::tracker::{TRACKER, TrackerParameters};
 use fmu_core::{Part, Row, Table};
@@ -36,6 +37,8 @@ pub struct EstimatorParameters {
     pub kalman: KalmanParameters,
     /// The hybrid.
     pub hybrid: HybridParameters,
+    /// Adaptation of the resistance.
+    pub adaptation: ResistanceParameters,
 }
 
 type P = Row<EstimatorParameters>;
