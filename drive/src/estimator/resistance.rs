@@ -10,10 +10,10 @@
 //! **At rest** (w = 0), x settles at R~ i_d / c_1, whatever psi_M^ and theta~ are. So R^ follows, at the `bandwidth` b:
 //!
 //! ```text
-//! dR^/dt = b c_1 g x i_d / (i_d^2 + i_q^2 + i^2),   g = exp(-(w_f / (1 rad/s))^2) at rest, otherwise 0
+//! dR^/dt = b c_1 g x i_d / (i_d^2 + i_q^2 + i^2),   g = (1 - (w_f / (2 rad/s))^2)^4 at rest, otherwise 0
 //! ```
 //!
-//! w_f is the low-passed mechanical speed. R^ adapts only where standstill is asked for: at a creeping speed the same
+//! w_f is the low-passed mechanical speed; beyond 2 rad/s, g is 0. R^ adapts only where standstill is asked for: at a creeping speed the same
 //! law gives s^3 + c_1 s^2 + (w^2 + k i_d) s + k w i_q, unstable for w i_q < 0. There, x = R~ i_q / w - d shows R~ only
 //! beside the error of psi_M^, and with k = i_q / w as regressor it has a zero at -w i_q / i_d: a generating load lost
 //! 3 to 7 of 56 creeping cells. R^ therefore stays constant while a speed is asked for.
@@ -36,13 +36,14 @@
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
 use crate::estimator::{Context, Kind, Sample};
 use crate::frame::DqHat;
-use crate::math::exp;
 use fmu_core::unit::{AMPERE, ONE, PER_SECOND};
 use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 
 /// Mechanical speed in rad/s below which a speed reference asks for standstill.
 const STANDSTILL: f64 = 0.05;
+/// Mechanical speed in rad/s from which on nothing adapts.
+const GATE: f64 = 2.0;
 /// Corner frequency in rad/s of the low-pass filter of the speed.
 const FILTER: f64 = 100.0;
 
@@ -108,9 +109,9 @@ impl Resistance {
         let (par, c_1, n_p) = (&par.adaptation, par.rasmussen.c_1, f64::from(motor.n_p));
         self.w_f += T_s * FILTER * (w - self.w_f);
         let Some(speed_ref) = sample.speed_ref else { return Adapted { c_1, v_q: 0.0 } };
-        let w_m = self.w_f / n_p;
-        // Beyond 4 rad/s, 1e-7 and less.
-        let g = if w_m.abs() < 4.0 { exp(-w_m * w_m) } else { 0.0 };
+        let share = self.w_f / (n_p * GATE);
+        let near = (1.0 - share * share).max(0.0);
+        let g = near * near * near * near;
         let rest = speed_ref.abs() < STANDSTILL;
         let v_q = if rest || speed_ref * i.q() > 0.0 { par.k_a * motor.R_s * g * i.q() } else { 0.0 };
         if rest {
