@@ -15,6 +15,7 @@ pub mod documentation;
 pub mod icons;
 pub mod licenses;
 pub mod pack;
+pub mod picture;
 pub mod ssp;
 pub mod ssv;
 pub mod target;

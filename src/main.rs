@@ -2,8 +2,8 @@
 
 #![forbid(unsafe_code)]
 
-use clap::{Parser, Subcommand};
-use fmu::commands::{build, compare, merge, reproduce, simulate, ssp, sweep, tune};
+use clap::{CommandFactory, Parser, Subcommand};
+use fmu::commands::{build, compare, info, merge, reproduce, simulate, ssp, sweep, tune};
 use fmu_check::{command as check, probe};
 use fmu_import::printable_lines;
 use std::process::ExitCode;
@@ -22,6 +22,7 @@ struct Cli {
 enum Command {
     Build(build::Build),
     Merge(merge::Merge),
+    Info(info::Info),
     Simulate(simulate::Simulate),
     Sweep(sweep::Sweep),
     Check(check::Check),
@@ -29,6 +30,13 @@ enum Command {
     Compare(compare::Compare),
     Tune(tune::Tune),
     Ssp(ssp::Ssp),
+    /// Writes what a shell needs to complete this command
+    ///
+    /// For bash: fmu completions bash > ~/.local/share/bash-completion/completions/fmu
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
     #[command(hide = true)]
     Probe(probe::ProbeArguments),
     #[command(hide = true)]
@@ -49,6 +57,14 @@ fn main() -> ExitCode {
             }
             ExitCode::SUCCESS
         }),
+        Command::Info(args) => info::run(&args).map(|text| {
+            print!("{text}");
+            ExitCode::SUCCESS
+        }),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "fmu", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
         Command::Merge(args) => merge::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Simulate(args) => simulate::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Sweep(args) => sweep::run(&args).map(|good| ExitCode::from(u8::from(!good))),

@@ -139,7 +139,16 @@ fn bad_usage_names_what_is_wrong() {
     let controller = archive("fmi2", "SensorlessController");
     let (p, c) = (format!("p={}", plant.display()), format!("c={}", controller.display()));
     for (arguments, part) in [
-        (["--set", "p.motor.R=3"], "p: PmsmPlant has no variable motor.R"),
+        (["--set", "p.motor.R=3"], "p: has no variable motor.R; did you mean motor.R_s?"),
+        (
+            ["--set", "R_s=3"],
+            "R_s: is not INSTANCE.VARIABLE; the instances are p, c; did you mean p.motor.R_s or c.motor.R_s?",
+        ),
+        (["--set", "p.motor.R_s=3,3"], "motor.R_s = 3,3 is not a number: write a decimal point"),
+        (["--set", "p.motor.R_s=3 mH"], "motor.R_s = 3mH is not a number in Ohm"),
+        (["--input", "c.speed_ref=0:0,1:5rps"], "c: speed_ref = 5rps is not a number in rad/s or rpm"),
+        (["--input", "p.motor.L_d=0:1"], "p.motor.L_d: is not an input or a tunable parameter"),
+        (["--plot", "run.pdf"], "plots are written as .svg or .png"),
         (["--set", "q.motor.R_s=3"], "q.motor.R_s: is not INSTANCE.VARIABLE; the instances are p, c"),
         (["--set", "p.motor.n_p=2.5"], "motor.n_p = 2.5 is not an integer"),
         (["--set", "c.estimator=Magic"], "estimator = Magic is not one of Rasmussen, "),
@@ -147,7 +156,7 @@ fn bad_usage_names_what_is_wrong() {
         (["--connect", "c.T_s=p.u_a"], "c.T_s: is not an output"),
         (["--input", "p.u_a=0:0,0:1"], "--input p.u_a=0:0,0:1: the time 0 does not follow 0"),
         (["--input", "nothing.csv"], "--input nothing.csv: "),
-        (["--record", "p.nothing"], "p: PmsmPlant has no variable nothing"),
+        (["--record", "p.nothing"], "p: has no variable nothing"),
         (["--step", "-1"], "step -1 be positive"),
     ] {
         fails(&[&["simulate", p.as_str(), c.as_str()][..], &arguments[..]].concat(), 2, &[part]);
@@ -212,6 +221,104 @@ fn inputs_left_alone_and_long_steps_are_told() {
     let told = warned(&["--input", "d.speed_ref=0:0,0.005:10", "--set", "d.tau_load=0", "--step", "0.001"]);
     assert!(told.lines().count() == 1 && told.contains("u_dc") && !told.contains("speed_ref ="), "{told}");
     assert!(!told.contains("tau_load"), "{told}");
+}
+
+/// A single FMU needs no name before its variables; numbers have the units that the FMU shows; a tunable parameter changes.
+#[test]
+fn what_a_person_types() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (load, png) = (file("load.csv"), file("run.png"));
+    std::fs::write(&load, "t,torque\n0,0\n0.1,1\n").unwrap();
+    for standard in ["fmi2", "fmi3"] {
+        let drive = archive(standard, "PmsmDrive");
+        let load = format!("tau_load={load}");
+        let output =
+            fmu(
+                &[
+                    &[
+                        "simulate",
+                        drive.to_str().unwrap(),
+                        "--stop",
+                        "0.1",
+                        "--input",
+                        "speed_ref=0:0rpm,0.05:1000 rpm",
+                    ][..],
+                    &["--input", &load, "--input", "controller.motor.R_s=0:1.8,0.05:1.9", "--set", "T_coolant=20degC"],
+                    &[
+                        "--record",
+                        "speed_ref,tau_load,controller.motor.R_s,T_coolant,R_s_est",
+                        "--csv",
+                        "-",
+                        "--plot",
+                        &png,
+                    ],
+                ]
+                .concat(),
+            );
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let csv = text(&output.stdout);
+        let row =
+            |k: usize| -> Vec<f64> { csv.lines().nth(k + 1).unwrap().split(',').map(|x| x.parse().unwrap()).collect() };
+        let near = |k: usize, wanted: [f64; 6]| {
+            assert!(
+                row(k).iter().zip(wanted).all(|(x, y)| (x - y).abs() < 1e-6),
+                "{standard}: {:?}, {wanted:?}",
+                row(k)
+            );
+        };
+        near(49, [0.049, 0.0, 0.49, 1.8, 293.15, 1.8]);
+        near(100, [0.1, 1000.0 * std::f64::consts::PI / 30.0, 1.0, 1.9, 293.15, 1.9]);
+        assert!(std::fs::read(&png).unwrap().starts_with(b"\x89PNG"), "a picture");
+    }
+}
+
+/// Ctrl-C keeps what was computed.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_keeps_its_results() {
+    for how in [&[][..], &["--in-process"]] {
+        let dir = tempfile::tempdir().unwrap();
+        let (csv, temporary) = (dir.path().join("out.csv"), dir.path().join("tmp"));
+        std::fs::create_dir(&temporary).unwrap();
+        let drive = archive("fmi3", "PmsmDrive");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fmu"));
+        command.args(["simulate", drive.to_str().unwrap(), "--stop", "1e5", "--record", "speed", "--csv"]);
+        command.arg(&csv).args(how).env("TMPDIR", &temporary).stderr(std::process::Stdio::piped());
+        let child = command.stdout(std::process::Stdio::null()).spawn().unwrap();
+        std::thread::sleep(std::time::Duration::from_secs(2));
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        let output = child.wait_with_output().unwrap();
+        let told = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{told}");
+        assert!(told.contains("error: interrupted at ") && told.contains(" s, where the results end"), "{told}");
+        assert!(std::fs::read_to_string(&csv).unwrap().lines().count() > 10);
+        let left: Vec<_> = std::fs::read_dir(&temporary).unwrap().collect();
+        assert!(left.is_empty(), "{how:?}: {left:?}");
+    }
+}
+
+#[test]
+fn info_tells_what_an_fmu_is() {
+    for (standard, version) in [("fmi2", "FMI 2.0"), ("fmi3", "FMI 3.0")] {
+        let drive = archive(standard, "PmsmDrive");
+        let told = text(&fmu(&["info", drive.to_str().unwrap()]).stdout);
+        for part in [
+            version,
+            "Co-Simulation and Model Exchange",
+            "step 0.001 s",
+            "inputs (",
+            "speed_ref",
+            "0 rad/s",
+            "Rasmussen",
+        ] {
+            assert!(told.contains(part), "{part}: {told}");
+        }
+        let limits = text(&fmu(&["info", drive.to_str().unwrap(), "limit"]).stdout);
+        assert!(limits.contains("controller.limit.i ") && !limits.contains("speed_ref"), "{limits}");
+    }
+    fails(&["info", "Cargo.toml"], 2, &["Cargo.toml: "]);
+    assert!(text(&fmu(&["completions", "bash"]).stdout).contains("--auto-connect"));
 }
 
 #[test]

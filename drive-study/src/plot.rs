@@ -1,4 +1,4 @@
-//! Plots a recording: one panel per unit, time on the horizontal axis.
+//! Plots a recording: one panel per display unit, time on the horizontal axis.
 
 use anyhow::{Result, anyhow};
 use fmu_import::cosimulation::{Column, Recording};
@@ -7,6 +7,8 @@ use plotters::prelude::*;
 /// Width of the curves and height of a panel in pixels; the names are beside the curves, never on them.
 const SIZE: (u32, u32) = (820, 240);
 const NAMES: u32 = 240;
+/// Units of the drawing in a pixel: the library rounds to whole ones, and curves would have corners.
+const FINE: u32 = 8;
 /// Maximum number of points drawn per curve: the highest and lowest point of as many intervals as the picture resolves.
 const STRETCHES: usize = 1000;
 /// Colors that remain distinguishable with color blindness (Okabe and Ito).
@@ -30,8 +32,8 @@ pub fn svg(recording: &Recording) -> Result<String> {
     };
     let mut units: Vec<&str> = Vec::new();
     for column in &recording.columns {
-        if !units.contains(&column.unit.as_str()) {
-            units.push(&column.unit);
+        if !units.contains(&unit_of(column)) {
+            units.push(unit_of(column));
         }
     }
     if units.is_empty() {
@@ -40,43 +42,59 @@ pub fn svg(recording: &Recording) -> Result<String> {
     let mut text = String::new();
     {
         let height = SIZE.1 * u32::try_from(units.len())?;
-        let root = SVGBackend::with_string(&mut text, (SIZE.0 + NAMES, height)).into_drawing_area();
+        let root = SVGBackend::with_string(&mut text, (FINE * (SIZE.0 + NAMES), FINE * height)).into_drawing_area();
         root.fill(&WHITE).map_err(drawing)?;
         for (area, unit) in root.split_evenly((units.len(), 1)).iter().zip(&units) {
-            let columns: Vec<&Column> = recording.columns.iter().filter(|c| c.unit == **unit).collect();
-            let finite = || columns.iter().flat_map(|c| c.values.iter().copied().filter(|x| x.is_finite()));
+            let shown = |c: &Column| -> Vec<f64> {
+                c.values.iter().map(|x| c.display.as_ref().map_or(*x, |display| display.show(*x))).collect()
+            };
+            let of_unit = recording.columns.iter().filter(|c| unit_of(c) == *unit);
+            let columns: Vec<(&str, Vec<f64>)> = of_unit.map(|c| (c.name.as_str(), shown(c))).collect();
+            let finite = || columns.iter().flat_map(|(_, x)| x.iter().copied().filter(|x| x.is_finite()));
             let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
             let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
             let margin = (0.06 * (high - low)).max(1e-9 + 1e-3 * high.abs().max(low.abs()));
-            let (curves, names) = area.split_horizontally(SIZE.0);
+            let (curves, names) = area.split_horizontally(FINE * SIZE.0);
             let mut chart = ChartBuilder::on(&curves)
-                .margin(10)
-                .x_label_area_size(30)
-                .y_label_area_size(70)
+                .margin(10 * FINE)
+                .x_label_area_size(30 * FINE)
+                .y_label_area_size(70 * FINE)
                 .build_cartesian_2d(start..stop, low - margin..high + margin)
                 .map_err(drawing)?;
             chart
                 .configure_mesh()
                 .light_line_style(TRANSPARENT)
-                .bold_line_style(RGBColor(225, 225, 225))
+                .bold_line_style(RGBColor(225, 225, 225).stroke_width(FINE))
+                .axis_style(BLACK.stroke_width(FINE))
+                .set_all_tick_mark_size(5 * FINE)
+                .label_style(("sans-serif", 12 * FINE))
                 .x_desc("time in s")
                 .y_desc(if unit.is_empty() { "1" } else { unit })
                 .draw()
                 .map_err(drawing)?;
-            for (place, column) in columns.iter().enumerate() {
+            for (place, (name, values)) in columns.iter().enumerate() {
                 // When the colors are used up, they repeat in a paler tone.
                 let color = COLORS[place % COLORS.len()].mix(if place < COLORS.len() { 1.0 } else { 0.45 });
-                let line = LineSeries::new(thin(&recording.time, &column.values), color.stroke_width(1));
+                let line = LineSeries::new(thin(&recording.time, values), color.stroke_width(3 * FINE / 2));
                 chart.draw_series(line).map_err(drawing)?;
-                let y = 20 + 17 * i32::try_from(place)?;
-                names.draw(&PathElement::new([(0, y), (18, y)], color.stroke_width(3))).map_err(drawing)?;
-                let name = Text::new(column.name.as_str(), (24, y - 5), ("sans-serif", 12));
+                let fine = i32::try_from(FINE)?;
+                let y = fine * (20 + 17 * i32::try_from(place)?);
+                let dash = PathElement::new([(0, y), (18 * fine, y)], color.stroke_width(3 * FINE));
+                names.draw(&dash).map_err(drawing)?;
+                let name = Text::new(*name, (24 * fine, y - 5 * fine), ("sans-serif", 12 * FINE));
                 names.draw(&name).map_err(drawing)?;
             }
         }
         root.present().map_err(drawing)?;
     }
-    Ok(text)
+    let size = |fine: u32, height: u32| format!("width=\"{}\" height=\"{}\"", fine * (SIZE.0 + NAMES), fine * height);
+    let height = SIZE.1 * u32::try_from(units.len())?;
+    Ok(text.replacen(&size(FINE, height), &size(1, height), 1))
+}
+
+/// The unit in which a column is drawn.
+fn unit_of(column: &Column) -> &str {
+    column.display.as_ref().map_or(&column.unit, |display| &display.name)
 }
 
 pub(crate) fn drawing(error: impl std::fmt::Display) -> anyhow::Error {

@@ -34,6 +34,7 @@ pub mod guard;
 mod instance;
 mod integration;
 pub mod platform;
+mod quantity;
 pub mod ssp;
 mod standard;
 mod text;

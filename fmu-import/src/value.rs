@@ -1,5 +1,6 @@
 //! Values that cross the interface, whatever the standard calls their type.
 
+use crate::quantity;
 use model_description::{BaseType, ModelDescription, ModelVariable};
 use std::fmt;
 
@@ -24,11 +25,21 @@ impl Values {
     /// # Errors
     /// Says what was expected.
     pub fn parse(text: &str, variable: &ModelVariable, items: &[(String, i64)]) -> Result<Self, String> {
+        Self::parse_with(text, variable, items, |e| Ok(e.parse::<f64>().ok()))
+    }
+
+    /// As [`parse`](Self::parse), where `number` reads an element of a real variable.
+    fn parse_with(
+        text: &str,
+        variable: &ModelVariable,
+        items: &[(String, i64)],
+        number: impl Fn(&str) -> Result<Option<f64>, String>,
+    ) -> Result<Self, String> {
         let elements = || text.split(',').map(str::trim);
         let wrong = |element: &str, expected: &str| format!("{} = {element} is not {expected}", variable.name);
         match variable.base {
             BaseType::Float32 | BaseType::Float64 => elements()
-                .map(|e| e.parse::<f64>().map_err(|_| wrong(e, "a number")))
+                .map(|e| number(e)?.ok_or_else(|| wrong(e, "a number")))
                 .collect::<Result<_, _>>()
                 .map(Self::Reals),
             BaseType::Boolean | BaseType::Clock => elements()
@@ -58,11 +69,21 @@ impl Values {
         }
     }
 
-    /// As [`parse`](Self::parse), with the names that the description has for an enumeration.
+    /// As [`parse`](Self::parse), with the names that the description has for an enumeration, and with its units behind
+    /// numbers: `1000 rpm`.
     pub(crate) fn read(text: &str, variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
         let definition = variable.declared_type.as_ref().and_then(|t| description.type_definition(t));
         let items = definition.map(|d| d.items.iter().map(|i| (i.name.clone(), i.value)).collect::<Vec<_>>());
-        Self::parse(text, variable, &items.unwrap_or_default())
+        if variable.base.is_float()
+            && !variable.is_array()
+            && text.split_once(',').is_some_and(|(a, b)| [a, b].iter().all(|x| x.parse::<f64>().is_ok()))
+        {
+            return Err(format!("{} = {text} is not a number: write a decimal point", variable.name));
+        }
+        Self::parse_with(text, variable, &items.unwrap_or_default(), |element| {
+            let Some((number, unit)) = quantity::split(element) else { return Ok(None) };
+            quantity::convert(number, unit, variable, description).map(Some)
+        })
     }
 
     /// A number as a value of this base type: rounded for an integer, not 0 for true.

@@ -2,6 +2,7 @@
 
 pub mod build;
 pub mod compare;
+pub mod info;
 pub mod merge;
 pub mod reproduce;
 pub mod simulate;

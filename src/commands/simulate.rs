@@ -1,7 +1,7 @@
 //! `fmu simulate`: co-simulates FMUs, or integrates those for Model Exchange.
 
 use crate::Failed;
-use crate::pack;
+use crate::{pack, picture};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use drive_study::plot;
@@ -15,11 +15,13 @@ use model_description::ModelVariable;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 /// Co-simulates FMUs of FMI 2.0 and FMI 3.0, from this project or any other tool.
 ///
-/// An instance is named after its file; NAME=FILE gives another name. Write variables as INSTANCE.VARIABLE.
+/// An instance is named after its file; NAME=FILE gives another name. Write variables as INSTANCE.VARIABLE, or as VARIABLE if there
+/// is one FMU.
 ///
 /// At every communication point the command reads all outputs, sets all inputs, then steps all FMUs: an output reaches other
 /// FMUs one step later. With --sequential, the FMUs step in the order given, and each receives the new outputs of those before
@@ -30,6 +32,8 @@ use std::time::{Duration, Instant};
 /// which one has no Co-Simulation run so without --me. With --event-mode and --early-return, FMUs for Co-Simulation of FMI 3.0
 /// handle their events at their time, whatever --step is.
 ///
+/// Ctrl-C ends the run at the next communication point and writes what was computed; a second Ctrl-C ends the command at once.
+///
 /// After the run, warnings on standard error list inputs that kept their start values because nothing feeds or sets them, and a
 /// step that is longer than the DefaultExperiment of an FMU.
 ///
@@ -38,9 +42,11 @@ use std::time::{Duration, Instant};
 /// error. --in-process runs them in the process of the command: it starts some milliseconds sooner, and an FMU that crashes
 /// takes the command with it.
 ///
-/// Start the motor and turn it at 1000 rpm (104.7 rad/s):
+/// Start the drive, turn it at 1000 rpm, and load it after 0.5 s:
+///   fmu simulate target/fmu/fmi3/PmsmDrive.fmu --input speed_ref=0:0,0.1:1000rpm --input tau_load=0:0,0.5:2 --plot run.svg
+/// The same with controller and plant apart, without a load:
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
-///     --input SensorlessController.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
+///     --input SensorlessController.speed_ref=0:0,0.1:1000rpm --stop 1 --plot run.svg
 /// The same from an SSP file of `fmu ssp` or any other tool; names without a dot refer to connectors of the system:
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
 /// The same, connected by terminals:
@@ -71,12 +77,13 @@ pub struct Simulate {
     /// Set the values of a parameter file (SSV of SSP 1.0) before --set (repeatable)
     #[arg(long, value_name = "INSTANCE=FILE.ssv")]
     pub parameters: Vec<String>,
-    /// Set a parameter or an unconnected input (repeatable)
+    /// Set a parameter or an unconnected input (repeatable); a number may have a unit that the FMU shows: 20degC
     #[arg(long, value_name = "VARIABLE=VALUE")]
     pub set: Vec<String>,
-    /// Feed an input over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE for straight lines, or
-    /// a CSV file with time in the first column and INSTANCE.VARIABLE as heading of the others
-    #[arg(long, value_name = "VARIABLE=POINTS|FILE.csv")]
+    /// Feed an input or a tunable parameter over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE
+    /// for straight lines, or a CSV file with time in the first column; without VARIABLE=, the headings of the others name
+    /// what they feed. VALUE and headings may have a unit: 1000rpm, speed_ref [rpm]
+    #[arg(long, value_name = "[VARIABLE=]POINTS|FILE.csv")]
     pub input: Vec<String>,
     /// Start time in s [default: from the FMUs, else 0]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
@@ -93,8 +100,8 @@ pub struct Simulate {
     /// Write the recording as CSV; - for standard output
     #[arg(long, value_name = "FILE|-")]
     pub csv: Option<PathBuf>,
-    /// Plot the recording
-    #[arg(long, value_name = "FILE.svg")]
+    /// Plot the recording; the ending tells the format
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
     pub plot: Option<PathBuf>,
     /// Step the FMUs one after another; each receives the new outputs of those before it
     #[arg(long)]
@@ -172,14 +179,32 @@ pub fn run(args: &Simulate) -> Result<()> {
     if args.worker {
         return work(args);
     }
+    if let Some(path) = &args.plot {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        if !matches!(ending.as_deref(), Some("svg" | "png")) {
+            bail!("--plot {}: plots are written as .svg or .png", path.display());
+        }
+    }
+    ctrlc::set_handler(|| {
+        INTERRUPTS.fetch_add(1, Ordering::Relaxed);
+    })?;
     if args.in_process {
         return simulate(args, io::stdout());
     }
     guarded(args)
 }
 
+/// How often the user has pressed Ctrl-C: the first time ends the run at the next communication point, the second the process.
+static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
+
 /// File for the status and the error of the worker, below its folder for temporary files.
 const RESULT: &str = "result";
+
+/// Time between two looks for Ctrl-C.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// File there that tells the worker to end the run.
+const INTERRUPT: &str = "interrupt";
 
 /// Runs the same command as a worker.
 fn guarded(args: &Simulate) -> Result<()> {
@@ -191,6 +216,11 @@ fn guarded(args: &Simulate) -> Result<()> {
     let folder = worker.folder().to_owned();
     let (mut since, mut progress) = (Instant::now(), None);
     let report = worker.wait(|_| {
+        match INTERRUPTS.load(Ordering::Relaxed) {
+            0 => {}
+            1 => drop(std::fs::write(folder.join(INTERRUPT), "")),
+            _ => return true,
+        }
         let last = journal::read(&folder);
         let now = last.as_ref().map(|last| last.progress);
         if now != progress || last.is_some_and(|last| last.call == journal::Call::Write) {
@@ -214,6 +244,9 @@ fn guarded(args: &Simulate) -> Result<()> {
             let last = journal::read(&folder).map_or_else(|| "the process of the FMUs".into(), |last| last.describe());
             match end {
                 End::Refused(_) => bail!("the process of the FMUs {}", end.describe()),
+                End::Stopped if INTERRUPTS.load(Ordering::Relaxed) > 1 => {
+                    Err(Failed("interrupted twice: nothing is written".into()).into())
+                }
                 End::Stopped => bail!("{last} did not return within {} s; --timeout changes the limit", args.timeout),
                 _ => bail!("{last} {}", end.describe()),
             }
@@ -254,12 +287,20 @@ fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
     let settings = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
     let mut progress = Progress::new(settings);
+    let (mut looked, interrupt, mut interrupted) = (Instant::now(), std::env::temp_dir().join(INTERRUPT), None);
     let mut hook = |point: &mut Point<'_>| {
         if args.logging {
             show(&point.take_messages());
         }
         progress.at(point.time);
         journal::reached(point.time);
+        if looked.elapsed() > LOOK {
+            looked = Instant::now();
+            if INTERRUPTS.load(Ordering::Relaxed) > 0 || (args.worker && interrupt.exists()) {
+                interrupted = Some(point.time);
+                return Ok(ControlFlow::Break(()));
+            }
+        }
         Ok(ControlFlow::Continue(()))
     };
     let outcome = system.run(&settings, &mut hook);
@@ -274,7 +315,11 @@ fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
     for text in warnings(&system, &settings) {
         eprintln!("warning: {}", printable(&text));
     }
-    written
+    written?;
+    match interrupted {
+        Some(time) => Err(Failed(format!("interrupted at {time} s, where the results end")).into()),
+        None => Ok(()),
+    }
 }
 
 /// Warnings about inputs that keep their start values and a step that is too long, which no FMU refuses.
@@ -321,6 +366,9 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
     }
     for text in &args.input {
         match text.split_once('=') {
+            Some((port, file)) if file.to_lowercase().ends_with(".csv") => {
+                loaded.input(port, &column(port, file).map_err(|cause| anyhow!("--input {text}: {cause}"))?)?;
+            }
             Some((port, points)) => {
                 let schedule = Schedule::parse(points).map_err(|cause| anyhow!("--input {text}: {cause}"))?;
                 loaded.input(port, &schedule)?;
@@ -356,6 +404,16 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
     Ok(loaded.settings(args.start, args.stop, args.step, args.sequential))
 }
 
+/// The column of a CSV file that feeds the input `port`: the one of its name, or the only one.
+fn column(port: &str, file: &str) -> Result<Schedule, String> {
+    let mut columns = Schedule::read_csv(Path::new(file))?;
+    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    match names.iter().position(|name| *name == port).or_else(|| (names.len() == 1).then_some(0)) {
+        Some(index) => Ok(columns.swap_remove(index).1),
+        None => Err(format!("has the columns {}; name one of them {port}", names.join(", "))),
+    }
+}
+
 fn write(recording: &Recording, args: &Simulate, mut out: impl Write) -> Result<()> {
     let mut to_stdout = false;
     match args.csv.as_deref() {
@@ -375,7 +433,13 @@ fn write(recording: &Recording, args: &Simulate, mut out: impl Write) -> Result<
         None => {}
     }
     if let Some(path) = &args.plot {
-        pack::write(path, plot::svg(recording)?.as_bytes())?;
+        let svg = plot::svg(recording)?;
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
+            let png = picture::with_text(&svg).with_context(|| path.display().to_string())?;
+            pack::write(path, &png)?;
+        } else {
+            pack::write(path, svg.as_bytes())?;
+        }
     }
     let mut table = recording.last_values();
     if let Some(name) = &recording.ended_by {

@@ -47,8 +47,11 @@ fn what_can_be_known_before_the_first_run_is_told_before_it() {
     let vary = |text: &str| format!("{design}[vary]\n{text}\n{measure}");
     let good = "'d.plant.motor.R_s' = { uniform = [2, 3] }";
     for (text, part) in [
-        (vary("'d.motor.R' = { uniform = [2, 3] }"), "d: PmsmDrive has no variable motor.R"),
-        (vary("'x.R' = { uniform = [2, 3] }"), "x.R: is not INSTANCE.VARIABLE; the instances are d"),
+        (
+            vary("'d.motor.R' = { uniform = [2, 3] }"),
+            "d: has no variable motor.R; did you mean plant.motor.R_s or controller.motor.R_s?",
+        ),
+        (vary("'x.R' = { uniform = [2, 3] }"), "d: has no variable x.R"),
         (vary("'d.speed' = { uniform = [2, 3] }"), "d.speed: is continuous output and takes no value"),
         (vary("'d.controller.estimator' = { values = ['Rasmusen'] }"), "Rasmusen is not one of Rasmussen"),
         (vary(&format!("{good}\n[set]\n'd.plant.motor.R_s' = 3")), "R_s is set for all runs and varied"),
@@ -56,7 +59,7 @@ fn what_can_be_known_before_the_first_run_is_told_before_it() {
         (vary(&format!("{good}\n[set]\n'd.plant.motor.R_s' = -3")), "R_s = -3"),
         (vary(good).replace("runs = 4", "runs = 0"), "it has no rows"),
         (vary(good).replace("stop = 0.01", "stop = 0.01\nstep = 0"), "step 0 be positive"),
-        (vary(good).replace("d.speed'", "d.spede'"), "d: PmsmDrive has no variable spede"),
+        (vary(good).replace("d.speed'", "d.spede'"), "d: has no variable spede; did you mean speed"),
         (vary(good).replace("d.speed'", "d.speed d.i_d'"), "\"d.i_d\" is not expected"),
         (vary(good).replace("'final'", "'final', after = 2"), "m: after = 2 s, expected a time from 0 to 0.01 s"),
         (vary(good).replace("\nm =", "\n'd.plant.motor.R_s' ="), "is the name of a varied variable"),

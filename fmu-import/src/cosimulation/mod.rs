@@ -157,12 +157,15 @@ impl System {
         Ok(found)
     }
 
-    /// Feeds an input over time.
+    /// Feeds an input or a tunable parameter over time.
     ///
     /// # Errors
-    /// The variable does not exist, is not a number, or is fed already.
+    /// The variable does not exist, is not a number, has other units, or is fed already.
     pub fn input(&mut self, port: &str, schedule: Schedule) -> Result<(), Error> {
         let target = self.parts.scalar(port)?;
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let schedule = schedule.in_unit_of(variable, self.instances[target.instance].description());
+        let schedule = schedule.map_err(|cause| Error::usage(self.instances[target.instance].name(), cause))?;
         self.feed(target, port, Source::Schedule(schedule))
     }
 
@@ -224,13 +227,15 @@ impl System {
     }
 
     fn feed(&mut self, target: Port, written: &str, source: Source) -> Result<(), Error> {
-        if self.parts.causality(&target) != Causality::Input {
-            return Err(Error::usage(written, "is not an input"));
-        }
         if self.wiring.feeds(target.instance, &target.name) {
             return Err(Error::usage(written, "is fed twice"));
         }
         let variable = self.parts.variable(target.instance, &target.name)?;
+        let tunable = variable.causality == Causality::Parameter && variable.variability == Variability::Tunable;
+        if variable.causality != Causality::Input && !(tunable && matches!(source, Source::Schedule(_))) {
+            let also = if matches!(source, Source::Schedule(_)) { " or a tunable parameter" } else { "" };
+            return Err(Error::usage(written, format!("is not an input{also}")));
+        }
         let continuous = variable.variability == Variability::Continuous && variable.base.is_float();
         self.wiring.add(target, source, continuous);
         Ok(())

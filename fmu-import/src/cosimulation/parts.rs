@@ -1,6 +1,7 @@
 //! The FMUs of a system with their names, and what is found in them by `instance.variable`.
 
 use super::Column;
+use crate::quantity::suggest;
 use crate::{Error, Fmu, Kind};
 use model_description::{BaseType, Causality, Initial, ModelDescription, ModelVariable, Variability};
 
@@ -69,7 +70,8 @@ impl Parts {
 
     pub(super) fn variable(&self, instance: usize, name: &str) -> Result<&ModelVariable, Error> {
         let Part { name: of, fmu, .. } = &self.0[instance];
-        let none = || Error::usage(of, format!("{} has no variable {name}", fmu.description().model_name));
+        let names = || fmu.description().variables.iter().map(|v| v.name.as_str());
+        let none = || Error::usage(of, format!("has no variable {name}{}", suggest(name, names())));
         fmu.description().variable(name).ok_or_else(none)
     }
 
@@ -77,14 +79,24 @@ impl Parts {
         self.variable(port.instance, &port.name).map_or(Causality::Local, |v| v.causality)
     }
 
-    /// The instance and what follows its name and a dot; an instance's name may itself have dots.
+    /// The instance and what follows its name and a dot; an instance's name may itself have dots. A single instance need not be
+    /// named.
     pub(super) fn instance_and_rest<'a>(&self, text: &'a str, what: &str) -> Result<(usize, &'a str), Error> {
         let split = |(index, part): (usize, &Part)| {
             Some((index, part.name.len(), text.strip_prefix(&part.name)?.strip_prefix('.')?))
         };
         let best = self.0.iter().enumerate().filter_map(split).max_by_key(|(_, length, _)| *length);
         let names = || self.0.iter().map(|part| part.name.as_str()).collect::<Vec<_>>().join(", ");
-        let wrong = || Error::usage(text, format!("is not INSTANCE.{what}; the instances are {}", names()));
+        let full = |part: &Part| {
+            let of = part.name.clone();
+            part.description().variables.iter().map(move |v| format!("{of}.{}", v.name)).collect::<Vec<_>>()
+        };
+        let wrong = || {
+            let all: Vec<String> = self.0.iter().flat_map(full).collect();
+            let meant = suggest(text, all.iter().map(String::as_str));
+            Error::usage(text, format!("is not INSTANCE.{what}; the instances are {}{meant}", names()))
+        };
+        let best = best.or_else(|| (self.0.len() == 1).then_some((0, 0, text)));
         best.map(|(index, _, rest)| (index, rest)).ok_or_else(wrong)
     }
 

@@ -1,5 +1,7 @@
 //! Inputs over time.
 
+use crate::quantity::{convert, split};
+use model_description::{ModelDescription, ModelVariable};
 use std::fmt;
 use std::path::Path;
 
@@ -8,6 +10,8 @@ use std::path::Path;
 pub struct Schedule {
     points: Vec<(f64, f64)>,
     linear: bool,
+    /// Unit of each value, where one has a unit; empty is that of the variable.
+    units: Vec<String>,
 }
 
 /// Instants closer than this (s) are the same: communication points are `start + k h`, rounded.
@@ -40,10 +44,25 @@ impl Schedule {
         if let Some(pair) = points.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
             return Err(format!("the time {} does not follow {}", pair[1].0, pair[0].0));
         }
-        Ok(Self { points, linear })
+        Ok(Self { points, linear, units: Vec::new() })
     }
 
-    /// `0:0,0.1:52.36` for steps, `0:0~0.1:52.36` for straight lines; a single number is a constant.
+    /// The same with the values in the unit of the `variable`.
+    pub(super) fn in_unit_of(self, variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
+        if self.units.is_empty() {
+            return Ok(self);
+        }
+        let converted = |(&(t, x), unit): (&(f64, f64), &String)| Ok((t, convert(x, unit, variable, description)?));
+        Self::new(self.points.iter().zip(&self.units).map(converted).collect::<Result<_, String>>()?, self.linear)
+    }
+
+    /// With these units of the values, if there is one.
+    fn with_units(self, units: Vec<String>) -> Self {
+        let units = if units.iter().all(String::is_empty) { Vec::new() } else { units };
+        Self { units, ..self }
+    }
+
+    /// `0:0,0.1:52.36` for steps, `0:0~0.1:500rpm` for straight lines; a single number is a constant.
     ///
     /// # Errors
     /// Says which point is none, or as [`steps`](Self::steps).
@@ -53,20 +72,26 @@ impl Schedule {
             return Err("has both , for steps and ~ for lines".into());
         }
         let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("{:?} is not a number", text.trim()));
+        let value = |text: &str| {
+            let (x, unit) = split(text).ok_or_else(|| format!("{:?} is not a number", text.trim()))?;
+            Ok::<_, String>((x, unit.to_owned()))
+        };
         let point = |text: &str| match text.split_once(':') {
-            Some((t, x)) => Ok((number(t)?, number(x)?)),
-            None if !text.contains(':') && !linear => Ok((0.0, number(text)?)),
+            Some((t, x)) => Ok((number(t)?, value(x)?)),
+            None if !linear => Ok((0.0, value(text)?)),
             None => Err(format!("{text:?} is not TIME:VALUE")),
         };
         let parts: Vec<&str> = text.split([',', '~']).collect();
         if parts.len() > 1 && parts.iter().any(|p| !p.contains(':')) {
             return Err("needs TIME:VALUE for every point".into());
         }
-        Self::new(parts.into_iter().map(point).collect::<Result<_, _>>()?, linear)
+        let points = parts.into_iter().map(point).collect::<Result<Vec<_>, _>>()?;
+        let (points, units) = points.into_iter().map(|(t, (x, unit))| ((t, x), unit)).unzip();
+        Ok(Self::new(points, linear)?.with_units(units))
     }
 
-    /// The columns of a CSV file: the first is time (s), the header of each other names its input. Lines connect the
-    /// points.
+    /// The columns of a CSV file: the first is time (s), the header of each other names its input, as in `speed_ref` or
+    /// `speed_ref [rpm]`. Lines connect the points.
     ///
     /// # Errors
     /// The file cannot be read, has no header, or a row has another number of numbers than the header.
@@ -78,23 +103,42 @@ impl Schedule {
     fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
         let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
         let cells = |line: &str| line.split(',').map(|c| c.trim().trim_matches('"').to_owned()).collect::<Vec<_>>();
-        let (_, header) = lines.next().ok_or("is empty")?;
+        let (first, header) = lines.next().ok_or("is empty")?;
+        if header.contains(';') {
+            return Err(format!(
+                "line {}: has semicolons; write commas between columns and a decimal point",
+                first + 1
+            ));
+        }
         let names: Vec<String> = cells(header).into_iter().skip(1).collect();
         if names.is_empty() {
             return Err("has no column besides time".into());
         }
         let mut columns: Vec<Vec<(f64, f64)>> = vec![Vec::new(); names.len()];
         for (index, line) in lines {
-            let row: Result<Vec<f64>, _> = cells(line).iter().map(|c| c.parse::<f64>()).collect();
-            match row.as_deref() {
-                Ok([t, values @ ..]) if values.len() == names.len() => {
+            let number = |cell: &String| {
+                cell.parse::<f64>().map_err(|_| format!("line {}: {cell:?} is not a number", index + 1))
+            };
+            match cells(line).iter().map(number).collect::<Result<Vec<f64>, _>>()?.as_slice() {
+                [t, values @ ..] if values.len() == names.len() => {
                     columns.iter_mut().zip(values).for_each(|(column, x)| column.push((*t, *x)));
                 }
-                Ok(_) => return Err(format!("line {}: expected {} numbers", index + 1, names.len() + 1)),
-                Err(_) => return Err(format!("line {}: a cell is not a number", index + 1)),
+                row => {
+                    let (line, expected, found) = (index + 1, names.len() + 1, row.len());
+                    let commas = if found > expected { "; commas separate columns: write a decimal point" } else { "" };
+                    return Err(format!("line {line}: expected {expected} numbers, found {found}{commas}"));
+                }
             }
         }
-        names.into_iter().zip(columns).map(|(name, points)| Ok((name, Self::lines(points)?))).collect()
+        let column = |(name, points): (String, Vec<(f64, f64)>)| {
+            let (name, unit) = match name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
+                Some((name, unit)) => (name.trim_end().to_owned(), unit.trim().to_owned()),
+                None => (name, String::new()),
+            };
+            let units = vec![unit; points.len()];
+            Ok((name, Self::lines(points)?.with_units(units)))
+        };
+        names.into_iter().zip(columns).map(column).collect()
     }
 
     /// Value at time `t` (s).
@@ -173,7 +217,13 @@ mod tests {
         let columns = Schedule::parse_csv("\"time\",\"c.speed_ref\",p.tau_load\n0,0,0\n1,10,2\n").unwrap();
         assert_eq!(columns[0].0, "c.speed_ref");
         assert_eq!((columns[0].1.at(0.5), columns[1].1.at(0.5)), (5.0, 1.0));
-        assert_eq!(Schedule::parse_csv("time,a\n0\n").unwrap_err(), "line 2: expected 2 numbers");
-        assert_eq!(Schedule::parse_csv("time,a\n0,x\n").unwrap_err(), "line 2: a cell is not a number");
+        for (text, cause) in [
+            ("time,a\n0\n", "line 2: expected 2 numbers, found 1"),
+            ("time,a\n0,1,5\n", "line 2: expected 2 numbers, found 3; commas separate columns: write a decimal point"),
+            ("time,a\n0,x\n", "line 2: \"x\" is not a number"),
+            ("time;a\n0;1,5\n", "line 1: has semicolons; write commas between columns and a decimal point"),
+        ] {
+            assert_eq!(Schedule::parse_csv(text).unwrap_err(), cause, "{text:?}");
+        }
     }
 }

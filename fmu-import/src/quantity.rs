@@ -1,0 +1,90 @@
+//! What a user writes for a variable: numbers with or without a unit, names with or without a mistake.
+
+use model_description::{ModelDescription, ModelVariable};
+
+/// Splits `1000 rpm` or `1000rpm` into the number and the unit, which is empty for a number alone.
+pub(crate) fn split(text: &str) -> Option<(f64, &str)> {
+    let text = text.trim();
+    if let Ok(number) = text.parse() {
+        return Some((number, ""));
+    }
+    let digits = text.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(text.len());
+    (1..=digits).rev().find_map(|end| Some((text.get(..end)?.parse().ok()?, text.get(end..)?.trim())))
+}
+
+/// The number in the unit of the variable, from one in `unit`: that of the variable or one of its display units; none is that
+/// of the variable.
+///
+/// # Errors
+/// Names the units that the variable has.
+pub(crate) fn convert(
+    number: f64,
+    unit: &str,
+    variable: &ModelVariable,
+    description: &ModelDescription,
+) -> Result<f64, String> {
+    let own = variable.unit.as_deref();
+    if unit.is_empty() || own == Some(unit) {
+        return Ok(number);
+    }
+    let definition = own.and_then(|own| description.unit(own));
+    if let Some(shown) = definition.and_then(|definition| definition.display_unit(unit)) {
+        return Ok(shown.unshow(number));
+    }
+    let of = format!("{} = {number}{unit}", variable.name);
+    if unit.starts_with(',') {
+        return Err(format!("{of} is not a number: write a decimal point"));
+    }
+    let shown = definition.iter().flat_map(|definition| &definition.display_units).map(|shown| shown.name.as_str());
+    match own.into_iter().chain(shown).collect::<Vec<_>>() {
+        units if units.is_empty() => Err(format!("{of} is not a number, and the variable has no unit")),
+        units => Err(format!("{of} is not a number in {}", units.join(" or "))),
+    }
+}
+
+/// `; did you mean a or b?` with the names that resemble what was written, or nothing.
+pub(crate) fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> String {
+    let (whole, last) = (written.to_lowercase(), last_part(written).to_lowercase());
+    let likeness = |name: &str| {
+        let lower = name.to_lowercase();
+        let part = last_part(&lower);
+        strsim::jaro_winkler(&whole, &lower).max(strsim::jaro_winkler(&last, part))
+    };
+    let mut near: Vec<(f64, &str)> = names.map(|name| (likeness(name), name)).filter(|(x, _)| *x > 0.78).collect();
+    near.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.len().cmp(&b.1.len())));
+    // As near as the nearest.
+    let best = near.first().map_or(1.0, |(x, _)| *x);
+    let names: Vec<&str> =
+        near.into_iter().take_while(|(x, _)| *x > best - 0.05).take(3).map(|(_, name)| name).collect();
+    if names.is_empty() { String::new() } else { format!("; did you mean {}?", names.join(" or ")) }
+}
+
+/// What follows the last dot.
+fn last_part(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_with_its_unit() {
+        assert_eq!(split(" 1000 rpm"), Some((1000.0, "rpm")));
+        assert_eq!(split("-1.5e3rad/s"), Some((-1500.0, "rad/s")));
+        assert_eq!(split("2e-3"), Some((2e-3, "")));
+        assert_eq!(split("36 mH"), Some((36.0, "mH")));
+        assert_eq!(split("1,5"), Some((1.0, ",5")));
+        assert_eq!(split("rpm"), None);
+    }
+
+    #[test]
+    fn names_that_resemble() {
+        let names = ["plant.motor.R_s", "controller.motor.R_s", "plant.motor.psi_M", "speed", "speed_ref"];
+        let of = |written| suggest(written, names.into_iter());
+        assert_eq!(of("R"), "; did you mean plant.motor.R_s or controller.motor.R_s?");
+        assert_eq!(of("motor.psi_m"), "; did you mean plant.motor.psi_M?");
+        assert_eq!(of("sped"), "; did you mean speed?");
+        assert_eq!(of("xyz"), "");
+    }
+}
