@@ -3,11 +3,14 @@
 //! - [`motor`]: the TOML file of a machine; [`rules`]: how values follow from it; [`iron`]: iron loss from a drag test;
 //!   [`check`](mod@check): whether the models have such variables; [`Tuned::pair`](rules::Tuned::pair): the drive with these values, natively.
 
+pub mod bandwidth;
 pub mod check;
 pub mod iron;
+pub mod limits;
 pub mod motor;
 mod native;
 pub mod rules;
+pub mod trial;
 
 use anyhow::{Context, Result, anyhow};
 use drive::{PmsmPlant, SensorlessController};

@@ -14,8 +14,10 @@
 //! (gain T_s / L) i[k]` is undamped at gain T_s / L = 1. The rules allow half of that (gain margin 6 dB) and lower w_c
 //! to meet it.
 
+use super::bandwidth::{Bandwidths, least_observer};
 use super::check::check;
 use super::iron;
+use super::limits::Limit;
 use super::motor::{Data, MotorFile, Number};
 use anyhow::{Result, bail};
 use drive::control::envelope::{Envelope, Warm};
@@ -65,6 +67,14 @@ pub struct Tuned {
     pub controller: Vec<Setting>,
     /// Warnings: values outside the ranges that the rules were tested in.
     pub notes: Vec<String>,
+    /// What the drive will not hold.
+    pub limits: Vec<Limit>,
+    /// Rated mechanical speed in rad/s.
+    pub speed: f64,
+    /// Rated torque in N.m.
+    pub torque: f64,
+    /// Time in s at rest before the first speed reference, in which the rotor aligns itself.
+    pub rest: f64,
 }
 
 fn given(name: &'static str, x: &Number) -> Setting {
@@ -88,20 +98,32 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     let mut plant = plant(data);
     let estimator = estimator(motor)?;
     let mut notes = Vec::new();
-    let mut controller = common(data, &estimator);
+    let bandwidths = Bandwidths::of(data, estimator == "Rasmussen");
+    let mut controller = common(data, &bandwidths, &estimator);
     // Check the given values before computing anything from them.
     check(&plant, &controller, motor)?;
-    fits(motor, &mut notes)?;
+    fits(motor, &bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
     if estimator == "Rasmussen" {
-        controller.extend(flux_observer(motor, &mut notes)?);
+        controller.extend(flux_observer(motor, &bandwidths, &mut notes)?);
     } else {
-        controller.extend(extended_emf(data, &mut notes));
+        controller.extend(extended_emf(data, &bandwidths, &mut notes));
     }
     controller.extend(weakening(motor, estimator != "Rasmussen", &mut notes)?);
-    cap_current_loop(data, &mut controller, &mut notes);
+    cap_current_loop(data, &bandwidths, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
-    Ok(Tuned { name: data.name.clone(), source: data.source.clone(), plant, controller, notes })
+    let (speed, torque) = (*data.rating.speed.get_ref(), *data.rating.torque.get_ref());
+    Ok(Tuned {
+        name: data.name.clone(),
+        source: data.source.clone(),
+        plant,
+        controller,
+        notes,
+        limits: Vec::new(),
+        speed,
+        torque,
+        rest: 0.2,
+    })
 }
 
 fn estimator(motor: &MotorFile) -> Result<String> {
@@ -146,10 +168,10 @@ fn plant(data: &Data) -> Vec<Setting> {
 }
 
 /// Values that every estimator needs.
-fn common(data: &Data, estimator: &str) -> Vec<Setting> {
-    let Data { machine, mechanics, bandwidth, control, .. } = data;
+fn common(data: &Data, bandwidths: &Bandwidths, estimator: &str) -> Vec<Setting> {
+    let Data { machine, mechanics, .. } = data;
     let mut all = vec![set("estimator", Value::Item(estimator.into()), "by the saliency, or as given")];
-    all.push(control.T_s.as_ref().map_or_else(|| real("T_s", 1e-4, "10 kHz"), |x| given("T_s", x)));
+    all.push(bandwidths.T_s.setting("T_s"));
     all.extend([
         set("motor.n_p", Value::Integer(*machine.n_p.get_ref()), "as given"),
         real("motor.R_s", 0.9 * machine.R_s.get_ref(), "0.9 R_s: the safe side at standstill"),
@@ -158,8 +180,8 @@ fn common(data: &Data, estimator: &str) -> Vec<Setting> {
         given("motor.psi_M", &machine.psi_M),
         given("mechanics.J", &mechanics.J),
         given("u_dc", &data.dc_link.u_dc),
-        given("current.bandwidth", &bandwidth.current),
-        given("speed_loop.bandwidth", &bandwidth.speed),
+        bandwidths.current.setting("current.bandwidth"),
+        bandwidths.speed.setting("speed_loop.bandwidth"),
         real("speed_loop.t_is", 4.0, "K_i = K_p w_s / 4"),
         given("limit.i", &data.rating.current),
     ]);
@@ -167,26 +189,26 @@ fn common(data: &Data, estimator: &str) -> Vec<Setting> {
 }
 
 /// Torque constant in N.m/A.
-fn torque_constant(data: &Data) -> f64 {
+pub(super) fn torque_constant(data: &Data) -> f64 {
     1.5 * f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref()
 }
 
 /// Rules for every estimator.
-fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
-    let Data { rating, bandwidth, .. } = &motor.data;
+fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<()> {
+    let rating = &motor.data.rating;
     for (name, x) in [("speed", &rating.speed), ("torque", &rating.torque), ("current", &rating.current)] {
         if !(x.get_ref().is_finite() && *x.get_ref() > 0.0) {
             bail!("{}: rating.{name} = {} must be greater than 0: correct the value", motor.place(x), x.get_ref());
         }
     }
-    let (w_s, w_o) = (*bandwidth.speed.get_ref(), *bandwidth.observer.get_ref());
+    let (w_s, w_o) = (bandwidths.speed.value, bandwidths.observer.value);
     if w_s > w_o / 3.0 * (1.0 + 1e-9) {
-        let place = motor.place(&bandwidth.speed);
+        let place = motor.place_at(bandwidths.speed.origin.or(bandwidths.observer.origin).unwrap_or_default());
         bail!(
             "{place}: bandwidth.speed = {w_s} rad/s is more than a third of bandwidth.observer = {w_o} rad/s: lower the former or raise the latter"
         );
     }
-    let hertz = bandwidth.current.get_ref() / TAU;
+    let hertz = bandwidths.current.value / TAU;
     if !(60.0..=600.0).contains(&hertz) {
         notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to 600 Hz were tried"));
     }
@@ -248,10 +270,10 @@ fn electrical(data: &Data) -> Motor {
 const MAX_GAIN: f64 = 0.5;
 
 /// Lowers the bandwidth of the current loop to what the smallest inductance allows, and reports it.
-fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<String>) {
+fn cap_current_loop(data: &Data, bandwidths: &Bandwidths, controller: &mut [Setting], notes: &mut Vec<String>) {
     let value = |name: &str| controller.iter().find(|s| s.name == name).map(|s| &s.value);
     let number = |name: &str| if let Some(Value::Real(x)) = value(name) { *x } else { 0.0 };
-    let Data { machine, rating, bandwidth, .. } = data;
+    let Data { machine, rating, .. } = data;
     // During a start, the current may be on one axis and the same damping on the other.
     let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
     let least = least_inductance(data, i);
@@ -261,7 +283,7 @@ fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<Str
         Some(Value::Boolean(true)) => (gain + number("motor.R_s")) / (2.0 * greatest),
         _ => gain / greatest,
     };
-    let wanted = *bandwidth.current.get_ref();
+    let wanted = bandwidths.current.value;
     if most < wanted {
         let (asked, given) = (wanted / TAU, most / TAU);
         notes.push(format!(
@@ -297,11 +319,11 @@ fn least_inductance(data: &Data, i: f64) -> f64 {
     (0..72).map(|k| at(f64::from(k) * TAU / 72.0)).fold(f64::INFINITY, f64::min)
 }
 
-fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setting>> {
+fn flux_observer(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<Vec<Setting>> {
     let data = &motor.data;
-    let Data { machine, rating, bandwidth, mechanics, .. } = data;
+    let Data { machine, rating, .. } = data;
     let (k, n_p) = (torque_constant(data), f64::from(*machine.n_p.get_ref()));
-    let (limit, w_n) = (*rating.current.get_ref(), *bandwidth.observer.get_ref());
+    let (limit, w_n) = (*rating.current.get_ref(), bandwidths.observer.value);
     let i_0 = 1.35 * rating.torque.get_ref() / k;
     if i_0 > limit {
         let place = motor.place(&rating.current);
@@ -310,9 +332,9 @@ fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setti
         );
     }
     let i_q = 0.8 * limit;
-    let least = (n_p * k * i_q / mechanics.J.get_ref() / 0.35).sqrt();
+    let least = least_observer(data);
     if w_n < least {
-        let place = motor.place(&bandwidth.observer);
+        let place = motor.place_at(bandwidths.observer.origin.unwrap_or_default());
         bail!(
             "{place}: bandwidth.observer = {w_n} rad/s cannot follow the greatest acceleration: at least {least:.0} rad/s, or a lower rating.current"
         );
@@ -320,7 +342,7 @@ fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setti
     if !(150.0..=800.0).contains(&w_n) {
         notes.push(format!("bandwidth.observer is {w_n} rad/s; 150 to 800 were tried"));
     }
-    let w_s = *bandwidth.speed.get_ref();
+    let w_s = bandwidths.speed.value;
     if !(40.0..=120.0).contains(&w_s) {
         notes.push(format!("bandwidth.speed is {w_s} rad/s; 40 to 120 were tried"));
     }
@@ -341,9 +363,9 @@ fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setti
     ])
 }
 
-fn extended_emf(data: &Data, notes: &mut Vec<String>) -> Vec<Setting> {
-    let Data { rating, bandwidth, mechanics, .. } = data;
-    let (limit, torque, rho) = (*rating.current.get_ref(), *rating.torque.get_ref(), *bandwidth.observer.get_ref());
+fn extended_emf(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Vec<Setting> {
+    let Data { rating, mechanics, .. } = data;
+    let (limit, torque, rho) = (*rating.current.get_ref(), *rating.torque.get_ref(), bandwidths.observer.value);
     if rho < TAU * 15.0 * (1.0 - 1e-9) {
         notes.push(format!(
             "bandwidth.observer is {rho} rad/s; below 94 rad/s a load step of half the torque loses the rotor"
