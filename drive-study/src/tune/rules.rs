@@ -383,6 +383,10 @@ fn extended_emf(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
             k * stable
         ));
     }
+    // The rotor swings on the current vector with w_0, damped by 0.5; the reluctance takes away a share of the stiffness, and
+    // of the damping torque.
+    let w_0 = (f64::from(*data.machine.n_p.get_ref()) * k * lead / mechanics.J.get_ref()).sqrt();
+    let decay = 0.5 * w_0 * (1.0 - saliency * lead / data.machine.psi_M.get_ref());
     vec![
         set("current.active_resistance", Value::Boolean(true), "K_i = w_c^2 L"),
         set("current.mtpa", Value::Boolean(true), "salient: least current for a torque"),
@@ -404,5 +408,7 @@ fn extended_emf(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
             (0.3 * k * lead / mechanics.J.get_ref()).min(100.0),
             "0.3 of the start's torque, at most 100 rad/s2",
         ),
+        real("start.t_align", (4.0 / decay).max(0.25), "the rotor settles on the current vector: 4 time constants, at least 0.25 s"),
+        real("start.settle", (5.0 / decay).max(0.2), "its swing has died at the hand-over: 5 time constants, at least 0.2 s"),
     ]
 }
