@@ -5,9 +5,11 @@
 //!   most. Rasmussen's observer: that of the greatest current, and 300 rad/s at least; the tracker of the extended EMF: that
 //!   of the rated torque, and 2 pi 20 rad/s at least.
 //! - Speed: a step of the torque T makes the loop dip by 2/e T / (J w_s), a double pole at w_s / 2. It is to be at most 0.05
-//!   pu; at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up to a limit.
+//!   pu; at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up to a limit;
+//!   with the extended EMF, less where the gain through the change of i_q would be high ([`limits`](super::limits)).
 //! - Current: 2 pi 250 rad/s (Rasmussen); 2 pi 200 rad/s with the I-f start, and 2/3 of the stable limit at most.
 
+use super::limits::{GREATEST_GAIN, gain_per_bandwidth};
 use super::motor::{Data, Number};
 use super::rules::{Setting, Value, torque_constant};
 use std::f64::consts::{E, TAU};
@@ -20,6 +22,9 @@ const PERIODS: [f64; 4] = [1e-4, 5e-5, 2.5e-5, 1.25e-5];
 
 /// Dip of the speed in pu under a step of the rated torque that the rules aim at.
 const DIP: f64 = 0.05;
+
+/// Gain of the speed loop through the EMF that a change of i_q makes, see [`limits`](super::limits): what the rules take.
+const CALM: f64 = 0.6 * GREATEST_GAIN;
 
 /// A value and where it comes from.
 #[derive(Clone, Debug)]
@@ -66,22 +71,24 @@ impl Bandwidths {
         let T_s = Chosen::new(data.control.T_s.as_ref(), "at least 12 samples per electrical period", || {
             PERIODS.into_iter().find(|T_s| period / T_s >= SAMPLES).unwrap_or(PERIODS[3])
         });
-        let (needed, slowest) = (DIP_OF_A_STEP * acceleration(data) / (DIP * data.rating.speed.get_ref()), if flux_observer { 40.0 } else { TAU * 5.0 });
-        let wanted = needed.max(slowest);
+        let n_p = f64::from(*machine.n_p.get_ref());
+        let needed = DIP_OF_A_STEP * acceleration(data) / (DIP * data.rating.speed.get_ref());
+        let wanted = needed.max(if flux_observer { 40.0 } else { TAU * 5.0 });
         let observer = if flux_observer {
             Chosen::new(given.observer.as_ref(), "follows the greatest acceleration, at least 300 rad/s", || {
-                let least = 1.05 * least_observer(data);
-                least.max(300.0).max((3.0 * wanted).min(600.0 * 1e-4 / T_s.value))
+                (1.05 * least_observer(data)).max(300.0).max((3.0 * wanted).min(600.0 * PERIODS[0] / T_s.value))
             })
         } else {
             Chosen::new(given.observer.as_ref(), "follows the rated torque, at least 2 pi 20 rad/s", || {
-                let least = 1.1 * (f64::from(*machine.n_p.get_ref()) * acceleration(data) / 0.35).sqrt();
-                least.max(TAU * 20.0).max((3.0 * wanted).min(TAU * 40.0))
+                let least = 1.1 * (n_p * acceleration(data) / 0.35).sqrt();
+                // With a third of rho as w_s, the gain has this at most.
+                let calm = (3.0 * CALM / gain_per_bandwidth(data, 1.0)).cbrt();
+                least.max(TAU * 20.0).max((3.0 * wanted).min(TAU * 40.0).min(calm))
             })
         };
-        let speed = Chosen::new(given.speed.as_ref(), "dips by 0.05 pu under a step of the rated torque; a third of the observer at most", || {
-            wanted.min(observer.value / 3.0)
-        });
+        let calm = if flux_observer { f64::INFINITY } else { CALM / gain_per_bandwidth(data, observer.value) };
+        let rule = "dips by 0.05 pu under a step of the rated torque; at most a third of the observer";
+        let speed = Chosen::new(given.speed.as_ref(), rule, || wanted.min(observer.value / 3.0).min(calm));
         let current = if flux_observer {
             Chosen::new(given.current.as_ref(), "250 Hz", || TAU * 250.0)
         } else {

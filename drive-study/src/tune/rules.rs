@@ -17,8 +17,9 @@
 use super::bandwidth::{Bandwidths, least_observer};
 use super::check::check;
 use super::iron;
-use super::limits::Limit;
+use super::limits::{self, Limit, resistance_margin, swing, zero_speed_current};
 use super::motor::{Data, MotorFile, Number};
+use super::plausible;
 use anyhow::{Result, bail};
 use drive::control::envelope::{Envelope, Warm};
 use drive::control::reference::max_torque_per_ampere;
@@ -102,16 +103,28 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     let mut controller = common(data, &bandwidths, &estimator);
     // Check the given values before computing anything from them.
     check(&plant, &controller, motor)?;
+    ratings(motor)?;
+    plausible::check(motor)?;
     fits(motor, &bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
-    if estimator == "Rasmussen" {
+    let observes_flux = estimator == "Rasmussen";
+    if observes_flux {
         controller.extend(flux_observer(motor, &bandwidths, &mut notes)?);
     } else {
         controller.extend(extended_emf(data, &bandwidths, &mut notes));
     }
-    controller.extend(weakening(motor, estimator != "Rasmussen", &mut notes)?);
+    controller.extend(weakening(motor, !observes_flux, &mut notes)?);
     cap_current_loop(data, &bandwidths, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
+    let (limits, narrow) = limits::of(data, &bandwidths, observes_flux);
+    notes.extend(narrow);
+    // Five periods of the swing that the observer damps, over 2 pi.
+    let rest = if observes_flux { (5.0 / swing(data, zero_speed_current(data))).max(REST) } else { 0.0 };
+    if rest > REST {
+        notes.push(format!(
+            "keep speed_ref at 0 for the first {rest:.2} s: the rotor turns to the current that holds standstill"
+        ));
+    }
     let (speed, torque) = (*data.rating.speed.get_ref(), *data.rating.torque.get_ref());
     Ok(Tuned {
         name: data.name.clone(),
@@ -119,12 +132,15 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
         plant,
         controller,
         notes,
-        limits: Vec::new(),
+        limits,
         speed,
         torque,
-        rest: 0.2,
+        rest,
     })
 }
+
+/// Time in s at rest that every drive needs before the first speed reference.
+const REST: f64 = 0.2;
 
 fn estimator(motor: &MotorFile) -> Result<String> {
     let machine = &motor.data.machine;
@@ -170,11 +186,11 @@ fn plant(data: &Data) -> Vec<Setting> {
 /// Values that every estimator needs.
 fn common(data: &Data, bandwidths: &Bandwidths, estimator: &str) -> Vec<Setting> {
     let Data { machine, mechanics, .. } = data;
-    let mut all = vec![set("estimator", Value::Item(estimator.into()), "by the saliency, or as given")];
+    let mut all = vec![set("estimator", Value::Item(estimator.into()), "by the saliency, or as given"), lock(data)];
     all.push(bandwidths.T_s.setting("T_s"));
     all.extend([
         set("motor.n_p", Value::Integer(*machine.n_p.get_ref()), "as given"),
-        real("motor.R_s", 0.9 * machine.R_s.get_ref(), "0.9 R_s: the safe side at standstill"),
+        resistance(data, estimator),
         given("motor.L_d", &machine.L_d),
         given("motor.L_q", &machine.L_q),
         given("motor.psi_M", &machine.psi_M),
@@ -188,25 +204,62 @@ fn common(data: &Data, bandwidths: &Bandwidths, estimator: &str) -> Vec<Setting>
     all
 }
 
+fn resistance(data: &Data, estimator: &str) -> Setting {
+    let R_s = data.machine.R_s.get_ref();
+    let margin = if estimator == "Rasmussen" { resistance_margin(data) } else { 0.1 };
+    if margin < 0.1 {
+        let rule = format!("{:.3} R_s: below R_s, and the rotor follows the estimate at rest", 1.0 - margin);
+        return real("motor.R_s", (1.0 - margin) * R_s, &rule);
+    }
+    real("motor.R_s", 0.9 * R_s, "0.9 R_s: the safe side at standstill")
+}
+
+/// The voltage error that `lock_lost` tolerates, scaled to the machine: a share of the EMF at rated speed, 5 V for the
+/// reference motor, and at least twice what R^ = 0.9 R leaves at the greatest current.
+fn lock(data: &Data) -> Setting {
+    const SHARE: f64 = 5.0 / 141.371_669_4;
+    let Data { machine, rating, .. } = data;
+    let emf = f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * machine.psi_M.get_ref();
+    let resistive = 0.2 * machine.R_s.get_ref() * rating.current.get_ref();
+    real(
+        "lock.u",
+        (SHARE * emf).max(resistive),
+        "0.035 of the EMF at rated speed, at least 0.2 R_s times the greatest current",
+    )
+}
+
 /// Torque constant in N.m/A.
 pub(super) fn torque_constant(data: &Data) -> f64 {
     1.5 * f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref()
 }
 
-/// Rules for every estimator.
-fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<()> {
+/// The ratings are positive.
+fn ratings(motor: &MotorFile) -> Result<()> {
     let rating = &motor.data.rating;
     for (name, x) in [("speed", &rating.speed), ("torque", &rating.torque), ("current", &rating.current)] {
         if !(x.get_ref().is_finite() && *x.get_ref() > 0.0) {
             bail!("{}: rating.{name} = {} must be greater than 0: correct the value", motor.place(x), x.get_ref());
         }
     }
+    Ok(())
+}
+
+/// Rules for every estimator.
+fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<()> {
+    let Data { machine, rating, .. } = &motor.data;
     let (w_s, w_o) = (bandwidths.speed.value, bandwidths.observer.value);
     if w_s > w_o / 3.0 * (1.0 + 1e-9) {
         let place = motor.place_at(bandwidths.speed.origin.or(bandwidths.observer.origin).unwrap_or_default());
         bail!(
             "{place}: bandwidth.speed = {w_s} rad/s is more than a third of bandwidth.observer = {w_o} rad/s: lower the former or raise the latter"
         );
+    }
+    let samples = TAU / (f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * bandwidths.T_s.value);
+    if samples < 10.0 {
+        notes.push(format!(
+            "2 pi / (w T_s) = {samples:.1} samples per electrical period at rating.speed; 10 or more were tried: lower \
+             control.T_s"
+        ));
     }
     let hertz = bandwidths.current.value / TAU;
     if !(60.0..=600.0).contains(&hertz) {
@@ -228,6 +281,14 @@ fn weakening(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Resul
         DqHat::new(0.0, torque / machine.torque_constant())
     };
     let U = WeakeningParameters::default().k_u * highest;
+    if i.magnitude() > *rating.current.get_ref() {
+        bail!(
+            "{}: rating.current = {} A is less than the {:.2} A that rating.torque takes: raise it, or lower the torque",
+            motor.place(&rating.current),
+            rating.current.get_ref(),
+            i.magnitude()
+        );
+    }
     if envelope.excess(i, w, U) <= 0.0 {
         return Ok(Vec::new());
     }
@@ -322,9 +383,9 @@ fn least_inductance(data: &Data, i: f64) -> f64 {
 fn flux_observer(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<Vec<Setting>> {
     let data = &motor.data;
     let Data { machine, rating, .. } = data;
-    let (k, n_p) = (torque_constant(data), f64::from(*machine.n_p.get_ref()));
+    let n_p = f64::from(*machine.n_p.get_ref());
     let (limit, w_n) = (*rating.current.get_ref(), bandwidths.observer.value);
-    let i_0 = 1.35 * rating.torque.get_ref() / k;
+    let i_0 = zero_speed_current(data);
     if i_0 > limit {
         let place = motor.place(&rating.current);
         bail!(
@@ -385,8 +446,8 @@ fn extended_emf(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
     }
     // The rotor swings on the current vector with w_0, damped by 0.5; the reluctance takes away a share of the stiffness, and
     // of the damping torque.
-    let w_0 = (f64::from(*data.machine.n_p.get_ref()) * k * lead / mechanics.J.get_ref()).sqrt();
-    let decay = 0.5 * w_0 * (1.0 - saliency * lead / data.machine.psi_M.get_ref());
+    let n_p = f64::from(*data.machine.n_p.get_ref());
+    let decay = 0.5 * swing(data, lead) * (1.0 - saliency * lead / data.machine.psi_M.get_ref());
     vec![
         set("current.active_resistance", Value::Boolean(true), "K_i = w_c^2 L"),
         set("current.mtpa", Value::Boolean(true), "salient: least current for a torque"),
@@ -395,6 +456,7 @@ fn extended_emf(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
         real("limit.tau", 1.6 * torque, "1.6 times the rated torque"),
         real("tracker.bandwidth", rho, "bandwidth.observer"),
         real("emf.bandwidth", 7.5 * rho, "7.5 times the tracker's; 3 times is the least"),
+        real("emf.w_sign", 0.01 * n_p * rating.speed.get_ref(), "0.01 of the rated electrical speed"),
         real("zero_speed.i_0", 0.0, "not used"),
         set("start.mode", Value::Item("CurrentFrequency".into()), "no EMF at standstill"),
         real(
@@ -408,7 +470,15 @@ fn extended_emf(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
             (0.3 * k * lead / mechanics.J.get_ref()).min(100.0),
             "0.3 of the start's torque, at most 100 rad/s2",
         ),
-        real("start.t_align", (4.0 / decay).max(0.25), "the rotor settles on the current vector: 4 time constants, at least 0.25 s"),
-        real("start.settle", (5.0 / decay).max(0.2), "its swing has died at the hand-over: 5 time constants, at least 0.2 s"),
+        real(
+            "start.t_align",
+            (4.0 / decay).max(0.25),
+            "the rotor settles on the current vector: 4 time constants, at least 0.25 s",
+        ),
+        real(
+            "start.settle",
+            (5.0 / decay).max(0.2),
+            "its swing has died at the hand-over: 5 time constants, at least 0.2 s",
+        ),
     ]
 }

@@ -9,7 +9,7 @@ use drive::math::wrap;
 use std::f64::consts::{PI, TAU};
 
 /// The levels of speed in pu.
-pub const LEVELS: [f64; 2] = [0.1, 0.5];
+pub const LEVELS: [f64; 3] = [0.1, 0.5, 1.0];
 
 /// What a number of start angles gave at one level.
 #[derive(Clone, Debug, Default, PartialEq)]
