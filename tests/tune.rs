@@ -30,7 +30,7 @@ fn every_machine_starts_and_reaches_its_speed() {
         let tuned = fmu(&["tune", motor.to_str().unwrap(), "--out", dir.path().to_str().unwrap()]);
         let table = String::from_utf8(tuned.stdout).unwrap();
         assert!(tuned.status.success(), "{}", String::from_utf8_lossy(&tuned.stderr));
-        let files: Vec<&str> = table.lines().rev().take(2).collect();
+        let files: Vec<&str> = table.lines().rev().take(3).collect();
         let text = std::fs::read_to_string(motor).unwrap();
         let data = MotorFile::parse(&text, motor).unwrap().data;
         let speed = 0.5 * data.rating.speed.get_ref();
@@ -41,6 +41,7 @@ fn every_machine_starts_and_reaches_its_speed() {
         let parameters = [format!("PmsmPlant={}", files[1]), format!("SensorlessController={}", files[0])];
         let speed_ref = format!("SensorlessController.speed_ref=0:0,0.6:{speed}");
         let load = format!("PmsmPlant.tau_load=0:0,3:{load}");
+        let T_s = tune::tune(motor).unwrap().pair().controller.model.parameters.T_s.to_string();
         let output = fmu(&[
             "simulate",
             &plant,
@@ -56,6 +57,8 @@ fn every_machine_starts_and_reaches_its_speed() {
             &speed_ref,
             "--input",
             &load,
+            "--step",
+            &T_s,
             "--stop",
             "4",
             "--record",

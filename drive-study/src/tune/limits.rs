@@ -47,6 +47,8 @@ pub struct Limit {
     pub reason: String,
     /// What helps.
     pub remedy: String,
+    /// Time in s in which the rated torque may rise instead, for a load.
+    pub rise: Option<f64>,
 }
 
 impl fmt::Display for Limit {
@@ -60,6 +62,9 @@ const LEAST_MARGIN: f64 = 0.02;
 
 /// Greatest loop gain through the EMF of the change of i_q, at 0.1 pu.
 pub const GREATEST_GAIN: f64 = 40.0;
+
+/// Greatest bandwidth of the observer in rad/s that a remedy asks for: 40 Hz.
+const FASTEST: f64 = 252.0;
 
 /// Share of R by which R^ is to be below it: 0.1, or what lets the rotor follow the estimate at rest.
 pub fn resistance_margin(data: &Data) -> f64 {
@@ -90,21 +95,18 @@ pub fn gain_per_bandwidth(data: &Data, rho: f64) -> f64 {
 /// What the drive will not hold, and what it holds by a narrow margin.
 pub fn of(data: &Data, bandwidths: &Bandwidths, flux_observer: bool) -> (Vec<Limit>, Vec<String>) {
     let (mut limits, mut notes) = (starts(data, bandwidths, flux_observer), Vec::new());
-    let (w_s, rated, J) = (bandwidths.speed.value, *data.rating.speed.get_ref(), *data.mechanics.J.get_ref());
+    let (w_s, rated) = (bandwidths.speed.value, *data.rating.speed.get_ref());
     let dip = DIP_OF_A_STEP * acceleration(data) / w_s;
     let share = if flux_observer { 2.0 } else { 0.6 };
     for level in LEVELS {
         let speed = level * rated;
         let reason = format!("a step of the rated torque takes 2/e T / (J w_s) = {dip:.3} of the {speed:.3} rad/s");
         if dip > share * speed {
-            let (faster, heavier) = (1.1 * w_s * dip / (share * speed), 1.1 * J * dip / (share * speed));
+            let excess = 1.1 * dip / (share * speed);
             let rise = 4.0 * acceleration(data) / (w_s * w_s * 0.5 * share * speed);
-            let remedy = format!(
-                "let the load rise in {rise:.2} s or more, or set bandwidth.speed to {faster:.0} rad/s and bandwidth.observer \
-                 to {:.0} rad/s at least, if the noise allows it, or count a load's inertia in mechanics.J, {heavier:.2e} kg.m2",
-                (3.0 * faster).max(bandwidths.observer.value)
-            );
-            limits.push(Limit { what: What::Load, level, reason, remedy });
+            let remedy =
+                format!("let the load rise in {rise:.2} s or more{}", others(data, bandwidths, excess, flux_observer));
+            limits.push(Limit { what: What::Load, level, reason, remedy, rise: Some(rise) });
         } else if dip > speed {
             notes.push(format!(
                 "at {level} pu, {reason}: it falls through zero speed, where the estimate depends on R_s"
@@ -114,12 +116,29 @@ pub fn of(data: &Data, bandwidths: &Bandwidths, flux_observer: bool) -> (Vec<Lim
     (limits, notes)
 }
 
+/// Other remedies for a dip that is `excess` times too large, where they do not raise the gain of the start too far.
+fn others(data: &Data, bandwidths: &Bandwidths, excess: f64, flux_observer: bool) -> String {
+    let (w_s, rho) = (excess * bandwidths.speed.value, bandwidths.observer.value);
+    let faster = (3.0 * w_s).max(rho);
+    let calm = |rho: f64, w_s: f64| flux_observer || gain_per_bandwidth(data, rho) * w_s <= GREATEST_GAIN;
+    let mut text = String::new();
+    if faster <= FASTEST.max(rho) && calm(faster, w_s) {
+        text += &format!(", or set bandwidth.speed to {w_s:.0} rad/s and bandwidth.observer to {faster:.0} rad/s");
+    }
+    if calm(rho, w_s) {
+        let J = excess * data.mechanics.J.get_ref();
+        text += &format!(", or count the load's inertia in mechanics.J: {J:.2e} kg.m2 would hold");
+    }
+    text
+}
+
 fn starts(data: &Data, bandwidths: &Bandwidths, flux_observer: bool) -> Vec<Limit> {
     let limit = |level, reason: &str, remedy: &str| Limit {
         what: What::Start,
         level,
         reason: reason.to_owned(),
         remedy: remedy.to_owned(),
+        rise: None,
     };
     if flux_observer {
         let margin = resistance_margin(data);

@@ -23,6 +23,7 @@ use super::plausible;
 use anyhow::{Result, bail};
 use drive::control::envelope::{Envelope, Warm};
 use drive::control::reference::max_torque_per_ampere;
+use drive::control::tables::ControllerParameters;
 use drive::control::weakening::WeakeningParameters;
 use drive::frame::{Dq, DqHat};
 use drive::motor::Motor;
@@ -261,6 +262,13 @@ fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> 
              control.T_s"
         ));
     }
+    if bandwidths.T_s.value != ControllerParameters::default().T_s {
+        notes.push(format!(
+            "T_s is {0:e} s: PmsmPlant and SensorlessController then exchange values in steps of {0:e} s (fmu simulate --step \
+             {0:e}); PmsmDrive takes any step",
+            bandwidths.T_s.value
+        ));
+    }
     let hertz = bandwidths.current.value / TAU;
     if !(60.0..=600.0).contains(&hertz) {
         notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to 600 Hz were tried"));
@@ -401,11 +409,11 @@ fn flux_observer(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<Str
         );
     }
     if !(150.0..=800.0).contains(&w_n) {
-        notes.push(format!("bandwidth.observer is {w_n} rad/s; 150 to 800 were tried"));
+        notes.push(format!("bandwidth.observer is {w_n:.0} rad/s; 150 to 800 were tried"));
     }
     let w_s = bandwidths.speed.value;
-    if !(40.0..=120.0).contains(&w_s) {
-        notes.push(format!("bandwidth.speed is {w_s} rad/s; 40 to 120 were tried"));
+    if !(40.0..=200.0).contains(&w_s) {
+        notes.push(format!("bandwidth.speed is {w_s:.0} rad/s; 40 to 200 were tried"));
     }
     let c_1 = (4.0 * 0.1 * machine.R_s.get_ref() * i_0 / machine.psi_M.get_ref()).max(50.0);
     if c_1 > 200.0 {
