@@ -1,5 +1,5 @@
 //! The machines of `motors/`: each starts from many angles and takes rated torque, or `tune` says beforehand that it will not.
-#![allow(missing_docs)]
+#![allow(missing_docs, non_snake_case)]
 
 use drive_study::tune::limits::What;
 use drive_study::tune::motor::MotorFile;

@@ -13,6 +13,7 @@ pub mod motor;
 mod native;
 pub mod plausible;
 pub mod rules;
+pub mod saturation;
 pub mod trial;
 
 use anyhow::{Context, Result, anyhow};

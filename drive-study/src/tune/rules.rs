@@ -19,15 +19,14 @@ use super::check::check;
 use super::iron;
 use super::limits::{self, Limit, resistance_margin, swing, zero_speed_current};
 use super::motor::{Data, MotorFile, Number};
-use super::plausible;
+use super::{plausible, saturation};
 use anyhow::{Result, bail};
 use drive::control::envelope::{Envelope, Warm};
 use drive::control::reference::max_torque_per_ampere;
 use drive::control::tables::ControllerParameters;
 use drive::control::weakening::WeakeningParameters;
-use drive::frame::{Dq, DqHat};
+use drive::frame::DqHat;
 use drive::motor::Motor;
-use drive::plant::{machine, saturation::Saturation};
 use std::f64::consts::TAU;
 
 /// A value for a variable.
@@ -106,6 +105,7 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     check(&plant, &controller, motor)?;
     ratings(motor)?;
     plausible::check(motor)?;
+    saturation::check(motor)?;
     fits(motor, &bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
     let observes_flux = estimator == "Rasmussen";
@@ -324,7 +324,7 @@ fn weakening(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Resul
 }
 
 /// The machine's electrical data.
-fn electrical(data: &Data) -> Motor {
+pub(super) fn electrical(data: &Data) -> Motor {
     let m = &data.machine;
     Motor {
         n_p: *m.n_p.get_ref(),
@@ -345,7 +345,7 @@ fn cap_current_loop(data: &Data, bandwidths: &Bandwidths, controller: &mut [Sett
     let Data { machine, rating, .. } = data;
     // During a start, the current may be on one axis and the same damping on the other.
     let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
-    let least = least_inductance(data, i);
+    let least = saturation::least_inductance(data, i);
     let greatest = machine.L_d.get_ref().max(*machine.L_q.get_ref());
     let gain = MAX_GAIN * least / number("T_s");
     let most = match value("current.active_resistance") {
@@ -365,27 +365,6 @@ fn cap_current_loop(data: &Data, bandwidths: &Bandwidths, controller: &mut [Sett
             setting.rule = format!("lowered from {asked:.0} Hz: gain T_s / L <= {MAX_GAIN} with the least inductance");
         }
     }
-}
-
-/// The smallest incremental inductance in H of the plant with a current of `i` (A) in any direction.
-fn least_inductance(data: &Data, i: f64) -> f64 {
-    let (motor, of) = (electrical(data), |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref()));
-    let saturation = data.saturation.as_ref().map_or_else(Saturation::default, |s| Saturation {
-        s_2: of(&s.s_2),
-        s_3: of(&s.s_3),
-        s_dq: of(&s.s_dq),
-    });
-    let at = |angle: f64| {
-        let psi = |r: f64| Dq::new(motor.psi_M + r * angle.cos(), r * angle.sin());
-        let (mut low, mut high) = (0.0, i * motor.L_d.max(motor.L_q));
-        for _ in 0..50 {
-            let r = 0.5 * (low + high);
-            let above = machine::current(&motor, &saturation, psi(r)).magnitude() > i;
-            *(if above { &mut high } else { &mut low }) = r;
-        }
-        saturation.least_inductance(&motor, psi(low))
-    };
-    (0..72).map(|k| at(f64::from(k) * TAU / 72.0)).fold(f64::INFINITY, f64::min)
 }
 
 fn flux_observer(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<Vec<Setting>> {
