@@ -82,8 +82,9 @@ fn tried(tuned: &Tuned) -> bool {
         let verdict = trial.verdict(&tuned.limits);
         good &= verdict != Verdict::Lost;
         let Trial { angles, started, held, least, error, .. } = trial;
+        let error = if held > 0 { format!("{error:.1} deg") } else { "-".into() };
         println!(
-            "{level:3} pu  {started:2} of {angles:2}   {held:2} of {started:2}   {least:8.3} pu  {error:7.1} deg   {verdict}"
+            "{level:3} pu  {started:2} of {angles:2}   {held:2} of {started:2}   {least:8.3} pu  {error:>11}   {verdict}"
         );
     }
     good

@@ -218,15 +218,17 @@ fn resistance(data: &Data, estimator: &str) -> Setting {
 /// The voltage error that `lock_lost` tolerates, scaled to the machine: a share of the EMF at rated speed, 5 V for the
 /// reference motor, and at least twice what R^ = 0.9 R leaves at the greatest current.
 fn lock(data: &Data) -> Setting {
-    const SHARE: f64 = 5.0 / 141.371_669_4;
+    const SHARE: f64 = 5.0 / 141.4;
     let Data { machine, rating, .. } = data;
     let emf = f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * machine.psi_M.get_ref();
     let resistive = 0.2 * machine.R_s.get_ref() * rating.current.get_ref();
-    real(
-        "lock.u",
-        (SHARE * emf).max(resistive),
-        "0.035 of the EMF at rated speed, at least 0.2 R_s times the greatest current",
-    )
+    let rule = "0.035 of the EMF at rated speed, at least 0.2 R_s times the greatest current";
+    real("lock.u", short((SHARE * emf).max(resistive)), rule)
+}
+
+/// A number with three digits.
+fn short(x: f64) -> f64 {
+    format!("{x:.2e}").parse().unwrap_or(x)
 }
 
 /// Torque constant in N.m/A.
