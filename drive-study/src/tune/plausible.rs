@@ -71,6 +71,15 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
     };
     vec![
         Check {
+            name: "dc_link.u_dc",
+            value: &data.dc_link.u_dc,
+            unit: "V",
+            per_unit: 1.0,
+            what: "a DC link, in V,",
+            range: (1.0, 1e4),
+            units: &[("kV", 1e3)],
+        },
+        Check {
             name: "machine.psi_M",
             value: &machine.psi_M,
             unit: "Wb",
@@ -147,7 +156,9 @@ mod tests {
             ("speed = 157.079633", "speed = 1500.0", "1500 rpm would fit: write 157.1 rad/s"),
             ("J = 15e-3", "J = 150000.0", "150000 kg.cm2 would fit: write 15 kg.m2"),
             ("torque = 14.0", "torque = 14000.0", "14000 mN.m would fit: write 14 N.m"),
-            ("u_dc = 540.0", "u_dc = 0.001", "correct it, or the values it is compared with"),
+            ("u_dc = 540.0", "u_dc = 0.54", "0.54 kV would fit: write 540 V"),
+            ("u_dc = 540.0", "u_dc = 1e6", "dc_link.u_dc = 1000000 V"),
+            ("torque = 14.0", "torque = 100.0", "correct it, or the values it is compared with"),
         ] {
             let error = refused(from, to);
             assert!(error.contains(told) && error.lines().count() == 1, "{error}");

@@ -4,7 +4,12 @@
 //! L_d), and the extended EMF with an I-f start for a salient one. Rules for Rasmussen's observer: w_n = observer, zeta = 1;
 //! c_1 = 4 |R - R^| i_0 / psi_M within 50..200 1/s, c_2 = c_1 / 50; K i_0 = 1.35 times the rated torque; w_0 = 30 rad/s
 //! electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest electrical
-//! acceleration alpha = n_p K i_q / J. R^ = 0.9 R: the safe side at standstill, where R^ > R runs away.
+//! acceleration alpha = n_p K i_q / J. R^ = 0.9 R: the safe side at standstill, where R^ > R runs away; closer to R where the
+//! rotor is too heavy to follow the estimate ([`limits`]). T_s and the bandwidths: [`bandwidth`](super::bandwidth).
+//!
+//! The I-f start: the rotor swings on the current vector with w_0 = sqrt(n_p K I / J), damped by 0.5, and the reluctance takes
+//! the share (L_q - L_d) I / psi_M of stiffness and damping away. The alignments take 3 of its time constants each, the speed
+//! before the hand-over 4.
 //!
 //! Field weakening is used where rated torque at rated speed takes more than its share of the voltage (k_u u_dc / sqrt 3).
 //!
@@ -68,7 +73,7 @@ pub struct Tuned {
     pub controller: Vec<Setting>,
     /// Warnings: values outside the ranges that the rules were tested in.
     pub notes: Vec<String>,
-    /// What the drive will not hold.
+    /// What the drive will not hold, with the remedy.
     pub limits: Vec<Limit>,
     /// Rated mechanical speed in rad/s.
     pub speed: f64,
@@ -433,8 +438,7 @@ fn extended_emf(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
             k * stable
         ));
     }
-    // The rotor swings on the current vector with w_0, damped by 0.5; the reluctance takes away a share of the stiffness, and
-    // of the damping torque.
+    // Of the swing on the current vector, in 1/s.
     let n_p = f64::from(*data.machine.n_p.get_ref());
     let decay = 0.5 * swing(data, lead) * (1.0 - saliency * lead / data.machine.psi_M.get_ref());
     vec![
@@ -461,13 +465,13 @@ fn extended_emf(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
         ),
         real(
             "start.t_align",
-            (4.0 / decay).max(0.25),
-            "the rotor settles on the current vector: 4 time constants, at least 0.25 s",
+            (3.0 / decay).max(0.25),
+            "the rotor settles on the current vector: 3 time constants, at least 0.25 s",
         ),
         real(
             "start.settle",
-            (5.0 / decay).max(0.2),
-            "its swing has died at the hand-over: 5 time constants, at least 0.2 s",
+            (4.0 / decay).max(0.2),
+            "its swing has died at the hand-over: 4 time constants, at least 0.2 s",
         ),
     ]
 }

@@ -80,8 +80,8 @@ impl Trial {
     }
 }
 
-/// One life of the drive from the electrical angle `theta` (rad), with a load that rises in `rise` (s): whether it started, whether it held the load, least speed in
-/// pu and greatest angle error in deg after the step.
+/// One life of the drive from the electrical angle `theta` (rad), with a load that rises in `rise` (s): whether it started,
+/// whether it held the load, least speed in pu and greatest angle error in deg after the step.
 fn one(tuned: &Tuned, level: f64, rise: f64, theta: f64) -> (bool, bool, f64, f64) {
     let mut pair = tuned.pair();
     pair.plant.model.parameters.initial.theta_e = theta;
@@ -99,7 +99,7 @@ fn one(tuned: &Tuned, level: f64, rise: f64, theta: f64) -> (bool, bool, f64, f6
             return (started, started && held, least, error);
         }
         let speed_ref = if t < timing.turn { 0.0 } else { reference };
-        let share = if t < timing.load { 0.0 } else { ((t - timing.load) / rise).min(1.0) };
+        let share = if t < timing.load { 0.0 } else { ((t - timing.load) / rise.max(f64::MIN_POSITIVE)).min(1.0) };
         pair.set_inputs(speed_ref, share * tuned.torque, u_dc);
         if pair.step(T_s).is_err() {
             return (started && t > timing.load, false, least, 180.0);
