@@ -1,5 +1,5 @@
 //! Every machine in motors/ with the values that `fmu tune` gives it: no chatter, and power that is accounted for.
-#![allow(missing_docs)]
+#![allow(missing_docs, non_snake_case)]
 
 use drive::{Pair, PmsmDrive};
 use drive_study::tune::{self, motor::MotorFile, rules::Tuned};
@@ -93,7 +93,8 @@ fn balance(machine: &Machine, h: f64, step: &mut impl FnMut(f64, f64) -> (f64, f
 #[test]
 fn mean_power_is_balanced_at_any_step() {
     for machine in machines() {
-        for h in [1e-4, 1e-3, 3.7e-5] {
+        let T_s = machine.tuned.pair().controller.model.parameters.T_s;
+        for h in [T_s, 10.0 * T_s, 0.37 * T_s] {
             let mut drive = Block::<PmsmDrive>::default();
             drive.model.pair = machine.tuned.pair();
             (drive.model.inputs.u_dc, drive.model.pair.plant.model.inputs.u_dc) = (machine.u_dc(), machine.u_dc());
@@ -109,7 +110,7 @@ fn mean_power_is_balanced_at_any_step() {
             });
             check(&machine, h, "drive", &of_drive);
             let (mut pair, u_dc): (Pair, f64) = (machine.tuned.pair(), machine.u_dc());
-            if h <= pair.controller.model.parameters.T_s {
+            if h <= T_s {
                 pair.start().unwrap();
                 let of_pair = balance(&machine, h, &mut |speed_ref, tau_load| {
                     pair.set_inputs(speed_ref, tau_load, u_dc);

@@ -154,11 +154,14 @@ mod tests {
             ("R_s = 3.6", "R_s = 3600.0", "3600 mOhm would fit: write 3.6 Ohm"),
             ("psi_M = 0.545", "psi_M = 545.0", "545 mWb would fit: write 0.545 Wb"),
             ("speed = 157.079633", "speed = 1500.0", "1500 rpm would fit: write 157.1 rad/s"),
-            ("J = 15e-3", "J = 150000.0", "150000 kg.cm2 would fit: write 15 kg.m2"),
+            ("J = 15e-3", "J = 150.0", "150 kg.cm2 would fit: write 0.015 kg.m2"),
             ("torque = 14.0", "torque = 14000.0", "14000 mN.m would fit: write 14 N.m"),
             ("u_dc = 540.0", "u_dc = 0.54", "0.54 kV would fit: write 540 V"),
-            ("u_dc = 540.0", "u_dc = 1e6", "dc_link.u_dc = 1000000 V"),
-            ("torque = 14.0", "torque = 100.0", "correct it, or the values it is compared with"),
+            (
+                "u_dc = 540.0",
+                "u_dc = 1e6",
+                "dc_link.u_dc = 1000000 V makes a DC link, in V, 1000000, expected 1 to 10000: correct it",
+            ),
         ] {
             let error = refused(from, to);
             assert!(error.contains(told) && error.lines().count() == 1, "{error}");
