@@ -162,6 +162,14 @@ fn lock_and_emf_are_scaled_to_the_machine() {
         let found = value(&tuned(name), "lock.u");
         assert!((found / u - 1.0).abs() < 1e-3, "{name}: {found} V");
     }
+    // The estimate half a turn beside the rotor at 0.1 pu leaves twice the EMF: lock_lost tells.
+    for name in CLASSES {
+        let tuned = tuned(name);
+        let par = &tuned.pair().controller.model.parameters;
+        let emf = 0.1 * f64::from(par.motor.n_p) * tuned.speed * par.motor.psi_M;
+        let lost = 2.0 * emf / (par.lock.u + 2.0 * (0.5 * par.lock.angle).sin() * emf);
+        assert!(lost > 1.3, "{name}: {lost}");
+    }
     let w_sign = value(&tuned("traction-63kw"), "emf.w_sign");
     assert!((w_sign - 18.85).abs() < 0.01, "{w_sign} rad/s");
 }
