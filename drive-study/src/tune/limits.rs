@@ -121,15 +121,13 @@ fn others(data: &Data, bandwidths: &Bandwidths, excess: f64, flux_observer: bool
     let (w_s, rho) = (excess * bandwidths.speed.value, bandwidths.observer.value);
     let faster = (3.0 * w_s).max(rho);
     let calm = |rho: f64, w_s: f64| flux_observer || gain_per_bandwidth(data, rho) * w_s <= GREATEST_GAIN;
-    let mut text = String::new();
-    if faster <= FASTEST.max(rho) && calm(faster, w_s) {
-        text += &format!(", or set bandwidth.speed to {w_s:.0} rad/s and bandwidth.observer to {faster:.0} rad/s");
-    }
-    if calm(rho, w_s) {
+    let by_speed = (faster <= FASTEST.max(rho) && calm(faster, w_s))
+        .then(|| format!(", or set bandwidth.speed to {w_s:.0} rad/s and bandwidth.observer to {faster:.0} rad/s"));
+    let by_inertia = calm(rho, w_s).then(|| {
         let J = excess * data.mechanics.J.get_ref();
-        text += &format!(", or count the load's inertia in mechanics.J: {J:.2e} kg.m2 would hold");
-    }
-    text
+        format!(", or count the load's inertia in mechanics.J: {J:.2e} kg.m2 would hold")
+    });
+    by_speed.unwrap_or_default() + &by_inertia.unwrap_or_default()
 }
 
 fn starts(data: &Data, bandwidths: &Bandwidths, flux_observer: bool) -> Vec<Limit> {

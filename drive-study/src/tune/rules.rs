@@ -269,7 +269,7 @@ fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> 
              control.T_s"
         ));
     }
-    if bandwidths.T_s.value != ControllerParameters::default().T_s {
+    if (bandwidths.T_s.value / ControllerParameters::default().T_s - 1.0).abs() > 1e-9 {
         notes.push(format!(
             "T_s is {0:e} s: PmsmPlant and SensorlessController then exchange values in steps of {0:e} s (fmu simulate --step \
              {0:e}); PmsmDrive takes any step",

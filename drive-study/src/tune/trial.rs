@@ -58,7 +58,7 @@ pub struct Trial {
 impl Trial {
     /// What happened against what `limits` told.
     pub fn verdict(&self, limits: &[Limit]) -> Verdict {
-        let told = |what| limits.iter().any(|limit| limit.what == what && limit.level == self.level);
+        let told = |what| limits.iter().any(|limit| limit.what == what && limit.level.total_cmp(&self.level).is_eq());
         let of = |what| match (self.does(what), told(what)) {
             (true, false) => Verdict::Holds,
             (false, true) => Verdict::Announced,
