@@ -72,7 +72,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
-        Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Tune(args) => tune::run(&args).map(|good| ExitCode::from(u8::from(!good))),
         Command::Ssp(args) => ssp::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Compare(args) => compare::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
     };

@@ -30,6 +30,20 @@ fn tuning_a_running_drive() {
     pytest("fmpy", "tuning", &["test_tuning.py"], &[]);
 }
 
+/// PmsmDrive with the values of `fmu tune`.
+#[test]
+fn tuned_machines() {
+    let folder = scratch().join(format!("tuned-{}", process::id()));
+    for name in ["drone-22v", "ipmsm-2.2kw"] {
+        let motor = format!("{}/motors/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let mut tune = Command::new(env!("CARGO_BIN_EXE_fmu"));
+        tune.args(["tune", &motor, "--integers", "--out"]).arg(&folder);
+        assert!(tune.output().unwrap().status.success(), "{name}");
+    }
+    pytest("fmpy", "tuned", &["test_tuned_drive.py"], &[("FMU_TUNED", &folder)]);
+    fs::remove_dir_all(&folder).unwrap();
+}
+
 #[test]
 fn misuse_of_the_c_interface() {
     pytest("fmpy", "misuse", &["test_misuse.py"], &[]);

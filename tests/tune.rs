@@ -1,5 +1,5 @@
 //! Machines as data: every file in motors/ gives parameter values with which the packed FMUs start and run.
-#![allow(missing_docs)]
+#![allow(missing_docs, non_snake_case)]
 
 mod common;
 
@@ -30,7 +30,7 @@ fn every_machine_starts_and_reaches_its_speed() {
         let tuned = fmu(&["tune", motor.to_str().unwrap(), "--out", dir.path().to_str().unwrap()]);
         let table = String::from_utf8(tuned.stdout).unwrap();
         assert!(tuned.status.success(), "{}", String::from_utf8_lossy(&tuned.stderr));
-        let files: Vec<&str> = table.lines().rev().take(2).collect();
+        let files: Vec<&str> = table.lines().rev().take(3).collect();
         let text = std::fs::read_to_string(motor).unwrap();
         let data = MotorFile::parse(&text, motor).unwrap().data;
         let speed = 0.5 * data.rating.speed.get_ref();
@@ -41,6 +41,7 @@ fn every_machine_starts_and_reaches_its_speed() {
         let parameters = [format!("PmsmPlant={}", files[1]), format!("SensorlessController={}", files[0])];
         let speed_ref = format!("SensorlessController.speed_ref=0:0,0.6:{speed}");
         let load = format!("PmsmPlant.tau_load=0:0,3:{load}");
+        let T_s = tune::tune(motor).unwrap().pair().controller.model.parameters.T_s.to_string();
         let output = fmu(&[
             "simulate",
             &plant,
@@ -56,6 +57,8 @@ fn every_machine_starts_and_reaches_its_speed() {
             &speed_ref,
             "--input",
             &load,
+            "--step",
+            &T_s,
             "--stop",
             "4",
             "--record",
@@ -184,4 +187,52 @@ fn a_wrong_file_is_told_with_place_and_remedy() {
     refused("speed = 314.159265", "speed = 3141.59", &["rating.speed", "u_dc"]);
     refused("[bandwidth]", "[control]\nestimator = \"Luenberger\"\n[bandwidth]", &["Luenberger", "choose Rasmussen"]);
     refused("[bandwidth]", "[bandwidth", &["m.toml:26:"]);
+}
+
+#[test]
+fn the_check_prints_what_holds_and_what_was_announced() {
+    let motor = motors().into_iter().find(|p| p.ends_with("ipmsm-2.2kw.toml")).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().to_str().unwrap();
+    let checked = fmu(&["tune", motor.to_str().unwrap(), "--check", "--out", out]);
+    let text = String::from_utf8(checked.stdout).unwrap();
+    assert_eq!(checked.status.code(), Some(0), "{text}");
+    for told in
+        ["note: will not hold LOAD at 0.1 pu: a step of the rated torque", "; let the load rise in 0.80 s or more"]
+    {
+        assert!(text.contains(told), "{told:?} is not in {text}");
+    }
+    let rows: Vec<_> = text.lines().filter(|line| line.contains(" pu  24 of 24 ")).collect();
+    let ends = ["does not hold, as announced", "deg   holds", "deg   holds"];
+    assert!(rows.len() == 3 && rows.iter().zip(ends).all(|(row, end)| row.ends_with(end)), "{text}");
+    // A wrong unit, in one line.
+    let absurd = dir.path().join("m.toml");
+    let given = std::fs::read_to_string(&motor).unwrap();
+    std::fs::write(&absurd, given.replacen("L_d = 36e-3", "L_d = 36.0", 1)).unwrap();
+    let refused = fmu(&["tune", absurd.to_str().unwrap(), "--out", out]);
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(said.contains("L_d = 36 H") && said.contains("36 mH would fit") && said.lines().count() == 1, "{said}");
+}
+
+/// The file of `PmsmDrive` has the values of both others.
+#[test]
+fn the_drive_has_the_values_of_plant_and_controller() {
+    let description = fmu_core::Description::of::<drive::PmsmDrive>().unwrap();
+    for path in motors() {
+        let tuned = tune::tune(&path).unwrap();
+        let (plant, controller) = tune::needed(&tuned, false).unwrap();
+        let drive = tune::of_drive(&tuned, false).unwrap();
+        for (name, value) in &drive {
+            assert!(description.variable(name).is_some(), "PmsmDrive has no {name}");
+            let (settings, own) = match name.split_once('.') {
+                Some(("controller", own)) => (&controller, own),
+                Some(("plant", own)) => (&plant, own),
+                _ => (&plant, name.as_str()),
+            };
+            assert_eq!(settings.iter().find(|s| s.name == own).map(|s| &s.value), Some(value), "{name}");
+        }
+        let shared = plant.iter().chain(&controller).filter(|s| s.name == "u_dc").count();
+        assert_eq!(drive.len() + shared.saturating_sub(1), plant.len() + controller.len(), "{}", path.display());
+    }
 }

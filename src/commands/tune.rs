@@ -5,14 +5,19 @@ use crate::{pack, ssv};
 use anyhow::Result;
 use clap::Args;
 use drive_study::tune::rules::{Setting, Value};
+use drive_study::tune::trial::{self, Trial, Verdict};
 use drive_study::tune::{self, rules::Tuned};
 use std::path::{Path, PathBuf};
 
-/// Computes parameter values of PmsmPlant and SensorlessController from motor data and bandwidths.
+/// Computes parameter values of PmsmPlant, SensorlessController and PmsmDrive from motor data.
 ///
-/// MOTOR.toml contains motor, mechanics, ratings, DC link and the bandwidths of current loop, speed loop and observer; see the
-/// examples in motors/. The command writes NAME.PmsmPlant.ssv and NAME.SensorlessController.ssv (SSP 1.0) with the values that
-/// differ from the start values of the FMUs, for importers:
+/// MOTOR.toml contains motor, mechanics, ratings and DC link, and may contain the bandwidths of current loop, speed loop and
+/// observer; see the examples in motors/. The command writes NAME.PmsmDrive.ssv, NAME.PmsmPlant.ssv and
+/// NAME.SensorlessController.ssv (SSP 1.0) with the values that differ from the start values of the FMUs, for importers. It
+/// tells beforehand what the drive will not hold, as notes.
+///
+/// With --check it also tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu. Exit status
+/// 1 if the drive loses what no note announces.
 ///
 ///   fmu tune motors/ipmsm-2.2kw.toml --out target/tune
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
@@ -31,13 +36,19 @@ pub struct Tune {
     /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
+    /// Try the drive from 24 start angles at 0.1, 0.5 and 1 pu, with rated torque as a step
+    #[arg(long)]
+    pub check: bool,
 }
 
-/// Runs the command.
+/// Start angles of --check.
+const ANGLES: u32 = 24;
+
+/// Runs the command; false: the drive does not hold something that no note announces.
 ///
 /// # Errors
 /// The motor file is invalid, or a file cannot be written.
-pub fn run(args: &Tune) -> Result<()> {
+pub fn run(args: &Tune) -> Result<bool> {
     let tuned = tune::tune(&args.motor)?;
     let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("tune")), Ok)?;
     let files = write(&tuned, &out, args.integers)?;
@@ -51,23 +62,49 @@ pub fn run(args: &Tune) -> Result<()> {
     for note in &tuned.notes {
         println!("\nnote: {note}");
     }
+    for limit in &tuned.limits {
+        println!("\nnote: {limit}");
+    }
+    let good = !args.check || tried(&tuned);
     println!();
     for file in &files {
         println!("{}", file.display());
     }
-    Ok(())
+    Ok(good)
 }
 
-/// Writes `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder, each with what [`tune::needed`] leaves; returns
-/// their paths.
-fn write(tuned: &Tuned, folder: &Path, integers: bool) -> Result<[PathBuf; 2]> {
-    let write = |model: &str, settings: &[Setting]| {
+/// Tries the drive and prints the table; false: it loses what no note announces.
+fn tried(tuned: &Tuned) -> bool {
+    println!("\nspeed   started    held load  least speed  angle error");
+    let mut good = true;
+    for level in trial::LEVELS {
+        let trial = trial::at(tuned, level, 0.0, ANGLES);
+        let verdict = trial.verdict(&tuned.limits);
+        good &= verdict != Verdict::Lost;
+        let Trial { angles, started, held, least, error, .. } = trial;
+        let error = if held > 0 { format!("{error:.1} deg") } else { "-".into() };
+        println!(
+            "{level:3} pu  {started:2} of {angles:2}   {held:2} of {started:2}   {least:8.3} pu  {error:>11}   {verdict}"
+        );
+    }
+    good
+}
+
+/// Writes `NAME.PmsmDrive.ssv`, `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder, each with what
+/// [`tune::needed`] leaves; returns their paths.
+fn write(tuned: &Tuned, folder: &Path, integers: bool) -> Result<[PathBuf; 3]> {
+    let write = |model: &str, text: &dyn Fn(&str) -> String| {
         let path = folder.join(format!("{}.{model}.ssv", tuned.name));
-        pack::write(&path, ssv::text(&format!("{} {model}", tuned.name), settings).as_bytes())?;
+        pack::write(&path, text(&format!("{} {model}", tuned.name)).as_bytes())?;
         anyhow::Ok(path)
     };
     let (plant, controller) = tune::needed(tuned, integers)?;
-    Ok([write("PmsmPlant", &plant)?, write("SensorlessController", &controller)?])
+    let drive = tune::of_drive(tuned, integers)?;
+    Ok([
+        write("PmsmDrive", &|title| ssv::text_of(title, drive.iter().map(|(name, value)| (name.as_str(), value))))?,
+        write("PmsmPlant", &|title| ssv::text(title, &plant))?,
+        write("SensorlessController", &|title| ssv::text(title, &controller))?,
+    ])
 }
 
 fn shown(value: &Value) -> String {

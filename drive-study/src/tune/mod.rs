@@ -1,13 +1,20 @@
 //! From a machine and bandwidths to parameter values of the FMUs.
 //!
-//! - [`motor`]: the TOML file of a machine; [`rules`]: how values follow from it; [`iron`]: iron loss from a drag test;
-//!   [`check`](mod@check): whether the models have such variables; [`Tuned::pair`](rules::Tuned::pair): the drive with these values, natively.
+//! - [`motor`]: the TOML file of a machine; [`plausible`]: whether its values are those of a machine; [`rules`]: how values
+//!   follow from it; [`bandwidth`]: the loops; [`iron`]: iron loss from a drag test; [`check`](mod@check): whether the models
+//!   have such variables; [`limits`]: what the drive will not hold; [`trial`]: the drive tried from many start angles;
+//!   [`Tuned::pair`](rules::Tuned::pair): the drive with these values, natively.
 
+pub mod bandwidth;
 pub mod check;
 pub mod iron;
+pub mod limits;
 pub mod motor;
 mod native;
+pub mod plausible;
 pub mod rules;
+pub mod saturation;
+pub mod trial;
 
 use anyhow::{Context, Result, anyhow};
 use drive::{PmsmPlant, SensorlessController};
@@ -34,6 +41,19 @@ pub fn tune(path: &Path) -> Result<Tuned> {
 /// A model cannot be described.
 pub fn needed(tuned: &Tuned, integers: bool) -> Result<(Vec<Setting>, Vec<Setting>)> {
     Ok((of_model::<PmsmPlant>(&tuned.plant, integers)?, of_model::<SensorlessController>(&tuned.controller, integers)?))
+}
+
+/// The settings of `PmsmDrive`, as [`needed`] for the two: the parameters of plant and controller with the prefixes `plant.` and
+/// `controller.`, and `u_dc` once.
+///
+/// # Errors
+/// A model cannot be described.
+pub fn of_drive(tuned: &Tuned, integers: bool) -> Result<Vec<(String, Value)>> {
+    let (plant, controller) = needed(tuned, integers)?;
+    let named = |prefix: &str, setting: &Setting| (format!("{prefix}{}", setting.name), setting.value.clone());
+    let of_plant = plant.iter().map(|s| named(if s.name == "u_dc" { "" } else { "plant." }, s));
+    let of_controller = controller.iter().filter(|s| s.name != "u_dc").map(|s| named("controller.", s));
+    Ok(of_plant.chain(of_controller).collect())
 }
 
 fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {

@@ -33,7 +33,8 @@ pub struct Data {
     pub rating: Rating,
     /// What feeds the inverter.
     pub dc_link: DcLink,
-    /// Bandwidths of the loops.
+    /// Bandwidths of the loops; by the rules where omitted.
+    #[serde(default)]
     pub bandwidth: Bandwidth,
     /// Saturation of the plant.
     pub saturation: Option<Saturation>,
@@ -96,16 +97,16 @@ pub struct DcLink {
     pub u_dc: Number,
 }
 
-/// Bandwidths of the loops, in rad/s.
-#[derive(Debug, Deserialize)]
+/// Bandwidths of the loops, in rad/s; by the rules where omitted.
+#[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bandwidth {
     /// Current loop.
-    pub current: Number,
+    pub current: Option<Number>,
     /// Speed loop.
-    pub speed: Number,
+    pub speed: Option<Number>,
     /// Speed adaptation of the flux observer, or tracker of the other estimators.
-    pub observer: Number,
+    pub observer: Option<Number>,
 }
 
 /// Saturation of the plant, in A/Wb2 and A/Wb3.

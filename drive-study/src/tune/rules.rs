@@ -4,7 +4,12 @@
 //! L_d), and the extended EMF with an I-f start for a salient one. Rules for Rasmussen's observer: w_n = observer, zeta = 1;
 //! c_1 = 4 |R - R^| i_0 / psi_M within 50..200 1/s, c_2 = c_1 / 50; K i_0 = 1.35 times the rated torque; w_0 = 30 rad/s
 //! electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest electrical
-//! acceleration alpha = n_p K i_q / J. R^ = 0.9 R: the safe side at standstill, where R^ > R runs away.
+//! acceleration alpha = n_p K i_q / J. R^ = 0.9 R: the safe side at standstill, where R^ > R runs away; closer to R where the
+//! rotor is too heavy to follow the estimate ([`limits`]). T_s and the bandwidths: [`bandwidth`](super::bandwidth).
+//!
+//! The I-f start: the rotor swings on the current vector with w_0 = sqrt(n_p K I / J), damped by 0.5, and the reluctance takes
+//! the share (L_q - L_d) I / psi_M of stiffness and damping away. The alignments take 3 of its time constants each, the speed
+//! before the hand-over 4.
 //!
 //! Field weakening is used where rated torque at rated speed takes more than its share of the voltage (k_u u_dc / sqrt 3).
 //!
@@ -14,16 +19,19 @@
 //! (gain T_s / L) i[k]` is undamped at gain T_s / L = 1. The rules allow half of that (gain margin 6 dB) and lower w_c
 //! to meet it.
 
+use super::bandwidth::{Bandwidths, least_observer};
 use super::check::check;
 use super::iron;
+use super::limits::{self, Limit, resistance_margin, swing, zero_speed_current};
 use super::motor::{Data, MotorFile, Number};
+use super::{plausible, saturation};
 use anyhow::{Result, bail};
 use drive::control::envelope::{Envelope, Warm};
 use drive::control::reference::max_torque_per_ampere;
+use drive::control::tables::ControllerParameters;
 use drive::control::weakening::WeakeningParameters;
-use drive::frame::{Dq, DqHat};
+use drive::frame::DqHat;
 use drive::motor::Motor;
-use drive::plant::{machine, saturation::Saturation};
 use std::f64::consts::TAU;
 
 /// A value for a variable.
@@ -65,6 +73,14 @@ pub struct Tuned {
     pub controller: Vec<Setting>,
     /// Warnings: values outside the ranges that the rules were tested in.
     pub notes: Vec<String>,
+    /// What the drive will not hold, with the remedy.
+    pub limits: Vec<Limit>,
+    /// Rated mechanical speed in rad/s.
+    pub speed: f64,
+    /// Rated torque in N.m.
+    pub torque: f64,
+    /// Time in s at rest before the first speed reference, in which the rotor aligns itself.
+    pub rest: f64,
 }
 
 fn given(name: &'static str, x: &Number) -> Setting {
@@ -88,21 +104,49 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     let mut plant = plant(data);
     let estimator = estimator(motor)?;
     let mut notes = Vec::new();
-    let mut controller = common(data, &estimator);
+    let bandwidths = Bandwidths::of(data, estimator == "Rasmussen");
+    let mut controller = common(data, &bandwidths, &estimator);
     // Check the given values before computing anything from them.
     check(&plant, &controller, motor)?;
-    fits(motor, &mut notes)?;
+    ratings(motor)?;
+    plausible::check(motor)?;
+    saturation::check(motor)?;
+    fits(motor, &bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
-    if estimator == "Rasmussen" {
-        controller.extend(flux_observer(motor, &mut notes)?);
+    let observes_flux = estimator == "Rasmussen";
+    if observes_flux {
+        controller.extend(flux_observer(motor, &bandwidths, &mut notes)?);
     } else {
-        controller.extend(extended_emf(data, &mut notes));
+        controller.extend(extended_emf(data, &bandwidths, &mut notes));
     }
-    controller.extend(weakening(motor, estimator != "Rasmussen", &mut notes)?);
-    cap_current_loop(data, &mut controller, &mut notes);
+    controller.extend(weakening(motor, !observes_flux, &mut notes)?);
+    cap_current_loop(data, &bandwidths, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
-    Ok(Tuned { name: data.name.clone(), source: data.source.clone(), plant, controller, notes })
+    let (limits, narrow) = limits::of(data, &bandwidths, observes_flux);
+    notes.extend(narrow);
+    // Five periods of the swing that the observer damps, over 2 pi.
+    let rest = if observes_flux { (5.0 / swing(data, zero_speed_current(data))).max(REST) } else { 0.0 };
+    if rest > REST {
+        notes.push(format!(
+            "keep speed_ref at 0 for the first {rest:.2} s: the rotor turns to the current that holds standstill"
+        ));
+    }
+    let (speed, torque) = (*data.rating.speed.get_ref(), *data.rating.torque.get_ref());
+    Ok(Tuned {
+        name: data.name.clone(),
+        source: data.source.clone(),
+        plant,
+        controller,
+        notes,
+        limits,
+        speed,
+        torque,
+        rest,
+    })
 }
+
+/// Time in s at rest that every drive needs before the first speed reference.
+const REST: f64 = 0.2;
 
 fn estimator(motor: &MotorFile) -> Result<String> {
     let machine = &motor.data.machine;
@@ -146,47 +190,93 @@ fn plant(data: &Data) -> Vec<Setting> {
 }
 
 /// Values that every estimator needs.
-fn common(data: &Data, estimator: &str) -> Vec<Setting> {
-    let Data { machine, mechanics, bandwidth, control, .. } = data;
-    let mut all = vec![set("estimator", Value::Item(estimator.into()), "by the saliency, or as given")];
-    all.push(control.T_s.as_ref().map_or_else(|| real("T_s", 1e-4, "10 kHz"), |x| given("T_s", x)));
+fn common(data: &Data, bandwidths: &Bandwidths, estimator: &str) -> Vec<Setting> {
+    let Data { machine, mechanics, .. } = data;
+    let mut all = vec![set("estimator", Value::Item(estimator.into()), "by the saliency, or as given"), lock(data)];
+    all.push(bandwidths.T_s.setting("T_s"));
     all.extend([
         set("motor.n_p", Value::Integer(*machine.n_p.get_ref()), "as given"),
-        real("motor.R_s", 0.9 * machine.R_s.get_ref(), "0.9 R_s: the safe side at standstill"),
+        resistance(data, estimator),
         given("motor.L_d", &machine.L_d),
         given("motor.L_q", &machine.L_q),
         given("motor.psi_M", &machine.psi_M),
         given("mechanics.J", &mechanics.J),
         given("u_dc", &data.dc_link.u_dc),
-        given("current.bandwidth", &bandwidth.current),
-        given("speed_loop.bandwidth", &bandwidth.speed),
+        bandwidths.current.setting("current.bandwidth"),
+        bandwidths.speed.setting("speed_loop.bandwidth"),
         real("speed_loop.t_is", 4.0, "K_i = K_p w_s / 4"),
         given("limit.i", &data.rating.current),
     ]);
     all
 }
 
+fn resistance(data: &Data, estimator: &str) -> Setting {
+    let R_s = data.machine.R_s.get_ref();
+    let margin = if estimator == "Rasmussen" { resistance_margin(data) } else { 0.1 };
+    if margin < 0.1 {
+        let rule = format!("{:.3} R_s: below R_s, and the rotor follows the estimate at rest", 1.0 - margin);
+        return real("motor.R_s", (1.0 - margin) * R_s, &rule);
+    }
+    real("motor.R_s", 0.9 * R_s, "0.9 R_s: the safe side at standstill")
+}
+
+/// The voltage error that `lock_lost` tolerates, scaled to the machine: a share of the EMF at rated speed, 5 V for the
+/// reference motor, and at least twice what R^ = 0.9 R leaves at the greatest current.
+fn lock(data: &Data) -> Setting {
+    const SHARE: f64 = 5.0 / 141.4;
+    let Data { machine, rating, .. } = data;
+    let emf = f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * machine.psi_M.get_ref();
+    let resistive = 0.2 * machine.R_s.get_ref() * rating.current.get_ref();
+    let rule = "0.035 of the EMF at rated speed, at least 0.2 R_s times the greatest current";
+    real("lock.u", short((SHARE * emf).max(resistive)), rule)
+}
+
+/// A number with three digits.
+fn short(x: f64) -> f64 {
+    format!("{x:.2e}").parse().unwrap_or(x)
+}
+
 /// Torque constant in N.m/A.
-fn torque_constant(data: &Data) -> f64 {
+pub(super) fn torque_constant(data: &Data) -> f64 {
     1.5 * f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref()
 }
 
-/// Rules for every estimator.
-fn fits(motor: &MotorFile, notes: &mut Vec<String>) -> Result<()> {
-    let Data { rating, bandwidth, .. } = &motor.data;
+/// The ratings are positive.
+fn ratings(motor: &MotorFile) -> Result<()> {
+    let rating = &motor.data.rating;
     for (name, x) in [("speed", &rating.speed), ("torque", &rating.torque), ("current", &rating.current)] {
         if !(x.get_ref().is_finite() && *x.get_ref() > 0.0) {
             bail!("{}: rating.{name} = {} must be greater than 0: correct the value", motor.place(x), x.get_ref());
         }
     }
-    let (w_s, w_o) = (*bandwidth.speed.get_ref(), *bandwidth.observer.get_ref());
+    Ok(())
+}
+
+/// Rules for every estimator.
+fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<()> {
+    let Data { machine, rating, .. } = &motor.data;
+    let (w_s, w_o) = (bandwidths.speed.value, bandwidths.observer.value);
     if w_s > w_o / 3.0 * (1.0 + 1e-9) {
-        let place = motor.place(&bandwidth.speed);
+        let place = motor.place_at(bandwidths.speed.origin.or(bandwidths.observer.origin).unwrap_or_default());
         bail!(
             "{place}: bandwidth.speed = {w_s} rad/s is more than a third of bandwidth.observer = {w_o} rad/s: lower the former or raise the latter"
         );
     }
-    let hertz = bandwidth.current.get_ref() / TAU;
+    let samples = TAU / (f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * bandwidths.T_s.value);
+    if samples < 10.0 {
+        notes.push(format!(
+            "2 pi / (w T_s) = {samples:.1} samples per electrical period at rating.speed; 10 or more were tried: lower \
+             control.T_s"
+        ));
+    }
+    if (bandwidths.T_s.value / ControllerParameters::default().T_s - 1.0).abs() > 1e-9 {
+        notes.push(format!(
+            "T_s is {0:e} s: PmsmPlant and SensorlessController then exchange values in steps of {0:e} s (fmu simulate --step \
+             {0:e}); PmsmDrive takes any step",
+            bandwidths.T_s.value
+        ));
+    }
+    let hertz = bandwidths.current.value / TAU;
     if !(60.0..=600.0).contains(&hertz) {
         notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to 600 Hz were tried"));
     }
@@ -206,6 +296,14 @@ fn weakening(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Resul
         DqHat::new(0.0, torque / machine.torque_constant())
     };
     let U = WeakeningParameters::default().k_u * highest;
+    if i.magnitude() > *rating.current.get_ref() {
+        bail!(
+            "{}: rating.current = {} A is less than the {:.2} A that rating.torque takes: raise it, or lower the torque",
+            motor.place(&rating.current),
+            rating.current.get_ref(),
+            i.magnitude()
+        );
+    }
     if envelope.excess(i, w, U) <= 0.0 {
         return Ok(Vec::new());
     }
@@ -233,7 +331,7 @@ fn weakening(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Resul
 }
 
 /// The machine's electrical data.
-fn electrical(data: &Data) -> Motor {
+pub(super) fn electrical(data: &Data) -> Motor {
     let m = &data.machine;
     Motor {
         n_p: *m.n_p.get_ref(),
@@ -248,20 +346,20 @@ fn electrical(data: &Data) -> Motor {
 const MAX_GAIN: f64 = 0.5;
 
 /// Lowers the bandwidth of the current loop to what the smallest inductance allows, and reports it.
-fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<String>) {
+fn cap_current_loop(data: &Data, bandwidths: &Bandwidths, controller: &mut [Setting], notes: &mut Vec<String>) {
     let value = |name: &str| controller.iter().find(|s| s.name == name).map(|s| &s.value);
     let number = |name: &str| if let Some(Value::Real(x)) = value(name) { *x } else { 0.0 };
-    let Data { machine, rating, bandwidth, .. } = data;
+    let Data { machine, rating, .. } = data;
     // During a start, the current may be on one axis and the same damping on the other.
     let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
-    let least = least_inductance(data, i);
+    let least = saturation::least_inductance(data, i);
     let greatest = machine.L_d.get_ref().max(*machine.L_q.get_ref());
     let gain = MAX_GAIN * least / number("T_s");
     let most = match value("current.active_resistance") {
         Some(Value::Boolean(true)) => (gain + number("motor.R_s")) / (2.0 * greatest),
         _ => gain / greatest,
     };
-    let wanted = *bandwidth.current.get_ref();
+    let wanted = bandwidths.current.value;
     if most < wanted {
         let (asked, given) = (wanted / TAU, most / TAU);
         notes.push(format!(
@@ -276,33 +374,12 @@ fn cap_current_loop(data: &Data, controller: &mut [Setting], notes: &mut Vec<Str
     }
 }
 
-/// The smallest incremental inductance in H of the plant with a current of `i` (A) in any direction.
-fn least_inductance(data: &Data, i: f64) -> f64 {
-    let (motor, of) = (electrical(data), |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref()));
-    let saturation = data.saturation.as_ref().map_or_else(Saturation::default, |s| Saturation {
-        s_2: of(&s.s_2),
-        s_3: of(&s.s_3),
-        s_dq: of(&s.s_dq),
-    });
-    let at = |angle: f64| {
-        let psi = |r: f64| Dq::new(motor.psi_M + r * angle.cos(), r * angle.sin());
-        let (mut low, mut high) = (0.0, i * motor.L_d.max(motor.L_q));
-        for _ in 0..50 {
-            let r = 0.5 * (low + high);
-            let above = machine::current(&motor, &saturation, psi(r)).magnitude() > i;
-            *(if above { &mut high } else { &mut low }) = r;
-        }
-        saturation.least_inductance(&motor, psi(low))
-    };
-    (0..72).map(|k| at(f64::from(k) * TAU / 72.0)).fold(f64::INFINITY, f64::min)
-}
-
-fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setting>> {
+fn flux_observer(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<Vec<Setting>> {
     let data = &motor.data;
-    let Data { machine, rating, bandwidth, mechanics, .. } = data;
-    let (k, n_p) = (torque_constant(data), f64::from(*machine.n_p.get_ref()));
-    let (limit, w_n) = (*rating.current.get_ref(), *bandwidth.observer.get_ref());
-    let i_0 = 1.35 * rating.torque.get_ref() / k;
+    let Data { machine, rating, .. } = data;
+    let n_p = f64::from(*machine.n_p.get_ref());
+    let (limit, w_n) = (*rating.current.get_ref(), bandwidths.observer.value);
+    let i_0 = zero_speed_current(data);
     if i_0 > limit {
         let place = motor.place(&rating.current);
         bail!(
@@ -310,19 +387,19 @@ fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setti
         );
     }
     let i_q = 0.8 * limit;
-    let least = (n_p * k * i_q / mechanics.J.get_ref() / 0.35).sqrt();
+    let least = least_observer(data);
     if w_n < least {
-        let place = motor.place(&bandwidth.observer);
+        let place = motor.place_at(bandwidths.observer.origin.unwrap_or_default());
         bail!(
             "{place}: bandwidth.observer = {w_n} rad/s cannot follow the greatest acceleration: at least {least:.0} rad/s, or a lower rating.current"
         );
     }
     if !(150.0..=800.0).contains(&w_n) {
-        notes.push(format!("bandwidth.observer is {w_n} rad/s; 150 to 800 were tried"));
+        notes.push(format!("bandwidth.observer is {w_n:.0} rad/s; 150 to 800 were tried"));
     }
-    let w_s = *bandwidth.speed.get_ref();
-    if !(40.0..=120.0).contains(&w_s) {
-        notes.push(format!("bandwidth.speed is {w_s} rad/s; 40 to 120 were tried"));
+    let w_s = bandwidths.speed.value;
+    if !(40.0..=200.0).contains(&w_s) {
+        notes.push(format!("bandwidth.speed is {w_s:.0} rad/s; 40 to 200 were tried"));
     }
     let c_1 = (4.0 * 0.1 * machine.R_s.get_ref() * i_0 / machine.psi_M.get_ref()).max(50.0);
     if c_1 > 200.0 {
@@ -341,9 +418,9 @@ fn flux_observer(motor: &MotorFile, notes: &mut Vec<String>) -> Result<Vec<Setti
     ])
 }
 
-fn extended_emf(data: &Data, notes: &mut Vec<String>) -> Vec<Setting> {
-    let Data { rating, bandwidth, mechanics, .. } = data;
-    let (limit, torque, rho) = (*rating.current.get_ref(), *rating.torque.get_ref(), *bandwidth.observer.get_ref());
+fn extended_emf(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Vec<Setting> {
+    let Data { rating, mechanics, .. } = data;
+    let (limit, torque, rho) = (*rating.current.get_ref(), *rating.torque.get_ref(), bandwidths.observer.value);
     if rho < TAU * 15.0 * (1.0 - 1e-9) {
         notes.push(format!(
             "bandwidth.observer is {rho} rad/s; below 94 rad/s a load step of half the torque loses the rotor"
@@ -361,6 +438,9 @@ fn extended_emf(data: &Data, notes: &mut Vec<String>) -> Vec<Setting> {
             k * stable
         ));
     }
+    // Of the swing on the current vector, in 1/s.
+    let n_p = f64::from(*data.machine.n_p.get_ref());
+    let decay = 0.5 * swing(data, lead) * (1.0 - saliency * lead / data.machine.psi_M.get_ref());
     vec![
         set("current.active_resistance", Value::Boolean(true), "K_i = w_c^2 L"),
         set("current.mtpa", Value::Boolean(true), "salient: least current for a torque"),
@@ -369,6 +449,7 @@ fn extended_emf(data: &Data, notes: &mut Vec<String>) -> Vec<Setting> {
         real("limit.tau", 1.6 * torque, "1.6 times the rated torque"),
         real("tracker.bandwidth", rho, "bandwidth.observer"),
         real("emf.bandwidth", 7.5 * rho, "7.5 times the tracker's; 3 times is the least"),
+        real("emf.w_sign", 0.01 * n_p * rating.speed.get_ref(), "0.01 of the rated electrical speed"),
         real("zero_speed.i_0", 0.0, "not used"),
         set("start.mode", Value::Item("CurrentFrequency".into()), "no EMF at standstill"),
         real(
@@ -381,6 +462,16 @@ fn extended_emf(data: &Data, notes: &mut Vec<String>) -> Vec<Setting> {
             "start.acceleration",
             (0.3 * k * lead / mechanics.J.get_ref()).min(100.0),
             "0.3 of the start's torque, at most 100 rad/s2",
+        ),
+        real(
+            "start.t_align",
+            (3.0 / decay).max(0.25),
+            "the rotor settles on the current vector: 3 time constants, at least 0.25 s",
+        ),
+        real(
+            "start.settle",
+            (4.0 / decay).max(0.2),
+            "its swing has died at the hand-over: 4 time constants, at least 0.2 s",
         ),
     ]
 }

@@ -1,0 +1,117 @@
+//! The sample period and the bandwidths of the loops: as given in the machine's file, or by these rules.
+//!
+//! - T_s: the longest of 100, 50, 25 and 12.5 us that gives at least 12 samples per electrical period at rated speed.
+//! - Observer: the acceleration alpha (electrical) that it must follow leaves an angle error of alpha / w_n^2 = 0.35 rad at
+//!   most. Rasmussen's observer: that of the greatest current, and 300 rad/s at least; the tracker of the extended EMF: that
+//!   of the rated torque, and 2 pi 20 rad/s at least.
+//! - Speed: a step of the torque T makes the loop dip by 2/e T / (J w_s), a double pole at w_s / 2. It is to be at most 0.05
+//!   pu; at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up to a limit;
+//!   with the extended EMF, less where the gain through the change of i_q would be high ([`limits`](super::limits)).
+//! - Current: 2 pi 250 rad/s (Rasmussen); 2 pi 200 rad/s with the I-f start, and 2/3 of the stable limit at most.
+
+use super::limits::{GREATEST_GAIN, gain_per_bandwidth};
+use super::motor::{Data, Number};
+use super::rules::{Setting, Value, torque_constant};
+use std::f64::consts::{E, TAU};
+
+/// Samples per electrical period at rated speed that the rules take.
+const SAMPLES: f64 = 12.0;
+
+/// Sample periods in s to choose from.
+const PERIODS: [f64; 4] = [1e-4, 5e-5, 2.5e-5, 1.25e-5];
+
+/// Dip of the speed in pu under a step of the rated torque that the rules aim at.
+const DIP: f64 = 0.05;
+
+/// Gain of the speed loop through the EMF that a change of i_q makes, see [`limits`](super::limits): what the rules take.
+const CALM: f64 = 0.6 * GREATEST_GAIN;
+
+/// A value and where it comes from.
+#[derive(Clone, Debug)]
+pub struct Chosen {
+    /// In rad/s or s.
+    pub value: f64,
+    rule: String,
+    /// Offset in the machine's file, where given.
+    pub origin: Option<usize>,
+}
+
+impl Chosen {
+    fn new(given: Option<&Number>, rule: &str, value: impl FnOnce() -> f64) -> Self {
+        given.map_or_else(
+            || Self { value: value(), rule: rule.into(), origin: None },
+            |x| Self { value: *x.get_ref(), rule: "as given".into(), origin: Some(x.span().start) },
+        )
+    }
+
+    /// As the value of a variable.
+    pub fn setting(&self, name: &'static str) -> Setting {
+        Setting { name, value: Value::Real(self.value), rule: self.rule.clone(), origin: self.origin }
+    }
+}
+
+/// Sample period in s, and bandwidths in rad/s.
+#[derive(Clone, Debug)]
+pub struct Bandwidths {
+    /// Sample period.
+    pub T_s: Chosen,
+    /// Current loop.
+    pub current: Chosen,
+    /// Speed loop.
+    pub speed: Chosen,
+    /// Observer or tracker.
+    pub observer: Chosen,
+}
+
+impl Bandwidths {
+    /// As given, or by the rules for the estimator.
+    pub fn of(data: &Data, flux_observer: bool) -> Self {
+        let (given, machine) = (&data.bandwidth, &data.machine);
+        let period = TAU / (f64::from(*machine.n_p.get_ref()) * data.rating.speed.get_ref());
+        let T_s = Chosen::new(data.control.T_s.as_ref(), "at least 12 samples per electrical period", || {
+            PERIODS.into_iter().find(|T_s| period / T_s >= SAMPLES).unwrap_or(PERIODS[3])
+        });
+        let n_p = f64::from(*machine.n_p.get_ref());
+        let needed = DIP_OF_A_STEP * acceleration(data) / (DIP * data.rating.speed.get_ref());
+        let wanted = needed.max(if flux_observer { 40.0 } else { TAU * 5.0 });
+        let observer = if flux_observer {
+            Chosen::new(given.observer.as_ref(), "follows the greatest acceleration, at least 300 rad/s", || {
+                (1.05 * least_observer(data)).max(300.0).max((3.0 * wanted).min(600.0 * PERIODS[0] / T_s.value))
+            })
+        } else {
+            Chosen::new(given.observer.as_ref(), "follows the rated torque, at least 2 pi 20 rad/s", || {
+                let least = 1.1 * (n_p * acceleration(data) / 0.35).sqrt();
+                // With a third of rho as w_s, the gain has this at most.
+                let calm = (3.0 * CALM / gain_per_bandwidth(data, 1.0)).cbrt();
+                least.max(TAU * 20.0).max((3.0 * wanted).min(TAU * 40.0).min(calm))
+            })
+        };
+        let calm = if flux_observer { f64::INFINITY } else { CALM / gain_per_bandwidth(data, observer.value) };
+        let rule = "dips by 0.05 pu under a step of the rated torque; at most a third of the observer";
+        let speed = Chosen::new(given.speed.as_ref(), rule, || wanted.min(observer.value / 3.0).min(calm));
+        let current = if flux_observer {
+            Chosen::new(given.current.as_ref(), "250 Hz", || TAU * 250.0)
+        } else {
+            Chosen::new(given.current.as_ref(), "200 Hz, 2/3 of the stable limit at most", || {
+                let (L_d, L_q) = (*machine.L_d.get_ref(), *machine.L_q.get_ref());
+                let stable = (0.5 * L_d.min(L_q) / T_s.value + 0.9 * machine.R_s.get_ref()) / (2.0 * L_d.max(L_q));
+                (TAU * 200.0).min(stable / 1.5)
+            })
+        };
+        Self { T_s, current, speed, observer }
+    }
+}
+
+/// Dip of the speed loop under a step of the torque T, in units of T / (J w_s): a double pole at w_s / 2.
+pub const DIP_OF_A_STEP: f64 = 2.0 / E;
+
+/// Mechanical acceleration in rad/s2 by the rated torque.
+pub fn acceleration(data: &Data) -> f64 {
+    data.rating.torque.get_ref() / data.mechanics.J.get_ref()
+}
+
+/// Least bandwidth in rad/s of Rasmussen's observer: it follows the greatest acceleration.
+pub fn least_observer(data: &Data) -> f64 {
+    let greatest = torque_constant(data) * 0.8 * data.rating.current.get_ref() / data.mechanics.J.get_ref();
+    (f64::from(*data.machine.n_p.get_ref()) * greatest / 0.35).sqrt()
+}

@@ -1,0 +1,170 @@
+//! Refuses values that no machine has, which are mostly those in another unit: 36 H for 36 mH, rpm for rad/s, g.cm2 for
+//! kg.m2.
+//!
+//! Each check forms a ratio of the value to the others of the file, and says in which range that is for machines: L i / psi_M
+//! at the greatest current; R_s i against u_dc; the EMF at rated speed against u_dc / sqrt(3); the time in which the rated
+//! torque reaches the rated speed; the rated torque against that of the greatest current.
+
+use super::motor::{Data, MotorFile, Number};
+use anyhow::{Result, bail};
+
+/// A value, what it is judged by, and other units in which it may have been written, with their size in the expected unit.
+struct Check<'a> {
+    name: &'static str,
+    value: &'a Number,
+    unit: &'static str,
+    /// The judged quantity per unit of the value; it is proportional to the value.
+    per_unit: f64,
+    what: &'static str,
+    range: (f64, f64),
+    units: &'static [(&'static str, f64)],
+}
+
+/// Checks all values.
+///
+/// # Errors
+/// The first value that is out of its range: the value, what was expected, and the unit that would fit.
+pub fn check(motor: &MotorFile) -> Result<()> {
+    checks(&motor.data).iter().try_for_each(|check| one(motor, check))
+}
+
+fn one(motor: &MotorFile, check: &Check<'_>) -> Result<()> {
+    let &Check { name, value, unit, per_unit, what, range: (low, high), units } = check;
+    let x = *value.get_ref();
+    let fits = |x: f64| (low..=high).contains(&(x * per_unit));
+    if fits(x) {
+        return Ok(());
+    }
+    let suggestion = units.iter().find(|(_, size)| fits(x * size)).map_or_else(
+        || "correct it, or the values it is compared with".to_owned(),
+        |(other, size)| format!("{x} {other} would fit: write {} {unit}", short(x * size)),
+    );
+    bail!(
+        "{}: {name} = {x} {unit} makes {what} {}, expected {low} to {high}: {suggestion}",
+        motor.place(value),
+        short(x * per_unit)
+    )
+}
+
+/// A number with four digits.
+fn short(x: f64) -> f64 {
+    format!("{x:.3e}").parse().unwrap_or(x)
+}
+
+const INDUCTANCE: &[(&str, f64)] = &[("mH", 1e-3), ("uH", 1e-6)];
+
+fn checks(data: &Data) -> Vec<Check<'_>> {
+    let (machine, rating) = (&data.machine, &data.rating);
+    let of = |x: &Number| *x.get_ref();
+    let (n_p, psi_M, i, u_dc) =
+        (f64::from(*machine.n_p.get_ref()), of(&machine.psi_M), of(&rating.current), of(&data.dc_link.u_dc));
+    let (speed, torque) = (of(&rating.speed), of(&rating.torque));
+    let saliency = (of(&machine.L_q) - of(&machine.L_d)).abs();
+    let inductance = |name, value| Check {
+        name,
+        value,
+        unit: "H",
+        per_unit: i / psi_M,
+        what: "L i / psi_M at rating.current",
+        range: (0.003, 30.0),
+        units: INDUCTANCE,
+    };
+    vec![
+        Check {
+            name: "dc_link.u_dc",
+            value: &data.dc_link.u_dc,
+            unit: "V",
+            per_unit: 1.0,
+            what: "a DC link, in V,",
+            range: (1.0, 1e4),
+            units: &[("kV", 1e3)],
+        },
+        Check {
+            name: "machine.psi_M",
+            value: &machine.psi_M,
+            unit: "Wb",
+            per_unit: n_p * speed * 3.0_f64.sqrt() / u_dc,
+            what: "the EMF at rating.speed over u_dc / sqrt(3)",
+            range: (0.02, 50.0),
+            units: &[("mWb", 1e-3), ("uWb", 1e-6)],
+        },
+        Check {
+            name: "rating.speed",
+            value: &rating.speed,
+            unit: "rad/s",
+            per_unit: n_p * psi_M * 3.0_f64.sqrt() / u_dc,
+            what: "the EMF over dc_link.u_dc / sqrt(3)",
+            range: (0.02, 5.0),
+            units: &[("rpm", std::f64::consts::PI / 30.0), ("deg/s", std::f64::consts::PI / 180.0)],
+        },
+        inductance("machine.L_d", &machine.L_d),
+        inductance("machine.L_q", &machine.L_q),
+        Check {
+            name: "machine.R_s",
+            value: &machine.R_s,
+            unit: "Ohm",
+            per_unit: i / u_dc,
+            what: "R_s i over u_dc at rating.current",
+            range: (1e-4, 0.6),
+            units: &[("mOhm", 1e-3), ("uOhm", 1e-6)],
+        },
+        Check {
+            name: "rating.torque",
+            value: &rating.torque,
+            unit: "N.m",
+            per_unit: 1.0 / (1.5 * n_p * (psi_M + saliency * i) * i),
+            what: "its share of the torque that rating.current can give",
+            range: (0.005, 1.5),
+            units: &[("mN.m", 1e-3), ("N.cm", 1e-2), ("kN.m", 1e3)],
+        },
+        Check {
+            name: "mechanics.J",
+            value: &data.mechanics.J,
+            unit: "kg.m2",
+            per_unit: speed / torque,
+            what: "the time in s to rating.speed with rating.torque",
+            range: (1e-4, 1e3),
+            units: &[("kg.cm2", 1e-4), ("g.cm2", 1e-7), ("g.m2", 1e-3)],
+        },
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    const TEXT: &str = include_str!("../../../motors/ipmsm-2.2kw.toml");
+
+    fn refused(from: &str, to: &str) -> String {
+        assert!(TEXT.contains(from), "{from}");
+        let motor = MotorFile::parse(&TEXT.replacen(from, to, 1), Path::new("m.toml")).unwrap();
+        check(&motor).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn another_unit_is_named() {
+        for (from, to, told) in [
+            (
+                "L_d = 36e-3",
+                "L_d = 36.0",
+                "machine.L_d = 36 H makes L i / psi_M at rating.current 990.8, expected 0.003 to 30: 36 mH would fit: write 0.036 H",
+            ),
+            ("L_q = 51e-3", "L_q = 51000.0", "51000 uH would fit: write 0.051 H"),
+            ("R_s = 3.6", "R_s = 3600.0", "3600 mOhm would fit: write 3.6 Ohm"),
+            ("psi_M = 0.545", "psi_M = 545.0", "545 mWb would fit: write 0.545 Wb"),
+            ("speed = 157.079633", "speed = 1500.0", "1500 rpm would fit: write 157.1 rad/s"),
+            ("J = 15e-3", "J = 150.0", "150 kg.cm2 would fit: write 0.015 kg.m2"),
+            ("torque = 14.0", "torque = 14000.0", "14000 mN.m would fit: write 14 N.m"),
+            ("u_dc = 540.0", "u_dc = 0.54", "0.54 kV would fit: write 540 V"),
+            (
+                "u_dc = 540.0",
+                "u_dc = 1e6",
+                "dc_link.u_dc = 1000000 V makes a DC link, in V, 1000000, expected 1 to 10000: correct it",
+            ),
+        ] {
+            let error = refused(from, to);
+            assert!(error.contains(told) && error.lines().count() == 1, "{error}");
+        }
+    }
+}
