@@ -28,6 +28,7 @@ fn each_fault_is_found_by_its_check() {
         ("link", &["Z01i"], |e| e[2].mode = 0o120_777),
         ("checksum", &["Z01j"], |e| e[2].crc = Some(7)),
         ("twice", &["Z01k"], |e| e.push(e[2].clone())),
+        ("file and folder", &["Z01k", "Z02b"], |e| e.push(Entry::new("sources", b""))),
         ("other name inside", &["Z01k"], |e| e[2].local_name = Some("sources/xyz.c".into())),
         ("no implementation", &["Z02a"], |e| {
             e.pop();

@@ -21,7 +21,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "Z01h", requirement: "The archive is neither split nor spanned.", clause: ZIP, levels: Levels::MUST, tried: "Reads the disk numbers of the end record and of every entry.", fix: "Write the archive as one file.", run: Run::File(split) },
     Check { id: "Z01i", requirement: "The archive contains no symbolic links.", clause: ZIP, levels: Levels::MUST, tried: "Reads the file attributes of every entry.", fix: "Pack the file that the link points to.", run: Run::File(links) },
     Check { id: "Z01j", requirement: "Every entry unpacks and matches its checksum.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Unpacks every entry and compares its size and checksum with the headers.", fix: "Write the archive again; check the disk and the transfer if it was whole before.", run: Run::File(contents) },
-    Check { id: "Z01k", requirement: "Entry names are unique, and local and central headers agree.", clause: "APPNOTE 4.3", levels: Levels::HARD, tried: "Compares the names of all entries, and the central header of each with its local header.", fix: "Add every file once, and let one library write both headers.", run: Run::File(headers) },
+    Check { id: "Z01k", requirement: "Entry names are unique, no file has the name of a folder, and local and central headers agree.", clause: "APPNOTE 4.3", levels: Levels::HARD, tried: "Compares the names of all entries, and the central header of each with its local header.", fix: "Add every file once, and let one library write both headers.", run: Run::File(headers) },
     Check { id: "Z02a", requirement: "The archive contains at least one implementation: binaries or sources.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Looks for files below binaries/ and sources/.", fix: "Pack the library below binaries/PLATFORM/, or the sources with buildDescription.xml.", run: Run::File(implementation) },
     Check { id: "Z02b", requirement: "The root contains only the entries of the standard.", clause: STRUCTURE, levels: Levels::SHOULD, tried: "Reads the first part of every entry's name.", fix: "Move other files to extra/REVERSE.DOMAIN/ or to resources/.", run: Run::File(root) },
     Check { id: "Z03", requirement: "Folders below binaries/ have the platform names of the standard.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4.1", levels: Levels::SHOULD, tried: "Reads the names of the folders below binaries/.", fix: "Name them win64, linux64 or darwin64 in FMI 2.0, x86_64-windows, x86_64-linux, aarch64-darwin and so on in FMI 3.0.", run: Run::File(platforms) },
@@ -125,6 +125,8 @@ fn headers(fmu: &FmuFile) -> Verdict {
     let twice = names.windows(2).filter(|w| w[0] == w[1]);
     let mut findings: Vec<_> =
         twice.map(|w| format!("entry {:?}: occurs twice (ignoring case)", String::from_utf8_lossy(&w[0]))).collect();
+    let both = fmu.zip.files_and_folders();
+    findings.extend(both.iter().map(|name| format!("entry {name:?}: is a file, and the folder of other entries")));
     for entry in entries {
         let c = &entry.central;
         match &entry.local {
