@@ -225,7 +225,10 @@ pub(super) fn copy(file: &File, entry: &Entry, limit: u64, out: &mut impl Write)
     Ok(written)
 }
 
-/// Whether a name stays below the folder that it is joined to, on every system.
+/// Whether a name stays below the folder that it is joined to. A colon after the first letter makes a drive of it.
 pub(super) fn is_inside(name: &str) -> bool {
-    !name.contains(['\\', ':', '\0']) && !name.starts_with('/') && name.split('/').all(|part| part != "..")
+    !name.contains(['\\', '\0'])
+        && name.as_bytes().get(1) != Some(&b':')
+        && !name.starts_with('/')
+        && name.split('/').all(|part| part != "..")
 }

@@ -109,7 +109,8 @@ fn a_library_that_stops_itself_is_found() {
     let cases = [("instantiate stop", "fmi2Instantiate"), ("step stop", "fmi2DoStep")];
     each(&cases, |(how, call)| {
         let ended = described(XML).run("check", &["--only", "L00", "--patience", "1"], how);
-        let found = ["L00    VIOLATED", call, "stopped the process (as by SIGSTOP), which was not continued within 1 s"];
+        let found =
+            ["L00    VIOLATED", call, "stopped the process (as by SIGSTOP), which was not continued within 1 s"];
         assert!(ended.status == 1 && found.iter().all(|part| ended.out.contains(part)), "{how}: {ended:?}");
     });
 }
