@@ -118,13 +118,16 @@ impl FmuFile {
         fs::create_dir(self.dir().join("resources"))?;
         fs::write(self.dir().join(DESCRIPTION), &self.xml)?;
         let mut left = limits::UNPACKED.most;
+        // Of a file and a folder of one name, the folder is what an importer needs.
+        let folders = self.zip.files_and_folders();
         for entry in &self.zip.entries {
             let name = entry.name();
             if name.ends_with('/') || entry.is_link() || !is_inside(&name) || (name == DESCRIPTION) {
                 continue;
             }
             let folder = name.split('/').next().unwrap_or_default();
-            let wanted = ["binaries", "resources", "terminalsAndIcons", "extra"].contains(&folder);
+            let wanted = ["binaries", "resources", "terminalsAndIcons", "extra"].contains(&folder)
+                && folders.binary_search(&name).is_err();
             let path = self.dir.path().join(&name);
             let made = || path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| File::create(&path));
             let mut target = Target(wanted.then(made));

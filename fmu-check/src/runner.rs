@@ -162,8 +162,10 @@ const WILD: [&str; 4] = ["T02b", "G07a", "E09", "F04c"];
 
 /// How a probe's process ended.
 enum Outcome {
-    /// By itself, or in a call that hangs.
+    /// By itself.
     End(End),
+    /// In a call that hangs, in this way.
+    Hang(&'static str),
     /// It was too slow, and no call hangs.
     Slow,
     /// The time of the whole run was over.
@@ -253,7 +255,7 @@ impl Runner {
                     break;
                 }
             }
-            if matches!(end, Outcome::End(End::Stopped)) {
+            if matches!(end, Outcome::Hang(_)) {
                 // One hang is enough to know; the other cases would cost as much time again.
                 break;
             }
@@ -343,6 +345,10 @@ impl Runner {
             End::Refused(why) => return Err(io::Error::other(why)),
             End::Stopped if late => return Ok(Outcome::OutOfTime),
             End::Stopped if state == State::Slow => return Ok(Outcome::Slow),
+            End::Stopped if state == State::Stopped => {
+                return Ok(Outcome::Hang("stopped the process (as by SIGSTOP), which was not continued"));
+            }
+            End::Stopped => return Ok(Outcome::Hang("did not return")),
             // What the checker itself has ended could not clean up.
             End::Ended(status) if status.success() => {
                 let left = report
@@ -367,7 +373,7 @@ impl Runner {
                 "the probe is too slow here for a limit of {limit} s for each call; it was in {} (see --patience)",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
-            Outcome::End(End::Stopped) => Ok((format!("did not return within {limit} s"), call.into())),
+            Outcome::Hang(how) => Ok((format!("{how} within {limit} s"), call.into())),
             Outcome::End(end) => Ok((end.describe(), call.into())),
         }
     }

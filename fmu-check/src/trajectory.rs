@@ -95,13 +95,22 @@ impl Session {
 
     /// Reports a deviation, relative to the largest value.
     pub(super) fn deviates(&self, largest: f64, text: &str) {
+        self.deviates_at(None, largest, text);
+    }
+
+    /// The same, of this level instead of that of the check.
+    pub(super) fn deviates_at(&self, lower: Option<Level>, largest: f64, text: &str) {
         let tolerance = self.tolerance();
-        if largest <= tolerance {
-            self.lesser(Level::Hard, format!("{text}; relative deviation {largest:.1e}, within {tolerance:e}"));
+        let (level, text) = if largest <= tolerance {
+            (Some(Level::Hard), format!("{text}; relative deviation {largest:.1e}, within {tolerance:e}"))
         } else if largest.is_finite() {
-            self.violated(format!("{text}; relative deviation {largest:.1e}, above {tolerance:e}"));
+            (lower, format!("{text}; relative deviation {largest:.1e}, above {tolerance:e}"))
         } else {
-            self.violated(text);
+            (lower, text.into())
+        };
+        match level {
+            Some(level) => self.lesser(level, text),
+            None => self.violated(text),
         }
     }
 }

@@ -15,6 +15,10 @@ pub(super) enum State {
     Runs,
     /// One call has used the processor for the time limit, or has slept for it.
     Hangs,
+    /// One call has stopped the process (`SIGSTOP`) for the time limit: nothing here stops a probe, and it is in a session of its
+    /// own, which no terminal stops.
+    #[cfg_attr(not(target_os = "linux"), allow(dead_code, reason = "only Linux tells"))]
+    Stopped,
     /// It makes progress, or gets no processor: neither shows a fault.
     Slow,
 }
@@ -25,65 +29,68 @@ pub(super) struct Watch {
     /// The file with the call that it is in.
     journal: PathBuf,
     limit: Duration,
-    began: Instant,
+    /// How long it has been watched. What this process slept itself, because it was stopped or got no processor, does not count.
+    watched: Duration,
     /// The call, since when, and the processor time then.
-    call: (Vec<u8>, Instant, Option<Duration>),
+    call: (Vec<u8>, Duration, Option<Duration>),
     looked: Instant,
 }
 
 impl Watch {
     pub(super) fn new(pid: u32, journal: PathBuf, limit: Duration) -> Self {
-        let now = Instant::now();
-        Self { pid, journal, limit, began: now, call: (Vec::new(), now, None), looked: now }
+        let zero = Duration::ZERO;
+        Self { pid, journal, limit, watched: zero, call: (Vec::new(), zero, None), looked: Instant::now() }
     }
 
     /// Looks at the process; cheap enough to be called in a loop.
     pub(super) fn look(&mut self) -> State {
-        if self.looked.elapsed() < self.limit / 100 {
+        let since = self.looked.elapsed();
+        if since < self.limit / 100 {
             return State::Runs;
         }
         self.looked = Instant::now();
-        let (used, waits) = processor(self.pid).unzip();
+        self.watched += since.min(self.limit / 10);
+        let (used, rests) = processor(self.pid).unzip();
         let call = fs::read(&self.journal).unwrap_or_default();
         if call != self.call.0 {
-            self.call = (call, self.looked, used);
+            self.call = (call, self.watched, used);
         }
-        let over = self.began.elapsed() > self.limit.saturating_mul(PATIENCE);
-        if self.call.1.elapsed() <= self.limit {
+        let over = self.watched > self.limit.saturating_mul(PATIENCE);
+        if self.watched - self.call.1 <= self.limit {
             return if over { State::Slow } else { State::Runs };
         }
-        let Some((used, waits)) = used.zip(waits) else { return State::Hangs };
+        let Some((used, rests)) = used.zip(rests) else { return State::Hangs };
         let since = used.saturating_sub(self.call.2.unwrap_or_default());
         // Half of the limit: the processor's clock ticks in steps.
-        if since > self.limit / 2 || (waits && since < self.limit / 20) {
-            State::Hangs
-        } else if over {
-            State::Slow
-        } else {
-            State::Runs
+        match rests {
+            _ if since > self.limit / 2 => State::Hangs,
+            Some(how) if since < self.limit / 20 => how,
+            _ if over => State::Slow,
+            _ => State::Runs,
         }
     }
 }
 
-/// The processor time that a process has used, and whether all its threads wait for something.
+/// The processor time that a process has used, and how all its threads rest: they wait for something, or a signal has stopped
+/// them.
 #[cfg(target_os = "linux")]
-fn processor(pid: u32) -> Option<(Duration, bool)> {
+fn processor(pid: u32) -> Option<(Duration, Option<State>)> {
     // The name of the program stands in parentheses and may contain anything.
     let fields =
         |text: String| Some(text.rsplit_once(')')?.1.split_whitespace().map(str::to_owned).collect::<Vec<_>>());
     let stat = fields(fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)?;
     // utime and stime; the kernel reports hundredths of a second on every system that we know.
     let ticks = stat.get(11)?.parse::<u64>().ok()? + stat.get(12)?.parse::<u64>().ok()?;
-    let mut tasks = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
-    let waits = |task: fs::DirEntry| {
-        let stat = fs::read_to_string(task.path().join("stat")).ok().and_then(fields);
-        stat.is_none_or(|stat| stat.first().is_some_and(|state| state == "S"))
-    };
-    Some((Duration::from_millis(10 * ticks), tasks.all(waits)))
+    let tasks = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
+    let state = |task: fs::DirEntry| fields(fs::read_to_string(task.path().join("stat")).ok()?)?.into_iter().next();
+    let states: Vec<String> = tasks.filter_map(state).collect();
+    let all = |state: &str| states.iter().all(|s| s == state);
+    let rests = if all("S") { Some(State::Hangs) } else { all("T").then_some(State::Stopped) };
+    Some((Duration::from_millis(10 * ticks), rests))
 }
 
 #[cfg(not(target_os = "linux"))]
-fn processor(_: u32) -> Option<(Duration, bool)> {
+fn processor(_: u32) -> Option<(Duration, Option<State>)> {
     None
 }
 
@@ -117,9 +124,24 @@ mod tests {
         // Call after call: slow, however long it takes.
         let calls = "n=0; while :; do n=$((n + 1)); echo \"C call $n\" > \"$JOURNAL\"; done";
         assert_eq!(end(calls, 400, &journal), State::Slow);
-        // A process that gets no processor (stopped) is not hanging.
-        assert_eq!(end("kill -STOP $$", 200, &journal), State::Slow);
+        // One call that stops the process.
+        assert_eq!(end("kill -STOP $$", 400, &journal), State::Stopped);
         // One that ends is left to end.
         assert_eq!(end("true", 400, &journal), State::Runs);
+    }
+
+    /// The whole run may be stopped (a terminal, a debugger): the probe has not hung meanwhile.
+    #[test]
+    fn what_the_watch_has_slept_does_not_count() {
+        let mut child = Command::new("sleep").arg("60").spawn().unwrap();
+        let limit = Duration::from_millis(500);
+        let mut watch = Watch::new(child.id(), "no journal".into(), limit);
+        let seen = [1, 3, 3].map(|times| {
+            std::thread::sleep(times * limit);
+            watch.look()
+        });
+        let _ = child.kill();
+        child.wait().unwrap();
+        assert_eq!(seen, [State::Runs; 3]);
     }
 }

@@ -101,6 +101,17 @@ impl Archive {
         self.entries.iter().find(|e| e.central.name == name.as_bytes())
     }
 
+    /// Names of files that are folders of other entries, too: no system can store both.
+    pub(super) fn files_and_folders(&self) -> Vec<String> {
+        let mut names: Vec<&[u8]> = self.entries.iter().map(|e| &*e.central.name).collect();
+        names.sort_unstable();
+        let is_folder = |name: &&&[u8]| {
+            let below = [name, &b"/"[..]].concat();
+            names.get(names.partition_point(|n| *n < &*below)).is_some_and(|next| next.starts_with(&below))
+        };
+        names.iter().filter(is_folder).map(|name| String::from_utf8_lossy(name).into_owned()).collect()
+    }
+
     pub(super) fn names(&self) -> Vec<String> {
         self.entries.iter().map(Entry::name).collect()
     }
@@ -214,7 +225,10 @@ pub(super) fn copy(file: &File, entry: &Entry, limit: u64, out: &mut impl Write)
     Ok(written)
 }
 
-/// Whether a name stays below the folder that it is joined to, on every system.
+/// Whether a name stays below the folder that it is joined to. A colon after the first letter makes a drive of it.
 pub(super) fn is_inside(name: &str) -> bool {
-    !name.contains(['\\', ':', '\0']) && !name.starts_with('/') && name.split('/').all(|part| part != "..")
+    !name.contains(['\\', '\0'])
+        && name.as_bytes().get(1) != Some(&b':')
+        && !name.starts_with('/')
+        && name.split('/').all(|part| part != "..")
 }

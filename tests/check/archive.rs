@@ -18,7 +18,10 @@ fn each_fault_is_found_by_its_check() {
         ("backslash", &["Z01b", "Z02b"], |e| e.push(Entry::new("a\\b", b""))),
         ("absolute", &["Z01b", "Z02b"], |e| e.push(Entry::new("/etc/passwd", b""))),
         ("outside", &["Z01b"], |e| e.push(Entry::new("resources/../../x", b""))),
-        ("dot", &["Z01b", "Z02b"], |e| e.push(Entry::new("./x", b""))),
+        ("drive", &["Z01b", "Z01c", "Z02b"], |e| e.push(Entry::new("c:/x", b""))),
+        // Neither ZIP nor FMI forbids these.
+        ("dot", &["Z01c", "Z02b"], |e| e.push(Entry::new("./x", b""))),
+        ("colon", &["Z01c"], |e| e.push(Entry::new("resources/a:b", b""))),
         ("umlaut", &["Z01c"], |e| e.push(Entry::new("resources/\u{e4}", b""))),
         ("method 12", &["Z01d", "Z01j"], |e| e[2].method = 12),
         ("descriptor without deflate", &["Z01e"], |e| e[2].flags = 8),
@@ -28,6 +31,7 @@ fn each_fault_is_found_by_its_check() {
         ("link", &["Z01i"], |e| e[2].mode = 0o120_777),
         ("checksum", &["Z01j"], |e| e[2].crc = Some(7)),
         ("twice", &["Z01k"], |e| e.push(e[2].clone())),
+        ("file and folder", &["Z01k", "Z02b"], |e| e.push(Entry::new("sources", b""))),
         ("other name inside", &["Z01k"], |e| e[2].local_name = Some("sources/xyz.c".into())),
         ("no implementation", &["Z02a"], |e| {
             e.pop();

@@ -95,6 +95,9 @@ static int update(M *m, Update *u) {
 #ifdef FAULT_E20
     if (m->k > 3) u->next = NAN;
 #endif
+#ifdef FAULT_E20s
+    if (m->k > 3) u->next = INFINITY;
+#endif
 #ifdef FAULT_E21
     if (m->exchange) u->next -= m->t;
 #endif

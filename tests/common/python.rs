@@ -123,10 +123,10 @@ fn base_python() -> Result<(String, String), String> {
 /// Runs a command to its end; otherwise one line with what was to be had, and what the command said.
 pub fn run(command: &mut Command, what: &str) -> Result<(), String> {
     let output =
-        command.output().map_err(|e| format!("no {what}: {}: {e}", command.get_program().to_string_lossy()))?;
+        command.output().map_err(|e| format!("cannot get {what}: {}: {e}", command.get_program().to_string_lossy()))?;
     if output.status.success() {
         return Ok(());
     }
     let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).trim().to_owned());
-    Err(format!("no {what}: {}: {}", output.status, said.join("\n").trim()))
+    Err(format!("cannot get {what}: {}: {}", output.status, said.join("\n").trim()))
 }

@@ -13,7 +13,7 @@ const STRUCTURE: &str = "2.0.5, 2.3; 3.0.2, 2.5.1";
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "Z01a", requirement: "The file extension is .fmu.", clause: ZIP, levels: Levels::MUST, tried: "Reads the name of the file.", fix: "Name the archive NAME.fmu.", run: Run::File(extension) },
     Check { id: "Z01b", requirement: "Entries have relative names with forward slashes and stay inside the archive.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Reads the names of all entries in both headers.", fix: "Write entry names relative to the root of the FMU, with forward slashes and without `.` and `..`.", run: Run::File(names) },
-    Check { id: "Z01c", requirement: "Entry names are ASCII.", clause: ZIP, levels: Levels::SHOULD, tried: "Reads the names of all entries.", fix: "Use ASCII names; keep other letters inside the files.", run: Run::File(ascii) },
+    Check { id: "Z01c", requirement: "Entry names are ASCII, without `:` and without `.` as a part, so that every system can store them.", clause: ZIP, levels: Levels::SHOULD, tried: "Reads the names of all entries.", fix: "Use plain ASCII names; keep other letters inside the files.", run: Run::File(portable) },
     Check { id: "Z01d", requirement: "Entries are stored or deflated (method 0 or 8).", clause: ZIP, levels: Levels::MUST, tried: "Reads the compression methods in both headers of every entry.", fix: "Tell the ZIP library to deflate or to store.", run: Run::File(methods) },
     Check { id: "Z01e", requirement: "A data descriptor (general purpose bit 3) occurs only with deflate.", clause: ZIP, levels: Levels::MUST, tried: "Reads the general purpose bits in both headers of every entry.", fix: "Let the ZIP library write to a file it can seek in, or deflate every entry.", run: Run::File(descriptors) },
     Check { id: "Z01f", requirement: "The version needed to extract is at most 2.0, so ZIP64 is not used.", clause: ZIP, levels: Levels::MUST, tried: "Reads the version needed in both headers of every entry, and the end records.", fix: "Switch ZIP64 off, and write the version 2.0 into the headers.", run: Run::File(needed) },
@@ -21,7 +21,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "Z01h", requirement: "The archive is neither split nor spanned.", clause: ZIP, levels: Levels::MUST, tried: "Reads the disk numbers of the end record and of every entry.", fix: "Write the archive as one file.", run: Run::File(split) },
     Check { id: "Z01i", requirement: "The archive contains no symbolic links.", clause: ZIP, levels: Levels::MUST, tried: "Reads the file attributes of every entry.", fix: "Pack the file that the link points to.", run: Run::File(links) },
     Check { id: "Z01j", requirement: "Every entry unpacks and matches its checksum.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Unpacks every entry and compares its size and checksum with the headers.", fix: "Write the archive again; check the disk and the transfer if it was whole before.", run: Run::File(contents) },
-    Check { id: "Z01k", requirement: "Entry names are unique, and local and central headers agree.", clause: "APPNOTE 4.3", levels: Levels::HARD, tried: "Compares the names of all entries, and the central header of each with its local header.", fix: "Add every file once, and let one library write both headers.", run: Run::File(headers) },
+    Check { id: "Z01k", requirement: "Entry names are unique, no file has the name of a folder, and local and central headers agree.", clause: "APPNOTE 4.3", levels: Levels::HARD, tried: "Compares the names of all entries, and the central header of each with its local header.", fix: "Add every file once, and let one library write both headers.", run: Run::File(headers) },
     Check { id: "Z02a", requirement: "The archive contains at least one implementation: binaries or sources.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Looks for files below binaries/ and sources/.", fix: "Pack the library below binaries/PLATFORM/, or the sources with buildDescription.xml.", run: Run::File(implementation) },
     Check { id: "Z02b", requirement: "The root contains only the entries of the standard.", clause: STRUCTURE, levels: Levels::SHOULD, tried: "Reads the first part of every entry's name.", fix: "Move other files to extra/REVERSE.DOMAIN/ or to resources/.", run: Run::File(root) },
     Check { id: "Z03", requirement: "Folders below binaries/ have the platform names of the standard.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4.1", levels: Levels::SHOULD, tried: "Reads the names of the folders below binaries/.", fix: "Name them win64, linux64 or darwin64 in FMI 2.0, x86_64-windows, x86_64-linux, aarch64-darwin and so on in FMI 3.0.", run: Run::File(platforms) },
@@ -54,13 +54,17 @@ fn extension(fmu: &FmuFile) -> Verdict {
 fn names(fmu: &FmuFile) -> Verdict {
     each_entry(fmu, |entry| {
         let name = entry.name();
-        let bad = !is_inside(&name) || name.starts_with("./") || name.contains("/./") || name.is_empty();
-        bad.then(|| "is not a plain relative path with forward slashes".into())
+        (name.is_empty() || !is_inside(&name)).then(|| "is not a plain relative path with forward slashes".into())
     })
 }
 
-fn ascii(fmu: &FmuFile) -> Verdict {
-    each_entry(fmu, |entry| (!entry.central.name.is_ascii()).then(|| "is not ASCII".into()))
+/// Windows stores no colons, and a folder named `.` is none anywhere; ZIP and FMI forbid neither.
+fn portable(fmu: &FmuFile) -> Verdict {
+    each_entry(fmu, |entry| {
+        let name = entry.name();
+        let odd = !entry.central.name.is_ascii() || name.contains(':') || name.split('/').any(|part| part == ".");
+        odd.then(|| "is not a name that every system can store".into())
+    })
 }
 
 fn methods(fmu: &FmuFile) -> Verdict {
@@ -125,6 +129,8 @@ fn headers(fmu: &FmuFile) -> Verdict {
     let twice = names.windows(2).filter(|w| w[0] == w[1]);
     let mut findings: Vec<_> =
         twice.map(|w| format!("entry {:?}: occurs twice (ignoring case)", String::from_utf8_lossy(&w[0]))).collect();
+    let both = fmu.zip.files_and_folders();
+    findings.extend(both.iter().map(|name| format!("entry {name:?}: is a file, and the folder of other entries")));
     for entry in entries {
         let c = &entry.central;
         match &entry.local {

@@ -4,17 +4,17 @@ use crate::check::{Check, Level, Levels, Run};
 use crate::exchange::Importer;
 use crate::session::{NotDetermined, Session};
 use model_description::{Causality, ModelVariable, Variability};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 const UPDATE: &str = "2.0.5, 3.2.2; 3.0.2, 2.3.5";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "E20", requirement: "Every update of the discrete states returns Booleans of 0 or 1, and a finite time where it defines a next event.", clause: UPDATE, levels: Levels::MUST, tried: "Looks at the results of every update.", fix: "Write all results before returning OK.", run: Run::Exchange(update_results) },
+    Check { id: "E20", requirement: "Every update of the discrete states returns Booleans of 0 or 1, and a time where it defines a next event (should: a finite one).", clause: UPDATE, levels: Levels::MUST, tried: "Looks at the results of every update.", fix: "Write all results before returning OK.", run: Run::Exchange(update_results) },
     Check { id: "E21", requirement: "The next time event, from the first update after initialization on, is an absolute time after now.", clause: UPDATE, levels: Levels::SHOULD, tried: "Looks at nextEventTime of every update.", fix: "Return an absolute time after now, from the first update on.", run: Run::Exchange(next_event_time) },
     Check { id: "E22", requirement: "An event before the next time event does not lose it: the update defines it anew.", clause: UPDATE, levels: Levels::SHOULD, tried: "Makes an event before the next time event and looks at nextEventTime.", fix: "Compute the next time event in every update.", run: Run::Exchange(renewed) },
     Check { id: "E23", requirement: "The iteration of an event comes to an end within 100 updates.", clause: "hardening", levels: Levels::HARD, tried: "Updates until no further update is needed.", fix: "End the iteration: newDiscreteStatesNeeded only if something has changed.", run: Run::Exchange(ends) },
-    Check { id: "E24a", requirement: "An update that changes a state says so with valuesOfContinuousStatesChanged.", clause: UPDATE, levels: Levels::MUST, tried: "Compares states before and after every update.", fix: "Set valuesOfContinuousStatesChanged whenever a state is reinitialized.", run: Run::Exchange(told_changes) },
+    Check { id: "E24a", requirement: "An update that changes a state says so with valuesOfContinuousStatesChanged.", clause: UPDATE, levels: Levels::SHOULD, tried: "Compares states before and after every update.", fix: "Set valuesOfContinuousStatesChanged whenever a state is reinitialized.", run: Run::Exchange(told_changes) },
     Check { id: "E24b", requirement: "valuesOfContinuousStatesChanged is true only if a state has changed.", clause: UPDATE, levels: Levels(Some(Level::Must), Some(Level::Should)), tried: "Compares states before and after every update.", fix: "Clear the flag where no state is reinitialized.", run: Run::Exchange(true_changes) },
     Check { id: "E25", requirement: "After Event Mode no event indicator is 0.", clause: "2.0.5, 3.2.2; 3.0.2, 3.1.1", levels: Levels::MUST, tried: "Reads the event indicators after Event Mode.", fix: "Shift an indicator that is 0, with a small hysteresis.", run: Run::Exchange(indicators) },
     Check { id: "E26", requirement: "Discrete variables do not change in Continuous-Time Mode.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, tried: "Reads discrete variables between events.", fix: "Assign discrete variables in updates only.", run: Run::Exchange(discrete) },
@@ -50,13 +50,17 @@ fn each_event(
 }
 
 fn update_results(session: &Session) -> Result<(), NotDetermined> {
+    let infinite = Cell::new(false);
     each_event(session, &|_, event| {
         event.updates.iter().find_map(|(u, _)| {
             let flags = [u.again, u.terminate, u.nominals_changed, u.states_changed, u.next_event_time_defined];
             let good = flags.iter().all(|f| matches!(f, 0 | 1));
-            let time = u.next_event_time_defined == 0 || u.next_event_time.is_finite();
-            (!good || !time)
-                .then(|| format!("{u:?}: a Boolean is not 0 or 1, or was not written, or the time is not finite"))
+            let time = u.next_event_time_defined == 0 || !u.next_event_time.is_nan();
+            // An event that never comes is odd, but an importer can integrate at most until then.
+            if u.next_event_time_defined == 1 && u.next_event_time.is_infinite() && !infinite.replace(true) {
+                session.lesser(Level::Should, format!("{u:?}: the time of the next event is infinite"));
+            }
+            (!good || !time).then(|| format!("{u:?}: a Boolean is not 0 or 1, or a result was not written"))
         })
     })
 }
