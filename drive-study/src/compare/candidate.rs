@@ -41,6 +41,16 @@ const VARIANTS: &[Entry] = &[
             p.speed_loop.bandwidth = TAU * 8.0;
         },
     },
+    Entry {
+        kind: Kind::FluxObserver,
+        name: "FluxObserver-adapting",
+        set: |p| (p.estimators.adaptation.resistance, p.estimators.flux_observer.magnet) = (true, 5.0),
+    },
+    Entry {
+        kind: Kind::GradientObserver,
+        name: "GradientObserver-clamped",
+        set: |p| p.estimators.gradient.clamped = true,
+    },
 ];
 
 impl Entry {

@@ -36,12 +36,13 @@
 //! Limits: at w = 0 the angle is not observable; without current, neither is R. An offset of the current sensors acts like
 //! a wrong R^ that turns: 20 mA loses cells at 0.01 pu. L_q^ = 1.2 L_q loses rated motoring load at 0.02 and 0.05 pu.
 
+use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Injection, Sample};
+use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use crate::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND};
-use fmu_core::{Row, Table};
+use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 
 /// Mechanical speed in rad/s below which a speed reference asks for standstill.
@@ -163,6 +164,21 @@ impl FluxObserver {
         self.psi += self.h * (R - self.R);
         self.R = R;
     }
+}
+
+/// Checks that the estimator adapts the magnet flux if it is asked to.
+///
+/// # Errors
+/// It is another estimator.
+pub fn validate_magnet(kind: Kind, par: &ControllerParameters) -> Result<(), Fault> {
+    if kind == Kind::FluxObserver || par.estimators.flux_observer.magnet == 0.0 {
+        return Ok(());
+    }
+    let allowed = format!(
+        "0 with {}, which does not adapt psi_M; set it to 0, or estimator = FluxObserver",
+        ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
+    );
+    Err(ALL_PARAMETERS.fault(par, |p| &mut p.estimators.flux_observer.magnet, allowed))
 }
 
 /// Stator flux linkage in Wb.

@@ -235,6 +235,8 @@ macro_rules! estimators {
             pub fn validate(self, par: &ControllerParameters) -> Result<(), Fault> {
                 tracker::validate(par)?;
                 resistance::validate(self, par)?;
+                emf::validate_reversal(self, par)?;
+                flux_observer::validate_magnet(self, par)?;
                 match self {
                     $(Self::$name => <$state>::validate(par),)*
                 }
