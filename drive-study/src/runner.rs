@@ -56,6 +56,14 @@ pub fn drive(kind: Kind) -> Pair {
         par.estimators.tracker.bandwidth = TAU * 15.0;
         par.estimators.emf.bandwidth = TAU * 300.0;
     }
+    if kind == Kind::FluxObserver {
+        // Nothing lags behind the flux; the resistance and the magnet flux come slowly enough to tell them apart.
+        par.estimators.tracker.bandwidth = TAU * 60.0;
+        par.estimators.adaptation.bandwidth = 5.0;
+    }
+    if kind == Kind::GradientObserver {
+        par.estimators.tracker.bandwidth = TAU * 40.0;
+    }
     if kind == Kind::Hybrid {
         par.estimators.tracker.bandwidth = TAU * 40.0;
     }
@@ -96,6 +104,11 @@ pub fn turning(mut pair: Pair, speed: f64) -> Pair {
     controller.parameters.speed_est = speed * RATED_SPEED;
     controller.inputs.speed_ref = speed * RATED_SPEED;
     pair
+}
+
+/// Linear ramp from `a` at time `from` to `b` at time `to`, constant outside.
+pub fn line(t: f64, from: f64, a: f64, to: f64, b: f64) -> f64 {
+    a + (b - a) * ((t - from) / (to - from)).clamp(0.0, 1.0)
 }
 
 /// Angle of the rotor ahead of the estimate: theta - theta^ in deg, wrapped.

@@ -42,7 +42,14 @@ fn preset(kind: Kind) -> Pair {
 }
 
 /// Kinds whose estimate cannot lose the rotor, or finds it back within a sample or two of an overload.
-const SURE: [Kind; 4] = [Kind::Sensored, Kind::Rasmussen, Kind::CurrentModel, Kind::KalmanFilter];
+const SURE: [Kind; 6] = [
+    Kind::Sensored,
+    Kind::Rasmussen,
+    Kind::CurrentModel,
+    Kind::KalmanFilter,
+    Kind::FluxObserver,
+    Kind::GradientObserver,
+];
 
 #[test]
 fn a_load_beyond_every_torque() {

@@ -15,6 +15,7 @@ use crate::control::signals::ControllerOutputs;
 use crate::control::tables::{self, ADAPTATION_OUTPUTS, ENABLED, LATER_OUTPUTS, LIMITED, LOCK_LOST};
 use crate::control::weakening::WEAKENING;
 use crate::estimator::resistance::ADAPTATION;
+use crate::estimator::tables::{EstimatorParameters, LATER_ESTIMATOR_PARAMETERS};
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
@@ -158,7 +159,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 9;
+    const STATE_VERSION: u16 = 10;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -376,6 +377,10 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 },
             ),
             V::part("", &Part { table: ADAPTATION_OUTPUTS, lens: |m| &mut m.out.controller }),
+            V::part(
+                "",
+                &Part { table: ESTIMATORS, lens: |m| &mut m.model.pair.controller.model.parameters.estimators },
+            ),
         ]
     },
 );
@@ -383,6 +388,10 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
 /// The plant's parameters of losses and temperatures.
 const LOSS_PARAMETERS: &Table<PlantParameters> =
     &Table::new(const { &[Row::part("plant.", &Part { table: plant::LOSS_PARAMETERS, lens: |p| p })] });
+
+/// The estimators' parameters that joined later.
+const ESTIMATORS: &Table<EstimatorParameters> =
+    &Table::new(const { &[Row::part("controller.", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |p| p })] });
 
 type O = Row<ControllerOutputs>;
 

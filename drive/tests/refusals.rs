@@ -201,3 +201,31 @@ fn clamps_of_the_resistance_that_exclude_the_parameter() {
     with(|p| p.estimators.adaptation.max = 0.95, &["adaptation.max = 0.95", "at least 1", "raise it"]);
     with(|p| p.estimators.adaptation.start = 0.3, &["adaptation.start = 0.3", "0.4 to 2.5"]);
 }
+
+#[test]
+fn what_another_estimator_adapts_or_holds() {
+    let name = |kind: Kind| format!("estimator = {} ({})", kind as i32, kind.name());
+    let reversal = |p: &mut ControllerParameters| p.estimators.emf.hold_reversal = true;
+    for kind in [Kind::Rasmussen, Kind::VoltageModel, Kind::Hybrid, Kind::KalmanFilter, Kind::FluxObserver] {
+        refused(kind, reversal, &["emf.hold_reversal = true", &name(kind), "set it to false", "SlidingMode"]);
+    }
+    let magnet = |p: &mut ControllerParameters| p.estimators.flux_observer.magnet = 5.0;
+    for kind in [Kind::Rasmussen, Kind::GradientObserver] {
+        refused(kind, magnet, &["flux_observer.magnet = 5 1/s", &name(kind), "FluxObserver"]);
+    }
+    for kind in [Kind::DirectEmf, Kind::SlidingMode, Kind::VoltageFeedback] {
+        let mut holding = controller(kind);
+        reversal(&mut holding.parameters);
+        holding.validate().unwrap();
+    }
+    let mut adapting = controller(Kind::FluxObserver);
+    magnet(&mut adapting.parameters);
+    adapting.parameters.estimators.adaptation.resistance = true;
+    adapting.validate().unwrap();
+}
+
+#[test]
+fn a_sliding_mode_that_chatters() {
+    let fast = |p: &mut ControllerParameters| p.estimators.sliding_mode.bandwidth = 11e3;
+    refused(Kind::SlidingMode, fast, &["sliding_mode.bandwidth = 11000 rad/s", "at most 1 / T_s = 10000 rad/s"]);
+}

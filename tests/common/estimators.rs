@@ -95,6 +95,29 @@ fn start(kind: Kind) -> Experiment {
     Experiment { name, pair, speed_ref: vec![(0.6, speed)], load: vec![], duration: 1.6 }
 }
 
+/// A cell of the flux observer's map: R^ = 0.8 R, psi^ = 0.95 psi, both adapting, half the load driving at 0.02 pu.
+fn adapting() -> Experiment {
+    let mut pair = runner::turning(runner::drive(Kind::FluxObserver), 0.2);
+    let par = &mut pair.controller.model.parameters;
+    (par.motor.R_s, par.motor.psi_M) = (0.8 * par.motor.R_s, 0.95 * par.motor.psi_M);
+    (par.estimators.adaptation.resistance, par.estimators.flux_observer.magnet) = (true, 5.0);
+    let step = |k: u32| (0.2 + 0.1 * f64::from(k), RATED_SPEED * (0.2 - 0.0225 * f64::from(k)));
+    let speed_ref = std::iter::once((0.0, 0.2 * RATED_SPEED)).chain((0..=8).map(step)).collect();
+    let load = (0..=6).map(|k| (1.5 + 0.05 * f64::from(k), -RATED_TORQUE * f64::from(k) / 12.0)).collect();
+    Experiment { name: "FluxObserver: adapting at 0.02 pu".into(), pair, speed_ref, load, duration: 2.6 }
+}
+
+/// The reversal from 0.5 to -0.5 pu in 0.5 s that only `emf.hold_reversal` holds, under friction of 0.3 pu.
+fn reversal(kind: Kind) -> Experiment {
+    let mut pair = runner::turning(runner::drive(kind), 0.5);
+    pair.plant.model.parameters.mechanics.tau_coulomb = 0.3 * RATED_TORQUE;
+    let par = &mut pair.controller.model.parameters;
+    par.estimators.emf.hold_reversal = kind != Kind::FluxObserver;
+    let step = |k: u32| (0.3 + 0.01 * f64::from(k), RATED_SPEED * (0.5 - 0.02 * f64::from(k)));
+    let speed_ref = std::iter::once((0.0, 0.5 * RATED_SPEED)).chain((0..=50).map(step)).collect();
+    Experiment { name: format!("{}: reversal", kind.name()), pair, speed_ref, load: vec![], duration: 1.6 }
+}
+
 impl Experiment {
     /// Runs it natively: the experiment as JSON with speed and estimated angle of every recorded point.
     fn run(mut self) -> Value {
@@ -126,5 +149,6 @@ impl Experiment {
 /// All experiments.
 pub fn experiments() -> Value {
     let all = Kind::ALL.iter().flat_map(|&kind| [load_step(kind), start(kind)]);
-    Value::Array(all.map(Experiment::run).collect())
+    let later = [adapting(), reversal(Kind::ExtendedEmf), reversal(Kind::FluxObserver)];
+    Value::Array(all.chain(later).map(Experiment::run).collect())
 }

@@ -41,21 +41,31 @@ const VARIANTS: &[Entry] = &[
             p.speed_loop.bandwidth = TAU * 8.0;
         },
     },
+    Entry {
+        kind: Kind::FluxObserver,
+        name: "FluxObserver-adapting",
+        set: |p| (p.estimators.adaptation.resistance, p.estimators.flux_observer.magnet) = (true, 5.0),
+    },
+    Entry {
+        kind: Kind::GradientObserver,
+        name: "GradientObserver-clamped",
+        set: |p| p.estimators.gradient.clamped = true,
+    },
 ];
 
 impl Entry {
     /// The machine it runs on, which also sets 1 pu of torque.
     pub fn machine(&self) -> &'static str {
-        match self.kind.class() {
-            Class::FluxObserver => "reference motor, 2 N.m",
+        match self.kind {
+            Kind::Rasmussen => "reference motor, 2 N.m",
             _ => "2.2 kW machine, 14 N.m",
         }
     }
 
     /// Its name in a table, with the machine if it differs from that of the others.
     pub fn label(&self) -> String {
-        match self.kind.class() {
-            Class::FluxObserver => format!("{} ({})", self.name, self.machine()),
+        match self.kind {
+            Kind::Rasmussen => format!("{} ({})", self.name, self.machine()),
             _ => self.name.into(),
         }
     }
@@ -88,8 +98,8 @@ impl Candidate {
     /// The candidate of a row.
     pub fn new(entry: Entry) -> Self {
         let class = entry.kind.class();
-        let (mut pair, torque) = match class {
-            Class::FluxObserver => (Pair::default(), 2.0),
+        let (mut pair, torque) = match entry.kind {
+            Kind::Rasmussen => (Pair::default(), 2.0),
             _ => (runner::drive(entry.kind), runner::RATED_TORQUE),
         };
         pair.controller.model.parameters.estimator = entry.kind;

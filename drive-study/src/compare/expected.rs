@@ -29,6 +29,10 @@ const INJECTION: &[&str] = &[
 ];
 const HYBRID: &[&str] = &["Hybrid"];
 const FLUX: &[&str] = &["Rasmussen"];
+const FLUX_OBSERVER: &[&str] = &["FluxObserver"];
+const ADAPTING: &[&str] = &["FluxObserver-adapting"];
+const GRADIENT: &[&str] = &["GradientObserver", "GradientObserver-clamped"];
+const SLIDING: &[&str] = &["SlidingMode"];
 const BEYOND_BASE_SPEED: &[&str] = &[
     "DirectEmf",
     "EmfObserver",
@@ -161,6 +165,21 @@ const FIGURES: &[Row] = &[
     (INJECTION, "load-0", PEAK, AtMost(30.0)),
     (HYBRID, "reversal", PEAK, tenth(7.6)),
     (HYBRID, "reversal-dead", PEAK, AtMost(13.0)),
+    // The methods that practice compares with, derived for this machine.
+    (FLUX_OBSERVER, "reversal", PEAK, AtMost(1.0)),
+    (FLUX_OBSERVER, "lowest", LOWEST, AtMost(0.0)),
+    (FLUX_OBSERVER, "lowest-dead", LOWEST, AtMost(0.0)),
+    (ADAPTING, "wrong-r", "+20 %", Near(0.0, 0.5)),
+    (ADAPTING, "wrong-r", "-20 %", Near(0.0, 0.5)),
+    (ADAPTING, "wrong-psi", "+20 %", Near(0.0, 0.1)),
+    (ADAPTING, "wrong-psi", "-20 %", Near(0.0, 0.1)),
+    (GRADIENT, "lowest", LOWEST, AtMost(0.03)),
+    (GRADIENT, "reversal", PEAK, AtMost(2.0)),
+    (SLIDING, "lowest", LOWEST, AtMost(0.03)),
+    (SLIDING, "wrong-l-q", "+20 %", deg(5.8)),
+    (SLIDING, "wrong-l-q", "-20 %", deg(-5.9)),
+    (SLIDING, "wrong-r", "+20 %", deg(1.3)),
+    (SLIDING, "wrong-r", "-20 %", deg(-1.3)),
     // Rasmussen's observer on its reference motor.
     (FLUX, "load-0", "dip", Near(127.0 / 1500.0, 8.0 / 1500.0)),
     (FLUX, "rated-0", MEAN, Near(-36.34, 0.3)),

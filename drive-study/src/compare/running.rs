@@ -4,15 +4,10 @@ use super::Outcome;
 use super::candidate::{Candidate, Class};
 use super::measure::{Follow, Measure};
 use super::scenario::Effort;
-use crate::runner;
+use crate::runner::{self, line};
 use drive::estimator::tracker::TrackerKind;
 use fmu_core::Fault;
 use std::f64::consts::TAU;
-
-/// Linear ramp from `a` at time `from` to `b` at time `to`, constant outside.
-pub(super) fn line(t: f64, from: f64, a: f64, to: f64, b: f64) -> f64 {
-    a + (b - a) * ((t - from) / (to - from)).clamp(0.0, 1.0)
-}
 
 /// Starts from standstill to half the rated speed at angles over the full circle: the number of failures, and the worst
 /// successful start.

@@ -4,10 +4,9 @@
 //! the limits of each estimator.
 
 use super::Outcome;
-use super::candidate::{Candidate, Class};
+use super::candidate::Candidate;
 use super::measure::{Follow, Measure};
-use super::running::line;
-use crate::runner::{self, RATED_SPEED, Statistics};
+use crate::runner::{self, RATED_SPEED, Statistics, line};
 use drive::control::envelope::{Envelope, Warm};
 use drive::estimator::Kind;
 use fmu_core::Fault;
@@ -66,7 +65,7 @@ pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
         return Ok(Outcome::NotApplicable(why));
     }
     // The envelope of Rasmussen's machine ends at 1.62 times its base speed.
-    let times = if candidate.class == Class::FluxObserver { 1.5 } else { 2.5 };
+    let times = if candidate.entry.kind == Kind::Rasmussen { 1.5 } else { 2.5 };
     let base = Truth::new(candidate).base_speed();
     let (candidate, target) = (weakening(candidate).turning(FROM), times * base);
     let truth = Truth::new(&candidate);

@@ -11,6 +11,7 @@ use crate::control::state::{Gains, InUse, State, context};
 use crate::control::tables::{ADAPTATION_OUTPUTS, ControllerParameters, LATER_OUTPUTS, OUTPUTS, PARAMETERS};
 use crate::control::weakening::{self, WEAKENING, WeakeningGains};
 use crate::estimator::resistance::ADAPTATION;
+use crate::estimator::tables::LATER_ESTIMATOR_PARAMETERS;
 use crate::estimator::{Class, Estimator, Sample};
 use crate::motor::Motor;
 use fmu_core::log::Warnings;
@@ -152,7 +153,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 8;
+    const STATE_VERSION: u16 = 9;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
@@ -305,6 +306,7 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
                 &Part { table: ADAPTATION, lens: |m| &mut m.model.parameters.estimators.adaptation },
             ),
             V::part("", &Part { table: ADAPTATION_OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |m| &mut m.model.parameters.estimators }),
         ]
     },
 );

@@ -11,7 +11,7 @@ use crate::control::weakening::{WEAKENING, WeakeningParameters};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::Kind;
 use crate::estimator::resistance::ADAPTATION;
-use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
+use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters, LATER_ESTIMATOR_PARAMETERS};
 use crate::motor::{MOTOR, Motor};
 use crate::plant::saturation::A_PER_WB2;
 use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METER, OHM, ONE, RADIAN, SECOND, SPEED, VOLT};
@@ -209,6 +209,7 @@ pub const ALL_PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::part("", &Part { table: PARAMETERS, lens: |p| p }),
             P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
             P::part("adaptation.", &Part { table: ADAPTATION, lens: |p| &mut p.estimators.adaptation }),
+            P::part("", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
         ]
     },
 );

@@ -6,7 +6,8 @@
 //! Correction to the paper: (11) contains w_r, not the printed speed estimate.
 //!
 //! Limits: the calculated EMF includes L p i, and therefore the current loop's voltage noise and each load change. The
-//! method holds rated load from 0.1 of the rated speed. A reversal at light load is ambiguous by half a turn.
+//! method holds rated load from 0.1 of the rated speed. A reversal at light load is ambiguous by half a turn, unless
+//! `emf.hold_reversal` holds it.
 
 use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, Direction, pole};
@@ -45,8 +46,7 @@ impl Estimating for DirectEmf {
             x.v.q() - motor.R_s * x.i.q() - (w * motor.L_d + slip * motor.L_q) * x.i.d(),
         );
         self.e += (e - self.e) * (1.0 - pole(par.emf.bandwidth, T_s));
-        let s = self.direction.update(w, par.emf.w_sign);
-        self.tracker.follow(context, emf::angle_error(s, self.e.d(), self.e.q()), sample)
+        emf::follow(&mut self.tracker, &mut self.direction, context, self.e, sample)
     }
 
     fn validate(par: &ControllerParameters) -> Result<(), Fault> {

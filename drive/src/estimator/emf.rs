@@ -11,9 +11,25 @@
 //!
 //! The paper neglects (w_f - w) L i in (18). Without this term, motoring produces a right-half-plane zero at about E /
 //! (L_d i_q), and the drive cannot hold rated load below 0.21-0.25 of the rated speed: `frame_term` keeps the term.
+//!
+//! A reversal at light load is lost in the papers' form: the sign of E is taken from w^, and where w^ changes its sign too
+//! late or too early, the angle error is off by half a turn. With `hold_reversal`, [`follow`] takes the direction from the
+//! EMF itself near standstill. The rotor's angle cannot jump, so the frame that was right before the reversal is right
+//! after it: e_q = w psi_M cos theta~ then gives the speed with its sign, and -e_d / e_q the angle error without one. With
+//! the share g = w_h^2 psi_M^2 / (|e|^2 + w_h^2 psi_M^2) of standstill, w_h = `w_hold`,
+//!
+//! ```text
+//! theta~ = (1 - g) atan2(-s e_d, s e_q), s = sign e_q where g > 1/2        dw^/dt += g w_o / 3 (e_q / psi_M - w^)
+//! ```
+//!
+//! The angle's gain fades with the EMF, and the speed goes on through zero with e_q, so that theta^ is its integral: the
+//! error grows with the time spent there, by (R - R^) i / psi_M in rad/s. It is for passing zero, not for staying.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
+use crate::control::tables::{ALL_PARAMETERS, ControllerParameters, PARAMETERS};
 use crate::estimator::interval::Interval;
+use crate::estimator::tracker::Tracker;
+use crate::estimator::{Context, Estimate, Kind, Sample};
+use crate::frame::DqHat;
 use crate::math::{atan2, exp};
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Fault, Row, Table};
@@ -29,11 +45,15 @@ pub struct EmfParameters {
     pub w_sign: f64,
     /// Keeps the frame-speed term.
     pub frame_term: bool,
+    /// Holds the rotor in a reversal.
+    pub hold_reversal: bool,
+    /// Electrical speed w_h in rad/s, > 0, below which a reversal is held.
+    pub w_hold: f64,
 }
 
 impl Default for EmfParameters {
     fn default() -> Self {
-        Self { bandwidth: TAU * 150.0, w_sign: 5.0, frame_term: true }
+        Self { bandwidth: TAU * 150.0, w_sign: 5.0, frame_term: true, hold_reversal: false, w_hold: 30.0 }
     }
 }
 
@@ -77,6 +97,34 @@ pub fn angle_error(s: f64, e_d: f64, e_q: f64) -> f64 {
     atan2(-s * e_d, s * e_q)
 }
 
+/// The last step of the methods that observe the EMF `e` (V): the tracker follows its angle.
+#[inline]
+pub fn follow(
+    tracker: &mut Tracker,
+    direction: &mut Direction,
+    context: &Context,
+    e: DqHat,
+    sample: &Sample,
+) -> Estimate {
+    let s = direction.update(tracker.w, context.par.emf.w_sign);
+    if !context.par.emf.hold_reversal {
+        return tracker.follow(context, angle_error(s, e.d(), e.q()), sample);
+    }
+    let g = hold(tracker, context, e);
+    let s = if g > 0.5 { 1.0_f64.copysign(e.q()) } else { s };
+    tracker.follow(context, (1.0 - g) * angle_error(s, e.d(), e.q()), sample)
+}
+
+/// Leads the speed through zero with the EMF `e` (V); returns the share g of standstill.
+#[inline]
+pub fn hold(tracker: &mut Tracker, context: &Context, e: DqHat) -> f64 {
+    let Context { motor, par, T_s, .. } = *context;
+    let least = par.emf.w_hold * motor.psi_M;
+    let g = least * least / (e.dot(e) + least * least);
+    tracker.w += T_s * g * par.emf.bandwidth / 3.0 * (e.q() / motor.psi_M - tracker.w);
+    g
+}
+
 /// Observer for the current and EMF of one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AxisObserver {
@@ -116,6 +164,25 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
     Ok(())
 }
 
+/// Checks that the estimator can hold a reversal if it is asked to.
+///
+/// # Errors
+/// The estimator does not take the direction from the sign of an EMF.
+pub fn validate_reversal(kind: Kind, par: &ControllerParameters) -> Result<(), Fault> {
+    use Kind::{DirectEmf, EmfObserver, ExtendedEmf, SlidingMode, VoltageFeedback};
+    if !par.estimators.emf.hold_reversal
+        || matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | SlidingMode)
+    {
+        return Ok(());
+    }
+    let allowed = format!(
+        "false with {}: it does not take the direction of rotation from the sign of the EMF; set it to false, or take \
+         DirectEmf, EmfObserver, ExtendedEmf, VoltageFeedback or SlidingMode",
+        ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
+    );
+    Err(ALL_PARAMETERS.fault(par, |p| &mut p.estimators.emf.hold_reversal, allowed))
+}
+
 /// Pole of a sampled first-order system with the bandwidth `w` (rad/s).
 #[inline]
 pub fn pole(w: f64, T_s: f64) -> f64 {
@@ -143,6 +210,26 @@ pub const EMF: &Table<EmfParameters> = &Table::new(
                 "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18)",
                 |p| &mut p.frame_term,
             ),
+        ]
+    },
+);
+
+/// Those that joined later.
+pub const REVERSAL: &Table<EmfParameters> = &Table::new(
+    const {
+        &[
+            P::boolean_parameter(
+                "hold_reversal",
+                "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held",
+                |p| &mut p.hold_reversal,
+            ),
+            P::parameter(
+                "w_hold",
+                &RAD_PER_S,
+                "Electrical speed below which emf.hold_reversal takes the speed from the EMF",
+                |p| &mut p.w_hold,
+            )
+            .above(0.0),
         ]
     },
 );

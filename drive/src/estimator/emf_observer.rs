@@ -14,6 +14,7 @@ use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
@@ -50,8 +51,7 @@ impl Estimating for EmfObserver {
         let r_q = x.v.q() - motor.R_s * x.i.q() - (w * motor.L_d + slip * motor.L_q) * x.i.d();
         let e_d = self.d.update(z, motor.L_d, T_s, r_d, x.i_now.d());
         let e_q = self.q.update(z, motor.L_q, T_s, r_q, x.i_now.q());
-        let s = self.direction.update(w, par.emf.w_sign);
-        self.tracker.follow(context, emf::angle_error(s, e_d, e_q), sample)
+        emf::follow(&mut self.tracker, &mut self.direction, context, DqHat::new(e_d, e_q), sample)
     }
 
     fn validate(par: &ControllerParameters) -> Result<(), Fault> {

@@ -7,7 +7,7 @@
 //! Correction to the paper: (19) and (21) use the measured current in the innovation; (20) is missing.
 //!
 //! Limits: the angle requires an EMF. The method holds rated load from 0.03 of the rated speed with an ideal inverter,
-//! 0.05 with a compensated one; a reversal at light load is ambiguous by half a turn. L_q + 20 % at rated load shifts
+//! 0.05 with a compensated one; a reversal at light load is ambiguous by half a turn, unless `emf.hold_reversal` holds it. L_q + 20 % at rated load shifts
 //! the angle by 5.8 deg.
 
 use crate::control::tables::ControllerParameters;
@@ -15,6 +15,7 @@ use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
@@ -41,14 +42,21 @@ impl ExtendedEmfObserver {
     /// Angle error theta - theta^ in rad from one interval, at the speed estimate `w` (rad/s).
     #[inline]
     pub fn angle_error(&mut self, context: &Context, x: &Interval, w: f64) -> f64 {
+        let e = self.emf(context, x, w);
+        let s = self.direction.update(w, context.par.emf.w_sign);
+        emf::angle_error(s, e.d(), e.q())
+    }
+
+    /// Extended EMF in V.
+    #[inline]
+    fn emf(&mut self, context: &Context, x: &Interval, w: f64) -> DqHat {
         let Context { motor, par, T_s, .. } = *context;
         let z = pole(par.emf.bandwidth, T_s);
         let cross = w * motor.L_q + par.emf.slip(x, w) * motor.L_d;
         let r = x.v - x.i * motor.R_s - x.i.turned() * cross;
         let e_d = self.d.update(z, motor.L_d, T_s, r.d(), x.i_now.d());
         let e_q = self.q.update(z, motor.L_d, T_s, r.q(), x.i_now.q());
-        let s = self.direction.update(w, par.emf.w_sign);
-        emf::angle_error(s, e_d, e_q)
+        DqHat::new(e_d, e_q)
     }
 }
 
@@ -72,8 +80,8 @@ impl Estimating for ExtendedEmf {
         let Self { tracker, observer } = self;
         tracker.advance(context.T_s);
         let x = Interval::new(tracker.theta_last, tracker.theta, sample, context.T_s);
-        let e = observer.angle_error(context, &x, tracker.w);
-        tracker.follow(context, e, sample)
+        let e = observer.emf(context, &x, tracker.w);
+        emf::follow(tracker, &mut observer.direction, context, e, sample)
     }
 
     fn validate(par: &ControllerParameters) -> Result<(), Fault> {

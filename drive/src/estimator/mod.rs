@@ -16,7 +16,9 @@ pub mod direct_emf;
 pub mod emf;
 pub mod emf_observer;
 pub mod extended_emf;
+pub mod flux_observer;
 pub mod follower;
+pub mod gradient;
 pub mod hybrid;
 pub mod interval;
 pub mod kalman;
@@ -27,6 +29,7 @@ pub mod resistance;
 pub mod rotating;
 pub mod saliency;
 pub mod sensored;
+pub mod sliding_mode;
 pub mod square_wave;
 pub mod tables;
 #[cfg(test)]
@@ -232,6 +235,8 @@ macro_rules! estimators {
             pub fn validate(self, par: &ControllerParameters) -> Result<(), Fault> {
                 tracker::validate(par)?;
                 resistance::validate(self, par)?;
+                emf::validate_reversal(self, par)?;
+                flux_observer::validate_magnet(self, par)?;
                 match self {
                     $(Self::$name => <$state>::validate(par),)*
                 }
@@ -317,6 +322,12 @@ estimators! {
         "Angle and speed of a sensor, theta_meas and speed_meas, Kim & Sul 2011, Fig. 1a";
     14 KalmanFilter(kalman::Kalman): BackEmf, standstill false,
         "Extended Kalman filter on stator flux, speed and angle, Kim & Sul 2011, section II.A";
+    15 FluxObserver(flux_observer::FluxObserver): FluxObserver, standstill true,
+        "Flux observer in stator axes with adaptation of resistance and magnet flux, Hinkkanen et al. 2018";
+    16 GradientObserver(gradient::GradientObserver): BackEmf, standstill false,
+        "Gradient observer of the stator flux, Ortega et al. 2011, or its clamped form";
+    17 SlidingMode(sliding_mode::SlidingMode): BackEmf, standstill false,
+        "Sliding-mode observer of the back EMF in stator axes, of application notes";
 }
 
 impl Default for Estimator {

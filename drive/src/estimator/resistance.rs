@@ -135,12 +135,12 @@ pub fn validate(kind: Kind, par: &ControllerParameters) -> Result<(), Fault> {
     if !adaptation.resistance {
         return Ok(());
     }
-    if kind != Kind::Rasmussen {
+    if !matches!(kind, Kind::Rasmussen | Kind::FluxObserver) {
         return Err(ALL_PARAMETERS.fault(
             par,
             |p| &mut p.estimators.adaptation.resistance,
             format!(
-                "{} has no resistance adaptation; set estimator = Rasmussen, or adaptation.resistance = false",
+                "{} has no resistance adaptation; set estimator = Rasmussen or FluxObserver, or adaptation.resistance = false",
                 ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
             ),
         ));
@@ -174,7 +174,7 @@ pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
         &[
             P::boolean_parameter(
                 "resistance",
-                "Rasmussen adapts the stator resistance while standstill is asked for; false: motor.R_s",
+                "Rasmussen (while standstill is asked for) and FluxObserver adapt the resistance; false: motor.R_s",
                 |p| &mut p.resistance,
             ),
             P::parameter(

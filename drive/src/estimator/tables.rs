@@ -1,14 +1,17 @@
 //! The estimators' parameters: each part has its own prefix.
 
 use crate::estimator::carrier::{CARRIER, CarrierParameters};
-use crate::estimator::emf::{EMF, EmfParameters};
+use crate::estimator::emf::{EMF, EmfParameters, REVERSAL};
+use crate::estimator::flux_observer::{FLUX_OBSERVER, FluxObserverParameters};
 use crate::estimator::follower::{MATSUI, MatsuiParameters};
+use crate::estimator::gradient::{GRADIENT, GradientParameters};
 use crate::estimator::hybrid::{HYBRID, HybridParameters};
 use crate::estimator::kalman::{KALMAN, KalmanParameters};
 use crate::estimator::near_pwm::{NEAR_PWM, NearPwmParameters};
 use crate::estimator::pulsating::{PULSATING, PulsatingParameters};
 use crate::estimator::rasmussen::{RASMUSSEN, RasmussenParameters};
 use crate::estimator::resistance::ResistanceParameters;
+use crate::estimator::sliding_mode::{SLIDING_MODE, SlidingModeParameters};
 use crate::estimator::square_wave::{SQUARE_WAVE, SquareWaveParameters};
 use crate::estimator::tracker::{TRACKER, TrackerParameters};
 use fmu_core::{Part, Row, Table};
@@ -39,6 +42,12 @@ pub struct EstimatorParameters {
     pub hybrid: HybridParameters,
     /// Adaptation of the resistance.
     pub adaptation: ResistanceParameters,
+    /// The flux observer.
+    pub flux_observer: FluxObserverParameters,
+    /// The gradient observer.
+    pub gradient: GradientParameters,
+    /// The sliding-mode observer.
+    pub sliding_mode: SlidingModeParameters,
 }
 
 type P = Row<EstimatorParameters>;
@@ -57,6 +66,18 @@ pub const ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = &Table::new(
             P::part("near_pwm.", &Part { table: NEAR_PWM, lens: |p| &mut p.near_pwm }),
             P::part("kalman.", &Part { table: KALMAN, lens: |p| &mut p.kalman }),
             P::part("hybrid.", &Part { table: HYBRID, lens: |p| &mut p.hybrid }),
+        ]
+    },
+);
+
+/// Those that joined later; the models append them.
+pub const LATER_ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = &Table::new(
+    const {
+        &[
+            P::part("flux_observer.", &Part { table: FLUX_OBSERVER, lens: |p| &mut p.flux_observer }),
+            P::part("gradient.", &Part { table: GRADIENT, lens: |p| &mut p.gradient }),
+            P::part("sliding_mode.", &Part { table: SLIDING_MODE, lens: |p| &mut p.sliding_mode }),
+            P::part("emf.", &Part { table: REVERSAL, lens: |p| &mut p.emf }),
         ]
     },
 );

@@ -8,13 +8,15 @@
 //! The method needs a specific current loop: feed-forward from the references and no active resistance, preferably with
 //! `current.integral` = 0.2.
 //! Limits: L p i is neglected. The method holds rated load from 0.02 of the rated speed with the frame term; as
-//! printed, it fails at 0.1 with rho = 2 pi 15 rad/s. A reversal at light load is ambiguous by half a turn.
+//! printed, it fails at 0.1 with rho = 2 pi 15 rad/s. A reversal at light load is ambiguous by half a turn, unless `emf.hold_reversal`
+//! holds it.
 
 use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::emf::{self, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
@@ -46,8 +48,15 @@ impl Estimating for VoltageFeedback {
         let smoothing = 1.0 - pole(par.emf.bandwidth, T_s);
         self.frame += smoothing * (par.emf.slip(&x, w) * motor.L_d * x.i.q() - self.frame);
         let v_dfb = sample.u_pi.d() + self.frame;
-        let e = (-s * v_dfb / (motor.psi_M * w.abs().max(par.emf.w_sign))).clamp(-CLIP, CLIP);
-        self.tracker.follow(context, e, sample)
+        let (mut s, mut fade, mut least) = (s, 1.0, par.emf.w_sign);
+        if par.emf.hold_reversal {
+            // On the q-axis, the feed-forward supplies w^ psi_M of the EMF, the PI the rest.
+            let e_q = w * motor.psi_M + sample.u_pi.q();
+            let g = emf::hold(&mut self.tracker, context, DqHat::new(v_dfb, e_q));
+            (s, fade, least) = (if g > 0.5 { 1.0_f64.copysign(e_q) } else { s }, 1.0 - g, par.emf.w_hold);
+        }
+        let e = (-s * v_dfb / (motor.psi_M * w.abs().max(least))).clamp(-CLIP, CLIP);
+        self.tracker.follow(context, fade * e, sample)
     }
 
     fn validate(par: &ControllerParameters) -> Result<(), Fault> {
