@@ -56,7 +56,7 @@ impl Watch {
             self.call = (call, self.watched, used);
         }
         let over = self.watched > self.limit.saturating_mul(PATIENCE);
-        if self.watched - self.call.1 <= self.limit {
+        if self.watched.saturating_sub(self.call.1) <= self.limit {
             return if over { State::Slow } else { State::Runs };
         }
         let Some((used, rests)) = used.zip(rests) else { return State::Hangs };
