@@ -6,6 +6,7 @@
 // The papers' symbols keep their case: J, T_s.
 #![allow(non_snake_case)]
 
+pub mod atlas;
 pub mod compare;
 pub mod plane;
 pub mod plot;

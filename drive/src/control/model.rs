@@ -1,7 +1,7 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
 use crate::control::current::CurrentGains;
-use crate::control::lock::{LOST, Lock, LockGains};
+use crate::control::lock::{LOST, Lock, LockGains, Reach};
 use crate::control::polarity;
 use crate::control::reference::max_torque;
 use crate::control::signals::{ControllerInputs, ControllerOutputs};
@@ -146,7 +146,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 8;
+    const STATE_VERSION: u16 = 9;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
@@ -156,6 +156,8 @@ impl Model for SensorlessController {
         let tau = if observes_flux { limit.tau } else { max_torque(motor, limit, current.mtpa) };
         let weakening = WeakeningGains::new(&self.parameters, tau, current.mtpa && !observes_flux);
         let speed = SpeedGains::new(speed_loop, *J, k);
+        let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
+        let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p * k * i / J };
         if !self.tuned {
             self.last_gains.clone_from(&self.gains);
         }
@@ -165,7 +167,7 @@ impl Model for SensorlessController {
             speed,
             k,
             i_tau: tau / k,
-            lock: LockGains::new(lock, motor, *T_s),
+            lock: LockGains::new(lock, motor, *T_s, reach),
             weakening,
         };
     }
