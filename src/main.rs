@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 use clap::{Parser, Subcommand};
-use fmu::commands::{build, compare, merge, reproduce, simulate, ssp, sweep, tune};
+use fmu::commands::{atlas, build, compare, merge, reproduce, simulate, ssp, sweep, tune};
 use fmu_check::{command as check, probe};
 use fmu_import::printable_lines;
 use std::process::ExitCode;
@@ -27,6 +27,7 @@ enum Command {
     Check(check::Check),
     Reproduce(reproduce::Reproduce),
     Compare(compare::Compare),
+    Atlas(atlas::Atlas),
     Tune(tune::Tune),
     Ssp(ssp::Ssp),
     #[command(hide = true)]
@@ -56,6 +57,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
+        Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Ssp(args) => ssp::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Compare(args) => compare::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),

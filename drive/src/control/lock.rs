@@ -21,8 +21,8 @@
 //! ```
 //!
 //! n_p i_max / K_i is the error integral for which the speed loop goes from no torque to its limit. No load that the
-//! drive can carry needs more, so no load step reaches S = 1, however it arrives; an error that stays does. x is 0 while
-//! the EMF confirms the angle: psi_M |w^| > 2 lock.u and a quotient below 0.5. There is no x in torque mode.
+//! drive can carry needs more, so no load step reaches S = 1, however it arrives; an error that stays does. S is at most 2,
+//! and 0 while the EMF confirms the angle: psi_M |w^| > 2 lock.u and a quotient below 0.5. There is no x in torque mode.
 //!
 //! The greater of the quotient and S, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
 //! fits, 1 and above that it is lost; the maximum is 10. It does not depend on the estimator.
@@ -79,11 +79,7 @@ impl LockParameters {
     /// loses `u_dead` (V) per leg without compensation, and a speed loop of `bandwidth` (rad/s): a third of the greatest
     /// resistive voltage and 4/3 u_dead are tolerated; the time is 4/bandwidth, within 0.02..0.2 s.
     pub fn scaled(R_s: f64, i: f64, u_dead: f64, bandwidth: f64) -> Self {
-        Self {
-            u: R_s * i / 3.0 + 4.0 / 3.0 * u_dead,
-            time: (4.0 / bandwidth).clamp(0.02, 0.2),
-            ..Self::default()
-        }
+        Self { u: R_s * i / 3.0 + 4.0 / 3.0 * u_dead, time: (4.0 / bandwidth).clamp(0.02, 0.2), ..Self::default() }
     }
 }
 
@@ -161,8 +157,8 @@ struct Following {
 }
 
 impl Following {
-    /// S after a sample with the d axis at `d` and the reference `w_ref` (rad/s); none in torque mode. Nothing counts
-    /// while the angle is `confirmed`.
+    /// S after a sample with the d axis at `d` and the reference `w_ref` (rad/s), none in torque mode; 0 if the EMF has
+    /// `confirmed` the angle.
     #[inline]
     fn update(&mut self, gains: &LockGains, d: AlphaBeta, w_ref: Option<f64>, confirmed: bool) -> f64 {
         let turned = self.d.alpha() * d.beta() - self.d.beta() * d.alpha();
@@ -171,8 +167,10 @@ impl Following {
         let w_ref = w_ref.unwrap_or(self.w);
         self.w_m += (w_ref - self.w_m).min(gains.follows).max(-gains.follows);
         let x = (w_ref.min(self.w_m) - self.w).max(self.w - w_ref.max(self.w_m));
-        if !confirmed && x > gains.w_0 + SPEED * w_ref.abs() {
-            self.S = (self.S + gains.integrates * x).min(LOST);
+        if confirmed {
+            self.S = 0.0;
+        } else if x > gains.w_0 + SPEED * w_ref.abs() {
+            self.S = (self.S + gains.integrates * x).min(2.0);
         } else {
             self.S -= self.S * gains.decays;
         }
