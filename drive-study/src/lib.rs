@@ -1,5 +1,5 @@
 //! Studies of the drive: [`reproduce`], the paper's experiments with packed FMUs; [`compare`], the estimators side by
-//! side; [`tune`], parameter values for a machine; [`runner`], the closed loop that they share; [`plot`], curves as
+//! side; [`atlas`], what wrong estimates lose at low speed; [`tune`], parameter values for a machine; [`runner`], the closed loop that they share; [`plot`], curves as
 //! SVG; [`plane`], torque over speed.
 
 #![forbid(unsafe_code)]

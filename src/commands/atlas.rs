@@ -39,10 +39,10 @@ pub struct Atlas {
     #[arg(long, value_name = "SCENARIO,...", value_delimiter = ',')]
     pub scenario: Option<Vec<String>>,
     /// Resistance estimate as a share of the resistance [default: 11 values, 0.5..1.5]
-    #[arg(long, value_name = "SHARE,...")]
+    #[arg(long, value_name = "SHARE,...", allow_hyphen_values = true)]
     pub resistance: Option<String>,
     /// Magnet flux estimate as a share of the magnet flux [default: 5 values, 0.8..1.2]
-    #[arg(long, value_name = "SHARE,...")]
+    #[arg(long, value_name = "SHARE,...", allow_hyphen_values = true)]
     pub flux: Option<String>,
     /// Load as a share of the rated torque [default: 0,0.5,-0.5,1,-1]
     #[arg(long, value_name = "SHARE,...", allow_hyphen_values = true)]

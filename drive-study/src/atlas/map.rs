@@ -14,10 +14,10 @@ const BELOW: f64 = 22.0;
 /// Height of a heading.
 const HEADING: f64 = 34.0;
 
-const STYLE: &str = ".atlas{--ink:#1d2429;--paper:#fff;--held:#cfe3d6;--lost:#d03030;--dot:#fff}\
-    @media (prefers-color-scheme:dark){.atlas{--ink:#e3e7ea;--paper:#15191c;--held:#2c4a3a;--lost:#e05050;--dot:#000}}\
-    .atlas text{fill:var(--ink);font:11px system-ui,sans-serif}.atlas .head{font-weight:600;font-size:13px}\
-    .atlas .paper{fill:var(--paper)}.atlas .h{fill:var(--held)}.atlas .l{fill:var(--lost)}.atlas .d{fill:var(--dot)}";
+const STYLE: &str = ".atlas text{fill:#1d2429;font:11px system-ui,sans-serif}.atlas .head{font-weight:600;font-size:13px}\
+    .atlas .paper{fill:#fff}.atlas .h{fill:#cfe3d6}.atlas .l{fill:#d03030}.atlas .d{fill:#fff}.atlas .h+.d{fill:#d03030}\
+    @media (prefers-color-scheme:dark){.atlas text{fill:#e3e7ea}.atlas .paper{fill:#15191c}.atlas .h{fill:#2c4a3a}\
+    .atlas .l{fill:#e05050}.atlas .d{fill:#000}.atlas .h+.d{fill:#e05050}}";
 
 /// Different values in the order of their size.
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {

@@ -177,8 +177,8 @@ fn definitions(atlases: &[Atlas]) -> Vec<&'static str> {
         );
     }
     all.push(
-        "Scenario heating lasts 14 s: R rises between 2 and 12 s. A run of lock_lost is true if it is 1 or more within 1 s of \
-         the loss, and never in a held cell.",
+        "Scenario heating lasts 14 s: R rises between 2 and 12 s. lock_lost is true if it is 1 or more within 1 s of the \
+         loss, and never 1 or more in a held cell.",
     );
     all
 }

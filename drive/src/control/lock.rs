@@ -277,4 +277,66 @@ mod tests {
         let level = beside(0.0, 300.0, 1.0);
         assert!(level > 5.0, "a rotor that runs, the estimate at rest: {level}");
     }
+
+    /// A machine at rest with the current (3, 4) A in the estimated frame and the resistance `R` (Ohm).
+    fn at_rest(R: f64, gains: &LockGains) -> f64 {
+        let (motor, i) = (Motor::default(), AlphaBeta::new(3.0, 4.0));
+        let sample = Sample { i, i_last: i, u: i * R, ..Sample::default() };
+        let mut lock = Lock::default();
+        let mut update = || lock.update(gains, &motor, motor.R_s, &sample, Axis::at(0.0), (0.0, None));
+        (0..10_000).map(|_| update()).last().unwrap()
+    }
+
+    /// 30 % of R^ explain themselves; of 60 %, the other 30 % remain: 0.3 * 2 Ohm * 5 A = 3 V.
+    #[test]
+    fn a_wrong_resistance_explains_its_voltage() {
+        let gains = LockGains::new(&LockParameters::default(), &Motor::default(), T_S, REACH);
+        assert!(at_rest(2.6, &gains) < 1e-9 && at_rest(1.4, &gains) < 1e-9);
+        assert!((at_rest(3.2, &gains) - 0.6).abs() < 1e-3 && (at_rest(0.8, &gains) - 0.6).abs() < 1e-3);
+    }
+
+    /// S after `seconds` with the frame turning at `w` and the reference `w_ref` (rad/s).
+    fn followed(watch: &mut Following, w: f64, w_ref: f64, seconds: f64, confirmed: bool) -> f64 {
+        let gains = LockGains::new(&LockParameters::default(), &Motor::default(), T_S, REACH);
+        let (start, mut t) = (watch.d.beta().atan2(watch.d.alpha()), 0.0);
+        while t < seconds {
+            t += T_S;
+            let d = Axis::<Estimated>::at(start + w * t).to_stator(DqHat::new(1.0, 0.0));
+            watch.update(&gains, d, Some(w_ref), confirmed);
+        }
+        watch.S
+    }
+
+    /// An error of 10 rad/s takes S_0 / 10 = 0.8 s; a reference that moves is given the time that half of the torque needs;
+    /// the EMF clears it.
+    #[test]
+    fn a_speed_that_is_not_reached_is_seen() {
+        let S = followed(&mut Following::default(), 10.0, 0.0, 0.4, false);
+        assert!((S - 0.5).abs() < 0.02, "{S}");
+        // w_0 = 5 / 3 rad/s.
+        assert!(followed(&mut Following::default(), 1.6, 0.0, 20.0, false) < 1e-9);
+        assert!(followed(&mut Following::default(), 2.0, 0.0, 20.0, false) > 1.9);
+        // 400 rad/s take 0.1 s with half of the torque.
+        assert!(followed(&mut Following::default(), 0.0, 400.0, 0.09, false) < 0.5 * 0.1 * 400.0 / 8.0 * 0.1);
+        let mut watch = Following::default();
+        assert!(followed(&mut watch, 0.0, 400.0, 0.3, false) > 1.0);
+        assert!(followed(&mut watch, 0.0, 400.0, T_S, true) == 0.0);
+    }
+
+    /// The rule gives the start values on the reference motor, and sees half a turn on a 22 V machine at a tenth of its
+    /// speed, where the start values are blind.
+    #[test]
+    fn scaled_to_the_machine() {
+        let par = LockParameters::scaled(2.0, 7.5, 0.0, 80.0);
+        assert!((par.u - 5.0).abs() < 1e-12 && (par.time - 0.05).abs() < 1e-12, "{par:?}");
+        assert_eq!(LockParameters::scaled(1.0, 3.0, 1.5, 1.0), LockParameters { u: 3.0, time: 0.2, ..par });
+        // 7 pole pairs, 50 mOhm, 20 A, 9000 rpm at 22 V.
+        let (motor, w) = (Motor { n_p: 7, R_s: 0.05, L_d: 20e-6, L_q: 20e-6, psi_M: 1.5e-3 }, 660.0);
+        let half_a_turn = |par: &LockParameters| {
+            let gains = LockGains::new(par, &motor, T_S, REACH);
+            2.0 * motor.psi_M * w / (gains.u + gains.psi * w)
+        };
+        assert!(half_a_turn(&LockParameters::scaled(0.05, 20.0, 0.0, 80.0)) > 2.0);
+        assert!(half_a_turn(&LockParameters::default()) < 0.5);
+    }
 }

@@ -256,8 +256,9 @@ impl Warns for SensorlessController {
         let Motor { R_s, L_d, L_q, psi_M, .. } = self.parameters.motor;
         log.warn("lock_lost", || {
             format!(
-                "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage; the rotor is not where \
-                 theta_est = {} rad and speed_est = {} rad/s say, or the controller's R_s = {R_s} Ohm, L_d = {L_d} H, \
+                "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage, or the speed is not reached; \
+                 the rotor is not where theta_est = {} rad and speed_est = {} rad/s say, the load exceeds the torque, or the \
+                 controller's R_s = {R_s} Ohm, L_d = {L_d} H, \
                  L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine",
                 out.lock_lost, out.theta_est, out.speed_est
             )
