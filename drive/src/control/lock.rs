@@ -316,8 +316,11 @@ mod tests {
         // w_0 = 5 / 3 rad/s.
         assert!(followed(&mut Following::default(), 1.6, 0.0, 20.0, false) < 1e-9);
         assert!(followed(&mut Following::default(), 2.0, 0.0, 20.0, false) > 1.9);
-        // 400 rad/s take 0.1 s with half of the torque.
-        assert!(followed(&mut Following::default(), 0.0, 400.0, 0.09, false) < 0.5 * 0.1 * 400.0 / 8.0 * 0.1);
+        // The model moves with 4000 rad/s2: 4000 (0.04 s)^2 / 2 = 3.2 rad to a frame that stays, 0 to one as fast.
+        let S = followed(&mut Following::default(), 0.0, 400.0, 0.04, false);
+        assert!((S - 3.2 / 8.0).abs() < 0.02, "{S}");
+        let mut watch = Following::default();
+        (0..100).for_each(|k| assert!(followed(&mut watch, 4.0 * f64::from(k), 400.0, 1e-3, false) < 0.02));
         let mut watch = Following::default();
         assert!(followed(&mut watch, 0.0, 400.0, 0.3, false) > 1.0);
         assert!(followed(&mut watch, 0.0, 400.0, T_S, true) == 0.0);
