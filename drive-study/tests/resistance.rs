@@ -118,7 +118,7 @@ fn the_atlas() {
     for (k_a, most, most_near) in [(None, 457, 44), (Some(0.0), 66, 0), (Some(0.02), 0, 0)] {
         let atlas = run(&cells, k_a);
         let lost: Vec<_> = atlas.that_are(true).collect();
-        let near = lost.iter().filter(|(c, _)| c.psi == 1.0 && (0.8..=1.2).contains(&c.R)).count();
+        let near = lost.iter().filter(|(c, _)| (c.psi - 1.0).abs() < 1e-9 && (0.8..=1.2).contains(&c.R)).count();
         let seen = lost.iter().filter(|(_, verdict)| verdict.told()).count();
         let alarms = atlas.that_are(false).filter(|(_, verdict)| !verdict.told()).count();
         println!(

@@ -28,7 +28,7 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
 }
 
 fn index(values: &[f64], x: f64) -> f64 {
-    let at = values.iter().position(|v| *v == x).unwrap_or_default();
+    let at = values.iter().position(|v| v.to_bits() == x.to_bits()).unwrap_or_default();
     u32::try_from(at).map_or(0.0, f64::from)
 }
 
@@ -40,6 +40,27 @@ fn count(values: &[f64]) -> f64 {
 pub(super) fn percent(share: f64) -> String {
     let text = format!("{:.1}", 100.0 * share);
     format!("{} %", text.strip_suffix(".0").unwrap_or(&text))
+}
+
+/// Title and axes of the panel with its upper left corner at `(x, y)`.
+fn labels((x, y): (f64, f64), title: &str, R: &[f64], psi: &[f64]) -> String {
+    let ends = |values: &[f64]| (values[0], values[values.len() - 1]);
+    let ((low, high), (least, most)) = (ends(R), ends(psi));
+    let (right, bottom) = (x + SIDE * count(R), y + SIDE * count(psi));
+    let text = |x: f64, y: f64, anchor: &str, text: &str| {
+        format!("<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>")
+    };
+    [
+        text(x, y - 5.0, "start", title),
+        text(x, bottom + 12.0, "start", &low.to_string()),
+        text(0.5 * (x + right), bottom + 12.0, "middle", "R̂/R"),
+        text(right, bottom + 12.0, "end", &high.to_string()),
+        text(x - 4.0, y + 10.0, "end", &most.to_string()),
+        text(x - 4.0, 0.5 * (y + bottom) + 4.0, "end", "ψ̂/ψ"),
+        text(x - 4.0, bottom - 2.0, "end", &least.to_string()),
+    ]
+    .concat()
+        + "\n"
 }
 
 /// Draws an SVG.
@@ -69,35 +90,10 @@ pub fn svg(atlas: &Atlas) -> String {
         for &theta in &angles {
             for &speed in &speeds {
                 for &load in &loads {
-                    let (x, y) = corner(&Cell { scenario, R: 1.0, psi: 1.0, load, speed, theta });
-                    let bottom = y + SIDE * count(&psi) + 12.0;
-                    let at = if angles.len() > 1 { format!(", {theta}°") } else { String::new() };
-                    let _ = writeln!(
-                        body,
-                        "<text x=\"{x}\" y=\"{}\">n {}, load {}{at}</text>",
-                        y - 5.0,
-                        percent(speed),
-                        percent(load)
-                    );
-                    let ends = |values: &[f64]| (values[0], values[values.len() - 1]);
-                    let ((low, high), (least, most)) = (ends(&R), ends(&psi));
-                    let _ = writeln!(
-                        body,
-                        "<text x=\"{x}\" y=\"{bottom}\">{low}</text>\
-                         <text x=\"{}\" y=\"{bottom}\" text-anchor=\"middle\">R̂/R</text>\
-                         <text x=\"{}\" y=\"{bottom}\" text-anchor=\"end\">{high}</text>\
-                         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">{most}</text>\
-                         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">ψ̂/ψ</text>\
-                         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">{least}</text>",
-                        x + 0.5 * SIDE * count(&R),
-                        x + SIDE * count(&R),
-                        x - 4.0,
-                        y + 10.0,
-                        x - 4.0,
-                        y + 0.5 * SIDE * count(&psi) + 4.0,
-                        x - 4.0,
-                        y + SIDE * count(&psi) - 2.0,
-                    );
+                    let at = corner(&Cell { scenario, R: 1.0, psi: 1.0, load, speed, theta });
+                    let angle = if angles.len() > 1 { format!(", {theta}°") } else { String::new() };
+                    let title = format!("n {}, load {}{angle}", percent(speed), percent(load));
+                    body.push_str(&labels(at, &title, &R, &psi));
                 }
             }
         }

@@ -101,10 +101,12 @@ fn by_scenario(atlases: &[Atlas]) -> Table {
     table
 }
 
+/// Name and value of an axis.
+type Axis = (&'static str, fn(&Cell) -> f64);
+
 /// Lost cells by the value on an axis.
 fn by_axis(atlases: &[Atlas]) -> Table {
     let mut table = Table::new(["Estimator", "Axis", "Lost at each value"]);
-    type Axis = (&'static str, fn(&Cell) -> f64);
     let axes: [Axis; 5] = [
         ("R^/R", |c| c.R),
         ("psi^/psi", |c| c.psi),
@@ -121,7 +123,7 @@ fn by_axis(atlases: &[Atlas]) -> Table {
                 continue;
             }
             let share = |x: &f64| {
-                let here = || runs.iter().filter(|(cell, _)| of(cell) == *x);
+                let here = || runs.iter().filter(|(cell, _)| of(cell).to_bits() == x.to_bits());
                 let count = |n: usize| u32::try_from(n).map_or(0.0, f64::from);
                 let lost = here().filter(|(_, verdict)| verdict.lost.is_some()).count();
                 format!("{x}: {}", percent(count(lost) / count(here().count())))
