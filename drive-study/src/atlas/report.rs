@@ -155,7 +155,9 @@ fn by_class(atlases: &[Atlas]) -> Table {
         }
         row("all lost", &of(None), seen(&of(None)));
         let held: Vec<&Verdict> = atlas.that_are(false).map(|(_, verdict)| verdict).collect();
-        row("held (a false alarm at any time)", &held, seen(&held));
+        row("held (1 or more at any time)", &held, seen(&held));
+        let alarms = held.iter().filter(|v| !v.told()).count();
+        row("held (1 or more while it has held for 1 s: a false alarm)", &held, alarms);
     }
     table
 }
@@ -180,7 +182,7 @@ fn definitions(atlases: &[Atlas]) -> Vec<&'static str> {
     }
     all.push(
         "Scenario heating lasts 14 s: R rises between 2 and 12 s. lock_lost is true if it is 1 or more within 1 s of the \
-         loss, and never 1 or more in a held cell.",
+         loss, and below 1 in a held cell wherever the drive has been within its tolerance for 1 s.",
     );
     all
 }

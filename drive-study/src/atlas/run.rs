@@ -90,6 +90,8 @@ pub struct Verdict {
     pub lost: Option<(Class, f64)>,
     /// Greatest `lock_lost` from the loss to 1 s later, or of the whole run if the cell is held.
     pub lock_lost: f64,
+    /// Greatest `lock_lost` of a held cell while the drive has been within its tolerance for 1 s.
+    pub while_held: f64,
     /// Greatest speed error while judged, as a share of the rated speed.
     pub speed_error: f64,
     /// Greatest angle error while judged, in deg.
@@ -97,9 +99,10 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Whether `lock_lost` told the truth: 1 or more within 1 s of the loss, never in a held cell.
+    /// Whether `lock_lost` told the truth: 1 or more within 1 s of a loss, below 1 while the drive holds. A cell that is
+    /// held in the end may have been lost before: `heating` brings R to R^ > R.
     pub fn told(&self) -> bool {
-        (self.lock_lost >= 1.0) == self.lost.is_some()
+        if self.lost.is_some() { self.lock_lost >= 1.0 } else { self.while_held < 1.0 }
     }
 }
 
@@ -157,6 +160,7 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
         Approach::Turning => (0.02, 30.0),
     };
     let (mut lost_at, mut before, mut after, mut last) = (None, 0.0_f64, 0.0_f64, 0.0);
+    let (mut while_held, mut last_off) = (0.0_f64, 0.0);
     let (mut speed_error, mut angle_error, mut slip, mut theta_tilde) = (0.0_f64, 0.0_f64, 0.0, 0.0);
     let (mut mean, mut judged) = (0.0, 0.0);
     let mut hot = 0_u32;
@@ -174,14 +178,20 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
         }
         let out = &p.controller.out;
         let error = wrap(p.plant.out.theta_e - out.theta_est);
+        let off = p.plant.out.speed / drive.speed - speed;
+        let is_off = off.abs() > tolerance || error.abs().to_degrees() > angle;
+        if is_off {
+            last_off = t;
+        } else if t > last_off + 1.0 {
+            while_held = while_held.max(out.lock_lost);
+        }
         if t > end - 2.0 - 1e-9 {
-            let off = p.plant.out.speed / drive.speed - cell.speed;
             speed_error = speed_error.max(off.abs());
             angle_error = angle_error.max(error.abs().to_degrees());
             slip += wrap(error - theta_tilde);
             (mean, judged) = (mean + off, judged + 1.0);
-            if lost_at.is_none() && (off.abs() > tolerance || error.abs().to_degrees() > angle) {
-                lost_at = Some(t);
+            if is_off {
+                lost_at = lost_at.or(Some(t));
             }
         }
         theta_tilde = error;
@@ -208,6 +218,7 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
     Ok(Verdict {
         lost: lost_at.map(|at| (class, at)),
         lock_lost: if lost_at.is_some() { after } else { before },
+        while_held: if lost_at.is_some() { 0.0 } else { while_held },
         speed_error,
         angle_error,
     })
