@@ -52,7 +52,8 @@ impl Table {
 
     fn html(&self) -> String {
         let line = |tag: &str, cells: &[String]| {
-            let cells: String = cells.iter().map(|c| format!("<{tag}>{}</{tag}>", escape(c))).collect();
+            let cells: String =
+                cells.iter().map(|c| format!("<{tag}>{}</{tag}>", escape(c))).collect::<Vec<_>>().concat();
             format!("<tr>{cells}</tr>\n")
         };
         let rows: String = self.rows.iter().map(|row| line("td", row)).collect();
@@ -189,7 +190,7 @@ fn definitions(atlases: &[Atlas]) -> Vec<&'static str> {
 
 /// The tables.
 pub fn markdown(atlases: &[Atlas]) -> String {
-    let notes: String = definitions(atlases).iter().map(|note| format!("{note}\n\n")).collect();
+    let notes: String = definitions(atlases).join("\n\n") + "\n\n";
     format!(
         "{notes}{}\n{}\n{}",
         by_scenario(atlases).markdown(),
