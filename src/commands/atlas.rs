@@ -127,12 +127,11 @@ fn grid(args: &Atlas) -> Result<Grid> {
 fn drives(args: &Atlas) -> Result<Vec<Drive>> {
     let mut drives: Vec<Drive> = Vec::new();
     for name in args.estimator.iter().filter(|name| !name.is_empty()) {
-        let mut drive = match &args.motor {
-            Some(path) => tuned(path, name)?,
-            None => {
-                let found = Entry::all().into_iter().find(|e| e.name.eq_ignore_ascii_case(name));
-                Drive::compared(found.ok_or_else(|| unknown(name, Entry::all().iter().map(|e| e.name)))?)
-            }
+        let mut drive = if let Some(path) = &args.motor {
+            tuned(path, name)?
+        } else {
+            let found = Entry::all().into_iter().find(|e| e.name.eq_ignore_ascii_case(name));
+            Drive::compared(found.ok_or_else(|| unknown(name, Entry::all().iter().map(|e| e.name)))?)
         };
         args.set.iter().try_for_each(|text| drive.set(text))?;
         drives.push(drive);
