@@ -297,7 +297,7 @@ fn an_atlas_is_written_or_refused() {
         (&["--set", "R=1"], &["--set R: is not a parameter of SensorlessController"]),
         (
             &["--estimator", "ExtendedEmf", "--set", "adaptation.resistance=true"],
-            &["ExtendedEmf has no resistance adaptation"],
+            &["(ExtendedEmf) has no resistance adaptation"],
         ),
         (&["none.toml"], &["reading none.toml"]),
     ] {
