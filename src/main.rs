@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 use clap::{CommandFactory, Parser, Subcommand};
-use fmu::commands::{build, compare, info, merge, reproduce, simulate, ssp, sweep, tune};
+use fmu::commands::{atlas, build, compare, info, merge, reproduce, simulate, ssp, sweep, tune};
 use fmu_check::{command as check, probe};
 use fmu_import::printable_lines;
 use std::process::ExitCode;
@@ -28,6 +28,7 @@ enum Command {
     Check(check::Check),
     Reproduce(reproduce::Reproduce),
     Compare(compare::Compare),
+    Atlas(atlas::Atlas),
     Tune(tune::Tune),
     Ssp(ssp::Ssp),
     /// Writes what a shell needs to complete this command
@@ -72,6 +73,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
+        Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Tune(args) => tune::run(&args).map(|good| ExitCode::from(u8::from(!good))),
         Command::Ssp(args) => ssp::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Compare(args) => compare::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),

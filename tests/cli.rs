@@ -364,3 +364,50 @@ fn help_has_an_example_for_the_pair() {
     assert!(help.contains("PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect"), "{help}");
     assert!(text(&fmu(&["build", "--help"]).stdout).contains("fmu build --package own-fmu"));
 }
+
+/// An atlas writes its files with the same bytes for any number of jobs, and refuses what cannot be run.
+#[test]
+fn an_atlas_is_written_or_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |jobs: &str, out: &str| {
+        let out = dir.path().join(out);
+        let cells = [
+            "atlas",
+            "--resistance",
+            "0.9",
+            "--flux",
+            "1",
+            "--load",
+            "0,-1",
+            "--speed",
+            "0.01",
+            "--jobs",
+            jobs,
+            "--out",
+        ];
+        let output = fmu(&[&cells[..], &[out.to_str().unwrap()]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        assert!(text(&output.stdout).contains("| 1 of 2 (50 %) |"), "{}", text(&output.stdout));
+        ["atlas.csv", "atlas.md", "atlas.html", "atlas-Rasmussen.svg"]
+            .map(|name| std::fs::read(out.join(name)).unwrap())
+    };
+    assert!(run("1", "a") == run("2", "b"));
+    for (arguments, parts) in [
+        (&["--load="][..], &["--load has no value", "at least one", "leave the option out"][..]),
+        (&["--scenario="], &["--scenario has no value"]),
+        (&["--estimator="], &["--estimator has no value"]),
+        (&["--flux", "-1"], &["--flux -1: must be within 0.1..10; correct the value"]),
+        (&["--speed", "fast"], &["--speed fast: is not a number; write for example --speed 0.9,1"]),
+        (&["--every", "0"], &["--every 0: must be 1 or more"]),
+        (&["--scenario", "storm"], &["--scenario storm: is not a scenario; there are load, speed, heating"]),
+        (&["--estimator", "Luenberger"], &["--estimator Luenberger: is not an estimator; there are Rasmussen"]),
+        (&["--set", "R=1"], &["--set R: is not a parameter of SensorlessController"]),
+        (
+            &["--estimator", "ExtendedEmf", "--set", "adaptation.resistance=true"],
+            &["(ExtendedEmf) has no resistance adaptation"],
+        ),
+        (&["none.toml"], &["reading none.toml"]),
+    ] {
+        fails(&[&["atlas"][..], arguments].concat(), 2, parts);
+    }
+}

@@ -1,5 +1,6 @@
 //! The commands of the command line.
 
+pub mod atlas;
 pub mod build;
 pub mod compare;
 pub mod info;

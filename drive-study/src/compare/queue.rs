@@ -6,6 +6,11 @@ use std::thread;
 
 /// Runs `work` on every job, on all cores.
 pub fn map<J: Sync, R: Send>(jobs: &[J], work: impl Fn(&J) -> R + Sync) -> Vec<R> {
+    map_on(thread::available_parallelism().map_or(1, NonZero::get), jobs, work)
+}
+
+/// Runs `work` on every job, on this many threads.
+pub fn map_on<J: Sync, R: Send>(threads: usize, jobs: &[J], work: impl Fn(&J) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let worker = || {
         let mut mine = Vec::new();
@@ -15,9 +20,8 @@ pub fn map<J: Sync, R: Send>(jobs: &[J], work: impl Fn(&J) -> R + Sync) -> Vec<R
             mine.push((index, work(job)));
         }
     };
-    let cores = thread::available_parallelism().map_or(1, NonZero::get).min(jobs.len());
     let mut all: Vec<(usize, R)> = thread::scope(|scope| {
-        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(worker)).collect();
+        let workers: Vec<_> = (0..threads.max(1).min(jobs.len())).map(|_| scope.spawn(worker)).collect();
         let join = |w: thread::ScopedJoinHandle<'_, _>| w.join().unwrap_or_else(|p| std::panic::resume_unwind(p));
         workers.into_iter().flat_map(join).collect()
     });

@@ -37,7 +37,8 @@ impl SensorlessController {
         let References { i: i_ref, limited: current_limited, tau: (low, high), weakens } =
             self.reference(mode, speed, frame.injection, tuned);
         let (u, voltage_limited, u_share) = self.modulate(mode, &frame, i_ref, tuned);
-        let lock_lost = self.lock(mode, &frame, &sample);
+        let R_s_est = self.state.estimator.resistance(&self.in_use.estimators, &self.parameters.motor);
+        let lock_lost = self.lock(mode, &frame, &sample, R_s_est);
         self.keep(&sample, i_ref, frame.i);
 
         ControllerOutputs {
@@ -54,7 +55,7 @@ impl SensorlessController {
             tau_min: -low,
             u_share,
             weakens,
-            R_s_est: self.state.estimator.resistance(&self.in_use.estimators, &self.parameters.motor),
+            R_s_est,
         }
     }
 
@@ -158,7 +159,7 @@ impl SensorlessController {
 
     /// The output `lock_lost`; 0 during a start sequence, because its angle is not an estimate.
     #[inline]
-    fn lock(&mut self, mode: Mode, frame: &Frame, sample: &Sample) -> f64 {
+    fn lock(&mut self, mode: Mode, frame: &Frame, sample: &Sample, R_s: f64) -> f64 {
         let Self { parameters: par, gains, state, .. } = self;
         match mode {
             Mode::Current(_) | Mode::Voltage(_) | Mode::AfterSearch => {
@@ -166,7 +167,9 @@ impl SensorlessController {
                 0.0
             }
             Mode::AfterStart | Mode::ClosedLoop => {
-                state.lock.update(&gains.lock, &par.motor, sample, frame.axis, frame.w)
+                let n_p = f64::from(par.motor.n_p);
+                let w_ref = (!par.speed_loop.torque_mode).then_some(n_p * state.w_ref);
+                state.lock.update(&gains.lock, &par.motor, R_s, sample, frame.axis, (frame.w, w_ref))
             }
         }
     }

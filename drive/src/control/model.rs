@@ -1,7 +1,7 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
 use crate::control::current::CurrentGains;
-use crate::control::lock::{LOST, Lock, LockGains};
+use crate::control::lock::{LOST, Lock, LockGains, Reach};
 use crate::control::polarity;
 use crate::control::reference::max_torque;
 use crate::control::signals::{ControllerInputs, ControllerOutputs};
@@ -163,6 +163,8 @@ impl Model for SensorlessController {
         let tau = if observes_flux { limit.tau } else { max_torque(motor, limit, current.mtpa) };
         let weakening = WeakeningGains::new(&self.parameters, tau, current.mtpa && !observes_flux);
         let speed = SpeedGains::new(speed_loop, *J, k);
+        let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
+        let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p * k * i / J };
         if !self.tuned {
             self.last_gains.clone_from(&self.gains);
         }
@@ -172,7 +174,7 @@ impl Model for SensorlessController {
             speed,
             k,
             i_tau: tau / k,
-            lock: LockGains::new(lock, motor, *T_s),
+            lock: LockGains::new(lock, motor, *T_s, reach),
             weakening,
         };
     }
@@ -261,8 +263,9 @@ impl Warns for SensorlessController {
         let Motor { R_s, L_d, L_q, psi_M, .. } = self.parameters.motor;
         log.warn("lock_lost", || {
             format!(
-                "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage; the rotor is not where \
-                 theta_est = {} rad and speed_est = {} rad/s say, or the controller's R_s = {R_s} Ohm, L_d = {L_d} H, \
+                "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage, or the speed is not reached; \
+                 the rotor is not where theta_est = {} rad and speed_est = {} rad/s say, the load exceeds the torque, or the \
+                 controller's R_s = {R_s} Ohm, L_d = {L_d} H, \
                  L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine",
                 out.lock_lost, out.theta_est, out.speed_est
             )

@@ -63,6 +63,11 @@ impl SpeedGains {
         let k_p = J * par.bandwidth / k;
         Self { k_p, k_i: k_p * par.bandwidth / par.t_is, b: par.b }
     }
+
+    /// Integral of the speed error in rad, mechanical, for which the integral part goes from 0 to `i` (A).
+    pub fn error_integral(&self, i: f64) -> f64 {
+        i / self.k_i
+    }
 }
 
 /// State: the integral part in A.

@@ -218,7 +218,7 @@ type O = Row<ControllerOutputs>;
 
 /// Description of the output `lock_lost`, on the controller and on `PmsmDrive`.
 pub const LOCK_LOST: &str =
-    "Mismatch between the estimate and the applied voltage: 0 locked, 1 or more lost, 10 at most";
+    "Mismatch of the estimate with the applied voltage or the speed reference: 0 locked, 1 or more lost, 10 at most";
 
 /// Description of the output `enabled`, on the controller and on `PmsmDrive`.
 pub const ENABLED: &str = "The controller is running: the voltage references are its own";

@@ -1,0 +1,147 @@
+//! A drive of the atlas: the one that `fmu compare` runs, or one tuned for a machine's file, with settings of the user.
+
+use super::run::Approach;
+use crate::compare::candidate::{Candidate, Class, Entry};
+use crate::runner::RATED_SPEED;
+use crate::tune::motor::MotorFile;
+use crate::tune::rules;
+use anyhow::{Context, Result, anyhow, bail};
+use drive::control::start::StartMode;
+use drive::estimator::Kind;
+use drive::{Pair, SensorlessController};
+use fmu_core::description::VariableKind;
+use fmu_core::variable::Causality;
+use fmu_core::{Description, Model, Slot};
+use std::path::Path;
+use toml::Spanned;
+
+/// A drive at rest, and what 1 means on the axes of the atlas.
+#[derive(Clone)]
+pub struct Drive {
+    /// Name of the estimator.
+    pub name: String,
+    /// Its machine.
+    pub machine: String,
+    /// Plant and controller.
+    pub pair: Pair,
+    /// Rated mechanical speed in rad/s.
+    pub speed: f64,
+    /// Rated torque in N.m.
+    pub torque: f64,
+    /// How it comes to its speed.
+    pub approach: Approach,
+}
+
+impl Drive {
+    /// The drive of `fmu compare`: rated are 3000 rpm and 2 N.m on the reference motor, 1500 rpm and 14 N.m on the 2.2 kW
+    /// machine.
+    pub fn compared(entry: Entry) -> Self {
+        let Candidate { class, pair, torque, .. } = Candidate::new(entry);
+        let rest = class == Class::FluxObserver;
+        Self {
+            name: entry.name.into(),
+            machine: entry.machine().into(),
+            pair,
+            speed: if rest { 2.0 } else { 1.0 } * RATED_SPEED,
+            torque,
+            approach: if rest { Approach::Rest } else { Approach::Turning },
+        }
+    }
+
+    /// The machine of a file with this estimator, tuned as `fmu tune` does: a flux observer by the rules for Rasmussen's, any
+    /// other by those for the extended EMF.
+    ///
+    /// # Errors
+    /// Those of [`crate::tune::tune`].
+    pub fn tuned(path: &Path, kind: Kind) -> Result<Self> {
+        let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
+        let mut file = MotorFile::parse(&text, path)?;
+        let rest = kind.class() == Class::FluxObserver;
+        let rules = if rest { "Rasmussen" } else { "ExtendedEmf" };
+        file.data.control.estimator = Some(Spanned::new(0..0, rules.into()));
+        let tuned = rules::tune(&file)?;
+        let mut pair = tuned.pair();
+        let par = &mut pair.controller.model.parameters;
+        par.estimator = kind;
+        par.start.mode = StartMode::Direct;
+        Ok(Self {
+            name: kind.name().into(),
+            machine: tuned.name,
+            pair,
+            speed: *file.data.rating.speed.get_ref(),
+            torque: *file.data.rating.torque.get_ref(),
+            approach: if rest { Approach::Rest } else { Approach::Turning },
+        })
+    }
+
+    /// Sets a parameter of the controller from the text `name=value`.
+    ///
+    /// # Errors
+    /// Names what is wrong and what was expected.
+    pub fn set(&mut self, text: &str) -> Result<()> {
+        let (name, value) = text
+            .split_once('=')
+            .ok_or_else(|| anyhow!("--set {text}: is not NAME=VALUE; write for example T_s=1e-4"))?;
+        let description = Description::of::<SensorlessController>().map_err(|e| anyhow!("{e}"))?;
+        let variable = description.variable(name).filter(|v| v.causality == Causality::Parameter).ok_or_else(|| {
+            anyhow!("--set {name}: is not a parameter of SensorlessController; its documentation page lists them")
+        })?;
+        if name.starts_with("motor.") {
+            bail!("--set {name}: the atlas sets the motor's values from the machine; choose --resistance or --flux");
+        }
+        let wrong = |expected: &str| anyhow!("--set {name}={value}: must be {expected}; correct the value");
+        let table = <SensorlessController as Model>::TABLE;
+        let index = (0..table.len()).find(|&i| table.locate(i).is_some_and(|(found, ..)| found == name));
+        let block = &mut self.pair.controller;
+        let (_, slot) =
+            index.and_then(|i| table.entry(block, i)).ok_or_else(|| anyhow!("--set {name}: has no place"))?;
+        match (slot, &variable.kind) {
+            (Slot::Real(x), _) => {
+                let range = variable.range();
+                let number = value.parse::<f64>().ok().filter(|x| x.is_finite() && range.contains(*x));
+                *x = number.ok_or_else(|| wrong(&format!("a number {range}")))?;
+            }
+            (Slot::Integer(x), _) => {
+                let range = variable.range();
+                let number = value.parse::<i32>().ok().filter(|x| range.contains(f64::from(*x)));
+                *x = number.ok_or_else(|| wrong(&format!("an integer {range}")))?;
+            }
+            (Slot::Boolean(x), _) => *x = value.parse().map_err(|_| wrong("true or false"))?,
+            (Slot::Enumeration(x), VariableKind::Enumeration { items, .. }) => {
+                let known = || items.iter().map(|(_, name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+                let item = items.iter().find(|(_, name, _)| name == value);
+                x.set(item.ok_or_else(|| wrong(&format!("one of {}", known())))?.0);
+            }
+            _ => return Err(wrong("a number")),
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_setting_names_what_is_allowed() {
+        let mut drive = Drive::compared(Entry::all()[0]);
+        for (text, expected) in [
+            ("T_s", "--set T_s: is not NAME=VALUE"),
+            ("adaptation.on=true", "--set adaptation.on: is not a parameter of SensorlessController"),
+            ("speed_est=1", "--set speed_est: is not a parameter"),
+            ("motor.R_s=1", "--set motor.R_s: the atlas sets the motor's values"),
+            ("adaptation.resistance=1", "--set adaptation.resistance=1: must be true or false"),
+            ("limit.i=-1", "--set limit.i=-1: must be a number"),
+            ("T_s=NaN", "--set T_s=NaN: must be a number"),
+            ("timing.delay=5", "--set timing.delay=5: must be an integer"),
+            ("start.mode=Now", "--set start.mode=Now: must be one of"),
+        ] {
+            let message = drive.set(text).unwrap_err().to_string();
+            assert!(message.starts_with(expected), "{message}");
+        }
+        drive.set("adaptation.k_a=0.02").unwrap();
+        drive.set("adaptation.resistance=true").unwrap();
+        let adaptation = &drive.pair.controller.model.parameters.estimators.adaptation;
+        assert!(adaptation.resistance && (adaptation.k_a - 0.02).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,77 @@
+//! The atlas: where a drive with wrong estimates of resistance and magnet flux holds low speeds under load, and whether
+//! `lock_lost` tells when it does not.
+//!
+//! - [`cell`]: the grid; [`run`]: a run, what counts as lost; [`drive`]: the drives;
+//! - [`map`]: the map of a drive; [`report`]: tables, CSV and page.
+
+pub mod cell;
+pub mod drive;
+pub mod map;
+pub mod report;
+pub mod run;
+
+use crate::compare::queue;
+use anyhow::{Context, Result, anyhow};
+use cell::Cell;
+use drive::Drive;
+use run::Verdict;
+use std::path::Path;
+
+/// The runs of a drive.
+#[derive(Clone)]
+pub struct Atlas {
+    /// The drive.
+    pub drive: Drive,
+    /// Cells and what they gave, in the order of the grid.
+    pub runs: Vec<(Cell, Verdict)>,
+}
+
+impl Atlas {
+    /// The cells that are lost, or held.
+    pub fn that_are(&self, lost: bool) -> impl Iterator<Item = &(Cell, Verdict)> {
+        self.runs.iter().filter(move |(_, verdict)| verdict.lost.is_some() == lost)
+    }
+}
+
+/// Runs every cell with every drive on this many threads; calls `done` after each run. The result does not depend on the
+/// number of threads.
+///
+/// # Errors
+/// The parameters of a drive do not fit together.
+pub fn run(drives: &[Drive], cells: &[Cell], threads: usize, done: impl Fn() + Sync) -> Result<Vec<Atlas>> {
+    let jobs: Vec<_> = drives.iter().flat_map(|drive| cells.iter().map(move |cell| (drive, cell))).collect();
+    let verdicts = queue::map_on(threads, &jobs, |(drive, cell)| {
+        let verdict = run::run(drive, cell);
+        done();
+        verdict
+    });
+    let mut verdicts = verdicts.into_iter();
+    let of = |drive: &Drive| {
+        let one = |(cell, verdict): (&Cell, Result<Verdict, _>)| {
+            let fault =
+                |fault: fmu_core::Fault| anyhow!("{} on the {}: {}", drive.name, drive.machine, fault.message());
+            Ok((*cell, verdict.map_err(fault)?))
+        };
+        let runs = cells.iter().zip(verdicts.by_ref()).map(one).collect::<Result<_>>()?;
+        Ok(Atlas { drive: drive.clone(), runs })
+    };
+    drives.iter().map(of).collect()
+}
+
+/// Writes CSV, tables, a map per drive and the page to `out`.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write(atlases: &[Atlas], out: &Path) -> Result<()> {
+    let file = |name: &str, text: &str| {
+        let path = out.join(name);
+        std::fs::write(&path, text).with_context(|| format!("writing {}", path.display()))
+    };
+    std::fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
+    for atlas in atlases {
+        file(&format!("atlas-{}.svg", atlas.drive.name), &map::svg(atlas))?;
+    }
+    file("atlas.csv", &report::csv(atlases))?;
+    file("atlas.md", &report::markdown(atlases))?;
+    file("atlas.html", &report::page(atlases))
+}

@@ -1,0 +1,225 @@
+//! One run: the course of speed and load, what counts as lost, and what `lock_lost` says about it.
+//!
+//! Every course has an approach, then a load, and it is judged at its end. Shares are of rated speed and torque:
+//!
+//! | | [`Approach::Rest`] | [`Approach::Turning`] |
+//! |---|---|---|
+//! | for | drives that start at rest by themselves (flux observers) | all others |
+//! | first | rest | 0.2 of the rated speed, in the sign of the reference |
+//! | `load` | speed as a step at 0.2 s, load as a step at 1 s | speed by a ramp 0.2..1 s, load by a ramp 1.5..1.8 s |
+//! | `speed` | load as a step at 0.5 s, speed as a step at 1.5 s | load by a ramp 0.2..0.5 s, speed by a ramp 1..1.8 s |
+//! | judged | 4..6 s (`heating`: 12..14 s, R rises 2..12 s) | the same |
+//! | lost: speed off by more than | 1/600 + 5 % of the reference | 0.02 |
+//! | lost: angle off by more than | 180 deg, which is never: at rest the d-axis current carries load at 36 deg | 30 deg |
+//!
+//! `noise` is that of sensors with 10 mA per 7.5 A of `limit.i`, `inverter` adds offsets of +20 and -20 mA per 7.5 A and a
+//! dead time of 2 % of T_s, compensated.
+
+use super::cell::{Cell, Scenario};
+use super::drive::Drive;
+use crate::runner;
+use drive::Pair;
+use drive::math::wrap;
+use fmu_core::{Fault, Model};
+use std::f64::consts::TAU;
+
+/// How the drive comes to its speed; with it goes what counts as lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Approach {
+    /// From rest, in steps.
+    Rest,
+    /// From 0.2 of the rated speed, by ramps.
+    Turning,
+}
+
+/// Rise of the resistance in `heating`, as a share.
+const HEATING: f64 = 0.4;
+/// Standard deviation of the current noise as a share of `limit.i`: 10 mA on the reference motor.
+const NOISE: f64 = 0.01 / 7.5;
+/// Offsets of the current sensors a and b as shares of `limit.i`: 20 mA and -20 mA on the reference motor.
+const OFFSET: f64 = 0.02 / 7.5;
+/// Dead time as a share of the sample period: 2 us at 10 kHz.
+const DEAD_TIME: f64 = 0.02;
+
+/// How the rotor was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// The rotor slips against the estimated frame, by a turn or more in the last 2 s.
+    Slips,
+    /// Rotor and estimate turn together at a speed that is not the reference.
+    Creeps,
+    /// Rotor and estimate turn together, at the reference on the average, and swing.
+    Swings,
+    /// The speed holds, the angle is off.
+    Angle,
+    /// A step failed.
+    Failed,
+}
+
+impl Class {
+    /// All classes.
+    pub const ALL: &'static [Self] = &[Self::Slips, Self::Creeps, Self::Swings, Self::Angle, Self::Failed];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Slips => "slips",
+            Self::Creeps => "creeps",
+            Self::Swings => "swings",
+            Self::Angle => "angle",
+            Self::Failed => "failed",
+        }
+    }
+
+    /// What it means.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Slips => "the rotor slips against the estimate",
+            Self::Creeps => "rotor and estimate turn together, not at the reference",
+            Self::Swings => "the speed swings about the reference",
+            Self::Angle => "the speed holds, the angle is off",
+            Self::Failed => "a step failed",
+        }
+    }
+}
+
+/// What a run gave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// How and when (s) the drive was lost: the first time out of its tolerance while it is judged.
+    pub lost: Option<(Class, f64)>,
+    /// Greatest `lock_lost` from the loss to 1 s later, or of the whole run if the cell is held.
+    pub lock_lost: f64,
+    /// Greatest `lock_lost` of a held cell while the drive has been within its tolerance for 1 s.
+    pub while_held: f64,
+    /// Greatest speed error while judged, as a share of the rated speed.
+    pub speed_error: f64,
+    /// Greatest angle error while judged, in deg.
+    pub angle_error: f64,
+}
+
+impl Verdict {
+    /// Whether `lock_lost` told the truth: 1 or more within 1 s of a loss, below 1 while the drive holds. A cell that is
+    /// held in the end may have been lost before: `heating` brings R to R^ > R.
+    pub fn told(&self) -> bool {
+        if self.lost.is_some() { self.lock_lost >= 1.0 } else { self.while_held < 1.0 }
+    }
+}
+
+/// Speed reference and load at the time `t` (s), as shares.
+fn course(approach: Approach, cell: &Cell, t: f64) -> (f64, f64) {
+    // The exact instants of the samples are above or below by rounding.
+    let step = |from: f64| if t >= from - 1e-9 { 1.0 } else { 0.0 };
+    let ramp = |from: f64, to: f64| ((t - from) / (to - from)).clamp(0.0, 1.0);
+    let first = 0.2_f64.copysign(cell.speed);
+    let slow_down = |share: f64| first + share * (cell.speed - first);
+    match (approach, cell.scenario) {
+        (Approach::Rest, Scenario::Speed) => (cell.speed * step(1.5), cell.load * step(0.5)),
+        (Approach::Rest, _) => (cell.speed * step(0.2), cell.load * step(1.0)),
+        (Approach::Turning, Scenario::Speed) => (slow_down(ramp(1.0, 1.8)), cell.load * ramp(0.2, 0.5)),
+        (Approach::Turning, _) => (slow_down(ramp(0.2, 1.0)), cell.load * ramp(1.5, 1.8)),
+    }
+}
+
+/// The drive of a cell before its start.
+fn prepared(drive: &Drive, cell: &Cell) -> Pair {
+    let mut pair = drive.pair.clone();
+    let (plant, controller) = (&mut pair.plant.model, &mut pair.controller.model);
+    let (truth, par) = (&mut plant.parameters, &mut controller.parameters);
+    par.motor.R_s = cell.R * truth.motor.R_s;
+    par.motor.psi_M = cell.psi * truth.motor.psi_M;
+    truth.initial.theta_e = par.theta_est + cell.theta.to_radians();
+    if drive.approach == Approach::Turning {
+        let speed = 0.2_f64.copysign(cell.speed) * drive.speed;
+        (truth.initial.speed, par.speed_est) = (speed, speed);
+    }
+    // The presets of some drives have noise of their own.
+    par.sensor.noise = 0.0;
+    if matches!(cell.scenario, Scenario::Noise | Scenario::Inverter) {
+        par.sensor.noise = NOISE * par.limit.i;
+    }
+    if cell.scenario == Scenario::Inverter {
+        (par.sensor.offset.a, par.sensor.offset.b) = (OFFSET * par.limit.i, -OFFSET * par.limit.i);
+        truth.inverter.dead_time = DEAD_TIME * par.T_s;
+        par.compensation.u_dead = truth.inverter.u_dead(plant.inputs.u_dc);
+    }
+    pair
+}
+
+/// Runs a cell.
+///
+/// # Errors
+/// The parameters do not fit together.
+pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
+    let mut pair = prepared(drive, cell);
+    let heats = cell.scenario == Scenario::Heating;
+    let (T_s, cold) = (pair.controller.model.parameters.T_s, pair.plant.model.parameters.motor.R_s);
+    let end = if heats { 14.0 } else { 6.0 };
+    let (tolerance, angle) = match drive.approach {
+        Approach::Rest => (1.0 / 600.0 + 0.05 * cell.speed.abs(), 180.0),
+        Approach::Turning => (0.02, 30.0),
+    };
+    let (mut lost_at, mut before, mut after, mut last) = (None, 0.0_f64, 0.0_f64, 0.0);
+    let (mut while_held, mut last_off) = (0.0_f64, 0.0);
+    let (mut speed_error, mut angle_error, mut slip, mut theta_tilde) = (0.0_f64, 0.0_f64, 0.0, 0.0);
+    let (mut mean, mut judged) = (0.0, 0.0);
+    let mut hot = 0_u32;
+    let finished = runner::run_in_steps(&mut pair, T_s, end, |t, p| {
+        last = t;
+        let (speed, load) = course(drive.approach, cell, t);
+        p.controller.model.inputs.speed_ref = speed * drive.speed;
+        p.plant.model.inputs.tau_load = load * drive.torque;
+        // A percent at a time.
+        let share = if heats { ((t - 2.0) / 10.0).clamp(0.0, 1.0) * 40.0 } else { 0.0 };
+        if share >= f64::from(hot + 1) {
+            hot += 1;
+            p.plant.model.parameters.motor.R_s = cold * (1.0 + HEATING * f64::from(hot) / 40.0);
+            p.plant.model.derive();
+        }
+        let out = &p.controller.out;
+        let error = wrap(p.plant.out.theta_e - out.theta_est);
+        let off = p.plant.out.speed / drive.speed - speed;
+        let is_off = off.abs() > tolerance || error.abs().to_degrees() > angle;
+        if is_off {
+            last_off = t;
+        } else if t > last_off + 1.0 {
+            while_held = while_held.max(out.lock_lost);
+        }
+        if t > end - 2.0 - 1e-9 {
+            speed_error = speed_error.max(off.abs());
+            angle_error = angle_error.max(error.abs().to_degrees());
+            slip += wrap(error - theta_tilde);
+            (mean, judged) = (mean + off, judged + 1.0);
+            if is_off {
+                lost_at = lost_at.or(Some(t));
+            }
+        }
+        theta_tilde = error;
+        match lost_at {
+            None => before = before.max(out.lock_lost),
+            Some(at) if t <= at + 1.0 => after = after.max(out.lock_lost),
+            Some(_) => {}
+        }
+    })?;
+    if !finished {
+        lost_at = lost_at.or(Some(last));
+    }
+    let class = if !finished {
+        Class::Failed
+    } else if slip.abs() >= TAU {
+        Class::Slips
+    } else if (mean / judged).abs() > tolerance {
+        Class::Creeps
+    } else if speed_error > tolerance {
+        Class::Swings
+    } else {
+        Class::Angle
+    };
+    Ok(Verdict {
+        lost: lost_at.map(|at| (class, at)),
+        lock_lost: if lost_at.is_some() { after } else { before },
+        while_held: if lost_at.is_some() { 0.0 } else { while_held },
+        speed_error,
+        angle_error,
+    })
+}
