@@ -74,15 +74,6 @@ impl Default for LockParameters {
     }
 }
 
-impl LockParameters {
-    /// The values for a machine with the resistance `R_s` (Ohm) that takes at most the current `i` (A), an inverter that
-    /// loses `u_dead` (V) per leg without compensation, and a speed loop of `bandwidth` (rad/s): a third of the greatest
-    /// resistive voltage and 4/3 u_dead are tolerated; the time is 4/bandwidth, within 0.02..0.2 s.
-    pub fn scaled(R_s: f64, i: f64, u_dead: f64, bandwidth: f64) -> Self {
-        Self { u: R_s * i / 3.0 + 4.0 / 3.0 * u_dead, time: (4.0 / bandwidth).clamp(0.02, 0.2), ..Self::default() }
-    }
-}
-
 /// What the speed loop can do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach {
@@ -324,22 +315,5 @@ mod tests {
         let mut watch = Following::default();
         assert!(followed(&mut watch, 0.0, 400.0, 0.3, false) > 1.0);
         assert!(followed(&mut watch, 0.0, 400.0, T_S, true) < 1e-12);
-    }
-
-    /// The rule gives the start values on the reference motor, and sees half a turn on a 22 V machine at a tenth of its
-    /// speed, where the start values are blind.
-    #[test]
-    fn scaled_to_the_machine() {
-        let par = LockParameters::scaled(2.0, 7.5, 0.0, 80.0);
-        assert!((par.u - 5.0).abs() < 1e-12 && (par.time - 0.05).abs() < 1e-12, "{par:?}");
-        assert_eq!(LockParameters::scaled(1.0, 3.0, 1.5, 1.0), LockParameters { u: 3.0, time: 0.2, ..par });
-        // 7 pole pairs, 50 mOhm, 20 A, 9000 rpm at 22 V.
-        let (motor, w) = (Motor { n_p: 7, R_s: 0.05, L_d: 20e-6, L_q: 20e-6, psi_M: 1.5e-3 }, 660.0);
-        let half_a_turn = |par: &LockParameters| {
-            let gains = LockGains::new(par, &motor, T_S, REACH);
-            2.0 * motor.psi_M * w / (gains.u + gains.psi * w)
-        };
-        assert!(half_a_turn(&LockParameters::scaled(0.05, 20.0, 0.0, 80.0)) > 2.0);
-        assert!(half_a_turn(&LockParameters::default()) < 0.5);
     }
 }
