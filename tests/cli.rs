@@ -273,6 +273,27 @@ fn what_a_person_types() {
     }
 }
 
+/// Without --record a plot shows what matters of a drive, and the CSV has the outputs alone.
+#[test]
+fn a_first_plot_has_five_panels() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (csv, svg, drive) = (file("run.csv"), file("run.svg"), archive("fmi2", "PmsmDrive"));
+    let run = |more: &[&str]| {
+        let arguments = ["simulate", drive.to_str().unwrap(), "--stop", "0.02", "--input", "speed_ref=1000rpm"];
+        let output = fmu(&[&arguments[..], &["--csv", &csv, "--plot", &svg], more].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let header = std::fs::read_to_string(&csv).unwrap().lines().next().unwrap().to_owned();
+        assert!(header.contains("PmsmDrive.i_a,") && !header.contains("speed_ref"), "{header}");
+        std::fs::read_to_string(&svg).unwrap()
+    };
+    let first = run(&[]);
+    for part in ["height=\"1200\"", "PmsmDrive.speed_ref", "theta_est - theta_e", "PmsmDrive.i_q_ref", "\nrpm\n", "\nW\n"] {
+        assert!(first.contains(part), "{part}");
+    }
+    assert!(!first.contains("PmsmDrive.i_a") && run(&["--all"]).contains("PmsmDrive.i_a"));
+}
+
 /// Ctrl-C keeps what was computed.
 #[cfg(unix)]
 #[test]

@@ -8,6 +8,7 @@
 
 pub mod atlas;
 pub mod compare;
+pub mod overview;
 pub mod plane;
 pub mod plot;
 pub mod reproduce;

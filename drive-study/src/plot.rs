@@ -32,8 +32,8 @@ pub fn svg(recording: &Recording) -> Result<String> {
     };
     let mut units: Vec<&str> = Vec::new();
     for column in &recording.columns {
-        if !units.contains(&unit_of(column)) {
-            units.push(unit_of(column));
+        if !units.contains(&column.shown_unit()) {
+            units.push(column.shown_unit());
         }
     }
     if units.is_empty() {
@@ -48,7 +48,7 @@ pub fn svg(recording: &Recording) -> Result<String> {
             let shown = |c: &Column| -> Vec<f64> {
                 c.values.iter().map(|x| c.display.as_ref().map_or(*x, |display| display.show(*x))).collect()
             };
-            let of_unit = recording.columns.iter().filter(|c| unit_of(c) == *unit);
+            let of_unit = recording.columns.iter().filter(|c| c.shown_unit() == *unit);
             let columns: Vec<(&str, Vec<f64>)> = of_unit.map(|c| (c.name.as_str(), shown(c))).collect();
             let finite = || columns.iter().flat_map(|(_, x)| x.iter().copied().filter(|x| x.is_finite()));
             let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
@@ -90,11 +90,6 @@ pub fn svg(recording: &Recording) -> Result<String> {
     let size = |fine: u32, height: u32| format!("width=\"{}\" height=\"{}\"", fine * (SIZE.0 + NAMES), fine * height);
     let height = SIZE.1 * u32::try_from(units.len())?;
     Ok(text.replacen(&size(FINE, height), &size(1, height), 1))
-}
-
-/// The unit in which a column is drawn.
-fn unit_of(column: &Column) -> &str {
-    column.display.as_ref().map_or(&column.unit, |display| &display.name)
 }
 
 pub(crate) fn drawing(error: impl std::fmt::Display) -> anyhow::Error {

@@ -70,7 +70,7 @@ limits! {
 }
 
 /// Time for the checks of a file that do not run it, in s.
-pub const STATIC_SECONDS: u64 = 15;
+pub const STATIC_SECONDS: u64 = 12;
 /// Address space of a process that runs FMUs, in bytes.
 pub const PROCESS_MEMORY: u64 = 4 << 30;
 /// Open files of a process that runs FMUs.

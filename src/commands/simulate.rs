@@ -4,7 +4,7 @@ use crate::Failed;
 use crate::{pack, picture};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use drive_study::plot;
+use drive_study::{overview, plot};
 use fmu_import::cosimulation::{Integration, Method, Point, Recording, Schedule, Settings, Solver, System};
 use fmu_import::guard::{self, Allowance, End, Guarded};
 use fmu_import::ssp::load::Loaded;
@@ -82,7 +82,7 @@ pub struct Simulate {
     pub set: Vec<String>,
     /// Feed an input or a tunable parameter over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE
     /// for straight lines, or a CSV file with time in the first column; without VARIABLE=, the headings of the others name
-    /// what they feed. VALUE and headings may have a unit: 1000rpm, speed_ref [rpm]
+    /// what they feed. VALUE and headings may have a unit: 1000rpm, `speed_ref [rpm]`
     #[arg(long, value_name = "[VARIABLE=]POINTS|FILE.csv")]
     pub input: Vec<String>,
     /// Start time in s [default: from the FMUs, else 0]
@@ -100,9 +100,13 @@ pub struct Simulate {
     /// Write the recording as CSV; - for standard output
     #[arg(long, value_name = "FILE|-")]
     pub csv: Option<PathBuf>,
-    /// Plot the recording; the ending tells the format
+    /// Plot the recording; the ending tells the format. Without --record: speed, torque, dq currents, angle error and power of
+    /// a drive, the first of each unit of other FMUs
     #[arg(long, value_name = "FILE.svg|FILE.png")]
     pub plot: Option<PathBuf>,
+    /// Plot all that is recorded
+    #[arg(long, requires = "plot")]
+    pub all: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it
     #[arg(long)]
     pub sequential: bool,
@@ -284,7 +288,7 @@ fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
     }
     std::env::set_current_dir(&home)?;
     loaded.notes.iter().for_each(|note| eprintln!("note: {}", printable(note)));
-    let settings = prepare(&mut loaded, args)?;
+    let (settings, for_plot) = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
     let mut progress = Progress::new(settings);
     let (mut looked, interrupt, mut interrupted) = (Instant::now(), std::env::temp_dir().join(INTERRUPT), None);
@@ -311,7 +315,7 @@ fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
     let recording = outcome?;
     journal::writes();
     std::env::set_current_dir(&home)?;
-    let written = write(&recording, args, out);
+    let written = write(recording, for_plot, args, out);
     for text in warnings(&system, &settings) {
         eprintln!("warning: {}", printable(&text));
     }
@@ -351,8 +355,8 @@ fn warnings(system: &System, settings: &Settings) -> Vec<String> {
     found
 }
 
-/// Everything before the run.
-fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
+/// Everything before the run; also how many of the last columns are for the plot alone.
+fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
     let Loaded { system, .. } = loaded;
     for text in &args.connect {
         let (from, to) = halves(text, "--connect OUTPUT=INPUT")?;
@@ -400,8 +404,15 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<Settings> {
     if args.record.is_empty() {
         loaded.record_outputs()?;
     }
+    let mut for_plot = 0;
+    if args.record.is_empty() && args.plot.is_some() && !args.all {
+        for port in loaded.system.fed_inputs(&overview::INPUTS) {
+            loaded.system.record(&port)?;
+            for_plot += 1;
+        }
+    }
     args.record.iter().try_for_each(|port| loaded.record(port))?;
-    Ok(loaded.settings(args.start, args.stop, args.step, args.sequential))
+    Ok((loaded.settings(args.start, args.stop, args.step, args.sequential), for_plot))
 }
 
 /// The column of a CSV file that feeds the input `port`: the one of its name, or the only one.
@@ -414,7 +425,13 @@ fn column(port: &str, file: &str) -> Result<Schedule, String> {
     }
 }
 
-fn write(recording: &Recording, args: &Simulate, mut out: impl Write) -> Result<()> {
+fn write(mut recording: Recording, for_plot: usize, args: &Simulate, mut out: impl Write) -> Result<()> {
+    let plotted = match &args.plot {
+        Some(_) if args.record.is_empty() && !args.all => Some(overview::overview(&recording)),
+        Some(_) => Some(recording.clone()),
+        None => None,
+    };
+    recording.columns.truncate(recording.columns.len() - for_plot);
     let mut to_stdout = false;
     match args.csv.as_deref() {
         Some(path) if path == Path::new("-") => {
@@ -432,8 +449,8 @@ fn write(recording: &Recording, args: &Simulate, mut out: impl Write) -> Result<
         }
         None => {}
     }
-    if let Some(path) = &args.plot {
-        let svg = plot::svg(recording)?;
+    if let (Some(path), Some(plotted)) = (&args.plot, &plotted) {
+        let svg = plot::svg(plotted)?;
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
             let png = picture::with_text(&svg).with_context(|| path.display().to_string())?;
             pack::write(path, &png)?;

@@ -95,6 +95,16 @@ fn start(kind: Kind) -> Experiment {
     Experiment { name, pair, speed_ref: vec![(0.6, speed)], load: vec![], duration: 1.6 }
 }
 
+/// A cell of the atlas that Rasmussen's observer loses without adaptation: R^ = 0.9 R, 2 N.m driving at 30 rpm.
+fn adapting_at_rest() -> Experiment {
+    let mut pair = flux_observer(Kind::Rasmussen);
+    let par = &mut pair.controller.model.parameters;
+    (par.estimators.adaptation.resistance, par.estimators.adaptation.k_a) = (true, 0.02);
+    let speed_ref = vec![(0.0, 0.0), (0.2, std::f64::consts::PI)];
+    let name = "Rasmussen: adapting, driven at 30 rpm".into();
+    Experiment { name, pair, speed_ref, load: vec![(1.0, -2.0)], duration: 2.6 }
+}
+
 /// A cell of the flux observer's map: R^ = 0.8 R, psi^ = 0.95 psi, both adapting, half the load driving at 0.02 pu.
 fn adapting() -> Experiment {
     let mut pair = runner::turning(runner::drive(Kind::FluxObserver), 0.2);
@@ -149,6 +159,6 @@ impl Experiment {
 /// All experiments.
 pub fn experiments() -> Value {
     let all = Kind::ALL.iter().flat_map(|&kind| [load_step(kind), start(kind)]);
-    let later = [adapting(), reversal(Kind::ExtendedEmf), reversal(Kind::FluxObserver)];
+    let later = [adapting_at_rest(), adapting(), reversal(Kind::ExtendedEmf), reversal(Kind::FluxObserver)];
     Value::Array(all.chain(later).map(Experiment::run).collect())
 }

@@ -207,6 +207,15 @@ impl System {
         self.instances[instance].description().variables.iter().filter(is_free).collect()
     }
 
+    /// The inputs of these names that a connection or a schedule feeds, written `instance.variable`.
+    pub fn fed_inputs(&self, names: &[&str]) -> Vec<String> {
+        let all =
+            self.instances.iter().enumerate().flat_map(|(index, i)| names.iter().map(move |name| (index, i, *name)));
+        all.filter(|(index, _, name)| self.wiring.feeds(*index, name))
+            .map(|(_, i, name)| format!("{}.{name}", i.name()))
+            .collect()
+    }
+
     /// Records all outputs of all instances.
     ///
     /// # Errors

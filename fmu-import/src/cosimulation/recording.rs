@@ -16,6 +16,13 @@ pub struct Column {
     pub values: Vec<f64>,
 }
 
+impl Column {
+    /// The unit to show the values in.
+    pub fn shown_unit(&self) -> &str {
+        self.display.as_ref().map_or(&self.unit, |display| &display.name)
+    }
+}
+
 /// Columns over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {

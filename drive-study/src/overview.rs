@@ -1,0 +1,88 @@
+//! What a first plot of a run shows: speed, torque, currents, angle error and power, of any drive with these names.
+
+use drive::math::wrap;
+use fmu_import::cosimulation::{Column, Recording};
+use model_description::DisplayUnit;
+
+/// Panels, each with the variables that belong into it, without the names of their instances.
+const PANELS: [&[&str]; 4] = [
+    &["speed", "speed_ref", "speed_est"],
+    &["tau_e", "tau_load", "tau_ref"],
+    &["i_d", "i_q", "i_d_ref", "i_q_ref"],
+    &["p_in", "p_mech", "p_loss"],
+];
+
+/// Inputs that belong to a first plot, if something feeds them.
+pub const INPUTS: [&str; 3] = ["speed_ref", "tau_load", "tau_ref"];
+
+/// Most panels, and curves in a panel, of a run that has none of these names.
+const MOST: (usize, usize) = (5, 6);
+
+/// The columns that a first plot shows. With `theta_est` and `theta_e` the angle error is one of them.
+pub fn overview(recording: &Recording) -> Recording {
+    let named = |name: &&str| recording.columns.iter().find(|c| last(&c.name) == *name);
+    let mut columns: Vec<Column> = PANELS.concat().iter().filter_map(named).cloned().collect();
+    if let (Some(estimate), Some(rotor)) = (named(&"theta_est"), named(&"theta_e")) {
+        let values = estimate.values.iter().zip(&rotor.values).map(|(a, b)| wrap(a - b)).collect();
+        let degrees = DisplayUnit { name: "deg".into(), factor: 1.0_f64.to_degrees(), offset: 0.0, inverse: false };
+        let name = "theta_est - theta_e".into();
+        columns.push(Column { name, unit: "rad".into(), display: Some(degrees), values });
+    }
+    if columns.is_empty() {
+        let mut panels: Vec<(&str, usize)> = Vec::new();
+        for column in &recording.columns {
+            let full = panels.len() >= MOST.0;
+            match panels.iter_mut().find(|(unit, _)| *unit == column.shown_unit()) {
+                Some((_, count)) if *count >= MOST.1 => continue,
+                Some((_, count)) => *count += 1,
+                None if full => continue,
+                None => panels.push((column.shown_unit(), 1)),
+            }
+            columns.push(column.clone());
+        }
+    }
+    Recording { columns, time: recording.time.clone(), ended_by: recording.ended_by.clone() }
+}
+
+/// The name without that of its instance.
+fn last(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recording(names: &[(&str, &str)]) -> Recording {
+        let column = |(name, unit): &(&str, &str)| Column {
+            name: (*name).into(),
+            unit: (*unit).into(),
+            display: None,
+            values: vec![0.0, 3.0],
+        };
+        Recording { time: vec![0.0, 1.0], columns: names.iter().map(column).collect(), ended_by: None }
+    }
+
+    fn shown(names: &[(&str, &str)]) -> Vec<String> {
+        overview(&recording(names)).columns.into_iter().map(|c| c.name).collect()
+    }
+
+    #[test]
+    fn a_drive_shows_what_matters() {
+        let names =
+            [("p.i_a", "A"), ("p.i_q", "A"), ("p.speed", "rad/s"), ("p.theta_e", "rad"), ("c.theta_est", "rad")];
+        assert_eq!(shown(&names), ["p.speed", "p.i_q", "theta_est - theta_e"]);
+        let mut turned = recording(&names);
+        turned.columns[4].values = vec![0.1, -3.2];
+        let error = overview(&turned).columns.pop().unwrap();
+        assert!((error.values[1] - (std::f64::consts::TAU - 6.2)).abs() < 1e-12, "wrapped: {error:?}");
+    }
+
+    #[test]
+    fn another_model_shows_the_first_of_each_unit() {
+        let names: Vec<String> = (0..9).map(|k| format!("x{k}")).collect();
+        let mut all: Vec<(&str, &str)> = names.iter().map(|name| (name.as_str(), "m")).collect();
+        all.extend([("a", "A"), ("b", "V"), ("c", "W"), ("d", "K"), ("e", "J")]);
+        assert_eq!(shown(&all), ["x0", "x1", "x2", "x3", "x4", "x5", "a", "b", "c", "d"]);
+    }
+}
