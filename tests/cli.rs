@@ -288,7 +288,9 @@ fn a_first_plot_has_five_panels() {
         std::fs::read_to_string(&svg).unwrap()
     };
     let first = run(&[]);
-    for part in ["height=\"1200\"", "PmsmDrive.speed_ref", "theta_est - theta_e", "PmsmDrive.i_q_ref", "\nrpm\n", "\nW\n"] {
+    for part in
+        ["height=\"1200\"", "PmsmDrive.speed_ref", "theta_est - theta_e", "PmsmDrive.i_q_ref", "\nrpm\n", "\nW\n"]
+    {
         assert!(first.contains(part), "{part}");
     }
     assert!(!first.contains("PmsmDrive.i_a") && run(&["--all"]).contains("PmsmDrive.i_a"));

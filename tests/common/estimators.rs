@@ -159,6 +159,6 @@ impl Experiment {
 /// All experiments.
 pub fn experiments() -> Value {
     let all = Kind::ALL.iter().flat_map(|&kind| [load_step(kind), start(kind)]);
-    let later = [adapting_at_rest(), adapting(), reversal(Kind::ExtendedEmf), reversal(Kind::FluxObserver)];
+    let later = vec![adapting_at_rest(), adapting(), reversal(Kind::ExtendedEmf), reversal(Kind::FluxObserver)];
     Value::Array(all.chain(later).map(Experiment::run).collect())
 }
