@@ -11,7 +11,8 @@ RPM, DEG = 30.0 / math.pi, 180.0 / math.pi
 DISPLAY = {"rpm": ("rad/s", RPM), "deg": ("rad", DEG)}
 ESTIMATORS = (
     "Rasmussen DirectEmf EmfObserver ExtendedEmf VoltageModel CurrentModel VoltageFeedback RotatingInjection "
-    "PulsatingInjection SquareWaveInjection NearPwmInjection Hybrid Sensored KalmanFilter"
+    "PulsatingInjection SquareWaveInjection NearPwmInjection Hybrid Sensored KalmanFilter "
+    "FluxObserver GradientObserver SlidingMode"
 ).split()
 
 

@@ -11,6 +11,9 @@ const SIDE: f64 = 13.0;
 const LEFT: f64 = 44.0;
 const TOP: f64 = 20.0;
 const BELOW: f64 = 22.0;
+/// Width of the longest title, with and without an angle.
+const TITLE: f64 = 150.0;
+const SHORT_TITLE: f64 = 110.0;
 /// Height of a heading.
 const HEADING: f64 = 34.0;
 
@@ -70,7 +73,9 @@ pub fn svg(atlas: &Atlas) -> String {
         [axis(|c| c.R), axis(|c| c.psi), axis(|c| c.load), axis(|c| c.speed), axis(|c| c.theta)];
     let has = |s: &&Scenario| atlas.runs.iter().any(|(cell, _)| cell.scenario == **s);
     let scenarios: Vec<Scenario> = Scenario::ALL.iter().filter(has).copied().collect();
-    let (panel_width, panel_height) = (LEFT + SIDE * count(&R), TOP + SIDE * count(&psi) + BELOW);
+    // A title must not reach into the next panel.
+    let title = if angles.len() > 1 { TITLE } else { SHORT_TITLE };
+    let (panel_width, panel_height) = (LEFT + (SIDE * count(&R)).max(title), TOP + SIDE * count(&psi) + BELOW);
     let rows = count(&speeds) * count(&angles);
     let block = HEADING + rows * panel_height;
     let (width, mut height) = ((panel_width * count(&loads) + 10.0).max(320.0), 10.0);

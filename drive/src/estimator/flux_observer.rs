@@ -199,8 +199,7 @@ pub const FLUX_OBSERVER: &Table<FluxObserverParameters> = &Table::new(
             P::parameter("magnet", &PER_SECOND, "Rate at which FluxObserver adapts psi_M; 0: motor.psi_M", |p| {
                 &mut p.magnet
             })
-            .at_least(0.0)
-            .tunable(),
+            .at_least(0.0),
         ]
     },
 );
