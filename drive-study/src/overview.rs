@@ -2,7 +2,6 @@
 
 use drive::math::wrap;
 use fmu_import::cosimulation::{Column, Recording};
-use model_description::DisplayUnit;
 
 /// Panels, each with the variables that belong into it, without the names of their instances.
 const PANELS: [&[&str]; 4] = [
@@ -24,9 +23,7 @@ pub fn overview(recording: &Recording) -> Recording {
     let mut columns: Vec<Column> = PANELS.concat().iter().filter_map(named).cloned().collect();
     if let (Some(estimate), Some(rotor)) = (named(&"theta_est"), named(&"theta_e")) {
         let values = estimate.values.iter().zip(&rotor.values).map(|(a, b)| wrap(a - b)).collect();
-        let degrees = DisplayUnit { name: "deg".into(), factor: 1.0_f64.to_degrees(), offset: 0.0, inverse: false };
-        let name = "theta_est - theta_e".into();
-        columns.push(Column { name, unit: "rad".into(), display: Some(degrees), values });
+        columns.push(Column { name: "theta_est - theta_e".into(), values, ..rotor.clone() });
     }
     if columns.is_empty() {
         let mut panels: Vec<(&str, usize)> = Vec::new();

@@ -227,6 +227,8 @@ def test_an_interrupt_ends_it(standard, tmp_path):
     script.write_text(textwrap.dedent(f"""
         import signal, threading, time, os
         from fmurun import Plan
+        # A shell lets what it starts in the background ignore Ctrl-C.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         plan = Plan({str(standard / "PmsmDrive.fmu")!r}, stop_time=0.2, step_size=1e-3, measures={{"x": "speed"}})
         threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
         begin = time.time()
