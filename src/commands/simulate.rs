@@ -1,12 +1,14 @@
 //! `fmu simulate`: co-simulates FMUs, or integrates those for Model Exchange.
 
+mod worker;
+
 use crate::Failed;
 use crate::{pack, picture};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use drive_study::{overview, plot};
 use fmu_import::cosimulation::{Integration, Method, Point, Recording, Schedule, Settings, Solver, System};
-use fmu_import::guard::{self, Allowance, End, Guarded};
+use fmu_import::guard::Allowance;
 use fmu_import::ssp::load::Loaded;
 use fmu_import::ssp::{ssv, values};
 use fmu_import::{Fmu, Kind, Message, journal, printable, printable_lines};
@@ -15,7 +17,6 @@ use model_description::ModelVariable;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 /// Co-simulates FMUs of FMI 2.0 and FMI 3.0, from this project or any other tool.
@@ -181,7 +182,7 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
 /// A file is not an FMU that runs here, a name is wrong, an FMU fails, or it ends its process.
 pub fn run(args: &Simulate) -> Result<()> {
     if args.worker {
-        return work(args);
+        return worker::work(args);
     }
     if let Some(path) = &args.plot {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
@@ -189,90 +190,11 @@ pub fn run(args: &Simulate) -> Result<()> {
             bail!("--plot {}: plots are written as .svg or .png", path.display());
         }
     }
-    ctrlc::set_handler(|| {
-        INTERRUPTS.fetch_add(1, Ordering::Relaxed);
-    })?;
+    worker::catch_interrupts()?;
     if args.in_process {
         return simulate(args, io::stdout());
     }
-    guarded(args)
-}
-
-/// How often the user has pressed Ctrl-C: the first time ends the run at the next communication point, the second the process.
-static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
-
-/// File for the status and the error of the worker, below its folder for temporary files.
-const RESULT: &str = "result";
-
-/// Time between two looks for Ctrl-C.
-const LOOK: Duration = Duration::from_millis(100);
-
-/// File there that tells the worker to end the run.
-const INTERRUPT: &str = "interrupt";
-
-/// Runs the same command as a worker.
-fn guarded(args: &Simulate) -> Result<()> {
-    let timeout = Duration::try_from_secs_f64(args.timeout).map_err(|e| anyhow!("--timeout {}: {e}", args.timeout))?;
-    let allowance = Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Allowance::default() };
-    let mut command = guard::command(&std::env::current_exe()?, allowance);
-    command.args(["simulate", "--worker"]).args(std::env::args_os().skip(2));
-    let mut worker = Guarded::start(command)?;
-    let folder = worker.folder().to_owned();
-    let (mut since, mut progress) = (Instant::now(), None);
-    let report = worker.wait(|_| {
-        match INTERRUPTS.load(Ordering::Relaxed) {
-            0 => {}
-            1 => drop(std::fs::write(folder.join(INTERRUPT), "")),
-            _ => return true,
-        }
-        let last = journal::read(&folder);
-        let now = last.as_ref().map(|last| last.progress);
-        if now != progress || last.is_some_and(|last| last.call == journal::Call::Write) {
-            (since, progress) = (Instant::now(), now);
-        }
-        !timeout.is_zero() && since.elapsed() > timeout
-    })?;
-    if !report.left.is_empty() {
-        eprintln!("warning: the FMUs left processes behind, which are ended now: {}", report.left.join(", "));
-    }
-    let result = std::fs::read_to_string(folder.join(RESULT)).ok();
-    let result = result.as_deref().and_then(|text| text.split_once(' '));
-    match (&report.end, result) {
-        (End::Ended(status), Some((code, cause))) if status.code().is_some_and(|c| c.to_string() == code) => match code
-        {
-            "0" => Ok(()),
-            "1" => Err(Failed(cause.into()).into()),
-            _ => Err(anyhow!("{cause}")),
-        },
-        (end, _) => {
-            let last = journal::read(&folder).map_or_else(|| "the process of the FMUs".into(), |last| last.describe());
-            match end {
-                End::Refused(_) => bail!("the process of the FMUs {}", end.describe()),
-                End::Stopped if INTERRUPTS.load(Ordering::Relaxed) > 1 => {
-                    Err(Failed("interrupted twice: nothing is written".into()).into())
-                }
-                End::Stopped => bail!("{last} did not return within {} s; --timeout changes the limit", args.timeout),
-                _ => bail!("{last} {}", end.describe()),
-            }
-        }
-    }
-}
-
-/// The worker: leaves its status and its error in a file, because an FMU may have closed everything else.
-fn work(args: &Simulate) -> Result<()> {
-    guard::end_with_parent();
-    let folder = std::env::temp_dir();
-    journal::open(&folder)?;
-    #[cfg(unix)]
-    let outcome = simulate(args, guard::keep_stdout()?);
-    #[cfg(not(unix))]
-    let outcome = simulate(args, io::stdout());
-    let (status, text) = match &outcome {
-        Ok(()) => (0, String::new()),
-        Err(error) => (crate::exit_status(error), format!("{error:#}")),
-    };
-    std::fs::write(folder.join(RESULT), format!("{status} {text}"))?;
-    outcome
+    worker::guarded(args)
 }
 
 fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
@@ -291,19 +213,16 @@ fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
     let (settings, for_plot) = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
     let mut progress = Progress::new(settings);
-    let (mut looked, interrupt, mut interrupted) = (Instant::now(), std::env::temp_dir().join(INTERRUPT), None);
+    let (mut look, mut interrupted) = (worker::look(args), None);
     let mut hook = |point: &mut Point<'_>| {
         if args.logging {
             show(&point.take_messages());
         }
         progress.at(point.time);
         journal::reached(point.time);
-        if looked.elapsed() > LOOK {
-            looked = Instant::now();
-            if INTERRUPTS.load(Ordering::Relaxed) > 0 || (args.worker && interrupt.exists()) {
-                interrupted = Some(point.time);
-                return Ok(ControlFlow::Break(()));
-            }
+        if look() {
+            interrupted = Some(point.time);
+            return Ok(ControlFlow::Break(()));
         }
         Ok(ControlFlow::Continue(()))
     };
