@@ -37,6 +37,7 @@
 //! a wrong R^ that turns: 20 mA loses cells at 0.01 pu. L_q^ = 1.2 L_q loses rated motoring load at 0.02 and 0.05 pu.
 
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
+use crate::estimator::resistance::{FILTER, STANDSTILL};
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Injection, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
@@ -45,10 +46,6 @@ use fmu_core::unit::{ONE, PER_SECOND};
 use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// Mechanical speed in rad/s below which a speed reference asks for standstill.
-const STANDSTILL: f64 = 0.05;
-/// Corner frequency in rad/s of the low-pass filter of the speed in c.
-const FILTER: f64 = 100.0;
 /// Share of `rho_0` above which the magnet flux adapts more slowly.
 const MAGNET_ALONE: f64 = 0.3;
 /// Least |psi_a|^2 as a share of `psi_M`^2.
@@ -95,8 +92,7 @@ impl Estimating for FluxObserver {
         let Context { motor, par, T_s, .. } = *context;
         let axis = Axis::<Estimated>::at(theta);
         let psi = axis.to_stator(flux(motor, motor.psi_M, axis.from_stator(sample.i)));
-        let share = if sample.speed_ref.is_some() { par.adaptation.start } else { 1.0 };
-        let (R, psi_M) = (share * motor.R_s, motor.psi_M);
+        let (R, psi_M) = (par.adaptation.first(motor, sample), motor.psi_M);
         let tracker = Tracker::at(theta, w, T_s);
         (Self { tracker, psi, R, psi_M, w_f: w, ..Self::default() }, Estimate::new(theta, w, sample))
     }
@@ -160,7 +156,7 @@ impl FluxObserver {
     fn adapt(&mut self, context: &Context, error: f64) {
         let Context { motor, T_s, par, .. } = *context;
         let R = self.R + T_s * par.adaptation.bandwidth * error;
-        let R = R.max(par.adaptation.min * motor.R_s).min(par.adaptation.max * motor.R_s);
+        let R = par.adaptation.within(motor, R);
         self.psi += self.h * (R - self.R);
         self.R = R;
     }

@@ -36,16 +36,17 @@
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
 use crate::estimator::{Context, Kind, Sample};
 use crate::frame::DqHat;
+use crate::motor::Motor;
 use fmu_core::unit::{AMPERE, ONE, PER_SECOND};
 use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 
 /// Mechanical speed in rad/s below which a speed reference asks for standstill.
-const STANDSTILL: f64 = 0.05;
+pub(super) const STANDSTILL: f64 = 0.05;
 /// Mechanical speed in rad/s from which on nothing adapts.
 const GATE: f64 = 2.0;
 /// Corner frequency in rad/s of the low-pass filter of the speed.
-const FILTER: f64 = 100.0;
+pub(super) const FILTER: f64 = 100.0;
 
 /// Parameters of the adaptation; shares are relative to `motor.R_s`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,6 +75,20 @@ impl Default for ResistanceParameters {
     }
 }
 
+impl ResistanceParameters {
+    /// First estimate in Ohm: `motor.R_s` in torque mode, where nothing tells when the rotor may stand.
+    pub(super) fn first(&self, motor: &Motor, sample: &Sample) -> f64 {
+        let share = if sample.speed_ref.is_some() { self.start } else { 1.0 };
+        share * motor.R_s
+    }
+
+    /// The estimate `R` (Ohm) within the clamps.
+    #[inline]
+    pub(super) fn within(&self, motor: &Motor, R: f64) -> f64 {
+        R.max(self.min * motor.R_s).min(self.max * motor.R_s)
+    }
+}
+
 /// State of the adaptation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Resistance {
@@ -97,8 +112,7 @@ pub struct Adapted {
 impl Resistance {
     /// The adaptation at the first sample, at the electrical speed `w` (rad/s).
     pub fn start(context: &Context, sample: &Sample, w: f64) -> Self {
-        let share = if sample.speed_ref.is_some() { context.par.adaptation.start } else { 1.0 };
-        Self { R: share * context.motor.R_s, remaining: 1.0, w_f: w }
+        Self { R: context.par.adaptation.first(context.motor, sample), remaining: 1.0, w_f: w }
     }
 
     /// One sample with the flux error `x` (Wb), the current `i` (A) in the estimated frame, and the electrical speed
@@ -117,7 +131,7 @@ impl Resistance {
         if rest {
             let rate = T_s * par.bandwidth * g / (i.d() * i.d() + i.q() * i.q() + par.i * par.i);
             let R = self.R + rate * c_1 * x * i.d();
-            self.R = R.max(par.min * motor.R_s).min(par.max * motor.R_s);
+            self.R = par.within(motor, R);
             self.remaining -= self.remaining * rate * i.d() * i.d();
             return Adapted { c_1, v_q };
         }
