@@ -49,7 +49,7 @@ def sweep(plan, rows, out, client, chunk=None):
     Raises:
         FmuError: `out` has parts of another plan or table, or of another cut
     """
-    from distributed import as_completed
+    from distributed import KilledWorker, as_completed
 
     table = None if rows is None or isinstance(rows, (int, np.integer)) else _columns(rows)
     count = len(plan) if rows is None else int(rows) if table is None else len(next(iter(table.values()), []))
@@ -81,11 +81,13 @@ def sweep(plan, rows, out, client, chunk=None):
     first_of = dict(zip(keys, firsts))
     for future in as_completed(futures, raise_errors=False):
         first = first_of[future.key]
-        if future.status == "finished":
+        try:
+            # Not `status`: a worker that died since then took the number with it, and `result` waits for another one.
             report["failed"] += future.result()
             continue
-        error = future.exception()
-        if type(error).__name__ != "KilledWorker":
+        except KilledWorker:
+            pass
+        except Exception as error:
             client.cancel(futures)
             cause = f"{folder}/{_part(first)}: {type(error).__name__}: {error}; the other parts stay, and the sweep resumes"
             raise error if isinstance(error, FmuError) else FmuError(None, None, None, cause) from error

@@ -6,10 +6,11 @@ import threading
 import time
 
 import dask
+import distributed
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from distributed import Client, LocalCluster
+from distributed import Client, LocalCluster, as_completed
 from fmurun import FmuError, Plan
 from fmurun.dask import sweep
 from poison import Full, Poisoned
@@ -73,6 +74,25 @@ def test_a_killed_worker_loses_no_row(archives, client, tmp_path):
     assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
     again = sweep(plan, table(ROWS), tmp_path, client)
     assert again["skipped"] == again["parts"] == ROWS // 50
+
+
+def test_a_worker_that_dies_with_its_number(archives, client, tmp_path, monkeypatch):
+    """The number of a finished part is gone before it is read: it comes from the part, and is no error."""
+
+    def after_a_death(futures, **more):
+        for future in list(as_completed(futures, **more)):
+            if future.status == "finished":
+                for pid in client.run(os.getpid).values():
+                    os.kill(pid, signal.SIGKILL)
+                while future.status == "finished":
+                    time.sleep(0.001)
+            yield future
+
+    monkeypatch.setattr(distributed, "as_completed", after_a_death)
+    rows = table(4)
+    rows["plant.motor.R_s"][2] = -1.0
+    report = sweep(drive(archives), rows, tmp_path, client, chunk=4)
+    assert (report["failed"], report["isolated"]) == (1, 0)
 
 
 def test_a_poison_row_ends_as_a_row(archives, client, tmp_path):
