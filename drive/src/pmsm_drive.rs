@@ -381,6 +381,13 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 "",
                 &Part { table: ESTIMATORS, lens: |m| &mut m.model.pair.controller.model.parameters.estimators },
             ),
+            V::part(
+                "controller.compensation.",
+                &Part {
+                    table: tables::LATER_COMPENSATION,
+                    lens: |m| &mut m.model.pair.controller.model.parameters.compensation,
+                },
+            ),
         ]
     },
 );

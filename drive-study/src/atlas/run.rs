@@ -37,6 +37,8 @@ const HEATING: f64 = 0.4;
 /// Standard deviation of the current noise as a share of `limit.i`: 10 mA on the reference motor.
 const NOISE: f64 = 0.01 / 7.5;
 /// Offsets of the current sensors a and b as shares of `limit.i`: 20 mA and -20 mA on the reference motor.
+const OFF: f64 = 0.05;
+/// x
 const OFFSET: f64 = 0.02 / 7.5;
 /// Dead time as a share of the sample period: 2 us at 10 kHz.
 const DEAD_TIME: f64 = 0.02;
@@ -152,6 +154,10 @@ fn prepared(drive: &Drive, cell: &Cell) -> Pair {
 /// The parameters do not fit together.
 pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
     let mut pair = prepared(drive, cell);
+    let off_first = drive.approach == Approach::Rest && pair.controller.model.parameters.compensation.offset;
+    if off_first {
+        (pair.controller.model.inputs.enable, pair.plant.model.inputs.enable) = (false, false);
+    }
     let heats = cell.scenario == Scenario::Heating;
     let (T_s, cold) = (pair.controller.model.parameters.T_s, pair.plant.model.parameters.motor.R_s);
     let end = if heats { 14.0 } else { 6.0 };
@@ -168,6 +174,8 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
         last = t;
         let (speed, load) = course(drive.approach, cell, t);
         p.controller.model.inputs.speed_ref = speed * drive.speed;
+        let on = !off_first || t >= OFF - 1e-9;
+        (p.controller.model.inputs.enable, p.plant.model.inputs.enable) = (on, on);
         p.plant.model.inputs.tau_load = load * drive.torque;
         // A percent at a time.
         let share = if heats { ((t - 2.0) / 10.0).clamp(0.0, 1.0) * 40.0 } else { 0.0 };

@@ -8,7 +8,7 @@ use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
 use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
-use crate::control::tables::{ADAPTATION_OUTPUTS, ControllerParameters, LATER_OUTPUTS, OUTPUTS, PARAMETERS};
+use crate::control::tables::{ADAPTATION_OUTPUTS, ControllerParameters, LATER_COMPENSATION, LATER_OUTPUTS, OUTPUTS, PARAMETERS};
 use crate::control::weakening::{self, WEAKENING, WeakeningGains};
 use crate::estimator::resistance::ADAPTATION;
 use crate::estimator::tables::LATER_ESTIMATOR_PARAMETERS;
@@ -75,7 +75,11 @@ impl SensorlessController {
         let Self { parameters: par, state, .. } = self;
         let new = State::new(par, false);
         let out = new.computed;
-        *state = State { samples: state.samples, shown: state.shown, ..new };
+        let mut offset = state.offset;
+        if par.compensation.offset {
+            offset.update(par.sensor.measure(self.inputs.i, state.samples), par.T_s);
+        }
+        *state = State { samples: state.samples, shown: state.shown, offset, ..new };
         out
     }
 
@@ -90,6 +94,7 @@ impl SensorlessController {
         *state = State {
             samples: state.samples,
             k: state.k,
+            offset: state.offset,
             estimator,
             lock: Lock::lost(),
             computed: state.computed,
@@ -310,6 +315,7 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             ),
             V::part("", &Part { table: ADAPTATION_OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |m| &mut m.model.parameters.estimators }),
+            V::part("compensation.", &Part { table: LATER_COMPENSATION, lens: |m| &mut m.model.parameters.compensation }),
         ]
     },
 );

@@ -37,18 +37,22 @@ impl Limits {
     }
 }
 
-/// Dead-time compensation, added to the command; the estimators receive the command without it.
+/// Dead-time compensation, added to the command, and what the estimators are told of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compensation {
     /// Voltage that a leg loses in V, >= 0; 0: none.
     pub u_dead: f64,
     /// Current in A below which the compensation is reduced, > 0.
     pub i_zero: f64,
+    /// The estimators take the voltage that the inverter loses at the measured currents.
+    pub observe: bool,
+    /// The offsets of the current sensors are measured while the controller is not enabled.
+    pub offset: bool,
 }
 
 impl Default for Compensation {
     fn default() -> Self {
-        Self { u_dead: 0.0, i_zero: 0.1 }
+        Self { u_dead: 0.0, i_zero: 0.1, observe: false, offset: false }
     }
 }
 
@@ -69,6 +73,24 @@ const COMPENSATION: &Table<Compensation> = &Table::new(
                 &mut p.i_zero
             })
             .above(0.0),
+        ]
+    },
+);
+
+/// Variables of the compensation that are newer than [`COMPENSATION`]; their owner supplies the prefix `compensation.`.
+pub const LATER_COMPENSATION: &Table<Compensation> = &Table::new(
+    const {
+        &[
+            C::boolean_parameter(
+                "observe",
+                "The estimators subtract the dead-time voltage at the measured currents; false: they assume that the compensation is exact",
+                |p| &mut p.observe,
+            ),
+            C::boolean_parameter(
+                "offset",
+                "The controller measures the offsets of the current sensors while enable is false; false: offsets stay",
+                |p| &mut p.offset,
+            ),
         ]
     },
 );
