@@ -3,8 +3,8 @@
 use crate::control::lock::Lock;
 use crate::control::model::SensorlessController;
 use crate::control::signals::ControllerOutputs;
-use crate::control::tables::Compensation;
 use crate::control::state::{Command, Mode, References, context};
+use crate::control::tables::Compensation;
 use crate::control::weakening::share;
 use crate::estimator::{Estimate, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};

@@ -8,7 +8,9 @@ use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
 use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
-use crate::control::tables::{ADAPTATION_OUTPUTS, ControllerParameters, LATER_COMPENSATION, LATER_OUTPUTS, OUTPUTS, PARAMETERS};
+use crate::control::tables::{
+    ADAPTATION_OUTPUTS, ControllerParameters, LATER_OUTPUTS, LATEST_PARAMETERS, OUTPUTS, PARAMETERS,
+};
 use crate::control::weakening::{self, WEAKENING, WeakeningGains};
 use crate::estimator::resistance::ADAPTATION;
 use crate::estimator::tables::LATER_ESTIMATOR_PARAMETERS;
@@ -76,7 +78,7 @@ impl SensorlessController {
         let new = State::new(par, false);
         let out = new.computed;
         let mut offset = state.offset;
-        if par.compensation.offset {
+        if par.compensation.calibrate {
             offset.update(par.sensor.measure(self.inputs.i, state.samples), par.T_s);
         }
         *state = State { samples: state.samples, shown: state.shown, offset, ..new };
@@ -158,7 +160,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 9;
+    const STATE_VERSION: u16 = 10;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
@@ -315,7 +317,7 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             ),
             V::part("", &Part { table: ADAPTATION_OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |m| &mut m.model.parameters.estimators }),
-            V::part("compensation.", &Part { table: LATER_COMPENSATION, lens: |m| &mut m.model.parameters.compensation }),
+            V::part("", &Part { table: LATEST_PARAMETERS, lens: |m| &mut m.model.parameters }),
         ]
     },
 );

@@ -342,3 +342,24 @@ mod fixed_size {
         <[u8; 8]>::deserialize(from).map(u64::from_le_bytes)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean is exact at once, and forgets currents that were still flowing at first.
+    #[test]
+    fn offsets_are_a_running_mean() {
+        let mut offset = Offset::default();
+        let at = |a: f64| Phases { a, b: -a, c: 0.01 };
+        offset.update(at(0.02), 1e-4);
+        assert!((offset.i.a - 0.02).abs() < 1e-15 && (offset.i.c - 0.01).abs() < 1e-15);
+        offset.update(at(0.04), 1e-4);
+        assert!((offset.i.a - 0.03).abs() < 1e-15 && (offset.i.b + 0.03).abs() < 1e-15);
+        offset.update(at(5.0), 1e-4);
+        for _ in 0..3000 {
+            offset.update(at(0.02), 1e-4);
+        }
+        assert!((offset.i.a - 0.02).abs() < 1e-5, "{}", offset.i.a);
+    }
+}
