@@ -118,7 +118,8 @@ fn a_real_inverter_near_standstill() {
 #[test]
 fn tracks_the_resistance_at_creep() {
     let heating = |load| Cell { scenario: Scenario::Heating, ..cell(1.0, 1.0, load, 60.0) };
-    let cells = [Cell { speed: 0.01, ..heating(0.0) }, heating(-1.0), Cell { theta: 120.0, ..cell(0.8, 1.0, -1.0, 30.0) }];
+    let cells =
+        [Cell { speed: 0.01, ..heating(0.0) }, heating(-1.0), Cell { theta: 120.0, ..cell(0.8, 1.0, -1.0, 30.0) }];
     assert_eq!(lost(&cells, Some(0.02)), cells);
     assert_eq!(lost_by(&cells, robust()), []);
 }

@@ -131,7 +131,7 @@ fn adapting() -> Experiment {
     let step = |k: u32| (0.2 + 0.1 * f64::from(k), RATED_SPEED * (0.2 - 0.0225 * f64::from(k)));
     let speed_ref = std::iter::once((0.0, 0.2 * RATED_SPEED)).chain((0..=8).map(step)).collect();
     let load = (0..=6).map(|k| (1.5 + 0.05 * f64::from(k), -RATED_TORQUE * f64::from(k) / 12.0)).collect();
-    Experiment { name: "FluxObserver: adapting at 0.02 pu".into(), pair, speed_ref, load, duration: 2.6 }
+    Experiment { name: "FluxObserver: adapting at 0.02 pu".into(), pair, speed_ref, load, duration: 2.6, on: 0.0 }
 }
 
 /// The reversal from 0.5 to -0.5 pu in 0.5 s that only `emf.hold_reversal` holds, under friction of 0.3 pu.
