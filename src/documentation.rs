@@ -28,7 +28,7 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
     );
     let mut out = String::new();
     if !d.documentation.is_empty() {
-        put!(out, "<section>\n{}\n</section>\n", d.documentation.trim());
+        put!(out, "<section>\n{}\n</section>\n", scrolling(d.documentation.trim()));
     }
     out += &timing(d);
     for (title, causality) in
@@ -55,6 +55,19 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
 fn icon(svg: &str) -> String {
     let svg = svg.find("<svg").map_or(svg, |at| &svg[at..]);
     format!("<div class=\"icon\" aria-hidden=\"true\">{}</div>\n", svg.trim())
+}
+
+/// Drawings and tables in boxes of their own, in which a narrow page scrolls them.
+fn scrolling(html: &str) -> String {
+    let boxed = |html: String, open: &str, close: &str| {
+        let mut parts = html.split(open);
+        let first = parts.next().unwrap_or_default().to_owned();
+        parts.fold(first, |out, part| {
+            let (inside, after) = part.split_once(close).unwrap_or((part, ""));
+            out + "<div class=\"scroll\">" + open + inside + close + "</div>" + after
+        })
+    };
+    boxed(boxed(html.to_owned(), "<svg ", "</svg>"), "<table", "</table>")
 }
 
 /// A table of contents that links to the headings, and the body with their anchors.

@@ -128,7 +128,7 @@ impl Area {
         for (place, words) in &panel.marks {
             let x = self.x(*place);
             let _ = writeln!(svg, "<path d=\"M{x:.1} {top:.1}V{bottom:.1}\" stroke=\"{REFERENCE}\"/>");
-            text(svg, (x + 5.0, top + 12.0), "start", words);
+            text(svg, (x + 3.0, top - 3.0), "start", words);
         }
         panel.curves.iter().for_each(|curve| self.curve(curve, svg));
         for (x, y) in &panel.dots {
