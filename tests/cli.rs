@@ -288,9 +288,14 @@ fn a_first_plot_has_five_panels() {
         std::fs::read_to_string(&svg).unwrap()
     };
     let first = run(&[]);
-    for part in
-        ["height=\"1200\"", "PmsmDrive.speed_ref", "theta_est - theta_e", "PmsmDrive.i_q_ref", ">rpm</text>", ">W</text>"]
-    {
+    for part in [
+        "height=\"1200\"",
+        "PmsmDrive.speed_ref",
+        "theta_est - theta_e",
+        "PmsmDrive.i_q_ref",
+        ">rpm</text>",
+        ">W</text>",
+    ] {
         assert!(first.contains(part), "{part}");
     }
     assert!(!first.contains("PmsmDrive.i_a") && run(&["--all"]).contains("PmsmDrive.i_a"));
@@ -329,7 +334,9 @@ fn a_run_is_written_as_a_page() {
     let long = run(&[&arguments[..], &["--all", "--step", "2e-7"]].concat());
     assert!(common::pages::figures(&long)[0]["lengths"][0] == 100_001);
     assert!(long.len() < 5_000_000, "100001 points of every output take {} bytes", long.len());
-    for (option, file, remedy) in [("--html", "run.svg", "pages are written as .html"), ("--all", "", "--html: add one")] {
+    for (option, file, remedy) in
+        [("--html", "run.svg", "pages are written as .html"), ("--all", "", "--html: add one")]
+    {
         let arguments: Vec<&str> = ["simulate", drive, option, file].into_iter().filter(|a| !a.is_empty()).collect();
         fails(&arguments, 2, &[file, remedy]);
     }

@@ -6,8 +6,8 @@ mod common;
 use drive::estimator::Kind;
 use drive_study::compare::candidate::{Class, Entry};
 use drive_study::compare::measure::Measure;
-use drive_study::compare::scenario::{Effort, SCENARIOS};
 use drive_study::compare::plots::{self, Plot};
+use drive_study::compare::scenario::{Effort, SCENARIOS};
 use drive_study::compare::{self, Cell, Selection, html, table};
 use drive_study::{ink, plot};
 use std::collections::BTreeMap;
@@ -206,8 +206,13 @@ fn the_command_writes_table_plots_and_page() {
         assert!(read(svg).contains("<svg"), "{svg}");
     }
     let html = read("compare.html");
-    let (swatch, curve) = ("background:#0593e6\"></span>Extended<wbr>Emf</th>", "\"ink\":\"#0593e6\",\"lost\":false,\"name\":\"ExtendedEmf\"");
-    for part in ["Fig. 8 of the review", "<small>pu</small></th>", "class=\"number in\" title=\"expected", swatch, curve] {
+    let (swatch, curve) = (
+        "background:#0593e6\"></span>Extended<wbr>Emf</th>",
+        "\"ink\":\"#0593e6\",\"lost\":false,\"name\":\"ExtendedEmf\"",
+    );
+    for part in
+        ["Fig. 8 of the review", "<small>pu</small></th>", "class=\"number in\" title=\"expected", swatch, curve]
+    {
         assert!(html.contains(part), "{part}");
     }
     common::pages::stands_alone(&html, |file| out.join(file).exists());

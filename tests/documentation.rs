@@ -136,6 +136,41 @@ fn pages_need_nothing_from_outside() {
     check::<PmsmDrive>();
 }
 
+/// Every page in a browser at three widths, on light and dark paper: nothing wider than the page, nothing from a network, curves drawn;
+/// zoom, legend and keyboard of the page of a run. Pictures stay in `target/tmp/pages`.
+#[test]
+#[ignore = "opt-in: cargo test --test documentation browser -- --ignored (needs Chromium; CHROMIUM names it)"]
+fn pages_in_a_browser() {
+    pages_need_nothing_from_outside();
+    let folder = common::python::scratch().join("pages");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    for model in ["PmsmDrive", "PmsmPlant", "SensorlessController"] {
+        let page = format!("{model}.html");
+        std::fs::copy(common::python::scratch().join(&page), folder.join(&page)).unwrap();
+    }
+    let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    let drive = common::archives().join("fmi3/PmsmDrive.fmu");
+    let inputs = ["--input", "speed_ref=0:0,0.1:1000rpm", "--input", "tau_load=0:0,0.5:2"];
+    let commands = [
+        [
+            &["simulate", drive.to_str().unwrap()][..],
+            &inputs,
+            &["--html", &path("run.html"), "--csv", &path("run.csv")],
+        ]
+        .concat(),
+        vec!["compare", "--scenario", "ramp,reversal,load-0,signal,signal-trace", "--out", &path("compare")],
+        vec!["reproduce", "--out", &path("reproduce")],
+        vec!["atlas", "--every", "20", "--out", &path("atlas")],
+    ]
+    .map(|command| command.into_iter().map(String::from).collect::<Vec<_>>());
+    for command in commands {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_fmu")).args(&command).output().unwrap();
+        assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    common::python::pytest("pages", "pages", &["test_browser.py"], &[("FMU_PAGES", &folder)]);
+}
+
 /// Every relative link of README, the pages at the root and `docs` leads to a file.
 #[test]
 fn links_lead_somewhere() {

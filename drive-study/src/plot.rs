@@ -47,7 +47,8 @@ pub fn svg(figure: &Figure) -> Result<String> {
         }
         let mut at = if beside { (area.right + 14.0, area.top + 10.0) } else { (area.left, area.top - 8.0) };
         for Curve { name, ink, opacity, fill, dashed, lost, .. } in &panel.curves {
-            let (dash, wide) = (if *dashed { " stroke-dasharray=\"5 3\"" } else { "" }, if *fill < 1.0 { 2.5 } else { 9.0 });
+            let (dash, wide) =
+                (if *dashed { " stroke-dasharray=\"5 3\"" } else { "" }, if *fill < 1.0 { 2.5 } else { 9.0 });
             let _ = writeln!(
                 svg,
                 "<path d=\"M{:.1} {:.1}h18\" stroke=\"{ink}\" stroke-opacity=\"{opacity}\" stroke-width=\"{wide}\"{dash}/>",
@@ -86,7 +87,8 @@ struct Area {
 
 impl Area {
     fn new(panel: &Panel, [left, top, right, bottom]: [f64; 4]) -> Self {
-        let curves = panel.curves.iter().flat_map(|c| c.points().chain((c.fill > 0.0).then_some((panel.window.0, 0.0))));
+        let curves =
+            panel.curves.iter().flat_map(|c| c.points().chain((c.fill > 0.0).then_some((panel.window.0, 0.0))));
         let seen = |(x, y): &(f64, f64)| y.is_finite() && (panel.window.0..=panel.window.1).contains(x);
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for (_, y) in curves.chain(panel.dots.iter().copied()).filter(seen) {
@@ -101,7 +103,8 @@ impl Area {
     }
 
     fn x(&self, x: f64) -> f64 {
-        self.left + (self.right - self.left) * (x - self.window.0) / (self.window.1 - self.window.0).max(f64::MIN_POSITIVE)
+        self.left
+            + (self.right - self.left) * (x - self.window.0) / (self.window.1 - self.window.0).max(f64::MIN_POSITIVE)
     }
 
     fn y(&self, y: f64) -> f64 {

@@ -391,8 +391,12 @@ fn write(mut recording: Recording, for_plot: usize, args: &Simulate, mut out: im
     }
     if let (Some(path), Some(plotted)) = (&args.html, &plotted) {
         let names: Vec<&str> = args.fmus.iter().map(|file| file.rsplit(['/', '\\']).next().unwrap_or(file)).collect();
-        let figure = page::figure(plotted, "The plot needs JavaScript; fmu simulate --plot FILE.svg draws it without.")?;
-        let ended = recording.ended_by.as_ref().map(|name| format!("<p>{} asked to end the simulation.</p>\n", page::escape(name)));
+        let figure =
+            page::figure(plotted, "The plot needs JavaScript; fmu simulate --plot FILE.svg draws it without.")?;
+        let ended = recording
+            .ended_by
+            .as_ref()
+            .map(|name| format!("<p>{} asked to end the simulation.</p>\n", page::escape(name)));
         let body = format!("{}{figure}", ended.unwrap_or_default());
         pack::write(path, page::page(&names.join(", "), &body).as_bytes())?;
     }

@@ -59,7 +59,10 @@ impl Table {
             format!("<tr>{cells}</tr>\n")
         };
         let rows: String = self.rows.iter().map(|row| line("td", row)).collect();
-        format!("<div class=\"scroll\" tabindex=\"0\"><table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody></table></div>\n", line("th", &self.heads))
+        format!(
+            "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody></table></div>\n",
+            line("th", &self.heads)
+        )
     }
 }
 

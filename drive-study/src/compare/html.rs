@@ -34,7 +34,8 @@ pub fn page(cells: &[Cell], plots: &[Plot]) -> Result<String> {
     }
     html.push_str("</nav>\n");
     for (k, block) in blocks.iter().enumerate() {
-        let _ = write!(html, "<h2 id=\"table-{k}\">{}</h2>\n{}<ul class=\"notes\">\n", escape(block.title), grid(block));
+        let _ =
+            write!(html, "<h2 id=\"table-{k}\">{}</h2>\n{}<ul class=\"notes\">\n", escape(block.title), grid(block));
         for note in &block.notes {
             let _ = writeln!(html, "<li>{}</li>", escape(note));
         }
@@ -61,7 +62,8 @@ fn grid(block: &Block<'_>) -> String {
     let first = |k: usize| if k == 0 { "number first" } else { "number" };
     for (_, measures) in &block.headings {
         for (k, m) in measures.iter().enumerate() {
-            let _ = write!(html, "<th class=\"{}\">{}<br><small>{}</small></th>", first(k), escape(m.name), escape(m.unit));
+            let _ =
+                write!(html, "<th class=\"{}\">{}<br><small>{}</small></th>", first(k), escape(m.name), escape(m.unit));
         }
         if measures.is_empty() {
             html.push_str("<th class=\"first\"></th>");

@@ -53,7 +53,10 @@ fn together(id: &str, cells: &[&Cell]) -> Plot {
         errors.push(curve(&trace.error));
     }
     let panels = vec![panel("speed in pu", &time, speeds), panel("theta - theta^ in deg", &time, errors)];
-    Plot { name: id.into(), figure: Figure { title: cells[0].scenario.title.into(), x: "time in s", columns: 1, panels } }
+    Plot {
+        name: id.into(),
+        figure: Figure { title: cells[0].scenario.title.into(), x: "time in s", columns: 1, panels },
+    }
 }
 
 /// Fig. 8 and 11: the carrier current over six milliseconds, and the angle found in it.
@@ -75,10 +78,7 @@ fn signal(cell: &Cell) -> Vec<Plot> {
         };
         let panels = vec![panel(unit, time, vec![of(0), of(1)])];
         let title = format!("{review}{name} at 0.05 pu: {what}");
-        Plot {
-            name: format!("signal-{name}-{part}"),
-            figure: Figure { title, x: "time in s", columns: 1, panels },
-        }
+        Plot { name: format!("signal-{name}-{part}"), figure: Figure { title, x: "time in s", columns: 1, panels } }
     };
     let currents = trace.current.get(from..to).unwrap_or_default();
     let time = trace.t.get(from..to).unwrap_or_default();

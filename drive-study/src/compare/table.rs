@@ -97,12 +97,9 @@ fn block<'a>(group: &'static str, cells: &'a [Cell]) -> Block<'a> {
         }
     }
     let of = |id: &'static str| inside.iter().copied().filter(move |c| c.scenario.id == id);
-    let heading = |id: &'static str| {
-        (id, of(id).map(Cell::measures).find(|m| !m.is_empty()).unwrap_or_default())
-    };
-    let row = |entry: &&'a Entry| {
-        (*entry, scenarios.iter().map(|id| of(id).find(|c| c.entry.name == entry.name)).collect())
-    };
+    let heading = |id: &'static str| (id, of(id).map(Cell::measures).find(|m| !m.is_empty()).unwrap_or_default());
+    let row =
+        |entry: &&'a Entry| (*entry, scenarios.iter().map(|id| of(id).find(|c| c.entry.name == entry.name)).collect());
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for cell in &inside {
         let (Outcome::NotApplicable(why), who) = (&cell.outcome, cell.entry.name) else { continue };

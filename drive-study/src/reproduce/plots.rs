@@ -14,8 +14,9 @@ fn panel<const N: usize>(title: &str, unit: &str, trace: &Trace, window: (f64, f
     let from = trace.t.partition_point(|x| *x < window.0);
     let to = trace.t.partition_point(|x| *x <= window.1);
     let x = trace.t[from..to].into();
-    let curve = |(name, ink, values): Row<'_>| {
-        Curve { dashed: ink == REFERENCE, ..Curve::new(name, ink, &x, values[from..to].to_vec()) }
+    let curve = |(name, ink, values): Row<'_>| Curve {
+        dashed: ink == REFERENCE,
+        ..Curve::new(name, ink, &x, values[from..to].to_vec())
     };
     let curves = rows.into_iter().map(curve).collect();
     Panel { title: title.into(), unit: unit.into(), window, curves, ..Panel::default() }

@@ -68,9 +68,13 @@ impl Table {
         };
         let heading = |f: &Figure| {
             let Figure { figure, quantity, unit, .. } = f;
-            format!("<th class=\"number\">{}<br><small>Fig. {figure}</small><br><small>{unit}</small></th>", escape(quantity))
+            format!(
+                "<th class=\"number\">{}<br><small>Fig. {figure}</small><br><small>{unit}</small></th>",
+                escape(quantity)
+            )
         };
-        let expected = |f: &Figure| format!("<td class=\"number\">{}</td>", escape(&f.expected.to_string()).replace('-', "−"));
+        let expected =
+            |f: &Figure| format!("<td class=\"number\">{}</td>", escape(&f.expected.to_string()).replace('-', "−"));
         let measured = |f: &Figure| {
             let (class, mark) = if f.holds() { ("in", "✓") } else { ("out", "✗") };
             format!("<td class=\"number {class}\">{} {mark}</td>", number(f.measured).replace('-', "−"))
