@@ -15,14 +15,15 @@ from fmpy import simulate_fmu
 folder = sys.argv[1] if len(sys.argv) > 1 else "target/fmu/fmi3"
 
 # Time in s, speed reference in rad/s, load in N.m: straight lines between the rows, a step where two have one time.
-rows = [(0, 0, 0), (0.1, 0, 0), (0.1, 104.7, 0), (0.5, 104.7, 0), (0.6, 104.7, 2), (1, 104.7, 2), (1.2, 104.7, -2), (1.5, 104.7, -2)]
+w = 1000 * np.pi / 30
+rows = [(0, 0, 0), (0.1, 0, 0), (0.1, w, 0), (0.5, w, 0), (0.6, w, 2), (1, w, 2), (1.2, w, -2), (1.5, w, -2)]
 inputs = np.array(rows, dtype=[("time", float), ("speed_ref", float), ("tau_load", float)])
-# Losses of iron (S) and inverter (V, Ohm, J), assumed: the start values are 0.
-losses = {"iron.G_e": 1.3e-4, "inverter.u_transistor": 0.8, "inverter.u_diode": 0.8, "inverter.r_transistor": 0.08, "inverter.r_diode": 0.08, "inverter.E_sw": 5e-4}
+# Losses of iron (S) and inverter (Ohm, J), assumed: the start values are 0.
+losses = {"iron.G_e": 1.3e-4, "inverter.r_transistor": 0.08, "inverter.r_diode": 0.08, "inverter.E_sw": 5e-4}
 outputs = ["speed", "speed_est", "tau_e", "p_in", "p_mech", "p_loss", "efficiency"]
 with redirect_stdout(None):  # FMPy lists the inputs that keep their start values
-    run = simulate_fmu(f"{folder}/PmsmDrive.fmu", stop_time=1.5, step_size=1e-3, output_interval=2e-3, input=inputs, output=outputs,
-                       start_values={f"plant.{name}": value for name, value in losses.items()})
+    run = simulate_fmu(f"{folder}/PmsmDrive.fmu", stop_time=1.5, step_size=1e-3, output_interval=2e-3, input=inputs,
+                       output=outputs, start_values={f"plant.{name}": value for name, value in losses.items()})
 
 t, rpm = run["time"], 30 / np.pi
 efficiency = np.where(run["efficiency"] > 0, 100 * run["efficiency"], np.nan)  # 0 where no power goes through
@@ -43,5 +44,6 @@ for axis, (label, curves) in zip(axes, panels.items()):
     axis.grid(alpha=0.3)
 
 for name, k in (("motor", 475), ("generator", 725)):
-    print(f"{name} at {rpm * run['speed'][k]:.1f} rpm: {run['p_in'][k]:.1f} W in, {run['p_mech'][k]:.1f} W out, efficiency {efficiency[k]:.1f} %")
+    speed, p_in, p_mech = (run[name][k] for name in ("speed", "p_in", "p_mech"))
+    print(f"{name} at {rpm * speed:.1f} rpm: {p_in:.1f} W in, {p_mech:.1f} W out, efficiency {efficiency[k]:.1f} %")
 figure.savefig("drive.svg")

@@ -89,7 +89,9 @@ impl Figure {
             let y = column.values.iter().map(shown).collect();
             panels[at].curves.push(Curve::new(column.name.as_str(), ink::REFERENCE, &time, y));
         }
-        panels.iter_mut().for_each(|panel| color(&mut panel.curves));
+        for panel in &mut panels {
+            color(&mut panel.curves);
+        }
         Self { title: String::new(), x: "time in s", columns: 1, panels }
     }
 

@@ -67,7 +67,7 @@ impl Follow {
     pub fn add(&mut self, t: f64, reference: f64, pair: &Pair) {
         let (speed, error) = (runner::speed(pair), runner::rotor_ahead(pair));
         let off = speed - reference;
-        if self.trace.lost.is_none() && !(error.abs() <= LOST) {
+        if self.trace.lost.is_none() && (error.is_nan() || error.abs() > LOST) {
             self.trace.lost = Some(t);
         }
         self.n += 1.0;
