@@ -10,6 +10,8 @@ const SIZE: [(f64, f64); 2] = [(1060.0, 240.0), (520.0, 270.0)];
 /// Space for the legend: beside the panels of one column, above those of several.
 const BESIDE: f64 = 240.0;
 const ABOVE: f64 = 22.0;
+/// Distance of two names below each other.
+const LINE: f64 = 17.0;
 /// Maximum number of points drawn per curve: the highest and lowest point of as many intervals as the picture resolves.
 const STRETCHES: usize = 1000;
 /// Maximum distance in pixels of a dropped point from the drawn curve.
@@ -28,16 +30,22 @@ pub fn svg(figure: &Figure) -> Result<String> {
         bail!("nothing was recorded, so there is nothing to plot");
     }
     let (width, height) = SIZE[usize::from(figure.columns > 1)];
-    let (across, down) = (figure.columns.min(figure.panels.len()), figure.panels.len().div_ceil(figure.columns));
-    let (all_width, all_height) = (width * count(across), height * count(down));
+    let beside = figure.columns == 1;
+    // As high as the names beside it need.
+    let height_of = |panel: &Panel| if beside { height.max(LINE * count(panel.curves.len()) + 20.0) } else { height };
+    let all_width = width * count(figure.columns.min(figure.panels.len()));
+    let all_height: f64 = figure.panels.iter().step_by(figure.columns).map(height_of).sum();
+    let mut top = 0.0;
     let mut svg = format!(
         "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" width=\"{all_width}\" height=\"{all_height}\" \
          viewBox=\"0 0 {all_width} {all_height}\" font-family=\"sans-serif\" font-size=\"12\">\n{STYLE}\n\
          <rect class=\"paper\" width=\"{all_width}\" height=\"{all_height}\" fill=\"#ffffff\"/>\n"
     );
     for (k, panel) in figure.panels.iter().enumerate() {
-        let (x, y) = (width * count(k % figure.columns), height * count(k / figure.columns));
-        let beside = figure.columns == 1;
+        let (x, y, height) = (width * count(k % figure.columns), top, height_of(panel));
+        if (k + 1) % figure.columns == 0 {
+            top += height;
+        }
         let above = if panel.title.is_empty() { 0.0 } else { 18.0 } + if beside { 10.0 } else { ABOVE };
         let right = if beside { BESIDE } else { 14.0 };
         let area = Area::new(panel, [x + 66.0, y + above, x + width - right, y + height - 40.0]);
@@ -58,7 +66,7 @@ pub fn svg(figure: &Figure) -> Result<String> {
             let label = if *lost { format!("{name} ✕ lost") } else { name.clone() };
             text(&mut svg, (at.0 + 24.0, at.1), "start", &label);
             // A letter is about 6.2 pixels wide.
-            at = if beside { (at.0, at.1 + 17.0) } else { (at.0 + 42.0 + 6.2 * count(label.chars().count()), at.1) };
+            at = if beside { (at.0, at.1 + LINE) } else { (at.0 + 42.0 + 6.2 * count(label.chars().count()), at.1) };
         }
     }
     Ok(svg + "</svg>\n")
@@ -244,5 +252,21 @@ mod tests {
         assert!(text.contains("a &amp; b ✕ lost") && text.contains("stroke-dasharray") && !text.contains("NaN"));
         assert!(text.contains("l10 10m0-10l-10 10"), "{text}");
         assert!(svg(&figure(Vec::new())).is_err());
+    }
+
+    #[test]
+    fn a_panel_is_as_high_as_its_names() {
+        let curve = |k: usize| Curve::through(format!("x{k}"), CURVES[0], [(0.0, 1.0), (1.0, 2.0)].into_iter());
+        let panel = |n: usize| Panel { window: (0.0, 1.0), curves: (0..n).map(curve).collect(), ..Panel::default() };
+        let figure = Figure { x: "time in s", columns: 1, panels: vec![panel(20), panel(2)], ..Figure::default() };
+        let text = svg(&figure).unwrap();
+        // 20 names of 17 pixels and 20 around them, then a panel of the usual height.
+        assert!(text.contains("height=\"600\"") && text.matches(">x19</text>").count() == 1, "{text}");
+        let places = text.match_indices("text-anchor=\"start\">x").map(|(at, _)| {
+            let before = &text[..at];
+            before.rsplit("y=\"").next().unwrap().split('"').next().unwrap().parse::<f64>().unwrap()
+        });
+        let places: Vec<f64> = places.collect();
+        assert!(places.windows(2).all(|pair| pair[1] - pair[0] >= 17.0), "{places:?}");
     }
 }

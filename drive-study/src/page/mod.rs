@@ -2,7 +2,7 @@
 
 use crate::figure::{Curve, Figure, Panel};
 use crate::ink::Ink;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
@@ -40,8 +40,11 @@ pub fn page(title: &str, body: &str) -> String {
 /// A figure with its data; `instead` is HTML for browsers without JavaScript.
 ///
 /// # Errors
-/// Memory for the data is missing.
+/// There is nothing to draw.
 pub fn figure(figure: &Figure, instead: &str) -> Result<String> {
+    if figure.is_empty() {
+        bail!("nothing was recorded, so there is nothing to plot");
+    }
     let mut data = Data::default();
     let panels: Vec<Value> = figure.panels.iter().map(|panel| data.panel(panel)).collect();
     let mut deflated = ZlibEncoder::new(Vec::new(), Compression::best());
