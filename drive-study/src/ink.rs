@@ -11,7 +11,7 @@ pub const CURVES: [Ink; 7] = ["#0a80c4", "#d55e00", "#009e73", "#cc79a7", "#e69f
 /// References and what frames others.
 pub const REFERENCE: Ink = CURVES[6];
 
-/// The color of an estimator, in every plot and on every page, with a contrast of about 3 or more to white and to the dark paper:
+/// The color of an estimator, in every plot and on every page, with a contrast of at least 3 to white and to the dark paper:
 /// light tones for those that follow the back EMF, dark ones for the others. A variant has the color of its estimator and a dashed line.
 pub fn of(kind: Kind) -> Ink {
     match kind {
@@ -24,13 +24,13 @@ pub fn of(kind: Kind) -> Ink {
         Kind::KalmanFilter => "#179fa5",
         Kind::GradientObserver => "#847ae8",
         Kind::SlidingMode => "#769c03",
-        Kind::Rasmussen => "#036eae",
-        Kind::FluxObserver => "#b23641",
-        Kind::RotatingInjection => "#a44c06",
-        Kind::PulsatingInjection => "#0a7d51",
-        Kind::SquareWaveInjection => "#993f94",
-        Kind::NearPwmInjection => "#846305",
-        Kind::Hybrid => "#6356bf",
+        Kind::Rasmussen => "#0775b9",
+        Kind::FluxObserver => "#bb3e48",
+        Kind::RotatingInjection => "#ae520a",
+        Kind::PulsatingInjection => "#0d8557",
+        Kind::SquareWaveInjection => "#a1469c",
+        Kind::NearPwmInjection => "#8d6a06",
+        Kind::Hybrid => "#695dc8",
         Kind::Sensored => "#7d8489",
     }
 }
@@ -58,7 +58,7 @@ mod tests {
         for (k, ink) in inks.iter().enumerate() {
             assert!(!inks[k + 1..].contains(ink), "{ink} twice");
             for paper in ["#ffffff", "#15191c"] {
-                assert!(contrast(ink, paper) > 2.95, "{ink} on {paper}: {}", contrast(ink, paper));
+                assert!(contrast(ink, paper) > 3.0, "{ink} on {paper}: {}", contrast(ink, paper));
             }
         }
     }
