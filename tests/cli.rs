@@ -460,6 +460,8 @@ fn an_atlas_is_written_or_refused() {
         ["atlas.csv", "atlas.md", "atlas.html", "atlas-Rasmussen.svg"]
             .map(|name| std::fs::read(out.join(name)).unwrap())
     };
+    let [.., page, _] = run("1", "a");
+    common::pages::stands_alone(&text(&page), |file| file == "atlas.csv");
     assert!(run("1", "a") == run("2", "b"));
     for (arguments, parts) in [
         (&["--load="][..], &["--load has no value", "at least one", "leave the option out"][..]),

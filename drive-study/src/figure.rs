@@ -1,6 +1,7 @@
 //! What a plot shows, for the two that draw it: [`crate::plot`] as SVG, [`crate::page`] as a page with zoom.
 
 use crate::ink::{self, Ink};
+use crate::overview;
 use fmu_import::cosimulation::Recording;
 use std::rc::Rc;
 
@@ -80,7 +81,7 @@ impl Figure {
         let window = (time.first().copied().unwrap_or_default(), time.last().copied().unwrap_or_default());
         let mut panels: Vec<Panel> = Vec::new();
         for column in &recording.columns {
-            let unit = if column.shown_unit().is_empty() { "1" } else { column.shown_unit() };
+            let unit = if column.shown_unit().is_empty() { "no unit" } else { column.shown_unit() };
             let at = panels.iter().position(|panel| panel.unit == unit).unwrap_or_else(|| {
                 panels.push(Panel { unit: unit.into(), window, ..Panel::default() });
                 panels.len() - 1
@@ -105,7 +106,12 @@ impl Figure {
 fn color(curves: &mut [Curve]) {
     let names: Vec<String> = curves.iter().map(|curve| curve.name.clone()).collect();
     let (mut colors, mut place) = (Vec::<(Ink, f64)>::new(), 0);
-    let base = |name: &str| name.strip_suffix("_ref").and_then(|base| names.iter().position(|other| other == base));
+    // The reference of a variable may be of another instance.
+    let base = |name: &str| {
+        let base = name.strip_suffix("_ref")?;
+        let same = names.iter().position(|other| other == base);
+        same.or_else(|| names.iter().position(|other| overview::last(other) == overview::last(base)))
+    };
     for name in &names {
         colors.push((ink::CURVES[place % 6], if place < 6 { 1.0 } else { 0.5 }));
         place += usize::from(base(name).is_none());
@@ -142,10 +148,10 @@ mod tests {
             display: None,
             values: vec![0.0, 1.0, f64::NAN],
         };
-        let columns = vec![column("p.i_a_ref", "A"), column("p.speed", ""), column("p.i_q", "A"), column("p.i_a", "A")];
+        let columns = vec![column("c.i_a_ref", "A"), column("p.speed", ""), column("p.i_q", "A"), column("p.i_a", "A")];
         let figure = Figure::of(&Recording { time: vec![0.0, 0.5, 1.0], columns, ended_by: None });
         let [currents, speed] = &figure.panels[..] else { panic!("{figure:?}") };
-        assert_eq!((currents.unit.as_str(), speed.unit.as_str(), speed.window), ("A", "1", (0.0, 1.0)));
+        assert_eq!((currents.unit.as_str(), speed.unit.as_str(), speed.window), ("A", "no unit", (0.0, 1.0)));
         let shown: Vec<_> = currents.curves.iter().map(|c| (c.ink, c.dashed)).collect();
         assert_eq!(shown, [(ink::CURVES[1], true), (ink::CURVES[0], false), (ink::CURVES[1], false)]);
     }

@@ -176,7 +176,7 @@ class Panel {
 
   draw() {
     this.left = this.view.left;
-    this.across = this.svg.clientWidth - this.left - 12;
+    this.across = this.svg.clientWidth - this.left - 18;
     const right = this.left + this.across;
     put(this.clip, { x: this.left, y: this.top - 2, width: this.across, height: this.bottom - this.top + 4 });
     this.axes.replaceChildren();

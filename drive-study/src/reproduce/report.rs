@@ -155,7 +155,10 @@ pub(super) fn html(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::figure::{Curve, Panel};
+    use crate::ink::REFERENCE;
     use crate::reproduce::figures::Expected;
+    use crate::reproduce::scenario::REST;
 
     #[test]
     fn numbers_have_four_digits() {
@@ -176,8 +179,19 @@ mod tests {
         };
         let table = Table { fmi2: vec![vec![figure(1.05)]], fmi3: vec![vec![figure(1.2)]] };
         assert!(!table.holds() && table.text().contains("OFF"));
-        let html = table.html(0);
-        assert!(html.contains("in\">1.050 ✓</td>") && html.contains("out\">1.200 ✗</td>"), "{html}");
+        let curve = Curve::through("speed", REFERENCE, [(0.0, 1.0), (1.0, 2.0)].into_iter());
+        let panels = vec![Panel { window: (0.0, 1.0), curves: vec![curve], ..Panel::default() }];
+        let plot = FigureOfPaper { title: "Fig. 4".into(), x: "time in s", columns: 1, panels };
+        let page = html(&table, true, &[("f.svg", plot)], &[Scenario { id: "dip", ..REST }]).unwrap();
+        let parts = [
+            "in\">1.050 ✓</td>",
+            "out\">1.200 ✗</td>",
+            "verdict off",
+            "<small>rpm</small></th>",
+            "href=\"dip.csv\"",
+            "href=\"f.svg\"",
+        ];
+        assert!(parts.iter().all(|part| page.contains(part)), "{page}");
         assert!(!Expected::AtMost(1.0).holds(f64::NAN) && !Expected::Near(1.0, 0.1).holds(f64::NAN));
     }
 }
