@@ -81,7 +81,7 @@ fn the_reference_motor_gives_the_start_values_of_the_controller() {
     let description = fmu_core::Description::of::<drive::SensorlessController>().unwrap();
     let mut compared = 0;
     for setting in &tuned.controller {
-        let start = description.variable(setting.name).unwrap().start.as_ref().unwrap()[0];
+        let start = &description.variable(setting.name).unwrap().start.as_ref().unwrap()[0];
         if let (rules::Value::Real(x), fmu_core::description::Value::Real(start)) = (&setting.value, start) {
             assert!((x - start).abs() <= 1e-6 * start.abs(), "{}: {x}, start value {start}", setting.name);
             compared += 1;
@@ -118,14 +118,15 @@ fn files_have_what_differs_from_the_start_values() {
     let start = |description: &fmu_core::Description, name: &str| {
         use fmu_core::description::{Value, VariableKind};
         let variable = description.variable(name).unwrap();
-        let item = |i: i32| match &variable.kind {
-            VariableKind::Enumeration { items, .. } => items.iter().find(|(value, ..)| *value == i).unwrap().1.clone(),
+        let item = |i: i128| match &variable.kind {
+            VariableKind::Enumeration { items, .. } => items.iter().find(|(value, ..)| i128::from(*value) == i).unwrap().1.clone(),
             _ => i.to_string(),
         };
-        match variable.start.as_ref().unwrap()[0] {
+        match &variable.start.as_ref().unwrap()[0] {
             Value::Real(x) => x.to_string(),
-            Value::Integer(i) => item(i),
+            Value::Integer(i) => item(*i),
             Value::Boolean(b) => b.to_string(),
+            Value::Text(text) => text.clone(),
         }
     };
     for path in motors() {

@@ -2,6 +2,7 @@
 
 use crate::{Elapsed, Fault, Hash, Step, Table, Terminal};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use std::path::Path;
 
 /// General information about a model, besides its variables.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +64,7 @@ pub enum Interface {
 /// A model of one block in a block diagram, sampled or continuous.
 ///
 /// The life of an instance:
-/// 1. `Default` creates it: inputs and parameters at their start values.
+/// 1. `Default` creates it: inputs and parameters at their start values. [`load`](Model::load) reads resources.
 /// 2. The importer sets parameters and inputs; each set is checked against its range in the table.
 /// 3. [`derive`](Model::derive), [`initialize`](Model::initialize) and [`output`](Model::output) run whenever the importer
 ///    asks for a value after it has set one, so that initialization can be iterated.
@@ -92,6 +93,16 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
 
     /// Hash of name, version and table.
     const HASH: Hash = Hash::START.text(Self::INFO.name).text(Self::INFO.version).join(&Self::TABLE.hash());
+
+    /// Reads data from the files of the FMU's folder `resources/`, once, at instantiation. `resources` is that folder; `None`
+    /// if the importer names none. What is read belongs into a [`Resource`](crate::Resource): it is no part of a saved state,
+    /// and is there again after a reset, and when a state is restored.
+    ///
+    /// # Errors
+    /// Names the file and the reason: there is no instance.
+    fn load(&mut self, _resources: Option<&Path>) -> Result<(), Fault> {
+        Ok(())
+    }
 
     /// Calculated parameters from the parameters; runs again when a tunable parameter was set.
     fn derive(&mut self) {}

@@ -16,9 +16,11 @@ pub mod lifecycle;
 pub mod log;
 mod message;
 pub mod registry;
+mod resources;
 pub mod sensitivity;
 pub mod snapshot;
 mod step;
+mod text;
 pub mod value;
 
 #[doc(hidden)]

@@ -11,6 +11,7 @@ use crate::lifecycle::{Standard, State};
 use crate::message;
 use crate::snapshot::ramps;
 use fmu_core::{Block, Causality, Elapsed, Exported, Fault, Kind, Model, Slot, Step, Variability};
+use std::borrow::Cow;
 
 /// Parts into which a step with changing inputs is divided: each has the inputs of its middle.
 const PARTS: u32 = 32;
@@ -45,6 +46,7 @@ impl<E: Exported> Instance<E> {
             Standard::Fmi2 => "providesDirectionalDerivative = false",
             Standard::Fmi3 => "providesDirectionalDerivatives = false",
         })?;
+        let (unknowns, knowns) = (&*self.each(unknowns)?, &*self.each(knowns)?);
         self.check_sides(unknowns, knowns)?;
         check_sizes(seed, knowns.len(), (out.len(), unknowns.len()))?;
         self.column(unknowns, knowns, seed, out)
@@ -56,6 +58,7 @@ impl<E: Exported> Instance<E> {
     /// As [`directional`](Self::directional).
     pub fn adjoint(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
         supported::<E>("providesAdjointDerivatives = false")?;
+        let (unknowns, knowns) = (&*self.each(unknowns)?, &*self.each(knowns)?);
         self.check_sides(unknowns, knowns)?;
         check_sizes(seed, unknowns.len(), (out.len(), knowns.len()))?;
         let mut column = std::mem::take(&mut self.scratch().column);
@@ -78,6 +81,7 @@ impl<E: Exported> Instance<E> {
         if let Some(order) = orders.iter().find(|&&order| order != 1) {
             return Err(Fault::value("order", order, "1: maxOutputDerivativeOrder = 1").into());
         }
+        let unknowns = &*self.each(unknowns)?;
         check_sizes(&[], 0, (out.len(), unknowns.len()))?;
         for &unknown in unknowns {
             if !self.is_output(unknown, false) {
@@ -177,6 +181,19 @@ impl<E: Exported> Instance<E> {
         }
         current.block = block;
         Ok(())
+    }
+
+    /// The references of all elements of what the references of FMI 3.0 stand for.
+    fn each<'a>(&mut self, references: &'a [u32]) -> Result<Cow<'a, [u32]>, Fault> {
+        if !self.arrays {
+            return Ok(Cow::Borrowed(references));
+        }
+        let mut all = Vec::with_capacity(references.len());
+        for &reference in references {
+            let elements = self.elements(reference)?;
+            all.extend((reference..).take(elements));
+        }
+        Ok(Cow::Owned(all))
     }
 
     fn scratch(&mut self) -> &mut Scratch<E::Model> {
@@ -366,7 +383,7 @@ impl<E: Exported> Instance<E> {
                     Causality::Parameter => initial || (parameters && meta.variability == Variability::Tunable),
                     _ => false,
                 };
-                fits && matches!(meta.kind, Kind::Real(_)) && meta.dimension.is_none()
+                fits && matches!(meta.kind, Kind::Real(_))
             });
             if !(state_row || input) {
                 return Err(Self::no_side(known, "a known of derivatives in this state"));

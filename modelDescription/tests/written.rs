@@ -214,7 +214,7 @@ fn structure() {
 fn an_array_output_stands_once_in_fmi3_and_by_elements_in_fmi2() {
     let mut three = sample();
     let speed = three.variables.iter_mut().find(|v| v.name == "speed").unwrap();
-    (speed.dimension, speed.value_reference) = (Some(3), 100);
+    (speed.shape, speed.value_reference) = (vec![3], 100);
     for (version, count) in [(FmiVersion::V2, 3), (FmiVersion::V3, 1)] {
         let md = read(write(&three, version, &generation())).unwrap();
         let of_speed = |unknowns: &[Unknown]| {

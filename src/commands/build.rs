@@ -3,7 +3,7 @@
 use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
-use crate::pack::{self, Moment};
+use crate::pack::{self, Entry, Moment};
 use crate::target::{Target, Tools, ZIG};
 use crate::workspace::{Package, Workspace};
 use anyhow::{Context, Result, anyhow, bail};
@@ -27,6 +27,9 @@ use std::path::{Path, PathBuf};
 ///   a library that is already built, or several libraries of one model for several platforms
 ///                                  fmu build --library target/release/libmy_fmu.so
 ///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
+///
+/// The folder resources/ beside the package's Cargo.toml, or that of --resources, becomes the FMU's own: the model reads it in
+/// `load`. Hidden files stay out.
 ///
 /// For other platforms, name the Rust targets; the FMUs then contain a binary for each of them and no others:
 ///   fmu build --target x86_64-unknown-linux-gnu,aarch64-unknown-linux-gnu,x86_64-pc-windows-gnu
@@ -57,6 +60,9 @@ pub struct Build {
     /// Library that is already built; with PLATFORM= if it is for another platform
     #[arg(long, value_name = "[PLATFORM=]FILE")]
     pub library: Vec<String>,
+    /// Folder with the resources of the --library
+    #[arg(long, value_name = "DIR", requires = "library")]
+    pub resources: Option<PathBuf>,
     /// Target to build for instead of this computer; separate several with commas or repeat the option
     #[arg(long, value_name = "TRIPLE", value_delimiter = ',', conflicts_with = "library")]
     pub target: Vec<String>,
@@ -73,6 +79,8 @@ struct Model {
     description: Description,
     binaries: Vec<(Platform, Vec<u8>)>,
     licenses: Licenses,
+    /// Files of the model's own.
+    resources: BTreeMap<String, Entry>,
 }
 
 /// Runs the command; returns the files that were written.
@@ -94,7 +102,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
         (compiled(&workspace, args)?, out)
     } else {
         let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("fmu")), Ok);
-        (vec![given(&args.library)?], out.context("there is no workspace here: name the output folder with --out")?)
+        (vec![given(&args.library, args.resources.as_deref())?], out.context("there is no workspace here: name the output folder with --out")?)
     };
     for note in notes(&models) {
         eprintln!("note: {note}");
@@ -102,10 +110,13 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     let mut written = Vec::new();
     for model in &models {
         for &version in &versions {
+            let name = &model.description.name;
+            model_description::fits(&model.description, version).map_err(|e| anyhow!("{name}: {e}"))?;
             let folder = if version == FmiVersion::V2 { "fmi2" } else { "fmi3" };
-            let path = out.join(folder).join(format!("{}.fmu", model.description.name));
+            let path = out.join(folder).join(format!("{name}.fmu"));
             let mut files = pack::contents(&model.description, &model.binaries, &model.licenses, version, moment);
             files.extend(icons::files(&model.description, version)?);
+            files.extend(model.resources.clone());
             pack::write(&path, &pack::archive(&files, moment)?)?;
             written.push(path);
         }
@@ -164,7 +175,10 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
         bail!("nothing that was compiled is a cdylib: set crate-type = [\"cdylib\"]");
     }
     let model = |(package, own): &Library| {
-        load(own, built.get(package).map_or(&[], Vec::as_slice), Licenses::of_package(workspace, package))
+        let folder = workspace.package(package).map(|package| package.folder().join("resources"));
+        let folder = folder.filter(|folder| folder.is_dir());
+        let libraries = built.get(package).map_or(&[][..], Vec::as_slice);
+        load(own, libraries, Licenses::of_package(workspace, package), folder.as_deref())
     };
     describing.iter().map(model).collect()
 }
@@ -218,7 +232,7 @@ fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>>
 }
 
 /// Libraries of one model that are already built.
-fn given(libraries: &[String]) -> Result<Model> {
+fn given(libraries: &[String], resources: Option<&Path>) -> Result<Model> {
     let parse = |text: &String| match text.split_once('=') {
         Some((platform, file)) => Ok((platform.parse().map_err(|e: String| anyhow!(e))?, PathBuf::from(file))),
         None => Ok((Platform::host(), PathBuf::from(text))),
@@ -228,14 +242,23 @@ fn given(libraries: &[String]) -> Result<Model> {
     let (_, own) = own.ok_or_else(|| {
         anyhow!("one library must be for this machine ({}): it describes the model", Platform::host())
     })?;
-    load(own, &libraries, Licenses::default())
+    load(own, &libraries, Licenses::default(), resources)
 }
 
 /// The model of these libraries, described by the one for this computer.
-fn load(own: &Path, libraries: &[(Platform, PathBuf)], licenses: Licenses) -> Result<Model> {
-    let description = describe(own)?;
+fn load(
+    own: &Path,
+    libraries: &[(Platform, PathBuf)],
+    licenses: Licenses,
+    resources: Option<&Path>,
+) -> Result<Model> {
+    let folder = resources.map(|folder| folder.canonicalize().with_context(|| folder.display().to_string())).transpose()?;
+    let resources = folder.as_deref();
+    let files = resources.map_or_else(|| Ok(BTreeMap::new()), pack::resources)?;
+    let description = describe(own, resources)?;
     let read = |(platform, path): &(Platform, PathBuf)| Ok((*platform, read(path)?));
-    Ok(Model { description, binaries: libraries.iter().map(read).collect::<Result<_>>()?, licenses })
+    let binaries = libraries.iter().map(read).collect::<Result<_>>()?;
+    Ok(Model { description, binaries, licenses, resources: files })
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {

@@ -7,7 +7,7 @@ use super::types::{FmuState, Instance, References};
 use crate::value::Value;
 use crate::{blob, registry};
 use fmu_core::{Exported, Fault};
-use std::ffi::{c_char, c_int};
+use std::ffi::{CStr, c_char, c_int};
 
 /// # Safety
 /// For every function here, the importer follows the standard: the instance is NULL, or one that this binary created and
@@ -45,6 +45,46 @@ impl<E: Exported> Abi<E> {
             enter::<E>(entry, instance, |instance| {
                 let values = array(values, n_values, "values")?;
                 instance.set(array(references, n, "value references")?, values)
+            })
+        }
+    }
+
+    /// The texts stay where they are until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
+    pub unsafe fn get_texts(
+        entry: Entry,
+        instance: Instance,
+        references: References,
+        n: usize,
+        values: *mut *const c_char,
+        room_for: usize,
+    ) -> c_int {
+        // SAFETY: the importer's arrays, of these lengths.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let out = room(values, room_for, "values")?;
+                let texts = instance.get_texts(array(references, n, "value references")?, out.len())?;
+                for (place, text) in out.iter_mut().zip(texts) {
+                    place.write(text.as_ptr());
+                }
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn set_texts(
+        entry: Entry,
+        instance: Instance,
+        references: References,
+        n: usize,
+        values: *const *const c_char,
+        n_values: usize,
+    ) -> c_int {
+        // SAFETY: the importer's arrays, of these lengths, the second one of C strings.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let values = array(values, n_values, "values")?;
+                let texts: Vec<Option<&CStr>> = values.iter().map(|&value| text(value)).collect();
+                Ok(instance.set_texts(array(references, n, "value references")?, &texts)?)
             })
         }
     }

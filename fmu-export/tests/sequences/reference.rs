@@ -67,7 +67,7 @@ impl Snapshot {
 
     fn integer(&self, reference: u32) -> i32 {
         self.slot(reference, |slot| match slot {
-            Slot::Integer(x) => *x,
+            Slot::Integer(x) => i32::try_from(x.get()).unwrap(),
             Slot::Enumeration(x) => x.get(),
             _ => unreachable!(),
         })
@@ -80,7 +80,7 @@ impl Snapshot {
     fn put(&mut self, reference: u32, value: Mixed) {
         match Probe::TABLE.entry(&mut self.block, reference as usize - 1).unwrap().1 {
             Slot::Real(x) => *x = value.real,
-            Slot::Integer(x) => *x = i32::try_from(value.integer).unwrap(),
+            Slot::Integer(x) => assert!(x.set(value.integer.into())),
             Slot::Boolean(x) => *x = value.truth != 0,
             Slot::Enumeration(x) => assert!(x.set(i32::try_from(value.integer).unwrap())),
         }
