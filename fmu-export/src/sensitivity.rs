@@ -191,7 +191,7 @@ impl<E: Exported> Instance<E> {
         let mut all = Vec::with_capacity(references.len());
         for &reference in references {
             let elements = self.elements(reference)?;
-            all.extend((reference..).take(elements));
+            all.extend((0..).zip(0..elements).map(|(i, _)| reference.wrapping_add(i)));
         }
         Ok(Cow::Owned(all))
     }
