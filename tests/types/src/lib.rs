@@ -104,6 +104,7 @@ struct Outputs {
     sums: [f64; 2],
     transposed: [[f64; 2]; 2],
     square: f64,
+    letters: i32,
     each: Each,
 }
 
@@ -124,6 +125,7 @@ impl Model for EveryType {
         description: "A variable of every type and causality",
         author: "The tests",
         license: "MIT OR Apache-2.0",
+        copyright: "None",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
         ..Info::DEFAULT
     };
@@ -165,6 +167,7 @@ impl Model for EveryType {
                 V::uint32_output("out.uint32", "As the input", |m| &mut m.out.each.uint32),
                 V::int64_output("out.int64", "As the input", |m| &mut m.out.each.int64),
                 V::uint64_output("out.uint64", "As the input", |m| &mut m.out.each.uint64),
+                V::integer_output("letters", "Length of the label", |m| &mut m.out.letters),
                 V::text_output("status", "The label, while in.truth is true", |m| {
                     if m.model.held.truth { &m.model.label } else { "off" }
                 }),
@@ -181,7 +184,7 @@ impl Model for EveryType {
                 V::integer_local("local.int32", "As the parameter", |m| &mut m.model.local.int32),
                 V::uint32_local("local.uint32", "As the parameter", |m| &mut m.model.local.uint32),
                 V::int64_local("local.int64", "As the parameter", |m| &mut m.model.local.int64),
-                V::uint64_local("local.uint64", "As the parameter", |m| &mut m.model.local.uint64),
+                V::uint64_local("local.uint64", "Square of the parameter", |m| &mut m.model.local.uint64),
                 V::parameter("tau", &SECOND, "Time constant of the state", |m| &mut m.model.tau).above(0.0),
                 V::calculated("rate", &PER_SECOND, "1/tau", |m| &mut m.model.rate),
                 V::parameter("band", &BAND, "Added to the start of the state", |m| &mut m.model.band).at_least(0.0),
@@ -223,7 +226,8 @@ impl Model for EveryType {
 
     fn derive(&mut self) {
         self.rate = 1.0 / self.tau;
-        self.local = Each { real: self.tuned.real, ..self.fixed.clone() };
+        let square = self.fixed.uint64.saturating_mul(self.fixed.uint64);
+        self.local = Each { real: self.tuned.real, uint64: square, ..self.fixed.clone() };
     }
 
     fn initialize(&mut self) {
@@ -238,6 +242,7 @@ impl Model for EveryType {
         }
         out.transposed = [0, 1].map(|i| [0, 1].map(|k| self.matrix[k][i]));
         out.square = self.square(f64::from(self.held.int32) + f64::from(self.tuned.int32) - 3.0);
+        out.letters = i32::try_from(self.label.chars().count()).unwrap_or(i32::MAX);
         out.each = self.held.clone();
     }
 
