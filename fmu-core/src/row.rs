@@ -97,6 +97,118 @@ impl std::fmt::Display for Slot<'_> {
 }
 
 /// A row of the table of `W`: a variable, or the table of a part of `W`.
+///
+/// A constructor says who sets the variable and when it changes; what follows says what is allowed.
+///
+/// Real numbers, continuous or sampled:
+///
+/// ```
+/// # use fmu_core::unit::{AMPERE, KELVIN, OHM, Quantity, VOLT};
+/// # use fmu_core::{Row, Table};
+/// # #[derive(Default)] struct Model { u: f64, u_k: f64, i: f64, i_k: f64, x: f64, x_k: f64, r: f64, g: f64, band: f64 }
+/// # type V = Row<Model>;
+/// const BAND: Quantity = KELVIN.relative("TemperatureDifference");
+/// const TABLE: &Table<Model> = &Table::new(const { &[
+///     V::input("u", &VOLT, "Continuous, held over a step of Co-Simulation", |m| &mut m.u),
+///     V::discrete_input("u_k", &VOLT, "Read at sample instants", |m| &mut m.u_k).at_least(-5.0).at_most(5.0),
+///     V::output("i", &AMPERE, "Continuous", |m| &mut m.i).mean(),
+///     V::discrete_output("i_k", &AMPERE, "Changes at sample instants", |m| &mut m.i_k),
+///     V::state("x", &VOLT, "For inspection, continuous", |m| &mut m.x).unbounded().nominal(10.0),
+///     V::discrete_local("x_k", &VOLT, "For inspection, sampled", |m| &mut m.x_k),
+///     V::parameter("R", &OHM, "Fixed after initialization", |m| &mut m.r).above(0.0).below(1e6),
+///     V::parameter("band", &BAND, "May change while the simulation runs", |m| &mut m.band).tunable(),
+///     V::calculated("G", &OHM, "From parameters, by `derive`", |m| &mut m.g),
+/// ] });
+/// let mut model = Model::default();
+/// assert_eq!(TABLE.tell(&model, |m| &mut m.band), "band = 0 K");
+/// assert_eq!(TABLE.fault(&model, |m| &mut m.r, "above 0").to_string(), "R = 0 Ohm is not allowed: above 0");
+/// # impl Clone for Model { fn clone(&self) -> Self { Self { ..*self } } }
+/// ```
+///
+/// Truth values, integers and enumerations. There are constructors for each integer type of FMI 3.0, `int8_input` to
+/// `uint64_parameter`; `integer_input` is of 32 bits:
+///
+/// ```
+/// # use fmu_core::{Field, Row, Table, enumeration};
+/// enumeration! {
+///     enum Fan("FanMode", "What the fan does") {
+///         1 Off "Stands still";
+///         2 On "Turns";
+///     }
+/// }
+/// # struct Model { on: bool, n: i32, small: u8, count: u64, fan: Fan }
+/// # type V = Row<Model>;
+/// const TABLE: &Table<Model> = &Table::new(const { &[
+///     V::boolean_input("on", "Input", |m| &mut m.on),
+///     V::boolean_output("on_out", "Output", |m| &mut m.on),
+///     V::boolean_local("on_local", "For inspection", |m| &mut m.on),
+///     V::boolean_parameter("on_parameter", "Parameter", |m| &mut m.on).tunable(),
+///     V::integer_input("n", "Input", |m| &mut m.n),
+///     V::integer_output("n_out", "Output", |m| &mut m.n),
+///     V::integer_local("n_local", "For inspection", |m| &mut m.n),
+///     V::integer_parameter("n_parameter", "Parameter", |m| &mut m.n).at_least(1.0),
+///     V::uint8_input("level", "Input; 0 to 100", |m| &mut m.small).at_most(100.0),
+///     V::uint64_output("count", "Output", |m| &mut m.count),
+///     V::enumeration_input("fan", "Input", &Field(|m| &mut m.fan)),
+///     V::enumeration_output("fan_out", "Output", &Field(|m| &mut m.fan)),
+///     V::enumeration_local("fan_local", "For inspection", &Field(|m| &mut m.fan)),
+///     V::enumeration_parameter("fan_parameter", "Parameter", &Field(|m| &mut m.fan)),
+/// ] });
+/// # let mut model = Model { on: false, n: 0, small: 0, count: 0, fan: Fan::Off };
+/// if let Some((_, fmu_core::Slot::Enumeration(fan))) = TABLE.entry(&mut model, 10) {
+///     assert!(fan.set(2) && !fan.set(3));
+/// }
+/// assert_eq!(model.fan.name(), "On");
+/// ```
+///
+/// Arrays, matrices, single precision and texts. An array is one variable of FMI 3.0, and `a[1]`, `a[2]` or `m[1,2]` in
+/// FMI 2.0:
+///
+/// ```
+/// # use fmu_core::unit::{ONE, VOLT};
+/// # use fmu_core::{Row, Table};
+/// # #[derive(Default)] struct Model { u: [f64; 3], y: [f64; 3], a: [[f64; 3]; 2], x: f32, label: String, on: bool }
+/// # type V = Row<Model>;
+/// const TABLE: &Table<Model> = &Table::new(const { &[
+///     V::array_input("u", &VOLT, "Three inputs", 3, |m| &mut m.u),
+///     V::array_output("y", &VOLT, "Three outputs, sampled", 3, |m| &mut m.y).discrete(),
+///     V::array_local("y_local", &VOLT, "For inspection", 3, |m| &mut m.y),
+///     V::array_parameter("A", &ONE, "Two rows of three", 6, |m| m.a.as_flattened_mut()).shape(&[2, 3]),
+///     V::float32_input("x", &VOLT, "Input, sampled", |m| &mut m.x),
+///     V::float32_output("x_out", &VOLT, "Output, sampled", |m| &mut m.x),
+///     V::float32_local("x_local", &VOLT, "For inspection", |m| &mut m.x),
+///     V::float32_parameter("x_parameter", &VOLT, "Parameter", |m| &mut m.x),
+///     V::text_parameter("label", "Fixed after initialization", |m| &mut m.label),
+///     V::text_output("status", "Chosen or kept, never made in a step", |m| if m.on { &m.label } else { "off" }),
+///     V::text_constant("revision", "Never changes", "r1"),
+/// ] });
+/// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 4 + 3);
+/// ```
+///
+/// A part has a table of its own, which the whole sees under a prefix:
+///
+/// ```
+/// # use fmu_core::unit::OHM;
+/// # use fmu_core::{Part, Row, Table};
+/// # struct Motor { r: f64 }
+/// # struct Drive { motor: Motor }
+/// const MOTOR: &Table<Motor> = &Table::new(const { &[Row::parameter("R", &OHM, "Resistance", |m: &mut Motor| &mut m.r)] });
+/// const DRIVE: &Table<Drive> =
+///     &Table::new(const { &[Row::part("motor.", &Part { table: MOTOR, lens: |d: &mut Drive| &mut d.motor })] });
+/// assert_eq!(DRIVE.locate(0).map(|(name, ..)| name), Some("motor.R".into()));
+/// ```
+///
+/// A row that contradicts itself does not compile; the compiler shows it, with its name and the reason:
+///
+/// ```compile_fail,E0080
+/// # use fmu_core::{Row, Table};
+/// # struct Model { on: bool }
+/// # type V = Row<Model>;
+/// const TABLE: &Table<Model> = &Table::new(const { &[
+///     V::boolean_input("on", "Input", |m| &mut m.on).at_least(0.0), // on: only a number can have a bound
+/// ] });
+/// # let _ = TABLE.len();
+/// ```
 pub struct Row<W: 'static> {
     pub(crate) meta: Meta,
     pub(crate) access: Access<W>,

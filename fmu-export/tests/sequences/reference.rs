@@ -83,6 +83,7 @@ impl Snapshot {
             Slot::Integer(x) => assert!(x.set(value.integer.into())),
             Slot::Boolean(x) => *x = value.truth != 0,
             Slot::Enumeration(x) => assert!(x.set(i32::try_from(value.integer).unwrap())),
+            _ => unreachable!(),
         }
     }
 
