@@ -1,7 +1,7 @@
 //! `documentation/index.html`: a self-contained page generated from the description.
 
-use fmu_core::description::{Description, Member, Value, Variable, VariableKind};
 use fmu_core::IntegerType;
+use fmu_core::description::{Description, Member, Value, Variable, VariableKind};
 use fmu_core::terminal::MemberKind;
 use fmu_core::variable::{Causality, Variability};
 use model_description::FmiVersion;

@@ -119,7 +119,9 @@ fn files_have_what_differs_from_the_start_values() {
         use fmu_core::description::{Value, VariableKind};
         let variable = description.variable(name).unwrap();
         let item = |i: i128| match &variable.kind {
-            VariableKind::Enumeration { items, .. } => items.iter().find(|(value, ..)| i128::from(*value) == i).unwrap().1.clone(),
+            VariableKind::Enumeration { items, .. } => {
+                items.iter().find(|(value, ..)| i128::from(*value) == i).unwrap().1.clone()
+            }
             _ => i.to_string(),
         };
         match &variable.start.as_ref().unwrap()[0] {

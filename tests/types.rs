@@ -9,6 +9,7 @@ use fmu_import::cosimulation::{Settings, System};
 use fmu_import::{Fmu, Instance, Kind, Values};
 use model_description::FmiVersion::{self, V2, V3};
 use model_description::{BaseType, Causality};
+use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -146,10 +147,8 @@ fn texts_are_set_and_said() {
         assert_eq!(instance.get("status").unwrap(), text("off"));
         let error = instance.set("label", &text("late")).unwrap_err().to_string();
         assert!(error.contains("label is a fixed parameter"), "{error}");
-        for (name, why) in [
-            ("status", "status is an output and cannot be set"),
-            ("revision", "revision cannot be set"),
-        ] {
+        for (name, why) in [("status", "status is an output and cannot be set"), ("revision", "revision cannot be set")]
+        {
             let error = fresh(version).set(name, &text("x")).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
         }
@@ -279,7 +278,8 @@ fn a_parameter_file_sets_texts() {
     for version in [V2, V3] {
         let mut system = System::default();
         system.add("it", &Fmu::open(archive(version)).unwrap(), false).unwrap();
-        fmu_import::ssp::values::set(&mut system, "it", "values.ssv", &fmu_import::ssp::ssv::read(file).unwrap()).unwrap();
+        fmu_import::ssp::values::set(&mut system, "it", "values.ssv", &fmu_import::ssp::ssv::read(file).unwrap())
+            .unwrap();
         system.record("it.local.uint8").unwrap();
         system.record("it.letters").unwrap();
         let settings = Settings { start: 0.0, stop: 0.1, step: 0.1, sequential: false };
@@ -297,7 +297,8 @@ fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
         (output.status.success(), String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned())
     };
     let three = archive(V3).to_str().unwrap();
-    let (done, said) = run(&["simulate", three, "--set", "label=a b,c", "--set", "weights=1,2,3,4,5,6", "--stop", "0.2"]);
+    let (done, said) =
+        run(&["simulate", three, "--set", "label=a b,c", "--set", "weights=1,2,3,4,5,6", "--stop", "0.2"]);
     assert!(done && said.contains("EveryType.out.uint64"), "{said}");
     for (option, value, why) in [
         ("--record", "status", "status: is a String; only numbers"),
@@ -353,6 +354,64 @@ fn every_type_has_every_causality() {
         for causality in [Causality::Input, Causality::Output, Causality::Local, Causality::Parameter] {
             assert!(md.variables.iter().any(|v| v.base == base && v.causality == causality), "{base} {causality}");
         }
+    }
+}
+
+/// The compiler shows the row and says which variable it is, and why. A crate of its own, checked by Cargo.
+#[test]
+fn a_wrong_row_is_an_error_at_its_place() {
+    const CASES: [(&str, &str, &str, usize); 8] = [
+        (
+            "bound",
+            r#"V::boolean_input("on", "", |m| &mut m.on).at_least(0.0)"#,
+            "on: only a number can have a bound",
+            5,
+        ),
+        (
+            "empty",
+            r#"V::output("x", &VOLT, "", |m| &mut m.u).above(1.0).at_most(1.0)"#,
+            "x: the bounds leave no value",
+            5,
+        ),
+        (
+            "shape",
+            r#"V::array_input("a", &VOLT, "", 4, |m| &mut m.a).shape(&[2, 3])"#,
+            "a: the product of the extents",
+            5,
+        ),
+        ("tuned", r#"V::text_parameter("t", "", |m| &mut m.t).tunable()"#, "t: only a parameter that is no text", 5),
+        ("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
+        ("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
+        // These two show in the table, whose start is in line 3.
+        ("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
+        ("empty_array", r#"V::array_input("a", &VOLT, "", 0, |m| &mut m.a)"#, "a: an array needs an element", 3),
+    ];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = common::python::scratch().join("rows");
+    let sources = folder.join("src/bin");
+    fs::create_dir_all(&sources).unwrap();
+    let manifest = format!(
+        "[workspace]\n[package]\nname = \"rows\"\nedition = \"2024\"\n[dependencies]\nfmu-core = {{ path = {:?} }}\n",
+        root.join("fmu-core")
+    );
+    fs::write(folder.join("Cargo.toml"), manifest).unwrap();
+    fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+    for (name, row, ..) in CASES {
+        let source = format!(
+            "use fmu_core::{{Row, Table, unit::VOLT}};\n\
+             struct M {{ u: f64, on: bool, a: [f64; 4], t: String, f: f32 }} type V = Row<M>;\n\
+             const TABLE: &Table<M> = &Table::new(const {{ &[\n    V::input(\"u\", &VOLT, \"\", |m| &mut m.u),\n    \
+             {row},\n] }});\nfn main() {{ let _ = TABLE.len(); }}\n"
+        );
+        fs::write(sources.join(format!("{name}.rs")), source).unwrap();
+    }
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["check", "--offline", "--keep-going", "--message-format", "short"]).current_dir(&folder);
+    let output = cargo.env("CARGO_TARGET_DIR", folder.join("target")).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    for (name, _, why, line) in CASES {
+        let place = Path::new("src/bin").join(format!("{name}.rs:{line}:")).display().to_string();
+        assert!(said.lines().any(|l| l.starts_with(&place) && l.contains(why)), "{place} {why}: {said}");
     }
 }
 

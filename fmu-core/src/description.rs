@@ -5,8 +5,8 @@ mod terminals;
 pub use terminals::{Member, Terminal, TerminalPicture};
 
 use crate::Fault;
-use crate::integer::IntegerType;
 use crate::capability::{Capabilities, Exported};
+use crate::integer::IntegerType;
 use crate::model::{Block, Experiment, Model};
 use crate::probe;
 use crate::row::{Row, Slot};

@@ -199,7 +199,8 @@ impl<E: Exported> Instance<E> {
         let found = table::<E>().entry(&mut self.current.block, index);
         if let Some((meta, slot)) = found {
             let held = meta.causality == Causality::Input && T::read(meta, &slot, self.standard) == Some(value);
-            let (possible, settable) = (value.judge(meta, self.standard), open(meta, state) || held || self.sets_state(index));
+            let (possible, settable) =
+                (value.judge(meta, self.standard), open(meta, state) || held || self.sets_state(index));
             if possible == Some(true) && settable {
                 return Ok(());
             }

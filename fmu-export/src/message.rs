@@ -113,8 +113,7 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>) -> Stri
         else {
             continue;
         };
-        if matches!(meta.causality, Causality::Input | Causality::Parameter) && new.to_string() != old.to_string()
-        {
+        if matches!(meta.causality, Causality::Input | Causality::Parameter) && new.to_string() != old.to_string() {
             changes.push(format!("{} = {new}", name::<M>(index)));
         }
     }

@@ -11,7 +11,6 @@ use crate::lifecycle::{Standard, State};
 use crate::message;
 use crate::snapshot::ramps;
 use fmu_core::{Block, Causality, Elapsed, Exported, Fault, Kind, Model, Slot, Step, Variability};
-use std::borrow::Cow;
 
 /// Parts into which a step with changing inputs is divided: each has the inputs of its middle.
 const PARTS: u32 = 32;
@@ -27,6 +26,8 @@ pub struct Scratch<M: Model> {
     others: Vec<(u32, f64)>,
     /// A column of the adjoint derivative.
     column: Vec<f64>,
+    /// The elements of unknowns and knowns.
+    sides: [Vec<u32>; 2],
 }
 
 impl<E: Exported> Instance<E> {
@@ -46,10 +47,11 @@ impl<E: Exported> Instance<E> {
             Standard::Fmi2 => "providesDirectionalDerivative = false",
             Standard::Fmi3 => "providesDirectionalDerivatives = false",
         })?;
-        let (unknowns, knowns) = (&*self.each(unknowns)?, &*self.each(knowns)?);
-        self.check_sides(unknowns, knowns)?;
-        check_sizes(seed, knowns.len(), (out.len(), unknowns.len()))?;
-        self.column(unknowns, knowns, seed, out)
+        self.with_elements(unknowns, knowns, |instance, unknowns, knowns| {
+            instance.check_sides(unknowns, knowns)?;
+            check_sizes(seed, knowns.len(), (out.len(), unknowns.len()))?;
+            instance.column(unknowns, knowns, seed, out)
+        })
     }
 
     /// Adjoint derivative: for each of `knowns`, the change of the sum of `unknowns` weighted with `seed`.
@@ -58,18 +60,19 @@ impl<E: Exported> Instance<E> {
     /// As [`directional`](Self::directional).
     pub fn adjoint(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
         supported::<E>("providesAdjointDerivatives = false")?;
-        let (unknowns, knowns) = (&*self.each(unknowns)?, &*self.each(knowns)?);
-        self.check_sides(unknowns, knowns)?;
-        check_sizes(seed, unknowns.len(), (out.len(), knowns.len()))?;
-        let mut column = std::mem::take(&mut self.scratch().column);
-        column.clear();
-        column.resize(unknowns.len(), 0.0);
-        for (known, out) in knowns.iter().zip(out) {
-            self.column(unknowns, std::slice::from_ref(known), &[1.0], &mut column)?;
-            *out = column.iter().zip(seed).map(|(x, w)| x * w).sum();
-        }
-        self.scratch().column = column;
-        Ok(())
+        self.with_elements(unknowns, knowns, |instance, unknowns, knowns| {
+            instance.check_sides(unknowns, knowns)?;
+            check_sizes(seed, unknowns.len(), (out.len(), knowns.len()))?;
+            let mut column = std::mem::take(&mut instance.scratch().column);
+            column.clear();
+            column.resize(unknowns.len(), 0.0);
+            for (known, out) in knowns.iter().zip(out) {
+                instance.column(unknowns, std::slice::from_ref(known), &[1.0], &mut column)?;
+                *out = column.iter().zip(seed).map(|(x, w)| x * w).sum();
+            }
+            instance.scratch().column = column;
+            Ok(())
+        })
     }
 
     /// First derivatives of continuous outputs with respect to time, with the inputs held.
@@ -81,7 +84,11 @@ impl<E: Exported> Instance<E> {
         if let Some(order) = orders.iter().find(|&&order| order != 1) {
             return Err(Fault::value("order", order, "1: maxOutputDerivativeOrder = 1").into());
         }
-        let unknowns = &*self.each(unknowns)?;
+        self.with_elements(unknowns, &[], |instance, unknowns, _| instance.rates(unknowns, out))
+    }
+
+    /// The derivatives of continuous outputs.
+    fn rates(&mut self, unknowns: &[u32], out: &mut [f64]) -> Result<(), Refusal> {
         check_sizes(&[], 0, (out.len(), unknowns.len()))?;
         for &unknown in unknowns {
             if !self.is_output(unknown, false) {
@@ -183,17 +190,30 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// The references of all elements of what the references of FMI 3.0 stand for.
-    fn each<'a>(&mut self, references: &'a [u32]) -> Result<Cow<'a, [u32]>, Fault> {
+    /// Works with the references of all elements, where those of FMI 3.0 stand for arrays.
+    fn with_elements(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        work: impl FnOnce(&mut Self, &[u32], &[u32]) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
         if !self.arrays {
-            return Ok(Cow::Borrowed(references));
+            return work(self, unknowns, knowns);
         }
-        let mut all = Vec::with_capacity(references.len());
+        let mut sides = std::mem::take(&mut self.scratch().sides);
+        let done = self.each(unknowns, &mut sides[0]).and_then(|()| self.each(knowns, &mut sides[1]));
+        let done = done.map_err(Refusal::from).and_then(|()| work(self, &sides[0], &sides[1]));
+        self.scratch().sides = sides;
+        done
+    }
+
+    fn each(&mut self, references: &[u32], all: &mut Vec<u32>) -> Result<(), Fault> {
+        all.clear();
         for &reference in references {
             let elements = self.elements(reference)?;
             all.extend((0..).zip(0..elements).map(|(i, _)| reference.wrapping_add(i)));
         }
-        Ok(Cow::Owned(all))
+        Ok(())
     }
 
     fn scratch(&mut self) -> &mut Scratch<E::Model> {
@@ -204,6 +224,7 @@ impl<E: Exported> Instance<E> {
                 rates: Vec::new(),
                 others: Vec::new(),
                 column: Vec::new(),
+                sides: [Vec::new(), Vec::new()],
             })
         })
     }

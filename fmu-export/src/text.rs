@@ -33,24 +33,32 @@ impl<E: Exported> Instance<E> {
         Ok(&self.texts)
     }
 
-    /// Sets texts: all of them or, on an error, none. `None` is NULL.
+    /// Sets `given` texts, each read by its position: all of them or, on an error, none. `None` is NULL. Nothing is read before
+    /// all references are known to be texts that can be set.
     ///
     /// # Errors
     /// Unknown reference, another type, not settable in this state, another number of values, NULL, not UTF-8.
-    pub fn set_texts(&mut self, references: &[u32], values: &[Option<&CStr>]) -> Result<(), Fault> {
-        self.check_count(references, values.len())?;
+    pub fn set_texts<'a>(
+        &mut self,
+        references: &[u32],
+        given: usize,
+        read: impl Fn(usize) -> Option<&'a CStr>,
+    ) -> Result<(), Fault> {
+        self.check_count(references, given)?;
         let state = self.current.life.state();
-        let mut texts = Vec::with_capacity(values.len());
-        for (&reference, value) in references.iter().zip(values) {
+        for &reference in references {
             self.text_of(reference)?;
             let index = index(reference);
-            let name = message::name::<E::Model>(index);
             if let Some((meta, _)) = E::Model::TABLE.entry(&mut self.current.block, index)
                 && !(meta.causality == Causality::Parameter && open(meta, state))
             {
                 return Err(message::fixed::<E::Model>(index, meta, state));
             }
-            let value = value.ok_or_else(|| Fault::value(&name, "NULL", "a text"))?;
+        }
+        let mut texts = Vec::with_capacity(given);
+        for (i, &reference) in references.iter().enumerate() {
+            let name = message::name::<E::Model>(index(reference));
+            let value = read(i).ok_or_else(|| Fault::value(&name, "NULL", "a text"))?;
             texts.push(value.to_str().map_err(|_| Fault::new(format!("the new value of {name} is not UTF-8")))?);
         }
         for (&reference, text) in references.iter().zip(texts) {

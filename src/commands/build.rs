@@ -102,7 +102,10 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
         (compiled(&workspace, args)?, out)
     } else {
         let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("fmu")), Ok);
-        (vec![given(&args.library, args.resources.as_deref())?], out.context("there is no workspace here: name the output folder with --out")?)
+        (
+            vec![given(&args.library, args.resources.as_deref())?],
+            out.context("there is no workspace here: name the output folder with --out")?,
+        )
     };
     for note in notes(&models) {
         eprintln!("note: {note}");
@@ -246,13 +249,9 @@ fn given(libraries: &[String], resources: Option<&Path>) -> Result<Model> {
 }
 
 /// The model of these libraries, described by the one for this computer.
-fn load(
-    own: &Path,
-    libraries: &[(Platform, PathBuf)],
-    licenses: Licenses,
-    resources: Option<&Path>,
-) -> Result<Model> {
-    let folder = resources.map(|folder| folder.canonicalize().with_context(|| folder.display().to_string())).transpose()?;
+fn load(own: &Path, libraries: &[(Platform, PathBuf)], licenses: Licenses, resources: Option<&Path>) -> Result<Model> {
+    let folder =
+        resources.map(|folder| folder.canonicalize().with_context(|| folder.display().to_string())).transpose()?;
     let resources = folder.as_deref();
     let files = resources.map_or_else(|| Ok(BTreeMap::new()), pack::resources)?;
     let description = describe(own, resources)?;

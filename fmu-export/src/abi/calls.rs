@@ -7,7 +7,7 @@ use super::types::{FmuState, Instance, References};
 use crate::value::Value;
 use crate::{blob, registry};
 use fmu_core::{Exported, Fault};
-use std::ffi::{CStr, c_char, c_int};
+use std::ffi::{c_char, c_int};
 
 /// # Safety
 /// For every function here, the importer follows the standard: the instance is NULL, or one that this binary created and
@@ -79,12 +79,12 @@ impl<E: Exported> Abi<E> {
         values: *const *const c_char,
         n_values: usize,
     ) -> c_int {
-        // SAFETY: the importer's arrays, of these lengths, the second one of C strings.
+        // SAFETY: the importer's arrays, of these lengths, the second one of C strings if the variables are texts.
         unsafe {
             enter::<E>(entry, instance, |instance| {
                 let values = array(values, n_values, "values")?;
-                let texts: Vec<Option<&CStr>> = values.iter().map(|&value| text(value)).collect();
-                Ok(instance.set_texts(array(references, n, "value references")?, &texts)?)
+                let references = array(references, n, "value references")?;
+                Ok(instance.set_texts(references, values.len(), |i| text(values[i]))?)
             })
         }
     }

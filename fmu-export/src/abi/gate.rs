@@ -1,13 +1,13 @@
 //! The gate: every call on an instance passes here. NULL, re-entry, standard and lifecycle are checked, panics caught,
 //! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
 
+use crate::blob;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Allowed, Call, Next, Standard};
 use crate::log::{Log, Status};
 use crate::message;
 use crate::resources::folder;
 use crate::snapshot::Snapshot;
-use crate::blob;
 use fmu_core::{Exported, Fault, Interface, Model};
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};

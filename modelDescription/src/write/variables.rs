@@ -58,7 +58,9 @@ fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
             VariableKind::Text => "String",
         });
         typed.attributes = type_attributes(v, FmiVersion::V2);
-        typed = typed.with_some("derivative", state.clone()).with_some("start", start.map(|value| text(v, value, FmiVersion::V2)));
+        typed = typed
+            .with_some("derivative", state.clone())
+            .with_some("start", start.map(|value| text(v, value, FmiVersion::V2)));
         identity("ScalarVariable", v, name, v.value_reference.saturating_add(offset)).children([typed])
     };
     let start = |i: usize| v.start.as_ref().and_then(|all| all.get(i));
@@ -87,7 +89,8 @@ fn variable(v: &Variable) -> Element {
     };
     let mut element = identity(base, v, &v.name, v.value_reference);
     element.attributes.extend(type_attributes(v, FmiVersion::V3));
-    let starts: Option<Vec<String>> = v.start.as_ref().map(|all| all.iter().map(|value| text(v, value, FmiVersion::V3)).collect());
+    let starts: Option<Vec<String>> =
+        v.start.as_ref().map(|all| all.iter().map(|value| text(v, value, FmiVersion::V3)).collect());
     if v.kind == VariableKind::Text {
         let starts = starts.into_iter().flatten();
         return element.children(starts.map(|value| Element::new("Start").with("value", value)));
@@ -149,7 +152,8 @@ fn type_attributes(v: &Variable, version: FmiVersion) -> Vec<(String, String)> {
         VariableKind::Integer(of) => {
             // Rounded inwards, and omitted where the type has no value beyond: in FMI 2.0 that is xs:int for all of them.
             let carried = if version == FmiVersion::V2 { IntegerType::Int32 } else { *of };
-            let ((low, high), (least, greatest)) = (of.within(&Range { above: false, below: false, ..v.range() }), carried.bounds());
+            let ((low, high), (least, greatest)) =
+                (of.within(&Range { above: false, below: false, ..v.range() }), carried.bounds());
             element
                 .with_some("min", (low > least && low <= greatest).then(|| low.to_string()))
                 .with_some("max", (high < greatest && high >= least).then(|| high.to_string()))

@@ -119,7 +119,10 @@ pub(crate) fn sample() -> Description {
             initial_dependencies: Some(vec![]),
             ..variable("speed", 11, (Causality::Output, Variability::Continuous), real(&SPEED))
         },
-        Variable { initial_dependencies: Some(vec![0, 8]), ..variable("sector", 12, output, VariableKind::Integer(IntegerType::Int32)) },
+        Variable {
+            initial_dependencies: Some(vec![0, 8]),
+            ..variable("sector", 12, output, VariableKind::Integer(IntegerType::Int32))
+        },
         Variable { initial_dependencies: Some(vec![2]), ..variable("ready", 13, output, VariableKind::Boolean) },
         variable("inner", 14, (Causality::Local, Variability::Continuous), real(&SPEED)),
     ];

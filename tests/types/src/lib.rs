@@ -2,8 +2,8 @@
 
 use fmu_core::unit::{KELVIN, ONE, PER_SECOND, Quantity, SECOND, VOLT};
 use fmu_core::{
-    Block, ContinuousTime, Elapsed, Experiment, Fault, Field, Info, Model, Resource, Row, State, Step, Table, enumeration,
-    integrate,
+    Block, ContinuousTime, Elapsed, Experiment, Fault, Field, Info, Model, Resource, Row, State, Step, Table,
+    enumeration, integrate,
 };
 use serde::{Deserialize, Serialize};
 use std::fs;
