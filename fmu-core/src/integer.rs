@@ -100,8 +100,8 @@ impl IntegerType {
         // A bound that is no integer is rounded inwards; a strict one excludes itself. Conversion saturates.
         #[expect(clippy::cast_possible_truncation, reason = "bounds are whole here, or infinite")]
         let (mut low, mut high) = (range.min.ceil() as i128, range.max.floor() as i128);
-        low = low.saturating_add(i128::from(range.above && range.min == range.min.ceil()));
-        high = high.saturating_sub(i128::from(range.below && range.max == range.max.floor()));
+        low = low.saturating_add(i128::from(range.above && range.min.fract() == 0.0));
+        high = high.saturating_sub(i128::from(range.below && range.max.fract() == 0.0));
         (min.max(low), max.min(high))
     }
 

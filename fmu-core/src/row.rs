@@ -625,7 +625,7 @@ impl<W: 'static> Row<W> {
         let number = matches!(self.meta.kind, Kind::Real(_) | Kind::Float32(_) | Kind::Integer(_));
         demand(number, self.meta.name, "only a number can have a bound");
         let Range { min, max, above, below } = self.meta.range;
-        demand(min < max || (min == max && !above && !below), self.meta.name, "the bounds leave no value");
+        demand(min < max || (min <= max && !above && !below), self.meta.name, "the bounds leave no value");
         self
     }
 
