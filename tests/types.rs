@@ -307,6 +307,7 @@ fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
         ("--input", "label=3", "label: is a String; only numbers"),
         ("--set", "weights=1,2", "weights has 6 elements, not 2"),
         ("--set", "in.uint8=x", "in.uint8 = x is not an integer"),
+        ("--set", "in.uint8=300", "in.uint8 = 300 is not of the type UInt8: 0 to 255"),
     ] {
         let (done, said) = run(&["simulate", three, option, value]);
         assert!(!done && said.contains(why), "{said}");
