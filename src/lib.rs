@@ -1,6 +1,6 @@
 //! The command-line tool `fmu`, as a library so that tests can use its parts.
 //!
-//! - [`commands`]: one module for each command.
+//! - [`cli`]: the command line; [`commands`]: one module for each command; [`vendor`]: the crates that `fmu new` writes.
 //! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`]: from Rust sources to `.fmu`
 //!   files.
 //! - [`ssp`], [`ssv`]: write systems and parameter values.
@@ -9,6 +9,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod cli;
 pub mod commands;
 pub mod compile;
 pub mod documentation;
@@ -19,6 +20,7 @@ pub mod picture;
 pub mod ssp;
 pub mod ssv;
 pub mod target;
+pub mod vendor;
 pub mod workspace;
 
 /// The work failed although the command and its files were valid: exit status 1 instead of 2.

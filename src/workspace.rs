@@ -103,7 +103,10 @@ impl Workspace {
         if !output.status.success() {
             let message = String::from_utf8_lossy(&output.stderr);
             let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
-            bail!("no Cargo workspace here: {}", message.trim_start_matches("error: "));
+            bail!(
+                "no Cargo package here: {}; change to the folder of one, or make one with fmu new my-model",
+                message.trim_start_matches("error: ")
+            );
         }
         let metadata: Metadata = serde_json::from_slice(&output.stdout).context("cargo metadata")?;
         let normal = |d: Dependency| d.dep_kinds.iter().any(|k| k.kind.is_none()).then_some(d.pkg);
@@ -117,10 +120,14 @@ impl Workspace {
         })
     }
 
-    /// The packages of FMUs: the workspace's members below `fmus/`.
+    /// The packages of FMUs: the workspace's members below `fmus/` or, in a workspace without that folder, every member with a
+    /// library that C can load and with `fmu-export` among its dependencies.
     pub fn fmus(&self) -> Vec<&Package> {
         let below = self.root.join("fmus");
-        self.packages.iter().filter(|p| self.is_member(p) && p.folder().starts_with(&below)).collect()
+        let collected = below.is_dir();
+        let exports = |p: &Package| p.has_cdylib() && self.linked(&p.name).iter().any(|l| l.name == "fmu-export");
+        let is_fmu = |p: &&Package| if collected { p.folder().starts_with(&below) } else { exports(p) };
+        self.packages.iter().filter(|p| self.is_member(p)).filter(is_fmu).collect()
     }
 
     /// The package of this name, a member of the workspace if several have it.

@@ -19,11 +19,12 @@ use std::path::{Path, PathBuf};
 
 /// Compiles FMUs and packs them for both standards.
 ///
-/// Without names, builds every FMU of the workspace: the packages in its folder fmus/. Select an FMU by the name of its package
-/// (pmsm-plant) or of the FMU (PmsmPlant).
+/// Without names, builds every FMU of the Cargo package or workspace around the current folder: the packages in its folder fmus/
+/// or, if there is no such folder, every package with crate-type = ["cdylib"] that depends on fmu-export. Select an FMU by the
+/// name of its package (pmsm-plant) or of the FMU (PmsmPlant). `fmu new` makes a package for an FMU of your own.
 ///
-/// Your own FMU is any cdylib with the line `fmu_export::export!(MyModel);`:
-///   a package of the workspace     fmu build --package own-fmu
+/// An FMU is any cdylib with the line `fmu_export::export!(MyModel);`:
+///   a package elsewhere in the workspace    fmu build --package own-fmu
 ///   a library that is already built, or several libraries of one model for several platforms
 ///                                  fmu build --library target/release/libmy_fmu.so
 ///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
@@ -204,7 +205,10 @@ fn notes(models: &[Model]) -> Vec<String> {
 fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>> {
     let letters = |name: &str| name.to_lowercase().replace(['-', '_'], "");
     if all.is_empty() {
-        bail!("the workspace has no folder fmus/ with packages");
+        bail!(
+            "no package here is an FMU: expected crate-type = [\"cdylib\"] and the dependency fmu-export in a Cargo.toml; \
+             fmu new my-model makes such a package"
+        );
     }
     if names.is_empty() {
         return Ok(all.to_vec());

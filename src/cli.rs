@@ -1,0 +1,98 @@
+//! The command line: one variant for each command.
+
+use clap::{CommandFactory, Parser, Subcommand};
+use crate::commands::{atlas, build, compare, info, merge, new, reproduce, simulate, ssp, sweep, tune};
+use fmu_check::{command as check, probe};
+use fmu_import::printable_lines;
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+/// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.
+///
+/// Exit status: 0 on success, 1 if a simulation, a compiler or a check fails, 2 for wrong usage or an unusable file.
+#[derive(Debug, Parser)]
+#[command(name = "fmu", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    New(new::New),
+    Build(build::Build),
+    Merge(merge::Merge),
+    Info(info::Info),
+    Simulate(simulate::Simulate),
+    Sweep(sweep::Sweep),
+    Check(check::Check),
+    Reproduce(reproduce::Reproduce),
+    Compare(compare::Compare),
+    Atlas(atlas::Atlas),
+    Tune(tune::Tune),
+    Ssp(ssp::Ssp),
+    /// Writes what a shell needs to complete this command
+    ///
+    /// For bash: fmu completions bash > ~/.local/share/bash-completion/completions/fmu
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    #[command(hide = true)]
+    Probe(probe::ProbeArguments),
+    #[command(hide = true)]
+    SweepWorker,
+}
+
+/// The arguments. Cargo runs `cargo-fmu fmu ...` for `cargo fmu ...`.
+fn arguments() -> impl Iterator<Item = OsString> {
+    let is_second = |(place, argument): &(usize, OsString)| *place == 1 && argument == "fmu";
+    std::env::args_os().enumerate().filter(move |a| !is_second(a)).map(|(_, argument)| argument)
+}
+
+/// Runs the command of this process's arguments.
+pub fn main() -> ExitCode {
+    if let Some(status) = fmu_import::guard::serve() {
+        return status;
+    }
+    let command = Cli::parse_from(arguments()).command;
+    // The process that started a worker tells its error.
+    let is_worker = matches!(&command, Command::Simulate(args) if args.worker);
+    let outcome = match command {
+        Command::New(args) => new::run(&args).map(|text| {
+            print!("{text}");
+            ExitCode::SUCCESS
+        }),
+        Command::Build(args) => build::run(&args).map(|files| {
+            for file in files {
+                println!("{}", file.display());
+            }
+            ExitCode::SUCCESS
+        }),
+        Command::Info(args) => info::run(&args).map(|text| {
+            print!("{text}");
+            ExitCode::SUCCESS
+        }),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "fmu", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Merge(args) => merge::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Simulate(args) => simulate::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Sweep(args) => sweep::run(&args).map(|good| ExitCode::from(u8::from(!good))),
+        Command::SweepWorker => fmu_sweep::isolate::serve().map(|()| ExitCode::SUCCESS).map_err(Into::into),
+        Command::Check(args) => check::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
+        Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
+        Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Tune(args) => tune::run(&args).map(|good| ExitCode::from(u8::from(!good))),
+        Command::Ssp(args) => ssp::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Compare(args) => compare::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
+    };
+    outcome.unwrap_or_else(|error| {
+        if !is_worker {
+            eprintln!("error: {}", printable_lines(&format!("{error:#}")));
+        }
+        ExitCode::from(crate::exit_status(&error))
+    })
+}
