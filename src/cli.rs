@@ -1,8 +1,8 @@
 //! The command line: one variant for each command.
 
-use clap::{CommandFactory, Parser, Subcommand};
 use crate::commands::{atlas, build, compare, info, merge, new, reproduce, simulate, ssp, sweep, tune};
-use fmu_check::{command as check, probe};
+use clap::{CommandFactory, Parser, Subcommand};
+use fmu_check::{command as check, message, probe};
 use fmu_import::printable_lines;
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -11,7 +11,7 @@ use std::process::ExitCode;
 ///
 /// Exit status: 0 on success, 1 if a simulation, a compiler or a check fails, 2 for wrong usage or an unusable file.
 #[derive(Debug, Parser)]
-#[command(name = "fmu", version)]
+#[command(name = "fmu", version, styles = message::HELP)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -33,7 +33,11 @@ enum Command {
     Ssp(ssp::Ssp),
     /// Writes what a shell needs to complete this command
     ///
-    /// For bash: fmu completions bash > ~/.local/share/bash-completion/completions/fmu
+    /// For bash and for PowerShell:
+    ///
+    ///   fmu completions bash > ~/.local/share/bash-completion/completions/fmu
+    ///   fmu completions powershell >> $PROFILE
+    #[command(verbatim_doc_comment)]
     Completions {
         /// The shell
         shell: clap_complete::Shell,
@@ -91,8 +95,39 @@ pub fn main() -> ExitCode {
     };
     outcome.unwrap_or_else(|error| {
         if !is_worker {
-            eprintln!("error: {}", printable_lines(&format!("{error:#}")));
+            message::error(&printable_lines(&format!("{error:#}")));
         }
         ExitCode::from(crate::exit_status(&error))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::error::ErrorKind;
+
+    /// An example is a line of the long help that starts with two spaces and the command; `\\` continues it.
+    #[test]
+    fn the_help_of_every_command_has_an_example_that_parses() {
+        let mut whole = Cli::command();
+        whole.build();
+        let commands: Vec<_> = whole.get_subcommands().filter(|c| !c.is_hide_set() && c.get_name() != "help").collect();
+        assert!(commands.len() > 10);
+        for command in commands {
+            let (name, help) = (command.get_name(), command.clone().render_long_help().to_string());
+            let help = help.replace("\\\n", " ");
+            let start = format!("  fmu {name} ");
+            let own = |line: &&str| format!("{line} ").starts_with(&start);
+            assert!(help.lines().any(|line| own(&line)), "fmu {name} --help has no example: {help}");
+            for line in help.lines().filter(|line| line.trim_start().starts_with("fmu ")) {
+                let words: Vec<&str> = line.split_whitespace().take_while(|w| !["#", ">", ">>"].contains(w)).collect();
+                let parsed = Cli::try_parse_from(&words);
+                let kind = parsed.as_ref().err().map(clap::Error::kind);
+                assert!(
+                    kind.is_none() || kind == Some(ErrorKind::DisplayHelp),
+                    "fmu {name} --help: {line}: {parsed:?}"
+                );
+            }
+        }
+    }
 }

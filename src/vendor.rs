@@ -43,6 +43,9 @@ fn standalone(text: &str) -> Result<String> {
             }
         }
     }
+    if let Some(package) = manifest.get_mut("package").and_then(Value::as_table_mut) {
+        package.remove("readme");
+    }
     manifest.retain(|key, _| ["package", "dependencies", "features"].contains(&key));
     Ok(manifest.to_string())
 }
@@ -64,8 +67,7 @@ pub fn lock(package: &str, version: &str) -> Result<String> {
     while let Some(wanted) = open.pop() {
         // "name" or, if the workspace has several versions, "name version".
         let (name, version) = wanted.split_once(' ').unwrap_or((&wanted, ""));
-        let is_wanted =
-            |p: &&Value| named(p, "name") == name && (version.is_empty() || named(p, "version") == version);
+        let is_wanted = |p: &&Value| named(p, "name") == name && (version.is_empty() || named(p, "version") == version);
         let mut found = all.iter().find(is_wanted).with_context(|| wanted.clone())?.clone();
         if !seen.insert((named(&found, "name"), named(&found, "version"))) {
             continue;
@@ -81,7 +83,8 @@ pub fn lock(package: &str, version: &str) -> Result<String> {
         locked.push(found);
     }
     locked.sort_by_key(|p| (named(p, "name"), named(p, "version")));
-    Ok(Table::from_iter([("version".to_owned(), lock["version"].clone()), ("package".to_owned(), locked.into())]).to_string())
+    Ok(Table::from_iter([("version".to_owned(), lock["version"].clone()), ("package".to_owned(), locked.into())])
+        .to_string())
 }
 
 fn file(name: &str) -> Result<&'static str> {

@@ -72,6 +72,16 @@ struct DependencyKind {
     kind: Option<String>,
 }
 
+/// The folder for what a command writes if no option names another: `name` in Cargo's target folder or, where there is no package,
+/// in the current folder.
+///
+/// # Errors
+/// Cargo's target folder is unknown although there is a package.
+pub fn output_folder(name: &str) -> Result<PathBuf> {
+    let is_package = std::env::current_dir()?.ancestors().any(|folder| folder.join("Cargo.toml").is_file());
+    if is_package { Ok(Workspace::find()?.target.join(name)) } else { Ok(name.into()) }
+}
+
 impl Package {
     /// Its folder.
     pub fn folder(&self) -> &Path {

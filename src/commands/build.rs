@@ -1,17 +1,20 @@
 //! `fmu build`: compiles models and packs them.
 
+use super::tune;
 use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
-use crate::pack::{self, Moment};
+use crate::pack::{self, Entry, Moment};
+use crate::reference;
 use crate::target::{Target, Tools, ZIG};
-use crate::workspace::{Package, Workspace};
+use crate::workspace::{Package, Workspace, output_folder};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
+use fmu_check::message;
 use fmu_core::Description;
-use fmu_import::describe;
 use fmu_import::elf::{FLOOR, Needs};
 use fmu_import::platform::Platform;
+use fmu_import::{describe, printable};
 use model_description::FmiVersion;
 use std::collections::BTreeMap;
 use std::fs;
@@ -72,8 +75,12 @@ const CHECKER: &str = "fmu-check";
 /// A compiled model, ready to be packed.
 struct Model {
     description: Description,
+    /// The binary for this computer.
+    own: Vec<(Platform, Vec<u8>)>,
     binaries: Vec<(Platform, Vec<u8>)>,
     licenses: Licenses,
+    /// The file with what feeds the default experiment.
+    stimuli: PathBuf,
 }
 
 /// Runs the command; returns the files that were written.
@@ -94,24 +101,42 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
         let out = args.out.clone().unwrap_or_else(|| workspace.target.join("fmu"));
         (compiled(&workspace, args)?, out)
     } else {
-        let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("fmu")), Ok);
-        (vec![given(&args.library)?], out.context("there is no workspace here: name the output folder with --out")?)
+        let out = args.out.clone().map_or_else(|| output_folder("fmu"), Ok)?;
+        (vec![given(&args.library)?], out)
     };
     for note in notes(&models) {
-        eprintln!("note: {note}");
+        message::note(&note);
     }
     let mut written = Vec::new();
     for model in &models {
+        let reference = reference(model, versions[0], moment)?;
         for &version in &versions {
             let folder = if version == FmiVersion::V2 { "fmi2" } else { "fmi3" };
             let path = out.join(folder).join(format!("{}.fmu", model.description.name));
             let mut files = pack::contents(&model.description, &model.binaries, &model.licenses, version, moment);
             files.extend(icons::files(&model.description, version)?);
+            files.extend(reference.clone());
             pack::write(&path, &pack::archive(&files, moment)?)?;
             written.push(path);
         }
     }
     Ok(written)
+}
+
+/// The reference files for the model's archives. A model that does not run by itself has none: why is a note.
+fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTreeMap<String, Entry>> {
+    let Model { description, stimuli, .. } = model;
+    let dir = tempfile::tempdir()?;
+    let archive = dir.path().join("reference.fmu");
+    let files = pack::contents(description, &model.own, &model.licenses, version, moment);
+    pack::write(&archive, &pack::archive(&files, moment)?)?;
+    let parameters = tune::example_for(description)?;
+    let parameters = parameters.as_ref().map(|(name, text)| (name.as_str(), text.as_str()));
+    reference::files(&archive, description, stimuli, parameters).or_else(|why| {
+        let name = &description.name;
+        message::note(&printable(&format!("{name}: the archive gets no reference result: {why:#}")));
+        Ok(BTreeMap::new())
+    })
 }
 
 /// Compiles the checker's program; returns where it is.
@@ -121,9 +146,9 @@ fn release(folder: &Path) -> Result<PathBuf> {
     if let Ok(needs) = Needs::of(&bytes)
         && !needs.are_modest()
     {
-        eprintln!(
-            "note: {CHECKER} needs {needs} where it runs; built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most"
-        );
+        message::note(&format!(
+            "{CHECKER} needs {needs} where it runs; built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most"
+        ));
     }
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let path = folder.join(built.file_name().unwrap_or_default());
@@ -165,7 +190,9 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
         bail!("nothing that was compiled is a cdylib: set crate-type = [\"cdylib\"]");
     }
     let model = |(package, own): &Library| {
-        load(own, built.get(package).map_or(&[], Vec::as_slice), Licenses::of_package(workspace, package))
+        let folder = workspace.package(package).map_or(Path::new("."), Package::folder);
+        let binaries = built.get(package).map(Vec::as_slice).unwrap_or_default();
+        load(own, binaries, Licenses::of_package(workspace, package), folder.join(reference::STIMULI))
     };
     describing.iter().map(model).collect()
 }
@@ -232,14 +259,15 @@ fn given(libraries: &[String]) -> Result<Model> {
     let (_, own) = own.ok_or_else(|| {
         anyhow!("one library must be for this machine ({}): it describes the model", Platform::host())
     })?;
-    load(own, &libraries, Licenses::default())
+    load(own, &libraries, Licenses::default(), PathBuf::from(reference::STIMULI))
 }
 
 /// The model of these libraries, described by the one for this computer.
-fn load(own: &Path, libraries: &[(Platform, PathBuf)], licenses: Licenses) -> Result<Model> {
+fn load(own: &Path, libraries: &[(Platform, PathBuf)], licenses: Licenses, stimuli: PathBuf) -> Result<Model> {
     let description = describe(own)?;
-    let read = |(platform, path): &(Platform, PathBuf)| Ok((*platform, read(path)?));
-    Ok(Model { description, binaries: libraries.iter().map(read).collect::<Result<_>>()?, licenses })
+    let read = |(platform, path): &(Platform, PathBuf)| anyhow::Ok((*platform, read(path)?));
+    let binaries = libraries.iter().map(read).collect::<Result<_>>()?;
+    Ok(Model { description, own: vec![read(&(Platform::host(), own.to_owned()))?], binaries, licenses, stimuli })
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {

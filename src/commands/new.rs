@@ -26,10 +26,11 @@ pub struct New {
 }
 
 /// The files of a project, with places for names in braces.
-const TEMPLATE: [(&str, &str); 5] = [
+const TEMPLATE: [(&str, &str); 6] = [
     ("Cargo.toml", include_str!("../../template/manifest.toml")),
     ("src/lib.rs", include_str!("../../template/lib.rs")),
     ("src/tests.rs", include_str!("../../template/tests.rs")),
+    ("stimuli.csv", include_str!("../../template/stimuli.csv")),
     (".github/workflows/fmu.yml", include_str!("../../template/ci.yml")),
     ("README.md", include_str!("../../template/README.md")),
 ];
@@ -59,7 +60,9 @@ pub fn run(args: &New) -> Result<String> {
     }
     fs::rename(&inner, Path::new(name)).with_context(why)?;
     let fmu = fmu_name(name);
-    Ok(format!("{name}: the FMU {fmu}. Next:\n  cd {name}\n  cargo test\n  fmu build\n  fmu check target/fmu/fmi3/{fmu}.fmu\n"))
+    Ok(format!(
+        "{name}: the FMU {fmu}. Next:\n  cd {name}\n  cargo test\n  fmu build\n  fmu check target/fmu/fmi3/{fmu}.fmu\n"
+    ))
 }
 
 /// All files by name.
@@ -70,7 +73,8 @@ fn files(name: &str) -> Result<BTreeMap<String, String>> {
         true => format!("{name} = {{ path = \"vendor/{name}\" }}"),
         false => format!("{name} = \"{version}\""),
     };
-    let install = if carried { "cargo install --locked --git ${{ vars.FMU_GIT }} fmu" } else { "cargo install --locked fmu" };
+    let install =
+        if carried { "cargo install --locked --git ${{ vars.FMU_GIT }} fmu" } else { "cargo install --locked fmu" };
     let year = &Moment::of_environment()?.date_and_time()[..4];
     let places = [
         ("{package}", name),
@@ -118,22 +122,35 @@ fn judge(name: &str) -> Result<()> {
         bail!("{name}: is a keyword of Rust: take another name, for example {name}-model");
     }
     if TAKEN.contains(&name) {
-        bail!("{name}: is a package that the FMU itself needs, or Cargo uses: take another name, for example {name}-model");
+        bail!(
+            "{name}: is a package that the FMU itself needs, or Cargo uses: take another name, for example {name}-model"
+        );
     }
     Ok(())
 }
 
 /// Rust's keywords in lower case, those of no crate name (reference, "Keywords", edition 2024).
 const KEYWORDS: [&str; 50] = [
-    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn", "else", "enum",
-    "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop", "macro", "match", "mod", "move",
-    "mut", "override", "priv", "pub", "ref", "return", "self", "static", "struct", "super", "trait", "true", "try", "type",
-    "typeof", "unsafe", "unsized", "use", "virtual", "where", "while",
+    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn", "else",
+    "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop", "macro", "match", "mod",
+    "move", "mut", "override", "priv", "pub", "ref", "return", "self", "static", "struct", "super", "trait", "true",
+    "try", "type", "typeof", "unsafe", "unsized", "use", "virtual", "where", "while",
 ];
 
 /// Packages and folders that a project has anyway.
 const TAKEN: [&str; 12] = [
-    "alloc", "build", "core", "deps", "examples", "fmu-core", "fmu-export", "incremental", "proc-macro", "serde", "std", "test",
+    "alloc",
+    "build",
+    "core",
+    "deps",
+    "examples",
+    "fmu-core",
+    "fmu-export",
+    "incremental",
+    "proc-macro",
+    "serde",
+    "std",
+    "test",
 ];
 
 /// Name of the FMU: the words of the package's name, each with a capital letter.
