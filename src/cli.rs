@@ -1,6 +1,6 @@
 //! The command line: one variant for each command.
 
-use crate::commands::{atlas, build, compare, info, merge, new, reproduce, simulate, ssp, sweep, tune};
+use crate::commands::{atlas, build, compare, info, merge, new, prove, reproduce, simulate, ssp, sweep, tune};
 use clap::{CommandFactory, Parser, Subcommand};
 use fmu_check::{command as check, message, probe};
 use fmu_import::printable_lines;
@@ -31,6 +31,7 @@ enum Command {
     Atlas(atlas::Atlas),
     Tune(tune::Tune),
     Ssp(ssp::Ssp),
+    Prove(prove::Prove),
     /// Writes what a shell needs to complete this command
     ///
     /// For bash and for PowerShell:
@@ -90,6 +91,10 @@ pub fn main() -> ExitCode {
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Tune(args) => tune::run(&args).map(|good| ExitCode::from(u8::from(!good))),
+        Command::Prove(args) => prove::run(&args).map(|(folders, good)| {
+            folders.iter().for_each(|folder| println!("{}", folder.display()));
+            ExitCode::from(u8::from(!good))
+        }),
         Command::Ssp(args) => ssp::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Compare(args) => compare::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
     };

@@ -1,7 +1,7 @@
 //! The command-line tool `fmu`, as a library so that tests can use its parts.
 //!
 //! - [`cli`]: the command line; [`commands`]: one module for each command; [`vendor`]: the crates that `fmu new` writes.
-//! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`], [`reference`]: from Rust sources to `.fmu`
+//! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`], [`reference`], [`release`]: from Rust sources to `.fmu`
 //!   files.
 //! - [`ssp`], [`ssv`]: write systems and parameter values.
 //!
@@ -18,6 +18,7 @@ pub mod licenses;
 pub mod pack;
 pub mod picture;
 pub mod reference;
+pub mod release;
 pub mod ssp;
 pub mod ssv;
 pub mod target;

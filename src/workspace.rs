@@ -31,6 +31,8 @@ pub struct Package {
     pub license: Option<String>,
     /// Source of the package.
     pub repository: Option<String>,
+    /// The registry or repository that Cargo has it from; `None` for a folder.
+    source: Option<String>,
     manifest_path: PathBuf,
     targets: Vec<Target>,
 }
@@ -86,6 +88,11 @@ impl Package {
     /// Its folder.
     pub fn folder(&self) -> &Path {
         self.manifest_path.parent().unwrap_or(Path::new("."))
+    }
+
+    /// Whether it comes from a registry.
+    pub fn is_published(&self) -> bool {
+        self.source.as_ref().is_some_and(|source| source.starts_with("registry+"))
     }
 
     /// Whether it has a library that C can load.

@@ -86,6 +86,24 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     let last: f64 = last.split(',').nth(1).unwrap().parse().unwrap();
     assert!((last - (333.15 - 40.0 * (-4.0_f64).exp())).abs() < 1e-6, "{last}");
 
+    // A release: sums that hold, and the crates with their licenses.
+    let host = fmu::target::host_triple().unwrap();
+    succeeds(command("fmu", &folder).args(["build", "--release-dir", "release", "--target", &host]));
+    let release = folder.join("release");
+    if cfg!(target_os = "linux") {
+        let said = succeeds(command("sha256sum", &release).args(["--check", "--strict", "SHA256SUMS"]));
+        for file in ["fmi2/MyModel.fmu: OK", "fmi3/MyModel.fmu: OK", "sbom.cdx.json: OK"] {
+            assert!(said.contains(file), "{said}");
+        }
+    }
+    let bill: serde_json::Value = serde_json::from_slice(&fs::read(release.join("sbom.cdx.json")).unwrap()).unwrap();
+    let components = bill["components"].as_array().unwrap();
+    let of = |name: &str| components.iter().find(|c| c["name"] == name).unwrap();
+    assert_eq!((&of("my-model")["type"], &of("my-model")["purl"]), (&"application".into(), &serde_json::Value::Null));
+    assert_eq!(of("postcard")["licenses"][0]["expression"], "MIT OR Apache-2.0");
+    assert!(of("serde")["purl"].as_str().unwrap().starts_with("pkg:cargo/serde@1."), "{bill}");
+    assert_eq!(bill["dependencies"][0]["dependsOn"].as_array().unwrap().len() + 1, components.len());
+
     // The licenses of what is linked, the two crates included; no license for the model that nobody gave.
     let files = fmu_import::contents(&folder.join(archives[1])).unwrap().1;
     let licenses = String::from_utf8_lossy(&files["documentation/licenses/license.txt"]).into_owned();

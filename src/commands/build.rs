@@ -5,9 +5,9 @@ use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
 use crate::pack::{self, Entry, Moment};
-use crate::reference;
 use crate::target::{Target, Tools, ZIG};
 use crate::workspace::{Package, Workspace, output_folder};
+use crate::{reference, release};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use fmu_check::message;
@@ -40,7 +40,10 @@ use std::path::{Path, PathBuf};
 /// With cargo-zigbuild in PATH, Linux binaries need glibc 2.17 (2012). Otherwise this computer's linker decides, and the command
 /// prints what they need. CARGO_TARGET_TRIPLE_LINKER, in Cargo's spelling, selects another linker.
 ///
-/// --release-dir DIR builds the program fmu-check to give away: with cargo-zigbuild it needs glibc 2.17 and no other library.
+/// --release-dir DIR writes what a release holds: the archives, with a binary for each of Linux, Windows and macOS that can be
+/// built for here; SHA256SUMS; sbom.cdx.json, the crates in them and their licenses (CycloneDX); and in the workspace that has
+/// them, the programs fmu, cargo-fmu and fmu-check for this computer, which need no other library with cargo-zigbuild.
+///   fmu build --release-dir release
 ///
 /// With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Default, Args)]
@@ -64,13 +67,22 @@ pub struct Build {
     /// Target to build for instead of this computer; separate several with commas or repeat the option
     #[arg(long, value_name = "TRIPLE", value_delimiter = ',', conflicts_with = "library")]
     pub target: Vec<String>,
-    /// Build the checker's program for this folder instead of FMUs
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["fmus", "package", "library", "target", "out", "fmi"])]
+    /// Write everything of a release to this folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["package", "library", "out"])]
     pub release_dir: Option<PathBuf>,
 }
 
-/// The package of the checker, and its program.
-const CHECKER: &str = "fmu-check";
+/// Targets of a release.
+const RELEASED: [&str; 5] = [
+    "x86_64-unknown-linux-gnu",
+    "aarch64-unknown-linux-gnu",
+    "x86_64-pc-windows-gnu",
+    "x86_64-apple-darwin",
+    "aarch64-apple-darwin",
+];
+
+/// Packages with programs of a release, in the workspace that has them.
+const PROGRAMS: [(&str, &str); 3] = [("fmu", "fmu"), ("fmu", "cargo-fmu"), ("fmu-check", "fmu-check")];
 
 /// A compiled model, ready to be packed.
 struct Model {
@@ -89,7 +101,7 @@ struct Model {
 /// A name is not an FMU, the compiler fails, a library was not made by `export!`, or a folder cannot be written.
 pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     if let Some(folder) = &args.release_dir {
-        return Ok(vec![release(folder)?]);
+        return release(args, folder);
     }
     let moment = Moment::of_environment()?;
     let versions = match args.fmi.as_deref() {
@@ -139,21 +151,46 @@ fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTree
     })
 }
 
-/// Compiles the checker's program; returns where it is.
-fn release(folder: &Path) -> Result<PathBuf> {
-    let built = program(&Workspace::find()?, CHECKER, &Tools::find()?.host())?;
-    let bytes = fs::read(&built).with_context(|| built.display().to_string())?;
-    if let Ok(needs) = Needs::of(&bytes)
-        && !needs.are_modest()
-    {
-        message::note(&format!(
-            "{CHECKER} needs {needs} where it runs; built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most"
-        ));
+/// Everything of a release, in a folder; returns its files.
+fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
+    let (workspace, tools, moment) = (Workspace::find()?, Tools::find()?, Moment::of_environment()?);
+    let target = if args.target.is_empty() { available(&tools) } else { args.target.clone() };
+    let (fmus, fmi) = (args.fmus.clone(), args.fmi.clone());
+    let mut packages: Vec<String> = choose(&workspace.fmus(), &fmus)?.iter().map(|p| p.name.clone()).collect();
+    let mut written = run(&Build { fmus, fmi, target, out: Some(folder.into()), ..Build::default() })?;
+    for (package, name) in PROGRAMS {
+        if !workspace.package(package).is_some_and(|p| workspace.is_member(p)) {
+            continue;
+        }
+        let built = program(&workspace, package, name, &tools.host())?;
+        let bytes = fs::read(&built).with_context(|| built.display().to_string())?;
+        if let Ok(needs) = Needs::of(&bytes)
+            && !needs.are_modest()
+        {
+            message::note(&format!(
+                "{name} needs {needs} where it runs; built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most"
+            ));
+        }
+        let path = folder.join(built.file_name().unwrap_or_default());
+        fs::copy(&built, &path).with_context(|| path.display().to_string())?;
+        written.push(path);
+        packages.push(package.into());
     }
-    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let path = folder.join(built.file_name().unwrap_or_default());
-    fs::copy(&built, &path).with_context(|| path.display().to_string())?;
-    Ok(path)
+    packages.dedup();
+    let others = release::finish(&workspace, &packages, folder, &written, moment)?;
+    Ok(written.into_iter().chain(others).collect())
+}
+
+/// The targets of a release that can be built for here; what is missing for the others is a note.
+fn available(tools: &Tools) -> Vec<String> {
+    let can = |triple: &&str| match tools.target(triple) {
+        Ok(_) => true,
+        Err(why) => {
+            message::note(&format!("the archives get no binary: {why:#}"));
+            false
+        }
+    };
+    RELEASED.into_iter().filter(can).map(str::to_owned).collect()
 }
 
 fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
