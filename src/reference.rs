@@ -6,7 +6,7 @@
 //! variables (https://github.com/modelica/fmi-standard.org, CONTRIBUTING, "Compatibility information").
 
 use crate::pack::Entry;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use fmu_core::{Description, Experiment};
 use fmu_import::Fmu;
 use fmu_import::cosimulation::{Recording, Schedule, Settings, System};
@@ -26,6 +26,9 @@ pub const STIMULI: &str = "stimuli.csv";
 /// Variables and intervals at most.
 const VARIABLES: usize = 10;
 const INTERVALS: f64 = 200.0;
+
+/// Communication steps at most: a build takes seconds.
+const MOST_STEPS: f64 = 1e6;
 
 /// Runs a packed FMU through its default experiment, fed with the file `stimuli` if there is one; returns the files for its
 /// archive. `parameters` is a set of values, its name and the text of its SSV file.
@@ -108,6 +111,9 @@ pub fn run(archive: &Path, experiment: &Experiment, fed: Vec<(String, Schedule)>
         system.input(&format!("fmu.{input}"), schedule)?;
     }
     let Experiment { start, stop, step } = *experiment;
+    if (stop - start) / step > MOST_STEPS {
+        bail!("the default experiment has more than {MOST_STEPS:e} steps");
+    }
     let settings = Settings { start, stop, step, sequential: false };
     system.run(&settings, |_| Ok(ControlFlow::Continue(()))).context("the default experiment")
 }

@@ -80,8 +80,11 @@ struct DependencyKind {
 /// # Errors
 /// Cargo's target folder is unknown although there is a package.
 pub fn output_folder(name: &str) -> Result<PathBuf> {
-    let is_package = std::env::current_dir()?.ancestors().any(|folder| folder.join("Cargo.toml").is_file());
-    if is_package { Ok(Workspace::find()?.target.join(name)) } else { Ok(name.into()) }
+    if has_manifest(&std::env::current_dir()?) { Ok(Workspace::find()?.target.join(name)) } else { Ok(name.into()) }
+}
+
+fn has_manifest(folder: &Path) -> bool {
+    folder.ancestors().any(|folder| folder.join("Cargo.toml").is_file())
 }
 
 impl Package {
@@ -114,16 +117,21 @@ impl Workspace {
     /// # Errors
     /// There is none, or Cargo cannot be run.
     pub fn find() -> Result<Self> {
+        let here = std::env::current_dir().context("the current folder")?;
+        if !has_manifest(&here) {
+            bail!(
+                "no Cargo package here: expected a Cargo.toml in {} or above it; change to the folder of a package, or make one \
+                 with fmu new my-model",
+                here.display()
+            );
+        }
         let mut metadata = cargo();
         metadata.args(["metadata", "--format-version", "1", "--filter-platform", &host_triple()?]);
         let output = metadata.stdin(Stdio::null()).output().context("cargo cannot be run")?;
         if !output.status.success() {
             let message = String::from_utf8_lossy(&output.stderr);
             let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
-            bail!(
-                "no Cargo package here: {}; change to the folder of one, or make one with fmu new my-model",
-                message.trim_start_matches("error: ")
-            );
+            bail!("cargo metadata: {}", message.trim_start_matches("error: "));
         }
         let metadata: Metadata = serde_json::from_slice(&output.stdout).context("cargo metadata")?;
         let normal = |d: Dependency| d.dep_kinds.iter().any(|k| k.kind.is_none()).then_some(d.pkg);

@@ -175,8 +175,20 @@ fn cargo_fmu_is_the_command() {
     let dir = tempfile::tempdir().unwrap();
     let one = succeeds(command("cargo", dir.path()).args(["fmu", "--version"]));
     assert_eq!(one, succeeds(command("fmu", dir.path()).arg("--version")));
-    let output = command("cargo", dir.path()).args(["fmu", "build"]).output().unwrap();
-    assert_eq!(output.status.code(), Some(2));
-    let said = text(&output);
-    assert!(said.contains("error: no Cargo package here: ") && said.contains("fmu new my-model"), "{said}");
+    let refused = |parts: &[&str]| {
+        let output = command("cargo", dir.path()).args(["fmu", "build"]).output().unwrap();
+        let said = text(&output);
+        assert!(output.status.code() == Some(2) && said.lines().count() == 1, "{said}");
+        parts.iter().for_each(|part| assert!(said.contains(part), "{part}: {said}"));
+    };
+    let here = dir.path().display().to_string();
+    refused(&["error: no Cargo package here: expected a Cargo.toml in ", &here, "fmu new my-model"]);
+    // A package that is no FMU.
+    let manifest = "[package]\nname = \"plain\"\nversion = \"0.1.0\"\nedition = \"2024\"\n[workspace]\n";
+    fs::write(dir.path().join("Cargo.toml"), manifest).unwrap();
+    fs::create_dir(dir.path().join("src")).unwrap();
+    fs::write(dir.path().join("src/lib.rs"), "").unwrap();
+    refused(&["error: no package here is an FMU: expected crate-type = [\"cdylib\"] and the dependency fmu-export"]);
+    fs::write(dir.path().join("Cargo.toml"), "[package]\nname = 1\n").unwrap();
+    refused(&["error: cargo metadata: "]);
 }

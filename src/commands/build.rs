@@ -186,7 +186,7 @@ fn available(tools: &Tools) -> Vec<String> {
     let can = |triple: &&str| match tools.target(triple) {
         Ok(_) => true,
         Err(why) => {
-            message::note(&format!("the archives get no binary: {why:#}"));
+            message::note(&format!("left out: {why:#}"));
             false
         }
     };
@@ -296,7 +296,7 @@ fn given(libraries: &[String]) -> Result<Model> {
     let (_, own) = own.ok_or_else(|| {
         anyhow!("one library must be for this machine ({}): it describes the model", Platform::host())
     })?;
-    load(own, &libraries, Licenses::default(), PathBuf::from(reference::STIMULI))
+    load(own, &libraries, Licenses::default(), PathBuf::new())
 }
 
 /// The model of these libraries, described by the one for this computer.
