@@ -92,7 +92,9 @@ pub fn main() -> ExitCode {
         Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Tune(args) => tune::run(&args).map(|good| ExitCode::from(u8::from(!good))),
         Command::Prove(args) => prove::run(&args).map(|(folders, good)| {
-            folders.iter().for_each(|folder| println!("{}", folder.display()));
+            for folder in &folders {
+                println!("{}", folder.display());
+            }
             ExitCode::from(u8::from(!good))
         }),
         Command::Ssp(args) => ssp::run(&args).map(|()| ExitCode::SUCCESS),

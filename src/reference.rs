@@ -1,9 +1,9 @@
 //! What an FMU gives when it is run as it recommends: reference files in its archive, as the layered standard FMI-LS-REF
-//! 1.0.0-beta.1 names them (https://github.com/modelica/fmi-ls-ref). The experiment has the format of its release 1.0.0-alpha.1,
+//! 1.0.0-beta.1 names them (<https://github.com/modelica/fmi-ls-ref>). The experiment has the format of its release 1.0.0-alpha.1,
 //! which <https://github.com/modelica/ma-hs-experiments> continues.
 //!
 //! The files of CSV keep to the rules for the examples that the FMI tools page lists: names in quotes, time first, at most ten
-//! variables (https://github.com/modelica/fmi-standard.org, CONTRIBUTING, "Compatibility information").
+//! variables (<https://github.com/modelica/fmi-standard.org>, CONTRIBUTING, "Compatibility information").
 
 use crate::pack::Entry;
 use anyhow::{Context, Result, bail};

@@ -47,7 +47,7 @@ pub fn finish(
     Ok([sums, materials])
 }
 
-/// The packages and what is linked into each, in the format CycloneDX 1.6 (https://cyclonedx.org/docs/1.6/json/).
+/// The packages and what is linked into each, in the format CycloneDX 1.6 (<https://cyclonedx.org/docs/1.6/json/>).
 fn bill(workspace: &Workspace, packages: &[String], moment: Moment) -> Value {
     let reference = |p: &Package| format!("pkg:cargo/{}@{}", p.name, p.version);
     let mut components = BTreeMap::new();

@@ -325,7 +325,9 @@ fn packed_fmus_are_enough_outside_a_checkout() {
         let output = outside(arguments);
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.code() == Some(2) && said.lines().count() == 1, "{said}");
-        parts.iter().for_each(|part| assert!(said.contains(part), "{part}: {said}"));
+        for part in parts {
+            assert!(said.contains(part), "{part}: {said}");
+        }
     };
     let missing = "expected SensorlessController.fmu and PmsmPlant.fmu there or in its folder fmi2, as fmu build --out writes them";
     refused(&["ssp", "--fmus", ".", "--out", "none.ssp"], &["error: --fmus .: ", missing]);

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 /// Compiles FMUs and packs them for both standards.
 ///
 /// Without names, builds every FMU of the Cargo package or workspace around the current folder: the packages in its folder fmus/
-/// or, if there is no such folder, every package with crate-type = ["cdylib"] that depends on fmu-export. Select an FMU by the
+/// or, if there is no such folder, every cdylib that depends on fmu-export. Select an FMU by the
 /// name of its package (pmsm-plant) or of the FMU (PmsmPlant). `fmu new` makes a package for an FMU of your own.
 ///
 /// An FMU is any cdylib with the line `fmu_export::export!(MyModel);`:

@@ -69,9 +69,8 @@ pub fn run(args: &New) -> Result<String> {
 fn files(name: &str) -> Result<BTreeMap<String, String>> {
     let carried = vendor::are_carried();
     let version = env!("CARGO_PKG_VERSION");
-    let from = |name: &str| match carried {
-        true => format!("{name} = {{ path = \"vendor/{name}\" }}"),
-        false => format!("{name} = \"{version}\""),
+    let from = |name: &str| {
+        if carried { format!("{name} = {{ path = \"vendor/{name}\" }}") } else { format!("{name} = \"{version}\"") }
     };
     let install =
         if carried { "cargo install --locked --git ${{ vars.FMU_GIT }} fmu" } else { "cargo install --locked fmu" };

@@ -61,15 +61,14 @@ pub fn run(args: &Ssp) -> Result<()> {
     let values = values(args)?;
     let dir = tempfile::tempdir()?;
     let standard = format!("fmi{}", args.fmi);
-    let folder = match &args.fmus {
-        Some(given) => packed(given, &standard)?,
-        None => {
-            let fmus = COMPONENTS.map(|(_, fmu, _)| fmu.to_owned()).to_vec();
-            let out = Some(dir.path().into());
-            build::run(&Build { fmus, fmi: Some(args.fmi.clone()), out, ..Build::default() })
-                .context("the FMUs of the drive cannot be built here; --fmus DIR takes those of a folder")?;
-            dir.path().join(standard)
-        }
+    let folder = if let Some(given) = &args.fmus {
+        packed(given, &standard)?
+    } else {
+        let fmus = COMPONENTS.map(|(_, fmu, _)| fmu.to_owned()).to_vec();
+        let out = Some(dir.path().into());
+        build::run(&Build { fmus, fmi: Some(args.fmi.clone()), out, ..Build::default() })
+            .context("the FMUs of the drive cannot be built here; --fmus DIR takes those of a folder")?;
+        dir.path().join(standard)
     };
     let options = Options { gates: args.gates, geometry: args.geometry };
     let files = ssp::files(&folder, &values, options, moment)?;
