@@ -1,7 +1,7 @@
 //! The command-line tool `fmu`, as a library so that tests can use its parts.
 //!
 //! - [`cli`]: the command line; [`commands`]: one module for each command; [`vendor`]: the crates that `fmu new` writes.
-//! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`], [`reference`], [`release`]: from Rust sources to `.fmu`
+//! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`], [`mod@reference`], [`release`]: from Rust sources to `.fmu`
 //!   files.
 //! - [`ssp`], [`ssv`]: write systems and parameter values.
 //!
