@@ -1,7 +1,7 @@
 //! The command line: one variant for each command.
 
 use crate::commands::{atlas, build, compare, info, merge, new, prove, reproduce, simulate, ssp, sweep, tune};
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use fmu_check::{command as check, message, probe};
 use fmu_import::printable_lines;
 use std::ffi::OsString;
@@ -49,6 +49,22 @@ enum Command {
     SweepWorker,
 }
 
+/// The command line. `-h` shows the first example of `--help`.
+fn line() -> clap::Command {
+    Cli::command().mut_subcommands(|command| {
+        let example = command.get_long_about().and_then(|text| first_example(&text.to_string(), command.get_name()));
+        example.into_iter().fold(command, |command, text| command.after_help(text).after_long_help(""))
+    })
+}
+
+/// The first line of a help that starts with two spaces and the command, with the lines that a backslash appends.
+fn first_example(help: &str, name: &str) -> Option<String> {
+    let start = help.find(&format!("\n  fmu {name}"))? + 1;
+    let is_continued = |line: &&str| line.ends_with('\\');
+    let lines = help[start..].lines().take_while(is_continued).count() + 1;
+    Some(format!("Example:\n{}", help[start..].lines().take(lines).collect::<Vec<_>>().join("\n")))
+}
+
 /// The arguments. Cargo runs `cargo-fmu fmu ...` for `cargo fmu ...`.
 fn arguments() -> impl Iterator<Item = OsString> {
     let is_second = |(place, argument): &(usize, OsString)| *place == 1 && argument == "fmu";
@@ -60,7 +76,8 @@ pub fn main() -> ExitCode {
     if let Some(status) = fmu_import::guard::serve() {
         return status;
     }
-    let command = Cli::parse_from(arguments()).command;
+    let command =
+        Cli::from_arg_matches(&line().get_matches_from(arguments())).unwrap_or_else(|error| error.exit()).command;
     // The process that started a worker tells its error.
     let is_worker = matches!(&command, Command::Simulate(args) if args.worker);
     let outcome = match command {
@@ -79,7 +96,7 @@ pub fn main() -> ExitCode {
             ExitCode::SUCCESS
         }),
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "fmu", &mut std::io::stdout());
+            clap_complete::generate(shell, &mut line(), "fmu", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)
         }
         Command::Merge(args) => merge::run(&args).map(|()| ExitCode::SUCCESS),
@@ -116,7 +133,7 @@ mod tests {
     /// An example is a line of the long help that starts with two spaces and the command; `\\` continues it.
     #[test]
     fn the_help_of_every_command_has_an_example_that_parses() {
-        let mut whole = Cli::command();
+        let mut whole = line();
         whole.build();
         let commands: Vec<_> = whole.get_subcommands().filter(|c| !c.is_hide_set() && c.get_name() != "help").collect();
         assert!(commands.len() > 10);
@@ -126,6 +143,8 @@ mod tests {
             let start = format!("  fmu {name} ");
             let own = |line: &&str| format!("{line} ").starts_with(&start);
             assert!(help.lines().any(|line| own(&line)), "fmu {name} --help has no example: {help}");
+            let short = command.clone().render_help().to_string();
+            assert!(short.lines().any(|line| own(&line)), "fmu {name} -h has no example: {short}");
             for line in help.lines().filter(|line| line.trim_start().starts_with("fmu ")) {
                 let words: Vec<&str> = line.split_whitespace().take_while(|w| !["#", ">", ">>"].contains(w)).collect();
                 let parsed = Cli::try_parse_from(&words);

@@ -18,7 +18,7 @@ fn command(program: &str, folder: &Path) -> Command {
     let inherited = env::var_os("PATH").unwrap_or_default();
     let paths = std::iter::once(own.to_owned()).chain(env::split_paths(&inherited));
     let mut command = Command::new(program);
-    command.current_dir(folder).env("PATH", env::join_paths(paths).unwrap());
+    command.current_dir(folder).env("PATH", env::join_paths(paths).unwrap()).env_remove("CARGO_TARGET_DIR");
     command
 }
 
