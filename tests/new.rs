@@ -106,6 +106,9 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
 
     // The licenses of what is linked, the two crates included; no license for the model that nobody gave.
     let files = fmu_import::contents(&folder.join(archives[1])).unwrap().1;
+    for file in ["MyModel_ref.csv", "MyModel_in.csv", "smoke-test.exp", "fmi-ls-manifest.xml"] {
+        assert!(files.contains_key(&format!("extra/org.fmi-standard.fmi-ls-ref/{file}")), "{file}");
+    }
     let licenses = String::from_utf8_lossy(&files["documentation/licenses/license.txt"]).into_owned();
     for part in ["fmu-core 0.1.0: MIT OR Apache-2.0", "serde 1.0", "fmu-core, fmu-export\n\nMIT License"] {
         assert!(licenses.contains(part), "{part}: {licenses}");
@@ -155,7 +158,9 @@ fn what_cannot_be_made_is_refused_in_one_line() {
         ("a/b", "is a path: change to a and run fmu new b"),
         ("/b", "is a path: change to / and run fmu new b"),
         ("match", "is a keyword of Rust: take another name, for example match-model"),
-        ("serde", "is a package that the FMU itself needs, or Cargo uses"),
+        ("test", "is a name of Rust or Cargo: take another name, for example test-model"),
+        ("serde", "is a package that the FMU itself needs: take another name, for example serde-model"),
+        ("syn", "is a package that the FMU itself needs"),
         ("there", "exists already: take another name, or remove it"),
         (&"x".repeat(65), "has 65 characters: 64 are allowed"),
     ] {

@@ -89,7 +89,11 @@ fn files(name: &str) -> Result<BTreeMap<String, String>> {
     files.insert(".gitignore".into(), "/target\n".into());
     if carried {
         files.extend(vendor::files()?);
-        files.insert("Cargo.lock".into(), vendor::lock(name, VERSION)?);
+        let lock = vendor::lock(name, VERSION)?;
+        if lock.matches(&format!("name = \"{name}\"\n")).count() > 1 {
+            bail!("{name}: is a package that the FMU itself needs: take another name, for example {name}-model");
+        }
+        files.insert("Cargo.lock".into(), lock);
     }
     Ok(files)
 }
@@ -121,9 +125,7 @@ fn judge(name: &str) -> Result<()> {
         bail!("{name}: is a keyword of Rust: take another name, for example {name}-model");
     }
     if TAKEN.contains(&name) {
-        bail!(
-            "{name}: is a package that the FMU itself needs, or Cargo uses: take another name, for example {name}-model"
-        );
+        bail!("{name}: is a name of Rust or Cargo: take another name, for example {name}-model");
     }
     Ok(())
 }
@@ -136,21 +138,8 @@ const KEYWORDS: [&str; 50] = [
     "try", "type", "typeof", "unsafe", "unsized", "use", "virtual", "where", "while",
 ];
 
-/// Packages and folders that a project has anyway.
-const TAKEN: [&str; 12] = [
-    "alloc",
-    "build",
-    "core",
-    "deps",
-    "examples",
-    "fmu-core",
-    "fmu-export",
-    "incremental",
-    "proc-macro",
-    "serde",
-    "std",
-    "test",
-];
+/// Crates of Rust itself, and names that Cargo uses.
+const TAKEN: [&str; 9] = ["alloc", "build", "core", "deps", "examples", "incremental", "proc-macro", "std", "test"];
 
 /// Name of the FMU: the words of the package's name, each with a capital letter.
 fn fmu_name(package: &str) -> String {
