@@ -9,7 +9,7 @@ use fmu_check::message;
 use fmu_core::Experiment;
 use fmu_import::cosimulation::Schedule;
 use fmu_import::platform::Platform;
-use model_description::{FmiVersion, ModelDescription};
+use model_description::{FmiVersion, Interface, ModelDescription};
 use serde::Deserialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -151,7 +151,7 @@ fn proof(example: &Example, md: &ModelDescription, python: &Path) -> Result<(Str
         "with all inputs at their start values".into()
     };
     let text = format!(
-        "{name} {}, FMI {}, Co-Simulation\n{}\n\nExported by {TOOL} on {}.\n\n\
+        "{name} {}, FMI {}, Co-Simulation\n{}\n\nExported by {TOOL} on {}. To test with it: {}.\n\n\
          {name}_ref.csv is the result from {start} s to {stop} s in communication steps of {step} s, {fed};\n\
          {name}_ref.opt has these options. Straight lines connect the points of inputs.\n\n\
          Importers that ran {name}.fmu from these files, with the largest deviation, relative to the largest value of a column:\n  {}\n\n\
@@ -160,10 +160,28 @@ fn proof(example: &Example, md: &ModelDescription, python: &Path) -> Result<(Str
         md.version,
         md.description.as_deref().unwrap_or_default(),
         Platform::host(),
+        features(md),
         replays.join("\n  "),
         validations.join("\n  "),
     );
     Ok((text, good))
+}
+
+/// What of FMI the FMU has.
+fn features(md: &ModelDescription) -> String {
+    let cs = md.co_simulation.as_ref();
+    let all = [
+        ("Co-Simulation", cs.is_some()),
+        ("Model Exchange", md.model_exchange.is_some()),
+        ("FMU state, saved and restored", cs.is_some_and(Interface::can_get_and_set_state)),
+        ("FMU state as bytes", cs.is_some_and(Interface::can_serialize_state)),
+        (
+            "directional derivatives",
+            cs.is_some_and(|cs| cs.flag("providesDirectionalDerivative") || cs.flag("providesDirectionalDerivatives")),
+        ),
+        ("Event Mode in Co-Simulation", cs.is_some_and(Interface::has_event_mode)),
+    ];
+    all.into_iter().filter(|(_, has)| *has).map(|(name, _)| name).collect::<Vec<_>>().join(", ")
 }
 
 /// The largest deviation of this program's importer.
