@@ -19,15 +19,16 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
     let head = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-         <header>\n<h1>{name}</h1>\n<p class=\"summary\">{}</p>\n<p>Version {} · FMI {version} for co-simulation · {}</p>\n\
+         <header>\n{}<h1>{name}</h1>\n<p class=\"summary\">{}</p>\n<p>Version {} · FMI {version} for co-simulation · {}</p>\n\
          </header>\n",
+        d.icon.as_deref().map(icon).unwrap_or_default(),
         escape(&d.description),
         escape(&d.version),
         escape(&d.author),
     );
     let mut out = String::new();
     if !d.documentation.is_empty() {
-        put!(out, "<section>\n{}\n</section>\n", d.documentation.trim());
+        put!(out, "<section>\n{}\n</section>\n", scrolling(d.documentation.trim()));
     }
     out += &timing(d);
     for (title, causality) in
@@ -48,6 +49,25 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
     );
     let (contents, body) = with_contents(&out);
     format!("{head}{contents}<main>\n{body}</main>\n</body>\n</html>\n")
+}
+
+/// The icon of the FMU as part of the page: an SVG document without its declaration, which the name beside it describes.
+fn icon(svg: &str) -> String {
+    let svg = svg.find("<svg").map_or(svg, |at| &svg[at..]);
+    format!("<div class=\"icon\" aria-hidden=\"true\">{}</div>\n", svg.trim())
+}
+
+/// Drawings and tables in boxes of their own, in which a narrow page scrolls them.
+fn scrolling(html: &str) -> String {
+    let boxed = |html: String, open: &str, close: &str| {
+        let mut parts = html.split(open);
+        let first = parts.next().unwrap_or_default().to_owned();
+        parts.fold(first, |out, part| {
+            let (inside, after) = part.split_once(close).unwrap_or((part, ""));
+            out + "<div class=\"scroll\">" + open + inside + close + "</div>" + after
+        })
+    };
+    boxed(boxed(html.to_owned(), "<svg ", "</svg>"), "<table", "</table>")
 }
 
 /// A table of contents that links to the headings, and the body with their anchors.

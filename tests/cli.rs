@@ -309,12 +309,58 @@ fn a_first_plot_has_five_panels() {
         std::fs::read_to_string(&svg).unwrap()
     };
     let first = run(&[]);
-    for part in
-        ["height=\"1200\"", "PmsmDrive.speed_ref", "theta_est - theta_e", "PmsmDrive.i_q_ref", "\nrpm\n", "\nW\n"]
-    {
+    for part in [
+        "height=\"1200\"",
+        "PmsmDrive.speed_ref",
+        "theta_est - theta_e",
+        "PmsmDrive.i_q_ref",
+        ">rpm</text>",
+        ">W</text>",
+    ] {
         assert!(first.contains(part), "{part}");
     }
     assert!(!first.contains("PmsmDrive.i_a") && run(&["--all"]).contains("PmsmDrive.i_a"));
+}
+
+/// The page of a run: the panels of the plot with all their points, and nothing from outside; of an FMU of another maker too.
+#[test]
+fn a_run_is_written_as_a_page() {
+    let dir = tempfile::tempdir().unwrap();
+    let html = dir.path().join("run.html");
+    let run = |arguments: &[&str]| {
+        let output = fmu(&[&["simulate"], arguments, &["--html", html.to_str().unwrap()]].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let page = std::fs::read_to_string(&html).unwrap();
+        common::pages::stands_alone(&page, |_| false);
+        page
+    };
+    let drive = archive("fmi3", "PmsmDrive");
+    let drive = drive.to_str().unwrap();
+    let arguments = [drive, "--stop", "0.02", "--input", "speed_ref=1000rpm"];
+    let page = run(&arguments);
+    assert!(page.contains("<h1>PmsmDrive.fmu</h1>") && page.contains("DecompressionStream"), "title and script");
+    let [figure] = &common::pages::figures(&page)[..] else { panic!("one figure") };
+    let panels = figure["panels"].as_array().unwrap();
+    let units: Vec<&str> = panels.iter().map(|panel| panel["unit"].as_str().unwrap()).collect();
+    assert_eq!(units, ["rpm", "N.m", "A", "W", "deg"]);
+    let names: Vec<&str> = panels
+        .iter()
+        .flat_map(|panel| panel["curves"].as_array().unwrap())
+        .map(|curve| curve["name"].as_str().unwrap())
+        .collect();
+    assert!(names.contains(&"PmsmDrive.speed_ref") && names.contains(&"theta_est - theta_e"), "{names:?}");
+    // The time in two parts, then every curve.
+    let lengths = figure["lengths"].as_array().unwrap();
+    assert!(lengths.len() == names.len() + 2 && lengths.iter().all(|n| n == 21), "{lengths:?}");
+    let long = run(&[&arguments[..], &["--all", "--step", "2e-7"]].concat());
+    assert!(common::pages::figures(&long)[0]["lengths"][0] == 100_001);
+    assert!(long.len() < 5_000_000, "100001 points of every output take {} bytes", long.len());
+    for (option, file, remedy) in
+        [("--html", "run.svg", "pages are written as .html"), ("--all", "", "--html: add one")]
+    {
+        let arguments: Vec<&str> = ["simulate", drive, option, file].into_iter().filter(|a| !a.is_empty()).collect();
+        fails(&arguments, 2, &[file, remedy]);
+    }
 }
 
 /// Ctrl-C keeps what was computed.
@@ -435,6 +481,8 @@ fn an_atlas_is_written_or_refused() {
         ["atlas.csv", "atlas.md", "atlas.html", "atlas-Rasmussen.svg"]
             .map(|name| std::fs::read(out.join(name)).unwrap())
     };
+    let [.., page, _] = run("1", "a");
+    common::pages::stands_alone(&text(&page), |file| file == "atlas.csv");
     assert!(run("1", "a") == run("2", "b"));
     for (arguments, parts) in [
         (&["--load="][..], &["--load has no value", "at least one", "leave the option out"][..]),

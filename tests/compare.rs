@@ -1,10 +1,15 @@
 //! The grid of estimators and scenarios: its reduced form against the golden copy, its figures, its command line.
 #![allow(missing_docs)]
 
+mod common;
+
+use drive::estimator::Kind;
 use drive_study::compare::candidate::{Class, Entry};
 use drive_study::compare::measure::Measure;
+use drive_study::compare::plots::{self, Plot};
 use drive_study::compare::scenario::{Effort, SCENARIOS};
 use drive_study::compare::{self, Cell, Selection, html, table};
+use drive_study::{ink, plot};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -137,6 +142,23 @@ fn the_results_page_shows_what_is_printed() {
     }
 }
 
+/// The curve of a lost run ends where the rotor is lost, in the color of its estimator, with a mark.
+#[test]
+fn a_lost_run_is_cut_where_it_is_lost() {
+    let plots = plots::all(&of(grid(), &["DirectEmf", "VoltageModel"], &["reversal"]));
+    let [Plot { figure, .. }] = &plots[..] else { panic!("{plots:?}") };
+    for panel in &figure.panels {
+        let [lost, held] = &panel.curves[..] else { panic!("{panel:?}") };
+        assert_eq!((lost.ink, held.ink), (ink::of(Kind::DirectEmf), ink::of(Kind::VoltageModel)));
+        assert!(lost.lost && !held.lost && held.y.len() == held.x.len());
+        // The reference passes zero at 0.95 s.
+        let end = lost.x[lost.y.len() - 1];
+        assert!((0.9..1.1).contains(&end) && lost.y.iter().all(|y| y.abs() <= 90.0), "{end} s");
+    }
+    let svg = plot::svg(figure).unwrap();
+    assert!(svg.contains("DirectEmf ✕ lost") && svg.matches("l10 10m0-10l-10 10").count() == 2, "{svg}");
+}
+
 #[test]
 fn what_is_outside_is_marked() {
     let mut cells: Vec<Cell> = grid().iter().filter(|c| c.entry.name == "DirectEmf").cloned().collect();
@@ -148,6 +170,8 @@ fn what_is_outside_is_marked() {
     assert!(text.contains("0.200✗"), "{text}");
     assert!(text.contains("OUTSIDE: DirectEmf, load-0.5, dip: 0.200 pu, expected 0.093"), "{text}");
     assert!(table::markdown(&cells).contains("| DirectEmf"));
+    let html = html::page(&cells, &[]).unwrap();
+    assert!(html.contains(" out\" title=\"expected 0.093") && html.contains(">0.200 ✗</td>"), "{html}");
 }
 
 /// Rasmussen's row is of another machine, and every table says so.
@@ -155,7 +179,7 @@ fn what_is_outside_is_marked() {
 fn another_machine_is_told_in_its_row() {
     let cells = of(grid(), &["Rasmussen", "ExtendedEmf"], &["generating-0.1"]);
     let row = "Rasmussen (reference motor, 2 N.m)";
-    for text in [table::text(&cells), table::markdown(&cells), html::page(&cells, &[])] {
+    for text in [table::text(&cells), table::markdown(&cells), html::page(&cells, &[]).unwrap()] {
         assert!(text.contains(row) && !text.contains("ExtendedEmf ("), "{text}");
     }
     let csv = table::csv(&cells);
@@ -182,8 +206,16 @@ fn the_command_writes_table_plots_and_page() {
         assert!(read(svg).contains("<svg"), "{svg}");
     }
     let html = read("compare.html");
-    assert!(html.contains("Fig. 8 of the review") && html.contains("<td>ExtendedEmf</td>"));
-    assert!(!html.contains("src=") && !html.contains("href="), "self-contained");
+    let (swatch, curve) = (
+        "background:#0593e6\"></span>Extended<wbr>Emf</th>",
+        "\"ink\":\"#0593e6\",\"lost\":false,\"name\":\"ExtendedEmf\"",
+    );
+    for part in
+        ["Fig. 8 of the review", "<small>pu</small></th>", "class=\"number in\" title=\"expected", swatch, curve]
+    {
+        assert!(html.contains(part), "{part}");
+    }
+    common::pages::stands_alone(&html, |file| out.join(file).exists());
     let csv = read("compare.csv");
     assert!(
         csv.contains("ExtendedEmf,load-0.5,dip,pu,0.09") && csv.contains("not applicable: injects nothing"),

@@ -15,6 +15,12 @@ fn fmpy_validates_and_cosimulates() {
     pytest("fmpy", "fmpy", &files, &[]);
 }
 
+/// The example for Python, as a script and as a notebook.
+#[test]
+fn the_example_for_python() {
+    pytest("fmpy", "example", &["test_drive_example.py"], &[]);
+}
+
 #[test]
 fn losses_and_temperatures() {
     pytest("fmpy", "losses", &["test_losses_and_temperature.py", "test_drive_cycle.py"], &[]);

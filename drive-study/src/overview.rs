@@ -42,7 +42,7 @@ pub fn overview(recording: &Recording) -> Recording {
 }
 
 /// The name without that of its instance.
-fn last(name: &str) -> &str {
+pub(crate) fn last(name: &str) -> &str {
     name.rsplit('.').next().unwrap_or(name)
 }
 

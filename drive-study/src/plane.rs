@@ -1,8 +1,7 @@
 //! The torque-speed plane and the losses of the reference drive, drawn for the documentation page: curves from the
 //! equations of the steady state, dots from the running drive.
 //!
-//! A [`Panel`] holds curves over the speed; filled curves reach down to zero. To stack quantities, fill their sums, the
-//! greatest first.
+//! To stack quantities, a [`Panel`] fills their sums down to zero, the greatest first.
 //!
 //! Steady state of a drive whose controller gets the torque `tau` and knows the machine but no losses: i is the current for
 //! `tau` under the voltage of field weakening at the samples. The voltage is held over T_s while the rotor turns, so that the
@@ -16,8 +15,8 @@
 //!
 //! u_on, r_on of transistor and diode alike, so the duty cycle has no influence; k is the switching loss per ampere.
 
-use crate::plot::drawing;
-use crate::reproduce::plots::tick;
+use crate::figure::{Curve, Figure, Panel};
+use crate::ink::{CURVES, Ink};
 use crate::runner;
 use anyhow::{Result, anyhow};
 use drive::Pair;
@@ -26,114 +25,18 @@ use drive::estimator::Kind;
 use drive::frame::{Dq, DqHat};
 use drive::plant::losses::{Losses, efficiency, switching};
 use drive::plant::machine;
-use plotters::prelude::*;
 use std::f64::consts::PI;
 
 const RPM: f64 = PI / 30.0;
-/// Size of a panel in pixels.
-const SIZE: (u32, u32) = (820, 360);
-const BLUE_INK: RGBColor = RGBColor(0, 114, 178);
-const RED_INK: RGBColor = RGBColor(213, 94, 0);
-const GREEN_INK: RGBColor = RGBColor(0, 158, 115);
-const ORANGE_INK: RGBColor = RGBColor(230, 159, 0);
-const SKY_INK: RGBColor = RGBColor(86, 180, 233);
-const GRAY: RGBColor = RGBColor(120, 120, 120);
 
-/// A curve over the speed.
-#[derive(Clone, Debug)]
-pub struct Curve {
-    /// Name in the legend.
-    pub name: &'static str,
-    /// Its color.
-    pub color: RGBColor,
-    /// Opacity of the area between it and zero, 0..1.
-    pub fill: f64,
-    /// Speed in rpm and value.
-    pub points: Vec<(f64, f64)>,
+/// A figure of panels over the speed, one below the other.
+pub fn figure(panels: Vec<Panel>) -> Figure {
+    Figure { title: String::new(), x: "speed in rpm", columns: 1, panels }
 }
 
-/// Curves of one unit over the speed.
-#[derive(Clone, Debug)]
-pub struct Panel {
-    /// Caption.
-    pub title: String,
-    /// Label of the vertical axis.
-    pub unit: &'static str,
-    /// The curves, in the order in which they are drawn.
-    pub curves: Vec<Curve>,
-    /// What runs gave: speed in rpm and value.
-    pub dots: Vec<(f64, f64)>,
-    /// Speeds in rpm with a label each.
-    pub marks: Vec<(f64, String)>,
-    /// Where the legend hides no curve.
-    pub legend: SeriesLabelPosition,
-}
-
-/// Draws panels, one below the other.
-///
-/// # Errors
-/// When drawing fails.
-pub fn svg(panels: &[Panel]) -> Result<String> {
-    let mut text = String::new();
-    {
-        let size = (SIZE.0, SIZE.1 * u32::try_from(panels.len())?);
-        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        root.fill(&WHITE).map_err(drawing)?;
-        for (panel, area) in panels.iter().zip(root.split_evenly((panels.len(), 1))) {
-            let points = || panel.curves.iter().flat_map(|c| &c.points).chain(&panel.dots);
-            let right = points().map(|p| p.0).fold(0.0, f64::max);
-            let (low, high) = points().fold((0.0_f64, 0.0_f64), |(low, high), p| (low.min(p.1), high.max(p.1)));
-            let margin = 0.08 * (high - low);
-            let mut chart = ChartBuilder::on(&area)
-                .caption(&panel.title, ("sans-serif", 18))
-                .margin(8)
-                .x_label_area_size(38)
-                .y_label_area_size(64)
-                .build_cartesian_2d(0.0..1.04 * right, low - margin..high + margin)
-                .map_err(drawing)?;
-            chart
-                .configure_mesh()
-                .x_desc("speed [rpm]")
-                .y_desc(panel.unit)
-                .x_label_formatter(&tick)
-                .y_label_formatter(&tick)
-                .light_line_style(TRANSPARENT)
-                .bold_line_style(RGBColor(225, 225, 225))
-                .label_style(("sans-serif", 15))
-                .draw()
-                .map_err(drawing)?;
-            for Curve { name, color, fill, points } in &panel.curves {
-                if *fill > 0.0 {
-                    let area = AreaSeries::new(points.iter().copied(), 0.0, color.mix(*fill));
-                    chart.draw_series(area).map_err(drawing)?;
-                }
-                let style = color.stroke_width(2);
-                let line = chart.draw_series(LineSeries::new(points.iter().copied(), style)).map_err(drawing)?;
-                line.label(*name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
-            }
-            for (speed, label) in &panel.marks {
-                let line = PathElement::new([(*speed, low - margin), (*speed, high + margin)], GRAY);
-                let name = Text::new(label.clone(), (*speed + 0.01 * right, high + 0.9 * margin), ("sans-serif", 15));
-                chart.draw_series([line]).map_err(drawing)?;
-                chart.draw_series([name]).map_err(drawing)?;
-            }
-            let dots = panel.dots.iter().map(|&at| Circle::new(at, 3, BLACK.filled()));
-            let drawn = chart.draw_series(dots).map_err(drawing)?;
-            if !panel.dots.is_empty() {
-                drawn.label("PmsmDrive").legend(|(x, y)| Circle::new((x + 9, y), 3, BLACK.filled()));
-            }
-            chart
-                .configure_series_labels()
-                .position(panel.legend.clone())
-                .background_style(WHITE.mix(0.8))
-                .border_style(GRAY)
-                .label_font(("sans-serif", 15))
-                .draw()
-                .map_err(drawing)?;
-        }
-        root.present().map_err(drawing)?;
-    }
-    Ok(text)
+/// A curve over the speed in rpm with the area between it and zero.
+fn area(name: &str, ink: Ink, fill: f64, points: impl Iterator<Item = (f64, f64)>) -> Curve {
+    Curve { fill, ..Curve::through(name, ink, points) }
 }
 
 /// The drive in steady state.
@@ -302,9 +205,9 @@ pub fn envelope(measured: &[f64]) -> Result<Plane> {
     let (limit, u_dc) = (&drive.pair.controller.model.parameters.limit, drive.pair.plant.model.inputs.u_dc);
     let base = drive.envelope.base_speed(drive.U) / drive.electrical(1.0);
     let end = bisect(base, 10.0 * base, |rpm| drive.limit(rpm, 1.0).tau > 0.0);
-    let curve = |name, color, s: f64| {
+    let curve = |name, ink, s: f64| {
         let speeds = (0..=200).map(|k| end * f64::from(k) / 200.0);
-        Curve { name, color, fill: 0.15, points: speeds.map(|rpm| (rpm, s * drive.limit(rpm, s).tau)).collect() }
+        area(name, ink, 0.15, speeds.map(|rpm| (rpm, s * drive.limit(rpm, s).tau)))
     };
     let mut dots = Vec::new();
     for &rpm in measured {
@@ -314,11 +217,11 @@ pub fn envelope(measured: &[f64]) -> Result<Plane> {
     }
     let panel = Panel {
         title: format!("reference motor, {} A, {u_dc} V", limit.i),
-        unit: "torque [N.m]",
-        curves: vec![curve("motoring", BLUE_INK, 1.0), curve("generating", RED_INK, -1.0)],
+        unit: "torque in N.m".into(),
+        window: (0.0, 1.04 * end),
+        curves: vec![curve("motoring", CURVES[0], 1.0), curve("generating", CURVES[1], -1.0)],
         dots,
         marks: vec![(base, format!("base speed {base:.0} rpm"))],
-        legend: SeriesLabelPosition::MiddleLeft,
     };
     Ok(Plane { base, end, panel })
 }
@@ -361,34 +264,25 @@ pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
         [cu, cu + iron, cu + iron + cond, cu + iron + cond + sw, p.losses.sum()]
     };
     let names = ["p_cu", "p_iron", "p_cond", "p_sw", "p_friction"];
-    let colors = [ORANGE_INK, BLUE_INK, GREEN_INK, RED_INK, SKY_INK];
-    let area = |k: usize| Curve {
-        name: names[k],
-        color: colors[k],
-        fill: 1.0,
-        points: curves.iter().map(|p| (p.rpm, sums(p)[k])).collect(),
-    };
+    let inks = [CURVES[4], CURVES[0], CURVES[2], CURVES[1], CURVES[5]];
+    let stack = |k: usize| area(names[k], inks[k], 1.0, curves.iter().map(|p| (p.rpm, sums(p)[k])));
+    let window = (0.0, 1.04 * highest);
     let stacked = Panel {
         title: title("losses"),
-        unit: "losses, stacked [W]",
-        curves: (0..5).rev().map(area).collect(),
+        unit: "losses, stacked, in W".into(),
+        window,
+        curves: (0..5).rev().map(stack).collect(),
         dots: points.iter().flat_map(|[_, run]| sums(run).map(|sum| (run.rpm, sum))).collect(),
         marks: vec![(onset, "field weakening".into()), (end, format!("{limit} A"))],
-        legend: SeriesLabelPosition::UpperLeft,
     };
     let percent = |p: &Point| (p.rpm, 100.0 * p.efficiency);
     let efficiency = Panel {
         title: title("efficiency"),
-        unit: "efficiency [%]",
-        curves: vec![Curve {
-            name: "p_mech / p_in",
-            color: BLUE_INK,
-            fill: 0.0,
-            points: curves.iter().map(percent).collect(),
-        }],
+        unit: "efficiency in %".into(),
+        window,
+        curves: vec![Curve::through("p_mech / p_in", CURVES[0], curves.iter().map(percent))],
         dots: points.iter().map(|[_, run]| percent(run)).collect(),
         marks: stacked.marks.clone(),
-        legend: SeriesLabelPosition::LowerMiddle,
     };
     Ok(Split { onset, end, panels: [stacked, efficiency], points })
 }

@@ -6,7 +6,8 @@ use crate::Failed;
 use crate::{pack, picture};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use drive_study::{overview, plot};
+use drive_study::figure::Figure;
+use drive_study::{overview, page, plot};
 use fmu_check::message;
 use fmu_import::cosimulation::{Integration, Method, Point, Recording, Schedule, Settings, Solver, System};
 use fmu_import::guard::Allowance;
@@ -45,7 +46,7 @@ use std::time::{Duration, Instant};
 /// takes the command with it.
 ///
 /// Start the drive, turn it at 1000 rpm, and load it after 0.5 s:
-///   fmu simulate target/fmu/fmi3/PmsmDrive.fmu --input speed_ref=0:0,0.1:1000rpm --input tau_load=0:0,0.5:2 --plot run.svg
+///   fmu simulate target/fmu/fmi3/PmsmDrive.fmu --input speed_ref=0:0,0.1:1000rpm --input tau_load=0:0,0.5:2 --html run.html
 /// The same with controller and plant apart, without a load:
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
 ///     --input SensorlessController.speed_ref=0:0,0.1:1000rpm --stop 1 --plot run.svg
@@ -106,8 +107,11 @@ pub struct Simulate {
     /// a drive, the first of each unit of other FMUs
     #[arg(long, value_name = "FILE.svg|FILE.png")]
     pub plot: Option<PathBuf>,
-    /// Plot all that is recorded
-    #[arg(long, requires = "plot")]
+    /// Write the same plot as a page with zoom, legend switches and values at the cursor, which needs no network
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
+    /// Plot all that is recorded, with --plot or --html
+    #[arg(long)]
     pub all: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it
     #[arg(long)]
@@ -185,11 +189,17 @@ pub fn run(args: &Simulate) -> Result<()> {
     if args.worker {
         return worker::work(args);
     }
-    if let Some(path) = &args.plot {
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        if !matches!(ending.as_deref(), Some("svg" | "png")) {
-            bail!("--plot {}: plots are written as .svg or .png", path.display());
-        }
+    let has_ending = |path: &Path, endings: &[&str]| {
+        path.extension().is_some_and(|ending| endings.iter().any(|known| ending.eq_ignore_ascii_case(known)))
+    };
+    if let Some(path) = args.plot.as_deref().filter(|path| !has_ending(path, &["svg", "png"])) {
+        bail!("--plot {}: plots are written as .svg or .png; --html FILE.html writes a page", path.display());
+    }
+    if let Some(path) = args.html.as_deref().filter(|path| !has_ending(path, &["html", "htm"])) {
+        bail!("--html {}: pages are written as .html; --plot FILE.svg or FILE.png writes a picture", path.display());
+    }
+    if args.all && args.plot.is_none() && args.html.is_none() {
+        bail!("--all is for --plot or --html: add one of them");
     }
     worker::catch_interrupts()?;
     if args.in_process {
@@ -325,7 +335,7 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
         loaded.record_outputs()?;
     }
     let mut for_plot = 0;
-    if args.record.is_empty() && args.plot.is_some() && !args.all {
+    if args.record.is_empty() && (args.plot.is_some() || args.html.is_some()) && !args.all {
         for port in loaded.system.fed_inputs(&overview::INPUTS) {
             loaded.system.record(&port)?;
             for_plot += 1;
@@ -346,11 +356,13 @@ fn column(port: &str, file: &str) -> Result<Schedule, String> {
 }
 
 fn write(mut recording: Recording, for_plot: usize, args: &Simulate, mut out: impl Write) -> Result<()> {
-    let plotted = match &args.plot {
-        Some(_) if args.record.is_empty() && !args.all => Some(overview::overview(&recording)),
-        Some(_) => Some(recording.clone()),
-        None => None,
-    };
+    let plotted = (args.plot.is_some() || args.html.is_some()).then(|| {
+        if args.record.is_empty() && !args.all {
+            Figure::of(&overview::overview(&recording))
+        } else {
+            Figure::of(&recording)
+        }
+    });
     recording.columns.truncate(recording.columns.len() - for_plot);
     let mut to_stdout = false;
     match args.csv.as_deref() {
@@ -377,6 +389,17 @@ fn write(mut recording: Recording, for_plot: usize, args: &Simulate, mut out: im
         } else {
             pack::write(path, svg.as_bytes())?;
         }
+    }
+    if let (Some(path), Some(plotted)) = (&args.html, &plotted) {
+        let names: Vec<&str> = args.fmus.iter().map(|file| file.rsplit(['/', '\\']).next().unwrap_or(file)).collect();
+        let figure =
+            page::figure(plotted, "The plot needs JavaScript; fmu simulate --plot FILE.svg draws it without.")?;
+        let ended = recording
+            .ended_by
+            .as_ref()
+            .map(|name| format!("<p>{} asked to end the simulation.</p>\n", page::escape(name)));
+        let body = format!("{}{figure}", ended.unwrap_or_default());
+        pack::write(path, page::page(&names.join(", "), &body).as_bytes())?;
     }
     let mut table = recording.last_values();
     if let Some(name) = &recording.ended_by {

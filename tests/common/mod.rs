@@ -3,6 +3,7 @@
 
 pub mod estimators;
 pub mod importers;
+pub mod pages;
 pub mod python;
 
 use drive::Pair;

@@ -4,6 +4,8 @@ use super::Atlas;
 use super::cell::{Cell, Scenario};
 use super::map::{self, percent};
 use super::run::{Approach, Class, Verdict};
+use crate::ink;
+use crate::page::{self, escape};
 use std::fmt::Write as _;
 
 /// A row per run.
@@ -57,12 +59,11 @@ impl Table {
             format!("<tr>{cells}</tr>\n")
         };
         let rows: String = self.rows.iter().map(|row| line("td", row)).collect();
-        format!("<div class=\"scroll\"><table>\n{}{rows}</table></div>\n", line("th", &self.heads))
+        format!(
+            "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody></table></div>\n",
+            line("th", &self.heads)
+        )
     }
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// How many of these runs there are, how many are lost, and the same with R^ within 20 % of R and psi^ within 5 %.
@@ -199,20 +200,9 @@ pub fn markdown(atlases: &[Atlas]) -> String {
     )
 }
 
-const STYLE: &str = ":root{--ink:#1d2429;--line:#d9dfe3;--paper:#fff}\
-    @media (prefers-color-scheme:dark){:root{--ink:#e3e7ea;--line:#374047;--paper:#15191c}}\
-    html{background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,sans-serif}\
-    body{margin:0 auto;max-width:76rem;padding:1rem}table{border-collapse:collapse;font-size:.9rem}\
-    td,th{border-bottom:1px solid var(--line);padding:.25rem .7rem .25rem 0;text-align:left;vertical-align:top}\
-    .scroll{overflow-x:auto}.scroll svg{display:block}";
-
 /// The page with the maps.
 pub fn page(atlases: &[Atlas]) -> String {
-    let mut html = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>Atlas of lost drives</title>\
-         <style>{STYLE}</style></head><body>\n<h1>Atlas of lost drives</h1>\n"
-    );
+    let mut html = String::from("<p>Every run: <a href=\"atlas.csv\">atlas.csv</a>.</p>\n");
     for note in definitions(atlases) {
         let _ = writeln!(html, "<p>{}</p>", escape(note));
     }
@@ -221,14 +211,15 @@ pub fn page(atlases: &[Atlas]) -> String {
         let _ = write!(html, "<h2>{title}</h2>\n{}", table.html());
     }
     for atlas in atlases {
-        let (name, machine) = (escape(&atlas.drive.name), escape(&atlas.drive.machine));
+        let drive = &atlas.drive;
+        let swatch = page::swatch(ink::of(drive.pair.controller.model.parameters.estimator));
+        let (name, machine) = (escape(&drive.name), escape(&drive.machine));
         let _ = write!(
             html,
-            "<h2>{name} ({machine})</h2>\n<p>Red: lost. A dot: lock_lost is not true. Speed n and load are shares of the rated \
-             values.</p>\n<div class=\"scroll\">{}</div>\n",
+            "<h2>{swatch}{name} ({machine})</h2>\n<p>Red: lost. A dot: lock_lost is not true. Speed n and load are shares of the \
+             rated values.</p>\n<div class=\"scroll\" tabindex=\"0\">{}</div>\n",
             map::svg(atlas)
         );
     }
-    html.push_str("</body></html>\n");
-    html
+    page::page("Atlas of lost drives", &html)
 }

@@ -1,53 +1,122 @@
 //! The grid as one self-contained page.
 
+use super::candidate::Entry;
 use super::plots::Plot;
-use super::{Cell, table};
+use super::table::{Block, mark, number};
+use super::{Cell, Outcome, table};
+use crate::ink;
+use crate::page::{self, escape};
+use anyhow::Result;
 use std::fmt::Write as _;
 
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
-const STYLE: &str = "body{font-family:sans-serif;max-width:1240px;margin:2em auto;padding:0 1em;color:#222;line-height:1.45}\
-    table{border-collapse:collapse;font-size:.86em}td,th{border-bottom:1px solid #ddd;padding:.25em .7em;text-align:left;\
-    vertical-align:top}th{background:#f3f3f3}th small{font-weight:normal;color:#555}td.off{background:#fdd}\
-    td{font-variant-numeric:tabular-nums;white-space:nowrap}svg{max-width:100%;height:auto}ul{font-size:.86em;color:#444}";
-
 /// The page with its plots.
-pub fn page(cells: &[Cell], plots: &[Plot]) -> String {
+///
+/// # Errors
+/// Those of [`page::figure`].
+pub fn page(cells: &[Cell], plots: &[Plot]) -> Result<String> {
+    let class = if cells.iter().all(Cell::holds) { "" } else { " off" };
     let mut html = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Estimators compared</title>\
-         <style>{STYLE}</style></head><body>\n<h1>Estimators of the rotor angle, compared</h1>\n\
+        "<p class=\"verdict{class}\">{}</p>\n\
          <p>S.-K. Sul and S. Kim's review, ICEMS 2011, every estimator in closed loop. {}</p>\n<p>{}</p>\n\
-         <p>✓ inside, ✗ outside the tolerance of the figure there is for it; a number without a mark has none.</p>\n",
+         <p><span class=\"in\">✓</span> inside, <span class=\"out\">✗</span> outside the tolerance of the figure there is for it; \
+         a number without a mark has none. Every number with its tolerance: <a href=\"compare.csv\">compare.csv</a>; the tables as \
+         text: <a href=\"compare.md\">compare.md</a>.</p>\n<nav>\n",
+        escape(table::verdict(cells).trim_end()),
         escape(table::MACHINES),
         escape(&table::starts(cells))
     );
-    let _ = writeln!(html, "<pre>{}</pre>", escape(&table::verdict(cells)));
-    for block in table::blocks(cells) {
-        let _ = write!(html, "<h2>{}</h2>\n<table><thead><tr><th>estimator</th>", escape(block.title));
-        for (id, names) in &block.headings {
-            let names = names.split(", ").map(escape).collect::<Vec<_>>().join("<br>");
-            let _ = write!(html, "<th>{}<br><small>{names}</small></th>", escape(id));
-        }
-        html.push_str("</tr></thead><tbody>\n");
-        for (name, cells) in &block.rows {
-            let _ = write!(html, "<tr><td>{name}</td>");
-            for (text, holds) in cells {
-                let class = if *holds { "" } else { " class=\"off\"" };
-                let _ = write!(html, "<td{class}>{}</td>", escape(text));
-            }
-            html.push_str("</tr>\n");
-        }
-        html.push_str("</tbody></table>\n<ul>\n");
+    let blocks = table::blocks(cells);
+    for (k, block) in blocks.iter().enumerate() {
+        let _ = writeln!(html, "<a href=\"#table-{k}\">{}</a>", escape(block.title));
+    }
+    if let Some(plot) = plots.first() {
+        let _ = writeln!(html, "<a href=\"#{}\">Plots</a>", plot.name);
+    }
+    html.push_str("</nav>\n");
+    for (k, block) in blocks.iter().enumerate() {
+        let _ =
+            write!(html, "<h2 id=\"table-{k}\">{}</h2>\n{}<ul class=\"notes\">\n", escape(block.title), grid(block));
         for note in &block.notes {
             let _ = writeln!(html, "<li>{}</li>", escape(note));
         }
         html.push_str("</ul>\n");
     }
-    for plot in plots {
-        let _ = write!(html, "<h2>{}</h2>\n{}\n", escape(&plot.title), plot.svg);
+    for Plot { name, figure } in plots {
+        let svg = format!("<a href=\"{name}.svg\">{name}.svg</a>");
+        let drawn = page::figure(figure, &format!("The plot without JavaScript: {svg}."))?;
+        let title = escape(&figure.title);
+        let _ = write!(html, "<h2 id=\"{name}\">Plot {name} <small>{svg}</small></h2>\n<p>{title}</p>\n{drawn}");
     }
-    html.push_str("</body></html>\n");
-    html
+    Ok(page::page("Estimators of the rotor angle, compared", &html))
+}
+
+/// A table with a column for each quantity of each scenario.
+fn grid(block: &Block<'_>) -> String {
+    let mut html = String::from(
+        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th class=\"name\" rowspan=\"2\">estimator</th>",
+    );
+    for (id, measures) in &block.headings {
+        let _ = write!(html, "<th class=\"first\" colspan=\"{}\">{id}</th>", measures.len().max(1));
+    }
+    html.push_str("</tr>\n<tr>");
+    let first = |k: usize| if k == 0 { "number first" } else { "number" };
+    for (_, measures) in &block.headings {
+        for (k, m) in measures.iter().enumerate() {
+            let _ =
+                write!(html, "<th class=\"{}\">{}<br><small>{}</small></th>", first(k), escape(m.name), escape(m.unit));
+        }
+        if measures.is_empty() {
+            html.push_str("<th class=\"first\"></th>");
+        }
+    }
+    html.push_str("</tr></thead>\n<tbody>\n");
+    for (entry, cells) in &block.rows {
+        let _ = write!(html, "<tr><th class=\"name\">{}</th>", name(entry));
+        for (cell, (_, heads)) in cells.iter().zip(&block.headings) {
+            let whole = |class: &str, text: &str| {
+                format!("<td class=\"first{class}\" colspan=\"{}\">{text}</td>", heads.len().max(1))
+            };
+            match cell.map(|cell| (&cell.outcome, cell.holds())) {
+                None => html += &whole("", ""),
+                Some((Outcome::NotApplicable(_), _)) => html += &whole("", "–"),
+                Some((Outcome::Refused(_), _)) => html += &whole(" out", "refused ✗"),
+                Some((Outcome::Measured(measures, _), holds)) if measures.iter().all(|m| m.value.is_infinite()) => {
+                    html += &if holds { whole("", "lost") } else { whole(" out", "lost ✗") };
+                }
+                Some((Outcome::Measured(measures, _), _)) => {
+                    for (k, head) in heads.iter().enumerate() {
+                        let Some(m) = measures.iter().find(|m| m.name == head.name) else {
+                            html.push_str("<td></td>");
+                            continue;
+                        };
+                        let mark = mark(m, m.expected.is_some());
+                        let class = match mark {
+                            "✓" => " in",
+                            "✗" => " out",
+                            _ => "",
+                        };
+                        let title = m.expected.map(|e| format!(" title=\"expected {e}\"")).unwrap_or_default();
+                        let number = number(m).replace('-', "−");
+                        let _ = write!(html, "<td class=\"{}{class}\"{title}>{number} {mark}</td>", first(k));
+                    }
+                }
+            }
+        }
+        html.push_str("</tr>\n");
+    }
+    html + "</tbody></table></div>\n"
+}
+
+/// The name of an estimator beside its color; a narrow page may break it before a capital.
+fn name(entry: &Entry) -> String {
+    let mut name = page::swatch(ink::of(entry.kind));
+    let mut last = ' ';
+    for c in escape(&entry.label()).chars() {
+        if last.is_ascii_lowercase() && c.is_ascii_uppercase() {
+            name.push_str("<wbr>");
+        }
+        name.push(c);
+        last = c;
+    }
+    name
 }

@@ -39,6 +39,8 @@ pub struct Trace {
     pub current: Vec<[f64; 2]>,
     /// Electrical angle in deg, true and estimated, at the same samples.
     pub angles: Vec<[f64; 2]>,
+    /// Time in s at which the rotor was lost.
+    pub lost: Option<f64>,
 }
 
 /// Angle error in deg beyond which the rotor counts as lost: no torque is left.
@@ -65,6 +67,9 @@ impl Follow {
     pub fn add(&mut self, t: f64, reference: f64, pair: &Pair) {
         let (speed, error) = (runner::speed(pair), runner::rotor_ahead(pair));
         let off = speed - reference;
+        if self.trace.lost.is_none() && (error.is_nan() || error.abs() > LOST) {
+            self.trace.lost = Some(t);
+        }
         self.n += 1.0;
         self.squares += off * off;
         self.angle.add(error);
@@ -128,8 +133,11 @@ impl Follow {
         }
     }
 
-    /// Returns the run over time.
-    pub fn into_trace(self) -> Trace {
+    /// Returns the run over time; a run in which a step failed is lost there.
+    pub fn into_trace(mut self, survived: bool) -> Trace {
+        if !survived {
+            self.trace.lost = self.trace.lost.or(self.trace.t.last().copied());
+        }
         self.trace
     }
 }
@@ -163,5 +171,10 @@ mod tests {
         assert!(f.lost());
         f.add(0.0, 0.5, &at(0.5, 120.0));
         assert!(f.lost() && f.rms().value.is_infinite() && f.peak().value.is_infinite());
+        f.add(0.1, 0.5, &at(0.5, 3.0));
+        assert_eq!(f.into_trace(true).lost, Some(0.0), "where it was lost first");
+        let mut f = Follow::default();
+        f.trace(0.2, 0.5, &at(0.5, 3.0));
+        assert_eq!((f.clone().into_trace(true).lost, f.into_trace(false).lost), (None, Some(0.2)));
     }
 }

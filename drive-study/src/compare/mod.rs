@@ -18,9 +18,11 @@ mod signal;
 pub mod table;
 mod weakening;
 
+use crate::plot;
 use anyhow::{Context, Result};
 use candidate::{Candidate, Entry};
 use measure::{Measure, Trace};
+use plots::Plot;
 use scenario::{Effort, SCENARIOS, Scenario};
 use std::path::Path;
 
@@ -122,12 +124,12 @@ pub fn write(cells: &[Cell], out: &Path) -> Result<()> {
         std::fs::write(&path, text).with_context(|| format!("writing {}", path.display()))
     };
     std::fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
-    let plots = plots::all(cells)?;
-    for plot in &plots {
-        file(&format!("{}.svg", plot.name), &plot.svg)?;
+    let plots = plots::all(cells);
+    for Plot { name, figure } in &plots {
+        file(&format!("{name}.svg"), &plot::svg(figure)?)?;
     }
     file("compare.csv", &table::csv(cells))?;
     file("compare.txt", &table::text(cells))?;
     file("compare.md", &table::markdown(cells))?;
-    file("compare.html", &html::page(cells, &plots))
+    file("compare.html", &html::page(cells, &plots)?)
 }

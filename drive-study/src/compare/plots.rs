@@ -2,9 +2,9 @@
 //! injects a voltage, the carrier current and the angle found in it (Fig. 8 and 11 of the review).
 
 use super::Cell;
-use crate::plot;
-use anyhow::Result;
-use fmu_import::cosimulation::{Column, Recording};
+use crate::figure::{Curve, Figure, Panel};
+use crate::ink::{self, CURVES, REFERENCE};
+use std::rc::Rc;
 
 /// A picture.
 #[derive(Debug)]
@@ -12,83 +12,80 @@ pub struct Plot {
     /// File name without extension.
     pub name: String,
     /// What it shows.
-    pub title: String,
-    /// The picture.
-    pub svg: String,
+    pub figure: Figure,
 }
 
 /// All pictures of the cells.
-///
-/// # Errors
-/// When drawing fails.
-pub fn all(cells: &[Cell]) -> Result<Vec<Plot>> {
+pub fn all(cells: &[Cell]) -> Vec<Plot> {
     let mut plots = Vec::new();
     for id in ["ramp", "reversal", "load-0", "load-0.1", "load-0.5", "load-1", "weakening"] {
         let with_trace: Vec<&Cell> = cells.iter().filter(|c| c.scenario.id == id && c.trace().is_some()).collect();
         if !with_trace.is_empty() {
-            plots.push(together(id, &with_trace)?);
+            plots.push(together(id, &with_trace));
         }
     }
-    for cell in cells.iter().filter(|c| c.scenario.id == "signal-trace") {
-        plots.extend(signal(cell)?);
-    }
-    Ok(plots)
+    plots.extend(cells.iter().filter(|c| c.scenario.id == "signal-trace").flat_map(signal));
+    plots
 }
 
-fn column(name: String, unit: &str, values: Vec<f64>) -> Column {
-    Column { name, unit: unit.into(), display: None, values }
+fn panel(unit: &str, time: &[f64], curves: Vec<Curve>) -> Panel {
+    let window = (time.first().copied().unwrap_or_default(), time.last().copied().unwrap_or_default());
+    Panel { unit: unit.into(), window, curves, ..Panel::default() }
 }
 
-/// All estimators in a scenario.
-fn together(id: &str, cells: &[&Cell]) -> Result<Plot> {
-    let mut recording = Recording::default();
-    for cell in cells {
-        let Some(trace) = cell.trace() else { continue };
-        if trace.t.len() > recording.time.len() {
-            recording.time.clone_from(&trace.t);
+/// All estimators in a scenario, each until it loses the rotor.
+fn together(id: &str, cells: &[&Cell]) -> Plot {
+    let (mut time, mut speeds, mut errors): (Rc<[f64]>, _, _) = (Rc::from([]), Vec::new(), Vec::new());
+    let traces = || cells.iter().filter_map(|cell| Some((&cell.entry, cell.trace()?)));
+    for (_, trace) in traces().filter(|(_, trace)| !trace.t.is_empty()) {
+        if trace.t.len() > time.len() {
+            time = trace.t.as_slice().into();
         }
     }
-    let full = |values: &[f64]| {
-        let missing = recording.time.len() - values.len();
-        // A lost rotor may have any angle; a curve that leaves the picture would hide all others.
-        values.iter().map(|x| x.clamp(-100.0, 100.0)).chain(std::iter::repeat_n(f64::NAN, missing)).collect()
-    };
-    let mut columns = Vec::new();
-    for cell in cells {
-        let Some(trace) = cell.trace() else { continue };
-        let name = cell.entry.label();
-        columns.push(column(name.clone(), "speed in pu", full(&trace.speed)));
-        columns.push(column(name, "theta - theta^ in deg", full(&trace.error)));
+    for (entry, trace) in traces() {
+        let end = trace.lost.map_or(trace.t.len(), |lost| trace.t.partition_point(|t| *t <= lost));
+        let curve = |values: &[f64]| Curve {
+            dashed: entry.name != entry.kind.name(),
+            lost: trace.lost.is_some(),
+            ..Curve::new(entry.label(), ink::of(entry.kind), &time, values[..end].to_vec())
+        };
+        speeds.push(curve(&trace.speed));
+        errors.push(curve(&trace.error));
     }
-    recording.columns = columns;
-    let title = format!("{id}: {}", cells[0].scenario.title);
-    Ok(Plot { name: id.into(), title, svg: plot::svg(&recording)? })
+    let panels = vec![panel("speed in pu", &time, speeds), panel("theta - theta^ in deg", &time, errors)];
+    Plot {
+        name: id.into(),
+        figure: Figure { title: cells[0].scenario.title.into(), x: "time in s", columns: 1, panels },
+    }
 }
 
 /// Fig. 8 and 11: the carrier current over six milliseconds, and the angle found in it.
-fn signal(cell: &Cell) -> Result<Vec<Plot>> {
-    let Some(trace) = cell.trace() else { return Ok(Vec::new()) };
+fn signal(cell: &Cell) -> Vec<Plot> {
+    let Some(trace) = cell.trace() else { return Vec::new() };
     let name = cell.entry.name;
-    let figure = match name {
+    let review = match name {
         "RotatingInjection" => "Fig. 8 of the review, ",
         "PulsatingInjection" => "Fig. 11 of the review, ",
         _ => "",
     };
     let index = |t: f64| trace.t.partition_point(|x| *x < t);
     let (from, to) = (index(0.3), index(0.306));
-    let picture = |part: &str, title: &str, unit: &str, names: [&str; 2], values: &[[f64; 2]], time: &[f64]| {
-        let of = |axis: usize| column(names[axis].into(), unit, values.iter().map(|x| x[axis]).collect());
-        let recording = Recording { time: time.to_vec(), columns: vec![of(0), of(1)], ended_by: None };
-        anyhow::Ok(Plot {
-            name: format!("signal-{name}-{part}"),
-            title: format!("{figure}{name} at 0.05 pu: {title}"),
-            svg: plot::svg(&recording)?,
-        })
+    let picture = |part: &str, what: &str, unit: &str, curves: [(&str, _); 2], values: &[[f64; 2]], time: &[f64]| {
+        let x = time.into();
+        let of = |axis: usize| {
+            let (name, ink) = curves[axis];
+            Curve::new(name, ink, &x, values.iter().map(|pair| pair[axis]).collect())
+        };
+        let panels = vec![panel(unit, time, vec![of(0), of(1)])];
+        let title = format!("{review}{name} at 0.05 pu: {what}");
+        Plot { name: format!("signal-{name}-{part}"), figure: Figure { title, x: "time in s", columns: 1, panels } }
     };
     let currents = trace.current.get(from..to).unwrap_or_default();
     let time = trace.t.get(from..to).unwrap_or_default();
-    Ok(vec![
-        picture("current", "stator current", "A", ["i_alpha", "i_beta"], currents, time)?,
-        picture("angle", "estimated angle", "angle in deg", ["true", "estimated"], &trace.angles, &trace.t)?,
-    ])
+    let axes = [("i_alpha", CURVES[0]), ("i_beta", CURVES[1])];
+    let angles = [("true", REFERENCE), ("estimated", ink::of(cell.entry.kind))];
+    vec![
+        picture("current", "stator current", "A", axes, currents, time),
+        picture("angle", "estimated angle", "angle in deg", angles, &trace.angles, &trace.t),
+    ]
 }

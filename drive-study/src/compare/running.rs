@@ -128,7 +128,7 @@ fn dynamic(follow: Follow, survived: bool, from: f64, with_dip: bool) -> Outcome
             m.value = f64::INFINITY;
         }
     }
-    Outcome::Measured(measures, Some(follow.into_trace()))
+    Outcome::Measured(measures, Some(follow.into_trace(survived)))
 }
 
 /// Rated load at a constant speed, measured in the last half second.

@@ -1,21 +1,37 @@
 //! The grid as text, Markdown and CSV: estimators as rows, scenarios as columns, one table per group of scenarios.
 
+use super::candidate::Entry;
 use super::measure::Measure;
 use super::{Cell, Outcome};
 use crate::compare::candidate::Class;
 use std::fmt::Write as _;
 
-/// A group of scenarios with its cells, as texts.
+/// A group of scenarios with its cells.
 #[derive(Debug)]
-pub struct Block {
+pub struct Block<'a> {
     /// What the scenarios have in common.
     pub title: &'static str,
-    /// Heading of each column: the scenario's name and its quantities.
-    pub headings: Vec<(String, String)>,
-    /// Estimator, its texts, and whether each is as expected.
-    pub rows: Vec<(String, Vec<(String, bool)>)>,
+    /// The scenarios, each with its quantities; their values are those of one estimator.
+    pub headings: Vec<(&'static str, &'a [Measure])>,
+    /// The estimators with their cells, one for each scenario.
+    pub rows: Vec<(&'a Entry, Vec<Option<&'a Cell>>)>,
     /// Notes under the table.
     pub notes: Vec<String>,
+}
+
+impl Block<'_> {
+    /// The quantities of a scenario, in one line.
+    fn quantities(measures: &[Measure]) -> String {
+        measures.iter().map(|m| format!("{} [{}]", m.name, m.unit)).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The rows as texts.
+    fn texts(&self) -> impl Iterator<Item = Vec<String>> {
+        self.rows.iter().map(|(entry, cells)| {
+            let texts = cells.iter().map(|cell| cell.map_or(String::new(), cell_text));
+            std::iter::once(entry.label()).chain(texts).collect()
+        })
+    }
 }
 
 /// A number in a resolution that suits its unit.
@@ -48,7 +64,8 @@ fn cell_text(cell: &Cell) -> String {
     }
 }
 
-fn mark(m: &Measure, expected: bool) -> &'static str {
+/// Inside or outside of the expected tolerance; nothing where nothing is expected.
+pub(super) fn mark(m: &Measure, expected: bool) -> &'static str {
     match (expected, m.expected.is_none_or(|e| e.holds(m.value)) && m.value.is_finite()) {
         (false, _) => "",
         (true, true) => "✓",
@@ -57,7 +74,7 @@ fn mark(m: &Measure, expected: bool) -> &'static str {
 }
 
 /// The tables of the cells.
-pub fn blocks(cells: &[Cell]) -> Vec<Block> {
+pub fn blocks(cells: &[Cell]) -> Vec<Block<'_>> {
     let mut groups: Vec<&'static str> = Vec::new();
     for cell in cells {
         if !groups.contains(&cell.scenario.group) {
@@ -67,31 +84,22 @@ pub fn blocks(cells: &[Cell]) -> Vec<Block> {
     groups.into_iter().map(|group| block(group, cells)).collect()
 }
 
-fn block(group: &'static str, cells: &[Cell]) -> Block {
-    let inside: Vec<&Cell> = cells.iter().filter(|c| c.scenario.group == group).collect();
-    let (mut scenarios, mut estimators, mut notes) = (Vec::new(), Vec::new(), Vec::new());
+fn block<'a>(group: &'static str, cells: &'a [Cell]) -> Block<'a> {
+    let inside: Vec<&'a Cell> = cells.iter().filter(|c| c.scenario.group == group).collect();
+    let (mut scenarios, mut estimators, mut notes) = (Vec::new(), Vec::<&Entry>::new(), Vec::new());
     for cell in &inside {
         if !scenarios.contains(&cell.scenario.id) {
             scenarios.push(cell.scenario.id);
             notes.push(format!("{}: {}", cell.scenario.id, cell.scenario.title));
         }
-        if !estimators.contains(&cell.entry.label()) {
-            estimators.push(cell.entry.label());
+        if !estimators.iter().any(|entry| entry.name == cell.entry.name) {
+            estimators.push(&cell.entry);
         }
     }
     let of = |id: &'static str| inside.iter().copied().filter(move |c| c.scenario.id == id);
-    let heading = |id: &'static str| {
-        let measured = of(id).map(Cell::measures).find(|m| !m.is_empty()).unwrap_or_default();
-        let names: Vec<_> = measured.iter().map(|m| format!("{} [{}]", m.name, m.unit)).collect();
-        (id.to_owned(), names.join(", "))
-    };
-    let row = |name: &String| {
-        let text = |id: &&'static str| {
-            let cell = of(id).find(|c| c.entry.label() == *name);
-            cell.map_or_else(|| (String::new(), true), |c| (cell_text(c), c.holds()))
-        };
-        (name.clone(), scenarios.iter().map(text).collect())
-    };
+    let heading = |id: &'static str| (id, of(id).map(Cell::measures).find(|m| !m.is_empty()).unwrap_or_default());
+    let row =
+        |entry: &&'a Entry| (*entry, scenarios.iter().map(|id| of(id).find(|c| c.entry.name == entry.name)).collect());
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for cell in &inside {
         let (Outcome::NotApplicable(why), who) = (&cell.outcome, cell.entry.name) else { continue };
@@ -136,14 +144,13 @@ fn aligned(rows: &[Vec<String>], left: &str, between: &str, right: &str, rule: i
 pub fn text(cells: &[Cell]) -> String {
     let mut text = String::new();
     for block in blocks(cells) {
-        let mut rows = vec![std::iter::once(String::new()).chain(block.headings.iter().map(|h| h.0.clone())).collect()];
-        rows.extend(block.rows.iter().map(|(name, cells)| {
-            std::iter::once(name.clone()).chain(cells.iter().map(|c| c.0.clone())).collect::<Vec<_>>()
-        }));
+        let heads = block.headings.iter().map(|h| h.0.into());
+        let mut rows: Vec<Vec<String>> = vec![std::iter::once(String::new()).chain(heads).collect()];
+        rows.extend(block.texts());
         let _ = writeln!(text, "{}", block.title);
         text.push_str(&aligned(&rows, "  ", "   ", "", |_| String::new()));
-        for (id, names) in block.headings.iter().filter(|h| !h.1.is_empty()) {
-            let _ = writeln!(text, "  {id}: {names}");
+        for (id, measures) in block.headings.iter().filter(|h| !h.1.is_empty()) {
+            let _ = writeln!(text, "  {id}: {}", Block::quantities(measures));
         }
         text.push('\n');
     }
@@ -209,13 +216,13 @@ pub fn markdown(cells: &[Cell]) -> String {
     text.push_str("✓: inside the tolerance of its expected figure; ✗: outside; no mark: no expected figure.\n\n");
     for block in blocks(cells) {
         let _ = writeln!(text, "## {}\n", block.title);
-        let heading =
-            |(id, names): &(String, String)| if names.is_empty() { id.clone() } else { format!("{id}: {names}") };
-        let mut rows =
-            vec![std::iter::once("estimator".to_owned()).chain(block.headings.iter().map(heading)).collect()];
-        rows.extend(block.rows.iter().map(|(name, cells)| {
-            std::iter::once(name.clone()).chain(cells.iter().map(|c| c.0.clone())).collect::<Vec<_>>()
-        }));
+        let heading = |(id, measures): &(&str, &[Measure])| match measures {
+            [] => (*id).to_owned(),
+            measures => format!("{id}: {}", Block::quantities(measures)),
+        };
+        let heads = block.headings.iter().map(heading);
+        let mut rows: Vec<Vec<String>> = vec![std::iter::once("estimator".to_owned()).chain(heads).collect()];
+        rows.extend(block.texts());
         let rule = |widths: &[usize]| {
             let lines: Vec<_> = widths.iter().map(|w| "-".repeat(w + 2)).collect();
             format!("|{}|\n", lines.join("|"))

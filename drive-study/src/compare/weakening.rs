@@ -99,5 +99,5 @@ pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
         follow.peak(),
         Measure::new("torque over envelope", "1", or_lost(torque.mean() / truth.torque(slow.mean()))),
     ];
-    Ok(Outcome::Measured(measures, Some(follow.into_trace())))
+    Ok(Outcome::Measured(measures, Some(follow.into_trace(survived))))
 }

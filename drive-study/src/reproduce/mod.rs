@@ -6,6 +6,7 @@ pub mod plots;
 mod report;
 pub mod scenario;
 
+use crate::plot;
 use anyhow::{Context, Result};
 use packed::Packed;
 use report::Table;
@@ -35,7 +36,7 @@ pub fn run(folder: &Path, out: &Path) -> Result<(String, bool)> {
     });
     let (fmi2, fmi3) = (fmi2?, fmi3?);
 
-    let measure = |traces: &[Trace]| ALL.iter().zip(traces).flat_map(|(s, trace)| figures::of(s.id, trace)).collect();
+    let measure = |traces: &[Trace]| ALL.iter().zip(traces).map(|(s, trace)| figures::of(s.id, trace)).collect();
     let table = Table { fmi2: measure(&fmi2), fmi3: measure(&fmi3) };
     let identical = fmi2 == fmi3;
 
@@ -49,18 +50,15 @@ pub fn run(folder: &Path, out: &Path) -> Result<(String, bool)> {
     let [start, step_20, step_500, step_1000, step_1500, load_0, load_1000] = &fmi3[..] else {
         unreachable!("as many traces as experiments")
     };
-    let figure_4 = plots::figure_4(start, [step_20, step_500, step_1000, step_1500])?;
-    let second = plots::second_start(start)?;
-    let figure_5 = plots::figure_5(load_0, load_1000)?;
-    write("figure-4.svg", &figure_4)?;
-    write("second-start.svg", &second)?;
-    write("figure-5.svg", &figure_5)?;
     let plots = [
-        ("Fig. 4: start-up and speed steps", figure_4.as_str()),
-        ("Section 3.2: the second start", second.as_str()),
-        ("Fig. 5: load steps", figure_5.as_str()),
+        ("figure-4.svg", plots::figure_4(start, [step_20, step_500, step_1000, step_1500])),
+        ("second-start.svg", plots::second_start(start)),
+        ("figure-5.svg", plots::figure_5(load_0, load_1000)),
     ];
-    write("report.html", &report::html(&table, identical, &plots, &ALL))?;
+    for (name, figure) in &plots {
+        write(name, &plot::svg(figure)?)?;
+    }
+    write("report.html", &report::html(&table, identical, &plots, &ALL)?)?;
     write("table.md", &table.text())?;
     let verdict = report::verdict(table.holds(), identical);
     Ok((format!("{}\n{verdict}", table.text()), table.holds() && identical))

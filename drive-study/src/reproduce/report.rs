@@ -2,14 +2,17 @@
 
 use super::figures::Figure;
 use super::scenario::{Scenario, Trace};
+use crate::figure::Figure as FigureOfPaper;
+use crate::page::{self, escape};
+use anyhow::Result;
 use std::fmt::Write as _;
 
 /// The figures of both standards side by side.
 pub(super) struct Table {
-    /// Measured through the FMI 2.0 archives.
-    pub(super) fmi2: Vec<Figure>,
-    /// Measured through the FMI 3.0 archives.
-    pub(super) fmi3: Vec<Figure>,
+    /// Measured through the FMI 2.0 archives, by experiment.
+    pub(super) fmi2: Vec<Vec<Figure>>,
+    /// Measured through the FMI 3.0 archives, by experiment.
+    pub(super) fmi3: Vec<Vec<Figure>>,
 }
 
 const HEADINGS: [&str; 6] = ["Fig.", "quantity", "expected", "FMI 2.0", "FMI 3.0", "verdict"];
@@ -17,29 +20,27 @@ const HEADINGS: [&str; 6] = ["Fig.", "quantity", "expected", "FMI 2.0", "FMI 3.0
 impl Table {
     /// Whether every figure is as expected.
     pub(super) fn holds(&self) -> bool {
-        self.fmi2.iter().chain(&self.fmi3).all(Figure::holds)
+        self.fmi2.iter().chain(&self.fmi3).flatten().all(Figure::holds)
     }
 
-    fn rows(&self) -> impl Iterator<Item = ([String; 6], bool)> {
-        self.fmi2.iter().zip(&self.fmi3).map(|(a, b)| {
-            let holds = a.holds() && b.holds();
-            let verdict = if holds { "ok" } else { "OFF" };
-            let row = [
+    fn rows(&self) -> impl Iterator<Item = [String; 6]> {
+        self.fmi2.iter().flatten().zip(self.fmi3.iter().flatten()).map(|(a, b)| {
+            let verdict = if a.holds() && b.holds() { "ok" } else { "OFF" };
+            [
                 a.figure.into(),
                 a.quantity.into(),
                 format!("{} {}", a.expected, a.unit),
                 number(a.measured),
                 number(b.measured),
                 verdict.into(),
-            ];
-            (row, holds)
+            ]
         })
     }
 
     /// The table in plain text (Markdown).
     pub(super) fn text(&self) -> String {
         let mut rows = vec![HEADINGS.map(String::from)];
-        rows.extend(self.rows().map(|(row, _)| row));
+        rows.extend(self.rows());
         let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
         let widths: [usize; 6] = std::array::from_fn(width);
         let mut text = String::new();
@@ -58,21 +59,33 @@ impl Table {
         text
     }
 
-    fn html(&self) -> String {
-        let mut html = String::from("<table><thead><tr>");
-        for heading in HEADINGS {
-            let _ = write!(html, "<th>{heading}</th>");
-        }
-        html.push_str("</tr></thead><tbody>\n");
-        for (row, holds) in self.rows() {
-            html.push_str(if holds { "<tr>" } else { "<tr class=\"off\">" });
-            for cell in row {
-                let _ = write!(html, "<td>{}</td>", escape(&cell));
-            }
-            html.push_str("</tr>\n");
-        }
-        html.push_str("</tbody></table>\n");
-        html
+    /// The figures of one experiment: a column for each quantity.
+    fn html(&self, experiment: usize) -> String {
+        let (fmi2, fmi3) = (&self.fmi2[experiment], &self.fmi3[experiment]);
+        let row = |tag: &str, head: &str, cell: &dyn Fn(&Figure) -> String, figures: &[Figure]| {
+            let cells: String = figures.iter().map(cell).collect();
+            format!("<tr><{tag} class=\"name\">{head}</{tag}>{cells}</tr>\n")
+        };
+        let heading = |f: &Figure| {
+            let Figure { figure, quantity, unit, .. } = f;
+            format!(
+                "<th class=\"number\">{}<br><small>Fig. {figure}</small><br><small>{unit}</small></th>",
+                escape(quantity)
+            )
+        };
+        let expected =
+            |f: &Figure| format!("<td class=\"number\">{}</td>", escape(&f.expected.to_string()).replace('-', "−"));
+        let measured = |f: &Figure| {
+            let (class, mark) = if f.holds() { ("in", "✓") } else { ("out", "✗") };
+            format!("<td class=\"number {class}\">{} {mark}</td>", number(f.measured).replace('-', "−"))
+        };
+        format!(
+            "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead>{}</thead>\n<tbody>\n{}{}{}</tbody></table></div>\n",
+            row("th", "", &heading, fmi2),
+            row("th", "expected", &expected, fmi2),
+            row("th", "FMI 2.0", &measured, fmi2),
+            row("th", "FMI 3.0", &measured, fmi3),
+        )
     }
 }
 
@@ -85,10 +98,6 @@ fn number(x: f64) -> String {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=9")]
     let decimals = decimals as usize;
     format!("{x:.decimals$}")
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// A trace as CSV with a heading line; doubles in the shortest form that reads back exactly.
@@ -113,36 +122,43 @@ pub(super) fn verdict(holds: bool, identical: bool) -> String {
     format!("{figures} The traces of FMI 2.0 and FMI 3.0 {same}.")
 }
 
-/// The page: the table and the plots, self-contained.
-pub(super) fn html(table: &Table, identical: bool, plots: &[(&str, &str)], scenarios: &[Scenario]) -> String {
-    let verdict = verdict(table.holds(), identical);
+/// The page: tables and plots, self-contained; `plots` come with the names of their SVG files.
+pub(super) fn html(
+    table: &Table,
+    identical: bool,
+    plots: &[(&str, FigureOfPaper)],
+    scenarios: &[Scenario],
+) -> Result<String> {
+    let class = if table.holds() && identical { "" } else { " off" };
     let mut html = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Rasmussen 2006, reproduced</title>\n\
-         <style>body{{font-family:sans-serif;max-width:1040px;margin:2em auto;padding:0 1em;color:#222;line-height:1.45}}\
-         table{{border-collapse:collapse;font-size:.92em}}td,th{{border-bottom:1px solid #ddd;padding:.25em .7em;\
-         text-align:left}}th{{background:#f3f3f3}}tr.off td{{background:#fdd}}svg{{max-width:100%;height:auto}}</style>\
-         </head><body>\n<h1>Sensorless speed control including zero speed, reproduced</h1>\n\
-         <p>H. Rasmussen, Bulletin of the Polish Academy of Sciences, Technical Sciences 54 (3), 2006, run with the packed \
+        "<p>H. Rasmussen, Bulletin of the Polish Academy of Sciences, Technical Sciences 54 (3), 2006, run with the packed \
          FMUs <b>PmsmPlant</b> and <b>SensorlessController</b> in co-simulation with steps of 0.1 ms. The paper's motor \
          table is missing: the motor here is an assumed one of the same class, and expected values are those of an \
-         independent model of the same drive. {verdict}</p>\n",
+         independent model of the same drive.</p>\n<p class=\"verdict{class}\">{}</p>\n\
+         <p><span class=\"in\">✓</span> inside, <span class=\"out\">✗</span> outside the tolerance. All numbers as text: \
+         <a href=\"table.md\">table.md</a>.</p>\n",
+        verdict(table.holds(), identical)
     );
-    html.push_str(&table.html());
-    for (title, svg) in plots {
-        let _ = write!(html, "<h2>{title}</h2>\n{svg}\n");
+    for (k, s) in scenarios.iter().enumerate() {
+        let csv = format!("<a href=\"{0}.csv\">{0}.csv</a>", s.id);
+        let (figure, title, duration) = (s.figure, escape(s.title), s.duration);
+        let _ = write!(html, "<h2>Fig. {figure}: {title}, {duration} s <small>{csv}</small></h2>\n{}", table.html(k));
     }
-    html.push_str("<h2>Experiments</h2>\n<ul>\n");
-    for s in scenarios {
-        let _ = writeln!(html, "<li>Fig. {}: {}, {} s (<code>{}.csv</code>)</li>", s.figure, s.title, s.duration, s.id);
+    for (name, plot) in plots {
+        let svg = format!("<a href=\"{name}\">{name}</a>");
+        let drawn = page::figure(plot, &format!("The plot without JavaScript: {svg}."))?;
+        let _ = write!(html, "<h2>{} <small>{svg}</small></h2>\n{drawn}", escape(&plot.title));
     }
-    html.push_str("</ul>\n</body></html>\n");
-    html
+    Ok(page::page("Sensorless speed control including zero speed, reproduced", &html))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::figure::{Curve, Panel};
+    use crate::ink::REFERENCE;
     use crate::reproduce::figures::Expected;
+    use crate::reproduce::scenario::REST;
 
     #[test]
     fn numbers_have_four_digits() {
@@ -161,8 +177,21 @@ mod tests {
             expected: Expected::Near(1.0, 0.1),
             measured,
         };
-        let table = Table { fmi2: vec![figure(1.05)], fmi3: vec![figure(1.2)] };
+        let table = Table { fmi2: vec![vec![figure(1.05)]], fmi3: vec![vec![figure(1.2)]] };
         assert!(!table.holds() && table.text().contains("OFF"));
+        let curve = Curve::through("speed", REFERENCE, [(0.0, 1.0), (1.0, 2.0)].into_iter());
+        let panels = vec![Panel { window: (0.0, 1.0), curves: vec![curve], ..Panel::default() }];
+        let plot = FigureOfPaper { title: "Fig. 4".into(), x: "time in s", columns: 1, panels };
+        let page = html(&table, true, &[("f.svg", plot)], &[Scenario { id: "dip", ..REST }]).unwrap();
+        let parts = [
+            "in\">1.050 ✓</td>",
+            "out\">1.200 ✗</td>",
+            "verdict off",
+            "<small>rpm</small></th>",
+            "href=\"dip.csv\"",
+            "href=\"f.svg\"",
+        ];
+        assert!(parts.iter().all(|part| page.contains(part)), "{page}");
         assert!(!Expected::AtMost(1.0).holds(f64::NAN) && !Expected::Near(1.0, 0.1).holds(f64::NAN));
     }
 }
