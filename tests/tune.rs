@@ -239,3 +239,22 @@ fn the_drive_has_the_values_of_plant_and_controller() {
         assert_eq!(drive.len() + shared.saturating_sub(1), plant.len() + controller.len(), "{}", path.display());
     }
 }
+
+/// Without a checkout: the example's file is in the command, and the values go to the current folder.
+#[test]
+fn a_motor_file_is_enough_outside_a_checkout() {
+    let dir = tempfile::tempdir().unwrap();
+    let outside = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).current_dir(dir.path()).output().unwrap()
+    };
+    let example = outside(&["tune", "--example"]);
+    assert!(example.status.success());
+    std::fs::write(dir.path().join("motor.toml"), &example.stdout).unwrap();
+    let tuned = outside(&["tune", "motor.toml"]);
+    let said = String::from_utf8(tuned.stdout).unwrap();
+    assert!(tuned.status.success() && said.ends_with("tune/ipmsm-2.2kw.SensorlessController.ssv\n"), "{said}");
+    assert!(dir.path().join("tune/ipmsm-2.2kw.PmsmDrive.ssv").is_file());
+    let refused = outside(&["tune", "none.toml"]);
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(refused.status.code() == Some(2) && said.lines().count() == 1 && said.contains("none.toml"), "{said}");
+}
