@@ -51,22 +51,22 @@ pub fn compile(workspace: &Workspace, packages: &[String], target: &Target) -> R
     Ok(libraries)
 }
 
-/// Compiles a package's program of the same name.
+/// Compiles a program of a package.
 ///
 /// # Errors
 /// The compiler cannot be run or fails.
-pub fn program(workspace: &Workspace, package: &str, target: &Target) -> Result<PathBuf> {
+pub fn program(workspace: &Workspace, package: &str, name: &str, target: &Target) -> Result<PathBuf> {
     let packages = [package.to_owned()];
     let mut build = build("build", workspace, &packages, target);
-    build.args(["--bin", package]);
+    build.args(["--bin", name]);
     let program = build.get_program().to_string_lossy().into_owned();
     let status = build.stdin(Stdio::null()).stdout(Stdio::null()).status();
     if !status.with_context(|| format!("{program} cannot be run"))?.success() {
-        return Err(crate::Failed(format!("building {package} failed")).into());
+        return Err(crate::Failed(format!("building {name} failed")).into());
     }
     // As `build` names the folder: below the target's name if one was given.
     let below = if target.linker == Linker::Zig { target.triple.as_str() } else { "" };
-    let file = format!("{package}{}", env::consts::EXE_SUFFIX);
+    let file = format!("{name}{}", env::consts::EXE_SUFFIX);
     Ok(workspace.target.join("fmu-build").join(below).join("release").join(file))
 }
 

@@ -1,5 +1,6 @@
 //! `documentation/index.html`: a self-contained page generated from the description.
 
+use fmu_core::IntegerType;
 use fmu_core::description::{Description, Member, Value, Variable, VariableKind};
 use fmu_core::terminal::MemberKind;
 use fmu_core::variable::{Causality, Variability};
@@ -184,9 +185,11 @@ fn table(variables: &[&Variable]) -> String {
                 " <small>sampled</small>"
             }
             (Causality::CalculatedParameter, _) => " <small>calculated</small>",
+            (_, Variability::Constant) => " <small>constant</small>",
             _ => "",
         };
-        let size = v.dimension.map(|n| format!("[{n}]")).unwrap_or_default();
+        let extents: Vec<String> = v.shape.iter().map(usize::to_string).collect();
+        let size = if v.is_array() { format!("[{}]", extents.join(",")) } else { String::new() };
         let (name, text, unit) = (escape(&v.name), escape(&v.description), unit(v));
         put!(out, "<tr><td class=\"name\">{name}{size}</td><td>{text}{kind}</td><td class=\"unit\">{unit}</td>");
         if settable {
@@ -201,20 +204,24 @@ fn table(variables: &[&Variable]) -> String {
 
 fn unit(v: &Variable) -> String {
     match &v.kind {
-        VariableKind::Real { unit, display, .. } => {
-            let shown = display.as_ref().map(|(name, ..)| format!(" <small>shown in {}</small>", escape(name)));
+        VariableKind::Real { unit, display, relative, .. } => {
+            let difference = if *relative { ", a difference" } else { "" };
+            let shown =
+                display.as_ref().map(|(name, ..)| format!(" <small>shown in {}{difference}</small>", escape(name)));
             escape(unit) + &shown.unwrap_or_default()
         }
-        VariableKind::Integer => "<small>integer</small>".into(),
+        VariableKind::Integer(of) if *of == IntegerType::Int32 => "<small>integer</small>".into(),
+        VariableKind::Integer(of) => format!("<small>integer, {}</small>", of.name()),
+        VariableKind::Text => "<small>text</small>".into(),
         VariableKind::Boolean => "<small>true or false</small>".into(),
         VariableKind::Enumeration { name, .. } => format!("<a href=\"#{0}\">{0}</a>", escape(name)),
     }
 }
 
 fn start(v: &Variable) -> String {
-    let item = |x: i32| match &v.kind {
+    let item = |x: i128| match &v.kind {
         VariableKind::Enumeration { items, .. } => {
-            items.iter().find(|(value, ..)| *value == x).map(|(_, name, _)| escape(name))
+            items.iter().find(|(value, ..)| i128::from(*value) == x).map(|(_, name, _)| escape(name))
         }
         _ => None,
     };
@@ -222,6 +229,7 @@ fn start(v: &Variable) -> String {
         Value::Real(x) => number(*x),
         Value::Integer(x) => item(*x).unwrap_or_else(|| x.to_string()),
         Value::Boolean(x) => x.to_string(),
+        Value::Text(x) => format!("“{}”", escape(x)),
     };
     let all: Vec<String> = v.start.iter().flatten().map(one).collect();
     match all.as_slice() {

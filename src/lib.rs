@@ -1,7 +1,7 @@
 //! The command-line tool `fmu`, as a library so that tests can use its parts.
 //!
-//! - [`commands`]: one module for each command.
-//! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`]: from Rust sources to `.fmu`
+//! - [`cli`]: the command line; [`commands`]: one module for each command; [`vendor`]: the crates that `fmu new` writes.
+//! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`], [`mod@reference`], [`release`]: from Rust sources to `.fmu`
 //!   files.
 //! - [`ssp`], [`ssv`]: write systems and parameter values.
 //!
@@ -9,6 +9,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod cli;
 pub mod commands;
 pub mod compile;
 pub mod documentation;
@@ -16,9 +17,12 @@ pub mod icons;
 pub mod licenses;
 pub mod pack;
 pub mod picture;
+pub mod reference;
+pub mod release;
 pub mod ssp;
 pub mod ssv;
 pub mod target;
+pub mod vendor;
 pub mod workspace;
 
 /// The work failed although the command and its files were valid: exit status 1 instead of 2.

@@ -20,7 +20,7 @@ pub struct Licenses {
 struct Crate {
     name: String,
     version: String,
-    license: String,
+    license: Option<String>,
     source: String,
     texts: Vec<String>,
 }
@@ -28,7 +28,9 @@ struct Crate {
 impl Licenses {
     /// Of what is linked into the library of a package.
     pub fn of_package(workspace: &Workspace, package: &str) -> Self {
-        let linked = workspace.linked(package);
+        let mut linked = workspace.linked(package);
+        // The FMU's own license stands in its description.
+        linked.retain(|p| p.name != package || p.license.is_some());
         let crates = linked.into_iter().map(|p| Crate::of(p, workspace.is_member(p))).collect();
         Self { own: texts_in(&workspace.root, ""), crates: Some(crates) }
     }
@@ -45,7 +47,8 @@ impl Licenses {
         let Some(crates) = &self.crates else { return out };
         let _ = writeln!(out, "{RULE}\nThe binary contains these Rust crates and parts of Rust's standard library.\n");
         for c in crates {
-            let _ = writeln!(out, "{} {}: {}  {}", c.name, c.version, c.license, c.source);
+            let license = c.license.as_deref().unwrap_or("see its text");
+            let _ = writeln!(out, "{} {}: {license}  {}", c.name, c.version, c.source);
         }
         let _ = writeln!(out, "std (Rust's standard library): MIT OR Apache-2.0  https://github.com/rust-lang/rust");
         // Many crates share one text.
@@ -84,7 +87,7 @@ impl Licenses {
         package("FMU", name, version, license, "NOASSERTION", &format!("<text>{copyright}</text>"));
         for c in self.crates.iter().flatten() {
             // "MIT/Apache-2.0" is an old spelling of Cargo's.
-            let license = c.license.replace('/', " OR ");
+            let license = c.license.as_deref().unwrap_or("NOASSERTION").replace('/', " OR ");
             let source = if c.source.is_empty() { "NOASSERTION" } else { &c.source };
             let id =
                 format!("{}-{}", c.name, c.version).replace(|x: char| !(x.is_ascii_alphanumeric() || x == '.'), "-");
@@ -98,8 +101,8 @@ const RULE: &str = "------------------------------------------------------------
 
 impl Crate {
     fn of(package: &Package, own: bool) -> Self {
-        let license = package.license.clone().unwrap_or_else(|| "see its text".into());
-        let texts = if own { Vec::new() } else { texts_in(package.folder(), &license) };
+        let license = package.license.clone();
+        let texts = if own { Vec::new() } else { texts_in(package.folder(), license.as_deref().unwrap_or_default()) };
         let source = package.repository.clone().unwrap_or_default();
         Self { name: package.name.clone(), version: package.version.clone(), license, source, texts }
     }

@@ -2,7 +2,7 @@
 
 use crate::documentation;
 use crate::licenses::Licenses;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use fmu_core::Description;
 use fmu_import::platform::Platform;
 use model_description::{FmiVersion, Generation, date_from_epoch};
@@ -108,6 +108,39 @@ pub fn contents(
     files
 }
 
+/// The files of a folder, with those of its folders, as `resources/` of an FMU. Hidden files stay out: systems and editors make
+/// them.
+///
+/// # Errors
+/// A file cannot be read, is neither file nor folder (a link is what it leads to), or has a name that not every system can write.
+pub fn resources(folder: &Path) -> Result<BTreeMap<String, Entry>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![(folder.to_owned(), "resources".to_owned(), 0)];
+    while let Some((folder, prefix, depth)) = folders.pop() {
+        // A link may lead back to where it is.
+        ensure!(depth < 32, "{}: more than 32 folders inside each other", folder.display());
+        for entry in fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
+            let path = entry?.path();
+            let of = || path.display().to_string();
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or("\u{fffd}");
+            if name.starts_with('.') {
+                continue;
+            }
+            let plain = name.bytes().all(|b| (b' '..=b'~').contains(&b) && !br#"\:*?"<>|"#.contains(&b));
+            ensure!(plain, "{}: rename it: letters of ASCII without \\ : * ? \" < > | are in every archive", of());
+            let name = format!("{prefix}/{name}");
+            let kind = fs::metadata(&path).with_context(of)?;
+            if kind.is_dir() {
+                folders.push((path, name, depth + 1));
+            } else {
+                ensure!(kind.is_file(), "{}: is neither a file nor a folder", of());
+                files.insert(name, Entry { bytes: fs::read(&path).with_context(of)?, executable: false });
+            }
+        }
+    }
+    Ok(files)
+}
+
 /// The bytes of a ZIP archive as FMI requires it (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5): deflate, `/` in names, files only, no
 /// ZIP64, no data descriptors; and the same for the same files: sorted, one time, one compressor.
 ///
@@ -188,6 +221,19 @@ mod tests {
         assert_eq!(modes, [0o100_755, 0o100_644]);
         assert!(central.iter().all(|i| u16_at(i + 6) <= 20 && u16_at(i + 30) == 0));
         assert!(starts(b"PK\x06\x06").is_empty(), "no ZIP64");
+    }
+
+    #[test]
+    fn resources_are_all_files_but_hidden_ones() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir_all(dir.path().join("b/c")).unwrap();
+        for name in ["a.csv", "b/c/d", ".gitkeep", "b/.hidden"] {
+            fs::write(dir.path().join(name), name).unwrap();
+        }
+        let names = |folder| resources(folder).map(|files| files.into_keys().collect::<Vec<_>>());
+        assert_eq!(names(dir.path()).unwrap(), ["resources/a.csv", "resources/b/c/d"]);
+        fs::write(dir.path().join("b/ü"), "").unwrap();
+        assert!(names(dir.path()).unwrap_err().to_string().contains("b/ü: rename it"));
     }
 
     #[test]

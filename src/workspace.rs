@@ -31,6 +31,8 @@ pub struct Package {
     pub license: Option<String>,
     /// Source of the package.
     pub repository: Option<String>,
+    /// The registry or repository that Cargo has it from; `None` for a folder.
+    source: Option<String>,
     manifest_path: PathBuf,
     targets: Vec<Target>,
 }
@@ -72,10 +74,28 @@ struct DependencyKind {
     kind: Option<String>,
 }
 
+/// The folder for what a command writes if no option names another: `name` in Cargo's target folder or, where there is no package,
+/// in the current folder.
+///
+/// # Errors
+/// Cargo's target folder is unknown although there is a package.
+pub fn output_folder(name: &str) -> Result<PathBuf> {
+    if has_manifest(&std::env::current_dir()?) { Ok(Workspace::find()?.target.join(name)) } else { Ok(name.into()) }
+}
+
+fn has_manifest(folder: &Path) -> bool {
+    folder.ancestors().any(|folder| folder.join("Cargo.toml").is_file())
+}
+
 impl Package {
     /// Its folder.
     pub fn folder(&self) -> &Path {
         self.manifest_path.parent().unwrap_or(Path::new("."))
+    }
+
+    /// Whether it comes from a registry.
+    pub fn is_published(&self) -> bool {
+        self.source.as_ref().is_some_and(|source| source.starts_with("registry+"))
     }
 
     /// Whether it has a library that C can load.
@@ -97,13 +117,21 @@ impl Workspace {
     /// # Errors
     /// There is none, or Cargo cannot be run.
     pub fn find() -> Result<Self> {
+        let here = std::env::current_dir().context("the current folder")?;
+        if !has_manifest(&here) {
+            bail!(
+                "no Cargo package here: expected a Cargo.toml in {} or above it; change to the folder of a package, or make one \
+                 with fmu new my-model",
+                here.display()
+            );
+        }
         let mut metadata = cargo();
         metadata.args(["metadata", "--format-version", "1", "--filter-platform", &host_triple()?]);
         let output = metadata.stdin(Stdio::null()).output().context("cargo cannot be run")?;
         if !output.status.success() {
             let message = String::from_utf8_lossy(&output.stderr);
             let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
-            bail!("no Cargo workspace here: {}", message.trim_start_matches("error: "));
+            bail!("cargo metadata: {}", message.trim_start_matches("error: "));
         }
         let metadata: Metadata = serde_json::from_slice(&output.stdout).context("cargo metadata")?;
         let normal = |d: Dependency| d.dep_kinds.iter().any(|k| k.kind.is_none()).then_some(d.pkg);
@@ -117,10 +145,14 @@ impl Workspace {
         })
     }
 
-    /// The packages of FMUs: the workspace's members below `fmus/`.
+    /// The packages of FMUs: the workspace's members below `fmus/` or, in a workspace without that folder, every member with a
+    /// library that C can load and with `fmu-export` among its dependencies.
     pub fn fmus(&self) -> Vec<&Package> {
         let below = self.root.join("fmus");
-        self.packages.iter().filter(|p| self.is_member(p) && p.folder().starts_with(&below)).collect()
+        let collected = below.is_dir();
+        let exports = |p: &Package| p.has_cdylib() && self.linked(&p.name).iter().any(|l| l.name == "fmu-export");
+        let is_fmu = |p: &&Package| if collected { p.folder().starts_with(&below) } else { exports(p) };
+        self.packages.iter().filter(|p| self.is_member(p)).filter(is_fmu).collect()
     }
 
     /// The package of this name, a member of the workspace if several have it.

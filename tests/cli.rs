@@ -27,6 +27,27 @@ fn fails(arguments: &[&str], status: i32, parts: &[&str]) {
     }
 }
 
+/// The first word of a message and the help are colored on a terminal alone; files and pipes get what users ask for.
+#[test]
+fn color_is_for_terminals() {
+    let said = |arguments: &[&str], variables: &[(&str, &str)]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fmu"));
+        for name in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"] {
+            command.env_remove(name);
+        }
+        let output = command.args(arguments).envs(variables.iter().copied()).output().unwrap();
+        text(&output.stderr) + &text(&output.stdout)
+    };
+    let drive = archive("fmi3", "PmsmDrive");
+    for arguments in [&["info", "no.fmu"][..], &["simulate", drive.to_str().unwrap(), "--stop", "0.01"], &["--help"]] {
+        let plain = said(arguments, &[]);
+        assert!(!plain.contains('\x1b'), "{plain}");
+        let forced = said(arguments, &[("CLICOLOR_FORCE", "1")]);
+        assert!(forced.contains("\x1b["), "{forced}");
+        assert_eq!(said(arguments, &[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")]), plain);
+    }
+}
+
 fn zip(path: &Path, entries: &[(&str, &[u8])]) {
     let mut zip = zip::ZipWriter::new(File::create(path).unwrap());
     for (name, bytes) in entries {

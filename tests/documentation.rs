@@ -14,6 +14,7 @@ use drive_study::reproduce::scenario::{
 };
 use fmu::documentation;
 use fmu_core::{Description, Model};
+use fmu_import::elf::FLOOR;
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 
@@ -134,6 +135,22 @@ fn pages_need_nothing_from_outside() {
     check::<PmsmPlant>();
     check::<SensorlessController>();
     check::<PmsmDrive>();
+}
+
+/// The floor of the C library stands in `elf.rs`; a page or a help that names one names that.
+#[test]
+fn one_floor_of_glibc() {
+    let floor = format!("glibc {}.{}", FLOOR.0, FLOOR.1);
+    let pages = ["README.md", "python/README.md", "docs/platforms.md", "docs/check.md", "src/commands/build.rs"];
+    for page in pages {
+        let text = std::fs::read_to_string(root().join(page)).unwrap();
+        let named: Vec<&str> = text.split("glibc ").skip(1).filter(|rest| rest.starts_with('2')).collect();
+        assert!(!named.is_empty(), "{page} names no floor");
+        for rest in named {
+            let other = format!("glibc {}", rest.split([' ', ',', ';', '|']).next().unwrap());
+            assert_eq!(other.trim_end_matches(['.', ':']), floor, "{page}");
+        }
+    }
 }
 
 /// Every page in a browser at three widths, on light and dark paper: nothing wider than the page, nothing from a network, curves drawn;

@@ -305,3 +305,33 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
         &["x.ssp: resources/plant.ssv: line ", "motor.R_s = -1 is not allowed"],
     );
 }
+
+/// Without sources: a folder with the FMUs is enough, and one line tells what is expected where.
+#[test]
+fn packed_fmus_are_enough_outside_a_checkout() {
+    let dir = tempfile::tempdir().unwrap();
+    let outside = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).current_dir(dir.path()).output().unwrap()
+    };
+    let archives = common::archives().to_str().unwrap();
+    let both = format!("{archives}/fmi2");
+    for (fmi, fmus) in [("2", archives), ("3", archives), ("2", &both)] {
+        let made = outside(&["ssp", "--fmus", fmus, "--fmi", fmi, "--out", "drive.ssp"]);
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        let run = outside(&["simulate", "drive.ssp", "--input", "speed_ref=10", "--stop", "0.01"]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    }
+    let refused = |arguments: &[&str], parts: &[&str]| {
+        let output = outside(arguments);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && said.lines().count() == 1, "{said}");
+        for part in parts {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+    };
+    let missing = "expected SensorlessController.fmu and PmsmPlant.fmu there or in its folder fmi2, as fmu build --out writes them";
+    refused(&["ssp", "--fmus", ".", "--out", "none.ssp"], &["error: --fmus .: ", missing]);
+    refused(&["ssp", "--out", "none.ssp"], &["--fmus DIR takes those of a folder", "no Cargo package here"]);
+    refused(&["reproduce"], &["no Cargo package here"]);
+    assert!(!dir.path().join("none.ssp").exists());
+}

@@ -81,7 +81,7 @@ fn the_reference_motor_gives_the_start_values_of_the_controller() {
     let description = fmu_core::Description::of::<drive::SensorlessController>().unwrap();
     let mut compared = 0;
     for setting in &tuned.controller {
-        let start = description.variable(setting.name).unwrap().start.as_ref().unwrap()[0];
+        let start = &description.variable(setting.name).unwrap().start.as_ref().unwrap()[0];
         if let (rules::Value::Real(x), fmu_core::description::Value::Real(start)) = (&setting.value, start) {
             assert!((x - start).abs() <= 1e-6 * start.abs(), "{}: {x}, start value {start}", setting.name);
             compared += 1;
@@ -118,14 +118,17 @@ fn files_have_what_differs_from_the_start_values() {
     let start = |description: &fmu_core::Description, name: &str| {
         use fmu_core::description::{Value, VariableKind};
         let variable = description.variable(name).unwrap();
-        let item = |i: i32| match &variable.kind {
-            VariableKind::Enumeration { items, .. } => items.iter().find(|(value, ..)| *value == i).unwrap().1.clone(),
+        let item = |i: i128| match &variable.kind {
+            VariableKind::Enumeration { items, .. } => {
+                items.iter().find(|(value, ..)| i128::from(*value) == i).unwrap().1.clone()
+            }
             _ => i.to_string(),
         };
-        match variable.start.as_ref().unwrap()[0] {
+        match &variable.start.as_ref().unwrap()[0] {
             Value::Real(x) => x.to_string(),
-            Value::Integer(i) => item(i),
+            Value::Integer(i) => item(*i),
             Value::Boolean(b) => b.to_string(),
+            Value::Text(text) => text.clone(),
         }
     };
     for path in motors() {
@@ -235,4 +238,23 @@ fn the_drive_has_the_values_of_plant_and_controller() {
         let shared = plant.iter().chain(&controller).filter(|s| s.name == "u_dc").count();
         assert_eq!(drive.len() + shared.saturating_sub(1), plant.len() + controller.len(), "{}", path.display());
     }
+}
+
+/// Without a checkout: the example's file is in the command, and the values go to the current folder.
+#[test]
+fn a_motor_file_is_enough_outside_a_checkout() {
+    let dir = tempfile::tempdir().unwrap();
+    let outside = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).current_dir(dir.path()).output().unwrap()
+    };
+    let example = outside(&["tune", "--example"]);
+    assert!(example.status.success());
+    std::fs::write(dir.path().join("motor.toml"), &example.stdout).unwrap();
+    let tuned = outside(&["tune", "motor.toml"]);
+    let said = String::from_utf8(tuned.stdout).unwrap();
+    assert!(tuned.status.success() && said.ends_with("tune/ipmsm-2.2kw.SensorlessController.ssv\n"), "{said}");
+    assert!(dir.path().join("tune/ipmsm-2.2kw.PmsmDrive.ssv").is_file());
+    let refused = outside(&["tune", "none.toml"]);
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(refused.status.code() == Some(2) && said.lines().count() == 1 && said.contains("none.toml"), "{said}");
 }

@@ -15,6 +15,7 @@ mod exchange;
 mod fmu_file;
 mod formats;
 mod instance;
+pub mod message;
 pub mod probe;
 mod replay;
 pub mod report;

@@ -3,11 +3,11 @@
 #![forbid(unsafe_code)]
 
 use clap::{Parser, Subcommand};
-use fmu_check::{command, probe};
+use fmu_check::{command, message, probe};
 use std::process::ExitCode;
 
 #[derive(Debug, Parser)]
-#[command(name = "fmu-check", version, subcommand_negates_reqs = true, args_conflicts_with_subcommands = true)]
+#[command(name = "fmu-check", version, styles = message::HELP, subcommand_negates_reqs = true, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(flatten)]
     check: command::Check,
@@ -31,7 +31,7 @@ fn main() -> ExitCode {
         None => command::run(&check).map(|holds| ExitCode::from(u8::from(!holds))),
     };
     outcome.unwrap_or_else(|error| {
-        eprintln!("error: {}", fmu_import::printable_lines(&format!("{error:#}")));
+        message::error(&fmu_import::printable_lines(&format!("{error:#}")));
         ExitCode::from(2)
     })
 }

@@ -6,12 +6,14 @@ pub use terminals::{Member, Terminal, TerminalPicture};
 
 use crate::Fault;
 use crate::capability::{Capabilities, Exported};
+use crate::integer::IntegerType;
 use crate::model::{Block, Experiment, Model};
 use crate::probe;
 use crate::row::{Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
@@ -88,8 +90,8 @@ pub struct Variable {
     pub nominal: Option<f64>,
     /// The value is unbounded.
     pub unbounded: bool,
-    /// Number of elements, `None` for a scalar.
-    pub dimension: Option<usize>,
+    /// Extents of an array, whose elements are row by row; empty for a scalar.
+    pub shape: Vec<usize>,
     /// Start values (one, or one per element) of variables that the importer may set; `None` for calculated ones.
     pub start: Option<Vec<Value>>,
     /// Value references that the initial value depends on; `None` for variables that are no initial unknown.
@@ -118,9 +120,13 @@ pub enum VariableKind {
         factor: f64,
         /// Display unit: name, factor and offset.
         display: Option<(String, f64, f64)>,
+        /// The value is a difference: the offset of the display unit does not apply.
+        relative: bool,
+        /// The variable is in single precision.
+        single: bool,
     },
-    /// A 32-bit integer.
-    Integer,
+    /// An integer.
+    Integer(IntegerType),
     /// A truth value.
     Boolean,
     /// A named value.
@@ -132,18 +138,22 @@ pub enum VariableKind {
         /// Value, name and description of each item.
         items: Vec<(i32, String, String)>,
     },
+    /// A text.
+    Text,
 }
 
 /// A start value.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Value {
     /// Of a real variable.
     Real(f64),
     /// Of an integer or an enumeration.
-    Integer(i32),
+    Integer(i128),
     /// Of a Boolean.
     Boolean(bool),
+    /// Of a text.
+    Text(String),
 }
 
 impl Description {
@@ -152,7 +162,7 @@ impl Description {
     /// # Errors
     /// As [`exported`](Self::exported).
     pub fn of<M: Model>() -> Result<Self, Fault> {
-        Self::with(&Capabilities::<M>::NONE)
+        Self::with(&Capabilities::<M>::NONE, None)
     }
 
     /// Describes a model as it is exported; start values come from its `Default`, dependencies from probing it.
@@ -161,29 +171,42 @@ impl Description {
     /// Reports problems that no compile-time check can find: a name shared by two parts, a start value outside its
     /// range, a type definition named like a variable, a terminal with missing variables, a state without a row.
     pub fn exported<E: Exported>() -> Result<Self, Fault> {
-        Self::with(&E::CAN)
+        Self::loaded::<E>(None)
     }
 
-    fn with<M: Model>(can: &Capabilities<M>) -> Result<Self, Fault> {
+    /// As [`exported`](Self::exported), with the folder of the model's resources.
+    ///
+    /// # Errors
+    /// As [`exported`](Self::exported) and [`Model::load`].
+    pub fn loaded<E: Exported>(resources: Option<&Path>) -> Result<Self, Fault> {
+        Self::with(&E::CAN, resources)
+    }
+
+    fn with<M: Model>(can: &Capabilities<M>, resources: Option<&Path>) -> Result<Self, Fault> {
         let mut block = Block::<M>::default();
-        block.initialize();
+        block.model.load(resources)?;
         let states = can.rows()?;
-        let initial = probe::initial_dependencies(can, &states);
-        let between = probe::dependencies(can, &states);
+        let initial = probe::initial_dependencies(can, &block, &states);
+        let between = probe::dependencies(can, &block, &states);
+        block.initialize();
         let references = |of: &Option<Vec<usize>>| of.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
         let table = M::TABLE;
         let mut variables: Vec<Variable> = Vec::new();
         for index in 0..table.len() {
             let Some((name, meta, element)) = table.locate(index) else { continue };
             let Some((_, slot)) = table.entry(&mut block, index) else { continue };
-            let start = meta.causality.is_settable().then(|| value(&slot));
-            if let (Some(start), true) = (start, meta.causality.is_settable()) {
-                check_start(&name, meta, start)?;
+            let told = meta.causality.is_settable() || meta.variability == Variability::Constant;
+            let start = told.then(|| value(&slot));
+            if told {
+                check_start(&name, meta, &slot)?;
             }
             if element > 0 {
-                if let (Some(Variable { start: Some(all), .. }), Some(start)) = (variables.last_mut(), start) {
+                let Some(array) = variables.last_mut() else { continue };
+                if let (Some(all), Some(start)) = (&mut array.start, start) {
                     all.push(start);
                 }
+                join(&mut array.initial_dependencies, references(&initial[index]));
+                join(&mut array.dependencies, references(&between[index]));
                 continue;
             }
             let state = states.iter().position(|&row| row == index);
@@ -255,6 +278,25 @@ impl Variable {
         let (min, max) = (self.min.unwrap_or(f64::NEG_INFINITY), self.max.unwrap_or(f64::INFINITY));
         Range { min, max, above: self.above, below: self.below }
     }
+
+    /// Whether it has elements, each with a value reference in FMI 2.0.
+    pub fn is_array(&self) -> bool {
+        !self.shape.is_empty()
+    }
+
+    /// Number of its elements, 1 for a scalar.
+    pub fn elements(&self) -> usize {
+        self.shape.iter().product()
+    }
+}
+
+/// The dependencies of an array are those of its elements together.
+fn join(all: &mut Option<Vec<u32>>, more: Option<Vec<u32>>) {
+    if let (Some(all), Some(more)) = (all, more) {
+        all.extend(more);
+        all.sort_unstable();
+        all.dedup();
+    }
 }
 
 fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value>) -> Variable {
@@ -271,7 +313,10 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
         below: meta.range.below,
         nominal: meta.nominal,
         unbounded: meta.unbounded,
-        dimension: meta.dimension,
+        shape: match (meta.shape, meta.dimension) {
+            ([], n) => n.into_iter().collect(),
+            (shape, _) => shape.to_vec(),
+        },
         start: start.map(|x| vec![x]),
         initial_dependencies: None,
         dependencies: None,
@@ -291,23 +336,30 @@ type V = Row<f64>;
 fn value(slot: &Slot<'_>) -> Value {
     match slot {
         Slot::Real(x) => Value::Real(**x),
-        Slot::Integer(x) => Value::Integer(**x),
+        Slot::Float32(x) => Value::Real((**x).into()),
+        Slot::Integer(x) => Value::Integer(x.get()),
         Slot::Boolean(x) => Value::Boolean(**x),
-        Slot::Enumeration(x) => Value::Integer(x.get()),
+        Slot::Enumeration(x) => Value::Integer(x.get().into()),
+        Slot::Text(x) => Value::Text((*x).clone()),
+        Slot::Said(x) => Value::Text((*x).into()),
     }
 }
 
 fn kind(kind: &Kind) -> VariableKind {
     match kind {
-        Kind::Real(Quantity { name, unit, display }) => VariableKind::Real {
+        Kind::Real(Quantity { name, unit, display, relative })
+        | Kind::Float32(Quantity { name, unit, display, relative }) => VariableKind::Real {
             quantity: (*name).into(),
             unit: unit.name.into(),
             exponents: unit.exponents,
             factor: unit.factor,
             display: display.map(|d| (d.name.into(), d.factor, d.offset)),
+            relative: *relative,
+            single: matches!(kind, Kind::Float32(_)),
         },
-        Kind::Integer => VariableKind::Integer,
+        Kind::Integer(of) => VariableKind::Integer(*of),
         Kind::Boolean => VariableKind::Boolean,
+        Kind::Text => VariableKind::Text,
         Kind::Enumeration(Enumeration { name, description, items }) => VariableKind::Enumeration {
             name: (*name).into(),
             description: (*description).into(),
@@ -316,17 +368,20 @@ fn kind(kind: &Kind) -> VariableKind {
     }
 }
 
-/// The same check as in a set call.
-fn check_start(name: &str, meta: &Meta, start: Value) -> Result<(), Fault> {
-    let allowed = match start {
-        Value::Real(x) => meta.range.contains(x),
-        Value::Integer(x) => meta.range.contains(f64::from(x)),
-        Value::Boolean(_) => true,
+/// The same check as in a set call. A text must be one that XML can hold (XML 1.0, 2.2).
+fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
+    let text = match slot {
+        Slot::Text(text) => text.as_str(),
+        Slot::Said(text) => text,
+        _ => "",
     };
-    if allowed {
+    if text.contains(|c: char| c.is_control() && !"\t\n\r".contains(c) || "\u{fffe}\u{ffff}".contains(c)) {
+        return Err(Fault::new(format!("{name} = {slot} at the start has a character that XML does not have")));
+    }
+    if slot.is_allowed(meta) {
         Ok(())
     } else {
-        Err(Fault::value(name, format!("{start:?} at the start"), Range::to_string(&meta.range)))
+        Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
     }
 }
 

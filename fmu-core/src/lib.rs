@@ -1,6 +1,82 @@
 //! The definition of a model, for exporters and authors: the trait [`Model`], its variable [`Table`], quantities and units,
 //! time on an integer grid, and the neutral [`Description`].
 //!
+//! A whole model, and a test of it:
+//!
+//! ```
+//! use fmu_core::unit::{Exponents, JOULE_PER_KELVIN, KELVIN, Quantity, Unit, WATT, WATT_PER_KELVIN};
+//! use fmu_core::{
+//!     Block, ContinuousTime, Elapsed, Fault, Info, Model, Row, State, Step, Table, integrate,
+//! };
+//! use serde::{Deserialize, Serialize};
+//!
+//! /// Inputs, parameters and state are plain data: what a saved state holds.
+//! #[derive(Clone, Serialize, Deserialize)]
+//! struct Heater { p: f64, t_ambient: f64, c: f64, g: f64, t: f64 }
+//!
+//! /// The start values; they stand nowhere else.
+//! impl Default for Heater {
+//!     fn default() -> Self {
+//!         Self { p: 0.0, t_ambient: 293.15, c: 500.0, g: 2.0, t: 0.0 }
+//!     }
+//! }
+//!
+//! #[derive(Clone, Default, Serialize, Deserialize)]
+//! struct Outputs { t: f64 }
+//!
+//! type V = Row<Block<Heater>>;
+//!
+//! impl Model for Heater {
+//!     type Outputs = Outputs;
+//!     const INFO: Info = Info { name: "Heater", description: "A heated body", ..Info::DEFAULT };
+//!     const TABLE: &'static Table<Block<Self>> = &Table::new(const { &[
+//!         V::input("P", &WATT, "Heating power", |m| &mut m.model.p).at_least(0.0),
+//!         V::output("T", &KELVIN, "Temperature", |m| &mut m.out.t),
+//!         V::parameter("T_ambient", &KELVIN, "Temperature around it, and at the start", |m| &mut m.model.t_ambient),
+//!         V::parameter("C", &JOULE_PER_KELVIN, "Heat capacity", |m| &mut m.model.c).above(0.0),
+//!         V::parameter("G", &WATT_PER_KELVIN, "Conductance to the ambient", |m| &mut m.model.g).tunable(),
+//!     ] });
+//!
+//!     fn initialize(&mut self) {
+//!         self.t = self.t_ambient;
+//!     }
+//!
+//!     fn output(&self, _now: Elapsed, out: &mut Outputs) {
+//!         out.t = self.t;
+//!     }
+//!
+//!     // Co-Simulation: one state, substeps of at most 0.1 s.
+//!     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+//!         integrate::smooth::<Self, 1>(self, step, 0.1)
+//!     }
+//! }
+//!
+//! /// The physics. It gives Model Exchange and derivatives besides.
+//! impl ContinuousTime for Heater {
+//!     const STATES: &'static [State<Self>] = &[State::new("T", &KELVIN_PER_S, |m| &mut m.t)];
+//!
+//!     fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+//!         dx[0] = (self.p - self.g * (self.t - self.t_ambient)) / self.c;
+//!         Ok(())
+//!     }
+//! }
+//!
+//! /// A quantity that the crate lacks: its name, its unit, the exponents of the SI base units.
+//! const KELVIN_PER_S: Quantity =
+//!     Quantity::new("Heating", Unit::si("K/s", Exponents::mechanical(0, 0, -1, 0).with_kelvin(1)));
+//!
+//! let mut heater = Block::<Heater>::default();
+//! heater.model.p = 100.0;
+//! heater.initialize();
+//! heater.step(&Step { start: Elapsed::ZERO, h: 250.0 })?;
+//! // 100 W over 2 W/K are 50 K; the time constant is 500/2 s.
+//! assert!((heater.out.t - 293.15 - 50.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-9);
+//! # Ok::<(), Fault>(())
+//! ```
+//!
+//! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`] and
+//! [`Warns`] are what a model can do besides; [`Model::load`] reads files that the FMU brings along.
+//!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`table`], [`terminal`], [`model`],
 //! [`continuous`], [`events`], [`capability`], [`description`]. No motor, no XML, no C, no `unsafe`.
 
@@ -13,10 +89,12 @@ pub mod dual;
 pub mod enumeration;
 pub mod events;
 pub mod fault;
+pub mod integer;
 pub mod integrate;
 pub mod log;
 pub mod model;
 mod probe;
+pub mod resource;
 pub mod row;
 pub mod table;
 pub mod terminal;
@@ -32,7 +110,9 @@ pub use dual::{Dual, Scalar};
 pub use enumeration::{Choice, Enumerated, Field};
 pub use events::{Events, Indicator, Next, Outcome, Sampled};
 pub use fault::Fault;
+pub use integer::{IntegerType, Whole};
 pub use model::{Block, Experiment, Info, Interface, Model};
+pub use resource::Resource;
 pub use row::{Row, Slot};
 pub use table::{Part, Table};
 pub use terminal::{Icon, Member, Terminal};

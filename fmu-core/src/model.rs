@@ -2,6 +2,7 @@
 
 use crate::{Elapsed, Fault, Hash, Step, Table, Terminal};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use std::path::Path;
 
 /// General information about a model, besides its variables.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +64,7 @@ pub enum Interface {
 /// A model of one block in a block diagram, sampled or continuous.
 ///
 /// The life of an instance:
-/// 1. `Default` creates it: inputs and parameters at their start values.
+/// 1. `Default` creates it: inputs and parameters at their start values. [`load`](Model::load) reads resources.
 /// 2. The importer sets parameters and inputs; each set is checked against its range in the table.
 /// 3. [`derive`](Model::derive), [`initialize`](Model::initialize) and [`output`](Model::output) run whenever the importer
 ///    asks for a value after it has set one, so that initialization can be iterated.
@@ -92,6 +93,41 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
 
     /// Hash of name, version and table.
     const HASH: Hash = Hash::START.text(Self::INFO.name).text(Self::INFO.version).join(&Self::TABLE.hash());
+
+    /// Reads data from the files of the FMU's folder `resources/`, once, at instantiation. `resources` is that folder; `None`
+    /// if the importer names none. What is read belongs into a [`Resource`](crate::Resource): it is no part of a saved state,
+    /// and is there again after a reset, and when a state is restored.
+    ///
+    /// ```
+    /// # use fmu_core::{Fault, Resource};
+    /// # use std::path::Path;
+    /// # #[derive(Default)] struct Motor { map: Resource<Vec<f64>> }
+    /// # impl Motor {
+    /// fn load(&mut self, resources: Option<&Path>) -> Result<(), Fault> {
+    ///     let file = resources.ok_or_else(|| Fault::new("map.txt is in the FMU's resources"))?.join("map.txt");
+    ///     let wrong = |why: &dyn std::fmt::Display| Fault::new(format!("{}: {why}", file.display()));
+    ///     let text = std::fs::read_to_string(&file).map_err(|e| wrong(&e))?;
+    ///     let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse).collect();
+    ///     self.map = numbers.map_err(|e| wrong(&e))?.into();
+    ///     Ok(())
+    /// }
+    /// # }
+    /// # let folder = std::env::temp_dir().join(format!("fmu-core-{}", std::process::id()));
+    /// # std::fs::create_dir_all(&folder).unwrap();
+    /// # std::fs::write(folder.join("map.txt"), "1 2.5").unwrap();
+    /// # let mut motor = Motor::default();
+    /// # motor.load(Some(&folder))?;
+    /// # std::fs::remove_dir_all(&folder).unwrap();
+    /// # assert_eq!(motor.map[1], 2.5);
+    /// # assert!(motor.load(None).is_err());
+    /// # Ok::<(), Fault>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Names the file and the reason: there is no instance.
+    fn load(&mut self, _resources: Option<&Path>) -> Result<(), Fault> {
+        Ok(())
+    }
 
     /// Calculated parameters from the parameters; runs again when a tunable parameter was set.
     fn derive(&mut self) {}

@@ -5,7 +5,7 @@ use crate::Elapsed;
 use crate::capability::Capabilities;
 use crate::model::{Block, Model};
 use crate::row::Slot;
-use crate::variable::{Causality, Kind, Meta, Variability};
+use crate::variable::{Causality, Kind, Variability};
 
 /// Operating points tried, the start values among them.
 const POINTS: u32 = 64;
@@ -17,13 +17,17 @@ pub(crate) const NOW: usize = usize::MAX;
 type Dependencies = Vec<Option<Vec<usize>>>;
 
 /// What initial values depend on: outputs, calculated parameters, states and derivatives on inputs and parameters.
-pub(crate) fn initial_dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Dependencies {
-    let causality = causalities::<M>();
+pub(crate) fn initial_dependencies<M: Model>(
+    can: &Capabilities<M>,
+    fresh: &Block<M>,
+    states: &[usize],
+) -> Dependencies {
+    let causality = causalities(fresh);
     let knowns: Vec<usize> = (0..causality.len()).filter(|&i| causality[i].0.is_settable()).collect();
     let mut found = Found::new(causality.len() + states.len());
     let mut draw = Draw(1);
     for point in 0..POINTS {
-        let base = operating_point::<M>(point, &knowns, &mut draw);
+        let base = operating_point(fresh, point, &knowns, &mut draw);
         let start = |mut block: Block<M>| {
             block.initialize();
             values(can, block, Elapsed::ZERO)
@@ -35,6 +39,11 @@ pub(crate) fn initial_dependencies<M: Model>(can: &Capabilities<M>, states: &[us
             found.compare(known, &before, &start(changed));
         }
     }
+    // Which texts mean something is not known, so none is tried.
+    let is_text = |&i: &usize| M::TABLE.locate(i).is_some_and(|(_, meta, _)| meta.kind == Kind::Text);
+    for known in knowns.into_iter().filter(is_text) {
+        found.suspect(known);
+    }
     let unknown = |i: usize| {
         let calculated = |&(c, _): &(Causality, _)| matches!(c, Causality::Output | Causality::CalculatedParameter);
         states.contains(&i) || causality.get(i).is_none_or(calculated)
@@ -44,15 +53,15 @@ pub(crate) fn initial_dependencies<M: Model>(can: &Capabilities<M>, states: &[us
 
 /// What values depend on between two events: outputs and derivatives on states, inputs, tunable parameters and time,
 /// for any values of the parameters.
-pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Dependencies {
-    let causality = causalities::<M>();
+pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
+    let causality = causalities(fresh);
     let known = |&(c, v): &(Causality, Variability)| c == Causality::Input || v == Variability::Tunable;
     let mut found = Found::new(causality.len() + states.len());
     let mut draw = Draw(2);
     let settable: Vec<usize> = (0..causality.len()).filter(|&i| causality[i].0.is_settable()).collect();
     let points = if can.model_exchange() { POINTS } else { 0 };
     for point in 0..points {
-        let mut base = operating_point::<M>(point, &settable, &mut draw);
+        let mut base = operating_point(fresh, point, &settable, &mut draw);
         base.initialize();
         let mut now = Elapsed::ZERO.plus(draw.between(0.0, 1.0));
         if let Some(events) = &can.events {
@@ -86,8 +95,8 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) ->
 }
 
 /// The start values first; then about half of the inputs and parameters have others.
-fn operating_point<M: Model>(point: u32, settable: &[usize], draw: &mut Draw) -> Block<M> {
-    let mut block = Block::<M>::default();
+fn operating_point<M: Model>(fresh: &Block<M>, point: u32, settable: &[usize], draw: &mut Draw) -> Block<M> {
+    let mut block = fresh.clone();
     for &i in settable {
         if point > 0 && draw.below(2) == 0 {
             change::<M>(&mut block, i, draw);
@@ -112,6 +121,11 @@ impl Found {
         }
     }
 
+    /// A known that everything may depend on.
+    fn suspect(&mut self, known: usize) {
+        self.0.iter_mut().for_each(|list| list.push(known));
+    }
+
     fn list(self, unknown: impl Fn(usize) -> bool) -> Dependencies {
         let sorted = |mut list: Vec<usize>| {
             list.sort_unstable();
@@ -121,8 +135,8 @@ impl Found {
     }
 }
 
-fn causalities<M: Model>() -> Vec<(Causality, Variability)> {
-    let mut block = Block::<M>::default();
+fn causalities<M: Model>(fresh: &Block<M>) -> Vec<(Causality, Variability)> {
+    let mut block = fresh.clone();
     let one = |i| M::TABLE.entry(&mut block, i).map(|(meta, _)| (meta.causality, meta.variability));
     (0..M::TABLE.len()).map_while(one).collect()
 }
@@ -142,13 +156,7 @@ fn values<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) ->
     {
         dx.fill(f64::NAN);
     }
-    let mut value = |i| match M::TABLE.entry(&mut block, i) {
-        Some((_, Slot::Real(x))) => x.to_bits(),
-        Some((_, Slot::Integer(x))) => u64::from(x.cast_unsigned()),
-        Some((_, Slot::Boolean(x))) => u64::from(*x),
-        Some((_, Slot::Enumeration(x))) => u64::from(x.get().cast_unsigned()),
-        None => 0,
-    };
+    let mut value = |i| M::TABLE.entry(&mut block, i).map_or(0, |(_, slot)| slot.bits());
     let mut all: Vec<u64> = (0..M::TABLE.len()).map(&mut value).collect();
     all.extend(dx.iter().map(|x| x.to_bits()));
     all
@@ -181,24 +189,28 @@ fn change<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
                 }
             }
         }
+        Slot::Float32(x) => {
+            let candidate = if *x == 0.0 { 1.0 } else { 1.5 * *x };
+            let other = [candidate, 0.75 * *x, -candidate].into_iter().find(|&v| meta.range.contains_single(v));
+            *x = other.unwrap_or(*x);
+        }
         Slot::Integer(x) => {
-            if let Some(&other) = other_integers(meta, *x).get(draw.below(2)) {
-                *x = other;
+            let Kind::Integer(of) = meta.kind else { return };
+            let value = x.get();
+            let others = [value + 1, value - 1, value + 2].into_iter().filter(|&v| of.allows(v, &meta.range));
+            if let Some(other) = others.collect::<Vec<_>>().get(draw.below(2)) {
+                x.set(*other);
             }
         }
         Slot::Boolean(x) => *x = !*x,
         Slot::Enumeration(x) => {
-            if let Some(&other) = other_integers(meta, x.get()).get(draw.below(2)) {
+            let Kind::Enumeration(e) = meta.kind else { return };
+            let others = e.items.iter().map(|item| item.value).filter(|&v| v != x.get());
+            if let Some(&other) = others.collect::<Vec<_>>().get(draw.below(2)) {
                 x.set(other);
             }
         }
-    }
-}
-
-fn other_integers(meta: &Meta, x: i32) -> Vec<i32> {
-    match &meta.kind {
-        Kind::Enumeration(e) => e.items.iter().map(|item| item.value).filter(|&v| v != x).collect(),
-        _ => [x + 1, x - 1, x + 2].into_iter().filter(|&v| meta.range.contains(f64::from(v))).collect(),
+        Slot::Text(_) | Slot::Said(_) => {}
     }
 }
 

@@ -4,7 +4,7 @@
 //! Everything that does not need a value is checked while compiling: names, ranges, the number of variables.
 
 use crate::fault::Fault;
-use crate::row::{Access, Node, Row, Slot};
+use crate::row::{Access, Node, Row, Slot, demand};
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Variability};
 use std::fmt::Display;
@@ -73,7 +73,7 @@ impl<W: 'static> Table<W> {
     /// Builds the table.
     ///
     /// # Panics
-    /// At compile time, on a duplicate name, an empty range or more than [`CAPACITY`] variables.
+    /// At compile time, on a duplicate name, an array without an element or more than [`CAPACITY`] variables.
     #[expect(clippy::cast_possible_truncation, reason = "CAPACITY fits in 16 bits, asserted below")]
     pub const fn new(rows: &'static [Row<W>]) -> Self {
         assert!(CAPACITY <= u16::MAX as usize);
@@ -131,9 +131,13 @@ impl<W: 'static> Table<W> {
         let slot = match &row.access {
             Access::Real(get) => Slot::Real(get(whole)),
             Access::Reals(get) => Slot::Real(get(whole).get_mut(usize::from(place.inner))?),
-            Access::Integer(get) => Slot::Integer(get(whole)),
+            Access::Float32(get) => Slot::Float32(get(whole)),
+            Access::Integer(get) => Slot::Integer(get.find(whole)),
             Access::Boolean(get) => Slot::Boolean(get(whole)),
             Access::Enumeration(field) => Slot::Enumeration(field.find(whole)),
+            Access::Text(get) => Slot::Text(get(whole)),
+            Access::Said(say) => Slot::Said(say(whole)),
+            Access::Constant(text) => Slot::Said(text),
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
         };
         Some((&row.meta, slot))
@@ -187,13 +191,17 @@ impl<W: 'static> Table<W> {
         let wanted = ptr::from_mut(get(&mut whole)).addr();
         let found = (0..self.len).find_map(|index| {
             let (meta, slot) = self.entry(&mut whole, index)?;
-            let (address, value) = match &slot {
-                Slot::Real(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
-                Slot::Integer(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
-                Slot::Boolean(x) => (ptr::from_ref(&**x).addr(), x.to_string()),
-                Slot::Enumeration(x) => (ptr::from_ref(&**x).addr(), item(meta, x.get())),
+            let address = match &slot {
+                Slot::Real(x) => ptr::from_ref(&**x).addr(),
+                Slot::Float32(x) => ptr::from_ref(&**x).addr(),
+                Slot::Integer(x) => ptr::from_ref(&**x).addr(),
+                Slot::Boolean(x) => ptr::from_ref(&**x).addr(),
+                Slot::Enumeration(x) => ptr::from_ref(&**x).addr(),
+                Slot::Text(x) => ptr::from_ref(&**x).addr(),
+                Slot::Said(_) => return None,
             };
-            let unit = if let Kind::Real(quantity) = meta.kind { quantity.unit.name } else { "" };
+            let value = if let Slot::Enumeration(x) = &slot { item(meta, x.get()) } else { slot.to_string() };
+            let unit = if let Kind::Real(of) | Kind::Float32(of) = meta.kind { of.unit.name } else { "" };
             let space = if unit.is_empty() { "" } else { " " };
             (address == wanted).then(|| Some(format!("{} = {value}{space}{unit}", self.locate(index)?.0))).flatten()
         });
@@ -215,8 +223,8 @@ impl<W: 'static> Table<W> {
 }
 
 const fn check(meta: &Meta) {
-    assert!(!meta.name.is_empty(), "a variable needs a name");
-    assert!(meta.range.min <= meta.range.max, "min is greater than max");
+    demand(!meta.name.is_empty(), meta.description, "a variable needs a name");
+    demand(!matches!(meta.dimension, Some(0)), meta.name, "an array needs an element");
 }
 
 /// The name of row `last` differs from all before it.
@@ -225,7 +233,7 @@ const fn check_unique<W>(rows: &[Row<W>], last: usize) {
     while row < last {
         // A part without a prefix has no name of its own; its variables are checked by the description.
         let same = !rows[row].meta.name.is_empty() && same_text(rows[row].meta.name, rows[last].meta.name);
-        assert!(!same, "two rows of a table have the same name");
+        demand(!same, rows[last].meta.name, "two rows of the table have this name");
         row += 1;
     }
 }

@@ -3,6 +3,7 @@
 //! Binaries of one model built separately, for several platforms, have the same token; a changed name, unit, range or
 //! version changes it. The token is a 128-bit FNV-1a hash, written as a GUID.
 
+use crate::integer::IntegerType;
 use crate::unit::Quantity;
 use crate::variable::{Kind, Meta};
 
@@ -59,9 +60,18 @@ impl Hash {
             .number(range.max)
             .number(nominal)
             .bytes(&dimension.to_le_bytes());
+        // Nothing for what older tables do not have: their tokens stay.
+        let (mut hash, mut i) = (hash, 0);
+        while i < meta.shape.len() {
+            hash = hash.bytes(&meta.shape[i].to_le_bytes());
+            i += 1;
+        }
         match meta.kind {
             Kind::Real(quantity) => hash.quantity(quantity),
-            Kind::Integer => hash.text("integer"),
+            Kind::Float32(quantity) => hash.text("Float32").quantity(quantity),
+            Kind::Integer(IntegerType::Int32) => hash.text("integer"),
+            Kind::Integer(of) => hash.text(of.name()),
+            Kind::Text => hash.text("text"),
             Kind::Boolean => hash.text("boolean"),
             Kind::Enumeration(enumeration) => {
                 let (mut hash, mut i) = (hash.text(enumeration.name), 0);
@@ -76,10 +86,11 @@ impl Hash {
 
     pub(crate) const fn quantity(self, quantity: &Quantity) -> Self {
         let hash = self.text(quantity.name).text(quantity.unit.name);
-        match quantity.display {
+        let hash = match quantity.display {
             Some(display) => hash.text(display.name),
             None => hash,
-        }
+        };
+        if quantity.relative { hash.text("relative") } else { hash }
     }
 
     const fn number(self, x: f64) -> Self {

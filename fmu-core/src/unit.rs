@@ -87,17 +87,31 @@ pub struct Quantity {
     pub unit: Unit,
     /// Unit an importer shows by default, if it differs.
     pub display: Option<DisplayUnit>,
+    /// The value is a difference: the factor of a display unit applies, its offset does not (FMI 2.0.5, 2.2.3;
+    /// FMI 3.0.2, 2.4.4 `relativeQuantity`).
+    pub relative: bool,
 }
 
 impl Quantity {
     /// A quantity shown in its own unit.
     pub const fn new(name: &'static str, unit: Unit) -> Self {
-        Self { name, unit, display: None }
+        Self { name, unit, display: None, relative: false }
     }
 
     /// The same, shown in another unit.
     pub const fn shown_in(self, display: DisplayUnit) -> Self {
         Self { display: Some(display), ..self }
+    }
+
+    /// The quantity of a difference of two such values, under a name of its own: a band of 1 K is shown as 1 degC, and not as
+    /// -272.15 degC.
+    ///
+    /// ```
+    /// # use fmu_core::unit::{KELVIN, Quantity};
+    /// const BAND: Quantity = KELVIN.relative("TemperatureDifference");
+    /// ```
+    pub const fn relative(self, name: &'static str) -> Self {
+        Self { name, relative: true, ..self }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The properties of a variable except the location of its value: causality, variability, type, range.
 
+use crate::integer::IntegerType;
 use crate::unit::Quantity;
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +39,8 @@ pub enum Variability {
     Discrete,
     /// Changes all the time.
     Continuous,
+    /// Never changes.
+    Constant,
 }
 
 /// An enumeration: a type with named values.
@@ -65,14 +68,18 @@ pub struct Item {
 /// Base type of a variable and what belongs to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// A real number of a quantity.
+    /// A real number of a quantity, in double precision.
     Real(&'static Quantity),
-    /// A 32-bit integer.
-    Integer,
+    /// A real number of a quantity, in single precision.
+    Float32(&'static Quantity),
+    /// An integer.
+    Integer(IntegerType),
     /// A truth value.
     Boolean,
     /// One of the named values.
     Enumeration(&'static Enumeration),
+    /// A text.
+    Text,
 }
 
 /// The values that are allowed. A strict bound is not itself allowed.
@@ -97,6 +104,13 @@ impl Range {
     pub fn contains(&self, x: f64) -> bool {
         let on_the_edge = (self.above && x <= self.min) || (self.below && x >= self.max);
         x.is_finite() && x >= self.min && x <= self.max && !on_the_edge
+    }
+
+    /// The same in single precision: its bounds are rounded as every number of it is.
+    #[expect(clippy::cast_possible_truncation, reason = "rounds")]
+    pub fn contains_single(&self, x: f32) -> bool {
+        let single = |bound: f64| f64::from(bound as f32);
+        Self { min: single(self.min), max: single(self.max), ..*self }.contains(x.into())
     }
 }
 
@@ -136,6 +150,21 @@ pub struct Meta {
     pub mean: bool,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,
+    /// Extents of a matrix, which is stored row by row; empty for a scalar, and for an array with one extent.
+    pub shape: &'static [usize],
+}
+
+/// Where an element of an array is, as names have it: `[2]`, or `[1,2]` in a matrix that is stored row by row.
+pub fn position(shape: &[usize], element: usize) -> String {
+    let mut rest = element;
+    let mut indices: Vec<String> = Vec::new();
+    for &extent in shape.iter().skip(1).rev() {
+        indices.push((rest % extent + 1).to_string());
+        rest /= extent;
+    }
+    indices.push((rest + 1).to_string());
+    indices.reverse();
+    format!("[{}]", indices.join(","))
 }
 
 #[cfg(test)]
@@ -149,6 +178,19 @@ mod tests {
         let closed = Range { min: -1.0, max: 1.0, ..Range::ALL };
         assert!(closed.contains(-1.0) && closed.contains(1.0) && !closed.contains(1.000_000_1));
         assert!(!Range::ALL.contains(f64::NAN) && !Range::ALL.contains(f64::INFINITY));
+    }
+
+    #[test]
+    fn positions_count_from_1_row_by_row() {
+        assert_eq!((position(&[], 2), position(&[3], 2)), ("[3]".into(), "[3]".into()));
+        let names: Vec<String> = (0..6).map(|i| position(&[2, 3], i)).collect();
+        assert_eq!(names, ["[1,1]", "[1,2]", "[1,3]", "[2,1]", "[2,2]", "[2,3]"]);
+    }
+
+    #[test]
+    fn single_precision_rounds_the_bounds_too() {
+        let tenth = Range { max: 0.1, ..Range::ALL };
+        assert!(tenth.contains_single(0.1) && !tenth.contains(f64::from(0.1_f32)) && !tenth.contains_single(0.11));
     }
 
     #[test]

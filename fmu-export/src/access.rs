@@ -6,7 +6,7 @@ use crate::lifecycle::{Standard, State};
 use crate::message;
 use crate::value::Value;
 use fmu_core::description::TIME;
-use fmu_core::{Causality, Exported, Fault, Meta, Model, Slot, Table, Variability};
+use fmu_core::{Causality, Exported, Fault, Kind, Meta, Model, Slot, Table, Variability};
 use std::mem::MaybeUninit;
 
 /// Number of previous values that a set call keeps to undo a partial set.
@@ -20,7 +20,7 @@ pub(crate) const fn index(reference: u32) -> usize {
 
 /// Whether a variable may be set in this state (FMI 2.0.5, 2.2.7, 3.2.3 and 4.2.4; FMI 3.0.2, 2.4.7.4).
 #[inline]
-fn open(meta: &Meta, state: State) -> bool {
+pub(crate) fn open(meta: &Meta, state: State) -> bool {
     match meta.causality {
         Causality::Input => state != State::Continuous || meta.variability == Variability::Continuous,
         Causality::Parameter => match state {
@@ -38,8 +38,9 @@ fn settable<'a, T: Value>(
     found: Option<(&'static Meta, Slot<'a>)>,
     state: State,
     value: T,
+    standard: Standard,
 ) -> Option<(&'static Meta, Slot<'a>)> {
-    found.filter(|(meta, _)| open(meta, state) && value.judge(meta) == Some(true))
+    found.filter(|(meta, _)| open(meta, state) && value.judge(meta, standard) == Some(true))
 }
 
 /// The table of the model.
@@ -75,7 +76,8 @@ impl<E: Exported> Instance<E> {
                     place.write(*value);
                     continue;
                 }
-                match table::<E>().entry(&mut self.current.block, index).and_then(|(meta, slot)| T::read(meta, &slot)) {
+                let found = table::<E>().entry(&mut self.current.block, index);
+                match found.and_then(|(meta, slot)| T::read(meta, &slot, self.standard)) {
                     Some(value) => place.write(value),
                     None => place.write(self.read_other(reference, index)?),
                 };
@@ -87,8 +89,12 @@ impl<E: Exported> Instance<E> {
     /// The value of `time`, of a derivative or of an indicator, or an error: no variable of this type has the reference.
     #[cold]
     fn read_other<T: Value>(&mut self, reference: u32, index: usize) -> Result<T, Refusal> {
-        if let Some((meta, _)) = table::<E>().entry(&mut self.current.block, index) {
-            return Err(message::type_of::<E::Model>(index, meta, T::CARRIES).into());
+        if let Some((meta, slot)) = table::<E>().entry(&mut self.current.block, index) {
+            return Err(match (&slot, meta.kind) {
+                (Slot::Integer(x), Kind::Integer(of)) if T::NARROW => message::narrow::<E::Model>(index, x.get(), of),
+                _ => message::type_of::<E::Model>(index, meta, T::CARRIES),
+            }
+            .into());
         }
         let time = reference == TIME;
         let x = if time { Some(self.current.end) } else { self.calculated(index)? };
@@ -165,11 +171,13 @@ impl<E: Exported> Instance<E> {
         if self.arrays || references.len() > SHORT {
             return false;
         }
-        let (state, mut old) = (self.current.life.state(), [any; SHORT]);
+        let (state, standard, mut old) = (self.current.life.state(), self.standard, [any; SHORT]);
         for (i, (&reference, &value)) in references.iter().zip(values).enumerate() {
             match T::find(table::<E>(), &mut self.current.block, index(reference)) {
                 Some((meta, place))
-                    if meta.causality == Causality::Input && open(meta, state) && value.judge(meta) == Some(true) =>
+                    if meta.causality == Causality::Input
+                        && open(meta, state)
+                        && value.judge(meta, standard) == Some(true) =>
                 {
                     (old[i], *place) = (*place, value);
                 }
@@ -190,8 +198,9 @@ impl<E: Exported> Instance<E> {
     fn try_value<T: Value>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
         let found = table::<E>().entry(&mut self.current.block, index);
         if let Some((meta, slot)) = found {
-            let held = meta.causality == Causality::Input && T::read(meta, &slot) == Some(value);
-            let (possible, settable) = (value.judge(meta), open(meta, state) || held || self.sets_state(index));
+            let held = meta.causality == Causality::Input && T::read(meta, &slot, self.standard) == Some(value);
+            let (possible, settable) =
+                (value.judge(meta, self.standard), open(meta, state) || held || self.sets_state(index));
             if possible == Some(true) && settable {
                 return Ok(());
             }
@@ -231,7 +240,7 @@ impl<E: Exported> Instance<E> {
         if values.len() > SHORT {
             self.judge_each::<T, ARRAYS>(references, values)?;
         }
-        let state = self.current.life.state();
+        let (state, standard) = (self.current.life.state(), self.standard);
         let (mut done, mut old, mut dirty) = (0, [(0, any); SHORT], false);
         let mut next = values.iter();
         for &reference in references {
@@ -241,7 +250,7 @@ impl<E: Exported> Instance<E> {
                 let index = first.wrapping_add(offset);
                 if let Some((meta, place)) = T::find(table::<E>(), &mut self.current.block, index)
                     && open(meta, state)
-                    && value.judge(meta) == Some(true)
+                    && value.judge(meta, standard) == Some(true)
                 {
                     if let Some(old) = old.get_mut(done) {
                         *old = (index, *place);
@@ -251,12 +260,12 @@ impl<E: Exported> Instance<E> {
                     dirty |= meta.causality == Causality::Parameter;
                     continue;
                 }
-                let Some((meta, slot)) = settable(table::<E>().entry(&mut self.current.block, index), state, value)
-                else {
+                let found = table::<E>().entry(&mut self.current.block, index);
+                let Some((meta, slot)) = settable(found, state, value, standard) else {
                     self.take_back(&old[..done]);
                     return Err(self.refusal(reference, index, value));
                 };
-                if let (Some(old), Some(before)) = (old.get_mut(done), T::read(meta, &slot)) {
+                if let (Some(old), Some(before)) = (old.get_mut(done), T::read(meta, &slot, standard)) {
                     *old = (index, before);
                     done += 1;
                 }
@@ -270,13 +279,14 @@ impl<E: Exported> Instance<E> {
     }
 
     fn judge_each<T: Value, const ARRAYS: bool>(&mut self, references: &[u32], values: &[T]) -> Result<(), Fault> {
-        let state = self.current.life.state();
+        let (state, standard) = (self.current.life.state(), self.standard);
         let mut next = values.iter();
         for &reference in references {
             let count = if ARRAYS { self.elements(reference)? } else { 1 };
             for (offset, &value) in (0..count).zip(&mut next) {
                 let index = index(reference).wrapping_add(offset);
-                if settable(table::<E>().entry(&mut self.current.block, index), state, value).is_none() {
+                let found = table::<E>().entry(&mut self.current.block, index);
+                if settable(found, state, value, standard).is_none() {
                     return Err(self.refusal(reference, index, value));
                 }
             }
@@ -297,7 +307,7 @@ impl<E: Exported> Instance<E> {
     #[cold]
     fn refusal<T: Value>(&mut self, reference: u32, index: usize, value: T) -> Fault {
         match table::<E>().entry(&mut self.current.block, index) {
-            Some((meta, _)) => match value.judge(meta) {
+            Some((meta, _)) => match value.judge(meta, self.standard) {
                 None => message::type_of::<E::Model>(index, meta, T::CARRIES),
                 Some(_) if !open(meta, self.current.life.state()) && !self.sets_state(index) => {
                     message::fixed::<E::Model>(index, meta, self.current.life.state())
@@ -311,7 +321,7 @@ impl<E: Exported> Instance<E> {
 
     /// Why a reference past the table cannot be set, or read as another type.
     #[cold]
-    fn beside_table(&self, reference: u32, carries: &str, set: bool) -> Fault {
+    pub(crate) fn beside_table(&self, reference: u32, carries: &str, set: bool) -> Fault {
         match self.after_table(index(reference)) {
             Some(after) if set => {
                 Fault::new(format!("{} is calculated and cannot be set", message::calculated::<E>(after)))
@@ -336,7 +346,7 @@ impl<E: Exported> Instance<E> {
 
     /// As many values as references, or in FMI 3.0 as many as the variables have elements (3.0.2, 2.2.7.2).
     #[inline]
-    fn check_count(&mut self, references: &[u32], given: usize) -> Result<(), Fault> {
+    pub(crate) fn check_count(&mut self, references: &[u32], given: usize) -> Result<(), Fault> {
         let mut needed = references.len();
         if self.arrays {
             needed = 0;
@@ -348,7 +358,7 @@ impl<E: Exported> Instance<E> {
     }
 
     /// How many values a reference of FMI 3.0 stands for: one, or all elements of an array.
-    fn elements(&mut self, reference: u32) -> Result<usize, Fault> {
+    pub(crate) fn elements(&mut self, reference: u32) -> Result<usize, Fault> {
         let index = index(reference);
         match table::<E>().element(index) {
             Some(element) if element > 0 => Err(message::element::<E::Model>(reference, index, element)),

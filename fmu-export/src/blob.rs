@@ -13,6 +13,7 @@
 
 use crate::lifecycle::State;
 use crate::snapshot::Snapshot;
+use fmu_core::resource::Shelf;
 use fmu_core::{Fault, Model};
 
 const MAGIC: &[u8; 8] = b"FMUstate";
@@ -115,6 +116,12 @@ fn unit<M: Model>() -> Result<usize, Fault> {
 
 fn padded<M: Model>(payload: usize) -> Result<usize, Fault> {
     Ok(HEADER + payload.next_multiple_of(unit::<M>()?) + CHECKSUM)
+}
+
+/// The resources of a model.
+pub(crate) fn shelf<M: Model>(model: &M) -> Shelf {
+    // A model that cannot be serialized fails where it should be.
+    Shelf::of(|| drop(postcard::experimental::serialized_size(model)))
 }
 
 /// CRC-32 of ISO 3309, as in PNG and ZIP.

@@ -6,7 +6,9 @@ use crate::sensitivity::Scratch;
 use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
 use fmu_core::log::Warnings;
+use fmu_core::resource::Shelf;
 use fmu_core::{Exported, Fault, Interface, Model, Range, SampleGrid, Step};
+use std::ffi::CString;
 
 /// Why a call failed.
 #[derive(Debug)]
@@ -56,6 +58,11 @@ pub struct Instance<E: Exported> {
     pub(crate) stale: bool,
     /// Memory for derivatives of the equations.
     pub(crate) scratch: Option<Box<Scratch<E::Model>>>,
+    /// The texts that were got last.
+    pub(crate) texts: Vec<CString>,
+    /// What the model loaded, if anything: the resources for states from bytes, and the model for a reset.
+    pub(crate) shelf: Shelf,
+    pub(crate) loaded: Option<Box<E::Model>>,
     /// Keys of the warnings of the last second, and the times of their messages.
     warned: Vec<(&'static str, f64)>,
 }
@@ -83,6 +90,9 @@ impl<E: Exported> Instance<E> {
             values: vec![0.0; E::CAN.states().len() + E::CAN.indicators().len()],
             stale: false,
             scratch: None,
+            texts: Vec::new(),
+            shelf: Shelf::default(),
+            loaded: None,
             warned: Vec::new(),
         }
     }
@@ -130,6 +140,9 @@ impl<E: Exported> Instance<E> {
     /// Restores the state after instantiation; name and logger stay.
     pub fn reset(&mut self) {
         self.current = Snapshot::new(self.current.life.interface());
+        if let Some(loaded) = &self.loaded {
+            self.current.block.model.clone_from(loaded);
+        }
         self.stale = false;
         self.warned.clear();
         self.log.event(|| format!("{}: reset", self.name));
@@ -285,7 +298,7 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// As [`blob::read`].
     pub fn deserialize(&self, bytes: &[u8]) -> Result<usize, Fault> {
-        blob::read::<E::Model>(bytes).map(registry::keep)
+        self.shelf.attach(|| blob::read::<E::Model>(bytes)).map(registry::keep)
     }
 
     /// Whether the importer integrates.

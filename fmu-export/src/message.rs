@@ -3,42 +3,50 @@
 use crate::lifecycle::{self, Standard};
 use crate::snapshot::Snapshot;
 use fmu_core::description::TIME;
-use fmu_core::{Block, Causality, Exported, Fault, Interface, Kind, Meta, Model, Slot, State, Variability};
+use fmu_core::variable::position;
+use fmu_core::{Block, Causality, Exported, Fault, IntegerType, Interface, Kind, Meta, Model, State, Variability};
 use std::fmt::Display;
 
 /// Full name of variable `index`, an element of an array as `name[1]`.
 pub(crate) fn name<M: Model>(index: usize) -> String {
     match M::TABLE.locate(index) {
-        Some((name, meta, element)) if meta.dimension.is_some() => format!("{name}[{}]", element + 1),
+        Some((name, meta, element)) if meta.dimension.is_some() => name + &position(meta.shape, element),
         Some((name, ..)) => name,
         None => format!("variable {index}"),
     }
 }
 
-/// A value as text.
-pub(crate) fn value(slot: &Slot<'_>) -> String {
-    match slot {
-        Slot::Real(x) => x.to_string(),
-        Slot::Integer(x) => x.to_string(),
-        Slot::Boolean(x) => x.to_string(),
-        Slot::Enumeration(x) => x.get().to_string(),
-    }
-}
-
 /// What a variable may be set to.
 pub(crate) fn allowed(meta: &Meta) -> String {
-    let Kind::Enumeration(enumeration) = meta.kind else { return meta.range.to_string() };
+    let enumeration = match meta.kind {
+        Kind::Enumeration(enumeration) => enumeration,
+        Kind::Integer(of) if of != IntegerType::Int32 => {
+            let (min, max) = of.within(&meta.range);
+            return format!("{min} to {max}");
+        }
+        _ => return meta.range.to_string(),
+    };
     let items: Vec<String> = enumeration.items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
     items.join(", ")
 }
 
-fn kind(kind: &Kind) -> &'static str {
+fn kind(kind: &Kind) -> String {
     match kind {
-        Kind::Real(_) => "a real number",
-        Kind::Integer => "an integer",
-        Kind::Boolean => "a truth value",
-        Kind::Enumeration(_) => "an enumeration",
+        Kind::Real(_) => "a real number".into(),
+        Kind::Float32(_) => "a Float32".into(),
+        Kind::Integer(IntegerType::Int32) => "an integer".into(),
+        Kind::Integer(of) => format!("an integer of the type {}", of.name()),
+        Kind::Boolean => "a truth value".into(),
+        Kind::Enumeration(_) => "an enumeration".into(),
+        Kind::Text => "a text".into(),
     }
+}
+
+/// The value of an integer has no place in the Integer of FMI 2.0.
+#[cold]
+pub(crate) fn narrow<M: Model>(index: usize, value: i128, of: IntegerType) -> Fault {
+    let (name, of) = (name::<M>(index), of.name());
+    Fault::new(format!("{name} = {value} does not fit: an Integer of FMI 2.0 has 32 bits; FMI 3.0 has it as {of}"))
 }
 
 /// No variable has this value reference.
@@ -105,8 +113,8 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>) -> Stri
         else {
             continue;
         };
-        if matches!(meta.causality, Causality::Input | Causality::Parameter) && value(&new) != value(&old) {
-            changes.push(format!("{} = {}", name::<M>(index), value(&new)));
+        if matches!(meta.causality, Causality::Input | Causality::Parameter) && new.to_string() != old.to_string() {
+            changes.push(format!("{} = {new}", name::<M>(index)));
         }
     }
     let changes = if changes.is_empty() { "all start values unchanged".into() } else { changes.join(", ") };

@@ -26,6 +26,8 @@ pub struct Scratch<M: Model> {
     others: Vec<(u32, f64)>,
     /// A column of the adjoint derivative.
     column: Vec<f64>,
+    /// The elements of unknowns and knowns.
+    sides: [Vec<u32>; 2],
 }
 
 impl<E: Exported> Instance<E> {
@@ -45,9 +47,11 @@ impl<E: Exported> Instance<E> {
             Standard::Fmi2 => "providesDirectionalDerivative = false",
             Standard::Fmi3 => "providesDirectionalDerivatives = false",
         })?;
-        self.check_sides(unknowns, knowns)?;
-        check_sizes(seed, knowns.len(), (out.len(), unknowns.len()))?;
-        self.column(unknowns, knowns, seed, out)
+        self.with_elements(unknowns, knowns, |instance, unknowns, knowns| {
+            instance.check_sides(unknowns, knowns)?;
+            check_sizes(seed, knowns.len(), (out.len(), unknowns.len()))?;
+            instance.column(unknowns, knowns, seed, out)
+        })
     }
 
     /// Adjoint derivative: for each of `knowns`, the change of the sum of `unknowns` weighted with `seed`.
@@ -56,17 +60,19 @@ impl<E: Exported> Instance<E> {
     /// As [`directional`](Self::directional).
     pub fn adjoint(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
         supported::<E>("providesAdjointDerivatives = false")?;
-        self.check_sides(unknowns, knowns)?;
-        check_sizes(seed, unknowns.len(), (out.len(), knowns.len()))?;
-        let mut column = std::mem::take(&mut self.scratch().column);
-        column.clear();
-        column.resize(unknowns.len(), 0.0);
-        for (known, out) in knowns.iter().zip(out) {
-            self.column(unknowns, std::slice::from_ref(known), &[1.0], &mut column)?;
-            *out = column.iter().zip(seed).map(|(x, w)| x * w).sum();
-        }
-        self.scratch().column = column;
-        Ok(())
+        self.with_elements(unknowns, knowns, |instance, unknowns, knowns| {
+            instance.check_sides(unknowns, knowns)?;
+            check_sizes(seed, unknowns.len(), (out.len(), knowns.len()))?;
+            let mut column = std::mem::take(&mut instance.scratch().column);
+            column.clear();
+            column.resize(unknowns.len(), 0.0);
+            for (known, out) in knowns.iter().zip(out) {
+                instance.column(unknowns, std::slice::from_ref(known), &[1.0], &mut column)?;
+                *out = column.iter().zip(seed).map(|(x, w)| x * w).sum();
+            }
+            instance.scratch().column = column;
+            Ok(())
+        })
     }
 
     /// First derivatives of continuous outputs with respect to time, with the inputs held.
@@ -78,6 +84,11 @@ impl<E: Exported> Instance<E> {
         if let Some(order) = orders.iter().find(|&&order| order != 1) {
             return Err(Fault::value("order", order, "1: maxOutputDerivativeOrder = 1").into());
         }
+        self.with_elements(unknowns, &[], |instance, unknowns, _| instance.rates(unknowns, out))
+    }
+
+    /// The derivatives of continuous outputs.
+    fn rates(&mut self, unknowns: &[u32], out: &mut [f64]) -> Result<(), Refusal> {
         check_sizes(&[], 0, (out.len(), unknowns.len()))?;
         for &unknown in unknowns {
             if !self.is_output(unknown, false) {
@@ -179,6 +190,32 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
+    /// Works with the references of all elements, where those of FMI 3.0 stand for arrays.
+    fn with_elements(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        work: impl FnOnce(&mut Self, &[u32], &[u32]) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        if !self.arrays {
+            return work(self, unknowns, knowns);
+        }
+        let mut sides = std::mem::take(&mut self.scratch().sides);
+        let done = self.each(unknowns, &mut sides[0]).and_then(|()| self.each(knowns, &mut sides[1]));
+        let done = done.map_err(Refusal::from).and_then(|()| work(self, &sides[0], &sides[1]));
+        self.scratch().sides = sides;
+        done
+    }
+
+    fn each(&mut self, references: &[u32], all: &mut Vec<u32>) -> Result<(), Fault> {
+        all.clear();
+        for &reference in references {
+            let elements = self.elements(reference)?;
+            all.extend((0..).zip(0..elements).map(|(i, _)| reference.wrapping_add(i)));
+        }
+        Ok(())
+    }
+
     fn scratch(&mut self) -> &mut Scratch<E::Model> {
         self.scratch.get_or_insert_with(|| {
             Box::new(Scratch {
@@ -187,6 +224,7 @@ impl<E: Exported> Instance<E> {
                 rates: Vec::new(),
                 others: Vec::new(),
                 column: Vec::new(),
+                sides: [Vec::new(), Vec::new()],
             })
         })
     }
@@ -366,7 +404,7 @@ impl<E: Exported> Instance<E> {
                     Causality::Parameter => initial || (parameters && meta.variability == Variability::Tunable),
                     _ => false,
                 };
-                fits && matches!(meta.kind, Kind::Real(_)) && meta.dimension.is_none()
+                fits && matches!(meta.kind, Kind::Real(_))
             });
             if !(state_row || input) {
                 return Err(Self::no_side(known, "a known of derivatives in this state"));

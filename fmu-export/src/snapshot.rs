@@ -2,7 +2,6 @@
 
 use crate::lifecycle::{Life, State};
 use crate::message;
-use crate::value::Value;
 use fmu_core::{Block, Causality, Elapsed, Fault, Interface, Kind, Meta, Model, Slot, Variability};
 use serde::{Deserialize, Serialize};
 
@@ -114,14 +113,14 @@ impl<M: Model> Snapshot<M> {
             let Some((meta, slot)) = M::TABLE.entry(&mut self.block, index) else { continue };
             let set = matches!(meta.causality, Causality::Input | Causality::Parameter);
             let refused = match &slot {
-                Slot::Real(x) if set => (**x).judge(meta) != Some(true),
-                Slot::Integer(x) if set => (**x).judge(meta) != Some(true),
+                _ if set => !slot.is_allowed(meta),
                 Slot::Real(x) => x.is_nan(),
+                Slot::Float32(x) => x.is_nan(),
                 _ => false,
             };
             if refused {
                 let allowed = if set { message::allowed(meta) } else { "a number".into() };
-                return Err(Fault::value(&message::name::<M>(index), message::value(&slot), allowed));
+                return Err(Fault::value(&message::name::<M>(index), slot, allowed));
             }
         }
         let ramps = |&(index, slope): &(u32, f64)| {

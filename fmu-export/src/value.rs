@@ -1,6 +1,7 @@
 //! Values as they cross the C interface: which base type of the table each C type carries.
 
-use fmu_core::{Kind, Meta, Slot, Table};
+use crate::lifecycle::Standard;
+use fmu_core::{IntegerType, Kind, Meta, Slot, Table};
 use std::ffi::c_int;
 use std::fmt::{self, Display};
 
@@ -9,14 +10,17 @@ pub trait Value: Copy + Display + PartialEq {
     /// Name of the type in messages.
     const CARRIES: &'static str;
 
-    /// The value in `slot`, `None` if the variable has another base type.
-    fn read(meta: &Meta, slot: &Slot<'_>) -> Option<Self>;
+    /// It carries integers of every type, as far as they fit.
+    const NARROW: bool = false;
+
+    /// The value in `slot`, `None` if the variable has another base type, or a value that this type lacks.
+    fn read(meta: &Meta, slot: &Slot<'_>, standard: Standard) -> Option<Self>;
 
     /// Writes a value that was [judged](Value::judge) before.
     fn write(self, slot: Slot<'_>);
 
     /// Whether the variable may take this value, `None` if it has another base type.
-    fn judge(self, meta: &Meta) -> Option<bool>;
+    fn judge(self, meta: &Meta, standard: Standard) -> Option<bool>;
 
     /// The place of a scalar that holds this very type, quickly; `None` if there is none, or no quick way to it.
     fn find<'a, W>(_table: &Table<W>, _whole: &'a mut W, _index: usize) -> Option<(&'static Meta, &'a mut Self)> {
@@ -83,20 +87,32 @@ impl Value for f64 {
     const CARRIES: &'static str = "a real number";
 
     #[inline]
-    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
-        if let Slot::Real(x) = slot { Some(**x) } else { None }
-    }
-
-    #[inline]
-    fn write(self, slot: Slot<'_>) {
-        if let Slot::Real(x) = slot {
-            *x = self;
+    fn read(meta: &Meta, slot: &Slot<'_>, standard: Standard) -> Option<Self> {
+        match slot {
+            Slot::Real(x) => Some(**x),
+            Slot::Float32(_) if standard == Standard::Fmi2 => f32::read(meta, slot, standard).map(Self::from),
+            _ => None,
         }
     }
 
     #[inline]
-    fn judge(self, meta: &Meta) -> Option<bool> {
-        matches!(meta.kind, Kind::Real(_)).then(|| meta.range.contains(self))
+    fn write(self, slot: Slot<'_>) {
+        match slot {
+            Slot::Real(x) => *x = self,
+            #[expect(clippy::cast_possible_truncation, reason = "rounds")]
+            Slot::Float32(_) => (self as f32).write(slot),
+            _ => {}
+        }
+    }
+
+    #[inline]
+    fn judge(self, meta: &Meta, standard: Standard) -> Option<bool> {
+        match meta.kind {
+            Kind::Real(_) => Some(meta.range.contains(self)),
+            #[expect(clippy::cast_possible_truncation, reason = "rounds")]
+            Kind::Float32(_) if standard == Standard::Fmi2 => (self as f32).judge(meta, standard),
+            _ => None,
+        }
     }
 
     #[inline]
@@ -113,72 +129,108 @@ impl Value for f64 {
     }
 }
 
-/// `fmi3Int32`.
-impl Value for i32 {
-    const CARRIES: &'static str = "a 32-bit integer";
+impl Value for f32 {
+    const CARRIES: &'static str = "a Float32";
 
-    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
-        if let Slot::Integer(x) = slot { Some(**x) } else { None }
+    fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
+        if let Slot::Float32(x) = slot { Some(**x) } else { None }
     }
 
     fn write(self, slot: Slot<'_>) {
-        if let Slot::Integer(x) = slot {
+        if let Slot::Float32(x) = slot {
             *x = self;
         }
     }
 
-    fn judge(self, meta: &Meta) -> Option<bool> {
-        matches!(meta.kind, Kind::Integer).then(|| meta.range.contains(f64::from(self)))
+    fn judge(self, meta: &Meta, _: Standard) -> Option<bool> {
+        matches!(meta.kind, Kind::Float32(_)).then(|| meta.range.contains_single(self))
     }
 }
 
-/// `fmi3Int64`, the type of an enumeration (FMI 3.0.2, 2.2.7.2).
-impl Value for i64 {
-    const CARRIES: &'static str = "an enumeration";
+/// The integers of FMI 3.0, each of which carries the variables of its own type.
+macro_rules! integers {
+    ($($type:ident $name:ident $carries:literal;)*) => { $(
+        impl Value for $type {
+            const CARRIES: &'static str = $carries;
 
-    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
-        if let Slot::Enumeration(x) = slot { Some(Self::from(x.get())) } else { None }
-    }
+            fn read(meta: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
+                match (meta.kind, slot) {
+                    (Kind::Integer(IntegerType::$name), Slot::Integer(x)) => x.get().try_into().ok(),
+                    (Kind::Enumeration(_), Slot::Enumeration(x)) if IntegerType::$name == ENUMERATIONS => {
+                        x.get().try_into().ok()
+                    }
+                    _ => None,
+                }
+            }
 
-    fn write(self, slot: Slot<'_>) {
-        if let (Slot::Enumeration(x), Ok(value)) = (slot, i32::try_from(self)) {
-            x.set(value);
+            fn write(self, slot: Slot<'_>) {
+                match slot {
+                    Slot::Integer(x) => {
+                        x.set(self.into());
+                    }
+                    Slot::Enumeration(x) => {
+                        x.set(i32::try_from(self).unwrap_or(x.get()));
+                    }
+                    _ => {}
+                }
+            }
+
+            fn judge(self, meta: &Meta, _: Standard) -> Option<bool> {
+                let value = i128::from(self);
+                match meta.kind {
+                    Kind::Integer(of @ IntegerType::$name) => Some(of.allows(value, &meta.range)),
+                    Kind::Enumeration(enumeration) if IntegerType::$name == ENUMERATIONS => {
+                        Some(enumeration.items.iter().any(|item| i128::from(item.value) == value))
+                    }
+                    _ => None,
+                }
+            }
         }
-    }
+    )* };
+}
 
-    fn judge(self, meta: &Meta) -> Option<bool> {
-        let Kind::Enumeration(enumeration) = meta.kind else { return None };
-        Some(enumeration.items.iter().any(|item| Self::from(item.value) == self))
-    }
+/// FMI 3.0.2, 2.2.7.2.
+const ENUMERATIONS: IntegerType = IntegerType::Int64;
+
+integers! {
+    i8 Int8 "an Int8";
+    u8 UInt8 "a UInt8";
+    i16 Int16 "an Int16";
+    u16 UInt16 "a UInt16";
+    i32 Int32 "a 32-bit integer";
+    u32 UInt32 "a UInt32";
+    i64 Int64 "an Int64 or an enumeration";
+    u64 UInt64 "a UInt64";
 }
 
 impl Value for Fmi2Integer {
     const CARRIES: &'static str = "an integer or an enumeration";
+    const NARROW: bool = true;
 
-    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
+    fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
         match slot {
-            Slot::Integer(x) => Some(Self(**x)),
+            Slot::Integer(x) => x.get().try_into().ok().map(Self),
             Slot::Enumeration(x) => Some(Self(x.get())),
             _ => None,
         }
     }
 
     fn write(self, slot: Slot<'_>) {
-        match slot {
-            Slot::Enumeration(_) => i64::from(self.0).write(slot),
-            _ => self.0.write(slot),
-        }
+        self.0.write(slot);
     }
 
-    fn judge(self, meta: &Meta) -> Option<bool> {
-        self.0.judge(meta).or_else(|| i64::from(self.0).judge(meta))
+    fn judge(self, meta: &Meta, standard: Standard) -> Option<bool> {
+        match meta.kind {
+            Kind::Integer(of) => Some(of.allows(self.0.into(), &meta.range)),
+            _ => i64::from(self.0).judge(meta, standard),
+        }
     }
 }
 
 impl Value for Fmi2Boolean {
     const CARRIES: &'static str = "a truth value";
 
-    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
+    fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
         if let Slot::Boolean(x) = slot { Some(Self(c_int::from(**x))) } else { None }
     }
 
@@ -188,7 +240,7 @@ impl Value for Fmi2Boolean {
         }
     }
 
-    fn judge(self, meta: &Meta) -> Option<bool> {
+    fn judge(self, meta: &Meta, _: Standard) -> Option<bool> {
         matches!(meta.kind, Kind::Boolean).then_some(true)
     }
 }
@@ -196,7 +248,7 @@ impl Value for Fmi2Boolean {
 impl Value for Fmi3Boolean {
     const CARRIES: &'static str = Fmi2Boolean::CARRIES;
 
-    fn read(_: &Meta, slot: &Slot<'_>) -> Option<Self> {
+    fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
         if let Slot::Boolean(x) = slot { Some(Self(u8::from(**x))) } else { None }
     }
 
@@ -204,7 +256,7 @@ impl Value for Fmi3Boolean {
         Fmi2Boolean(c_int::from(self.0)).write(slot);
     }
 
-    fn judge(self, meta: &Meta) -> Option<bool> {
+    fn judge(self, meta: &Meta, _: Standard) -> Option<bool> {
         matches!(meta.kind, Kind::Boolean).then_some(true)
     }
 }

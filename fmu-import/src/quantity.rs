@@ -27,10 +27,10 @@ pub(crate) fn convert(
     if unit.is_empty() || own == Some(unit) {
         return Ok(number);
     }
-    let definition = own.and_then(|own| description.unit(own));
-    if let Some(shown) = definition.and_then(|definition| definition.display_unit(unit)) {
+    if let Some(shown) = description.display_unit(variable, Some(unit)) {
         return Ok(shown.unshow(number));
     }
+    let definition = own.and_then(|own| description.unit(own));
     let of = format!("{} = {number}{unit}", variable.name);
     if unit.starts_with(',') {
         return Err(format!("{of} is not a number: write a decimal point"));

@@ -1,6 +1,7 @@
 //! Values that cross the interface, whatever the standard calls their type.
 
 use crate::quantity;
+use fmu_core::IntegerType;
 use model_description::{BaseType, ModelDescription, ModelVariable};
 use std::fmt;
 
@@ -62,8 +63,13 @@ impl Values {
                 })
                 .collect::<Result<_, _>>()
                 .map(Self::Integers),
-            _ => elements()
-                .map(|e| e.parse().map_err(|_| wrong(e, "an integer")))
+            base => elements()
+                .map(|e| {
+                    let value = e.parse().map_err(|_| wrong(e, "an integer"))?;
+                    let (min, max) = bounds(base);
+                    let fits = (min..=max).contains(&value);
+                    if fits { Ok(value) } else { Err(wrong(e, &format!("of the type {base}: {min} to {max}"))) }
+                })
                 .collect::<Result<_, _>>()
                 .map(Self::Integers),
         }
@@ -130,6 +136,21 @@ impl Values {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+}
+
+/// The least and the greatest value of an integer type.
+fn bounds(base: BaseType) -> (i128, i128) {
+    match base {
+        BaseType::Int8 => IntegerType::Int8,
+        BaseType::UInt8 => IntegerType::UInt8,
+        BaseType::Int16 => IntegerType::Int16,
+        BaseType::UInt16 => IntegerType::UInt16,
+        BaseType::Int32 => IntegerType::Int32,
+        BaseType::UInt32 => IntegerType::UInt32,
+        BaseType::UInt64 => IntegerType::UInt64,
+        _ => IntegerType::Int64,
+    }
+    .bounds()
 }
 
 impl fmt::Display for Values {

@@ -1,6 +1,6 @@
 //! The content of a modelDescription.xml, as far as importers need it.
 
-use crate::units::{TypeDefinition, Unit};
+use crate::units::{DisplayUnit, TypeDefinition, Unit};
 use crate::variable::ModelVariable;
 use crate::version::FmiVersion;
 
@@ -89,6 +89,12 @@ impl ModelDescription {
     /// The unit with this name.
     pub fn unit(&self, name: &str) -> Option<&Unit> {
         self.units.iter().find(|u| u.name == name)
+    }
+
+    /// A unit to show the variable's values in: that of a name, or without one the variable's own.
+    pub fn display_unit(&self, v: &ModelVariable, name: Option<&str>) -> Option<DisplayUnit> {
+        let shown = self.unit(v.unit.as_deref()?)?.display_unit(name.or(v.display_unit.as_deref())?)?;
+        Some(if v.relative { shown.of_differences() } else { shown.clone() })
     }
 
     /// The type definition with this name.

@@ -31,5 +31,5 @@ pub use terminals::{Area, CoordinateSystem, Member, StreamMember, Terminal, Term
 pub use units::{BaseUnit, DisplayUnit, Item, TypeDefinition, Unit};
 pub use variable::{Alias, BaseType, Causality, Dimension, Initial, ModelVariable, Variability};
 pub use version::{FmiVersion, UnknownVersion};
-pub use write::{Generation, write, write_terminals};
+pub use write::{Generation, fits, write, write_terminals};
 pub use xml::Element;

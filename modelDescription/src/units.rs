@@ -52,6 +52,11 @@ pub struct DisplayUnit {
 }
 
 impl DisplayUnit {
+    /// The same for differences of values: its factor alone.
+    pub fn of_differences(&self) -> Self {
+        Self { offset: 0.0, ..self.clone() }
+    }
+
     /// The value in this display unit.
     pub fn show(&self, value: f64) -> f64 {
         if self.inverse { self.factor / value } else { self.factor * value + self.offset }
@@ -78,6 +83,8 @@ pub struct TypeDefinition {
     pub unit: Option<String>,
     /// Unit to show values in.
     pub display_unit: Option<String>,
+    /// Values are differences, for which the offset of a display unit does not count (`relativeQuantity`).
+    pub relative: Option<bool>,
     /// Lower bound.
     pub min: Option<f64>,
     /// Upper bound.

@@ -171,6 +171,8 @@ pub struct ModelVariable {
     pub unit: Option<String>,
     /// Unit to show values in.
     pub display_unit: Option<String>,
+    /// The value is a difference, for which the offset of a display unit does not count (`relativeQuantity`).
+    pub relative: bool,
     /// Lower bound; beyond 2^53 the nearest double.
     pub min: Option<f64>,
     /// Upper bound; beyond 2^53 the nearest double.

@@ -11,7 +11,7 @@ use crate::number;
 use crate::version::FmiVersion;
 use crate::xml::{Element, print};
 use fmu_core::Description;
-use fmu_core::description::ModelExchange;
+use fmu_core::description::{ModelExchange, Value, VariableKind};
 
 /// The tool and the time of generation: the only content that does not follow from the description.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,6 +42,26 @@ pub fn write(description: &Description, version: FmiVersion, generation: &Genera
         .flatten(),
     );
     print(&root)
+}
+
+/// Whether the standard has room for the start values: an Integer of FMI 2.0 has 32 bits.
+///
+/// # Errors
+/// Names the variable, its value and the remedy.
+pub fn fits(description: &Description, version: FmiVersion) -> Result<(), String> {
+    let narrow = |value: &Value| matches!(value, Value::Integer(x) if i32::try_from(*x).is_err());
+    for v in description.variables.iter().filter(|_| version == FmiVersion::V2) {
+        if let (VariableKind::Integer(of), Some(Value::Integer(x))) =
+            (&v.kind, v.start.iter().flatten().find(|value| narrow(value)))
+        {
+            let (name, of) = (&v.name, of.name());
+            return Err(format!(
+                "{name} starts with {x}, and an Integer of FMI 2.0 has 32 bits: choose another start value, or build \
+                 for FMI 3.0 only, which has {of}"
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// FMI 2.0.5, 2.2.1; FMI 3.0.2, 2.4.1.

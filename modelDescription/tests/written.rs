@@ -3,9 +3,10 @@
 mod common;
 
 use common::{AWKWARD, VERSIONS, exchange_sample, generation, sample, sampled_sample, xml};
-use fmu_core::Description;
+use fmu_core::description::{Value, VariableKind};
+use fmu_core::{Description, IntegerType};
 use model_description::{
-    BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, Unknown, Variability, read, write,
+    BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, Unknown, Variability, fits, read, write,
 };
 
 fn sample_read(version: FmiVersion) -> ModelDescription {
@@ -214,7 +215,7 @@ fn structure() {
 fn an_array_output_stands_once_in_fmi3_and_by_elements_in_fmi2() {
     let mut three = sample();
     let speed = three.variables.iter_mut().find(|v| v.name == "speed").unwrap();
-    (speed.dimension, speed.value_reference) = (Some(3), 100);
+    (speed.shape, speed.value_reference) = (vec![3], 100);
     for (version, count) in [(FmiVersion::V2, 3), (FmiVersion::V3, 1)] {
         let md = read(write(&three, version, &generation())).unwrap();
         let of_speed = |unknowns: &[Unknown]| {
@@ -224,6 +225,26 @@ fn an_array_output_stands_once_in_fmi3_and_by_elements_in_fmi2() {
         assert_eq!((of_speed(&md.outputs), md.outputs.len()), (count, count + 2), "S01");
         assert_eq!((of_speed(&md.initial_unknowns), md.initial_unknowns.len()), (count, count + 3), "S02");
     }
+}
+
+/// FMI 2.0 has integers of 32 bits; FMI 3.0 has each type, and a matrix with two extents.
+#[test]
+fn wide_integers_and_matrices() {
+    let mut d = sample();
+    let n = d.variables.iter_mut().find(|v| v.name == "motor.n_p").unwrap();
+    n.kind = VariableKind::Integer(IntegerType::UInt64);
+    (n.start, n.min, n.max) = (Some(vec![Value::Integer(u64::MAX.into())]), None, Some(1e19));
+    let b = d.variables.iter_mut().find(|v| v.name == "filter.b").unwrap();
+    (b.shape, b.start) = (vec![1, 3], Some([0.0, 1.0, 2.0].map(Value::Real).to_vec()));
+    let refusal = fits(&d, FmiVersion::V2).unwrap_err();
+    assert!(refusal.starts_with("motor.n_p starts with 18446744073709551615, and an Integer of FMI 2.0"), "{refusal}");
+    assert_eq!(fits(&d, FmiVersion::V3), Ok(()));
+    let three = write(&d, FmiVersion::V3, &generation());
+    assert!(three.contains(r#"max="10000000000000000000" start="18446744073709551615""#), "{three}");
+    let (two, three) = (read(write(&d, FmiVersion::V2, &generation())).unwrap(), read(three).unwrap());
+    assert_eq!(three.variable("motor.n_p").unwrap().base, BaseType::UInt64);
+    assert_eq!(three.variable("filter.b").unwrap().dimensions, [Dimension::Fixed(1), Dimension::Fixed(3)]);
+    assert_eq!(two.variable("filter.b[1,3]").unwrap().start.as_deref(), Some("2"));
 }
 
 #[test]

@@ -14,6 +14,9 @@ _COLUMNS = {
     "Boolean": np.bool_,
 }  # fmt: skip
 _FLOATS = ("Real", "Float32", "Float64")
+# The least and the greatest value of each integer type.
+_INTEGERS = {f"Int{n}": (-(2 ** (n - 1)), 2 ** (n - 1) - 1) for n in (8, 16, 32, 64)}
+_INTEGERS |= {f"UInt{n}": (0, 2**n - 1) for n in (8, 16, 32, 64)} | {"Integer": _INTEGERS["Int32"]}
 
 
 class SimulationResult(np.ndarray):
@@ -230,10 +233,13 @@ def _value(v, description, value):
         if v.type == "Enumeration" and isinstance(value, str) and v.declaredType:
             value = {item.name: item.value for item in v.declaredType.items}.get(value, value)
         convert = float if v.type in _FLOATS else {"Boolean": bool, "String": str}.get(v.type, int)
-        if not v.shape:
-            return [convert(value)]
-        elements = value.split() if isinstance(value, str) else np.ravel(value)
+        elements = [value] if not v.shape else value.split() if isinstance(value, str) else np.ravel(value)
         values = [convert(x) for x in elements]
+        least, greatest = _INTEGERS.get(v.type, (None, None))
+        if least is not None and not all(least <= x <= greatest for x in values):
+            raise ValueError
+        if not v.shape:
+            return values
     except (TypeError, ValueError, KeyError):
         raise ValueError(f"the start value {value!r} of {v.name} is not of the type {v.type}") from None
     if len(values) != prod(v.shape):

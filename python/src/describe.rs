@@ -53,7 +53,8 @@ pub(crate) fn dictionary<'py>(py: Python<'py>, d: &ModelDescription) -> PyResult
         types.append(
             dict!(py, "name": &t.name, "type": type_name(d.version, t.base), "description": &t.description,
             "quantity": &t.quantity, "unit": &t.unit, "displayUnit": &t.display_unit, "min": numbers(t.min),
-            "max": numbers(t.max), "nominal": numbers(t.nominal), "items": items),
+            "max": numbers(t.max), "nominal": numbers(t.nominal), "items": items,
+            "relativeQuantity": t.relative.unwrap_or(false)),
         )?;
     }
     let variables = PyList::empty(py);
@@ -63,7 +64,7 @@ pub(crate) fn dictionary<'py>(py: Python<'py>, d: &ModelDescription) -> PyResult
             "type": type_name(d.version, v.base), "description": &v.description, "causality": v.causality.as_str(),
             "variability": v.variability.as_str(), "initial": v.initial_or_default().map(model_description::Initial::as_str),
             "declaredType": &v.declared_type, "quantity": &v.quantity, "unit": &v.unit, "displayUnit": &v.display_unit,
-            "min": numbers(v.min), "max": numbers(v.max), "nominal": numbers(v.nominal),
+            "relativeQuantity": v.relative, "min": numbers(v.min), "max": numbers(v.max), "nominal": numbers(v.nominal),
             "start": v.start_texts.first().or(v.start.as_ref()), "shape": shape(d, v), "aliases": aliases,
             "derivative": v.derivative.and_then(|r| d.referenced(r)).map(|s| &s.name), "sourceline": v.line))?;
     }

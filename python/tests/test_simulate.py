@@ -123,6 +123,7 @@ WRONG = {
     "an output as input": ({"input": np.array([(0.0, 1.0)], dtype=[("t", float), ("speed", float)])}, "neither an input nor"),
     "a start value for an output": ({"start_values": {"speed": 3.0}}, "could not be set: speed"),
     "a type": ({"start_values": {"motor.n_p": "two"}}, "start value 'two' of motor.n_p is not of the type Int32"),
+    "the range of a type": ({"start_values": {"motor.n_p": 2**40}}, "start value 1099511627776 of motor.n_p is not of the type Int32"),
     "a unit": ({"start_values": {"motor.R_s": (3.0, "rpm")}}, "unit 'rpm' of the start value of motor.R_s is not one of"),
     "an interval of zero": ({"output_interval": 0.0}, "output_interval must be positive"),
     "a stop that is no number": ({"stop_time": float("nan")}, "must be finite"),

@@ -1,6 +1,6 @@
 //! `fmu atlas`: where a drive with wrong estimates holds low speeds under load.
 
-use crate::workspace::Workspace;
+use crate::workspace::output_folder;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use drive::estimator::Kind;
@@ -77,7 +77,7 @@ pub struct Atlas {
 pub fn run(args: &Atlas) -> Result<()> {
     let cells = grid(args)?.cells(args.every)?;
     let drives = drives(args)?;
-    let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("atlas")), Ok)?;
+    let out = args.out.clone().map_or_else(|| output_folder("atlas"), Ok)?;
     let jobs = args.jobs.map_or_else(|| thread::available_parallelism().map_or(1, NonZero::get), usize::from);
 
     let count = u64::try_from(cells.len() * drives.len())?;

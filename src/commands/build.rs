@@ -1,17 +1,20 @@
 //! `fmu build`: compiles models and packs them.
 
+use super::tune;
 use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
-use crate::pack::{self, Moment};
+use crate::pack::{self, Entry, Moment};
 use crate::target::{Target, Tools, ZIG};
-use crate::workspace::{Package, Workspace};
+use crate::workspace::{Package, Workspace, output_folder};
+use crate::{reference, release};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
+use fmu_check::message;
 use fmu_core::Description;
-use fmu_import::describe;
 use fmu_import::elf::{FLOOR, Needs};
 use fmu_import::platform::Platform;
+use fmu_import::{describe, printable};
 use model_description::FmiVersion;
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,14 +22,18 @@ use std::path::{Path, PathBuf};
 
 /// Compiles FMUs and packs them for both standards.
 ///
-/// Without names, builds every FMU of the workspace: the packages in its folder fmus/. Select an FMU by the name of its package
-/// (pmsm-plant) or of the FMU (PmsmPlant).
+/// Without names, builds every FMU of the Cargo package or workspace around the current folder: the packages in its folder fmus/
+/// or, if there is no such folder, every cdylib that depends on fmu-export. Select an FMU by the
+/// name of its package (pmsm-plant) or of the FMU (PmsmPlant). `fmu new` makes a package for an FMU of your own.
 ///
-/// Your own FMU is any cdylib with the line `fmu_export::export!(MyModel);`:
-///   a package of the workspace     fmu build --package own-fmu
+/// An FMU is any cdylib with the line `fmu_export::export!(MyModel);`:
+///   a package elsewhere in the workspace    fmu build --package own-fmu
 ///   a library that is already built, or several libraries of one model for several platforms
 ///                                  fmu build --library target/release/libmy_fmu.so
 ///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
+///
+/// The folder resources/ beside the package's Cargo.toml, or that of --resources, becomes the FMU's own: the model reads it in
+/// `load`. Hidden files stay out.
 ///
 /// For other platforms, name the Rust targets; the FMUs then contain a binary for each of them and no others:
 ///   fmu build --target x86_64-unknown-linux-gnu,aarch64-unknown-linux-gnu,x86_64-pc-windows-gnu
@@ -36,7 +43,10 @@ use std::path::{Path, PathBuf};
 /// With cargo-zigbuild in PATH, Linux binaries need glibc 2.17 (2012). Otherwise this computer's linker decides, and the command
 /// prints what they need. CARGO_TARGET_TRIPLE_LINKER, in Cargo's spelling, selects another linker.
 ///
-/// --release-dir DIR builds the program fmu-check to give away: with cargo-zigbuild it needs glibc 2.17 and no other library.
+/// --release-dir DIR writes what a release holds: the archives, with a binary for each of Linux, Windows and macOS that can be
+/// built for here; SHA256SUMS; sbom.cdx.json, the crates in them and their licenses (CycloneDX); and in the workspace that has
+/// them, the programs fmu, cargo-fmu and fmu-check for this computer, which need no other library with cargo-zigbuild.
+///   fmu build --release-dir release
 ///
 /// With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Default, Args)]
@@ -57,22 +67,40 @@ pub struct Build {
     /// Library that is already built; with PLATFORM= if it is for another platform
     #[arg(long, value_name = "[PLATFORM=]FILE")]
     pub library: Vec<String>,
+    /// Folder with the resources of the --library
+    #[arg(long, value_name = "DIR", requires = "library")]
+    pub resources: Option<PathBuf>,
     /// Target to build for instead of this computer; separate several with commas or repeat the option
     #[arg(long, value_name = "TRIPLE", value_delimiter = ',', conflicts_with = "library")]
     pub target: Vec<String>,
-    /// Build the checker's program for this folder instead of FMUs
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["fmus", "package", "library", "target", "out", "fmi"])]
+    /// Write everything of a release to this folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["package", "library", "out"])]
     pub release_dir: Option<PathBuf>,
 }
 
-/// The package of the checker, and its program.
-const CHECKER: &str = "fmu-check";
+/// Targets of a release.
+const RELEASED: [&str; 5] = [
+    "x86_64-unknown-linux-gnu",
+    "aarch64-unknown-linux-gnu",
+    "x86_64-pc-windows-gnu",
+    "x86_64-apple-darwin",
+    "aarch64-apple-darwin",
+];
+
+/// Packages with programs of a release, in the workspace that has them.
+const PROGRAMS: [(&str, &str); 3] = [("fmu", "fmu"), ("fmu", "cargo-fmu"), ("fmu-check", "fmu-check")];
 
 /// A compiled model, ready to be packed.
 struct Model {
     description: Description,
+    /// The binary for this computer.
+    own: Vec<(Platform, Vec<u8>)>,
     binaries: Vec<(Platform, Vec<u8>)>,
     licenses: Licenses,
+    /// Files of the model's own.
+    resources: BTreeMap<String, Entry>,
+    /// The file with what feeds the default experiment.
+    stimuli: PathBuf,
 }
 
 /// Runs the command; returns the files that were written.
@@ -81,7 +109,7 @@ struct Model {
 /// A name is not an FMU, the compiler fails, a library was not made by `export!`, or a folder cannot be written.
 pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     if let Some(folder) = &args.release_dir {
-        return Ok(vec![release(folder)?]);
+        return release(args, folder);
     }
     let moment = Moment::of_environment()?;
     let versions = match args.fmi.as_deref() {
@@ -93,19 +121,24 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
         let out = args.out.clone().unwrap_or_else(|| workspace.target.join("fmu"));
         (compiled(&workspace, args)?, out)
     } else {
-        let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("fmu")), Ok);
-        (vec![given(&args.library)?], out.context("there is no workspace here: name the output folder with --out")?)
+        let out = args.out.clone().map_or_else(|| output_folder("fmu"), Ok)?;
+        (vec![given(&args.library, args.resources.as_deref())?], out)
     };
     for note in notes(&models) {
-        eprintln!("note: {note}");
+        message::note(&note);
     }
     let mut written = Vec::new();
     for model in &models {
+        let reference = reference(model, versions[0], moment)?;
         for &version in &versions {
+            let name = &model.description.name;
+            model_description::fits(&model.description, version).map_err(|e| anyhow!("{name}: {e}"))?;
             let folder = if version == FmiVersion::V2 { "fmi2" } else { "fmi3" };
-            let path = out.join(folder).join(format!("{}.fmu", model.description.name));
+            let path = out.join(folder).join(format!("{name}.fmu"));
             let mut files = pack::contents(&model.description, &model.binaries, &model.licenses, version, moment);
             files.extend(icons::files(&model.description, version)?);
+            files.extend(model.resources.clone());
+            files.extend(reference.clone());
             pack::write(&path, &pack::archive(&files, moment)?)?;
             written.push(path);
         }
@@ -113,21 +146,63 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     Ok(written)
 }
 
-/// Compiles the checker's program; returns where it is.
-fn release(folder: &Path) -> Result<PathBuf> {
-    let built = program(&Workspace::find()?, CHECKER, &Tools::find()?.host())?;
-    let bytes = fs::read(&built).with_context(|| built.display().to_string())?;
-    if let Ok(needs) = Needs::of(&bytes)
-        && !needs.are_modest()
-    {
-        eprintln!(
-            "note: {CHECKER} needs {needs} where it runs; built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most"
-        );
+/// The reference files for the model's archives. A model that does not run by itself has none: why is a note.
+fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTreeMap<String, Entry>> {
+    let Model { description, stimuli, .. } = model;
+    let dir = tempfile::tempdir()?;
+    let archive = dir.path().join("reference.fmu");
+    let mut files = pack::contents(description, &model.own, &model.licenses, version, moment);
+    files.extend(model.resources.clone());
+    pack::write(&archive, &pack::archive(&files, moment)?)?;
+    let parameters = tune::example_for(description)?;
+    let parameters = parameters.as_ref().map(|(name, text)| (name.as_str(), text.as_str()));
+    reference::files(&archive, description, stimuli, parameters).or_else(|why| {
+        let name = &description.name;
+        message::note(&printable(&format!("{name}: the archive gets no reference result: {why:#}")));
+        Ok(BTreeMap::new())
+    })
+}
+
+/// Everything of a release, in a folder; returns its files.
+fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
+    let (workspace, tools, moment) = (Workspace::find()?, Tools::find()?, Moment::of_environment()?);
+    let target = if args.target.is_empty() { available(&tools) } else { args.target.clone() };
+    let (fmus, fmi) = (args.fmus.clone(), args.fmi.clone());
+    let mut packages: Vec<String> = choose(&workspace.fmus(), &fmus)?.iter().map(|p| p.name.clone()).collect();
+    let mut written = run(&Build { fmus, fmi, target, out: Some(folder.into()), ..Build::default() })?;
+    for (package, name) in PROGRAMS {
+        if !workspace.package(package).is_some_and(|p| workspace.is_member(p)) {
+            continue;
+        }
+        let built = program(&workspace, package, name, &tools.host())?;
+        let bytes = fs::read(&built).with_context(|| built.display().to_string())?;
+        if let Ok(needs) = Needs::of(&bytes)
+            && !needs.are_modest()
+        {
+            message::note(&format!(
+                "{name} needs {needs} where it runs; built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most"
+            ));
+        }
+        let path = folder.join(built.file_name().unwrap_or_default());
+        fs::copy(&built, &path).with_context(|| path.display().to_string())?;
+        written.push(path);
+        packages.push(package.into());
     }
-    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let path = folder.join(built.file_name().unwrap_or_default());
-    fs::copy(&built, &path).with_context(|| path.display().to_string())?;
-    Ok(path)
+    packages.dedup();
+    let others = release::finish(&workspace, &packages, folder, &written, moment)?;
+    Ok(written.into_iter().chain(others).collect())
+}
+
+/// The targets of a release that can be built for here; what is missing for the others is a note.
+fn available(tools: &Tools) -> Vec<String> {
+    let can = |triple: &&str| match tools.target(triple) {
+        Ok(_) => true,
+        Err(why) => {
+            message::note(&format!("left out: {why:#}"));
+            false
+        }
+    };
+    RELEASED.into_iter().filter(can).map(str::to_owned).collect()
 }
 
 fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
@@ -164,7 +239,11 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
         bail!("nothing that was compiled is a cdylib: set crate-type = [\"cdylib\"]");
     }
     let model = |(package, own): &Library| {
-        load(own, built.get(package).map_or(&[], Vec::as_slice), Licenses::of_package(workspace, package))
+        let folder = workspace.package(package).map_or(Path::new("."), Package::folder);
+        let resources = Some(folder.join("resources")).filter(|folder| folder.is_dir());
+        let binaries = built.get(package).map(Vec::as_slice).unwrap_or_default();
+        let stimuli = folder.join(reference::STIMULI);
+        load(own, binaries, Licenses::of_package(workspace, package), resources.as_deref(), stimuli)
     };
     describing.iter().map(model).collect()
 }
@@ -204,7 +283,10 @@ fn notes(models: &[Model]) -> Vec<String> {
 fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>> {
     let letters = |name: &str| name.to_lowercase().replace(['-', '_'], "");
     if all.is_empty() {
-        bail!("the workspace has no folder fmus/ with packages");
+        bail!(
+            "no package here is an FMU: expected crate-type = [\"cdylib\"] and the dependency fmu-export in a Cargo.toml; \
+             fmu new my-model makes such a package"
+        );
     }
     if names.is_empty() {
         return Ok(all.to_vec());
@@ -218,7 +300,7 @@ fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>>
 }
 
 /// Libraries of one model that are already built.
-fn given(libraries: &[String]) -> Result<Model> {
+fn given(libraries: &[String], resources: Option<&Path>) -> Result<Model> {
     let parse = |text: &String| match text.split_once('=') {
         Some((platform, file)) => Ok((platform.parse().map_err(|e: String| anyhow!(e))?, PathBuf::from(file))),
         None => Ok((Platform::host(), PathBuf::from(text))),
@@ -228,14 +310,25 @@ fn given(libraries: &[String]) -> Result<Model> {
     let (_, own) = own.ok_or_else(|| {
         anyhow!("one library must be for this machine ({}): it describes the model", Platform::host())
     })?;
-    load(own, &libraries, Licenses::default())
+    load(own, &libraries, Licenses::default(), resources, PathBuf::new())
 }
 
 /// The model of these libraries, described by the one for this computer.
-fn load(own: &Path, libraries: &[(Platform, PathBuf)], licenses: Licenses) -> Result<Model> {
-    let description = describe(own)?;
-    let read = |(platform, path): &(Platform, PathBuf)| Ok((*platform, read(path)?));
-    Ok(Model { description, binaries: libraries.iter().map(read).collect::<Result<_>>()?, licenses })
+fn load(
+    own: &Path,
+    libraries: &[(Platform, PathBuf)],
+    licenses: Licenses,
+    resources: Option<&Path>,
+    stimuli: PathBuf,
+) -> Result<Model> {
+    let folder =
+        resources.map(|folder| folder.canonicalize().with_context(|| folder.display().to_string())).transpose()?;
+    let files = folder.as_deref().map_or_else(|| Ok(BTreeMap::new()), pack::resources)?;
+    let description = describe(own, folder.as_deref())?;
+    let read = |(platform, path): &(Platform, PathBuf)| anyhow::Ok((*platform, read(path)?));
+    let binaries = libraries.iter().map(read).collect::<Result<_>>()?;
+    let own = vec![read(&(Platform::host(), own.to_owned()))?];
+    Ok(Model { description, own, binaries, licenses, resources: files, stimuli })
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {

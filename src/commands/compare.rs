@@ -1,6 +1,6 @@
 //! `fmu compare`: every estimator through every scenario.
 
-use crate::workspace::Workspace;
+use crate::workspace::output_folder;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use drive_study::compare::candidate::Entry;
@@ -14,7 +14,10 @@ use std::path::PathBuf;
 ///
 /// Runs natively on all cores. Writes compare.html, compare.md, compare.txt, compare.csv and plots to `compare` in Cargo's
 /// target folder. Exits with status 1 if a figure is outside its tolerance.
+///
+///   fmu compare --out target/compare
 #[derive(Debug, Default, Args)]
+#[command(verbatim_doc_comment)]
 pub struct Compare {
     /// Run only these estimators
     #[arg(long, value_name = "ESTIMATOR,...", value_delimiter = ',')]
@@ -43,7 +46,7 @@ pub fn run(args: &Compare) -> Result<bool> {
         return Ok(true);
     }
     let selection = selection(args)?;
-    let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("compare")), Ok)?;
+    let out = args.out.clone().map_or_else(|| output_folder("compare"), Ok)?;
 
     let count = u64::try_from(selection.entries.len() * selection.scenarios.len())?;
     let bar = if stderr().is_terminal() { ProgressBar::new(count) } else { ProgressBar::hidden() };

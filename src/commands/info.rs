@@ -3,7 +3,9 @@
 use anyhow::Result;
 use clap::Args;
 use fmu_import::printable;
-use model_description::{Causality, Interface, ModelDescription, ModelVariable, Variability, read_terminals};
+use model_description::{
+    BaseType, Causality, Dimension, Interface, ModelDescription, ModelVariable, Variability, read_terminals,
+};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -46,7 +48,7 @@ pub fn run(args: &Info) -> Result<String> {
             continue;
         }
         lines.push(format!("{}{group} ({})", if lines.is_empty() { "" } else { "\n" }, variables.len()));
-        let width = variables.iter().map(|v| v.name.chars().count()).max().unwrap_or(0).min(40);
+        let width = variables.iter().map(|v| name(v).chars().count()).max().unwrap_or(0).min(40);
         lines.extend(variables.iter().map(|v| row(v, md, width)));
     }
     if lines.is_empty() {
@@ -105,11 +107,24 @@ fn head(md: &ModelDescription, files: &BTreeMap<String, Vec<u8>>, size: u64) -> 
     lines
 }
 
+/// Name, with the extents of an array.
+fn name(v: &ModelVariable) -> String {
+    let extent = |dimension: &Dimension| match dimension {
+        Dimension::Fixed(n) => n.to_string(),
+        Dimension::Variable(reference) => format!("#{reference}"),
+    };
+    let extents: Vec<String> = v.dimensions.iter().map(extent).collect();
+    if v.is_array() { format!("{}[{}]", v.name, extents.join(",")) } else { v.name.clone() }
+}
+
 /// Name, start value with its unit, description.
 fn row(v: &ModelVariable, md: &ModelDescription, width: usize) -> String {
     let mut value = v.start.clone().unwrap_or_default();
     if v.is_array() && value.len() > 24 {
         value = "(array)".into();
+    }
+    if v.base == BaseType::String && v.start.is_some() {
+        value = format!("{value:?}");
     }
     let definition = v.declared_type.as_ref().and_then(|t| md.type_definition(t));
     let named = definition.and_then(|d| d.items.iter().find(|i| Ok(i.value) == value.parse()));
@@ -119,7 +134,7 @@ fn row(v: &ModelVariable, md: &ModelDescription, width: usize) -> String {
     let unit = v.unit.as_deref().map(|unit| if value.is_empty() { format!("in {unit}") } else { format!(" {unit}") });
     format!(
         "  {:<width$}  {:<16} {}",
-        v.name,
+        name(v),
         value + &unit.unwrap_or_default(),
         v.description.as_deref().unwrap_or_default()
     )

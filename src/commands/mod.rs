@@ -5,6 +5,8 @@ pub mod build;
 pub mod compare;
 pub mod info;
 pub mod merge;
+pub mod new;
+pub mod prove;
 pub mod reproduce;
 pub mod simulate;
 pub mod ssp;

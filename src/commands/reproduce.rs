@@ -10,7 +10,10 @@ use std::path::PathBuf;
 ///
 /// Writes CSV, plots and report.html to `reproduce` in Cargo's target folder. Exits with status 1 if a figure
 /// is outside its tolerance.
+///
+///   fmu reproduce
 #[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
 pub struct Reproduce {
     /// Output folder [default: reproduce in Cargo's target folder]
     #[arg(long, value_name = "DIR")]

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use drive_study::figure::Figure;
 use drive_study::{overview, page, plot};
+use fmu_check::message;
 use fmu_import::cosimulation::{Integration, Method, Point, Recording, Schedule, Settings, Solver, System};
 use fmu_import::guard::Allowance;
 use fmu_import::ssp::load::Loaded;
@@ -165,7 +166,7 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
     let all_exchange = fmus.iter().all(|(_, fmu)| fmu.description().model_exchange.is_some());
     match cannot_step {
         Some((name, _)) if all_exchange && !args.me && !args.event_mode && !args.early_return => {
-            eprintln!("note: {name} has no Co-Simulation: the FMUs are integrated, as with --me");
+            message::note(&format!("{name} has no Co-Simulation: the FMUs are integrated, as with --me"));
         }
         _ if !args.me => {
             return Method::CoSimulation { event_mode: args.event_mode, early_return: args.early_return };
@@ -219,7 +220,7 @@ fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
         bail!("--rtol is for --solver dopri; --solver rk4 takes the steps of --step");
     }
     std::env::set_current_dir(&home)?;
-    loaded.notes.iter().for_each(|note| eprintln!("note: {}", printable(note)));
+    loaded.notes.iter().for_each(|note| message::note(&printable(note)));
     let (settings, for_plot) = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
     let mut progress = Progress::new(settings);
@@ -246,7 +247,7 @@ fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
     std::env::set_current_dir(&home)?;
     let written = write(recording, for_plot, args, out);
     for text in warnings(&system, &settings) {
-        eprintln!("warning: {}", printable(&text));
+        message::warning(&printable(&text));
     }
     written?;
     match interrupted {

@@ -7,7 +7,7 @@ use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use drive_study::tune;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Packs plant and controller, connected and with the values of a motor, into one SSP file (SSP 1.0).
 ///
@@ -16,6 +16,8 @@ use std::path::PathBuf;
 ///
 ///   fmu ssp --motor motors/ipmsm-2.2kw.toml --out drive.ssp
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg
+/// With FMUs that are packed already:
+///   fmu ssp --fmus target/fmu --fmi 3 --out drive.ssp
 ///
 /// SSP 1.0 is older than FMI 3.0, and many SSP importers accept only FMUs of FMI 2.0. OMSimulator's command line runs the file
 /// unchanged; add --integers if a motor is given. With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
@@ -25,6 +27,10 @@ pub struct Ssp {
     /// FMI version of the FMUs: 2 or 3
     #[arg(long, value_name = "VERSION", default_value = "2", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
     pub fmi: String,
+    /// Folder with PmsmPlant.fmu and SensorlessController.fmu, or with the folders of `fmu build` [default: they are built from
+    /// the sources around the current folder]
+    #[arg(long, value_name = "DIR")]
+    pub fmus: Option<PathBuf>,
     /// Motor file, as for `fmu tune`
     #[arg(long, value_name = "MOTOR.toml", conflicts_with = "parameters")]
     pub motor: Option<PathBuf>,
@@ -54,15 +60,34 @@ pub fn run(args: &Ssp) -> Result<()> {
     let moment = Moment::of_environment()?;
     let values = values(args)?;
     let dir = tempfile::tempdir()?;
-    let fmus = COMPONENTS.map(|(_, fmu, _)| fmu.to_owned()).to_vec();
-    let built =
-        build::run(&Build { fmus, fmi: Some(args.fmi.clone()), out: Some(dir.path().into()), ..Build::default() })?;
-    let folder = built.first().and_then(|f| f.parent()).context("nothing was built")?;
+    let standard = format!("fmi{}", args.fmi);
+    let folder = if let Some(given) = &args.fmus {
+        packed(given, &standard)?
+    } else {
+        let fmus = COMPONENTS.map(|(_, fmu, _)| fmu.to_owned()).to_vec();
+        let out = Some(dir.path().into());
+        build::run(&Build { fmus, fmi: Some(args.fmi.clone()), out, ..Build::default() })
+            .context("the FMUs of the drive cannot be built here; --fmus DIR takes those of a folder")?;
+        dir.path().join(standard)
+    };
     let options = Options { gates: args.gates, geometry: args.geometry };
-    let files = ssp::files(folder, &values, options, moment)?;
+    let files = ssp::files(&folder, &values, options, moment)?;
     pack::write(&args.out, &pack::archive(&files, moment)?)?;
     println!("{}", args.out.display());
     Ok(())
+}
+
+/// The folder with the FMUs: the given one, or the one of the standard in it.
+fn packed(given: &Path, standard: &str) -> Result<PathBuf> {
+    let file = |folder: &Path, fmu: &str| folder.join(fmu).with_extension("fmu");
+    let has_all = |folder: &PathBuf| COMPONENTS.iter().all(|(_, fmu, _)| file(folder, fmu).is_file());
+    [given.to_owned(), given.join(standard)].into_iter().find(has_all).ok_or_else(|| {
+        let names = COMPONENTS.map(|(_, fmu, _)| format!("{fmu}.fmu")).join(" and ");
+        anyhow!(
+            "--fmus {}: expected {names} there or in its folder {standard}, as fmu build --out writes them",
+            given.display()
+        )
+    })
 }
 
 /// The values, each with its file.

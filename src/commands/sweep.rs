@@ -159,7 +159,7 @@ struct Shown {
 
 impl Watch for Shown {
     fn note(&self, text: &str) {
-        eprintln!("note: {text}");
+        fmu_check::message::note(text);
     }
 
     fn progress(&self, done: u64, failed: u64, all: u64) {

@@ -1,17 +1,20 @@
 //! The command `fmu tune`: parameter values of the FMUs for a motor.
 
-use crate::workspace::Workspace;
+use crate::workspace::output_folder;
 use crate::{pack, ssv};
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use clap::Args;
-use drive_study::tune::rules::{Setting, Value};
+use drive::{PmsmDrive, PmsmPlant, SensorlessController};
+use drive_study::tune::motor::MotorFile;
+use drive_study::tune::rules::{self, Setting, Value};
 use drive_study::tune::trial::{self, Trial, Verdict};
 use drive_study::tune::{self, rules::Tuned};
+use fmu_core::Description;
 use std::path::{Path, PathBuf};
 
 /// Computes parameter values of PmsmPlant, SensorlessController and PmsmDrive from motor data.
 ///
-/// MOTOR.toml contains motor, mechanics, ratings and DC link, and may contain the bandwidths of current loop, speed loop and
+/// `fmu tune --example` prints a motor file to start from. MOTOR.toml contains motor, mechanics, ratings and DC link, and may contain the bandwidths of current loop, speed loop and
 /// observer; see the examples in motors/. The command writes NAME.PmsmDrive.ssv, NAME.PmsmPlant.ssv and
 /// NAME.SensorlessController.ssv (SSP 1.0) with the values that differ from the start values of the FMUs, for importers. It
 /// tells beforehand what the drive will not hold, as notes.
@@ -28,8 +31,11 @@ use std::path::{Path, PathBuf};
 #[command(verbatim_doc_comment)]
 pub struct Tune {
     /// Motor file
-    #[arg(value_name = "MOTOR.toml")]
-    pub motor: PathBuf,
+    #[arg(value_name = "MOTOR.toml", required_unless_present = "example")]
+    pub motor: Option<PathBuf>,
+    /// Print the motor file of a 2.2 kW machine and exit
+    #[arg(long, exclusive = true)]
+    pub example: bool,
     /// Output folder [default: tune in Cargo's target folder]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -41,6 +47,9 @@ pub struct Tune {
     pub check: bool,
 }
 
+/// The motor file of --example.
+const EXAMPLE: &str = include_str!("../../motors/ipmsm-2.2kw.toml");
+
 /// Start angles of --check.
 const ANGLES: u32 = 24;
 
@@ -49,8 +58,12 @@ const ANGLES: u32 = 24;
 /// # Errors
 /// The motor file is invalid, or a file cannot be written.
 pub fn run(args: &Tune) -> Result<bool> {
-    let tuned = tune::tune(&args.motor)?;
-    let out = args.out.clone().map_or_else(|| Workspace::find().map(|w| w.target.join("tune")), Ok)?;
+    let Some(motor) = &args.motor else {
+        print!("{EXAMPLE}");
+        return Ok(true);
+    };
+    let tuned = tune::tune(motor)?;
+    let out = args.out.clone().map_or_else(|| output_folder("tune"), Ok)?;
     let files = write(&tuned, &out, args.integers)?;
     println!("{}\n{}", tuned.name, tuned.source);
     for (model, settings) in [("PmsmPlant", &tuned.plant), ("SensorlessController", &tuned.controller)] {
@@ -90,20 +103,46 @@ fn tried(tuned: &Tuned) -> bool {
     good
 }
 
-/// Writes `NAME.PmsmDrive.ssv`, `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder, each with what
-/// [`tune::needed`] leaves; returns their paths.
-fn write(tuned: &Tuned, folder: &Path, integers: bool) -> Result<[PathBuf; 3]> {
-    let write = |model: &str, text: &dyn Fn(&str) -> String| {
+/// The values for one of the FMUs with the machine of --example: the name of the set and the SSV file. None for a model of any
+/// other interface.
+///
+/// # Errors
+/// A model cannot be described.
+pub fn example_for(description: &Description) -> Result<Option<(String, String)>> {
+    let of = |found: Result<Description, _>| found.map_err(|e: fmu_core::Fault| anyhow!("{e}"));
+    let known = [
+        of(Description::of::<PmsmDrive>())?,
+        of(Description::of::<PmsmPlant>())?,
+        of(Description::of::<SensorlessController>())?,
+    ];
+    let names = |d: &Description| d.variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
+    let is_it = |d: &Description| d.name == description.name && names(description).starts_with(&names(d));
+    let Some(place) = known.iter().position(is_it) else { return Ok(None) };
+    let tuned = rules::tune(&MotorFile::parse(EXAMPLE, Path::new("ipmsm-2.2kw.toml"))?)?;
+    let (_, text) = texts(&tuned, false)?.swap_remove(place);
+    Ok(Some((tuned.name, text)))
+}
+
+/// Writes `NAME.PmsmDrive.ssv`, `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder; returns their paths.
+fn write(tuned: &Tuned, folder: &Path, integers: bool) -> Result<Vec<PathBuf>> {
+    let write = |(model, text): (&str, String)| {
         let path = folder.join(format!("{}.{model}.ssv", tuned.name));
-        pack::write(&path, text(&format!("{} {model}", tuned.name)).as_bytes())?;
-        anyhow::Ok(path)
+        pack::write(&path, text.as_bytes())?;
+        Ok(path)
     };
+    texts(tuned, integers)?.into_iter().map(write).collect()
+}
+
+/// The SSV files of the three FMUs, each with what [`tune::needed`] leaves.
+fn texts(tuned: &Tuned, integers: bool) -> Result<Vec<(&'static str, String)>> {
     let (plant, controller) = tune::needed(tuned, integers)?;
     let drive = tune::of_drive(tuned, integers)?;
-    Ok([
-        write("PmsmDrive", &|title| ssv::text_of(title, drive.iter().map(|(name, value)| (name.as_str(), value))))?,
-        write("PmsmPlant", &|title| ssv::text(title, &plant))?,
-        write("SensorlessController", &|title| ssv::text(title, &controller))?,
+    let title = |model: &str| format!("{} {model}", tuned.name);
+    let of_drive = drive.iter().map(|(name, value)| (name.as_str(), value));
+    Ok(vec![
+        ("PmsmDrive", ssv::text_of(&title("PmsmDrive"), of_drive)),
+        ("PmsmPlant", ssv::text(&title("PmsmPlant"), &plant)),
+        ("SensorlessController", ssv::text(&title("SensorlessController"), &controller)),
     ])
 }
 

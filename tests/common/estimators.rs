@@ -35,10 +35,10 @@ fn parameters<M: Model>(block: &Block<M>) -> Map<String, Value> {
         }
         let value = |block: &mut Block<M>| match M::TABLE.entry(block, i) {
             Some((_, Slot::Real(x))) => json!(*x),
-            Some((_, Slot::Integer(x))) => json!(*x),
+            Some((_, Slot::Integer(x))) => json!(x.get()),
             Some((_, Slot::Boolean(x))) => json!(*x),
             Some((_, Slot::Enumeration(x))) => json!(x.get()),
-            None => Value::Null,
+            _ => Value::Null,
         };
         let set = value(&mut block);
         if set != value(&mut fresh) {

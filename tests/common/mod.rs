@@ -20,11 +20,11 @@ pub fn set<M: Model>(block: &mut Block<M>, name: &str, value: f64) {
     match M::TABLE.entry(block, index) {
         Some((_, Slot::Real(x))) => *x = value,
         #[expect(clippy::cast_possible_truncation, reason = "small integers in tests")]
-        Some((_, Slot::Integer(x))) => *x = value as i32,
+        Some((_, Slot::Integer(x))) => assert!(x.set(value as i128), "{name} = {value}"),
         Some((_, Slot::Boolean(x))) => *x = value != 0.0,
         #[expect(clippy::cast_possible_truncation, reason = "small integers in tests")]
         Some((_, Slot::Enumeration(x))) => assert!(x.set(value as i32), "{name} = {value}"),
-        None => unreachable!(),
+        _ => unreachable!("{name} is no number"),
     }
 }
 

@@ -104,7 +104,7 @@ impl Drive {
             (Slot::Integer(x), _) => {
                 let range = variable.range();
                 let number = value.parse::<i32>().ok().filter(|x| range.contains(f64::from(*x)));
-                *x = number.ok_or_else(|| wrong(&format!("an integer {range}")))?;
+                x.set(number.ok_or_else(|| wrong(&format!("an integer {range}")))?.into());
             }
             (Slot::Boolean(x), _) => *x = value.parse().map_err(|_| wrong("true or false"))?,
             (Slot::Enumeration(x), VariableKind::Enumeration { items, .. }) => {

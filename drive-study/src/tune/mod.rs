@@ -62,7 +62,7 @@ fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Settin
         let variable = description.variable(setting.name);
         let number = variable.and_then(|v| item_value(v, &setting.value)).map(Value::Integer);
         let start = variable.and_then(|v| v.start.as_ref()?.first());
-        let same = start.is_some_and(|start| is(number.as_ref().unwrap_or(&setting.value), *start));
+        let same = start.is_some_and(|start| is(number.as_ref().unwrap_or(&setting.value), start));
         let value = number.filter(|_| integers).unwrap_or_else(|| setting.value.clone());
         (!same).then(|| Setting { value, ..setting.clone() })
     };
@@ -80,11 +80,11 @@ fn item_value(variable: &Variable, value: &Value) -> Option<i32> {
 }
 
 /// Whether a value is the start value, to the last bit.
-fn is(value: &Value, start: description::Value) -> bool {
+fn is(value: &Value, start: &description::Value) -> bool {
     match (value, start) {
         (Value::Real(x), description::Value::Real(start)) => x.to_bits() == start.to_bits(),
-        (Value::Integer(x), description::Value::Integer(start)) => *x == start,
-        (Value::Boolean(x), description::Value::Boolean(start)) => *x == start,
+        (Value::Integer(x), description::Value::Integer(start)) => i128::from(*x) == *start,
+        (Value::Boolean(x), description::Value::Boolean(start)) => x == start,
         _ => false,
     }
 }

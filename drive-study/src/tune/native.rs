@@ -22,7 +22,9 @@ fn set<M: Model>(block: &mut Block<M>, setting: &Setting) {
     let (meta, slot) = index.and_then(|i| M::TABLE.entry(block, i)).expect("a variable of the model");
     match (slot, &setting.value, meta.kind) {
         (Slot::Real(x), Value::Real(value), _) => *x = *value,
-        (Slot::Integer(x), Value::Integer(value), _) => *x = *value,
+        (Slot::Integer(x), Value::Integer(value), _) => {
+            x.set((*value).into());
+        }
         (Slot::Boolean(x), Value::Boolean(value), _) => *x = *value,
         (Slot::Enumeration(x), Value::Item(name), Kind::Enumeration(e)) => {
             x.set(e.items.iter().find(|item| item.name == name).expect("an item of the enumeration").value);

@@ -57,7 +57,7 @@ pub(super) fn describe(terminals: &[terminal::Terminal], variables: &[Variable])
             match variables.iter().find(|v| v.name == *variable) {
                 None => return Err(wrong(format!("names the variable {variable}, which does not exist"))),
                 // FMI 3.0.2, 2.4.9.2.3; in FMI 2.0 an array is not a variable.
-                Some(v) if v.causality == Causality::Local || v.dimension.is_some() => {
+                Some(v) if v.causality == Causality::Local || v.is_array() => {
                     return Err(wrong(format!(
                         "has {variable}: only a scalar input, output or parameter can be a member"
                     )));

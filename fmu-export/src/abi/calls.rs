@@ -49,6 +49,46 @@ impl<E: Exported> Abi<E> {
         }
     }
 
+    /// The texts stay where they are until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
+    pub unsafe fn get_texts(
+        entry: Entry,
+        instance: Instance,
+        references: References,
+        n: usize,
+        values: *mut *const c_char,
+        room_for: usize,
+    ) -> c_int {
+        // SAFETY: the importer's arrays, of these lengths.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let out = room(values, room_for, "values")?;
+                let texts = instance.get_texts(array(references, n, "value references")?, out.len())?;
+                for (place, text) in out.iter_mut().zip(texts) {
+                    place.write(text.as_ptr());
+                }
+                Ok(())
+            })
+        }
+    }
+
+    pub unsafe fn set_texts(
+        entry: Entry,
+        instance: Instance,
+        references: References,
+        n: usize,
+        values: *const *const c_char,
+        n_values: usize,
+    ) -> c_int {
+        // SAFETY: the importer's arrays, of these lengths, the second one of C strings if the variables are texts.
+        unsafe {
+            enter::<E>(entry, instance, |instance| {
+                let values = array(values, n_values, "values")?;
+                let references = array(references, n, "value references")?;
+                Ok(instance.set_texts(references, values.len(), |i| text(values[i]))?)
+            })
+        }
+    }
+
     /// A getter or setter of a type that no variable has: succeeds only for zero variables.
     pub unsafe fn none(
         entry: Entry,

@@ -29,11 +29,13 @@ impl<E: Exported> Abi<E> {
         name: Text,
         fmu_type: c_int,
         token: Text,
+        resources: Text,
         callbacks: *const Fmi2Callbacks,
         logging_on: bool,
     ) -> Instance {
         // SAFETY: the importer's texts and struct, valid during this call.
-        let (name, token, callbacks) = unsafe { (text(name), text(token), callbacks.as_ref()) };
+        let (name, token, resources, callbacks) =
+            unsafe { (text(name), text(token), text(resources), callbacks.as_ref()) };
         let sink = Fmi2Sink {
             logger: callbacks.and_then(|c| c.logger),
             environment: callbacks.map_or(std::ptr::null_mut(), |c| c.environment),
@@ -47,7 +49,7 @@ impl<E: Exported> Abi<E> {
             if fits { Ok(name) } else { Err(allowed()) }
         });
         let interface = if fmu_type == MODEL_EXCHANGE { Interface::ModelExchange } else { Interface::CoSimulation };
-        open::<E>(entry, Log::new(Box::new(sink), logging_on), judged, interface, false)
+        open::<E>(entry, Log::new(Box::new(sink), logging_on), judged, resources, interface, false)
     }
 
     pub unsafe fn fmi2_setup_experiment(
@@ -161,7 +163,7 @@ macro_rules! export_fmi2 {
             name: Text,
             fmu_type: c_int,
             guid: Text,
-            _resources: Text,
+            resources: Text,
             callbacks: *const Fmi2Callbacks,
             _visible: Fmi2Boolean,
             logging_on: Fmi2Boolean,
@@ -170,7 +172,9 @@ macro_rules! export_fmi2 {
             const ENTRY: Entry = Entry::new(Standard::Fmi2, Call::Instantiate, "fmi2Instantiate");
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$exported>::fmi2_instantiate(ENTRY, name, fmu_type, guid, callbacks, logging_on.0 != 0)
+                $crate::abi::Abi::<$exported>::fmi2_instantiate(
+                    ENTRY, name, fmu_type, guid, resources, callbacks, logging_on.0 != 0,
+                )
             }
         }
 
@@ -193,11 +197,11 @@ macro_rules! export_fmi2 {
             fmi2GetReal(vr: References, n: usize, values: *mut f64) => Get: get(vr, n, values, n);
             fmi2GetInteger(vr: References, n: usize, values: *mut Fmi2Integer) => Get: get(vr, n, values, n);
             fmi2GetBoolean(vr: References, n: usize, values: *mut Fmi2Boolean) => Get: get(vr, n, values, n);
-            fmi2GetString(vr: References, n: usize, _values: *mut Text) => Get: none(vr, n, 0, "a text");
+            fmi2GetString(vr: References, n: usize, values: *mut Text) => Get: get_texts(vr, n, values, n);
             fmi2SetReal(vr: References, n: usize, values: *const f64) => Set: set(vr, n, values, n);
             fmi2SetInteger(vr: References, n: usize, values: *const Fmi2Integer) => Set: set(vr, n, values, n);
             fmi2SetBoolean(vr: References, n: usize, values: *const Fmi2Boolean) => Set: set(vr, n, values, n);
-            fmi2SetString(vr: References, n: usize, _values: *const Text) => Set: none(vr, n, 0, "a text");
+            fmi2SetString(vr: References, n: usize, values: *const Text) => Set: set_texts(vr, n, values, n);
 
             fmi2GetFMUstate(state: *mut FmuState) => SaveState: save_state(state);
             fmi2SetFMUstate(state: FmuState) => RestoreState: restore_state(state);

@@ -19,6 +19,7 @@ impl<E: Exported> Abi<E> {
         entry: Entry,
         name: Text,
         token: Text,
+        resources: Text,
         logging_on: Fmi3Boolean,
         environment: *mut c_void,
         logger: Option<Fmi3Logger>,
@@ -27,7 +28,7 @@ impl<E: Exported> Abi<E> {
         refused: Option<&str>,
     ) -> Instance {
         // SAFETY: the importer's texts, valid during this call.
-        let (name, token) = unsafe { (text(name), text(token)) };
+        let (name, token, resources) = unsafe { (text(name), text(token), text(resources)) };
         let refused = refused.or(match interface {
             Interface::ModelExchange if !E::CAN.model_exchange() => {
                 Some("not supported: Model Exchange; this FMU is for Co-Simulation")
@@ -40,7 +41,7 @@ impl<E: Exported> Abi<E> {
         let judged = credentials::<E>(name, token);
         let judged = judged.and_then(|name| refused.map_or(Ok(name), |why| Err(Fault::new(why))));
         let log = Log::new(Box::new(Fmi3Sink { logger, environment }), logging_on.0 != 0);
-        open::<E>(entry, log, judged, interface, early_return)
+        open::<E>(entry, log, judged, resources, interface, early_return)
     }
 
     pub unsafe fn fmi3_enter_initialization(
@@ -161,7 +162,7 @@ macro_rules! export_fmi3 {
         pub(crate) unsafe extern "C" fn fmi3InstantiateCoSimulation(
             name: Text,
             token: Text,
-            _resources: Text,
+            resources: Text,
             _visible: Fmi3Boolean,
             logging_on: Fmi3Boolean,
             event_mode_used: Fmi3Boolean,
@@ -182,7 +183,7 @@ macro_rules! export_fmi3 {
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, logging_on, environment, logger, interface, early, refused,
+                    ENTRY, name, token, resources, logging_on, environment, logger, interface, early, refused,
                 )
             }
         }
@@ -191,7 +192,7 @@ macro_rules! export_fmi3 {
         pub(crate) unsafe extern "C" fn fmi3InstantiateModelExchange(
             name: Text,
             token: Text,
-            _resources: Text,
+            resources: Text,
             _visible: Fmi3Boolean,
             logging_on: Fmi3Boolean,
             environment: *mut c_void,
@@ -203,7 +204,7 @@ macro_rules! export_fmi3 {
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, logging_on, environment, logger, interface, false, None,
+                    ENTRY, name, token, resources, logging_on, environment, logger, interface, false, None,
                 )
             }
         }
@@ -212,7 +213,7 @@ macro_rules! export_fmi3 {
         pub(crate) unsafe extern "C" fn fmi3InstantiateScheduledExecution(
             name: Text,
             token: Text,
-            _resources: Text,
+            resources: Text,
             _visible: Fmi3Boolean,
             logging_on: Fmi3Boolean,
             environment: *mut c_void,
@@ -227,7 +228,7 @@ macro_rules! export_fmi3 {
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, logging_on, environment, logger, Interface::CoSimulation, false, refused,
+                    ENTRY, name, token, resources, logging_on, environment, logger, Interface::CoSimulation, false, refused,
                 )
             }
         }
@@ -251,14 +252,14 @@ macro_rules! export_fmi3 {
             fmi3GetInt32(vr: References, n: usize, values: *mut i32, m: usize) => Get: get(vr, n, values, m);
             fmi3GetInt64(vr: References, n: usize, values: *mut i64, m: usize) => Get: get(vr, n, values, m);
             fmi3GetBoolean(vr: References, n: usize, values: *mut Fmi3Boolean, m: usize) => Get: get(vr, n, values, m);
-            fmi3GetFloat32(vr: References, n: usize, _v: *mut f32, m: usize) => Get: none(vr, n, m, "a Float32");
-            fmi3GetInt8(vr: References, n: usize, _v: *mut i8, m: usize) => Get: none(vr, n, m, "an Int8");
-            fmi3GetUInt8(vr: References, n: usize, _v: *mut u8, m: usize) => Get: none(vr, n, m, "a UInt8");
-            fmi3GetInt16(vr: References, n: usize, _v: *mut i16, m: usize) => Get: none(vr, n, m, "an Int16");
-            fmi3GetUInt16(vr: References, n: usize, _v: *mut u16, m: usize) => Get: none(vr, n, m, "a UInt16");
-            fmi3GetUInt32(vr: References, n: usize, _v: *mut u32, m: usize) => Get: none(vr, n, m, "a UInt32");
-            fmi3GetUInt64(vr: References, n: usize, _v: *mut u64, m: usize) => Get: none(vr, n, m, "a UInt64");
-            fmi3GetString(vr: References, n: usize, _v: *mut Text, m: usize) => Get: none(vr, n, m, "a text");
+            fmi3GetFloat32(vr: References, n: usize, values: *mut f32, m: usize) => Get: get(vr, n, values, m);
+            fmi3GetInt8(vr: References, n: usize, values: *mut i8, m: usize) => Get: get(vr, n, values, m);
+            fmi3GetUInt8(vr: References, n: usize, values: *mut u8, m: usize) => Get: get(vr, n, values, m);
+            fmi3GetInt16(vr: References, n: usize, values: *mut i16, m: usize) => Get: get(vr, n, values, m);
+            fmi3GetUInt16(vr: References, n: usize, values: *mut u16, m: usize) => Get: get(vr, n, values, m);
+            fmi3GetUInt32(vr: References, n: usize, values: *mut u32, m: usize) => Get: get(vr, n, values, m);
+            fmi3GetUInt64(vr: References, n: usize, values: *mut u64, m: usize) => Get: get(vr, n, values, m);
+            fmi3GetString(vr: References, n: usize, values: *mut Text, m: usize) => Get: get_texts(vr, n, values, m);
             fmi3GetBinary(vr: References, n: usize, _sizes: *mut usize, _v: *mut *const u8, m: usize)
                 => Get: none(vr, n, m, "bytes");
             fmi3GetClock(_vr: References, _n: usize, _v: *mut Fmi3Boolean) => Unsupported: unsupported("clocks");
@@ -267,14 +268,14 @@ macro_rules! export_fmi3 {
             fmi3SetInt32(vr: References, n: usize, values: *const i32, m: usize) => Set: set(vr, n, values, m);
             fmi3SetInt64(vr: References, n: usize, values: *const i64, m: usize) => Set: set(vr, n, values, m);
             fmi3SetBoolean(vr: References, n: usize, values: *const Fmi3Boolean, m: usize) => Set: set(vr, n, values, m);
-            fmi3SetFloat32(vr: References, n: usize, _v: *const f32, m: usize) => Set: none(vr, n, m, "a Float32");
-            fmi3SetInt8(vr: References, n: usize, _v: *const i8, m: usize) => Set: none(vr, n, m, "an Int8");
-            fmi3SetUInt8(vr: References, n: usize, _v: *const u8, m: usize) => Set: none(vr, n, m, "a UInt8");
-            fmi3SetInt16(vr: References, n: usize, _v: *const i16, m: usize) => Set: none(vr, n, m, "an Int16");
-            fmi3SetUInt16(vr: References, n: usize, _v: *const u16, m: usize) => Set: none(vr, n, m, "a UInt16");
-            fmi3SetUInt32(vr: References, n: usize, _v: *const u32, m: usize) => Set: none(vr, n, m, "a UInt32");
-            fmi3SetUInt64(vr: References, n: usize, _v: *const u64, m: usize) => Set: none(vr, n, m, "a UInt64");
-            fmi3SetString(vr: References, n: usize, _v: *const Text, m: usize) => Set: none(vr, n, m, "a text");
+            fmi3SetFloat32(vr: References, n: usize, values: *const f32, m: usize) => Set: set(vr, n, values, m);
+            fmi3SetInt8(vr: References, n: usize, values: *const i8, m: usize) => Set: set(vr, n, values, m);
+            fmi3SetUInt8(vr: References, n: usize, values: *const u8, m: usize) => Set: set(vr, n, values, m);
+            fmi3SetInt16(vr: References, n: usize, values: *const i16, m: usize) => Set: set(vr, n, values, m);
+            fmi3SetUInt16(vr: References, n: usize, values: *const u16, m: usize) => Set: set(vr, n, values, m);
+            fmi3SetUInt32(vr: References, n: usize, values: *const u32, m: usize) => Set: set(vr, n, values, m);
+            fmi3SetUInt64(vr: References, n: usize, values: *const u64, m: usize) => Set: set(vr, n, values, m);
+            fmi3SetString(vr: References, n: usize, values: *const Text, m: usize) => Set: set_texts(vr, n, values, m);
             fmi3SetBinary(vr: References, n: usize, _sizes: *const usize, _v: *const *const u8, m: usize)
                 => Set: none(vr, n, m, "bytes");
             fmi3SetClock(_vr: References, _n: usize, _v: *const Fmi3Boolean) => Unsupported: unsupported("clocks");

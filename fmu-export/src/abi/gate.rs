@@ -1,15 +1,17 @@
 //! The gate: every call on an instance passes here. NULL, re-entry, standard and lifecycle are checked, panics caught,
 //! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
 
+use crate::blob;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Allowed, Call, Next, Standard};
 use crate::log::{Log, Status};
 use crate::message;
+use crate::resources::folder;
 use crate::snapshot::Snapshot;
-use fmu_core::{Exported, Fault, Interface};
+use fmu_core::{Exported, Fault, Interface, Model};
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
-use std::ffi::{c_int, c_void};
+use std::ffi::{CStr, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Which function was called: its name in C and its row of the lifecycle table.
@@ -119,14 +121,24 @@ pub(crate) fn open<E: Exported>(
     entry: Entry,
     log: Log,
     name: Result<String, Fault>,
+    resources: Option<&CStr>,
     interface: Interface,
     early_return: bool,
 ) -> *mut c_void {
-    let model = || catch_unwind(|| Snapshot::new(interface)).map_err(|payload| panicked(payload.as_ref()));
+    let model = || {
+        let loaded = catch_unwind(|| {
+            let mut current = Snapshot::<E::Model>::new(interface);
+            current.block.model.load(folder(resources).as_deref())?;
+            let shelf = blob::shelf(&current.block.model);
+            Ok((current, shelf))
+        });
+        loaded.unwrap_or_else(|payload| Err(panicked(payload.as_ref())))
+    };
     match name.and_then(|name| Ok((name, model()?))) {
-        Ok((name, current)) => {
+        Ok((name, (current, shelf))) => {
+            let loaded = (!shelf.is_empty()).then(|| Box::new(current.block.model.clone()));
             let mut instance = Instance::<E>::new(entry.standard, name, log, current);
-            instance.early_return = early_return;
+            (instance.shelf, instance.loaded, instance.early_return) = (shelf, loaded, early_return);
             Box::into_raw(Box::new(Handle { busy: Cell::new(false), instance: UnsafeCell::new(instance) })).cast()
         }
         Err(fault) => {

@@ -11,10 +11,13 @@ mod logger;
 mod pointer;
 pub mod types;
 
-use fmu_core::{Description, Exported, Fault};
+use crate::blob;
+use crate::snapshot::Snapshot;
+use fmu_core::{Description, Exported, Fault, Model};
 use std::ffi::{CStr, c_int, c_void};
 use std::marker::PhantomData;
 use std::panic::{catch_unwind, set_hook};
+use std::path::Path;
 use std::sync::Once;
 use types::Instance;
 
@@ -29,13 +32,23 @@ impl<E: Exported> Abi<E> {
         unsafe { gate::close::<E>(instance) }
     }
 
-    /// Passes the model's description to `sink` as JSON and returns 0, or a message and 1.
-    pub fn describe(
+    /// Passes the model's description to `sink` as JSON and returns 0, or a message and 1. `resources` is the folder of the
+    /// model's resources, or NULL.
+    ///
+    /// # Safety
+    /// `resources` is NULL or a C string.
+    pub unsafe fn describe(
         sink: extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize),
         context: *mut c_void,
+        resources: types::Text,
     ) -> c_int {
+        // SAFETY: the caller's promise.
+        let resources = crate::resources::folder(unsafe { pointer::text(resources) });
         let json = catch_unwind(|| {
-            let description = Description::exported::<E>()?;
+            let description = Description::loaded::<E>(resources.as_deref())?;
+            if changes_on_loading::<E::Model>(resources.as_deref())? {
+                return Err(Fault::new("load changes what a state saves: what it reads belongs into a Resource"));
+            }
             serde_json::to_string(&description).map_err(|e| Fault::new(e.to_string()))
         });
         let json = json.unwrap_or_else(|_| Err(Fault::new("a fault in the model's code (panic)")));
@@ -46,6 +59,16 @@ impl<E: Exported> Abi<E> {
         sink(context, text.as_ptr(), text.len());
         status
     }
+}
+
+/// Whether `load` changes more than resources: a reset would undo it, and a saved state hold it.
+fn changes_on_loading<M: Model>(resources: Option<&Path>) -> Result<bool, Fault> {
+    let fresh = Snapshot::<M>::default();
+    let mut loaded = Snapshot::<M>::default();
+    loaded.block.model.load(resources)?;
+    let before = blob::write(&fresh)?;
+    // A model whose bytes differ by themselves, as those of a hash map do, tells nothing.
+    Ok(before == blob::write(&Snapshot::<M>::default())? && before != blob::write(&loaded)?)
 }
 
 /// A panic becomes a log message, so the hook that would print it is silenced. The hook is the binary's own: a cdylib
@@ -155,12 +178,14 @@ macro_rules! export {
             $crate::export_fmi3!(This);
 
             #[unsafe(no_mangle)]
-            pub(crate) extern "C" fn fmu_description(
+            pub(crate) unsafe extern "C" fn fmu_description(
                 sink: extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize),
                 context: *mut c_void,
+                resources: Text,
             ) -> c_int {
                 $crate::abi::quiet();
-                $crate::abi::Abi::<This>::describe(sink, context)
+                // SAFETY: what `fmu build` passes.
+                unsafe { $crate::abi::Abi::<This>::describe(sink, context, resources) }
             }
         }
     };

@@ -35,8 +35,15 @@ pub(crate) enum Kind {
     /// In FMI 3.0 a type of its own, `Int64`.
     Enumeration,
     Boolean,
-    /// One of the types that no variable has.
+    /// One of the types that no variable of this model has.
     Foreign(u8),
+}
+
+impl Kind {
+    /// Bytes, which no variable of any model has: their getter and setter look at references alone.
+    pub(crate) fn is_binary(self, version: u8) -> bool {
+        version == 3 && matches!(self, Self::Foreign(8..))
+    }
 }
 
 /// What is wrong with the arrays of a getter or setter.

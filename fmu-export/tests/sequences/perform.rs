@@ -98,7 +98,7 @@ struct Memory {
 
 impl Memory {
     fn new(version: u8, kind: Kind, references: &[u32], arrays: Arrays) -> Self {
-        let of = |&r: &u32| if let Kind::Foreign(_) = kind { 1 } else { elements(version, r).unwrap_or(1) };
+        let of = |&r: &u32| if kind.is_binary(version) { 1 } else { elements(version, r).unwrap_or(1) };
         let m: usize = references.iter().map(of).sum();
         let m = match arrays {
             Arrays::More if version == 3 => m + 1,

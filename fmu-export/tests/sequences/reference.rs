@@ -67,7 +67,7 @@ impl Snapshot {
 
     fn integer(&self, reference: u32) -> i32 {
         self.slot(reference, |slot| match slot {
-            Slot::Integer(x) => *x,
+            Slot::Integer(x) => i32::try_from(x.get()).unwrap(),
             Slot::Enumeration(x) => x.get(),
             _ => unreachable!(),
         })
@@ -80,9 +80,10 @@ impl Snapshot {
     fn put(&mut self, reference: u32, value: Mixed) {
         match Probe::TABLE.entry(&mut self.block, reference as usize - 1).unwrap().1 {
             Slot::Real(x) => *x = value.real,
-            Slot::Integer(x) => *x = i32::try_from(value.integer).unwrap(),
+            Slot::Integer(x) => assert!(x.set(value.integer.into())),
             Slot::Boolean(x) => *x = value.truth != 0,
             Slot::Enumeration(x) => assert!(x.set(i32::try_from(value.integer).unwrap())),
+            _ => unreachable!(),
         }
     }
 
@@ -246,7 +247,7 @@ impl Reference {
         let mut bits = Vec::new();
         let status = self.call(GET, |it| {
             it.arrays(kind, references, arrays)?;
-            if let Kind::Foreign(_) = kind {
+            if kind.is_binary(it.version) {
                 return if references.is_empty() { Ok(OK) } else { Err(()) };
             }
             it.now.refresh()?;
@@ -264,9 +265,10 @@ impl Reference {
     /// Whether the arrays can be used at all.
     fn arrays(&self, kind: Kind, references: &[u32], arrays: Arrays) -> Result<(), ()> {
         let empty = references.is_empty();
-        let foreign = matches!(kind, Kind::Foreign(_));
-        // Bytes are always aligned, and a type that no variable has is refused before its values are looked at.
-        let aligned = foreign || (kind == Kind::Boolean && self.version == 3);
+        let foreign = kind.is_binary(self.version);
+        // Bytes are always aligned, and Binary is refused before its values are looked at.
+        let byte = matches!(kind, Kind::Boolean | Kind::Foreign(1 | 2));
+        let aligned = foreign || (byte && self.version == 3);
         let usable = match arrays {
             Arrays::Good => true,
             Arrays::NullReferences | Arrays::NullValues => empty,

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use libloading::Library;
-use std::ffi::{c_int, c_void};
+use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::Path;
 
 /// Declares a struct of C functions, each with the symbol it is found under, and a loader that names a missing one.
@@ -53,13 +53,14 @@ fn reason(error: &libloading::Error) -> String {
 }
 
 type Sink = extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize);
-type Describe = unsafe extern "C" fn(sink: Sink, context: *mut c_void) -> c_int;
+type Describe = unsafe extern "C" fn(sink: Sink, context: *mut c_void, resources: *const c_char) -> c_int;
 
-/// The description that a library made with `fmu_export::export!` returns.
+/// The description that a library made with `fmu_export::export!` returns, with the folder of the model's resources.
 ///
 /// # Errors
-/// The file is not a library for this platform, or was not made by this version of the exporter.
-pub fn describe(path: &Path) -> Result<fmu_core::Description, Error> {
+/// The file is not a library for this platform, or was not made by this version of the exporter; the model refuses its
+/// resources.
+pub fn describe(path: &Path, resources: Option<&Path>) -> Result<fmu_core::Description, Error> {
     extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {
         if context.is_null() || bytes.is_null() {
             return;
@@ -70,13 +71,15 @@ pub fn describe(path: &Path) -> Result<fmu_core::Description, Error> {
         text.extend_from_slice(bytes);
     }
     let library = load(path)?;
+    let resources = resources.map(|folder| CString::new(crate::file_uri(folder)).unwrap_or_default());
+    let resources = resources.as_ref().map_or(std::ptr::null(), |uri| uri.as_ptr());
     let mut json: Vec<u8> = Vec::new();
     // SAFETY: the symbol belongs to this exporter, which gives it this type.
     let describe = unsafe { library.get::<Describe>("fmu_description") }.map_err(|_| {
         Error::file(path, "has no function fmu_description: not a library made with fmu_export::export!")
     })?;
-    // SAFETY: the function calls the sink with the context, before it returns; both live until then.
-    let status = unsafe { describe(collect, (&raw mut json).cast()) };
+    // SAFETY: the function calls the sink with the context, before it returns; both live until then, and so does the text.
+    let status = unsafe { describe(collect, (&raw mut json).cast(), resources) };
     if status != 0 {
         let said = String::from_utf8_lossy(&json);
         return Err(Error::file(path, format!("fmu_description returned {status}: {said}")));

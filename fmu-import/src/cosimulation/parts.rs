@@ -105,10 +105,8 @@ impl Parts {
         let description = self.0[port.instance].description();
         let variable = description.variable(&port.name);
         let unit = variable.and_then(|v| v.unit.clone());
-        let shown = variable.and_then(|v| v.display_unit.as_ref());
-        let definition = unit.as_ref().and_then(|u| description.unit(u));
-        let display = definition.zip(shown).and_then(|(unit, name)| unit.display_unit(name));
-        Column { name: name.into(), unit: unit.unwrap_or_default(), display: display.cloned(), values: Vec::new() }
+        let display = variable.and_then(|v| description.display_unit(v, None));
+        Column { name: name.into(), unit: unit.unwrap_or_default(), display, values: Vec::new() }
     }
 }
 

@@ -79,6 +79,7 @@ fn definition(element: &Element, base: BaseType, typed: &Element) -> Result<Type
         quantity: owned(typed, "quantity"),
         unit: owned(typed, "unit"),
         display_unit: owned(typed, "displayUnit"),
+        relative: boolean(typed, "relativeQuantity")?,
         min: number(typed, "min")?,
         max: number(typed, "max")?,
         nominal: number(typed, "nominal")?,

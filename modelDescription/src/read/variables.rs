@@ -92,6 +92,7 @@ fn variable(
         quantity: owned(typed, "quantity").or_else(|| inherited(|t| &t.quantity)),
         display_unit: owned(typed, "displayUnit").or_else(|| inherited(|t| &t.display_unit).filter(|_| same_unit)),
         unit: unit.or_else(|| inherited(|t| &t.unit)),
+        relative: boolean(typed, "relativeQuantity")?.or(declared.and_then(|t| t.relative)).unwrap_or(false),
         min: number(typed, "min")?.or(declared.and_then(|t| t.min)),
         max: number(typed, "max")?.or(declared.and_then(|t| t.max)),
         nominal: number(typed, "nominal")?.or(declared.and_then(|t| t.nominal)),

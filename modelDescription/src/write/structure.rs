@@ -86,7 +86,7 @@ impl<'a> Numbering<'a> {
         let mut variables = Vec::new();
         for v in &description.variables {
             let mut numbers = Vec::new();
-            for (_, reference) in (0..v.dimension.unwrap_or(1)).zip(v.value_reference..) {
+            for (_, reference) in (0..v.elements()).zip(v.value_reference..) {
                 index += 1;
                 let number = if version == FmiVersion::V2 { index } else { v.value_reference };
                 numbers.push(number);

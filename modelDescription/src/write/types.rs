@@ -70,14 +70,17 @@ pub(super) fn definitions(description: &Description, version: FmiVersion) -> Opt
 
 fn definition(kind: &VariableKind, version: FmiVersion) -> Option<Element> {
     let (name, description, base, three) = match kind {
-        VariableKind::Real { quantity, unit, display, .. } if !quantity.is_empty() => {
+        // FMI 3.0 has other types for single precision; its variables say the same themselves.
+        VariableKind::Real { single: true, .. } if version == FmiVersion::V3 => return None,
+        VariableKind::Real { quantity, unit, display, relative, .. } if !quantity.is_empty() => {
             let display = display.as_ref().map(|(name, ..)| name.as_str()).filter(|_| !unit.is_empty());
             // A number without a unit measures no quantity either.
             let measured = Some(quantity.as_str()).filter(|_| !unit.is_empty());
             let base = Element::new("Real")
                 .with_some("quantity", measured)
                 .with_text("unit", unit)
-                .with_some("displayUnit", display);
+                .with_some("displayUnit", display)
+                .with_some("relativeQuantity", relative.then_some("true"));
             (quantity, "", base, "Float64Type")
         }
         VariableKind::Enumeration { name, description, items } => {

@@ -11,7 +11,8 @@ use crate::xml::Element;
 use fmu_core::Description;
 use fmu_core::description::{TIME, Value, Variable, VariableKind};
 use fmu_core::unit::SECOND;
-use fmu_core::{Causality, Variability};
+use fmu_core::variable::position;
+use fmu_core::{Causality, IntegerType, Range, Variability};
 
 /// All variables.
 pub(super) fn variables(description: &Description, version: FmiVersion) -> Element {
@@ -51,46 +52,59 @@ fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
     let element = |name: &str, offset: u32, start: Option<&Value>| {
         let mut typed = Element::new(match v.kind {
             VariableKind::Real { .. } => "Real",
-            VariableKind::Integer => "Integer",
+            VariableKind::Integer(_) => "Integer",
             VariableKind::Boolean => "Boolean",
             VariableKind::Enumeration { .. } => "Enumeration",
+            VariableKind::Text => "String",
         });
-        typed.attributes = type_attributes(v);
-        typed = typed.with_some("derivative", state.clone()).with_some("start", start.map(text));
+        typed.attributes = type_attributes(v, FmiVersion::V2);
+        typed = typed
+            .with_some("derivative", state.clone())
+            .with_some("start", start.map(|value| text(v, value, FmiVersion::V2)));
         identity("ScalarVariable", v, name, v.value_reference.saturating_add(offset)).children([typed])
     };
     let start = |i: usize| v.start.as_ref().and_then(|all| all.get(i));
-    match v.dimension {
-        None => vec![element(&v.name, 0, start(0))],
-        Some(n) => (0..n).zip(0..).map(|(i, k)| element(&format!("{}[{}]", v.name, i + 1), k, start(i))).collect(),
+    if !v.is_array() {
+        return vec![element(&v.name, 0, start(0))];
     }
+    let of_array = |(i, k)| element(&format!("{}{}", v.name, position(&v.shape, i)), k, start(i));
+    (0..v.elements()).zip(0..).map(of_array).collect()
 }
 
 /// Position in the list of FMI 2.0, from 1; time is the first.
 fn index(description: &Description, reference: u32) -> usize {
     let before = description.variables.iter().take_while(|v| v.value_reference != reference);
-    2 + before.map(|v| v.dimension.unwrap_or(1)).sum::<usize>()
+    2 + before.map(Variable::elements).sum::<usize>()
 }
 
 /// One variable of FMI 3.0, scalar or array.
 fn variable(v: &Variable) -> Element {
     let base = match v.kind {
-        VariableKind::Real { .. } => "Float64",
-        VariableKind::Integer => "Int32",
+        VariableKind::Real { single: false, .. } => "Float64",
+        VariableKind::Real { single: true, .. } => "Float32",
+        VariableKind::Integer(of) => of.name(),
         VariableKind::Boolean => "Boolean",
         VariableKind::Enumeration { .. } => "Enumeration",
+        VariableKind::Text => "String",
     };
     let mut element = identity(base, v, &v.name, v.value_reference);
-    element.attributes.extend(type_attributes(v));
-    let start = v.start.as_ref().map(|all| all.iter().map(text).collect::<Vec<_>>().join(" "));
-    let dimension = v.dimension.map(|n| Element::new("Dimension").with("start", n.to_string()));
+    element.attributes.extend(type_attributes(v, FmiVersion::V3));
+    let starts: Option<Vec<String>> =
+        v.start.as_ref().map(|all| all.iter().map(|value| text(v, value, FmiVersion::V3)).collect());
+    if v.kind == VariableKind::Text {
+        let starts = starts.into_iter().flatten();
+        return element.children(starts.map(|value| Element::new("Start").with("value", value)));
+    }
+    let dimensions = v.shape.iter().map(|n| Element::new("Dimension").with("start", n.to_string()));
     let state = v.derivative.map(|reference| reference.to_string());
-    element.with_some("derivative", state).with_some("start", start).children(dimension)
+    let start = starts.map(|all| all.join(" "));
+    element.with_some("derivative", state).with_some("start", start).children(dimensions)
 }
 
 /// The properties of the variable that do not depend on its base type.
 fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> Element {
     let (causality, initial) = match v.causality {
+        Causality::Local if v.variability == Variability::Constant => ("local", Some("exact")),
         Causality::Parameter => ("parameter", Some("exact")),
         Causality::CalculatedParameter => ("calculatedParameter", Some("calculated")),
         // FMI 2.0 forbids `initial` on an input, FMI 3.0 allows only the default.
@@ -103,6 +117,7 @@ fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> El
         Variability::Tunable => "tunable",
         Variability::Discrete => "discrete",
         Variability::Continuous => "continuous",
+        Variability::Constant => "constant",
     };
     Element::new(element)
         .with("name", name)
@@ -115,15 +130,18 @@ fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> El
 
 /// Type definition, unit and bounds. The XML cannot express a strict bound, so it is written like any other; the FMU
 /// refuses the bound itself and gives the reason.
-fn type_attributes(v: &Variable) -> Vec<(String, String)> {
+fn type_attributes(v: &Variable, version: FmiVersion) -> Vec<(String, String)> {
     let element = Element::default();
     let element = match &v.kind {
-        VariableKind::Real { quantity, unit, display, .. } => {
+        VariableKind::Real { quantity, unit, display, relative, single, .. } => {
             let display = display.as_ref().map(|(name, ..)| name.as_str()).filter(|_| !unit.is_empty());
+            // Type definitions are of double precision.
+            let declared = if *single && version == FmiVersion::V3 { "quantity" } else { "declaredType" };
             element
-                .with_text("declaredType", quantity)
+                .with_text(declared, quantity)
                 .with_text("unit", unit)
                 .with_some("displayUnit", display)
+                .with_some("relativeQuantity", relative.then_some("true"))
                 .with_some("min", v.min.map(number::format))
                 .with_some("max", v.max.map(number::format))
                 // A magnitude, greater than 0 in both standards.
@@ -131,23 +149,31 @@ fn type_attributes(v: &Variable) -> Vec<(String, String)> {
                 .with_some("unbounded", v.unbounded.then(|| "true".to_owned()))
                 .with_some("reinit", v.reinit.then(|| "true".to_owned()))
         }
-        VariableKind::Integer => {
-            // xs:int: rounded inwards, and omitted if every integer is inside.
-            let representable = |x: &f64| x.abs() <= f64::from(i32::MAX);
+        VariableKind::Integer(of) => {
+            // Rounded inwards, and omitted where the type has no value beyond: in FMI 2.0 that is xs:int for all of them.
+            let carried = if version == FmiVersion::V2 { IntegerType::Int32 } else { *of };
+            let ((low, high), (least, greatest)) =
+                (of.within(&Range { above: false, below: false, ..v.range() }), carried.bounds());
             element
-                .with_some("min", v.min.map(f64::ceil).filter(representable).map(number::format))
-                .with_some("max", v.max.map(f64::floor).filter(representable).map(number::format))
+                .with_some("min", (low > least && low <= greatest).then(|| low.to_string()))
+                .with_some("max", (high < greatest && high >= least).then(|| high.to_string()))
         }
-        VariableKind::Boolean => element,
+        VariableKind::Boolean | VariableKind::Text => element,
         VariableKind::Enumeration { name, .. } => element.with("declaredType", name),
     };
     element.attributes
 }
 
-fn text(value: &Value) -> String {
+fn text(v: &Variable, value: &Value, version: FmiVersion) -> String {
     match value {
+        // The shortest text that reads back as the same number in single precision; FMI 2.0 reads double precision.
+        #[expect(clippy::cast_possible_truncation, reason = "exact")]
+        Value::Real(x) if version == FmiVersion::V3 && matches!(v.kind, VariableKind::Real { single: true, .. }) => {
+            number::format((*x as f32).to_string().parse().unwrap_or(*x))
+        }
         Value::Real(x) => number::format(*x),
         Value::Integer(x) => x.to_string(),
         Value::Boolean(x) => x.to_string(),
+        Value::Text(x) => x.clone(),
     }
 }

@@ -5,7 +5,7 @@
 use fmu_core::description::{Member, ModelExchange, Terminal, TerminalPicture, Value, Variable, VariableKind};
 use fmu_core::terminal::{MatchingRule, MemberKind};
 use fmu_core::unit::{ONE, Quantity, RAD_PER_S, SPEED, Unit, VOLT};
-use fmu_core::{Causality, Description, Experiment, Variability};
+use fmu_core::{Causality, Description, Experiment, IntegerType, Variability};
 use model_description::{FmiVersion, Generation, write};
 
 /// Both standards.
@@ -29,6 +29,8 @@ pub(crate) fn real(quantity: &Quantity) -> VariableKind {
         exponents: quantity.unit.exponents,
         factor: quantity.unit.factor,
         display: quantity.display.map(|d| (d.name.into(), d.factor, d.offset)),
+        relative: quantity.relative,
+        single: false,
     }
 }
 
@@ -51,7 +53,7 @@ pub(crate) fn variable(
         below: false,
         nominal: None,
         unbounded: false,
-        dimension: None,
+        shape: Vec::new(),
         start: None,
         initial_dependencies: None,
         dependencies: None,
@@ -75,6 +77,8 @@ pub(crate) fn sample() -> Description {
         exponents: ONE.unit.exponents,
         factor: 0.01,
         display: Some(("ppm".into(), 1e4, 0.5)),
+        relative: false,
+        single: false,
     };
     let variables = vec![
         Variable {
@@ -93,11 +97,11 @@ pub(crate) fn sample() -> Description {
             start: Some(vec![Value::Integer(3)]),
             min: Some(1.0),
             max: Some(3e9),
-            ..variable("motor.n_p", 3, parameter, VariableKind::Integer)
+            ..variable("motor.n_p", 3, parameter, VariableKind::Integer(IntegerType::Int32))
         },
         Variable {
             start: Some(vec![Value::Real(0.1), Value::Real(-1e-7), Value::Real(1.0 / 3.0)]),
-            dimension: Some(3),
+            shape: vec![3],
             ..variable("filter.b", 4, parameter, real(&ONE))
         },
         Variable { start: Some(vec![Value::Integer(3)]), ..variable("observer", 7, parameter, observer) },
@@ -115,7 +119,10 @@ pub(crate) fn sample() -> Description {
             initial_dependencies: Some(vec![]),
             ..variable("speed", 11, (Causality::Output, Variability::Continuous), real(&SPEED))
         },
-        Variable { initial_dependencies: Some(vec![0, 8]), ..variable("sector", 12, output, VariableKind::Integer) },
+        Variable {
+            initial_dependencies: Some(vec![0, 8]),
+            ..variable("sector", 12, output, VariableKind::Integer(IntegerType::Int32))
+        },
         Variable { initial_dependencies: Some(vec![2]), ..variable("ready", 13, output, VariableKind::Boolean) },
         variable("inner", 14, (Causality::Local, Variability::Continuous), real(&SPEED)),
     ];

@@ -43,7 +43,10 @@ pub(super) fn guarded(args: &Simulate) -> Result<()> {
         !timeout.is_zero() && since.elapsed() > timeout
     })?;
     if !report.left.is_empty() {
-        eprintln!("warning: the FMUs left processes behind, which are ended now: {}", report.left.join(", "));
+        fmu_check::message::warning(&format!(
+            "the FMUs left processes behind, which are ended now: {}",
+            report.left.join(", ")
+        ));
     }
     let result = std::fs::read_to_string(folder.join(RESULT)).ok();
     let result = result.as_deref().and_then(|text| text.split_once(' '));

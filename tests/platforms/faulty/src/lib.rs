@@ -1,7 +1,6 @@
 //! An FMU whose steps can be told to fail and to panic: what `tests/platforms.rs` runs on every platform.
 #![allow(missing_docs, dead_code, unreachable_pub)]
 
-#[path = "../../../../fmu-export/tests/common/model.rs"]
 mod model;
 
 fmu_export::export!(model::Probe);

@@ -1,0 +1,32 @@
+//! Messages on standard error, with a colored first word on a terminal. `NO_COLOR` takes the color away, `CLICOLOR_FORCE` gives it
+//! to files and pipes too.
+
+use clap::builder::Styles;
+use clap::builder::styling::{AnsiColor, Style};
+
+/// Colors of the help.
+pub const HELP: Styles = Styles::styled()
+    .header(AnsiColor::Green.on_default().bold())
+    .usage(AnsiColor::Green.on_default().bold())
+    .literal(AnsiColor::Cyan.on_default().bold())
+    .placeholder(AnsiColor::Cyan.on_default());
+
+/// Why the command ends.
+pub fn error(text: &str) {
+    say(AnsiColor::Red, "error", text);
+}
+
+/// What may make a result wrong.
+pub fn warning(text: &str) {
+    say(AnsiColor::Yellow, "warning", text);
+}
+
+/// What is good to know.
+pub fn note(text: &str) {
+    say(AnsiColor::Cyan, "note", text);
+}
+
+fn say(color: AnsiColor, word: &str, text: &str) {
+    let style: Style = color.on_default().bold();
+    anstream::eprintln!("{style}{word}:{style:#} {text}");
+}

@@ -1,0 +1,123 @@
+//! Data that a model reads from files at instantiation: shared, and no part of a saved state.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::any::Any;
+use std::cell::RefCell;
+use std::mem::{ManuallyDrop, take};
+use std::ops::Deref;
+use std::sync::Arc;
+
+/// What a model read in [`load`](crate::Model::load). A clone shares the data; a saved state does not hold it, and the
+/// exporter puts it back when a state is read from bytes. Before `load`, it is the default of its type.
+///
+/// It is a field of the model like any other, but not one inside a list whose length changes.
+///
+/// ```
+/// # use fmu_core::Resource;
+/// let map = Resource::from(vec![1.0, 2.0]);
+/// assert_eq!(map[1], 2.0);
+/// ```
+#[derive(Debug, Default)]
+pub struct Resource<T>(Arc<T>);
+
+impl<T> Clone for Resource<T> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<T> From<T> for Resource<T> {
+    fn from(data: T) -> Self {
+        Self(Arc::new(data))
+    }
+}
+
+impl<T> Deref for Resource<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+/// Nothing is written.
+impl<T: Send + Sync + 'static> Serialize for Resource<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        SHELF.with_borrow_mut(|shelf| {
+            if shelf.collects {
+                shelf.data.push(self.0.clone());
+            }
+        });
+        serializer.serialize_unit()
+    }
+}
+
+/// What the [`Shelf`] in use has in this place; without one, the default.
+impl<'de, T: Default + Send + Sync + 'static> Deserialize<'de> for Resource<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        <()>::deserialize(deserializer)?;
+        let next = SHELF.with_borrow_mut(|shelf| {
+            shelf.next += 1;
+            shelf.data.get(shelf.next - 1).cloned()
+        });
+        Ok(next.and_then(|data| data.downcast().ok()).map_or_else(Self::default, Self))
+    }
+}
+
+/// The resources of an instance, in the order in which its model is serialized.
+#[derive(Clone, Default)]
+pub struct Shelf(Vec<Arc<dyn Any + Send + Sync>>);
+
+impl Shelf {
+    /// The resources of what is serialized meanwhile.
+    pub fn of(serialize: impl FnOnce()) -> Self {
+        let _cleared = InUse::start(Vec::new(), true);
+        serialize();
+        SHELF.with_borrow_mut(|shelf| Self(take(&mut *shelf.data)))
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Puts the resources into what is deserialized meanwhile.
+    pub fn attach<T>(&self, deserialize: impl FnOnce() -> T) -> T {
+        if self.is_empty() {
+            return deserialize();
+        }
+        let _cleared = InUse::start(self.0.clone(), false);
+        deserialize()
+    }
+}
+
+/// serde passes nothing along, so that the shelf in use is a variable of the thread.
+struct Used {
+    /// Empty but while a shelf is in use. A variable with a destructor would keep the binary from being unloaded.
+    data: ManuallyDrop<Vec<Arc<dyn Any + Send + Sync>>>,
+    next: usize,
+    collects: bool,
+}
+
+thread_local! {
+    static SHELF: RefCell<Used> =
+        const { RefCell::new(Used { data: ManuallyDrop::new(Vec::new()), next: 0, collects: false }) };
+}
+
+/// Empties the thread's shelf at its end, in a panic too.
+struct InUse;
+
+impl InUse {
+    fn start(data: Vec<Arc<dyn Any + Send + Sync>>, collects: bool) -> Self {
+        SHELF.set(Used { data: ManuallyDrop::new(data), next: 0, collects });
+        Self
+    }
+}
+
+impl Drop for InUse {
+    fn drop(&mut self) {
+        let Used { mut data, .. } =
+            SHELF.replace(Used { data: ManuallyDrop::new(Vec::new()), next: 0, collects: false });
+        drop(take(&mut *data));
+    }
+}

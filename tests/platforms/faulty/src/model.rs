@@ -1,0 +1,1 @@
+../../../../fmu-export/tests/common/model.rs

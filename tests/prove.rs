@@ -1,0 +1,110 @@
+//! `fmu prove`: what every archive holds of FMI-LS-REF is what the FMU gives, in this program and in FMPy.
+#![allow(missing_docs)]
+
+mod common;
+
+use common::python;
+use fmu_import::contents;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const FOLDER: &str = "extra/org.fmi-standard.fmi-ls-ref/";
+
+fn prove(folder: &Path, archives: &[PathBuf]) -> Output {
+    let python = python::environment(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fmpy/requirements.txt"));
+    let mut fmu = Command::new(env!("CARGO_BIN_EXE_fmu"));
+    fmu.arg("prove").arg(folder).args(archives).arg("--python").arg(python).output().unwrap()
+}
+
+fn archives() -> Vec<PathBuf> {
+    let names = ["PmsmDrive", "PmsmPlant", "SensorlessController"];
+    let of =
+        |standard: &'static str| names.map(|name| common::archives().join(standard).join(name).with_extension("fmu"));
+    ["fmi2", "fmi3"].into_iter().flat_map(of).collect()
+}
+
+/// Every importer gives the reference results again, and the folders are those that the FMI tools page asks for.
+#[test]
+fn the_reference_results_are_replayed() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = prove(dir.path(), &archives());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !said.contains("note: "), "{said}");
+    for archive in archives() {
+        let (standard, name) = (archive.parent().unwrap().file_name().unwrap(), archive.file_stem().unwrap());
+        let (folder, name) = (dir.path().join(standard).join(name), name.to_str().unwrap());
+        let read = |file: &str| fs::read_to_string(folder.join(file)).unwrap();
+        let readme = read("Readme.txt");
+        for part in [
+            "fmu 0.1.0: ",
+            "FMPy 0.3.32: ",
+            "validate_fmu: no problems",
+            "fmu check: no requirement of the standard",
+            "test with it: Co-Simulation, Model Exchange, FMU state",
+        ] {
+            assert!(readme.contains(part), "{part}: {readme}");
+        }
+        assert_eq!(fs::read(folder.join(format!("{name}.fmu"))).unwrap(), fs::read(&archive).unwrap());
+        assert!(read(&format!("{name}_ref.opt")).starts_with("StartTime, 0.0\nStopTime, 1.0\nStepSize, "));
+        let (md, files) = contents(&archive).unwrap();
+        for file in [format!("{name}_ref.csv"), format!("{name}_in.csv")] {
+            let text = read(&file);
+            assert_eq!(text.as_bytes(), files[&format!("{FOLDER}{file}")]);
+            let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+            let named = |quoted: &&str| md.variable(quoted.trim_matches('"')).is_some() && quoted.starts_with('"');
+            assert!(header[0] == "\"time\"" && header[1..].iter().all(named) && header.len() <= 11, "{header:?}");
+            let times: Vec<f64> = text.lines().skip(1).map(|l| l.split(',').next().unwrap().parse().unwrap()).collect();
+            assert!(times.windows(2).all(|t| t[0] < t[1]) && times.last() == Some(&1.0), "{file}: {times:?}");
+        }
+        // The result moves: a run of constants proves nothing.
+        let result = read(&format!("{name}_ref.csv"));
+        let rows: Vec<&str> = result.lines().skip(1).map(|line| line.split_once(',').unwrap().1).collect();
+        assert!(rows.len() == 201 && rows[200] != rows[100] && rows[100] != rows[0], "{name}: {}", rows[200]);
+    }
+}
+
+/// The manifest names the files that are there, with the roles of the standard, and the set of values fits the FMU.
+#[test]
+fn the_manifest_names_what_is_there() {
+    for archive in archives() {
+        let (md, files) = contents(&archive).unwrap();
+        let text = |file: &str| String::from_utf8(files[&format!("{FOLDER}{file}")].clone()).unwrap();
+        let manifest = text("fmi-ls-manifest.xml");
+        let attribute = |line: &str, name: &str| {
+            line.split_once(&format!(" {name}=\"")).unwrap().1.split('"').next().unwrap().to_owned()
+        };
+        let related: Vec<_> = manifest.lines().filter(|line| line.contains("<Related ")).collect();
+        let roles: Vec<_> = related.iter().map(|line| attribute(line, "role")).collect();
+        assert_eq!(roles, ["result", "experiment/smoke-test", "parameter"], "{manifest}");
+        for line in &related {
+            assert!(!text(&attribute(line, "source")).is_empty());
+        }
+        let experiment = text("smoke-test.exp");
+        for part in ["<Stimuli source=\"", "<References source=\""] {
+            let source = experiment.split_once(part).unwrap().1.split('"').next().unwrap();
+            assert!(files.contains_key(&format!("{FOLDER}{source}")), "{experiment}");
+        }
+        let values = fmu_import::ssp::ssv::read(&text("ipmsm-2.2kw.ssv")).unwrap();
+        assert!(values.len() > 5 && values.iter().all(|p| md.variable(&p.name).is_some()), "{}", archive.display());
+    }
+}
+
+/// A reference that the FMU does not give is found, by each importer.
+#[test]
+fn a_wrong_reference_is_found() {
+    let dir = tempfile::tempdir().unwrap();
+    let (archive, wrong) = (&archives()[3], dir.path().join("PmsmDrive.fmu"));
+    common::rewrite(archive, &wrong, |name, bytes| {
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        Some(if name.ends_with("_ref.csv") { text.replace("\n0.5,-0.", "\n0.5,-9.").into_bytes() } else { bytes })
+    });
+    let output = prove(&dir.path().join("out"), &[wrong]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let deviation = |importer: &str| {
+        let text = said.split_once(&format!("{importer}: ")).unwrap_or_else(|| panic!("{said}")).1;
+        text.split([',', ';']).next().unwrap().parse::<f64>().unwrap()
+    };
+    assert!(deviation("fmu 0.1.0") > 0.1 && deviation("FMPy 0.3.32") > 0.1, "{said}");
+}
