@@ -220,7 +220,7 @@ fn communication_step() {
 
 #[test]
 fn dead_time() {
-    let drive = |dead: bool, compensated: f64, real_sensors: bool| {
+    let drive = |name: &str, dead: bool, compensated: f64, real_sensors: bool| {
         let mut pair = Pair::default();
         if real_sensors {
             let sensor = &mut pair.controller.model.parameters.sensor;
@@ -230,9 +230,14 @@ fn dead_time() {
             pair.plant.model.parameters.inverter.dead_time = 2e-6;
             pair.controller.model.parameters.compensation.u_dead = 6.5 * compensated;
         }
+        let compensation = &mut pair.controller.model.parameters.compensation;
+        compensation.observe = name.contains("observed");
+        compensation.calibrate = name.contains("calibrated");
         pair
     };
-    let plant = drive(true, 0.0, false).plant.model;
+    // A drive that measures its offsets is off for 50 ms.
+    let starts = |p: &Pair, t: f64| !p.controller.model.parameters.compensation.calibrate || t >= 0.05 - 1e-9;
+    let plant = drive("", true, 0.0, false).plant.model;
     let (u, motor) = (plant.parameters.inverter.u_dead(325.0), &plant.parameters.motor);
     let speed = u / (f64::from(motor.n_p) * motor.psi_M) / RPM;
     let sentence = format!("cost a leg {u:.1} V, the EMF of {speed:.0} rpm");
@@ -244,12 +249,16 @@ fn dead_time() {
         ("90 %", true, 0.9, false),
         ("100 %", true, 1.0, false),
         ("100 %, real sensors", true, 1.0, true),
+        ("100 %, observed", true, 1.0, false),
+        ("100 %, real sensors, observed, calibrated", true, 1.0, true),
+        ("90 %, real sensors, observed, calibrated", true, 0.9, true),
         ("110 %", true, 1.1, false),
     ] {
         let mut cells = vec![name.to_owned()];
         for speed in [20.0, 1000.0] {
-            let (mut pair, mut seen) = (drive(dead, compensated, real_sensors), Seen::none());
+            let (mut pair, mut seen) = (drive(name, dead, compensated, real_sensors), Seen::none());
             run(&mut pair, T_S, 3.0, |t, p| {
+                p.controller.model.inputs.enable = starts(p, t);
                 p.controller.model.inputs.speed_ref = from(0.1, t, speed * RPM);
                 if t > 1.0 {
                     seen.see(p);
@@ -257,8 +266,11 @@ fn dead_time() {
             });
             cells.push(format!("{} to {} rpm", number(seen.0, 0), number(seen.1, 0)));
         }
-        let mut pair = drive(dead, compensated, real_sensors);
-        run(&mut pair, T_S, 6.5, |t, p| p.plant.model.inputs.tau_load = from(0.5, t, 2.0));
+        let mut pair = drive(name, dead, compensated, real_sensors);
+        run(&mut pair, T_S, 6.5, |t, p| {
+            p.controller.model.inputs.enable = starts(p, t);
+            p.plant.model.inputs.tau_load = from(0.5, t, 2.0);
+        });
         cells.push(format!("{} at {} rpm", degrees(error(&pair)), number(pair.plant.out.speed / RPM, 1)));
         holds(&cells);
     }

@@ -12,7 +12,9 @@ use crate::PmsmPlant;
 #[cfg(doc)]
 use crate::SensorlessController;
 use crate::control::signals::ControllerOutputs;
-use crate::control::tables::{self, ADAPTATION_OUTPUTS, ENABLED, LATER_OUTPUTS, LIMITED, LOCK_LOST};
+use crate::control::tables::{
+    self, ADAPTATION_OUTPUTS, ControllerParameters, ENABLED, LATER_OUTPUTS, LIMITED, LOCK_LOST,
+};
 use crate::control::weakening::WEAKENING;
 use crate::estimator::resistance::ADAPTATION;
 use crate::estimator::tables::{EstimatorParameters, LATER_ESTIMATOR_PARAMETERS};
@@ -159,7 +161,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 10;
+    const STATE_VERSION: u16 = 11;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -381,6 +383,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 "",
                 &Part { table: ESTIMATORS, lens: |m| &mut m.model.pair.controller.model.parameters.estimators },
             ),
+            V::part("", &Part { table: LATEST, lens: |m| &mut m.model.pair.controller.model.parameters }),
         ]
     },
 );
@@ -392,6 +395,10 @@ const LOSS_PARAMETERS: &Table<PlantParameters> =
 /// The estimators' parameters that joined later.
 const ESTIMATORS: &Table<EstimatorParameters> =
     &Table::new(const { &[Row::part("controller.", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |p| p })] });
+
+/// The controller's parameters that joined last.
+const LATEST: &Table<ControllerParameters> =
+    &Table::new(const { &[Row::part("controller.", &Part { table: tables::LATEST_PARAMETERS, lens: |p| p })] });
 
 type O = Row<ControllerOutputs>;
 

@@ -183,6 +183,11 @@ fn field_weakening_with_an_estimator_that_cannot() {
 fn resistance_adaptation_where_there_is_none() {
     let parts = ["adaptation.resistance = true", "estimator = 4 (ExtendedEmf)", "set estimator = Rasmussen"];
     refused(Kind::ExtendedEmf, |p| p.estimators.adaptation.resistance = true, &parts);
+    let tracking = |p: &mut ControllerParameters| {
+        (p.estimators.adaptation.resistance, p.estimators.adaptation.tracking) = (true, 0.15);
+    };
+    let parts = ["adaptation.tracking = 0.15", "(FluxObserver)", "set adaptation.tracking = 0"];
+    refused(Kind::FluxObserver, tracking, &parts);
 }
 
 #[test]

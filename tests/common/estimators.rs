@@ -20,6 +20,8 @@ struct Experiment {
     speed_ref: Schedule,
     load: Schedule,
     duration: f64,
+    /// Time (s) from which the controller is enabled.
+    on: f64,
 }
 
 /// Every parameter that is not at its start value.
@@ -69,7 +71,7 @@ fn load_step(kind: Kind) -> Experiment {
         (runner::turning(runner::drive(kind), speed), speed * RATED_SPEED, 0.3 * RATED_TORQUE)
     };
     let name = format!("{}: load step", kind.name());
-    Experiment { name, pair, speed_ref: vec![(0.0, speed)], load: vec![(0.2, load)], duration: 0.8 }
+    Experiment { name, pair, speed_ref: vec![(0.0, speed)], load: vec![(0.2, load)], duration: 0.8, on: 0.0 }
 }
 
 fn start(kind: Kind) -> Experiment {
@@ -92,7 +94,7 @@ fn start(kind: Kind) -> Experiment {
         pair.controller.model.parameters.s_2 = 40.0;
     }
     let name = format!("{}: start", kind.name());
-    Experiment { name, pair, speed_ref: vec![(0.6, speed)], load: vec![], duration: 1.6 }
+    Experiment { name, pair, speed_ref: vec![(0.6, speed)], load: vec![], duration: 1.6, on: 0.0 }
 }
 
 /// A cell of the atlas that Rasmussen's observer loses without adaptation: R^ = 0.9 R, 2 N.m driving at 30 rpm.
@@ -102,7 +104,22 @@ fn adapting_at_rest() -> Experiment {
     (par.estimators.adaptation.resistance, par.estimators.adaptation.k_a) = (true, 0.02);
     let speed_ref = vec![(0.0, 0.0), (0.2, std::f64::consts::PI)];
     let name = "Rasmussen: adapting, driven at 30 rpm".into();
-    Experiment { name, pair, speed_ref, load: vec![(1.0, -2.0)], duration: 2.6 }
+    Experiment { name, pair, speed_ref, load: vec![(1.0, -2.0)], duration: 2.6, on: 0.0 }
+}
+
+/// What only `compensation.observe` and `compensation.calibrate` hold: 15 rpm under 2 N.m with a dead time, noise and
+/// offsets, while the resistance is tracked.
+fn with_a_real_inverter() -> Experiment {
+    let mut experiment = adapting_at_rest();
+    let Pair { plant, controller, .. } = &mut experiment.pair;
+    let (truth, par) = (&mut plant.model.parameters, &mut controller.model.parameters);
+    truth.inverter.dead_time = 2e-6;
+    par.compensation.u_dead = truth.inverter.u_dead(plant.model.inputs.u_dc);
+    (par.compensation.observe, par.compensation.calibrate) = (true, true);
+    (par.sensor.noise, par.sensor.offset.a, par.sensor.offset.b) = (0.01, 0.02, -0.02);
+    par.estimators.adaptation.tracking = 0.15;
+    let speed_ref = vec![(0.0, 0.0), (0.25, 0.5 * std::f64::consts::PI)];
+    Experiment { name: "Rasmussen: dead time, offsets, 15 rpm".into(), speed_ref, on: 0.05, ..experiment }
 }
 
 /// A cell of the flux observer's map: R^ = 0.8 R, psi^ = 0.95 psi, both adapting, half the load driving at 0.02 pu.
@@ -114,7 +131,7 @@ fn adapting() -> Experiment {
     let step = |k: u32| (0.2 + 0.1 * f64::from(k), RATED_SPEED * (0.2 - 0.0225 * f64::from(k)));
     let speed_ref = std::iter::once((0.0, 0.2 * RATED_SPEED)).chain((0..=8).map(step)).collect();
     let load = (0..=6).map(|k| (1.5 + 0.05 * f64::from(k), -RATED_TORQUE * f64::from(k) / 12.0)).collect();
-    Experiment { name: "FluxObserver: adapting at 0.02 pu".into(), pair, speed_ref, load, duration: 2.6 }
+    Experiment { name: "FluxObserver: adapting at 0.02 pu".into(), pair, speed_ref, load, duration: 2.6, on: 0.0 }
 }
 
 /// The reversal from 0.5 to -0.5 pu in 0.5 s that only `emf.hold_reversal` holds, under friction of 0.3 pu.
@@ -125,7 +142,7 @@ fn reversal(kind: Kind) -> Experiment {
     par.estimators.emf.hold_reversal = kind != Kind::FluxObserver;
     let step = |k: u32| (0.3 + 0.01 * f64::from(k), RATED_SPEED * (0.5 - 0.02 * f64::from(k)));
     let speed_ref = std::iter::once((0.0, 0.5 * RATED_SPEED)).chain((0..=50).map(step)).collect();
-    Experiment { name: format!("{}: reversal", kind.name()), pair, speed_ref, load: vec![], duration: 1.6 }
+    Experiment { name: format!("{}: reversal", kind.name()), pair, speed_ref, load: vec![], duration: 1.6, on: 0.0 }
 }
 
 impl Experiment {
@@ -142,6 +159,7 @@ impl Experiment {
                 speed.push(p.plant.out.speed);
                 theta_est.push(p.controller.out.theta_est);
             }
+            p.controller.model.inputs.enable = t >= self.on - 1e-9;
             p.set_inputs(at(&self.speed_ref, t), at(&self.load, t), u_dc);
         });
         let reference = at(&self.speed_ref, self.duration);
@@ -150,7 +168,7 @@ impl Experiment {
         assert!(error.abs() < 20.0, "{}: {error} deg off", self.name);
         json!({
             "name": self.name, "plant": plant, "controller": controller, "u_dc": u_dc, "speed_ref": self.speed_ref,
-            "load": self.load, "steps": (speed.len() - 1) * EVERY as usize, "every": EVERY, "speed": speed,
+            "load": self.load, "on": self.on, "steps": (speed.len() - 1) * EVERY as usize, "every": EVERY, "speed": speed,
             "theta_est": theta_est,
         })
     }
@@ -159,6 +177,7 @@ impl Experiment {
 /// All experiments.
 pub fn experiments() -> Value {
     let all = Kind::ALL.iter().flat_map(|&kind| [load_step(kind), start(kind)]);
-    let later = vec![adapting_at_rest(), adapting(), reversal(Kind::ExtendedEmf), reversal(Kind::FluxObserver)];
+    let reversals = [Kind::ExtendedEmf, Kind::FluxObserver].map(reversal);
+    let later = [adapting_at_rest(), with_a_real_inverter(), adapting()].into_iter().chain(reversals);
     Value::Array(all.chain(later).map(Experiment::run).collect())
 }

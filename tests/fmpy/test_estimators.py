@@ -61,6 +61,7 @@ def test_as_native(archives, standard, experiment):
             theta_est.append(command[3])
         plant.set_reals(to_plant, [*command[:3], at(experiment["load"], t)])
         controller.set_reals(to_controller, [*out, at(experiment["speed_ref"], t)])
+        controller.slave.setBoolean(controller.of("enable"), [t >= experiment["on"] - 1e-9])
         plant.slave.doStep(currentCommunicationPoint=t, communicationStepSize=T_S)
         controller.slave.doStep(currentCommunicationPoint=t, communicationStepSize=T_S)
     plant.close()

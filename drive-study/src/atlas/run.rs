@@ -13,7 +13,8 @@
 //! | lost: angle off by more than | 180 deg, which is never: at rest the d-axis current carries load at 36 deg | 30 deg |
 //!
 //! `noise` is that of sensors with 10 mA per 7.5 A of `limit.i`, `inverter` adds offsets of +20 and -20 mA per 7.5 A and a
-//! dead time of 2 % of T_s, compensated.
+//! dead time of 2 % of T_s, compensated. A drive with `compensation.calibrate` is off for the
+//! first 0.05 s, and the course begins after that.
 
 use super::cell::{Cell, Scenario};
 use super::drive::Drive;
@@ -38,6 +39,8 @@ const HEATING: f64 = 0.4;
 const NOISE: f64 = 0.01 / 7.5;
 /// Offsets of the current sensors a and b as shares of `limit.i`: 20 mA and -20 mA on the reference motor.
 const OFFSET: f64 = 0.02 / 7.5;
+/// Time in s for which a drive with `compensation.calibrate` is off at first.
+const OFF: f64 = 0.05;
 /// Dead time as a share of the sample period: 2 us at 10 kHz.
 const DEAD_TIME: f64 = 0.02;
 
@@ -152,6 +155,13 @@ fn prepared(drive: &Drive, cell: &Cell) -> Pair {
 /// The parameters do not fit together.
 pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
     let mut pair = prepared(drive, cell);
+    let off = if pair.controller.model.parameters.compensation.calibrate { OFF } else { 0.0 };
+    if off > 0.0 {
+        let coasting = &mut pair.plant.model;
+        coasting.parameters.initial.theta_e -=
+            f64::from(coasting.parameters.motor.n_p) * coasting.parameters.initial.speed * off;
+        (coasting.inputs.enable, pair.controller.model.inputs.enable) = (false, false);
+    }
     let heats = cell.scenario == Scenario::Heating;
     let (T_s, cold) = (pair.controller.model.parameters.T_s, pair.plant.model.parameters.motor.R_s);
     let end = if heats { 14.0 } else { 6.0 };
@@ -166,8 +176,10 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
     let mut hot = 0_u32;
     let finished = runner::run_in_steps(&mut pair, T_s, end, |t, p| {
         last = t;
-        let (speed, load) = course(drive.approach, cell, t);
+        let (speed, load) = course(drive.approach, cell, t - off);
         p.controller.model.inputs.speed_ref = speed * drive.speed;
+        let on = t >= off - 1e-9;
+        (p.controller.model.inputs.enable, p.plant.model.inputs.enable) = (on, on);
         p.plant.model.inputs.tau_load = load * drive.torque;
         // A percent at a time.
         let share = if heats { ((t - 2.0) / 10.0).clamp(0.0, 1.0) * 40.0 } else { 0.0 };

@@ -4,6 +4,7 @@ use crate::control::lock::Lock;
 use crate::control::model::SensorlessController;
 use crate::control::signals::ControllerOutputs;
 use crate::control::state::{Command, Mode, References, context};
+use crate::control::tables::Compensation;
 use crate::control::weakening::share;
 use crate::estimator::{Estimate, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
@@ -59,22 +60,39 @@ impl SensorlessController {
         }
     }
 
+    /// Measured currents in A, without the offsets that were found.
+    #[inline]
+    fn currents(&self) -> Phases {
+        let Phases { a, b, c } = self.parameters.sensor.measure(self.inputs.i, self.state.samples);
+        let zero = self.state.offset.i;
+        Phases { a: a - zero.a, b: b - zero.b, c: c - zero.c }
+    }
+
     /// Values from the sensors and the previous samples.
     #[inline]
     fn measure(&self) -> Sample {
         let Self { inputs, parameters: par, state, .. } = self;
-        let i = par.sensor.measure(inputs.i, state.samples).to_stator();
+        let i = self.currents().to_stator();
+        let i_last = if state.k == 0 { i } else { state.i_last };
         // The command applied since the last sample: the newest one if there is no delay.
         let acted = match (par.delay, state.commands) {
             (0, [newest, ..]) => newest,
             (1, [_, older, _]) => older,
             (_, [.., oldest]) => oldest,
         };
+        let Compensation { u_dead, i_zero, observe, .. } = par.compensation;
+        // The trapezoid over the interval.
+        let lost = if observe && u_dead > 0.0 {
+            let at = |i: AlphaBeta| dead_time_loss(0.5 * u_dead, i_zero, Phases::from_stator(i));
+            at(i_last) + at(i)
+        } else {
+            AlphaBeta::ZERO
+        };
         Sample {
             k: state.k,
             i,
-            i_last: if state.k == 0 { i } else { state.i_last },
-            u: acted.u,
+            i_last,
+            u: acted.u - lost,
             u_injected: acted.injected,
             u_pi: state.u_pi,
             i_ref: state.i_ref,
@@ -145,16 +163,16 @@ impl SensorlessController {
         let limitation = acting.from_stator(command - injected) - requested;
         state.current.integrate(&gains.current, i_ref - frame.i, limitation, T_s);
         let injected = if limited { injected * (command.magnitude() / whole.magnitude()) } else { injected };
-        let [newest, older, _] = state.commands;
-        state.commands = [Command { u: command, injected }, newest, older];
+        let (mut output, mut beyond) = (command, false);
         if par.compensation.u_dead > 0.0 {
             let legs = Phases::from_stator(acting.to_stator(i_ref));
             let loss = dead_time_loss(par.compensation.u_dead, par.compensation.i_zero, legs);
-            let (compensated, beyond) = within_hexagon(command + loss, inputs.u_dc);
-            (Phases::from_stator(compensated), limited || beyond, u_share)
-        } else {
-            (Phases::from_stator(command), limited, u_share)
+            (output, beyond) = within_hexagon(command + loss, inputs.u_dc);
         }
+        let [newest, older, _] = state.commands;
+        let u = if par.compensation.observe { output } else { command };
+        state.commands = [Command { u, injected }, newest, older];
+        (Phases::from_stator(output), limited || beyond, u_share)
     }
 
     /// The output `lock_lost`; 0 during a start sequence, because its angle is not an estimate.

@@ -8,7 +8,9 @@ use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
 use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
-use crate::control::tables::{ADAPTATION_OUTPUTS, ControllerParameters, LATER_OUTPUTS, OUTPUTS, PARAMETERS};
+use crate::control::tables::{
+    ADAPTATION_OUTPUTS, ControllerParameters, LATER_OUTPUTS, LATEST_PARAMETERS, OUTPUTS, PARAMETERS,
+};
 use crate::control::weakening::{self, WEAKENING, WeakeningGains};
 use crate::estimator::resistance::ADAPTATION;
 use crate::estimator::tables::LATER_ESTIMATOR_PARAMETERS;
@@ -75,7 +77,11 @@ impl SensorlessController {
         let Self { parameters: par, state, .. } = self;
         let new = State::new(par, false);
         let out = new.computed;
-        *state = State { samples: state.samples, shown: state.shown, ..new };
+        let mut offset = state.offset;
+        if par.compensation.calibrate {
+            offset.update(par.sensor.measure(self.inputs.i, state.samples), par.T_s);
+        }
+        *state = State { samples: state.samples, shown: state.shown, offset, ..new };
         out
     }
 
@@ -90,6 +96,7 @@ impl SensorlessController {
         *state = State {
             samples: state.samples,
             k: state.k,
+            offset: state.offset,
             estimator,
             lock: Lock::lost(),
             computed: state.computed,
@@ -153,7 +160,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 9;
+    const STATE_VERSION: u16 = 10;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
@@ -310,6 +317,7 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             ),
             V::part("", &Part { table: ADAPTATION_OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |m| &mut m.model.parameters.estimators }),
+            V::part("", &Part { table: LATEST_PARAMETERS, lens: |m| &mut m.model.parameters }),
         ]
     },
 );

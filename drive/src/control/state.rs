@@ -10,7 +10,7 @@ use crate::control::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::control::tables::ControllerParameters;
 use crate::control::weakening::{Weakening, WeakeningGains};
 use crate::estimator::{Class, Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
-use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
 use crate::math::wrap;
 use crate::motor::Motor;
 use serde::{Deserialize, Serialize};
@@ -127,6 +127,7 @@ pub(super) struct State {
     pub(super) w_ref: f64,
     /// Output of the current PI at the last sample in V.
     pub(super) u_pi: DqHat,
+    pub(super) offset: Offset,
     pub(super) lock: Lock,
     pub(super) weakening: Weakening,
     /// Time in s for which a limit has reduced the references, while field weakening is in use.
@@ -135,6 +136,28 @@ pub(super) struct State {
     pub(super) computed: ControllerOutputs,
     /// Outputs visible now.
     pub(super) shown: ControllerOutputs,
+}
+
+/// Running mean of the measured currents while the drive rests.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Offset {
+    /// Mean in A.
+    pub(super) i: Phases,
+    /// Number of samples in it, at most those of `MEMORY`.
+    n: f64,
+}
+
+impl Offset {
+    /// Time in s over which the mean extends: currents that decay after the drive was switched off are forgotten.
+    const MEMORY: f64 = 0.02;
+
+    /// One more sample of currents (A) with the sample period `T_s` (s).
+    pub(super) fn update(&mut self, measured: Phases, T_s: f64) {
+        self.n = (self.n + 1.0).min((Self::MEMORY / T_s).max(1.0));
+        let toward = |mean: f64, x: f64| mean + (x - mean) / self.n;
+        let Phases { a, b, c } = self.i;
+        self.i = Phases { a: toward(a, measured.a), b: toward(b, measured.b), c: toward(c, measured.c) };
+    }
 }
 
 impl State {
@@ -317,5 +340,26 @@ mod fixed_size {
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
         <[u8; 8]>::deserialize(from).map(u64::from_le_bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean is exact at once, and forgets currents that were still flowing at first.
+    #[test]
+    fn offsets_are_a_running_mean() {
+        let mut offset = Offset::default();
+        let at = |a: f64| Phases { a, b: -a, c: 0.01 };
+        offset.update(at(0.02), 1e-4);
+        assert!((offset.i.a - 0.02).abs() < 1e-15 && (offset.i.c - 0.01).abs() < 1e-15);
+        offset.update(at(0.04), 1e-4);
+        assert!((offset.i.a - 0.03).abs() < 1e-15 && (offset.i.b + 0.03).abs() < 1e-15);
+        offset.update(at(5.0), 1e-4);
+        for _ in 0..3000 {
+            offset.update(at(0.02), 1e-4);
+        }
+        assert!((offset.i.a - 0.02).abs() < 1e-5, "{}", offset.i.a);
     }
 }

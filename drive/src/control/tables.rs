@@ -10,7 +10,7 @@ use crate::control::start::{START, StartParameters};
 use crate::control::weakening::{WEAKENING, WeakeningParameters};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::Kind;
-use crate::estimator::resistance::ADAPTATION;
+use crate::estimator::resistance::{ADAPTATION, LATER_ADAPTATION};
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters, LATER_ESTIMATOR_PARAMETERS};
 use crate::motor::{MOTOR, Motor};
 use crate::plant::saturation::A_PER_WB2;
@@ -37,18 +37,22 @@ impl Limits {
     }
 }
 
-/// Dead-time compensation, added to the command; the estimators receive the command without it.
+/// Dead-time compensation, added to the command, and what the estimators are told of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compensation {
     /// Voltage that a leg loses in V, >= 0; 0: none.
     pub u_dead: f64,
     /// Current in A below which the compensation is reduced, > 0.
     pub i_zero: f64,
+    /// The estimators take the voltage that the inverter loses at the measured currents.
+    pub observe: bool,
+    /// The offsets of the current sensors are measured while the controller is not enabled.
+    pub calibrate: bool,
 }
 
 impl Default for Compensation {
     fn default() -> Self {
-        Self { u_dead: 0.0, i_zero: 0.1 }
+        Self { u_dead: 0.0, i_zero: 0.1, observe: false, calibrate: false }
     }
 }
 
@@ -69,6 +73,34 @@ const COMPENSATION: &Table<Compensation> = &Table::new(
                 &mut p.i_zero
             })
             .above(0.0),
+        ]
+    },
+);
+
+/// Variables of the compensation that are newer than [`COMPENSATION`]; their owner supplies the prefix `compensation.`.
+const LATER_COMPENSATION: &Table<Compensation> = &Table::new(
+    const {
+        &[
+            C::boolean_parameter(
+                "observe",
+                "The estimators subtract the dead-time voltage at the measured currents; false: they assume that the compensation is exact",
+                |p| &mut p.observe,
+            ),
+            C::boolean_parameter(
+                "calibrate",
+                "The controller measures the offsets of the current sensors while enable is false; false: offsets stay",
+                |p| &mut p.calibrate,
+            ),
+        ]
+    },
+);
+
+/// Parameters that joined the controller last.
+pub const LATEST_PARAMETERS: &Table<ControllerParameters> = &Table::new(
+    const {
+        &[
+            Row::part("adaptation.", &Part { table: LATER_ADAPTATION, lens: |p| &mut p.estimators.adaptation }),
+            Row::part("compensation.", &Part { table: LATER_COMPENSATION, lens: |p| &mut p.compensation }),
         ]
     },
 );
@@ -209,6 +241,7 @@ pub const ALL_PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::part("", &Part { table: PARAMETERS, lens: |p| p }),
             P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
             P::part("adaptation.", &Part { table: ADAPTATION, lens: |p| &mut p.estimators.adaptation }),
+            P::part("", &Part { table: LATEST_PARAMETERS, lens: |p| p }),
             P::part("", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
         ]
     },

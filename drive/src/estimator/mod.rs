@@ -54,8 +54,8 @@ pub struct Sample {
     pub i: AlphaBeta,
     /// Stator current measured at sample k - 1, in A; the first sample repeats the current of sample 0.
     pub i_last: AlphaBeta,
-    /// Stator voltage command that acted in [k - 1, k), in V: limited, with injection, without dead-time compensation,
-    /// held in stator axes. It is the command of sample k - 1 - delay, and so is the injection in it: identify the
+    /// Stator voltage command that acted in [k - 1, k), in V: limited, with injection, without dead-time compensation
+    /// (with `compensation.observe`: with it, less what the legs lose at the measured currents), held in stator axes. It is the command of sample k - 1 - delay, and so is the injection in it: identify the
     /// carrier from `u_injected`, not from the most recently requested sign.
     pub u: AlphaBeta,
     /// The injected part of `u`, in V, reduced in the same way as `u` if the voltage limit applied.

@@ -15,8 +15,8 @@
 //!
 //! w_f is the low-passed mechanical speed; beyond 2 rad/s, g is 0. R^ adapts only where standstill is asked for: at a creeping speed the same
 //! law gives s^3 + c_1 s^2 + (w^2 + k i_d) s + k w i_q, unstable for w i_q < 0. There, x = R~ i_q / w - d shows R~ only
-//! beside the error of psi_M^, and with k = i_q / w as regressor it has a zero at -w i_q / i_d: a generating load lost
-//! 3 to 7 of 56 creeping cells. R^ therefore stays constant while a speed is asked for.
+//! beside the error of psi_M^, and a fast k with i_q / w as regressor lost 3 to 7 of 56 creeping cells with a generating
+//! load. R^ therefore stays constant while a speed is asked for, unless it is tracked.
 //!
 //! **At creep**, the steady state is sin theta~ = -(c_1 d + R~ i_d) / (w psi_M) + c_1 R~ i_q / (w^2 psi_M). A constant
 //! c_1 lets both terms grow without limit towards w = 0: at 30 rpm, psi_M^ = 1.2 psi_M has no equilibrium. With
@@ -24,6 +24,18 @@
 //! damped by k_c / 2. An equilibrium exists for psi_M^ / psi_M <= sqrt(1 + 1 / k_c^2): up to 1.41 with k_c = 1.
 //! A small c_1 needs a known R^: the remaining share r of R~ obeys dr/dt = -b g i_d^2 / (i_d^2 + i_q^2 + i^2) r from
 //! r = 1, and c_1 = c_1' + r^2 (c_1 - c_1'), c_1' = min(c_1, k_c |w|).
+//!
+//! **Tracking at creep** (`adaptation.tracking` = k_t, off at the start): with the regressor i_q / w and only as far as x
+//! exceeds the uncertainty delta psi_M^ (`adaptation.flux`) of the magnet flux,
+//!
+//! ```text
+//! dR^/dt = k_t |w| f (x - sat(x, delta psi_M^)) w i_q / (i_q^2 + (0.12 i)^2),   f = (1 - (w k_c / (2 c_1))^2)^2
+//! ```
+//!
+//! With c_1' = |w|, its poles are those of s^3 + |w| s^2 + (w^2 + k i_d) s + k w i_q, k = k_t |w| w i_q / (i_q^2 + ...):
+//! stable for k_t (1 + i_d / |i_q|) < 1 with a generating load, where the zero at -w i_q / i_d lies in the right
+//! half-plane. So k_t = 0.15 is the useful value; it lags a ramp of R by dR/dt / (k_t |w|). A psi_M^ that is wrong by more
+//! than delta drives R^ off; without i_q, nothing is observable and R^ stays.
 //!
 //! **k_a** adds the voltage k_a R_nom g i_q on the q-axis, which acts like a lower R^ there: dy/dt = k_a R_nom i_q
 //! turns the frame until i_d carries the load, the safe side at rest, where theta~ is not observable: with an exact R^
@@ -48,6 +60,9 @@ const GATE: f64 = 2.0;
 /// Corner frequency in rad/s of the low-pass filter of the speed.
 pub(super) const FILTER: f64 = 100.0;
 
+/// Current i_q below which the tracking slows down, as a share of `adaptation.i`.
+const LITTLE: f64 = 0.12;
+
 /// Parameters of the adaptation; shares are relative to `motor.R_s`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResistanceParameters {
@@ -67,11 +82,26 @@ pub struct ResistanceParameters {
     pub max: f64,
     /// c_1 at creep divided by the electrical speed, > 0.
     pub k_c: f64,
+    /// Rate at which R^ follows R at creep divided by the electrical speed, >= 0; 0: R^ stays constant there.
+    pub tracking: f64,
+    /// Error of psi_M^ that is no sign of R, as a share of psi_M^, >= 0.
+    pub flux: f64,
 }
 
 impl Default for ResistanceParameters {
     fn default() -> Self {
-        Self { resistance: false, k_a: 0.0, bandwidth: 20.0, i: 2.5, start: 0.8, min: 0.4, max: 2.5, k_c: 1.0 }
+        Self {
+            resistance: false,
+            k_a: 0.0,
+            bandwidth: 20.0,
+            i: 2.5,
+            start: 0.8,
+            min: 0.4,
+            max: 2.5,
+            k_c: 1.0,
+            tracking: 0.0,
+            flux: 0.06,
+        }
     }
 }
 
@@ -135,8 +165,27 @@ impl Resistance {
             self.remaining -= self.remaining * rate * i.d() * i.d();
             return Adapted { c_1, v_q };
         }
+        if par.tracking > 0.0 {
+            self.track(context, x, i.q());
+        }
         let low = c_1.min(par.k_c * self.w_f.abs().max(n_p * speed_ref.abs()));
         Adapted { c_1: low + self.remaining * self.remaining * (c_1 - low), v_q }
+    }
+}
+
+impl Resistance {
+    /// A creeping sample with the flux error `x` (Wb) and the current `i_q` (A).
+    #[inline]
+    fn track(&mut self, context: &Context, x: f64, i_q: f64) {
+        let Context { motor, T_s, par, .. } = *context;
+        let (par, c_1) = (&par.adaptation, par.rasmussen.c_1);
+        let known = par.flux * motor.psi_M;
+        let share = self.w_f * par.k_c / (2.0 * c_1);
+        let fade = (1.0 - share * share).max(0.0);
+        let (i_0, excess) = (LITTLE * par.i, x - x.max(-known).min(known));
+        let rate = T_s * par.tracking * self.w_f.abs() * fade * fade;
+        let R = self.R + rate * excess * self.w_f * i_q / (i_q * i_q + i_0 * i_0);
+        self.R = par.within(motor, R);
     }
 }
 
@@ -155,6 +204,16 @@ pub fn validate(kind: Kind, par: &ControllerParameters) -> Result<(), Fault> {
             |p| &mut p.estimators.adaptation.resistance,
             format!(
                 "{} has no resistance adaptation; set estimator = Rasmussen or FluxObserver, or adaptation.resistance = false",
+                ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
+            ),
+        ));
+    }
+    if adaptation.tracking > 0.0 && kind != Kind::Rasmussen {
+        return Err(ALL_PARAMETERS.fault(
+            par,
+            |p| &mut p.estimators.adaptation.tracking,
+            format!(
+                "0 with {}, which adapts the resistance at every speed by itself; set adaptation.tracking = 0, or estimator = Rasmussen",
                 ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
             ),
         ));
@@ -181,6 +240,31 @@ pub fn validate(kind: Kind, par: &ControllerParameters) -> Result<(), Fault> {
 }
 
 type P = Row<ResistanceParameters>;
+
+/// The adaptation's variables that are newer than [`ADAPTATION`]; their owner adds the prefix `adaptation.`.
+pub const LATER_ADAPTATION: &Table<ResistanceParameters> = &Table::new(
+    const {
+        &[
+            P::parameter(
+                "tracking",
+                &ONE,
+                "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed; 0: it stays constant there",
+                |p| &mut p.tracking,
+            )
+            .at_least(0.0)
+            .at_most(1.0),
+            P::parameter(
+                "flux",
+                &ONE,
+                "Error of psi_M that the tracking does not take for one of the resistance, as a share of motor.psi_M",
+                |p| &mut p.flux,
+            )
+            .at_least(0.0)
+            .at_most(1.0)
+            .tunable(),
+        ]
+    },
+);
 
 /// The adaptation's variables; their owner adds the prefix `adaptation.`.
 pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
