@@ -54,7 +54,8 @@ fn every_scenario_and_any_number_of_threads() {
     assert_eq!(csv.lines().count(), 16);
     assert!(markdown.contains("| SquareWaveInjection | 2.2 kW machine, 14 N.m | load: "), "{markdown}");
     assert!(maps.contains("class=\"l\"") && maps.contains("class=\"h\""), "{maps}");
-    for needs in ["src=", "href=", "@import", "url("] {
+    // Its links are the files beside it.
+    for needs in ["src=", "href=\"http", "href=\"/", "@import", "url("] {
         assert!(!page.contains(needs), "the page needs {needs}");
     }
     assert!(page.contains("prefers-color-scheme:dark") && page.contains("width=device-width"));
