@@ -208,3 +208,25 @@ fn within_hexagon(u: AlphaBeta, u_dc: f64) -> (AlphaBeta, bool) {
     let span = Phases::from_stator(u).span();
     (limit_span(u, span, u_dc), span > u_dc)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Inside +-i_zero a leg is a resistance of 6.5 V / 0.1 A: the current that rises from 0.02 to 0.06 A costs 65 * 0.04 V
+    /// of the command that acted, the older one with a delay of one sample.
+    #[test]
+    fn the_estimators_see_what_the_legs_lose() {
+        let mut controller = SensorlessController::default();
+        let par = &mut controller.parameters;
+        (par.compensation.u_dead, par.compensation.i_zero, par.compensation.observe) = (6.5, 0.1, true);
+        let command = |u: f64| Command { u: AlphaBeta::new(u, 0.0), injected: AlphaBeta::ZERO };
+        controller.state.commands = [command(99.0), command(10.0), command(-99.0)];
+        (controller.state.k, controller.state.i_last) = (5, AlphaBeta::new(0.02, 0.0));
+        controller.inputs.i = Phases { a: 0.06, b: -0.03, c: -0.03 };
+        let u = controller.measure().u;
+        assert!((u.alpha() - (10.0 - 65.0 * 0.04)).abs() < 1e-12 && u.beta().abs() < 1e-12, "{u:?}");
+        controller.parameters.compensation.observe = false;
+        assert!((controller.measure().u.alpha() - 10.0).abs() < 1e-12);
+    }
+}

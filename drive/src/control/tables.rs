@@ -37,7 +37,17 @@ impl Limits {
     }
 }
 
-/// Dead-time compensation, added to the command, and what the estimators are told of it.
+/// Dead-time compensation, added to the command, and what the estimators are told of it. With u_loss(i) of
+/// [`modulation`](crate::modulation) (V, stator axes, at the currents i in A):
+///
+/// ```text
+/// command of the legs                    u* = u + u_loss(i_ref), limited to the hexagon
+/// voltage of the estimators              u, the command without compensation: exact only for i = i_ref
+///   with `observe`                       u* - (u_loss(i[k-1]) + u_loss(i[k])) / 2, i measured: the trapezoid over [k-1, k)
+/// measured currents with `calibrate`     i - mean of i while the controller is not enabled, over its last 20 ms
+/// ```
+///
+/// Derived here: within +-i_zero, a leg is a resistance u_dead / i_zero that the compensation follows 1.5 T_s late.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compensation {
     /// Voltage that a leg loses in V, >= 0; 0: none.
