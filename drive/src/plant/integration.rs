@@ -3,14 +3,11 @@
 use crate::frame::{AlphaBeta, Dq, Turn};
 use crate::motor::Motor;
 use crate::plant::legs::Legs;
-use crate::plant::losses::Losses;
 use crate::plant::losses::flow::{self, Lossy};
 use crate::plant::losses::region::Sides;
-use crate::plant::machine::Machine;
 use crate::plant::mechanics::Shaft;
 use crate::plant::model::PmsmPlant;
-use crate::plant::power::Energy;
-use crate::plant::rates::{Between, Circuit, Held, Passed, Rates};
+use crate::plant::rates::{Between, Circuit, Driven, Held, Passed};
 use crate::plant::state::{State, axis_at};
 use crate::plant::tables::PlantParameters;
 
@@ -31,43 +28,35 @@ pub(super) const LARGEST_TURN: f64 = 0.25;
 const LARGEST_TURN_WITH_LOSSES: f64 = 0.0625;
 
 impl PmsmPlant {
-    /// One integration step of `h` (s) under the voltage `u` (V), with the classical Runge-Kutta method ([`rk4`]): the
-    /// flux linkage in stator axes, and the angle as the deviation from a motion at constant speed.
+    /// One integration step of `h` (s) with the classical Runge-Kutta method ([`rk4`](crate::integrate::rk4)): the flux
+    /// linkage in stator axes, and the angle as the deviation from a motion at constant speed.
     ///
     /// In stator axes, the flux linkage is the integral of the held voltage minus R_s i. Only this small resistive part
-    /// follows the rotor, so a step is more exact than two of half its length in rotor axes.
+    /// follows the rotor, so a step is more exact than two of half its length in rotor axes. The axes of the motion at
+    /// constant speed do not wait for the stages, whose accelerations then turn them a little.
     #[expect(clippy::inline_always, reason = "as a call, it passes the state through memory: 10 % of a period")]
     #[inline(always)]
-    fn drive<const LOSSY: bool>(&self, start: &State, h: f64, circuit: &impl Circuit) -> (State, Passed) {
-        let motor = &self.warm.motor;
-        let (n_p, half, speed) = (f64::from(motor.n_p), 0.5 * h, start.speed);
-        let psi = circuit.machine().to_stator(start.axis, start.psi);
-        let turn = Turn::new(n_p * half * speed);
-        let middle = start.axis.ahead(turn);
+    pub(super) fn drive(&self, start: &State, h: f64, circuit: &impl Circuit) -> (State, Passed) {
+        let (motor, machine) = (&self.warm.motor, self.machine());
+        let (n_p, half, sixth, speed) = (f64::from(motor.n_p), 0.5 * h, h * (1.0 / 6.0), start.speed);
+        let middle = start.axis.ahead(Turn::new(n_p * half * speed));
+        let end = axis_at(motor, start.angle + h * speed);
+        let psi = machine.to_stator(start.axis, start.psi);
 
-        let k_1 = circuit.rates_in_stator(start.axis, psi, speed);
-        let k_2 = circuit.rates_in_stator(middle, psi + k_1.d_psi * half, speed + k_1.acceleration * half);
-        let axis = middle.ahead(Turn::tiny(n_p * half * half * k_1.acceleration));
-        let k_3 = circuit.rates_in_stator(axis, psi + k_2.d_psi * half, speed + k_2.acceleration * half);
-        let axis = middle.ahead(turn).ahead(Turn::tiny(n_p * half * h * k_2.acceleration));
-        let k_4 = circuit.rates_in_stator(axis, psi + k_3.d_psi * h, speed + k_3.acceleration * h);
+        let (e_1, a_1, k_1) = circuit.slopes(start.axis, psi, speed);
+        let (e_2, a_2, k_2) = circuit.slopes(middle, psi + e_1 * half, speed + a_1 * half);
+        let axis = middle.slightly_ahead(n_p * half * half * a_1);
+        let (e_3, a_3, k_3) = circuit.slopes(axis, psi + e_2 * half, speed + a_2 * half);
+        let axis = end.slightly_ahead(n_p * half * h * a_2);
+        let (e_4, a_4, k_4) = circuit.slopes(axis, psi + e_3 * h, speed + a_3 * h);
 
-        let sixth = h / 6.0;
-        let psi = psi + (k_1.d_psi + (k_2.d_psi + k_3.d_psi) * 2.0 + k_4.d_psi) * sixth;
-        let acceleration = k_2.acceleration + k_3.acceleration;
-        let angle = start.angle + h * (speed + sixth * (k_1.acceleration + acceleration));
-        let speed = speed + sixth * (k_1.acceleration + 2.0 * acceleration + k_4.acceleration);
-        let over = |power: fn(&Rates) -> f64| sixth * (power(&k_1) + 2.0 * (power(&k_2) + power(&k_3)) + power(&k_4));
-        let energy = Energy { r#in: over(|k| k.p_in), mech: over(|k| k.p_mech), loss: over(|k| k.p_loss) };
-        let friction = over(|k| k.losses.friction);
-        let losses = if LOSSY {
-            let [cu, iron] = [over(|k| k.losses.cu), over(|k| k.losses.iron)];
-            Losses { cu, iron, cond: over(|k| k.losses.cond), sw: over(|k| k.losses.sw), friction }
-        } else {
-            Losses { cu: energy.loss - friction, friction, ..Losses::none() }
-        };
-        let axis = axis_at(motor, angle);
-        (State { psi: circuit.machine().from_stator(axis, psi), speed, angle, axis }, Passed { energy, losses })
+        let psi = psi + (e_1 + (e_2 + e_3) * 2.0 + e_4) * sixth;
+        let deviation = h * sixth * (a_1 + a_2 + a_3);
+        let turned = h * speed + deviation;
+        let axis = end.ahead(Turn::tiny(n_p * deviation));
+        let speed = speed + sixth * (a_1 + 2.0 * (a_2 + a_3) + a_4);
+        let state = State { psi: machine.from_stator(axis, psi), speed, angle: start.angle + turned, axis };
+        (state, circuit.passed(&[k_1, k_2, k_3, k_4], h, turned))
     }
 
     /// [`drive`](Self::drive) under the voltage `u` (V).
@@ -81,17 +70,16 @@ impl PmsmPlant {
         legs: &Legs,
         lossy: Option<&Lossy<'_>>,
     ) -> (State, Passed) {
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
-        let shaft = Shaft::new(mechanics, self.inputs.tau_load, start.speed);
+        let shaft = Shaft::new(&self.parameters.mechanics, self.inputs.tau_load, start.speed);
         let held = Held {
-            machine: Machine::new(&self.warm.motor, saturation),
+            machine: self.machine(),
             u,
             legs: legs.drop().then_some(legs),
             // Known to the compiler, so that a step without them takes no time for them.
             lossy: if LOSSY { lossy } else { None },
             shaft: if LOSSY { shaft } else { shaft.without_windage() },
         };
-        self.drive::<LOSSY>(start, h, &held)
+        self.drive(start, h, &Driven::<LOSSY>(held))
     }
 
     /// The same with losses besides that of a constant resistance.
@@ -110,7 +98,7 @@ impl PmsmPlant {
     /// [`drive`](Self::drive) while the currents keep their sides; a function of its own has registers enough.
     #[inline(never)]
     fn drive_between(&self, start: &State, h: f64, circuit: &Between<'_>) -> (State, Passed) {
-        self.drive::<true>(start, h, circuit)
+        self.drive(start, h, circuit)
     }
 
     /// Integration steps over `h` (s) from `state` on with switching legs and losses, and the current (A) by the iron at
@@ -126,9 +114,8 @@ impl PmsmPlant {
         legs: &Legs,
         lossy: &Lossy<'_>,
     ) -> (Passed, Dq) {
-        let PlantParameters { saturation, inverter, mechanics, .. } = &self.parameters;
-        let (motor, zone) = (&self.warm.motor, legs.i_zone());
-        let machine = Machine::new(motor, saturation);
+        let PlantParameters { inverter, mechanics, .. } = &self.parameters;
+        let (motor, zone, machine) = (&self.warm.motor, legs.i_zone(), self.machine());
         let (R_s, n_p) = (machine.resistance(), f64::from(motor.n_p));
         let kinks = legs.drop() || lossy.kinks();
         let within = if kinks { Self::within_the_zone(motor, legs, inverter.devices.threshold()) } else { 0.0 };
@@ -189,7 +176,7 @@ impl PmsmPlant {
     /// Voltage (V) behind the resistance with the current `i` (A) of the flux linkage and the voltage `u` (V) of the legs.
     #[inline(never)]
     fn emf(&self, state: &State, i: AlphaBeta, u: AlphaBeta, legs: &Legs, lossy: &Lossy<'_>) -> AlphaBeta {
-        let machine = Machine::new(&self.warm.motor, &self.parameters.saturation);
+        let machine = self.machine();
         let steady = lossy.steady(state.psi, machine.current(state.psi), state.speed);
         let u = if legs.drop() { u - legs.loss(state.axis.to_stator(steady)) } else { u };
         lossy.flow(machine.resistance(), u, i, state.speed).d_psi

@@ -9,6 +9,7 @@ use crate::math::reciprocal;
 use crate::motor::Motor;
 use crate::plant::saturation::Saturation;
 use fmu_core::Scalar;
+use serde::{Deserialize, Serialize};
 
 /// Flux linkage (Wb) for the current `i` (A) without saturation.
 #[inline]
@@ -29,6 +30,21 @@ pub fn magnetic_energy(motor: &Motor, saturation: &Saturation, psi: Dq) -> f64 {
     0.75 * (x * x / motor.L_d + q * q / motor.L_q) + saturation.energy(motor, psi)
 }
 
+/// The reciprocals of the inductances in 1/H.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Inverse {
+    d: f64,
+    q: f64,
+}
+
+impl Inverse {
+    /// Of this machine.
+    #[inline]
+    pub fn of<S>(motor: &Motor<S>) -> Self {
+        Self { d: reciprocal(motor.L_d), q: reciprocal(motor.L_q) }
+    }
+}
+
 /// The machine with constants for many evaluations.
 #[derive(Clone, Copy, Debug)]
 pub struct Machine<'a, S = f64> {
@@ -47,10 +63,15 @@ impl<'a, S: Scalar> Machine<'a, S> {
     /// From the parameters.
     #[inline]
     pub fn new(motor: &'a Motor<S>, saturation: &'a Saturation) -> Self {
-        let Motor { n_p, R_s, L_d, L_q, psi_M } = *motor;
+        Self::with(motor, saturation, Inverse::of(motor))
+    }
+
+    /// With the reciprocals at hand.
+    #[inline]
+    pub fn with(motor: &'a Motor<S>, saturation: &'a Saturation, Inverse { d, q }: Inverse) -> Self {
+        let Motor { n_p, R_s, psi_M, .. } = *motor;
         let saturation = (!saturation.is_none()).then_some(saturation);
-        let (by_L_d, by_L_q) = (reciprocal(L_d), reciprocal(L_q));
-        Self { motor, saturation, psi_M, R_s, by_L_d, by_L_q, torque: 1.5 * f64::from(n_p) }
+        Self { motor, saturation, psi_M, R_s, by_L_d: d, by_L_q: q, torque: 1.5 * f64::from(n_p) }
     }
 
     /// Current (A) for the flux linkage `psi` (Wb).

@@ -5,6 +5,7 @@ mod integration;
 pub mod inverter;
 pub mod iron;
 pub mod legs;
+mod linear;
 pub mod losses;
 pub mod machine;
 pub mod mechanics;

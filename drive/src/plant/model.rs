@@ -76,9 +76,8 @@ impl PmsmPlant {
     /// The present instant, at the end of a step.
     #[inline]
     pub(super) fn reached(&self) -> Instant {
-        let (motor, saturation) = (&self.warm.motor, &self.parameters.saturation);
         let State { psi, speed, angle, axis } = self.state;
-        let i = machine::current(motor, saturation, psi);
+        let i = self.machine().current(psi);
         Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable }
     }
 
@@ -222,6 +221,11 @@ impl Model for PmsmPlant {
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        if self.inputs.enable
+            && let Some(linear) = self.warm.linear
+        {
+            return self.step_linear(&linear, step);
+        }
         let PlantParameters { thermal, .. } = &self.parameters;
         if self.inputs.enable && thermal.mode == ThermalMode::Constant && !losses::any(&self.parameters) {
             self.step::<false>(step)

@@ -1,6 +1,6 @@
 //! Derivatives and powers of inverter, machine and shaft at an instant.
 
-use crate::frame::{AlphaBeta, Axis, Dq, Rotor, Stator, Vector};
+use crate::frame::{AlphaBeta, Axis, Rotor, Stator, Vector};
 use crate::plant::legs::Legs;
 use crate::plant::losses::Losses;
 use crate::plant::losses::flow::{Flow, Lossy};
@@ -88,32 +88,59 @@ impl<S: Scalar> Held<'_, S> {
 
 /// What the integrator integrates.
 pub(super) trait Circuit {
-    fn machine(&self) -> &Machine<'_>;
+    /// What passes at an instant.
+    type At;
 
-    /// Derivatives and powers with the d-axis on `axis`, the flux linkage `psi` (Wb), its current `i` (A) and the `speed`
-    /// (rad/s).
-    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates;
+    /// Derivatives of the flux linkage in stator axes (V) and of the speed (rad/s2), and what passes, with the d-axis on
+    /// `axis`, the flux linkage `psi` (Wb) in stator axes and the `speed` (rad/s).
+    fn slopes(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> (AlphaBeta, f64, Self::At);
 
-    /// The same with the flux linkage `psi` (Wb) in stator axes.
+    /// What passes in a step of `h` (s) with these four stages, in which the shaft turns by `turned` (rad).
+    fn passed(&self, stages: &[Self::At; 4], h: f64, turned: f64) -> Passed;
+}
+
+/// The integral over `h` (s) of the values of the four stages, by the weights of the Runge-Kutta method.
+#[inline]
+pub(super) fn integral<T>(h: f64, [a, b, c, d]: &[T; 4], value: impl Fn(&T) -> f64) -> f64 {
+    h * (1.0 / 6.0) * (value(a) + 2.0 * (value(b) + value(c)) + value(d))
+}
+
+/// [`Held`] with every loss, or with none besides those of a constant resistance and of friction.
+pub(super) struct Driven<'a, const LOSSY: bool>(pub(super) Held<'a>);
+
+impl<const LOSSY: bool> Circuit for Driven<'_, LOSSY> {
+    type At = Rates;
+
     #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
     #[inline(always)]
-    fn rates_in_stator(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> Rates {
-        let psi = self.machine().from_stator(axis, psi);
-        self.rates(axis, psi, self.machine().current(psi), speed)
+    fn slopes(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> (AlphaBeta, f64, Rates) {
+        let Self(held) = self;
+        let psi = held.machine.from_stator(axis, psi);
+        let rates = held.rates(axis, psi, held.machine.current(psi), speed);
+        (rates.d_psi, rates.acceleration, rates)
+    }
+
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+    #[inline(always)]
+    fn passed(&self, stages: &[Rates; 4], h: f64, _turned: f64) -> Passed {
+        passed::<LOSSY>(stages, h)
     }
 }
 
-impl Circuit for Held<'_> {
-    #[inline]
-    fn machine(&self) -> &Machine<'_> {
-        &self.machine
-    }
-
-    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
-    #[inline(always)]
-    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates {
-        Held::rates(self, axis, psi, i, speed)
-    }
+/// Energies from the powers of each stage.
+#[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+#[inline(always)]
+fn passed<const LOSSY: bool>(stages: &[Rates; 4], h: f64) -> Passed {
+    let over = |power: fn(&Rates) -> f64| integral(h, stages, power);
+    let energy = Energy { r#in: over(|k| k.p_in), mech: over(|k| k.p_mech), loss: over(|k| k.p_loss) };
+    let friction = over(|k| k.losses.friction);
+    let losses = if LOSSY {
+        let [cu, iron] = [over(|k| k.losses.cu), over(|k| k.losses.iron)];
+        Losses { cu, iron, cond: over(|k| k.losses.cond), sw: over(|k| k.losses.sw), friction }
+    } else {
+        Losses { cu: energy.loss - friction, friction, ..Losses::none() }
+    };
+    Passed { energy, losses }
 }
 
 /// Inverter, machine and shaft while the currents keep their sides.
@@ -124,17 +151,23 @@ pub(super) struct Between<'a> {
 }
 
 impl Circuit for Between<'_> {
-    #[inline]
-    fn machine(&self) -> &Machine<'_> {
-        &self.machine
+    type At = Rates;
+
+    #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
+    #[inline(always)]
+    fn slopes(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> (AlphaBeta, f64, Rates) {
+        let psi = self.machine.from_stator(axis, psi);
+        let i = self.machine.current(psi);
+        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
+        let Flow { i, d_psi, p_in, losses } = self.region.flow(axis.to_stator(i));
+        let losses = Losses { friction: p_friction, ..losses };
+        let rates = Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i };
+        (d_psi, acceleration, rates)
     }
 
     #[expect(clippy::inline_always, reason = "as for `Held::rates`")]
     #[inline(always)]
-    fn rates(&self, axis: Axis<Rotor>, psi: Dq, i: Dq, speed: f64) -> Rates {
-        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
-        let Flow { i, d_psi, p_in, losses } = self.region.flow(axis.to_stator(i));
-        let losses = Losses { friction: p_friction, ..losses };
-        Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i }
+    fn passed(&self, stages: &[Rates; 4], h: f64, _turned: f64) -> Passed {
+        passed::<true>(stages, h)
     }
 }

@@ -5,9 +5,10 @@ use crate::integrate::rk4;
 use crate::modulation::limit_to_hexagon;
 use crate::plant::integration::{LARGEST_TURN, LONGEST_SUBSTEP};
 use crate::plant::legs::Legs;
+use crate::plant::linear::Linear;
 use crate::plant::losses::Losses;
 use crate::plant::losses::flow::Lossy;
-use crate::plant::machine::{self, Machine};
+use crate::plant::machine;
 use crate::plant::mechanics::Shaft;
 use crate::plant::model::PmsmPlant;
 use crate::plant::power::{Energy, Powers};
@@ -36,7 +37,7 @@ impl PmsmPlant {
         }
         let motor = &self.warm.motor;
         let axis = axis_at(motor, angle_shaft);
-        let machine = Machine::new(motor, saturation);
+        let machine = self.machine();
         let psi = machine.from_stator(axis, machine.to_stator(self.state.axis, self.state.psi));
         let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
         let energy = Energy { mech: stored(self.state.psi) - stored(psi), ..Energy::default() };
@@ -81,14 +82,13 @@ impl PmsmPlant {
                 lossy => self.drive_lossy(start, h, AlphaBeta::ZERO, legs, lossy),
             };
         };
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
         let motor = &self.warm.motor;
         let held = Held {
-            machine: Machine::new(motor, saturation),
+            machine: self.machine(),
             u: AlphaBeta::ZERO,
             legs: None,
             lossy: None,
-            shaft: Shaft::new(mechanics, self.inputs.tau_load, start.speed),
+            shaft: Shaft::new(&self.parameters.mechanics, self.inputs.tau_load, start.speed),
         };
         let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost, 0.0]), h, |x| {
             let i = self.idle_current(motor, x[0]);
@@ -150,20 +150,84 @@ impl PmsmPlant {
         if !LOSSY {
             losses.cu = energy.loss - losses.friction;
         }
-        if !(state.is_finite() && energy.is_finite()) {
-            return Err(Fault::new(format!(
-                "the machine's state left the finite numbers within a step of {} s; the step before it ended with {}",
-                step.h,
-                self.state.tell()
-            )));
-        }
-        (self.state, self.blocked) = (state, lost.is_some());
-        self.energy.add(&energy);
+        self.conclude(step.h, state, &energy, losses, lost.is_some(), &legs)?;
         if LOSSY && !self.parameters.iron.is_none() {
             self.by_iron = by_iron.unwrap_or_else(|| self.current_by_iron());
         }
-        self.powers = Powers::mean(&energy, losses, step.h, &self.inputs, &legs, || self.currents());
         Ok(())
+    }
+
+    /// A communication step of a `linear` machine on ideal legs, which switch.
+    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[inline(always)]
+    pub(super) fn step_linear(&mut self, linear: &Linear, step: &Step) -> Result<(), Fault> {
+        let PlantInputs { u, u_dc, .. } = self.inputs;
+        let u = limit_to_hexagon(u, u_dc);
+        let w = (f64::from(self.warm.motor.n_p) * self.state.speed).abs();
+        let (state, energy, losses) = if step.h <= LONGEST_SUBSTEP && w * step.h <= LARGEST_TURN {
+            let (state, Passed { energy, losses }) = self.drive_linear(linear, &self.state, step.h, u);
+            (state, energy, losses)
+        } else {
+            let mut left = Self::count(step.h, LONGEST_SUBSTEP.min(LARGEST_TURN / w))?;
+            let (h, mut state, mut energy, mut losses) = (step.h / left, self.state, Energy::default(), Losses::none());
+            while left > 0.0 {
+                let (next, passed) = self.drive_again(linear, &state, h, u);
+                state = next;
+                energy.add(&passed.energy);
+                losses.add(&passed.losses);
+                left -= 1.0;
+            }
+            (state, energy, losses)
+        };
+        self.conclude(step.h, state, &energy, losses, false, &Legs::switching(&self.parameters.inverter, u_dc))
+    }
+
+    /// [`drive`](Self::drive) of a `linear` machine under the voltage `u` (V).
+    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[inline(always)]
+    fn drive_linear(&self, linear: &Linear, start: &State, h: f64, u: AlphaBeta) -> (State, Passed) {
+        let tau_load = self.inputs.tau_load;
+        if linear.is_near_standstill(start.speed) {
+            self.drive(start, h, &linear.held::<true>(u, tau_load, start.speed))
+        } else {
+            self.drive(start, h, &linear.held::<false>(u, tau_load, start.speed))
+        }
+    }
+
+    /// [`drive_linear`](Self::drive_linear) in a loop.
+    #[inline(never)]
+    fn drive_again(&self, linear: &Linear, start: &State, h: f64, u: AlphaBeta) -> (State, Passed) {
+        self.drive_linear(linear, start, h, u)
+    }
+
+    /// Takes the `state` at the end of a step of `h` (s), in which `energy` passed with its `losses`.
+    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[inline(always)]
+    fn conclude(
+        &mut self,
+        h: f64,
+        state: State,
+        energy: &Energy,
+        losses: Losses,
+        blocked: bool,
+        legs: &Legs,
+    ) -> Result<(), Fault> {
+        if !(state.is_finite() && energy.is_finite()) {
+            return Err(self.diverged(h));
+        }
+        (self.state, self.blocked) = (state, blocked);
+        self.energy.add(energy);
+        self.powers = Powers::mean(energy, losses, h, &self.inputs, legs, || self.currents());
+        Ok(())
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn diverged(&self, h: f64) -> Fault {
+        Fault::new(format!(
+            "the machine's state left the finite numbers within a step of {h} s; the step before it ended with {}",
+            self.state.tell()
+        ))
     }
 
     /// [`step`](Self::step) with losses and temperatures, out of the way of a step without them.

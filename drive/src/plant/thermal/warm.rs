@@ -5,7 +5,9 @@
 
 use super::{Heat, Temperatures, ThermalMode};
 use crate::motor::Motor;
+use crate::plant::linear::Linear;
 use crate::plant::losses::Losses;
+use crate::plant::machine::{Inverse, Machine};
 use crate::plant::model::PmsmPlant;
 use crate::plant::signals::PlantInputs;
 use fmu_core::{Fault, Interface, Scalar};
@@ -18,11 +20,16 @@ pub struct Warm {
     pub at: Temperatures,
     /// Resistance and permanent-magnet flux linkage are those at the temperatures.
     pub motor: Motor,
+    /// Reciprocals of its inductances.
+    inverse: Inverse,
+    /// Its constants, if it is linear.
+    pub(in crate::plant) linear: Option<Linear>,
 }
 
 impl Default for Warm {
     fn default() -> Self {
-        Self { at: Temperatures::all(super::T_20), motor: Motor::default() }
+        let motor = Motor::default();
+        Self { at: Temperatures::all(super::T_20), inverse: Inverse::of(&motor), motor, linear: None }
     }
 }
 
@@ -50,6 +57,12 @@ impl PmsmPlant {
         Motor { n_p, R_s: R_s.into(), L_d, L_q, psi_M: psi_M.into() }
     }
 
+    /// The machine at its temperatures.
+    #[inline]
+    pub(in crate::plant) fn machine(&self) -> Machine<'_> {
+        Machine::with(&self.warm.motor, &self.parameters.saturation, self.warm.inverse)
+    }
+
     /// The heat (W) of these `losses` (W) at the temperatures `at` (K) under these `inputs`.
     #[inline]
     pub(crate) fn heat<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Temperatures<S>, losses: &Losses<S>) -> Heat<S> {
@@ -64,8 +77,9 @@ impl PmsmPlant {
 
     /// From now on, the parts have these temperatures (K).
     pub(in crate::plant) fn take(&mut self, at: Temperatures) {
-        self.warm.motor = self.parameters.thermal.motor(&self.parameters.motor, &at);
-        self.warm.at = at;
+        let motor = self.parameters.thermal.motor(&self.parameters.motor, &at);
+        let (inverse, linear) = (Inverse::of(&motor), Linear::new(&self.parameters, &motor));
+        self.warm = Warm { at, motor, inverse, linear };
     }
 
     /// The temperatures (K) that parameters and `inputs` say, and the names of those of winding and magnets.
