@@ -77,21 +77,51 @@ impl Linear {
 
     /// Over a step that begins at the `speed` (rad/s), under the voltage `u` (V) and the load `tau_load` (N.m).
     #[inline]
-    pub(super) fn held<const NEAR: bool>(&self, u: AlphaBeta, tau_load: f64, speed: f64) -> LinearHeld<'_, NEAR> {
-        let coulomb = if NEAR { self.series(speed) } else { [self.tau_coulomb.copysign(speed), 0.0, 0.0, 0.0, 0.0] };
-        LinearHeld { linear: self, u, tau_load, speed, sign: 1.0_f64.copysign(speed), coulomb }
+    pub(super) fn held<'a, const NEAR: bool>(
+        &'a self,
+        u: AlphaBeta,
+        tau_load: f64,
+        speed: f64,
+        coulomb: &'a mut Coulomb,
+    ) -> LinearHeld<'a, NEAR> {
+        if NEAR && ((speed - coulomb.speed) * self.by_w_coulomb).abs() > 0.5 * Coulomb::REACH {
+            *coulomb = self.coulomb(speed);
+        }
+        let (sign, tau_full) = (1.0_f64.copysign(speed), self.tau_coulomb.copysign(speed));
+        LinearHeld { linear: self, u, tau_load, sign, tau_full, coulomb }
     }
 
-    /// Series of the Coulomb torque (N.m) in the change of speed / w_coulomb from the `speed` (rad/s) on. The coefficients of
-    /// y = tanh x follow from y' = 1 - y^2.
+    /// The Coulomb torque about the `speed` (rad/s). The coefficients of y = tanh x follow from y' = 1 - y^2.
     #[inline(never)]
-    fn series(&self, speed: f64) -> [f64; 5] {
+    fn coulomb(&self, speed: f64) -> Coulomb {
         let y = tanh(speed * self.by_w_coulomb);
         let c_1 = 1.0 - y * y;
         let c_2 = -y * c_1;
         let c_3 = (-2.0 * y * c_2 - c_1 * c_1) * (1.0 / 3.0);
-        [y, c_1, c_2, c_3, -0.5 * (y * c_3 + c_1 * c_2)].map(|c| c * self.tau_coulomb)
+        let series = [y, c_1, c_2, c_3, -0.5 * (y * c_3 + c_1 * c_2)].map(|c| c * self.tau_coulomb);
+        Coulomb { speed, series }
     }
+}
+
+/// Coulomb torque near a speed; it serves until the speed has left its reach.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Coulomb {
+    /// In rad/s.
+    speed: f64,
+    /// Series of the torque (N.m) in x = speed / w_coulomb from there on.
+    series: [f64; 5],
+}
+
+impl Default for Coulomb {
+    /// Of no speed.
+    fn default() -> Self {
+        Self { speed: f64::INFINITY, series: [0.0; 5] }
+    }
+}
+
+impl Coulomb {
+    /// Greatest change of x: the first term left out is below 2e-16.
+    const REACH: f64 = 1e-3;
 }
 
 /// The same with what is held over a step; `NEAR` standstill or not.
@@ -99,26 +129,24 @@ pub(super) struct LinearHeld<'a, const NEAR: bool> {
     linear: &'a Linear,
     u: AlphaBeta,
     tau_load: f64,
-    /// Speed in rad/s at the start.
-    speed: f64,
-    /// Its sign.
+    /// Sign of the speed, and the whole Coulomb torque against it in N.m.
     sign: f64,
-    /// Series of the Coulomb torque from there on.
-    coulomb: [f64; 5],
+    tau_full: f64,
+    coulomb: &'a Coulomb,
 }
 
 impl<const NEAR: bool> LinearHeld<'_, NEAR> {
-    /// Coulomb torque in N.m at the `speed` (rad/s). For |d| <= 0.001, the first term left out is below 2e-16 of it.
+    /// Coulomb torque in N.m at the `speed` (rad/s).
     #[inline]
     fn coulomb(&self, speed: f64) -> f64 {
-        let [c_0, c_1, c_2, c_3, c_4] = self.coulomb;
         if NEAR {
-            let d = (speed - self.speed) * self.linear.by_w_coulomb;
-            if d.abs() <= 1e-3 {
-                return c_0 + d * ((c_1 + c_2 * d) + d * d * (c_3 + c_4 * d));
+            let Coulomb { speed: near, series: [c_0, c_1, c_2, c_3, c_4] } = *self.coulomb;
+            let x = (speed - near) * self.linear.by_w_coulomb;
+            if x.abs() <= Coulomb::REACH {
+                return c_0 + x * ((c_1 + c_2 * x) + x * x * (c_3 + c_4 * x));
             }
         } else if speed * self.sign > self.linear.w_full {
-            return c_0;
+            return self.tau_full;
         }
         self.linear.whole_coulomb(speed)
     }

@@ -5,6 +5,7 @@ use crate::math::wrap;
 use crate::motor::Motor;
 use crate::plant::inverter::Inverter;
 use crate::plant::legs::Legs;
+use crate::plant::linear::Coulomb;
 use crate::plant::losses::flow::Lossy;
 use crate::plant::losses::{self, Losses, efficiency, switching};
 use crate::plant::machine::{self, Machine};
@@ -39,6 +40,8 @@ pub struct PmsmPlant {
     pub(super) by_iron: Dq,
     /// The switching loss at the last link voltage.
     pub(super) sw: switching::Last,
+    /// The Coulomb torque about a speed at which a step near standstill began.
+    pub(super) coulomb: Coulomb,
 }
 
 impl PmsmPlant {
@@ -174,10 +177,10 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 8;
+    const STATE_VERSION: u16 = 9;
 
     fn derive(&mut self) {
-        self.sw = switching::Last::default();
+        (self.sw, self.coulomb) = (switching::Last::default(), Coulomb::default());
         self.take(self.warm.at);
     }
 
@@ -221,10 +224,8 @@ impl Model for PmsmPlant {
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        if self.inputs.enable
-            && let Some(linear) = self.warm.linear
-        {
-            return self.step_linear(&linear, step);
+        if let Some(done) = self.step_linear(step) {
+            return done;
         }
         let PlantParameters { thermal, .. } = &self.parameters;
         if self.inputs.enable && thermal.mode == ThermalMode::Constant && !losses::any(&self.parameters) {
