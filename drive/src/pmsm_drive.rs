@@ -161,7 +161,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 11;
+    const STATE_VERSION: u16 = 12;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -202,8 +202,13 @@ impl Model for PmsmDrive {
         }
         pair.now = step.start;
         let mut outputs_are_present = true;
-        while end.since(pair.now) > grid.width() {
-            let (left, next) = (end.since(pair.now), to_next_sample(grid, pair.now));
+        let mut at_sample = false;
+        loop {
+            let left = end.since(pair.now);
+            if left <= grid.width() {
+                break;
+            }
+            let next = if at_sample { grid.period } else { to_next_sample(grid, pair.now) };
             let before = pair.now;
             // An imposed shaft keeps turning at the held speed over all samples of the step.
             pair.plant.model.inputs.angle_shaft = inputs.angle_shaft + inputs.speed_shaft * before.since(step.start);
@@ -216,6 +221,7 @@ impl Model for PmsmDrive {
                 pair.exchange_present();
             }
             pair.advance(h)?;
+            at_sample = ends;
             period.add(pair.plant.model.powers(), h, ends);
             if pair.now == before {
                 return Err(Fault::new(format!(

@@ -15,7 +15,6 @@ use crate::plant::losses::{self, Losses};
 use crate::plant::power::Energy;
 use crate::plant::rates::{Circuit, Passed, integral};
 use crate::plant::tables::PlantParameters;
-use crate::plant::thermal::ThermalMode;
 use serde::{Deserialize, Serialize};
 
 /// Constants of machine and shaft, from the parameters.
@@ -38,11 +37,11 @@ pub(super) struct Linear {
 }
 
 impl Linear {
-    /// `None` for a machine that saturates, legs with dead time, other losses, temperatures that change, or an imposed shaft.
+    /// With the machine `motor` at its temperatures; `None` if it saturates, for legs with dead time, other losses or an
+    /// imposed shaft.
     pub(super) fn new(parameters: &PlantParameters, motor: &Motor) -> Option<Self> {
-        let PlantParameters { saturation, inverter, mechanics, thermal, .. } = parameters;
-        let linear = saturation.is_none() && thermal.mode == ThermalMode::Constant;
-        if !linear || inverter.dead_time > 0.0 || mechanics.imposed || losses::any(parameters) {
+        let PlantParameters { saturation, inverter, mechanics, .. } = parameters;
+        if !saturation.is_none() || inverter.dead_time > 0.0 || mechanics.imposed || losses::any(parameters) {
             return None;
         }
         let Motor { n_p, R_s, L_d, L_q, psi_M } = *motor;

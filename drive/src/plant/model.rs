@@ -7,7 +7,7 @@ use crate::plant::inverter::Inverter;
 use crate::plant::legs::Legs;
 use crate::plant::linear::Coulomb;
 use crate::plant::losses::flow::Lossy;
-use crate::plant::losses::{self, Losses, efficiency, switching};
+use crate::plant::losses::{Losses, efficiency, switching};
 use crate::plant::machine::{self, Machine};
 use crate::plant::power::Energy;
 use crate::plant::power::Powers;
@@ -224,15 +224,13 @@ impl Model for PmsmPlant {
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        if self.parameters.thermal.mode != ThermalMode::Constant {
+            return self.step_with_temperatures(step);
+        }
         if let Some(done) = self.step_linear(step) {
             return done;
         }
-        let PlantParameters { thermal, .. } = &self.parameters;
-        if self.inputs.enable && thermal.mode == ThermalMode::Constant && !losses::any(&self.parameters) {
-            self.step::<false>(step)
-        } else {
-            self.step_with_losses(step)
-        }
+        self.step_general(step)
     }
 }
 

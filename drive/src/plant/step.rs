@@ -6,8 +6,8 @@ use crate::modulation::limit_to_hexagon;
 use crate::plant::integration::{LARGEST_TURN, LONGEST_SUBSTEP};
 use crate::plant::legs::Legs;
 use crate::plant::linear::{Coulomb, Linear};
-use crate::plant::losses::Losses;
 use crate::plant::losses::flow::Lossy;
+use crate::plant::losses::{self, Losses};
 use crate::plant::machine;
 use crate::plant::mechanics::Shaft;
 use crate::plant::model::PmsmPlant;
@@ -255,14 +255,27 @@ impl PmsmPlant {
         ))
     }
 
-    /// [`step`](Self::step) with losses and temperatures, out of the way of a step without them.
+    /// [`step`](Self::step) of any machine.
     #[inline(never)]
-    pub(super) fn step_with_losses(&mut self, step: &Step) -> Result<(), Fault> {
+    pub(super) fn step_general(&mut self, step: &Step) -> Result<(), Fault> {
+        if self.inputs.enable && !losses::any(&self.parameters) {
+            self.step::<false>(step)
+        } else {
+            self.step::<true>(step)
+        }
+    }
+
+    /// The same with temperatures that change.
+    #[inline(never)]
+    pub(super) fn step_with_temperatures(&mut self, step: &Step) -> Result<(), Fault> {
         let mode = self.parameters.thermal.mode;
         if mode == ThermalMode::Imposed {
             self.impose()?;
         }
-        self.step::<true>(step)?;
+        match self.step_linear(step) {
+            Some(done) => done?,
+            None => self.step_general(step)?,
+        }
         if mode == ThermalMode::Network {
             self.warm_up(step.h)?;
         }
