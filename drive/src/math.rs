@@ -157,10 +157,16 @@ pub fn reciprocal(x: f64) -> f64 {
     (1.0 / x).min(f64::MAX)
 }
 
-/// Whether all values are numbers: 0 times any other is not 0.
+/// Whether all values are numbers.
 #[inline]
 pub fn all_finite<const N: usize>(values: [f64; N]) -> bool {
-    values.iter().map(|x| x * 0.0).sum::<f64>() == 0.0
+    // Then their sum is one, too, unless it overflows.
+    values.iter().sum::<f64>().is_finite() || each_finite(values)
+}
+
+#[cold]
+fn each_finite<const N: usize>(values: [f64; N]) -> bool {
+    values.iter().all(|x| x.is_finite())
 }
 
 /// The angle `x` (rad) wrapped to (-pi, pi].

@@ -108,7 +108,7 @@ impl SensorlessController {
     #[inline]
     fn estimate(&mut self, sample: &Sample, tuned: bool) -> (Frame, Mode) {
         let Self { inputs, parameters: par, gains, in_use, state, .. } = self;
-        let (estimate, mode) = state.estimate(par.estimator, gains, par, in_use, inputs, sample);
+        let (estimate, mode) = state.estimate(gains, par, in_use, inputs, sample);
         if tuned {
             let new = context(par, &par.estimators, &par.motor);
             state.estimator.retune(&context(par, &in_use.estimators, &in_use.motor), &new);

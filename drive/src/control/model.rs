@@ -52,14 +52,15 @@ impl SensorlessController {
 
     /// One sample of the controller: currents in, voltage references out. If a lost estimator makes the state
     /// non-finite, the controller restarts at rest from its last angle and reports the loss.
-    fn compute(&mut self) -> ControllerOutputs {
+    fn compute(&mut self) {
         if !self.inputs.enable {
-            return self.rest();
+            self.state.computed = self.rest();
+            return;
         }
         let out = self.control();
         self.state.k += 1;
         let sane = (out.speed_est * f64::from(self.parameters.motor.n_p) * self.parameters.T_s).abs() < MAX_TURN;
-        if sane && out.is_finite() { out } else { self.start_again() }
+        self.state.computed = if sane && out.is_finite() { out } else { self.start_again() };
     }
 
     /// Refuses inputs that are no numbers.
@@ -229,7 +230,7 @@ impl Sampled for SensorlessController {
 
     fn sample(&mut self) -> Result<(), Fault> {
         self.finite()?;
-        self.state.computed = self.compute();
+        self.compute();
         self.state.samples += 1;
         Ok(())
     }

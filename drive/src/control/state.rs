@@ -194,9 +194,9 @@ impl State {
     }
 
     /// The estimate at a sample, from the active source, and the action of the loops.
+    #[inline]
     pub(super) fn estimate(
         &mut self,
-        kind: Kind,
         gains: &Gains,
         par: &ControllerParameters,
         in_use: &InUse,
@@ -204,36 +204,53 @@ impl State {
         sample: &Sample,
     ) -> (Estimate, Mode) {
         let context = context(par, &in_use.estimators, &in_use.motor);
+        if sample.k > 0 && matches!(self.leader, Leader::Estimator) {
+            return (self.estimator.update(&context, sample), Mode::ClosedLoop);
+        }
+        self.starting(gains, par, context, inputs, *sample)
+    }
+
+    /// The same at the first sample and during a start sequence.
+    #[cold]
+    fn starting(
+        &mut self,
+        gains: &Gains,
+        par: &ControllerParameters,
+        context: Context,
+        inputs: &ControllerInputs,
+        sample: Sample,
+    ) -> (Estimate, Mode) {
+        let (context, sample) = (&context, &sample);
         let first = (sample.k == 0).then(|| {
             let w = f64::from(par.motor.n_p) * par.speed_est;
-            let (estimator, estimate) = Estimator::start(kind, &context, sample, par.theta_est, w);
+            let (estimator, estimate) = Estimator::start(par.estimator, context, sample, par.theta_est, w);
             self.estimator = estimator;
             estimate
         });
         let reference = if par.speed_loop.torque_mode { inputs.tau_ref } else { inputs.speed_ref };
         match &mut self.leader {
-            Leader::Start(start) => match start.update(&par.start, &context, par.theta_est, reference, sample) {
+            Leader::Start(start) => match start.update(&par.start, context, par.theta_est, reference, sample) {
                 StartStep::Current { theta, w, i_ref } => (Estimate::new(theta, w, sample), Mode::Current(i_ref)),
                 StartStep::HandOver { theta, w, theta_frame } => {
-                    self.estimator.place(&context, sample, theta, w);
+                    self.estimator.place(context, sample, theta, w);
                     self.take_over(gains, par, inputs.speed_ref, sample, (theta, w, theta_frame));
                     (Estimate::new(theta, w, sample), Mode::AfterStart)
                 }
             },
-            Leader::Search(search) => match search.update(&par.polarity, &context, sample) {
+            Leader::Search(search) => match search.update(&par.polarity, context, sample) {
                 SearchStep::Inject => {
-                    let estimate = first.unwrap_or_else(|| self.estimator.update(&context, sample));
+                    let estimate = first.unwrap_or_else(|| self.estimator.update(context, sample));
                     search.sees(estimate.theta);
                     (estimate, Mode::Current(DqHat::ZERO))
                 }
                 SearchStep::Pulse { theta, u } => (Estimate::new(theta, 0.0, sample), Mode::Voltage(u)),
                 SearchStep::Found(theta) => {
-                    self.estimator.place(&context, sample, theta, 0.0);
+                    self.estimator.place(context, sample, theta, 0.0);
                     self.begin_at_rest();
                     (Estimate::new(theta, 0.0, sample), Mode::AfterSearch)
                 }
             },
-            Leader::Estimator => (first.unwrap_or_else(|| self.estimator.update(&context, sample)), Mode::ClosedLoop),
+            Leader::Estimator => (first.unwrap_or_else(|| self.estimator.update(context, sample)), Mode::ClosedLoop),
         }
     }
 

@@ -164,7 +164,8 @@ pub trait Estimating: Sized {
         let _ = (old, new);
     }
 
-    /// Stator resistance in Ohm that the estimator uses: the estimate `R_s` of the motor, unless it adapts it.
+    /// Stator resistance in Ohm that the estimator uses: the estimate `R_s` of the motor, unless it adapts it; asked only
+    /// with `adaptation.resistance`.
     fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
         let _ = par;
         motor.R_s
@@ -260,11 +261,20 @@ macro_rules! estimators {
                 }
             }
 
-            /// See [`Estimating::update`].
+            /// See [`Estimating::update`]. The estimator of the default needs no call, and the others get copies: so the
+            /// values of a sample stay in registers.
             #[inline]
             pub fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
                 match self {
-                    $(Self::$name(state) => state.update(context, sample),)*
+                    Self::Rasmussen(state) => state.update(context, sample),
+                    _ => self.update_any(*context, *sample),
+                }
+            }
+
+            #[inline(never)]
+            fn update_any(&mut self, context: Context, sample: Sample) -> Estimate {
+                match self {
+                    $(Self::$name(state) => state.update(&context, &sample),)*
                 }
             }
 
@@ -278,6 +288,9 @@ macro_rules! estimators {
             /// See [`Estimating::resistance`].
             #[inline]
             pub fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
+                if !par.adaptation.resistance {
+                    return motor.R_s;
+                }
                 match self {
                     $(Self::$name(state) => state.resistance(par, motor),)*
                 }
