@@ -49,12 +49,14 @@ const POWERS_OF_2: [f64; 64] = [
 /// 4e-17. Tang 1989, ACM Trans. Math. Softw. 15 (2), without the tail of the table.
 #[inline]
 pub fn exp(x: f64) -> f64 {
+    if x.abs() <= 700.0 { exp_near(x) } else { exp_far(x) }
+}
+
+#[inline]
+fn exp_near(x: f64) -> f64 {
     use std::f64::consts::LOG2_E;
     // ln(2) / 64 in two parts; n times the first one is exact.
     const STEP: [f64; 2] = [6.931_471_803_691_238e-1 / 64.0, 1.908_214_929_270_587_7e-10 / 64.0];
-    if x.abs() > 700.0 || x.is_nan() {
-        return exp_far(x);
-    }
     let shifted = x * (64.0 * LOG2_E) + ROUNDS;
     let n = shifted - ROUNDS;
     let r = (x - n * STEP[0]) - n * STEP[1];
@@ -161,12 +163,7 @@ pub fn reciprocal(x: f64) -> f64 {
 #[inline]
 pub fn all_finite<const N: usize>(values: [f64; N]) -> bool {
     // Then their sum is one, too, unless it overflows.
-    values.iter().sum::<f64>().is_finite() || each_finite(values)
-}
-
-#[cold]
-fn each_finite<const N: usize>(values: [f64; N]) -> bool {
-    values.iter().all(|x| x.is_finite())
+    values.iter().sum::<f64>().abs() <= f64::MAX || values.iter().all(|x| x.is_finite())
 }
 
 /// The angle `x` (rad) wrapped to (-pi, pi].

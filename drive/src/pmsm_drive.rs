@@ -161,7 +161,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 11;
+    const STATE_VERSION: u16 = 12;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();

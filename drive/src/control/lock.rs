@@ -185,7 +185,8 @@ impl Lock {
 
     /// `lock_lost` after a sample with the estimated frame on `axis`, turning at `w` (rad/s) with the reference `w_ref`
     /// (rad/s), none in torque mode; `R_s` (Ohm) is the resistance that the estimator uses.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
     pub fn update(
         &mut self,
         gains: &LockGains,

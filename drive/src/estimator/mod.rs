@@ -261,20 +261,11 @@ macro_rules! estimators {
                 }
             }
 
-            /// See [`Estimating::update`]. The estimator of the default needs no call, and the others get copies: so the
-            /// values of a sample stay in registers.
+            /// See [`Estimating::update`].
             #[inline]
             pub fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
                 match self {
-                    Self::Rasmussen(state) => state.update(context, sample),
-                    _ => self.update_any(*context, *sample),
-                }
-            }
-
-            #[inline(never)]
-            fn update_any(&mut self, context: Context, sample: Sample) -> Estimate {
-                match self {
-                    $(Self::$name(state) => state.update(&context, &sample),)*
+                    $(Self::$name(state) => state.update(context, sample),)*
                 }
             }
 

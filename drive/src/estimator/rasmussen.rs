@@ -76,7 +76,8 @@ impl Estimating for Rasmussen {
         (Self { psi_s, i, theta, w, w_i: w, resistance, ..Self::default() }, Estimate::new(theta, w, sample))
     }
 
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
     fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
         let Context { motor, T_s, par: EstimatorParameters { rasmussen: par, .. }, .. } = *context;
         let turn = T_s * self.w;
