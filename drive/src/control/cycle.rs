@@ -28,15 +28,20 @@ struct Frame {
 
 impl SensorlessController {
     /// One sample: currents in, voltage references out.
-    pub(super) fn control(&mut self) -> ControllerOutputs {
+    #[inline]
+    pub(super) fn control(&mut self) {
         let Self { tuned, state, .. } = self;
         let steady = state.k > 0 && !*tuned && matches!(state.leader, Leader::Estimator);
-        if steady && matches!(state.estimator, Estimator::Rasmussen(_)) { self.cycle(true) } else { self.any_cycle() }
+        if steady && matches!(state.estimator, Estimator::Rasmussen(_)) {
+            self.state.computed = self.cycle(true);
+        } else {
+            self.any_cycle();
+        }
     }
 
     #[inline(never)]
-    fn any_cycle(&mut self) -> ControllerOutputs {
-        self.cycle(false)
+    fn any_cycle(&mut self) {
+        self.state.computed = self.cycle(false);
     }
 
     /// [`control`](Self::control), once for any sample and once more, without calls, for the `steady` state of the default:
@@ -180,13 +185,15 @@ impl SensorlessController {
         // The command acts from `delay` to `delay + 1` samples from now, so rotate it to the middle of that interval.
         let acting = frame.axis.ahead(Turn::new((f64::from(par.delay) + 0.5) * T_s * frame.w));
         let injected = match frame.injection {
-            Injection::None => AlphaBeta::ZERO,
-            Injection::Stator(u) => u,
-            Injection::Estimated(u) => acting.to_stator(u),
+            Injection::None => None,
+            Injection::Stator(u) => Some(u),
+            Injection::Estimated(u) => Some(acting.to_stator(u)),
         };
-        let whole = acting.to_stator(requested) + injected;
+        let without = acting.to_stator(requested);
+        let whole = injected.map_or(without, |injected| without + injected);
+        let injected = injected.unwrap_or_default();
         let (mut command, limited) = within_hexagon(whole, inputs.u_dc);
-        let limitation = acting.from_stator(command - injected) - requested;
+        let limitation = limited.then(|| acting.from_stator(command - injected) - requested);
         state.current.integrate(&gains.current, i_ref - frame.i, limitation, T_s);
         let injected = if limited { injected * (command.magnitude() / whole.magnitude()) } else { injected };
         let (mut output, mut beyond) = (command, false);

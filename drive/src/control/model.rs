@@ -58,7 +58,7 @@ impl SensorlessController {
             return;
         }
         let theta = self.state.computed.theta_est;
-        self.state.computed = self.control();
+        self.control();
         self.state.k += 1;
         let (out, par) = (&self.state.computed, &self.parameters);
         let sane = (out.speed_est * f64::from(par.motor.n_p) * par.T_s).abs() < MAX_TURN;
