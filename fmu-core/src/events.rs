@@ -112,6 +112,7 @@ pub trait Sampled: Model {
 }
 
 /// The instants of a sampled model.
+#[inline]
 pub fn grid<M: Sampled>(model: &M) -> SampleGrid {
     SampleGrid { period: model.period() }
 }
@@ -121,12 +122,19 @@ pub fn grid<M: Sampled>(model: &M) -> SampleGrid {
 /// # Errors
 /// More than 1e7 samples are due at `now`.
 pub fn bounded<M: Sampled>(model: &M, now: Elapsed) -> Result<(), Fault> {
-    let period = model.period();
-    if now.minus_periods(model.samples(), period) <= MAX_SAMPLES * period {
-        return Ok(());
-    }
+    bounded_by(model, grid(model).past(model.samples(), now), now)
+}
+
+/// The same `past` (s) the next sample.
+#[inline]
+pub(crate) fn bounded_by<M: Sampled>(model: &M, past: f64, now: Elapsed) -> Result<(), Fault> {
+    if past <= MAX_SAMPLES * model.period() { Ok(()) } else { Err(endless(model.period(), now)) }
+}
+
+#[cold]
+fn endless(period: f64, now: Elapsed) -> Fault {
     let longest = format!("at most {MAX_SAMPLES} sample periods of {period} s after the last sample");
-    Err(Fault::value("the time", format!("{} s after the start", now.seconds()), longest))
+    Fault::value("the time", format!("{} s after the start", now.seconds()), longest)
 }
 
 impl<M: Sampled> Events for M {

@@ -4,7 +4,7 @@
 //! The classical Runge-Kutta method with equal substeps; an indicator's change of sign is located by regula
 //! falsi and bisection in turn, each trial being a substep of its own, as exact as the integration itself.
 
-use crate::events::{bounded, grid};
+use crate::events::{bounded_by, grid};
 use crate::{ContinuousTime, Elapsed, Events, Fault, Sampled, Step};
 
 /// Maximum number of substeps in one communication step.
@@ -92,14 +92,19 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
 ///
 /// # Errors
 /// Those of [`Sampled::sample`]; more than 1e7 samples in the step.
+#[inline]
 pub fn sampled<M: Sampled>(model: &mut M, step: &Step) -> Result<(), Fault> {
     let (grid, end) = (grid(model), step.end());
-    bounded(model, end)?;
-    while grid.passed(model.samples(), end) {
+    let (mut past, width) = (grid.past(model.samples(), end), grid.width());
+    bounded_by(model, past, end)?;
+    while past > width {
         model.show();
         model.sample()?;
+        past = grid.past(model.samples(), end);
     }
-    model.begin(end);
+    if past >= -width {
+        model.show();
+    }
     Ok(())
 }
 

@@ -35,10 +35,13 @@ impl Elapsed {
     }
 
     /// This instant and `h` seconds.
+    #[inline]
     pub fn plus(self, h: f64) -> Self {
         let (high, error) = two_sum(self.high, h);
-        let (high, low) = two_sum(high, self.low + error);
-        Self { high, low }
+        let low = self.low + error;
+        // Dekker's sum, as exact as `two_sum` because the first number is the larger one.
+        let sum = high + low;
+        Self { high: sum, low: low - (sum - high) }
     }
 
     /// Seconds since the start, rounded to one double.
@@ -62,6 +65,7 @@ impl Elapsed {
 }
 
 /// `a + b` and its rounding error.
+#[inline]
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_in = sum - a;
@@ -70,6 +74,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 }
 
 /// An integer count as a double, exact below 2^53 (2.8 million years at 100 Hz, 285 000 years at 1 kHz).
+#[inline]
 #[expect(clippy::cast_precision_loss, reason = "a count of samples stays below 2^53")]
 fn count(k: u64) -> f64 {
     k as f64
@@ -86,6 +91,7 @@ pub struct Step {
 
 impl Step {
     /// Time since the start of the simulation at the end of the step.
+    #[inline]
     pub fn end(&self) -> Elapsed {
         self.start.plus(self.h)
     }
@@ -100,6 +106,7 @@ pub struct SampleGrid {
 
 impl SampleGrid {
     /// Instants closer than this many seconds are the same instant.
+    #[inline]
     pub fn width(&self) -> f64 {
         SAME_INSTANT * self.period
     }
@@ -110,13 +117,31 @@ impl SampleGrid {
     }
 
     /// Whether instant `k` is at `now` or before it.
+    #[inline]
     pub fn reached(&self, k: u64, now: Elapsed) -> bool {
-        now.minus_periods(k, self.period) >= -self.width()
+        self.past(k, now) >= -self.width()
     }
 
     /// Whether instant `k` is before `now` and not the same instant.
+    #[inline]
     pub fn passed(&self, k: u64, now: Elapsed) -> bool {
-        now.minus_periods(k, self.period) > self.width()
+        self.past(k, now) > self.width()
+    }
+
+    /// Seconds from instant `k` to `now`: on the right side of +-[`width`](Self::width), but otherwise to the rounding of
+    /// `now`. One subtraction unless it leaves a doubt.
+    #[inline]
+    pub(crate) fn past(&self, k: u64, now: Elapsed) -> f64 {
+        let product = count(k) * self.period;
+        let past = now.high - product;
+        // Twice what the low part of `now` and the rounding of the product can add.
+        let doubt = 2.0 * (now.low.abs() + f64::EPSILON * product);
+        if (past.abs() - self.width()).abs() > doubt { past } else { self.past_exactly(k, now) }
+    }
+
+    #[cold]
+    fn past_exactly(&self, k: u64, now: Elapsed) -> f64 {
+        now.minus_periods(k, self.period)
     }
 
     /// The first instant after `now` that is not the same instant; `now` is not before the start.
@@ -163,6 +188,34 @@ mod tests {
         assert!(grid.first_after(Elapsed::ZERO.plus(1e300)) > 0, "an absurd time ends too");
         let (early, late) = (Elapsed::ZERO.plus(1e6), Elapsed::ZERO.plus(1e6).plus(1e-9));
         assert!((late.since(early) - 1e-9).abs() < 1e-24, "a nanosecond after 1e6 s");
+    }
+
+    /// The quick subtraction decides as the exact one, at every distance from +-`width`, wherever the low part of the time is.
+    #[test]
+    fn the_quick_comparison_decides_as_the_exact_one() {
+        let (mut seed, mut exactly) = (1_u64, 0);
+        let mut random = move || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            seed >> 11
+        };
+        for _ in 0..200_000 {
+            let period = count(random() % 1_000_000 + 1) * 1e-9;
+            let (grid, k) = (SampleGrid { period }, random() >> (random() % 53));
+            let side = [-grid.width(), 0.0, grid.width(), period][usize::try_from(random() % 4).unwrap()];
+            let at = Elapsed::periods(k, period).plus(side);
+            let near = Elapsed {
+                low: at.low + at.high * f64::EPSILON * 0.25 * count(random() % 9) - at.high * f64::EPSILON,
+                ..at
+            };
+            for now in [at, near, at.plus(side * f64::EPSILON), at.plus(-at.high * f64::EPSILON), at.plus(at.low)] {
+                let exact = now.minus_periods(k, period);
+                let (reached, passed) = (exact >= -grid.width(), exact > grid.width());
+                let told = format!("{k} {period} {now:?}: {exact}");
+                assert_eq!((grid.reached(k, now), grid.passed(k, now)), (reached, passed), "{told}");
+                exactly += u32::from(grid.past(k, now).to_bits() == exact.to_bits());
+            }
+        }
+        assert!(exactly > 100_000, "the test comes close: {exactly}");
     }
 
     #[test]

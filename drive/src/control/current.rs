@@ -130,14 +130,12 @@ impl CurrentController {
         self.integral + DqHat::new(gains.d.k_p * error.d(), gains.q.k_p * error.q())
     }
 
-    /// Integrates one sample of `T_s` (s); `limitation` (V) is the limited voltage minus the requested one.
+    /// Integrates one sample of `T_s` (s); `limitation` (V) is the voltage minus the requested one, if that was limited.
     #[inline]
-    pub fn integrate(&mut self, gains: &CurrentGains, error: DqHat, limitation: DqHat, T_s: f64) {
+    pub fn integrate(&mut self, gains: &CurrentGains, error: DqHat, limitation: Option<DqHat>, T_s: f64) {
         let CurrentGains { d, q, .. } = gains;
-        self.integral += DqHat::new(
-            T_s * d.k_i * (error.d() + limitation.d() / d.k_p),
-            T_s * q.k_i * (error.q() + limitation.q() / q.k_p),
-        );
+        let error = limitation.map_or(error, |u| error + DqHat::new(u.d() / d.k_p, u.q() / q.k_p));
+        self.integral += DqHat::new(T_s * d.k_i * error.d(), T_s * q.k_i * error.q());
     }
 }
 
@@ -186,7 +184,7 @@ mod tests {
         for k in 0..100_000_u32 {
             let (i_ref, measured) = (DqHat::new(0.0, 1.0), DqHat::new(0.0, i));
             let u = controller.command(&gains, &motor, i_ref, measured, 0.0).q();
-            controller.integrate(&gains, i_ref - measured, DqHat::ZERO, h);
+            controller.integrate(&gains, i_ref - measured, None, h);
             i += h * (u - motor.R_s * i) / motor.L_q;
             if i > 1.0 - (-1.0_f64).exp() {
                 return f64::from(k) * h;
@@ -217,7 +215,7 @@ mod tests {
         let (i_ref, i, limit) = (DqHat::new(0.0, 5.0), DqHat::ZERO, 20.0);
         for _ in 0..100_000 {
             let wanted = c.command(&gains, &motor, i_ref, i, 0.0).q();
-            c.integrate(&gains, i_ref - i, DqHat::new(0.0, limit - wanted), 1e-4);
+            c.integrate(&gains, i_ref - i, Some(DqHat::new(0.0, limit - wanted)), 1e-4);
         }
         // limitation = -K_p e: the integral part stays bounded at the limit instead of growing with K_i e t.
         assert!((c.integral.q() - limit).abs() < 1e-6, "{:?}", c.integral);

@@ -1,12 +1,14 @@
 //! One sample of the controller, in the order of Rasmussen 2006, Fig. 2: measure, estimate, reference, modulate.
 
+#![expect(clippy::inline_always, reason = "one sample is one function: its values stay in registers")]
+
 use crate::control::lock::Lock;
 use crate::control::model::SensorlessController;
 use crate::control::signals::ControllerOutputs;
-use crate::control::state::{Command, Mode, References, context};
+use crate::control::state::{Command, Leader, Mode, References, context};
 use crate::control::tables::Compensation;
 use crate::control::weakening::share;
-use crate::estimator::{Estimate, Injection, Sample};
+use crate::estimator::{Estimate, Estimating, Estimator, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
 use crate::math::wrap;
 use crate::modulation::{dead_time_loss, limit_span};
@@ -26,14 +28,33 @@ struct Frame {
 
 impl SensorlessController {
     /// One sample: currents in, voltage references out.
-    pub(super) fn control(&mut self) -> ControllerOutputs {
-        let first = self.state.k == 0;
-        let tuned = std::mem::take(&mut self.tuned) && !first;
+    #[inline]
+    pub(super) fn control(&mut self) {
+        let Self { tuned, state, .. } = self;
+        let steady = state.k > 0 && !*tuned && matches!(state.leader, Leader::Estimator);
+        if steady && matches!(state.estimator, Estimator::Rasmussen(_)) {
+            self.state.computed = self.cycle(true);
+        } else {
+            self.any_cycle();
+        }
+    }
+
+    #[inline(never)]
+    fn any_cycle(&mut self) {
+        self.state.computed = self.cycle(false);
+    }
+
+    /// [`control`](Self::control), once for any sample and once more, without calls, for the `steady` state of the default:
+    /// on its estimator, after the start, with nothing tuned.
+    #[inline(always)]
+    fn cycle(&mut self, steady: bool) -> ControllerOutputs {
+        let first = !steady && self.state.k == 0;
+        let tuned = !steady && std::mem::take(&mut self.tuned) && !first;
         if first {
-            self.in_use.take_up(&self.parameters);
+            self.begin();
         }
         let sample = self.measure();
-        let (frame, mode) = self.estimate(&sample, tuned);
+        let (frame, mode) = self.estimate(&sample, tuned, steady);
         let speed = frame.w / f64::from(self.parameters.motor.n_p);
         let References { i: i_ref, limited: current_limited, tau: (low, high), weakens } =
             self.reference(mode, speed, frame.injection, tuned);
@@ -60,8 +81,15 @@ impl SensorlessController {
         }
     }
 
+    /// Prepares the first sample, which repeats its current.
+    #[cold]
+    fn begin(&mut self) {
+        self.in_use.take_up(&self.parameters);
+        self.state.i_last = self.currents().to_stator();
+    }
+
     /// Measured currents in A, without the offsets that were found.
-    #[inline]
+    #[inline(always)]
     fn currents(&self) -> Phases {
         let Phases { a, b, c } = self.parameters.sensor.measure(self.inputs.i, self.state.samples);
         let zero = self.state.offset.i;
@@ -69,31 +97,29 @@ impl SensorlessController {
     }
 
     /// Values from the sensors and the previous samples.
-    #[inline]
+    #[inline(always)]
     fn measure(&self) -> Sample {
         let Self { inputs, parameters: par, state, .. } = self;
         let i = self.currents().to_stator();
-        let i_last = if state.k == 0 { i } else { state.i_last };
         // The command applied since the last sample: the newest one if there is no delay.
-        let acted = match (par.delay, state.commands) {
-            (0, [newest, ..]) => newest,
-            (1, [_, older, _]) => older,
-            (_, [.., oldest]) => oldest,
+        let [newest, older, oldest] = &state.commands;
+        let Command { mut u, injected } = *match par.delay {
+            0 => newest,
+            1 => older,
+            _ => oldest,
         };
         let Compensation { u_dead, i_zero, observe, .. } = par.compensation;
-        // The trapezoid over the interval.
-        let lost = if observe && u_dead > 0.0 {
-            let at = |i: AlphaBeta| dead_time_loss(0.5 * u_dead, i_zero, Phases::from_stator(i));
-            at(i_last) + at(i)
-        } else {
-            AlphaBeta::ZERO
-        };
+        if observe && u_dead > 0.0 {
+            // The trapezoid over the interval.
+            let lost = |i: AlphaBeta| dead_time_loss(0.5 * u_dead, i_zero, Phases::from_stator(i));
+            u = u - (lost(state.i_last) + lost(i));
+        }
         Sample {
             k: state.k,
             i,
-            i_last,
-            u: acted.u - lost,
-            u_injected: acted.injected,
+            i_last: state.i_last,
+            u,
+            u_injected: injected,
             u_pi: state.u_pi,
             i_ref: state.i_ref,
             tau_ref: state.tau_ref,
@@ -105,10 +131,15 @@ impl SensorlessController {
     }
 
     /// The estimated frame and the action of the loops in it. Parameters that were `tuned` then act on the estimator.
-    #[inline]
-    fn estimate(&mut self, sample: &Sample, tuned: bool) -> (Frame, Mode) {
+    #[inline(always)]
+    fn estimate(&mut self, sample: &Sample, tuned: bool, steady: bool) -> (Frame, Mode) {
         let Self { inputs, parameters: par, gains, in_use, state, .. } = self;
-        let (estimate, mode) = state.estimate(par.estimator, gains, par, in_use, inputs, sample);
+        let (estimate, mode) = match &mut state.estimator {
+            Estimator::Rasmussen(observer) if steady => {
+                (observer.update(&context(par, &in_use.estimators, &in_use.motor), sample), Mode::ClosedLoop)
+            }
+            _ => state.estimate(gains, par, in_use, inputs, sample),
+        };
         if tuned {
             let new = context(par, &par.estimators, &par.motor);
             state.estimator.retune(&context(par, &in_use.estimators, &in_use.motor), &new);
@@ -119,7 +150,7 @@ impl SensorlessController {
     }
 
     /// The references at the estimated mechanical `speed` (rad/s) beside an `injection`.
-    #[inline]
+    #[inline(always)]
     fn reference(&mut self, mode: Mode, speed: f64, injection: Injection, tuned: bool) -> References {
         let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
         match mode {
@@ -127,14 +158,14 @@ impl SensorlessController {
             Mode::Voltage(_) => References::default(),
             Mode::AfterStart | Mode::AfterSearch | Mode::ClosedLoop => {
                 let old = (tuned && mode == Mode::ClosedLoop).then_some(&last_gains.speed);
-                state.references(par.estimator, gains, old, par, inputs, speed, injection)
+                state.references(gains, old, par, inputs, speed, injection)
             }
         }
     }
 
     /// Current control, injection, the hexagon and dead-time compensation: the voltage references in V, whether the
     /// hexagon limited them, and the share of u_dc / sqrt(3) that was requested.
-    #[inline]
+    #[inline(always)]
     fn modulate(&mut self, mode: Mode, frame: &Frame, i_ref: DqHat, tuned: bool) -> (Phases, bool, f64) {
         let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
         let (motor, T_s) = (&par.motor, par.T_s);
@@ -154,13 +185,15 @@ impl SensorlessController {
         // The command acts from `delay` to `delay + 1` samples from now, so rotate it to the middle of that interval.
         let acting = frame.axis.ahead(Turn::new((f64::from(par.delay) + 0.5) * T_s * frame.w));
         let injected = match frame.injection {
-            Injection::None => AlphaBeta::ZERO,
-            Injection::Stator(u) => u,
-            Injection::Estimated(u) => acting.to_stator(u),
+            Injection::None => None,
+            Injection::Stator(u) => Some(u),
+            Injection::Estimated(u) => Some(acting.to_stator(u)),
         };
-        let whole = acting.to_stator(requested) + injected;
-        let (command, limited) = within_hexagon(whole, inputs.u_dc);
-        let limitation = acting.from_stator(command - injected) - requested;
+        let without = acting.to_stator(requested);
+        let whole = injected.map_or(without, |injected| without + injected);
+        let injected = injected.unwrap_or_default();
+        let (mut command, limited) = within_hexagon(whole, inputs.u_dc);
+        let limitation = limited.then(|| acting.from_stator(command - injected) - requested);
         state.current.integrate(&gains.current, i_ref - frame.i, limitation, T_s);
         let injected = if limited { injected * (command.magnitude() / whole.magnitude()) } else { injected };
         let (mut output, mut beyond) = (command, false);
@@ -168,15 +201,18 @@ impl SensorlessController {
             let legs = Phases::from_stator(acting.to_stator(i_ref));
             let loss = dead_time_loss(par.compensation.u_dead, par.compensation.i_zero, legs);
             (output, beyond) = within_hexagon(command + loss, inputs.u_dc);
+            if par.compensation.observe {
+                command = output;
+            }
         }
-        let [newest, older, _] = state.commands;
-        let u = if par.compensation.observe { output } else { command };
-        state.commands = [Command { u, injected }, newest, older];
+        state.commands[2] = state.commands[1];
+        state.commands[1] = state.commands[0];
+        state.commands[0] = Command { u: command, injected };
         (Phases::from_stator(output), limited || beyond, u_share)
     }
 
     /// The output `lock_lost`; 0 during a start sequence, because its angle is not an estimate.
-    #[inline]
+    #[inline(always)]
     fn lock(&mut self, mode: Mode, frame: &Frame, sample: &Sample, R_s: f64) -> f64 {
         let Self { parameters: par, gains, state, .. } = self;
         match mode {
@@ -193,7 +229,7 @@ impl SensorlessController {
     }
 
     /// Stores what the next sample needs: the references and the current `i` (A) of this sample.
-    #[inline]
+    #[inline(always)]
     fn keep(&mut self, sample: &Sample, i_ref: DqHat, i: DqHat) {
         let Self { parameters: par, gains, state, .. } = self;
         state.i_last = sample.i;

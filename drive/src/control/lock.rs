@@ -39,7 +39,7 @@
 
 use crate::estimator::Sample;
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
-use crate::math::{exp, sin_cos};
+use crate::math::{at_least, at_most, exp, sin_cos, within};
 use crate::motor::Motor;
 use fmu_core::unit::{RADIAN, SECOND, VOLT};
 use fmu_core::{Row, Table};
@@ -159,18 +159,17 @@ impl Following {
     /// `confirmed` the angle.
     #[inline]
     fn update(&mut self, gains: &LockGains, d: AlphaBeta, w_ref: Option<f64>, confirmed: bool) -> f64 {
-        let turned = self.d.alpha() * d.beta() - self.d.beta() * d.alpha();
-        let w = turned * gains.rate;
+        let w = self.d.cross(d) * gains.rate;
         self.d = d;
         let w_ref = w_ref.unwrap_or(w);
-        self.w_m += (w_ref - self.w_m).min(gains.follows).max(-gains.follows);
+        self.w_m += within(w_ref - self.w_m, gains.follows);
         self.off += (w - w_ref - self.off) * gains.smooth;
         self.off_m += (w - self.w_m - self.off_m) * gains.smooth;
-        let x = self.off.min(self.off_m).max(-self.off.max(self.off_m));
+        let x = at_least(at_most(self.off, self.off_m), -at_least(self.off, self.off_m));
         if confirmed {
             self.S = 0.0;
         } else if x > gains.w_0 + SPEED * w_ref.abs() {
-            self.S = (self.S + gains.integrates * x).min(2.0);
+            self.S = at_most(self.S + gains.integrates * x, 2.0);
         } else {
             self.S -= self.S * gains.decays;
         }
@@ -186,7 +185,8 @@ impl Lock {
 
     /// `lock_lost` after a sample with the estimated frame on `axis`, turning at `w` (rad/s) with the reference `w_ref`
     /// (rad/s), none in torque mode; `R_s` (Ohm) is the resistance that the estimator uses.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
     pub fn update(
         &mut self,
         gains: &LockGains,
@@ -197,21 +197,19 @@ impl Lock {
         (w, w_ref): (f64, Option<f64>),
     ) -> f64 {
         let i = axis.from_stator(sample.i);
-        let psi = axis.to_stator(DqHat::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q()));
+        let psi = DqHat::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q());
         if self.started {
             let resistive = (sample.i_last + sample.i) * (0.5 * R_s);
-            let epsilon = sample.u - resistive - (psi - self.psi) * gains.rate;
-            self.e += (axis.from_stator(epsilon) - self.e) * gains.filter;
+            let epsilon = axis.from_stator(sample.u - resistive + self.psi * gains.rate) - psi * gains.rate;
+            self.e += (epsilon - self.e) * gains.filter;
             // The error of the resistance that explains most; the tiny current keeps 0/0 away.
-            let (most, squared) = (RESISTANCE * R_s, i.d() * i.d() + i.q() * i.q() + 1e-12);
-            let dR = ((self.e.d() * i.d() + self.e.q() * i.q()) / squared).min(most).max(-most);
-            let quotient = ((self.e - i * dR).magnitude() / (gains.u + gains.psi * w.abs())).min(LOST);
+            let dR = within(self.e.dot(i) / (i.dot(i) + 1e-12), RESISTANCE * R_s);
+            let quotient = at_most((self.e - i * dR).magnitude() / (gains.u + gains.psi * w.abs()), LOST);
             let confirmed = quotient < 0.5 && motor.psi_M * w.abs() > 2.0 * gains.u;
-            let d = axis.to_stator(DqHat::new(1.0, 0.0));
-            let level = quotient.max(self.following.update(gains, d, w_ref, confirmed));
+            let level = at_least(quotient, self.following.update(gains, axis.along(1.0), w_ref, confirmed));
             self.level += (level - self.level) * gains.level;
         }
-        (self.started, self.psi) = (true, psi);
+        (self.started, self.psi) = (true, axis.to_stator(psi));
         self.level
     }
 }

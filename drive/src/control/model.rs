@@ -52,14 +52,19 @@ impl SensorlessController {
 
     /// One sample of the controller: currents in, voltage references out. If a lost estimator makes the state
     /// non-finite, the controller restarts at rest from its last angle and reports the loss.
-    fn compute(&mut self) -> ControllerOutputs {
+    fn compute(&mut self) {
         if !self.inputs.enable {
-            return self.rest();
+            self.state.computed = self.rest();
+            return;
         }
-        let out = self.control();
+        let theta = self.state.computed.theta_est;
+        self.control();
         self.state.k += 1;
-        let sane = (out.speed_est * f64::from(self.parameters.motor.n_p) * self.parameters.T_s).abs() < MAX_TURN;
-        if sane && out.is_finite() { out } else { self.start_again() }
+        let (out, par) = (&self.state.computed, &self.parameters);
+        let sane = (out.speed_est * f64::from(par.motor.n_p) * par.T_s).abs() < MAX_TURN;
+        if !(sane && out.is_finite()) {
+            self.start_again(theta);
+        }
     }
 
     /// Refuses inputs that are no numbers.
@@ -85,11 +90,10 @@ impl SensorlessController {
         out
     }
 
-    /// Restarts at the angle of the last sample, at rest and without voltage.
+    /// Restarts at the angle `theta` (rad) of the last sample, at rest and without voltage.
     #[cold]
-    fn start_again(&mut self) -> ControllerOutputs {
+    fn start_again(&mut self, theta: f64) {
         let Self { parameters: par, state, .. } = self;
-        let theta = state.computed.theta_est;
         let kind = par.estimator;
         let nothing = Sample { k: state.k, ..Sample::default() };
         let (estimator, _) = Estimator::start(kind, &context(par, &par.estimators, &par.motor), &nothing, theta, 0.0);
@@ -99,12 +103,17 @@ impl SensorlessController {
             offset: state.offset,
             estimator,
             lock: Lock::lost(),
-            computed: state.computed,
             shown: state.shown,
             ..State::default()
         };
         let R_s_est = state.estimator.resistance(&par.estimators, &par.motor);
-        ControllerOutputs { theta_est: theta, lock_lost: LOST, enabled: true, R_s_est, ..ControllerOutputs::default() }
+        state.computed = ControllerOutputs {
+            theta_est: theta,
+            lock_lost: LOST,
+            enabled: true,
+            R_s_est,
+            ..ControllerOutputs::default()
+        };
     }
 
     /// Checks that the parameters fit together, with a DC link of `u_dc` (V) at the start.
@@ -160,7 +169,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 10;
+    const STATE_VERSION: u16 = 11;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
@@ -181,6 +190,7 @@ impl Model for SensorlessController {
             speed,
             k,
             i_tau: tau / k,
+            observes_flux,
             lock: LockGains::new(lock, motor, *T_s, reach),
             weakening,
         };
@@ -224,12 +234,15 @@ impl Sampled for SensorlessController {
     }
 
     fn show(&mut self) {
-        self.state.shown.clone_from(&self.state.computed);
+        if std::mem::take(&mut self.state.hidden) {
+            self.state.shown.clone_from(&self.state.computed);
+        }
     }
 
     fn sample(&mut self) -> Result<(), Fault> {
         self.finite()?;
-        self.state.computed = self.compute();
+        self.compute();
+        self.state.hidden = true;
         self.state.samples += 1;
         Ok(())
     }

@@ -11,6 +11,7 @@
 //! A.s/rad.
 
 use crate::control::start::RAD_PER_S2;
+use crate::math::{at_least, at_most};
 use fmu_core::unit::{ONE, RAD_PER_S};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
@@ -83,8 +84,8 @@ impl SpeedController {
     pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limits: (f64, f64), T_s: f64) -> (f64, f64) {
         let ((low, high), error) = (limits, w_ref - w);
         let wanted = gains.k_p * (gains.b * w_ref - w) + self.integral;
-        let i_q_ref = wanted.clamp(low, high);
-        let further_in = (wanted > high && error > 0.0) || (wanted < low && error < 0.0);
+        let i_q_ref = at_least(at_most(wanted, high), low);
+        let further_in = (wanted - i_q_ref) * error > 0.0;
         if !further_in {
             self.integral += T_s * gains.k_i * error;
         }

@@ -9,9 +9,9 @@ use crate::control::speed::{SpeedController, SpeedGains};
 use crate::control::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::control::tables::ControllerParameters;
 use crate::control::weakening::{Weakening, WeakeningGains};
-use crate::estimator::{Class, Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
+use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
-use crate::math::wrap;
+use crate::math::{at_most, within, wrap};
 use crate::motor::Motor;
 use serde::{Deserialize, Serialize};
 
@@ -33,8 +33,26 @@ pub(super) struct Gains {
     pub(super) k: f64,
     /// Maximum torque in N.m divided by the torque constant: the limit of the speed loop in A.
     pub(super) i_tau: f64,
+    /// The estimator is a flux observer: it needs the low-speed law at standstill, where the others would only have its
+    /// losses.
+    pub(super) observes_flux: bool,
     pub(super) lock: LockGains,
     pub(super) weakening: WeakeningGains,
+}
+
+impl Gains {
+    /// Whether the references have maximum torque per ampere.
+    #[inline]
+    fn mtpa(&self, par: &ControllerParameters) -> bool {
+        par.current.mtpa && !self.observes_flux
+    }
+
+    /// References of the currents (A) without field weakening: of maximum torque per ampere for the torque of `i_q` (A), or
+    /// `i_d` and `i_q`.
+    #[inline]
+    fn currents(&self, par: &ControllerParameters, i_d: f64, i_q: f64) -> DqHat {
+        if self.mtpa(par) { max_torque_per_ampere(&par.motor, self.k * i_q) } else { DqHat::new(i_d, i_q) }
+    }
 }
 
 /// Parameters the estimator uses: at the first sample after retuning, still the previous ones.
@@ -132,8 +150,10 @@ pub(super) struct State {
     pub(super) weakening: Weakening,
     /// Time in s for which a limit has reduced the references, while field weakening is in use.
     pub(super) limited_for: f64,
-    /// Outputs of the last sample, hidden until the next instant.
+    /// Outputs of the last sample.
     pub(super) computed: ControllerOutputs,
+    /// They wait for the next instant.
+    pub(super) hidden: bool,
     /// Outputs visible now.
     pub(super) shown: ControllerOutputs,
 }
@@ -196,7 +216,6 @@ impl State {
     /// The estimate at a sample, from the active source, and the action of the loops.
     pub(super) fn estimate(
         &mut self,
-        kind: Kind,
         gains: &Gains,
         par: &ControllerParameters,
         in_use: &InUse,
@@ -206,7 +225,7 @@ impl State {
         let context = context(par, &in_use.estimators, &in_use.motor);
         let first = (sample.k == 0).then(|| {
             let w = f64::from(par.motor.n_p) * par.speed_est;
-            let (estimator, estimate) = Estimator::start(kind, &context, sample, par.theta_est, w);
+            let (estimator, estimate) = Estimator::start(par.estimator, &context, sample, par.theta_est, w);
             self.estimator = estimator;
             estimate
         });
@@ -239,11 +258,10 @@ impl State {
 
     /// The references at the estimated mechanical `speed` (rad/s) beside an `injection`; `old` are the gains of a speed loop
     /// that is retuned at this sample.
-    #[inline]
-    #[expect(clippy::too_many_arguments, reason = "parameters, inputs and estimate, each of its own kind")]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
     pub(super) fn references(
         &mut self,
-        kind: Kind,
         gains: &Gains,
         old: Option<&SpeedGains>,
         par: &ControllerParameters,
@@ -256,44 +274,38 @@ impl State {
         if let Some(old) = old {
             self.speed.retune(old, &gains.speed, w_ref, speed);
         }
-        // Only a flux observer needs the low-speed law at standstill; with the other methods it would only add losses.
-        let observes_flux = kind.class() == Class::FluxObserver;
-        let (i_d_ref, limit) = if observes_flux {
+        let (i_d_ref, limit) = if gains.observes_flux {
             let i_d_ref = par.zero_speed.i_d_ref(speed);
-            (i_d_ref, par.limit.i_q_beside(i_d_ref).min(gains.i_tau))
+            (i_d_ref, at_most(par.limit.i_q_beside(i_d_ref), gains.i_tau))
         } else {
             (0.0, gains.i_tau)
         };
-        let salient = par.current.mtpa && !observes_flux;
-        let today = |i_q_ref: f64| {
-            if salient { max_torque_per_ampere(&par.motor, gains.k * i_q_ref) } else { DqHat::new(i_d_ref, i_q_ref) }
-        };
         if par.weakening.used {
-            return self.weakened(gains, par, inputs, (speed, w_ref), limit, injection, salient, today);
+            let References { i, limited, tau, weakens } =
+                self.weakened(gains, par, inputs, (speed, w_ref), (i_d_ref, limit), injection);
+            return References { i, limited, tau, weakens };
         }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
-            (requested.clamp(-limit, limit), requested)
+            (within(requested, limit), requested)
         } else {
             self.speed.update(&gains.speed, w_ref, speed, (-limit, limit), par.T_s)
         };
         let tau = gains.k * limit;
-        References { i: today(i_q_ref), limited: requested.abs() > limit, tau: (tau, tau), weakens: false }
+        let i = gains.currents(par, i_d_ref, i_q_ref);
+        References { i, limited: requested.abs() > limit, tau: (tau, tau), weakens: false }
     }
 
-    /// [`references`](Self::references) with field weakening.
+    /// [`references`](Self::references) with field weakening, `limit` (A) of i_q beside `i_d_ref` (A).
     #[inline(never)]
-    #[expect(clippy::too_many_arguments, reason = "what the references have computed")]
     fn weakened(
         &mut self,
         gains: &Gains,
         par: &ControllerParameters,
         inputs: &ControllerInputs,
         (speed, w_ref): (f64, f64),
-        limit: f64,
+        (i_d_ref, limit): (f64, f64),
         injection: Injection,
-        salient: bool,
-        today: impl Fn(f64) -> DqHat,
     ) -> References {
         let w = f64::from(par.motor.n_p) * speed;
         let at = (w, inputs.u_dc, injection.magnitude());
@@ -308,8 +320,9 @@ impl State {
         };
         let limited = requested > high || requested < -low;
         self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
-        let tau = gains.k * i_q_ref;
-        let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, salient, || today(i_q_ref));
+        let (tau, mtpa) = (gains.k * i_q_ref, gains.mtpa(par));
+        let today = || gains.currents(par, i_d_ref, i_q_ref);
+        let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, mtpa, today);
         References { i, limited, tau: (gains.k * low, gains.k * high), weakens: self.weakening.weakens }
     }
 

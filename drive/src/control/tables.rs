@@ -12,6 +12,7 @@ use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::Kind;
 use crate::estimator::resistance::{ADAPTATION, LATER_ADAPTATION};
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters, LATER_ESTIMATOR_PARAMETERS};
+use crate::math::{at_least, at_most};
 use crate::motor::{MOTOR, Motor};
 use crate::plant::saturation::A_PER_WB2;
 use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METER, OHM, ONE, RADIAN, SECOND, SPEED, VOLT};
@@ -33,7 +34,7 @@ impl Limits {
     /// Maximum |i_q| in A that remains beside `i_d` (A), which has priority.
     #[inline]
     pub fn i_q_beside(&self, i_d: f64) -> f64 {
-        self.i_q.min((self.i * self.i - i_d * i_d).max(0.0).sqrt())
+        at_most(at_least(self.i * self.i - i_d * i_d, 0.0).sqrt(), self.i_q)
     }
 }
 

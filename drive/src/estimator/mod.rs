@@ -164,7 +164,8 @@ pub trait Estimating: Sized {
         let _ = (old, new);
     }
 
-    /// Stator resistance in Ohm that the estimator uses: the estimate `R_s` of the motor, unless it adapts it.
+    /// Stator resistance in Ohm that the estimator uses: the estimate `R_s` of the motor, unless it adapts it; asked only
+    /// with `adaptation.resistance`.
     fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
         let _ = par;
         motor.R_s
@@ -278,6 +279,9 @@ macro_rules! estimators {
             /// See [`Estimating::resistance`].
             #[inline]
             pub fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
+                if !par.adaptation.resistance {
+                    return motor.R_s;
+                }
                 match self {
                     $(Self::$name(state) => state.resistance(par, motor),)*
                 }

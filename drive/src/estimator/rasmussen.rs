@@ -76,7 +76,8 @@ impl Estimating for Rasmussen {
         (Self { psi_s, i, theta, w, w_i: w, resistance, ..Self::default() }, Estimate::new(theta, w, sample))
     }
 
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
     fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
         let Context { motor, T_s, par: EstimatorParameters { rasmussen: par, .. }, .. } = *context;
         let turn = T_s * self.w;
@@ -88,10 +89,10 @@ impl Estimating for Rasmussen {
         self.i = sample.i;
 
         let psi_r = self.psi_r(motor, axis);
-        let g_2 = par.w_n * par.w_n / motor.psi_M;
-        let g_1 = par.g_1(motor);
-        self.w_i += T_s * g_2 * psi_r.q();
-        self.w = g_1 * psi_r.q() + self.w_i;
+        // g_1 psi_rq^ = 2 zeta w_q, g_2 psi_rq^ = w_n w_q
+        let w_q = par.w_n * psi_r.q() / motor.psi_M;
+        self.w_i += T_s * par.w_n * w_q;
+        self.w = 2.0 * par.zeta * w_q + self.w_i;
         let x = psi_r.d() - motor.psi_M;
         let Adapted { c_1, v_q } = if context.par.adaptation.resistance {
             self.resistance.update(context, sample, x, axis.from_stator(sample.i), self.w)
