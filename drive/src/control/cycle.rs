@@ -20,6 +20,8 @@ struct Frame {
     theta: f64,
     /// Electrical speed in rad/s.
     w: f64,
+    /// The rotation by `w` in half a sample.
+    half: Turn,
     /// Stator current to control in A, with the carrier removed.
     i: DqHat,
     /// Injected voltage in V.
@@ -145,8 +147,9 @@ impl SensorlessController {
             state.estimator.retune(&context(par, &in_use.estimators, &in_use.motor), &new);
             in_use.take_up(par);
         }
-        let Estimate { theta, axis, w, i, injection } = estimate;
-        (Frame { axis, theta, w, i: axis.from_stator(i), injection }, mode)
+        let Estimate { theta, axis, w, half, i, injection } = estimate;
+        let half = half.unwrap_or_else(|| Turn::new(0.5 * par.T_s * w));
+        (Frame { axis, theta, w, half, i: axis.from_stator(i), injection }, mode)
     }
 
     /// The references at the estimated mechanical `speed` (rad/s) beside an `injection`.
@@ -183,7 +186,10 @@ impl SensorlessController {
             state.weakening.integrate(&par.weakening, magnitude, inputs.u_dc, T_s);
         }
         // The command acts from `delay` to `delay + 1` samples from now, so rotate it to the middle of that interval.
-        let acting = frame.axis.ahead(Turn::new((f64::from(par.delay) + 0.5) * T_s * frame.w));
+        let mut acting = frame.axis.ahead(frame.half);
+        for _ in 0..par.delay {
+            acting = acting.ahead(frame.half).ahead(frame.half);
+        }
         let injected = match frame.injection {
             Injection::None => None,
             Injection::Stator(u) => Some(u),
