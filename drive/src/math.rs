@@ -286,6 +286,18 @@ mod tests {
     }
 
     #[test]
+    fn no_number_stays_none() {
+        assert!(all_finite([f64::MAX, f64::MAX, -1.0]) && all_finite([0.0; 3]), "a sum that overflows is no fault");
+        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(!all_finite([1.0, x]) && !all_finite([f64::INFINITY, 1.0, x, f64::MAX, f64::MAX]));
+        }
+        assert!(within(f64::NAN, 1.0).is_nan() && at_most(f64::NAN, 1.0).is_nan() && at_least(f64::NAN, 1.0).is_nan());
+        for (x, expected) in [(-3.0, -2.0), (0.5, 0.5), (f64::INFINITY, 2.0)] {
+            assert!((within(x, 2.0) - expected).abs() < 1e-15);
+        }
+    }
+
+    #[test]
     fn wrap_is_half_open() {
         assert!((wrap(PI) - PI).abs() < 1e-15 && (wrap(-PI) - PI).abs() < 1e-15);
         assert!((wrap(3.0 * PI) - PI).abs() < 1e-14 && (wrap(-7.0) - (-7.0 + 2.0 * PI)).abs() < 1e-14);

@@ -281,9 +281,7 @@ impl State {
             (0.0, gains.i_tau)
         };
         if par.weakening.used {
-            let References { i, limited, tau, weakens } =
-                self.weakened(gains, par, inputs, (speed, w_ref), (i_d_ref, limit), injection);
-            return References { i, limited, tau, weakens };
+            return self.weakened(gains, par, inputs, (speed, w_ref), (i_d_ref, limit), injection);
         }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;

@@ -136,7 +136,14 @@ impl Estimating for FluxObserver {
         self.v = psi_a * (c * r);
         self.psi_M -= T_s * par.flux_observer.magnet * r * psi_M / (1.0 + others * others);
         self.tracker.correct(context, par.tracker.bandwidth, -inverse * psi_a.cross(e), sample.tau_ref);
-        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, injection: Injection::None }
+        Estimate {
+            theta: self.tracker.theta,
+            axis,
+            w: self.tracker.w,
+            half: None,
+            i: sample.i,
+            injection: Injection::None,
+        }
     }
 
     #[inline]

@@ -81,7 +81,14 @@ impl Estimating for GradientObserver {
         }
         let eta = axis.from_stator(self.eta);
         self.tracker.correct(context, par.tracker.bandwidth, atan2(eta.q(), eta.d()), sample.tau_ref);
-        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, injection: Injection::None }
+        Estimate {
+            theta: self.tracker.theta,
+            axis,
+            w: self.tracker.w,
+            half: None,
+            i: sample.i,
+            injection: Injection::None,
+        }
     }
 }
 

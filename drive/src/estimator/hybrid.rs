@@ -65,7 +65,7 @@ impl Hybrid {
             Injection::None
         };
         let axis = Axis::<Estimated>::at(theta);
-        Estimate { theta, axis, w, i: axis.to_stator(i), injection }
+        Estimate { theta, axis, w, half: None, i: axis.to_stator(i), injection }
     }
 }
 

@@ -39,7 +39,7 @@ pub mod voltage_feedback;
 pub mod voltage_model;
 
 use crate::control::tables::ControllerParameters;
-use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
+use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use crate::motor::Motor;
 use fmu_core::{Fault, enumeration};
 use serde::{Deserialize, Serialize};
@@ -115,7 +115,7 @@ impl Injection {
 }
 
 /// An estimator's results at sample k, and the voltage it requests.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Estimate {
     /// Electrical rotor angle in rad, not wrapped.
     pub theta: f64,
@@ -123,6 +123,8 @@ pub struct Estimate {
     pub axis: Axis<Estimated>,
     /// Electrical speed in rad/s.
     pub w: f64,
+    /// The rotation by `w` in half a sample, if the estimator has needed it.
+    pub half: Option<Turn>,
     /// Stator current to control in A: the measured current without the carrier.
     pub i: AlphaBeta,
     /// Voltage to add.
@@ -139,7 +141,7 @@ impl Estimate {
     /// Angle (rad) and speed (rad/s), the current `i` (A) to control and the voltage to add.
     #[inline]
     pub fn injecting(theta: f64, w: f64, i: AlphaBeta, injection: Injection) -> Self {
-        Self { theta, axis: Axis::at(theta), w, i, injection }
+        Self { theta, axis: Axis::at(theta), w, half: None, i, injection }
     }
 }
 

@@ -65,7 +65,7 @@ impl NearPwmInjection {
         };
         let axis = Axis::<Estimated>::at(self.tracker.theta);
         let injection = Injection::Stator(direction * context.par.near_pwm.voltage);
-        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: axis.to_stator(i), injection }
+        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, half: None, i: axis.to_stator(i), injection }
     }
 }
 

@@ -52,8 +52,8 @@ impl Default for RasmussenParameters {
 pub struct Rasmussen {
     /// Estimated stator flux linkage in Wb.
     psi_s: AlphaBeta,
-    /// Feedback v in V.
-    v: DqHat,
+    /// Feedback v in V, as it acts in the middle of the interval that begins.
+    v: AlphaBeta,
     /// Measured current in A.
     i: AlphaBeta,
     /// Integral part of the speed in rad/s, electrical.
@@ -80,12 +80,10 @@ impl Estimating for Rasmussen {
     #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
     fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
         let Context { motor, T_s, par: EstimatorParameters { rasmussen: par, .. }, .. } = *context;
-        let turn = T_s * self.w;
-        self.theta += turn;
+        self.theta += T_s * self.w;
         let axis = Axis::<Estimated>::at(self.theta);
-        let half_way = axis.ahead(Turn::new(-0.5 * turn));
         let resistive = (self.i + sample.i) * (0.5 * self.resistance(context.par, motor));
-        self.psi_s += (sample.u - resistive + half_way.to_stator(self.v)) * T_s;
+        self.psi_s += (sample.u - resistive + self.v) * T_s;
         self.i = sample.i;
 
         let psi_r = self.psi_r(motor, axis);
@@ -99,8 +97,9 @@ impl Estimating for Rasmussen {
         } else {
             Adapted { c_1: par.c_1, v_q: 0.0 }
         };
-        self.v = DqHat::new(-c_1 * x, v_q - par.c_2 * psi_r.q());
-        Estimate { theta: self.theta, axis, w: self.w, i: sample.i, injection: Injection::None }
+        let half = Turn::new(0.5 * T_s * self.w);
+        self.v = axis.ahead(half).to_stator(DqHat::new(-c_1 * x, v_q - par.c_2 * psi_r.q()));
+        Estimate { theta: self.theta, axis, w: self.w, half: Some(half), i: sample.i, injection: Injection::None }
     }
 
     #[inline]

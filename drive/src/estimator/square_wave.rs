@@ -95,7 +95,7 @@ impl SquareWaveInjection {
     fn estimate(&self, context: &Context, sample: &Sample, i: DqHat) -> Estimate {
         let axis = Axis::<Estimated>::at(self.tracker.theta);
         let injection = Injection::Estimated(DqHat::new(context.par.square_wave.command(sample.k), 0.0));
-        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: axis.to_stator(i), injection }
+        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, half: None, i: axis.to_stator(i), injection }
     }
 }
 
