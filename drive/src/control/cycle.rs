@@ -57,7 +57,7 @@ impl SensorlessController {
         }
         let sample = self.measure();
         let (frame, mode) = self.estimate(&sample, tuned, steady);
-        let speed = frame.w / f64::from(self.parameters.motor.n_p);
+        let speed = frame.w * (1.0 / f64::from(self.parameters.motor.n_p));
         let References { i: i_ref, limited: current_limited, tau: (low, high), weakens } =
             self.reference(mode, speed, frame.injection, tuned);
         let (u, voltage_limited, u_share) = self.modulate(mode, &frame, i_ref, tuned);

@@ -26,7 +26,7 @@ impl ZeroSpeed {
     /// Reference of i_sd in A at the estimated mechanical speed in rad/s.
     #[inline]
     pub fn i_d_ref(&self, speed_hat: f64) -> f64 {
-        self.i_0 * exp(-speed_hat.abs() / self.w_0)
+        self.i_0 * exp(-speed_hat.abs() * (1.0 / self.w_0))
     }
 }
 

@@ -62,6 +62,8 @@ pub struct Rasmussen {
     theta: f64,
     /// Estimated electrical speed in rad/s.
     w: f64,
+    /// The frame at the next sample: a sample does not begin with a wait for its sine and cosine.
+    next: Axis<Estimated>,
     /// Adaptation of the resistance.
     resistance: Resistance,
 }
@@ -72,8 +74,8 @@ impl Estimating for Rasmussen {
         let (motor, i) = (context.motor, sample.i);
         let axis = Axis::<Estimated>::at(theta);
         let psi_s = axis.to_stator(DqHat::new(motor.psi_M, 0.0) + inductive(motor, axis.from_stator(i)));
-        let resistance = Resistance::start(context, sample, w);
-        (Self { psi_s, i, theta, w, w_i: w, resistance, ..Self::default() }, Estimate::new(theta, w, sample))
+        let (next, resistance) = (Axis::at(theta + context.T_s * w), Resistance::start(context, sample, w));
+        (Self { psi_s, i, theta, w, w_i: w, next, resistance, ..Self::default() }, Estimate::new(theta, w, sample))
     }
 
     #[inline(always)]
@@ -81,16 +83,17 @@ impl Estimating for Rasmussen {
     fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
         let Context { motor, T_s, par: EstimatorParameters { rasmussen: par, .. }, .. } = *context;
         self.theta += T_s * self.w;
-        let axis = Axis::<Estimated>::at(self.theta);
+        let axis = self.next;
         let resistive = (self.i + sample.i) * (0.5 * self.resistance(context.par, motor));
         self.psi_s += (sample.u - resistive + self.v) * T_s;
         self.i = sample.i;
 
         let psi_r = self.psi_r(motor, axis);
         // g_1 psi_rq^ = 2 zeta w_q, g_2 psi_rq^ = w_n w_q
-        let w_q = par.w_n * psi_r.q() / motor.psi_M;
+        let w_q = par.w_n / motor.psi_M * psi_r.q();
         self.w_i += T_s * par.w_n * w_q;
         self.w = 2.0 * par.zeta * w_q + self.w_i;
+        self.next = Axis::at(self.theta + T_s * self.w);
         let x = psi_r.d() - motor.psi_M;
         let Adapted { c_1, v_q } = if context.par.adaptation.resistance {
             self.resistance.update(context, sample, x, axis.from_stator(sample.i), self.w)
