@@ -5,15 +5,18 @@
 
 use crate::enumeration::{Choice, Enumerated, Field, Place};
 use crate::integer::{Getter, Whole};
+use crate::reals::Inputs;
 use crate::token::Hash;
 use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::mem::MaybeUninit;
 
 /// The interface of a part for a table that does not know its type.
 pub(crate) trait Node<W>: Sync {
     fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
-    fn real<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut f64)>;
+    fn read(&self, whole: &mut W, list: &[u32], first: u32, out: &mut [MaybeUninit<f64>]) -> usize;
+    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
 }

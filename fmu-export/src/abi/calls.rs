@@ -15,8 +15,9 @@ use std::ffi::{c_char, c_int};
 /// states.
 #[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
 impl<E: Exported> Abi<E> {
+    #[inline(never)]
     pub unsafe fn get<T: Value>(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         references: References,
         n: usize,
@@ -25,15 +26,16 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E>(entry, instance, move |instance| {
                 let out = room(values, room_for, "values")?;
                 instance.get(array(references, n, "value references")?, out)
             })
         }
     }
 
+    #[inline(never)]
     pub unsafe fn set<T: Value>(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         references: References,
         n: usize,
@@ -42,7 +44,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E>(entry, instance, move |instance| {
                 let values = array(values, n_values, "values")?;
                 instance.set(array(references, n, "value references")?, values)
             })
@@ -51,7 +53,7 @@ impl<E: Exported> Abi<E> {
 
     /// The texts stay where they are until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
     pub unsafe fn get_texts(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         references: References,
         n: usize,
@@ -72,7 +74,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn set_texts(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         references: References,
         n: usize,
@@ -91,7 +93,7 @@ impl<E: Exported> Abi<E> {
 
     /// A getter or setter of a type that no variable has: succeeds only for zero variables.
     pub unsafe fn none(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         references: References,
         n: usize,
@@ -108,7 +110,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn set_debug_logging(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         on: bool,
         n: usize,
@@ -127,12 +129,12 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn exit_initialization(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn exit_initialization(entry: &'static Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E>(entry, instance, |instance| Ok(instance.exit_initialization()?)) }
     }
 
-    pub unsafe fn terminate(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn terminate(entry: &'static Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
             enter::<E>(entry, instance, |instance| {
@@ -142,7 +144,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn reset(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn reset(entry: &'static Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
             enter::<E>(entry, instance, |instance| {
@@ -153,7 +155,7 @@ impl<E: Exported> Abi<E> {
     }
 
     /// `state` points to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
-    pub unsafe fn save_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
+    pub unsafe fn save_state(entry: &'static Entry, instance: Instance, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
             enter::<E>(entry, instance, |instance| {
@@ -164,13 +166,13 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn restore_state(entry: Entry, instance: Instance, state: FmuState) -> c_int {
+    pub unsafe fn restore_state(entry: &'static Entry, instance: Instance, state: FmuState) -> c_int {
         // SAFETY: the importer's instance; the state is only a number.
         unsafe { enter::<E>(entry, instance, |instance| Ok(instance.restore(state.addr())?)) }
     }
 
     /// Ignores NULL and a variable that holds NULL.
-    pub unsafe fn free_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
+    pub unsafe fn free_state(entry: &'static Entry, instance: Instance, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
             enter::<E>(entry, instance, |_| {
@@ -185,7 +187,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn serialized_size(entry: Entry, instance: Instance, state: FmuState, size: *mut usize) -> c_int {
+    pub unsafe fn serialized_size(entry: &'static Entry, instance: Instance, state: FmuState, size: *mut usize) -> c_int {
         // SAFETY: the importer's variable; the state is only a number.
         unsafe {
             enter::<E>(entry, instance, |_| {
@@ -196,7 +198,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn serialize(entry: Entry, instance: Instance, state: FmuState, bytes: *mut u8, size: usize) -> c_int {
+    pub unsafe fn serialize(entry: &'static Entry, instance: Instance, state: FmuState, bytes: *mut u8, size: usize) -> c_int {
         // SAFETY: the importer's array of this size; the state is only a number.
         unsafe {
             enter::<E>(entry, instance, |_| {
@@ -215,7 +217,7 @@ impl<E: Exported> Abi<E> {
 
     /// Always creates a new state and ignores the previous value of the variable.
     pub unsafe fn deserialize(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         bytes: *const u8,
         size: usize,
@@ -231,7 +233,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn enter_event(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn enter_event(entry: &'static Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
             enter::<E>(entry, instance, |instance| {
@@ -241,43 +243,43 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn enter_continuous(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn enter_continuous(entry: &'static Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E>(entry, instance, |instance| Ok(instance.leave_event()?)) }
     }
 
-    pub unsafe fn set_time(entry: Entry, instance: Instance, time: f64) -> c_int {
+    pub unsafe fn set_time(entry: &'static Entry, instance: Instance, time: f64) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E>(entry, instance, |instance| Ok(instance.set_time(time)?)) }
     }
 
-    pub unsafe fn set_states(entry: Entry, instance: Instance, x: *const f64, n: usize) -> c_int {
+    pub unsafe fn set_states(entry: &'static Entry, instance: Instance, x: *const f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe { enter::<E>(entry, instance, |instance| instance.set_states(array(x, n, "continuous states")?)) }
     }
 
-    pub unsafe fn get_states(entry: Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {
+    pub unsafe fn get_states(entry: &'static Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe { enter::<E>(entry, instance, |instance| Ok(instance.get_states(numbers(x, n, "continuous states")?)?)) }
     }
 
-    pub unsafe fn derivatives(entry: Entry, instance: Instance, dx: *mut f64, n: usize) -> c_int {
+    pub unsafe fn derivatives(entry: &'static Entry, instance: Instance, dx: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe { enter::<E>(entry, instance, |instance| instance.derivatives(numbers(dx, n, "derivatives")?)) }
     }
 
-    pub unsafe fn indicators(entry: Entry, instance: Instance, z: *mut f64, n: usize) -> c_int {
+    pub unsafe fn indicators(entry: &'static Entry, instance: Instance, z: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe { enter::<E>(entry, instance, |instance| instance.indicators(numbers(z, n, "event indicators")?)) }
     }
 
-    pub unsafe fn nominals(entry: Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {
+    pub unsafe fn nominals(entry: &'static Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe { enter::<E>(entry, instance, |instance| Ok(instance.nominals(numbers(x, n, "nominals")?)?)) }
     }
 
     /// No step of the integrator is an event, and none ends the simulation: both flags are 0.
-    pub unsafe fn completed_step<B>(entry: Entry, instance: Instance, event: *mut B, end: *mut B) -> c_int
+    pub unsafe fn completed_step<B>(entry: &'static Entry, instance: Instance, event: *mut B, end: *mut B) -> c_int
     where
         B: From<bool>,
     {
@@ -294,7 +296,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn directional(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         (unknowns, n_unknowns): (References, usize),
         (knowns, n_knowns): (References, usize),
@@ -317,7 +319,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn output_derivatives(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         references: References,
         n: usize,
@@ -335,7 +337,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn input_derivatives(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         references: References,
         n: usize,
@@ -352,7 +354,7 @@ impl<E: Exported> Abi<E> {
     }
 
     /// A function of a capability that this FMU does not have.
-    pub unsafe fn unsupported(entry: Entry, instance: Instance, why: &str) -> c_int {
+    pub unsafe fn unsupported(entry: &'static Entry, instance: Instance, why: &str) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E>(entry, instance, |_| Err(Fault::new(format!("not supported: {why}")).into())) }
     }

@@ -25,7 +25,7 @@ const TERMINATED: c_int = 3;
 impl<E: Exported> Abi<E> {
     /// FMI 2.0.5, 2.1.5. The callbacks' struct is copied: its pointer is valid only during this call.
     pub unsafe fn fmi2_instantiate(
-        entry: Entry,
+        entry: &'static Entry,
         name: Text,
         fmu_type: c_int,
         token: Text,
@@ -53,7 +53,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn fmi2_setup_experiment(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         start: f64,
         stop_defined: Fmi2Boolean,
@@ -65,12 +65,12 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi2_enter_initialization(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn fmi2_enter_initialization(entry: &'static Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E>(entry, instance, |instance| Ok(instance.enter_initialization()?)) }
     }
 
-    pub unsafe fn fmi2_do_step(entry: Entry, instance: Instance, t: f64, h: f64) -> c_int {
+    pub unsafe fn fmi2_do_step(entry: &'static Entry, instance: Instance, t: f64, h: f64) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
             enter::<E>(entry, instance, |instance| {
@@ -80,7 +80,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi2_new_discrete_states(entry: Entry, instance: Instance, info: *mut Fmi2EventInfo) -> c_int {
+    pub unsafe fn fmi2_new_discrete_states(entry: &'static Entry, instance: Instance, info: *mut Fmi2EventInfo) -> c_int {
         // SAFETY: the importer's struct.
         unsafe {
             enter::<E>(entry, instance, |instance| {
@@ -100,7 +100,7 @@ impl<E: Exported> Abi<E> {
     }
 
     /// `fmi2LastSuccessfulTime`; the other kinds belong to asynchronous steps (FMI 2.0.5, 4.2.3).
-    pub unsafe fn fmi2_real_status(entry: Entry, instance: Instance, kind: c_int, value: *mut f64) -> c_int {
+    pub unsafe fn fmi2_real_status(entry: &'static Entry, instance: Instance, kind: c_int, value: *mut f64) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
             enter::<E>(entry, instance, |instance| {
@@ -115,7 +115,7 @@ impl<E: Exported> Abi<E> {
     }
 
     /// `fmi2Terminated`: this FMU never asks to end the simulation.
-    pub unsafe fn fmi2_boolean_status(entry: Entry, instance: Instance, kind: c_int, value: *mut Fmi2Boolean) -> c_int {
+    pub unsafe fn fmi2_boolean_status(entry: &'static Entry, instance: Instance, kind: c_int, value: *mut Fmi2Boolean) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
             enter::<E>(entry, instance, |_| {
@@ -129,7 +129,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi2_no_status(entry: Entry, instance: Instance, kind: c_int) -> c_int {
+    pub unsafe fn fmi2_no_status(entry: &'static Entry, instance: Instance, kind: c_int) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E>(entry, instance, |_| no_status(kind)) }
     }
@@ -169,7 +169,7 @@ macro_rules! export_fmi2 {
             logging_on: Fmi2Boolean,
         ) -> Instance {
             $crate::abi::quiet();
-            const ENTRY: Entry = Entry::new(Standard::Fmi2, Call::Instantiate, "fmi2Instantiate");
+            const ENTRY: &Entry = &Entry::new(Standard::Fmi2, Call::Instantiate, "fmi2Instantiate");
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi2_instantiate(

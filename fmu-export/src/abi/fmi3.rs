@@ -16,7 +16,7 @@ impl<E: Exported> Abi<E> {
     /// FMI 3.0.2, 2.3.1. `refused` names a requested feature that this FMU lacks.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_instantiate(
-        entry: Entry,
+        entry: &'static Entry,
         name: Text,
         token: Text,
         resources: Text,
@@ -45,7 +45,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn fmi3_enter_initialization(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         start: f64,
         stop_defined: Fmi3Boolean,
@@ -60,7 +60,7 @@ impl<E: Exported> Abi<E> {
     /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_do_step(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         t: f64,
         h: f64,
@@ -90,7 +90,7 @@ impl<E: Exported> Abi<E> {
 
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_update_discrete_states(
-        entry: Entry,
+        entry: &'static Entry,
         instance: Instance,
         again: *mut Fmi3Boolean,
         terminate: *mut Fmi3Boolean,
@@ -120,7 +120,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi3_enter_step(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn fmi3_enter_step(entry: &'static Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
             enter::<E>(entry, instance, |instance| {
@@ -131,12 +131,12 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi3_evaluate(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn fmi3_evaluate(entry: &'static Entry, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E>(entry, instance, |_| Ok(())) }
     }
 
-    pub unsafe fn fmi3_count(entry: Entry, instance: Instance, count: *mut usize, of_indicators: bool) -> c_int {
+    pub unsafe fn fmi3_count(entry: &'static Entry, instance: Instance, count: *mut usize, of_indicators: bool) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
             enter::<E>(entry, instance, |_| {
@@ -174,7 +174,7 @@ macro_rules! export_fmi3 {
             _intermediate_update: *const c_void,
         ) -> Instance {
             $crate::abi::quiet();
-            const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateCoSimulation");
+            const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateCoSimulation");
             let refused = (n_intermediate > 0)
                 .then_some("nRequiredIntermediateVariables must be 0: providesIntermediateUpdate = false");
             let interface =
@@ -199,7 +199,7 @@ macro_rules! export_fmi3 {
             logger: Option<Fmi3Logger>,
         ) -> Instance {
             $crate::abi::quiet();
-            const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateModelExchange");
+            const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateModelExchange");
             let interface = Interface::ModelExchange;
             // SAFETY: what the standard demands of the importer.
             unsafe {
@@ -223,7 +223,7 @@ macro_rules! export_fmi3 {
             _unlock_preemption: *const c_void,
         ) -> Instance {
             $crate::abi::quiet();
-            const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateScheduledExecution");
+            const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateScheduledExecution");
             let refused = Some("not supported: Scheduled Execution");
             // SAFETY: what the standard demands of the importer.
             unsafe {

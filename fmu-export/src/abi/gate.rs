@@ -40,9 +40,9 @@ struct Handle<E: Exported> {
 ///
 /// # Safety
 /// `pointer` is NULL, or comes from [`open`] for the same `E` and was not closed; no other thread uses it now.
-#[inline]
+#[inline(always)]
 pub(crate) unsafe fn enter<E: Exported>(
-    entry: Entry,
+    entry: &'static Entry,
     pointer: *mut c_void,
     body: impl FnOnce(&mut Instance<E>) -> Result<(), Refusal>,
 ) -> c_int {
@@ -61,9 +61,9 @@ pub(crate) unsafe fn enter<E: Exported>(
     status as c_int
 }
 
-#[inline]
+#[inline(always)]
 fn pass<E: Exported>(
-    entry: Entry,
+    entry: &'static Entry,
     instance: &mut Instance<E>,
     body: impl FnOnce(&mut Instance<E>) -> Result<(), Refusal>,
 ) -> Status {
@@ -83,7 +83,7 @@ fn pass<E: Exported>(
 }
 
 #[cold]
-fn fail<E: Exported>(entry: Entry, instance: &mut Instance<E>, refusal: Refusal) -> Status {
+fn fail<E: Exported>(entry: &'static Entry, instance: &mut Instance<E>, refusal: Refusal) -> Status {
     match refusal {
         Refusal::Error(fault) => {
             instance.current.life.after(false, Next::Stay);
@@ -98,7 +98,7 @@ fn fail<E: Exported>(entry: Entry, instance: &mut Instance<E>, refusal: Refusal)
 }
 
 #[cold]
-fn misplaced<E: Exported>(entry: Entry, instance: &Instance<E>) -> Fault {
+fn misplaced<E: Exported>(entry: &'static Entry, instance: &Instance<E>) -> Fault {
     if instance.standard != entry.standard {
         return Fault::new("the instance was made by the other standard's function");
     }
@@ -118,7 +118,7 @@ fn panicked(payload: &(dyn Any + Send)) -> Fault {
 
 /// A new instance for the importer, or NULL and a message.
 pub(crate) fn open<E: Exported>(
-    entry: Entry,
+    entry: &'static Entry,
     log: Log,
     name: Result<String, Fault>,
     resources: Option<&CStr>,

@@ -103,7 +103,7 @@ macro_rules! functions {
     )*) => { $(
         #[unsafe(no_mangle)]
         pub(crate) unsafe extern "C" fn $name(instance: Instance $(, $argument: $type)*) -> c_int {
-            const ENTRY: Entry = Entry::new(Standard::$standard, Call::$call, stringify!($name));
+            const ENTRY: &Entry = &Entry::new(Standard::$standard, Call::$call, stringify!($name));
             // SAFETY: what the standard demands of the importer.
             unsafe { $crate::abi::Abi::<$exported>::$function(ENTRY, instance $(, $passed)*) }
         }
