@@ -169,7 +169,8 @@ impl<E: Exported> Instance<E> {
         if E::CAN.continuous.is_some() && !current.slopes.is_empty() {
             self.step_on_slopes(h)?;
         } else {
-            current.block.step(&Step { start: current.elapsed, h })?;
+            current.block.model.advance(&Step { start: current.elapsed, h })?;
+            current.block.model.output(next, &mut current.block.out);
         }
         self.current.elapsed = next;
         self.current.end = t + h;
