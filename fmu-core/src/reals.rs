@@ -119,9 +119,7 @@ mod tests {
     type P = Row<Pair>;
 
     const PAIR: &Table<Pair> = &Table::new(
-        const {
-            &[P::input("a", &VOLT, "", |p| &mut p.a), P::discrete_input("b", &VOLT, "", |p| &mut p.b).at_most(5.0)]
-        },
+        const { &[P::input("a", &VOLT, "", |p| &mut p.a), P::discrete_input("b", &VOLT, "", |p| &mut p.b).at_most(5.0)] },
     );
     const TABLE: &Table<Whole> = &Table::new(
         const {

@@ -187,7 +187,12 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn serialized_size(entry: &'static Entry, instance: Instance, state: FmuState, size: *mut usize) -> c_int {
+    pub unsafe fn serialized_size(
+        entry: &'static Entry,
+        instance: Instance,
+        state: FmuState,
+        size: *mut usize,
+    ) -> c_int {
         // SAFETY: the importer's variable; the state is only a number.
         unsafe {
             enter::<E>(entry, instance, |_| {
@@ -198,7 +203,13 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn serialize(entry: &'static Entry, instance: Instance, state: FmuState, bytes: *mut u8, size: usize) -> c_int {
+    pub unsafe fn serialize(
+        entry: &'static Entry,
+        instance: Instance,
+        state: FmuState,
+        bytes: *mut u8,
+        size: usize,
+    ) -> c_int {
         // SAFETY: the importer's array of this size; the state is only a number.
         unsafe {
             enter::<E>(entry, instance, |_| {

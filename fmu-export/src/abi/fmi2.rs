@@ -80,7 +80,11 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi2_new_discrete_states(entry: &'static Entry, instance: Instance, info: *mut Fmi2EventInfo) -> c_int {
+    pub unsafe fn fmi2_new_discrete_states(
+        entry: &'static Entry,
+        instance: Instance,
+        info: *mut Fmi2EventInfo,
+    ) -> c_int {
         // SAFETY: the importer's struct.
         unsafe {
             enter::<E>(entry, instance, |instance| {
@@ -115,7 +119,12 @@ impl<E: Exported> Abi<E> {
     }
 
     /// `fmi2Terminated`: this FMU never asks to end the simulation.
-    pub unsafe fn fmi2_boolean_status(entry: &'static Entry, instance: Instance, kind: c_int, value: *mut Fmi2Boolean) -> c_int {
+    pub unsafe fn fmi2_boolean_status(
+        entry: &'static Entry,
+        instance: Instance,
+        kind: c_int,
+        value: *mut Fmi2Boolean,
+    ) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
             enter::<E>(entry, instance, |_| {

@@ -136,7 +136,12 @@ impl<E: Exported> Abi<E> {
         unsafe { enter::<E>(entry, instance, |_| Ok(())) }
     }
 
-    pub unsafe fn fmi3_count(entry: &'static Entry, instance: Instance, count: *mut usize, of_indicators: bool) -> c_int {
+    pub unsafe fn fmi3_count(
+        entry: &'static Entry,
+        instance: Instance,
+        count: *mut usize,
+        of_indicators: bool,
+    ) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
             enter::<E>(entry, instance, |_| {
