@@ -4,7 +4,7 @@
 
 use crate::row::{Access, Row};
 use crate::table::Table;
-use crate::variable::{Causality, Variability};
+use crate::variable::{Causality, Kind, Meta, Range, Variability};
 use std::mem::{MaybeUninit, replace};
 
 /// Values for real inputs.
@@ -26,7 +26,7 @@ impl<W: 'static> Table<W> {
         let n = list.len().min(out.len());
         let (list, out, mut i) = (&list[..n], &mut out[..n], 0);
         while i < n {
-            let Some((row, inner)) = self.find(list[i].wrapping_sub(first) as usize) else { break };
+            let Some((row, inner)) = self.find(list[i].wrapping_sub(first)) else { break };
             match &row.access {
                 Access::Real(get) => {
                     out[i].write(*get(whole));
@@ -53,10 +53,11 @@ impl<W: 'static> Table<W> {
         let n = list.len().min(values.len()).min(before.len());
         let (list, values, before, mut i) = (&list[..n], &values[..n], &mut before[..n], 0);
         while i < n {
-            let Some((row, inner)) = self.find(list[i].wrapping_sub(first) as usize) else { break };
+            let Some((row, inner)) = self.find(list[i].wrapping_sub(first)) else { break };
             match &row.access {
                 Access::Real(get) => {
-                    if !row.takes(values[i], continuous) {
+                    let open = !continuous || row.meta.variability == Variability::Continuous;
+                    if !open || !row.settable.contains(values[i]) {
                         break;
                     }
                     before[i] = replace(get(whole), values[i]);
@@ -76,21 +77,34 @@ impl<W: 'static> Table<W> {
         i
     }
 
-    /// The row of variable `index`, and the index inside it.
+    /// The row of variable `index`, and the index inside that row.
     #[inline]
-    fn find(&self, index: usize) -> Option<(&'static Row<W>, u32)> {
-        let place = self.places.get(index)?;
+    fn find(&self, index: u32) -> Option<(&'static Row<W>, u32)> {
+        let place = self.places.get(index as usize)?;
         Some((self.rows.get(usize::from(place.row))?, place.inner.into()))
     }
 }
 
-impl<W> Row<W> {
-    /// Whether this is a real input that is open and may have this value.
+/// The values that a real input can be set to, as a closed interval; none for another variable.
+pub(crate) struct Interval {
+    low: f64,
+    high: f64,
+}
+
+impl Interval {
+    /// [`Range::contains`] as two comparisons.
+    pub(crate) const fn of(meta: &Meta) -> Self {
+        if !(matches!(meta.causality, Causality::Input) && matches!(meta.kind, Kind::Real(_))) {
+            return Self { low: f64::INFINITY, high: f64::NEG_INFINITY };
+        }
+        let Range { min, max, above, below } = meta.range;
+        let (low, high) = (if above { min.next_up() } else { min }, if below { max.next_down() } else { max });
+        Self { low: low.max(f64::MIN), high: high.min(f64::MAX) }
+    }
+
     #[inline]
-    fn takes(&self, value: f64, continuous: bool) -> bool {
-        let meta = &self.meta;
-        let open = !continuous || meta.variability == Variability::Continuous;
-        meta.causality == Causality::Input && open && meta.range.contains(value)
+    fn contains(&self, x: f64) -> bool {
+        x >= self.low && x <= self.high
     }
 }
 
@@ -170,5 +184,20 @@ mod tests {
             assert_eq!((n, values), (1, [1.0, 2.0, 0.0, 0.0, 0.0]), "{refused:?}");
         }
         assert_eq!(write(&[3, 4], &[1.0, 1.0], true).0, 1, "b is discrete");
+    }
+
+    #[test]
+    fn inputs_take_what_their_range_contains() {
+        const EDGES: [f64; 8] = [0.0, -0.0, -1.0, 2.0, f64::MIN, f64::MAX, f64::INFINITY, f64::NEG_INFINITY];
+        let row = || P::input("a", &VOLT, "", |p| &mut p.a);
+        let rows =
+            [row(), row().above(0.0), row().above(-0.0).below(2.0), row().at_least(-1.0).at_most(2.0), row().below(-1.0)];
+        for row in rows {
+            for x in EDGES.into_iter().flat_map(|x| [x.next_down(), x, x.next_up()]).chain([f64::NAN]) {
+                assert_eq!(row.settable.contains(x), row.meta.range.contains(x), "{x} in {}", row.meta.range);
+            }
+        }
+        assert!(!P::output("a", &VOLT, "", |p| &mut p.a).settable.contains(0.0));
+        assert!(!P::parameter("a", &VOLT, "", |p| &mut p.a).settable.contains(0.0));
     }
 }
