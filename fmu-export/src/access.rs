@@ -42,14 +42,16 @@ impl<E: Exported> Instance<E> {
     /// Unknown reference, another type, or another number of values than `out` has room for.
     #[inline]
     pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
-        self.check_count(references, out.len())?;
         self.refresh();
-        let done = T::read_first(&mut self.current.block, references, out);
-        if done == references.len() { Ok(()) } else { self.get_each(&references[done..], &mut out[done..]) }
+        if references.len() == out.len() && T::read_reals(&mut self.current.block, references, out) == out.len() {
+            return Ok(());
+        }
+        self.get_each(references, out)
     }
 
     #[inline(never)]
     fn get_each<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+        self.check_count(references, out.len())?;
         let (mut references, mut out) = (references, out);
         while let Some((&reference, others)) = references.split_first() {
             let count = if self.arrays { self.elements(reference)? } else { 1 };
@@ -62,7 +64,7 @@ impl<E: Exported> Instance<E> {
                     None => place.write(self.read_other(reference, index)?),
                 };
             }
-            let done = T::read_first(&mut self.current.block, others, rest);
+            let done = T::read_reals(&mut self.current.block, others, rest);
             (references, out) = (&others[done..], &mut rest[done..]);
         }
         Ok(())
@@ -113,16 +115,17 @@ impl<E: Exported> Instance<E> {
     /// Unknown reference, another type, not settable in this state, value out of range, another number of values.
     #[inline]
     pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
-        self.check_count(references, values.len())?;
-        if references.is_empty() {
-            return Ok(());
-        }
         let state = self.current.life.state();
-        if !T::write_inputs(&mut self.current.block, references, values, state) {
+        if references.len() != values.len()
+            || !T::write_inputs(&mut self.current.block, references, values, state == State::Continuous)
+        {
             self.set_each(references, values)?;
         }
-        self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);
-        self.stale |= self.exchanges() && matches!(state, State::Event | State::Continuous);
+        // In Step Mode, the model reads inputs directly.
+        if state != State::Step && !references.is_empty() {
+            self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);
+            self.stale |= self.exchanges() && matches!(state, State::Event | State::Continuous);
+        }
         Ok(())
     }
 
@@ -130,6 +133,7 @@ impl<E: Exported> Instance<E> {
     /// discarded, the states can be set too, and a discrete input to the value that it has.
     #[inline(never)]
     fn set_each<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+        self.check_count(references, values.len())?;
         let state = self.current.life.state();
         for write in [false, true] {
             let mut next = values.iter();
@@ -222,13 +226,7 @@ impl<E: Exported> Instance<E> {
     }
 
     /// As many values as references, or in FMI 3.0 as many as the variables have elements (3.0.2, 2.2.7.2).
-    #[inline]
     pub(crate) fn check_count(&mut self, references: &[u32], given: usize) -> Result<(), Fault> {
-        if given == references.len() && !self.arrays { Ok(()) } else { self.count(references, given) }
-    }
-
-    #[inline(never)]
-    fn count(&mut self, references: &[u32], given: usize) -> Result<(), Fault> {
         let mut needed = references.len();
         if self.arrays {
             needed = 0;

@@ -1,6 +1,6 @@
 //! Values as they cross the C interface: which base type of the table each C type carries.
 
-use crate::lifecycle::{Standard, State};
+use crate::lifecycle::Standard;
 use fmu_core::{Block, Inputs, IntegerType, Kind, Meta, Model, Slot};
 use std::ffi::c_int;
 use std::fmt::{self, Display};
@@ -31,13 +31,13 @@ pub trait Value: Copy + Display + PartialEq {
 
     /// Reads scalars that hold this very type, quickly, up to the first reference of anything else; returns how many.
     #[inline]
-    fn read_first<M: Model>(_block: &mut Block<M>, _references: &[u32], _out: &mut [MaybeUninit<Self>]) -> usize {
+    fn read_reals<M: Model>(_block: &mut Block<M>, _references: &[u32], _out: &mut [MaybeUninit<Self>]) -> usize {
         0
     }
 
     /// Sets inputs that hold this very type, quickly: all of them or, if one cannot be set in this way, none.
     #[inline]
-    fn write_inputs<M: Model>(_block: &mut Block<M>, _references: &[u32], _values: &[Self], _state: State) -> bool {
+    fn write_inputs<M: Model>(_block: &mut Block<M>, _references: &[u32], _values: &[Self], _continuous: bool) -> bool {
         false
     }
 
@@ -130,22 +130,22 @@ impl Value for f64 {
     }
 
     #[inline]
-    fn read_first<M: Model>(block: &mut Block<M>, list: &[u32], out: &mut [MaybeUninit<Self>]) -> usize {
+    fn read_reals<M: Model>(block: &mut Block<M>, list: &[u32], out: &mut [MaybeUninit<Self>]) -> usize {
         M::TABLE.read(block, list, FIRST, out)
     }
 
     #[inline]
-    fn write_inputs<M: Model>(block: &mut Block<M>, list: &[u32], values: &[Self], state: State) -> bool {
+    fn write_inputs<M: Model>(block: &mut Block<M>, list: &[u32], values: &[Self], continuous: bool) -> bool {
         let mut before = [0.0; SHORT];
         if list.len() > SHORT {
             return false;
         }
-        let inputs = Inputs { values, before: &mut before, continuous: state == State::Continuous };
-        let done = M::TABLE.write(block, list, FIRST, inputs);
-        if done < list.len() {
-            take_back(block, &list[..done], &before);
+        let done = M::TABLE.write(block, list, FIRST, Inputs { values, before: &mut before, continuous });
+        if done == list.len() {
+            return true;
         }
-        done == list.len()
+        take_back(block, &list[..done], &before);
+        false
     }
 
     fn from_real(x: f64) -> Option<Self> {

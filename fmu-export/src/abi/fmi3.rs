@@ -1,6 +1,6 @@
 //! FMI 3.0.2: its own calls, and the table of its functions.
 
-use super::gate::{Entry, enter, open};
+use super::gate::{Entry, Function, enter, open};
 use super::logger::{Fmi3Logger, Fmi3Sink};
 use super::pointer::{place, text};
 use super::types::{Fmi3Boolean, Instance, Text};
@@ -45,7 +45,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn fmi3_enter_initialization(
-        entry: &'static Entry,
+        entry: impl Function,
         instance: Instance,
         start: f64,
         stop_defined: Fmi3Boolean,
@@ -53,14 +53,14 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
+            enter::<E, _>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
         }
     }
 
     /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_do_step(
-        entry: &'static Entry,
+        entry: impl Function,
         instance: Instance,
         t: f64,
         h: f64,
@@ -71,7 +71,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's variables.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let time = place(last_successful_time, "lastSuccessfulTime")?;
                 let event = place(event_handling_needed, "eventHandlingNeeded")?;
                 let early = place(early_return, "earlyReturn")?;
@@ -90,7 +90,7 @@ impl<E: Exported> Abi<E> {
 
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_update_discrete_states(
-        entry: &'static Entry,
+        entry: impl Function,
         instance: Instance,
         again: *mut Fmi3Boolean,
         terminate: *mut Fmi3Boolean,
@@ -101,7 +101,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's variables.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let again = place(again, "discreteStatesNeedUpdate")?;
                 let terminate = place(terminate, "terminateSimulation")?;
                 let nominals = place(nominals, "nominalsOfContinuousStatesChanged")?;
@@ -120,10 +120,10 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi3_enter_step(entry: &'static Entry, instance: Instance) -> c_int {
+    pub unsafe fn fmi3_enter_step(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 // A sample that the importer did not ask for is taken by the next step.
                 instance.current.pending = false;
                 Ok(())
@@ -131,20 +131,20 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi3_evaluate(entry: &'static Entry, instance: Instance) -> c_int {
+    pub unsafe fn fmi3_evaluate(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<E>(entry, instance, |_| Ok(())) }
+        unsafe { enter::<E, _>(entry, instance, |_| Ok(())) }
     }
 
     pub unsafe fn fmi3_count(
-        entry: &'static Entry,
+        entry: impl Function,
         instance: Instance,
         count: *mut usize,
         of_indicators: bool,
     ) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
-            enter::<E>(entry, instance, |_| {
+            enter::<E, _>(entry, instance, |_| {
                 let number = if of_indicators { E::CAN.indicators().len() } else { E::CAN.states().len() };
                 place(count, "the number")?.write(number);
                 Ok(())

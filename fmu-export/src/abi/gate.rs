@@ -30,6 +30,12 @@ impl Entry {
     }
 }
 
+/// A C function as a type: what it is is known while compiling.
+pub trait Function {
+    /// Its name and its row.
+    const ENTRY: Entry;
+}
+
 /// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused.
 struct Handle<E: Exported> {
     busy: Cell<bool>,
@@ -40,9 +46,9 @@ struct Handle<E: Exported> {
 ///
 /// # Safety
 /// `pointer` is NULL, or comes from [`open`] for the same `E` and was not closed; no other thread uses it now.
-#[inline(always)]
-pub(crate) unsafe fn enter<E: Exported>(
-    entry: &'static Entry,
+#[inline]
+pub(crate) unsafe fn enter<E: Exported, F: Function>(
+    _: F,
     pointer: *mut c_void,
     body: impl FnOnce(&mut Instance<E>) -> Result<(), Refusal>,
 ) -> c_int {
@@ -56,12 +62,12 @@ pub(crate) unsafe fn enter<E: Exported>(
     }
     // SAFETY: `busy` was false, so no other call of this thread holds the instance, and no other thread uses it.
     let instance = unsafe { &mut *handle.instance.get() };
-    let status = pass(entry, instance, body);
+    let status = pass(const { &F::ENTRY }, instance, body);
     handle.busy.set(false);
     status as c_int
 }
 
-#[inline(always)]
+#[inline]
 fn pass<E: Exported>(
     entry: &'static Entry,
     instance: &mut Instance<E>,
