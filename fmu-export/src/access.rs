@@ -113,7 +113,8 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// Unknown reference, another type, not settable in this state, value out of range, another number of values.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         let state = self.current.life.state();
         if references.len() != values.len()

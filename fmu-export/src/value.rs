@@ -134,7 +134,8 @@ impl Value for f64 {
         M::TABLE.read(block, list, FIRST, out)
     }
 
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     fn write_inputs<M: Model>(block: &mut Block<M>, list: &[u32], values: &[Self], continuous: bool) -> bool {
         let mut before = [0.0; SHORT];
         if list.len() > SHORT {
