@@ -158,7 +158,7 @@ mod tests {
         let inputs = Inputs { values, before: &mut before, continuous };
         let n = TABLE.write(&mut whole, list, 1, inputs);
         for (&reference, x) in list[..n].iter().zip(&before) {
-            assert_eq!(*x, if reference == 1 { 1.0 } else { 0.0 }, "value of {reference} before");
+            assert_eq!(x.to_bits(), f64::from(u8::from(reference == 1)).to_bits(), "value of {reference} before");
         }
         (n, [whole.u, whole.pair.a, whole.pair.b, whole.k, whole.y])
     }
@@ -190,8 +190,13 @@ mod tests {
     fn inputs_take_what_their_range_contains() {
         const EDGES: [f64; 8] = [0.0, -0.0, -1.0, 2.0, f64::MIN, f64::MAX, f64::INFINITY, f64::NEG_INFINITY];
         let row = || P::input("a", &VOLT, "", |p| &mut p.a);
-        let rows =
-            [row(), row().above(0.0), row().above(-0.0).below(2.0), row().at_least(-1.0).at_most(2.0), row().below(-1.0)];
+        let rows = [
+            row(),
+            row().above(0.0),
+            row().above(-0.0).below(2.0),
+            row().at_least(-1.0).at_most(2.0),
+            row().below(-1.0),
+        ];
         for row in rows {
             for x in EDGES.into_iter().flat_map(|x| [x.next_down(), x, x.next_up()]).chain([f64::NAN]) {
                 assert_eq!(row.settable.contains(x), row.meta.range.contains(x), "{x} in {}", row.meta.range);

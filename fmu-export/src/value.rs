@@ -1,5 +1,6 @@
 //! Values as they cross the C interface: which base type of the table each C type carries.
 
+use crate::access::index;
 use crate::lifecycle::Standard;
 use fmu_core::{Block, Inputs, IntegerType, Kind, Meta, Model, Slot};
 use std::ffi::c_int;
@@ -161,9 +162,10 @@ impl Value for f64 {
 /// Undoes a partial set, the last value first: a reference may come twice.
 #[cold]
 fn take_back<M: Model>(block: &mut Block<M>, list: &[u32], before: &[f64]) {
-    for (reference, x) in list.iter().zip(before).rev() {
-        let inputs = Inputs { values: &[*x], before: &mut [0.0], continuous: false };
-        M::TABLE.write(block, &[*reference], FIRST, inputs);
+    for (&reference, &value) in list.iter().zip(before).rev() {
+        if let Some((_, Slot::Real(x))) = M::TABLE.entry(block, index(reference)) {
+            *x = value;
+        }
     }
 }
 

@@ -269,7 +269,9 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn get_states(entry: impl Function, instance: Instance, x: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
-        unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.get_states(numbers(x, n, "continuous states")?)?)) }
+        unsafe {
+            enter::<E, _>(entry, instance, |instance| Ok(instance.get_states(numbers(x, n, "continuous states")?)?))
+        }
     }
 
     pub unsafe fn derivatives(entry: impl Function, instance: Instance, dx: *mut f64, n: usize) -> c_int {

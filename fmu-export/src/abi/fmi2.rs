@@ -61,7 +61,11 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E, _>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
+            enter::<E, _>(
+                entry,
+                instance,
+                |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?),
+            )
         }
     }
 

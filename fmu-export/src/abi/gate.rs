@@ -30,7 +30,7 @@ impl Entry {
     }
 }
 
-/// A C function as a type: what it is is known while compiling.
+/// A C function as a type: its entry is known while compiling, and its checks are compiled into it.
 pub trait Function {
     /// Its name and its row.
     const ENTRY: Entry;
