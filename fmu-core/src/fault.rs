@@ -6,13 +6,14 @@ use std::fmt::Display;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct Fault {
-    message: String,
+    #[expect(clippy::box_collection, reason = "one pointer: a result returns in a register")]
+    message: Box<String>,
 }
 
 impl Fault {
     /// A fault with free text.
     pub fn new(message: impl Into<String>) -> Self {
-        Self { message: message.into() }
+        Self { message: Box::new(message.into()) }
     }
 
     /// A variable with a value that is not allowed.

@@ -5,15 +5,18 @@
 
 use crate::enumeration::{Choice, Enumerated, Field, Place};
 use crate::integer::{Getter, Whole};
+use crate::reals::{Inputs, Interval};
 use crate::token::Hash;
 use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::mem::MaybeUninit;
 
 /// The interface of a part for a table that does not know its type.
 pub(crate) trait Node<W>: Sync {
     fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
-    fn real<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut f64)>;
+    fn read(&self, whole: &mut W, list: &[u32], first: u32, out: &mut [MaybeUninit<f64>]) -> usize;
+    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
 }
@@ -212,6 +215,7 @@ impl std::fmt::Display for Slot<'_> {
 pub struct Row<W: 'static> {
     pub(crate) meta: Meta,
     pub(crate) access: Access<W>,
+    pub(crate) settable: Interval,
 }
 
 impl<W: 'static> Row<W> {
@@ -236,7 +240,7 @@ impl<W: 'static> Row<W> {
             dimension: None,
             shape: &[],
         };
-        Self { meta, access }
+        Self { settable: Interval::of(&meta), meta, access }
     }
 
     /// What the row says about its variable.
@@ -621,11 +625,12 @@ impl<W: 'static> Row<W> {
     }
 
     #[track_caller]
-    const fn bounded(self) -> Self {
+    const fn bounded(mut self) -> Self {
         let number = matches!(self.meta.kind, Kind::Real(_) | Kind::Float32(_) | Kind::Integer(_));
         demand(number, self.meta.name, "only a number can have a bound");
         let Range { min, max, above, below } = self.meta.range;
         demand(min < max || (min <= max && !above && !below), self.meta.name, "the bounds leave no value");
+        self.settable = Interval::of(&self.meta);
         self
     }
 

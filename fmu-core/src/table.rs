@@ -4,10 +4,12 @@
 //! Everything that does not need a value is checked while compiling: names, ranges, the number of variables.
 
 use crate::fault::Fault;
+use crate::reals::Inputs;
 use crate::row::{Access, Node, Row, Slot, demand};
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Variability};
 use std::fmt::Display;
+use std::mem::MaybeUninit;
 use std::ptr;
 
 /// Maximum number of variables in a table, including those of its parts.
@@ -26,8 +28,12 @@ impl<W, P> Node<W> for Part<W, P> {
         self.table.entry((self.lens)(whole), index)
     }
 
-    fn real<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut f64)> {
-        self.table.real((self.lens)(whole), index)
+    fn read(&self, whole: &mut W, list: &[u32], first: u32, out: &mut [MaybeUninit<f64>]) -> usize {
+        self.table.read((self.lens)(whole), list, first, out)
+    }
+
+    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize {
+        self.table.write((self.lens)(whole), list, first, inputs)
     }
 
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {
@@ -56,15 +62,15 @@ fn item(meta: &Meta, value: i32) -> String {
 
 /// Where an index leads: a row, and the index inside it.
 #[derive(Clone, Copy)]
-struct Place {
-    row: u16,
-    inner: u16,
+pub(crate) struct Place {
+    pub(crate) row: u16,
+    pub(crate) inner: u16,
 }
 
 /// All variables of `W`.
 pub struct Table<W: 'static> {
-    rows: &'static [Row<W>],
-    places: [Place; CAPACITY],
+    pub(crate) rows: &'static [Row<W>],
+    pub(crate) places: [Place; CAPACITY],
     len: usize,
     hash: Hash,
 }
@@ -77,7 +83,8 @@ impl<W: 'static> Table<W> {
     #[expect(clippy::cast_possible_truncation, reason = "CAPACITY fits in 16 bits, asserted below")]
     pub const fn new(rows: &'static [Row<W>]) -> Self {
         assert!(CAPACITY <= u16::MAX as usize);
-        let mut places = [Place { row: 0, inner: 0 }; CAPACITY];
+        // No row past the end.
+        let mut places = [Place { row: u16::MAX, inner: 0 }; CAPACITY];
         let (mut len, mut row, mut hash) = (0, 0, Hash::START);
         while row < rows.len() {
             let meta = &rows[row].meta;
@@ -141,21 +148,6 @@ impl<W: 'static> Table<W> {
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
         };
         Some((&row.meta, slot))
-    }
-
-    /// The same for a real scalar only, quickly.
-    #[inline]
-    pub fn real<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut f64)> {
-        if index >= self.len {
-            return None;
-        }
-        let place = self.places[index];
-        let row = &self.rows[usize::from(place.row)];
-        match &row.access {
-            Access::Real(get) => Some((&row.meta, get(whole))),
-            Access::Part { node, .. } => node.real(whole, usize::from(place.inner)),
-            _ => None,
-        }
     }
 
     /// Which element of an array variable `index` is, 0 for a scalar; `None` past the end. Does not allocate.

@@ -9,9 +9,6 @@ use fmu_core::description::TIME;
 use fmu_core::{Causality, Exported, Fault, Kind, Meta, Model, Slot, Table, Variability};
 use std::mem::MaybeUninit;
 
-/// Number of previous values that a set call keeps to undo a partial set.
-const SHORT: usize = 8;
-
 /// The table's index of a value reference; [`TIME`] becomes an index past every table.
 #[inline]
 pub(crate) const fn index(reference: u32) -> usize {
@@ -32,17 +29,6 @@ pub(crate) fn open(meta: &Meta, state: State) -> bool {
     }
 }
 
-/// The variable, if it can be set to this value in the current state.
-#[inline]
-fn settable<'a, T: Value>(
-    found: Option<(&'static Meta, Slot<'a>)>,
-    state: State,
-    value: T,
-    standard: Standard,
-) -> Option<(&'static Meta, Slot<'a>)> {
-    found.filter(|(meta, _)| open(meta, state) && value.judge(meta, standard) == Some(true))
-}
-
 /// The table of the model.
 const fn table<E: Exported>() -> &'static Table<fmu_core::Block<E::Model>> {
     E::Model::TABLE
@@ -56,32 +42,30 @@ impl<E: Exported> Instance<E> {
     /// Unknown reference, another type, or another number of values than `out` has room for.
     #[inline]
     pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
-        self.check_count(references, out.len())?;
         self.refresh();
-        if self.arrays { self.get_each::<T, true>(references, out) } else { self.get_each::<T, false>(references, out) }
+        if references.len() == out.len() && T::read_reals(&mut self.current.block, references, out) == out.len() {
+            return Ok(());
+        }
+        self.get_each(references, out)
     }
 
-    fn get_each<T: Value, const ARRAYS: bool>(
-        &mut self,
-        references: &[u32],
-        out: &mut [MaybeUninit<T>],
-    ) -> Result<(), Refusal> {
-        let mut places = out.iter_mut();
-        for &reference in references {
-            let first = index(reference);
-            let count = if ARRAYS { self.elements(reference)? } else { 1 };
-            for (offset, place) in (0..count).zip(&mut places) {
-                let index = first.wrapping_add(offset);
-                if let Some((_, value)) = T::find(table::<E>(), &mut self.current.block, index) {
-                    place.write(*value);
-                    continue;
-                }
+    #[inline(never)]
+    fn get_each<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+        self.check_count(references, out.len())?;
+        let (mut references, mut out) = (references, out);
+        while let Some((&reference, others)) = references.split_first() {
+            let count = if self.arrays { self.elements(reference)? } else { 1 };
+            let (places, rest) = out.split_at_mut(count);
+            for (offset, place) in places.iter_mut().enumerate() {
+                let index = index(reference).wrapping_add(offset);
                 let found = table::<E>().entry(&mut self.current.block, index);
                 match found.and_then(|(meta, slot)| T::read(meta, &slot, self.standard)) {
                     Some(value) => place.write(value),
                     None => place.write(self.read_other(reference, index)?),
                 };
             }
+            let done = T::read_reals(&mut self.current.block, others, rest);
+            (references, out) = (&others[done..], &mut rest[done..]);
         }
         Ok(())
     }
@@ -129,28 +113,28 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// Unknown reference, another type, not settable in this state, value out of range, another number of values.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
-        self.check_count(references, values.len())?;
-        let Some(&any) = values.first() else { return Ok(()) };
-        if self.exchanges() {
-            if !self.set_inputs(references, values, any) {
-                self.set_in_exchange(references, values)?;
-            }
-            self.current.dirty |= matches!(self.current.life.state(), State::Instantiated | State::Initialization);
-            self.stale |= matches!(self.current.life.state(), State::Event | State::Continuous);
-            return Ok(());
+        let state = self.current.life.state();
+        if references.len() != values.len()
+            || !T::write_inputs(&mut self.current.block, references, values, state == State::Continuous)
+        {
+            self.set_each(references, values)?;
         }
-        Ok(if self.arrays {
-            self.set_each::<T, true>(references, values, any)
-        } else {
-            self.set_each::<T, false>(references, values, any)
-        }?)
+        // In Step Mode, the model reads inputs directly.
+        if state != State::Step && !references.is_empty() {
+            self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);
+            self.stale |= self.exchanges() && matches!(state, State::Event | State::Continuous);
+        }
+        Ok(())
     }
 
-    /// Sets in Model Exchange: judges all values, then writes them. In Continuous-Time Mode, a solver tries values: one
-    /// that is out of range is discarded, the states can be set too, and a discrete input to the value that it has.
-    fn set_in_exchange<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    /// Judges all values, then writes them. In Continuous-Time Mode, a solver tries values: one that is out of range is
+    /// discarded, the states can be set too, and a discrete input to the value that it has.
+    #[inline(never)]
+    fn set_each<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+        self.check_count(references, values.len())?;
         let state = self.current.life.state();
         for write in [false, true] {
             let mut next = values.iter();
@@ -163,35 +147,6 @@ impl<E: Exported> Instance<E> {
             }
         }
         Ok(())
-    }
-
-    /// Sets a few inputs quickly, or nothing if one cannot be set in this way.
-    #[inline]
-    fn set_inputs<T: Value>(&mut self, references: &[u32], values: &[T], any: T) -> bool {
-        if self.arrays || references.len() > SHORT {
-            return false;
-        }
-        let (state, standard, mut old) = (self.current.life.state(), self.standard, [any; SHORT]);
-        for (i, (&reference, &value)) in references.iter().zip(values).enumerate() {
-            match T::find(table::<E>(), &mut self.current.block, index(reference)) {
-                Some((meta, place))
-                    if meta.causality == Causality::Input
-                        && open(meta, state)
-                        && value.judge(meta, standard) == Some(true) =>
-                {
-                    (old[i], *place) = (*place, value);
-                }
-                _ => {
-                    for (&reference, &before) in references[..i].iter().zip(&old).rev() {
-                        if let Some((_, place)) = T::find(table::<E>(), &mut self.current.block, index(reference)) {
-                            *place = before;
-                        }
-                    }
-                    return false;
-                }
-            }
-        }
-        true
     }
 
     /// Whether the value can be written in this state.
@@ -227,79 +182,6 @@ impl<E: Exported> Instance<E> {
         } else if let Some((meta, slot)) = table::<E>().entry(&mut self.current.block, index) {
             value.write(slot);
             self.current.dirty |= meta.causality == Causality::Parameter;
-        }
-    }
-
-    /// Writes a short vector at once and undoes it on an error; checks a long one before writing.
-    fn set_each<T: Value, const ARRAYS: bool>(
-        &mut self,
-        references: &[u32],
-        values: &[T],
-        any: T,
-    ) -> Result<(), Fault> {
-        if values.len() > SHORT {
-            self.judge_each::<T, ARRAYS>(references, values)?;
-        }
-        let (state, standard) = (self.current.life.state(), self.standard);
-        let (mut done, mut old, mut dirty) = (0, [(0, any); SHORT], false);
-        let mut next = values.iter();
-        for &reference in references {
-            let first = index(reference);
-            let count = if ARRAYS { self.elements(reference)? } else { 1 };
-            for (offset, &value) in (0..count).zip(&mut next) {
-                let index = first.wrapping_add(offset);
-                if let Some((meta, place)) = T::find(table::<E>(), &mut self.current.block, index)
-                    && open(meta, state)
-                    && value.judge(meta, standard) == Some(true)
-                {
-                    if let Some(old) = old.get_mut(done) {
-                        *old = (index, *place);
-                        done += 1;
-                    }
-                    *place = value;
-                    dirty |= meta.causality == Causality::Parameter;
-                    continue;
-                }
-                let found = table::<E>().entry(&mut self.current.block, index);
-                let Some((meta, slot)) = settable(found, state, value, standard) else {
-                    self.take_back(&old[..done]);
-                    return Err(self.refusal(reference, index, value));
-                };
-                if let (Some(old), Some(before)) = (old.get_mut(done), T::read(meta, &slot, standard)) {
-                    *old = (index, before);
-                    done += 1;
-                }
-                value.write(slot);
-                // The model reads inputs directly; parameters take effect through `initialize` or `derive`.
-                dirty |= meta.causality == Causality::Parameter;
-            }
-        }
-        self.current.dirty |= dirty || matches!(state, State::Instantiated | State::Initialization);
-        Ok(())
-    }
-
-    fn judge_each<T: Value, const ARRAYS: bool>(&mut self, references: &[u32], values: &[T]) -> Result<(), Fault> {
-        let (state, standard) = (self.current.life.state(), self.standard);
-        let mut next = values.iter();
-        for &reference in references {
-            let count = if ARRAYS { self.elements(reference)? } else { 1 };
-            for (offset, &value) in (0..count).zip(&mut next) {
-                let index = index(reference).wrapping_add(offset);
-                let found = table::<E>().entry(&mut self.current.block, index);
-                if settable(found, state, value, standard).is_none() {
-                    return Err(self.refusal(reference, index, value));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    #[cold]
-    fn take_back<T: Value>(&mut self, old: &[(usize, T)]) {
-        for &(index, before) in old.iter().rev() {
-            if let Some((_, slot)) = table::<E>().entry(&mut self.current.block, index) {
-                before.write(slot);
-            }
         }
     }
 
@@ -345,7 +227,6 @@ impl<E: Exported> Instance<E> {
     }
 
     /// As many values as references, or in FMI 3.0 as many as the variables have elements (3.0.2, 2.2.7.2).
-    #[inline]
     pub(crate) fn check_count(&mut self, references: &[u32], given: usize) -> Result<(), Fault> {
         let mut needed = references.len();
         if self.arrays {

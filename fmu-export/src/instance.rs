@@ -153,7 +153,8 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// Times that do not continue the simulation, tunable parameters that do not fit together: then nothing has changed.
     /// Or what the model reports.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<Stepped, Fault> {
         let current = &mut self.current;
         let next = current.elapsed.plus(h);
@@ -169,7 +170,8 @@ impl<E: Exported> Instance<E> {
         if E::CAN.continuous.is_some() && !current.slopes.is_empty() {
             self.step_on_slopes(h)?;
         } else {
-            current.block.step(&Step { start: current.elapsed, h })?;
+            current.block.model.advance(&Step { start: current.elapsed, h })?;
+            current.block.model.output(next, &mut current.block.out);
         }
         self.current.elapsed = next;
         self.current.end = t + h;

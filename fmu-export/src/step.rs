@@ -1,6 +1,6 @@
 //! Whether a communication step continues the simulation (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1).
 
-use crate::snapshot::Snapshot;
+use crate::snapshot::{Experiment, Snapshot};
 use fmu_core::{Elapsed, Fault, Model};
 
 impl<M: Model> Snapshot<M> {
@@ -10,23 +10,32 @@ impl<M: Model> Snapshot<M> {
     /// Names the invalid argument and the expected value.
     #[inline]
     pub(crate) fn check_step(&self, t: f64, h: f64, next: Elapsed) -> Result<(), Fault> {
-        // NaN is not contained; a subnormal h is below the resolution of any time but 0.
-        if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&h) {
-            return Err(size(h));
-        }
         let end = t + h;
-        if !(t.is_finite() && (t - self.end).abs() <= h / 100.0 + rounding(t) && end > t && end < f64::INFINITY) {
-            return Err(point(t, h, self.end));
+        // Nothing of this holds for NaN; a subnormal h is below the resolution of any time but 0.
+        let advances = h >= f64::MIN_POSITIVE && end > t && end < f64::INFINITY;
+        if !(advances && self.continues(t, h)) {
+            return Err(self.misplaced(t, h));
         }
         match self.experiment {
-            Some(experiment) => {
-                let Some(stop) = experiment.stop else { return Ok(()) };
+            Some(Experiment { start, stop: Some(stop) }) if end > stop => {
                 // Our own sum does not drift; the importer's may, and it may cut its last step to meet the stop time.
-                let reached = (experiment.start + next.seconds()).min(end);
+                let reached = (start + next.seconds()).min(end);
                 if reached > stop + 1e-9 * h + rounding(stop) { Err(beyond(t, h, stop)) } else { Ok(()) }
             }
-            None => Ok(()),
+            _ => Ok(()),
         }
+    }
+
+    /// Whether the step begins where the last one ended.
+    #[inline]
+    fn continues(&self, t: f64, h: f64) -> bool {
+        (t - self.end).abs() <= h / 100.0 + rounding(t)
+    }
+
+    #[cold]
+    fn misplaced(&self, t: f64, h: f64) -> Fault {
+        let positive = (f64::MIN_POSITIVE..f64::INFINITY).contains(&h);
+        if positive { point(t, h, self.end) } else { size(h) }
     }
 }
 

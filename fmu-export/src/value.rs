@@ -1,9 +1,17 @@
 //! Values as they cross the C interface: which base type of the table each C type carries.
 
+use crate::access::index;
 use crate::lifecycle::Standard;
-use fmu_core::{IntegerType, Kind, Meta, Slot, Table};
+use fmu_core::{Block, Inputs, IntegerType, Kind, Meta, Model, Slot};
 use std::ffi::c_int;
 use std::fmt::{self, Display};
+use std::mem::MaybeUninit;
+
+/// The reference of a table's first variable, after that of `time`.
+const FIRST: u32 = 1;
+
+/// Number of inputs that are set quickly: the room for the values that they had before.
+const SHORT: usize = 8;
 
 /// A C type of one of the standards, in the layout of C.
 pub trait Value: Copy + Display + PartialEq {
@@ -22,9 +30,16 @@ pub trait Value: Copy + Display + PartialEq {
     /// Whether the variable may take this value, `None` if it has another base type.
     fn judge(self, meta: &Meta, standard: Standard) -> Option<bool>;
 
-    /// The place of a scalar that holds this very type, quickly; `None` if there is none, or no quick way to it.
-    fn find<'a, W>(_table: &Table<W>, _whole: &'a mut W, _index: usize) -> Option<(&'static Meta, &'a mut Self)> {
-        None
+    /// Reads scalars that hold this very type, quickly, up to the first reference of anything else; returns how many.
+    #[inline]
+    fn read_reals<M: Model>(_block: &mut Block<M>, _references: &[u32], _out: &mut [MaybeUninit<Self>]) -> usize {
+        0
+    }
+
+    /// Sets inputs that hold this very type, quickly: all of them or, if one cannot be set in this way, none.
+    #[inline]
+    fn write_inputs<M: Model>(_block: &mut Block<M>, _references: &[u32], _values: &[Self], _continuous: bool) -> bool {
+        false
     }
 
     /// A real number as a value, for the one type that carries it.
@@ -116,8 +131,23 @@ impl Value for f64 {
     }
 
     #[inline]
-    fn find<'a, W>(table: &Table<W>, whole: &'a mut W, index: usize) -> Option<(&'static Meta, &'a mut Self)> {
-        table.real(whole, index)
+    fn read_reals<M: Model>(block: &mut Block<M>, list: &[u32], out: &mut [MaybeUninit<Self>]) -> usize {
+        M::TABLE.read(block, list, FIRST, out)
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
+    fn write_inputs<M: Model>(block: &mut Block<M>, list: &[u32], values: &[Self], continuous: bool) -> bool {
+        let mut before = [0.0; SHORT];
+        if list.len() > SHORT {
+            return false;
+        }
+        let done = M::TABLE.write(block, list, FIRST, Inputs { values, before: &mut before, continuous });
+        if done == list.len() {
+            return true;
+        }
+        take_back(block, &list[..done], &before);
+        false
     }
 
     fn from_real(x: f64) -> Option<Self> {
@@ -126,6 +156,16 @@ impl Value for f64 {
 
     fn real(self) -> Option<f64> {
         Some(self)
+    }
+}
+
+/// Undoes a partial set, the last value first: a reference may come twice.
+#[cold]
+fn take_back<M: Model>(block: &mut Block<M>, list: &[u32], before: &[f64]) {
+    for (&reference, &value) in list.iter().zip(before).rev() {
+        if let Some((_, Slot::Real(x))) = M::TABLE.entry(block, index(reference)) {
+            *x = value;
+        }
     }
 }
 

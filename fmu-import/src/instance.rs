@@ -4,8 +4,9 @@ mod equations;
 
 pub use equations::{CompletedStep, Stepped, Update};
 
-use super::standard::{Experiment, Kind, Outcome, Refusal, Standard};
+use super::standard::{Experiment, Kind, Outcome, Refusal};
 use super::{Error, Values, explain};
+use crate::abi::AnyInstance;
 use crate::abi::journal::{self, Call};
 use crate::abi::log::{Log, Message, Status};
 use crate::abi::shared::Handle;
@@ -23,7 +24,7 @@ pub struct Instance {
     /// Its number in the journal.
     id: u32,
     description: Arc<ModelDescription>,
-    standard: Box<dyn Standard + Send>,
+    standard: AnyInstance,
     kind: Kind,
     states: Vec<Option<Handle>>,
     dead: bool,
@@ -36,7 +37,7 @@ impl Instance {
         name: &str,
         id: u32,
         description: Arc<ModelDescription>,
-        standard: Box<dyn Standard + Send>,
+        standard: AnyInstance,
         kind: Kind,
         log: Arc<Log>,
     ) -> Self {
@@ -317,17 +318,25 @@ impl Instance {
 
     /// The one way to the FMU.
     #[inline]
-    fn call<T>(&mut self, what: Call, call: impl FnOnce(&mut dyn Standard) -> Outcome<T>) -> Result<T, Error> {
+    fn call<T>(&mut self, what: Call, call: impl FnOnce(&mut AnyInstance) -> Outcome<T>) -> Result<T, Error> {
         if self.dead {
-            return Err(Error::usage(&self.name, "had a fatal error before, and takes no more calls"));
+            return Err(self.buried());
         }
         journal::note(self.id, what);
-        call(&mut *self.standard).map_err(|refusal| {
-            if matches!(refusal, Refusal::Status(_, Status::FATAL)) {
-                self.abandon();
-            }
-            explain(&self.name, refusal, self.log.reason())
-        })
+        call(&mut self.standard).map_err(|refusal| self.refused(refusal))
+    }
+
+    #[cold]
+    fn buried(&self) -> Error {
+        Error::usage(&self.name, "had a fatal error before, and takes no more calls")
+    }
+
+    #[cold]
+    fn refused(&mut self, refusal: Refusal) -> Error {
+        if matches!(refusal, Refusal::Status(_, Status::FATAL)) {
+            self.abandon();
+        }
+        explain(&self.name, refusal, self.log.reason())
     }
 }
 

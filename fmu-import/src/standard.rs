@@ -3,7 +3,7 @@
 use super::value::Values;
 use crate::abi::log::Status;
 use crate::abi::shared::SharedInstance;
-use crate::instance::{CompletedStep, Stepped, Update};
+use crate::instance::{CompletedStep, Update};
 use model_description::BaseType;
 
 /// A call that did not succeed.
@@ -20,6 +20,7 @@ pub(super) enum Refusal {
 pub(super) type Outcome<T = ()> = Result<T, Refusal>;
 
 /// Judges a status: a warning is a success.
+#[inline]
 pub(super) fn judge(function: &'static str, status: Status) -> Outcome {
     if status.is_ok() { Ok(()) } else { Err(Refusal::Status(function, status)) }
 }
@@ -57,14 +58,11 @@ impl Default for Kind {
 pub(super) trait Standard: Equations {
     /// The calls that both standards share: end of initialization, terminate, reset, saved states, modes, vectors.
     fn shared(&mut self) -> &mut SharedInstance;
-    fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome;
-    fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome;
     fn get(&mut self, base: BaseType, reference: u32, count: usize) -> Outcome<Values>;
     fn set(&mut self, base: BaseType, reference: u32, values: &Values) -> Outcome;
     fn set_debug_logging(&mut self, on: bool) -> Outcome;
     fn setup(&mut self, experiment: Experiment) -> Outcome;
     fn enter_initialization(&mut self) -> Outcome;
-    fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped>;
     fn last_successful_time(&mut self) -> Outcome<f64>;
 }
 

@@ -1,7 +1,7 @@
 //! The calls that both standards have: from pointers to the instance's functions.
 
 use super::Abi;
-use super::gate::{Entry, enter};
+use super::gate::{Function, enter};
 use super::pointer::{array, numbers, place, room, text};
 use super::types::{FmuState, Instance, References};
 use crate::value::Value;
@@ -16,7 +16,7 @@ use std::ffi::{c_char, c_int};
 #[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
 impl<E: Exported> Abi<E> {
     pub unsafe fn get<T: Value>(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         references: References,
         n: usize,
@@ -25,7 +25,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, move |instance| {
                 let out = room(values, room_for, "values")?;
                 instance.get(array(references, n, "value references")?, out)
             })
@@ -33,7 +33,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn set<T: Value>(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         references: References,
         n: usize,
@@ -42,7 +42,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, move |instance| {
                 let values = array(values, n_values, "values")?;
                 instance.set(array(references, n, "value references")?, values)
             })
@@ -51,7 +51,7 @@ impl<E: Exported> Abi<E> {
 
     /// The texts stay where they are until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
     pub unsafe fn get_texts(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         references: References,
         n: usize,
@@ -60,7 +60,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let out = room(values, room_for, "values")?;
                 let texts = instance.get_texts(array(references, n, "value references")?, out.len())?;
                 for (place, text) in out.iter_mut().zip(texts) {
@@ -72,7 +72,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn set_texts(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         references: References,
         n: usize,
@@ -81,7 +81,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths, the second one of C strings if the variables are texts.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let values = array(values, n_values, "values")?;
                 let references = array(references, n, "value references")?;
                 Ok(instance.set_texts(references, values.len(), |i| text(values[i]))?)
@@ -91,7 +91,7 @@ impl<E: Exported> Abi<E> {
 
     /// A getter or setter of a type that no variable has: succeeds only for zero variables.
     pub unsafe fn none(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         references: References,
         n: usize,
@@ -100,7 +100,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 instance.refuse(array(references, n, "value references")?, carries)?;
                 if n_values == 0 { Ok(()) } else { Err(Fault::value("nValues", n_values, "0 for no reference").into()) }
             })
@@ -108,7 +108,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn set_debug_logging(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         on: bool,
         n: usize,
@@ -116,36 +116,36 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's array of C strings.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let mut names = Vec::new();
                 for &category in array(categories, n, "categories")? {
                     let category = text(category).ok_or_else(|| Fault::new("a log category is NULL"))?;
                     names.push(category.to_str().map_err(|_| Fault::new("a log category is not UTF-8"))?);
                 }
-                Ok(instance.log.switch(entry.standard, on, &names)?)
+                Ok(instance.log.switch(instance.standard, on, &names)?)
             })
         }
     }
 
-    pub unsafe fn exit_initialization(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn exit_initialization(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.exit_initialization()?)) }
+        unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.exit_initialization()?)) }
     }
 
-    pub unsafe fn terminate(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn terminate(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 instance.terminate();
                 Ok(())
             })
         }
     }
 
-    pub unsafe fn reset(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn reset(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 instance.reset();
                 Ok(())
             })
@@ -153,10 +153,10 @@ impl<E: Exported> Abi<E> {
     }
 
     /// `state` points to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
-    pub unsafe fn save_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
+    pub unsafe fn save_state(entry: impl Function, instance: Instance, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let state = place(state, "FMUState")?.assume_init_mut();
                 *state = handle(instance.save(state.addr())?);
                 Ok(())
@@ -164,16 +164,16 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn restore_state(entry: Entry, instance: Instance, state: FmuState) -> c_int {
+    pub unsafe fn restore_state(entry: impl Function, instance: Instance, state: FmuState) -> c_int {
         // SAFETY: the importer's instance; the state is only a number.
-        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.restore(state.addr())?)) }
+        unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.restore(state.addr())?)) }
     }
 
     /// Ignores NULL and a variable that holds NULL.
-    pub unsafe fn free_state(entry: Entry, instance: Instance, state: *mut FmuState) -> c_int {
+    pub unsafe fn free_state(entry: impl Function, instance: Instance, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
-            enter::<E>(entry, instance, |_| {
+            enter::<E, _>(entry, instance, |_| {
                 if state.is_null() {
                     return Ok(());
                 }
@@ -185,10 +185,15 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn serialized_size(entry: Entry, instance: Instance, state: FmuState, size: *mut usize) -> c_int {
+    pub unsafe fn serialized_size(
+        entry: impl Function,
+        instance: Instance,
+        state: FmuState,
+        size: *mut usize,
+    ) -> c_int {
         // SAFETY: the importer's variable; the state is only a number.
         unsafe {
-            enter::<E>(entry, instance, |_| {
+            enter::<E, _>(entry, instance, |_| {
                 let size = place(size, "size")?;
                 size.write(registry::with::<E::Model, _>(state.addr(), |state| blob::size(state))?);
                 Ok(())
@@ -196,10 +201,16 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn serialize(entry: Entry, instance: Instance, state: FmuState, bytes: *mut u8, size: usize) -> c_int {
+    pub unsafe fn serialize(
+        entry: impl Function,
+        instance: Instance,
+        state: FmuState,
+        bytes: *mut u8,
+        size: usize,
+    ) -> c_int {
         // SAFETY: the importer's array of this size; the state is only a number.
         unsafe {
-            enter::<E>(entry, instance, |_| {
+            enter::<E, _>(entry, instance, |_| {
                 let out = room(bytes, size, "serializedState")?;
                 let bytes = registry::with::<E::Model, _>(state.addr(), |state| blob::write(state))?;
                 if bytes.len() != size {
@@ -215,7 +226,7 @@ impl<E: Exported> Abi<E> {
 
     /// Always creates a new state and ignores the previous value of the variable.
     pub unsafe fn deserialize(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         bytes: *const u8,
         size: usize,
@@ -223,7 +234,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's array of this size, and its variable.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let state = place(state, "FMUState")?;
                 state.write(handle(instance.deserialize(array(bytes, size, "serializedState")?)?));
                 Ok(())
@@ -231,59 +242,61 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn enter_event(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn enter_event(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 instance.enter_event();
                 Ok(())
             })
         }
     }
 
-    pub unsafe fn enter_continuous(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn enter_continuous(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.leave_event()?)) }
+        unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.leave_event()?)) }
     }
 
-    pub unsafe fn set_time(entry: Entry, instance: Instance, time: f64) -> c_int {
+    pub unsafe fn set_time(entry: impl Function, instance: Instance, time: f64) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.set_time(time)?)) }
+        unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.set_time(time)?)) }
     }
 
-    pub unsafe fn set_states(entry: Entry, instance: Instance, x: *const f64, n: usize) -> c_int {
+    pub unsafe fn set_states(entry: impl Function, instance: Instance, x: *const f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
-        unsafe { enter::<E>(entry, instance, |instance| instance.set_states(array(x, n, "continuous states")?)) }
+        unsafe { enter::<E, _>(entry, instance, |instance| instance.set_states(array(x, n, "continuous states")?)) }
     }
 
-    pub unsafe fn get_states(entry: Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {
+    pub unsafe fn get_states(entry: impl Function, instance: Instance, x: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
-        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.get_states(numbers(x, n, "continuous states")?)?)) }
+        unsafe {
+            enter::<E, _>(entry, instance, |instance| Ok(instance.get_states(numbers(x, n, "continuous states")?)?))
+        }
     }
 
-    pub unsafe fn derivatives(entry: Entry, instance: Instance, dx: *mut f64, n: usize) -> c_int {
+    pub unsafe fn derivatives(entry: impl Function, instance: Instance, dx: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
-        unsafe { enter::<E>(entry, instance, |instance| instance.derivatives(numbers(dx, n, "derivatives")?)) }
+        unsafe { enter::<E, _>(entry, instance, |instance| instance.derivatives(numbers(dx, n, "derivatives")?)) }
     }
 
-    pub unsafe fn indicators(entry: Entry, instance: Instance, z: *mut f64, n: usize) -> c_int {
+    pub unsafe fn indicators(entry: impl Function, instance: Instance, z: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
-        unsafe { enter::<E>(entry, instance, |instance| instance.indicators(numbers(z, n, "event indicators")?)) }
+        unsafe { enter::<E, _>(entry, instance, |instance| instance.indicators(numbers(z, n, "event indicators")?)) }
     }
 
-    pub unsafe fn nominals(entry: Entry, instance: Instance, x: *mut f64, n: usize) -> c_int {
+    pub unsafe fn nominals(entry: impl Function, instance: Instance, x: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
-        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.nominals(numbers(x, n, "nominals")?)?)) }
+        unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.nominals(numbers(x, n, "nominals")?)?)) }
     }
 
     /// No step of the integrator is an event, and none ends the simulation: both flags are 0.
-    pub unsafe fn completed_step<B>(entry: Entry, instance: Instance, event: *mut B, end: *mut B) -> c_int
+    pub unsafe fn completed_step<B>(entry: impl Function, instance: Instance, event: *mut B, end: *mut B) -> c_int
     where
         B: From<bool>,
     {
         // SAFETY: the importer's variables.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let end = place(end, "terminateSimulation")?;
                 place(event, "enterEventMode")?.write(false.into());
                 end.write(false.into());
@@ -294,7 +307,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn directional(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         (unknowns, n_unknowns): (References, usize),
         (knowns, n_knowns): (References, usize),
@@ -304,7 +317,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let (unknowns, knowns) = (array(unknowns, n_unknowns, "unknowns")?, array(knowns, n_knowns, "knowns")?);
                 let (seed, out) = (array(seed, n_seed, "seed")?, numbers(sensitivity, n_sensitivity, "sensitivity")?);
                 if adjoint {
@@ -317,7 +330,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn output_derivatives(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         references: References,
         n: usize,
@@ -327,7 +340,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of these lengths.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let (references, orders) = (array(references, n, "value references")?, array(orders, n, "orders")?);
                 instance.output_derivatives(references, orders, numbers(values, n_values, "values")?)
             })
@@ -335,7 +348,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn input_derivatives(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         references: References,
         n: usize,
@@ -344,7 +357,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's arrays, of this length.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let (references, orders) = (array(references, n, "value references")?, array(orders, n, "orders")?);
                 Ok(instance.input_derivatives(references, orders, array(values, n, "values")?)?)
             })
@@ -352,9 +365,9 @@ impl<E: Exported> Abi<E> {
     }
 
     /// A function of a capability that this FMU does not have.
-    pub unsafe fn unsupported(entry: Entry, instance: Instance, why: &str) -> c_int {
+    pub unsafe fn unsupported(entry: impl Function, instance: Instance, why: &str) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<E>(entry, instance, |_| Err(Fault::new(format!("not supported: {why}")).into())) }
+        unsafe { enter::<E, _>(entry, instance, |_| Err(Fault::new(format!("not supported: {why}")).into())) }
     }
 }
 

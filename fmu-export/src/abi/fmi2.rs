@@ -1,6 +1,6 @@
 //! FMI 2.0.5: its own calls, and the table of its functions.
 
-use super::gate::{Entry, enter, open};
+use super::gate::{Entry, Function, enter, open};
 use super::logger::Fmi2Sink;
 use super::pointer::{place, text};
 use super::types::{Fmi2Boolean, Fmi2Callbacks, Fmi2EventInfo, Instance, Text};
@@ -25,7 +25,7 @@ const TERMINATED: c_int = 3;
 impl<E: Exported> Abi<E> {
     /// FMI 2.0.5, 2.1.5. The callbacks' struct is copied: its pointer is valid only during this call.
     pub unsafe fn fmi2_instantiate(
-        entry: Entry,
+        entry: &'static Entry,
         name: Text,
         fmu_type: c_int,
         token: Text,
@@ -53,7 +53,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn fmi2_setup_experiment(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         start: f64,
         stop_defined: Fmi2Boolean,
@@ -61,29 +61,37 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
+            enter::<E, _>(
+                entry,
+                instance,
+                |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?),
+            )
         }
     }
 
-    pub unsafe fn fmi2_enter_initialization(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn fmi2_enter_initialization(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<E>(entry, instance, |instance| Ok(instance.enter_initialization()?)) }
+        unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.enter_initialization()?)) }
     }
 
-    pub unsafe fn fmi2_do_step(entry: Entry, instance: Instance, t: f64, h: f64) -> c_int {
+    pub unsafe fn fmi2_do_step(entry: impl Function, instance: Instance, t: f64, h: f64) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 instance.do_step(t, h)?;
                 Ok(())
             })
         }
     }
 
-    pub unsafe fn fmi2_new_discrete_states(entry: Entry, instance: Instance, info: *mut Fmi2EventInfo) -> c_int {
+    pub unsafe fn fmi2_new_discrete_states(
+        entry: impl Function,
+        instance: Instance,
+        info: *mut Fmi2EventInfo,
+    ) -> c_int {
         // SAFETY: the importer's struct.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let info = place(info, "fmi2EventInfo")?;
                 let update = instance.update_discrete()?;
                 info.write(Fmi2EventInfo {
@@ -100,10 +108,10 @@ impl<E: Exported> Abi<E> {
     }
 
     /// `fmi2LastSuccessfulTime`; the other kinds belong to asynchronous steps (FMI 2.0.5, 4.2.3).
-    pub unsafe fn fmi2_real_status(entry: Entry, instance: Instance, kind: c_int, value: *mut f64) -> c_int {
+    pub unsafe fn fmi2_real_status(entry: impl Function, instance: Instance, kind: c_int, value: *mut f64) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let value = place(value, "value")?;
                 if kind != LAST_SUCCESSFUL_TIME {
                     return no_status(kind);
@@ -115,10 +123,15 @@ impl<E: Exported> Abi<E> {
     }
 
     /// `fmi2Terminated`: this FMU never asks to end the simulation.
-    pub unsafe fn fmi2_boolean_status(entry: Entry, instance: Instance, kind: c_int, value: *mut Fmi2Boolean) -> c_int {
+    pub unsafe fn fmi2_boolean_status(
+        entry: impl Function,
+        instance: Instance,
+        kind: c_int,
+        value: *mut Fmi2Boolean,
+    ) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
-            enter::<E>(entry, instance, |_| {
+            enter::<E, _>(entry, instance, |_| {
                 let value = place(value, "value")?;
                 if kind != TERMINATED {
                     return no_status(kind);
@@ -129,9 +142,9 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi2_no_status(entry: Entry, instance: Instance, kind: c_int) -> c_int {
+    pub unsafe fn fmi2_no_status(entry: impl Function, instance: Instance, kind: c_int) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<E>(entry, instance, |_| no_status(kind)) }
+        unsafe { enter::<E, _>(entry, instance, |_| no_status(kind)) }
     }
 }
 
@@ -169,7 +182,7 @@ macro_rules! export_fmi2 {
             logging_on: Fmi2Boolean,
         ) -> Instance {
             $crate::abi::quiet();
-            const ENTRY: Entry = Entry::new(Standard::Fmi2, Call::Instantiate, "fmi2Instantiate");
+            const ENTRY: &Entry = &Entry::new(Standard::Fmi2, Call::Instantiate, "fmi2Instantiate");
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi2_instantiate(

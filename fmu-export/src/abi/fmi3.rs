@@ -1,6 +1,6 @@
 //! FMI 3.0.2: its own calls, and the table of its functions.
 
-use super::gate::{Entry, enter, open};
+use super::gate::{Entry, Function, enter, open};
 use super::logger::{Fmi3Logger, Fmi3Sink};
 use super::pointer::{place, text};
 use super::types::{Fmi3Boolean, Instance, Text};
@@ -16,7 +16,7 @@ impl<E: Exported> Abi<E> {
     /// FMI 3.0.2, 2.3.1. `refused` names a requested feature that this FMU lacks.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_instantiate(
-        entry: Entry,
+        entry: &'static Entry,
         name: Text,
         token: Text,
         resources: Text,
@@ -45,7 +45,7 @@ impl<E: Exported> Abi<E> {
     }
 
     pub unsafe fn fmi3_enter_initialization(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         start: f64,
         stop_defined: Fmi3Boolean,
@@ -53,14 +53,18 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E>(entry, instance, |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?))
+            enter::<E, _>(
+                entry,
+                instance,
+                |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?),
+            )
         }
     }
 
     /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_do_step(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         t: f64,
         h: f64,
@@ -71,7 +75,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's variables.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let time = place(last_successful_time, "lastSuccessfulTime")?;
                 let event = place(event_handling_needed, "eventHandlingNeeded")?;
                 let early = place(early_return, "earlyReturn")?;
@@ -90,7 +94,7 @@ impl<E: Exported> Abi<E> {
 
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_update_discrete_states(
-        entry: Entry,
+        entry: impl Function,
         instance: Instance,
         again: *mut Fmi3Boolean,
         terminate: *mut Fmi3Boolean,
@@ -101,7 +105,7 @@ impl<E: Exported> Abi<E> {
     ) -> c_int {
         // SAFETY: the importer's variables.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 let again = place(again, "discreteStatesNeedUpdate")?;
                 let terminate = place(terminate, "terminateSimulation")?;
                 let nominals = place(nominals, "nominalsOfContinuousStatesChanged")?;
@@ -120,10 +124,10 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi3_enter_step(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn fmi3_enter_step(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
-            enter::<E>(entry, instance, |instance| {
+            enter::<E, _>(entry, instance, |instance| {
                 // A sample that the importer did not ask for is taken by the next step.
                 instance.current.pending = false;
                 Ok(())
@@ -131,15 +135,20 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi3_evaluate(entry: Entry, instance: Instance) -> c_int {
+    pub unsafe fn fmi3_evaluate(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe { enter::<E>(entry, instance, |_| Ok(())) }
+        unsafe { enter::<E, _>(entry, instance, |_| Ok(())) }
     }
 
-    pub unsafe fn fmi3_count(entry: Entry, instance: Instance, count: *mut usize, of_indicators: bool) -> c_int {
+    pub unsafe fn fmi3_count(
+        entry: impl Function,
+        instance: Instance,
+        count: *mut usize,
+        of_indicators: bool,
+    ) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
-            enter::<E>(entry, instance, |_| {
+            enter::<E, _>(entry, instance, |_| {
                 let number = if of_indicators { E::CAN.indicators().len() } else { E::CAN.states().len() };
                 place(count, "the number")?.write(number);
                 Ok(())
@@ -174,7 +183,7 @@ macro_rules! export_fmi3 {
             _intermediate_update: *const c_void,
         ) -> Instance {
             $crate::abi::quiet();
-            const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateCoSimulation");
+            const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateCoSimulation");
             let refused = (n_intermediate > 0)
                 .then_some("nRequiredIntermediateVariables must be 0: providesIntermediateUpdate = false");
             let interface =
@@ -199,7 +208,7 @@ macro_rules! export_fmi3 {
             logger: Option<Fmi3Logger>,
         ) -> Instance {
             $crate::abi::quiet();
-            const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateModelExchange");
+            const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateModelExchange");
             let interface = Interface::ModelExchange;
             // SAFETY: what the standard demands of the importer.
             unsafe {
@@ -223,7 +232,7 @@ macro_rules! export_fmi3 {
             _unlock_preemption: *const c_void,
         ) -> Instance {
             $crate::abi::quiet();
-            const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateScheduledExecution");
+            const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateScheduledExecution");
             let refused = Some("not supported: Scheduled Execution");
             // SAFETY: what the standard demands of the importer.
             unsafe {

@@ -30,6 +30,12 @@ impl Entry {
     }
 }
 
+/// A C function as a type: its entry is known while compiling, and its checks are compiled into it.
+pub trait Function {
+    /// Its name and its row.
+    const ENTRY: Entry;
+}
+
 /// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused.
 struct Handle<E: Exported> {
     busy: Cell<bool>,
@@ -41,8 +47,8 @@ struct Handle<E: Exported> {
 /// # Safety
 /// `pointer` is NULL, or comes from [`open`] for the same `E` and was not closed; no other thread uses it now.
 #[inline]
-pub(crate) unsafe fn enter<E: Exported>(
-    entry: Entry,
+pub(crate) unsafe fn enter<E: Exported, F: Function>(
+    _: F,
     pointer: *mut c_void,
     body: impl FnOnce(&mut Instance<E>) -> Result<(), Refusal>,
 ) -> c_int {
@@ -56,14 +62,14 @@ pub(crate) unsafe fn enter<E: Exported>(
     }
     // SAFETY: `busy` was false, so no other call of this thread holds the instance, and no other thread uses it.
     let instance = unsafe { &mut *handle.instance.get() };
-    let status = pass(entry, instance, body);
+    let status = pass(const { &F::ENTRY }, instance, body);
     handle.busy.set(false);
     status as c_int
 }
 
 #[inline]
 fn pass<E: Exported>(
-    entry: Entry,
+    entry: &'static Entry,
     instance: &mut Instance<E>,
     body: impl FnOnce(&mut Instance<E>) -> Result<(), Refusal>,
 ) -> Status {
@@ -83,7 +89,7 @@ fn pass<E: Exported>(
 }
 
 #[cold]
-fn fail<E: Exported>(entry: Entry, instance: &mut Instance<E>, refusal: Refusal) -> Status {
+fn fail<E: Exported>(entry: &'static Entry, instance: &mut Instance<E>, refusal: Refusal) -> Status {
     match refusal {
         Refusal::Error(fault) => {
             instance.current.life.after(false, Next::Stay);
@@ -98,7 +104,7 @@ fn fail<E: Exported>(entry: Entry, instance: &mut Instance<E>, refusal: Refusal)
 }
 
 #[cold]
-fn misplaced<E: Exported>(entry: Entry, instance: &Instance<E>) -> Fault {
+fn misplaced<E: Exported>(entry: &'static Entry, instance: &Instance<E>) -> Fault {
     if instance.standard != entry.standard {
         return Fault::new("the instance was made by the other standard's function");
     }
@@ -118,7 +124,7 @@ fn panicked(payload: &(dyn Any + Send)) -> Fault {
 
 /// A new instance for the importer, or NULL and a message.
 pub(crate) fn open<E: Exported>(
-    entry: Entry,
+    entry: &'static Entry,
     log: Log,
     name: Result<String, Fault>,
     resources: Option<&CStr>,

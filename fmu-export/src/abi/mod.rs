@@ -103,9 +103,12 @@ macro_rules! functions {
     )*) => { $(
         #[unsafe(no_mangle)]
         pub(crate) unsafe extern "C" fn $name(instance: Instance $(, $argument: $type)*) -> c_int {
-            const ENTRY: Entry = Entry::new(Standard::$standard, Call::$call, stringify!($name));
+            struct Here;
+            impl Function for Here {
+                const ENTRY: Entry = Entry::new(Standard::$standard, Call::$call, stringify!($name));
+            }
             // SAFETY: what the standard demands of the importer.
-            unsafe { $crate::abi::Abi::<$exported>::$function(ENTRY, instance $(, $passed)*) }
+            unsafe { $crate::abi::Abi::<$exported>::$function(Here, instance $(, $passed)*) }
         }
     )* };
 }

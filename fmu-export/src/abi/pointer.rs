@@ -11,11 +11,8 @@ use std::slice;
 /// A non-NULL aligned `pointer` is readable for `n` elements, and is not written during `'a`.
 #[inline]
 pub(crate) unsafe fn array<'a, T>(pointer: *const T, n: usize, name: &str) -> Result<&'a [T], Fault> {
-    if n == 0 {
-        return Ok(&[]);
-    }
     if !fits(pointer, n) {
-        return Err(refuse(pointer.is_null(), n, name));
+        return if n == 0 { Ok(&[]) } else { Err(refuse(pointer.is_null(), n, name)) };
     }
     // SAFETY: not NULL, aligned, no larger than an allocation can be; readable by the caller's promise.
     Ok(unsafe { slice::from_raw_parts(pointer, n) })
@@ -27,11 +24,8 @@ pub(crate) unsafe fn array<'a, T>(pointer: *const T, n: usize, name: &str) -> Re
 /// A non-NULL aligned `pointer` is writable for `n` elements, and is not used elsewhere during `'a`.
 #[inline]
 pub(crate) unsafe fn room<'a, T>(pointer: *mut T, n: usize, name: &str) -> Result<&'a mut [MaybeUninit<T>], Fault> {
-    if n == 0 {
-        return Ok(&mut []);
-    }
     if !fits(pointer, n) {
-        return Err(refuse(pointer.is_null(), n, name));
+        return if n == 0 { Ok(&mut []) } else { Err(refuse(pointer.is_null(), n, name)) };
     }
     // SAFETY: not NULL, aligned, no larger than an allocation can be; ours by the caller's promise; it may be uninitialized.
     Ok(unsafe { slice::from_raw_parts_mut(pointer.cast(), n) })

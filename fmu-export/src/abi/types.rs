@@ -1,6 +1,6 @@
 //! The C types of both standards, as far as the signatures need them.
 
-pub use super::gate::Entry;
+pub use super::gate::{Entry, Function};
 pub use super::logger::{Fmi2Logger, Fmi3Logger};
 pub use crate::lifecycle::{Call, Standard};
 pub use crate::value::{Fmi2Boolean, Fmi2Integer, Fmi3Boolean};

@@ -95,7 +95,7 @@ unsafe extern "C" fn logger(
 }
 
 /// An instance. Owns the data that the FMU may keep pointers to.
-pub(super) struct Instance {
+pub(crate) struct Instance {
     // First, so that the instance is freed before the library and the callbacks.
     shared: SharedInstance,
     functions: Arc<Loaded<Functions>>,
@@ -142,6 +142,7 @@ impl Instance {
     }
 
     /// Reads scalars, as many as both slices have.
+    #[inline]
     fn read<T>(&self, name: &'static str, function: Get<T>, references: &[u32], values: &mut [T]) -> Outcome {
         let n = references.len().min(values.len());
         // SAFETY: the instance is alive; both slices have at least n elements.
@@ -149,6 +150,7 @@ impl Instance {
     }
 
     /// Writes scalars, as many as both slices have.
+    #[inline]
     fn write<T>(&self, name: &'static str, function: Set<T>, references: &[u32], values: &[T]) -> Outcome {
         let n = references.len().min(values.len());
         // SAFETY: the instance is alive; both slices have at least n elements.
@@ -160,17 +162,38 @@ impl Instance {
     }
 }
 
-impl Standard for Instance {
-    fn shared(&mut self) -> &mut SharedInstance {
-        &mut self.shared
-    }
-
-    fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
+impl Instance {
+    #[inline]
+    pub(super) fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         self.read("fmi2GetReal", self.functions.api.get_real, references, values)
     }
 
-    fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+    #[inline]
+    pub(super) fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
         self.write("fmi2SetReal", self.functions.api.set_real, references, values)
+    }
+
+    #[inline]
+    pub(super) fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped> {
+        let do_step = self.functions.api.do_step.ok_or_else(|| missing("fmi2DoStep"))?;
+        // SAFETY: the instance is alive. "No set state before this point" is false: a state may be set at any time.
+        let status = unsafe { do_step(self.shared.pointer(), t, h, 0) };
+        let stepped = Stepped { terminate: false, event: false, early: false, last: t + h };
+        if let (Status::DISCARD, Some(function)) = (status, self.functions.api.get_boolean_status) {
+            let mut ended = 0;
+            // SAFETY: the instance is alive, there is room for one value.
+            let asked = unsafe { function(self.shared.pointer(), TERMINATED, &raw mut ended) };
+            if asked == Status::OK && ended != 0 {
+                return Ok(Stepped { terminate: true, ..stepped });
+            }
+        }
+        judge("fmi2DoStep", status).map(|()| stepped)
+    }
+}
+
+impl Standard for Instance {
+    fn shared(&mut self) -> &mut SharedInstance {
+        &mut self.shared
     }
 
     fn get(&mut self, base: BaseType, reference: u32, _count: usize) -> Outcome<Values> {
@@ -231,22 +254,6 @@ impl Standard for Instance {
 
     fn enter_initialization(&mut self) -> Outcome {
         self.shared.call("fmi2EnterInitializationMode", self.functions.api.enter)
-    }
-
-    fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped> {
-        let do_step = self.functions.api.do_step.ok_or_else(|| missing("fmi2DoStep"))?;
-        // SAFETY: the instance is alive. "No set state before this point" is false: a state may be set at any time.
-        let status = unsafe { do_step(self.shared.pointer(), t, h, 0) };
-        let stepped = Stepped { terminate: false, event: false, early: false, last: t + h };
-        if let (Status::DISCARD, Some(function)) = (status, self.functions.api.get_boolean_status) {
-            let mut ended = 0;
-            // SAFETY: the instance is alive, there is room for one value.
-            let asked = unsafe { function(self.shared.pointer(), TERMINATED, &raw mut ended) };
-            if asked == Status::OK && ended != 0 {
-                return Ok(Stepped { terminate: true, ..stepped });
-            }
-        }
-        judge("fmi2DoStep", status).map(|()| stepped)
     }
 
     fn last_successful_time(&mut self) -> Outcome<f64> {

@@ -95,7 +95,7 @@ unsafe extern "C" fn log_message(
 }
 
 /// An instance.
-pub(super) struct Instance {
+pub(crate) struct Instance {
     // First, so that the instance is freed before the library.
     shared: SharedInstance,
     functions: Arc<Loaded<Functions>>,
@@ -163,12 +163,14 @@ impl Instance {
         Ok(Self { shared, functions, experiment, last_successful_time: 0.0 })
     }
 
+    #[inline]
     fn read<T>(&self, name: &'static str, f: Get<T>, references: &[u32], values: &mut [T]) -> Outcome {
         let (n, count) = (references.len(), values.len());
         // SAFETY: the instance is alive; both arrays have the lengths that are passed.
         judge(name, unsafe { f(self.shared.pointer(), references.as_ptr(), n, values.as_mut_ptr(), count) })
     }
 
+    #[inline]
     fn write<T>(&self, name: &'static str, f: Set<T>, references: &[u32], values: &[T]) -> Outcome {
         let (n, count) = (references.len(), values.len());
         // SAFETY: the instance is alive; both arrays have the lengths that are passed.
@@ -206,19 +208,46 @@ fn wide<T: Into<i128>>(values: Vec<T>) -> Values {
     Values::Integers(values.into_iter().map(Into::into).collect())
 }
 
-impl Standard for Instance {
-    fn shared(&mut self) -> &mut SharedInstance {
-        &mut self.shared
-    }
-
-    fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
+impl Instance {
+    #[inline]
+    pub(super) fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         let n = references.len().min(values.len());
         self.read("fmi3GetFloat64", self.functions.api.get_float64, &references[..n], &mut values[..n])
     }
 
-    fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+    #[inline]
+    pub(super) fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
         let n = references.len().min(values.len());
         self.write("fmi3SetFloat64", self.functions.api.set_float64, &references[..n], &values[..n])
+    }
+
+    #[inline]
+    pub(super) fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped> {
+        let do_step = function!(self.do_step, "fmi3DoStep");
+        let (mut event, mut terminate, mut early, mut last) = (0, 0, 0, t);
+        // SAFETY: the instance is alive, there is room for each result. "No set state before this point" is false: a
+        // state may be set at any time.
+        let status = unsafe {
+            do_step(
+                self.shared.pointer(),
+                t,
+                h,
+                false,
+                &raw mut event,
+                &raw mut terminate,
+                &raw mut early,
+                &raw mut last,
+            )
+        };
+        judge("fmi3DoStep", status)?;
+        self.last_successful_time = last;
+        Ok(Stepped { terminate: terminate != 0, event: event != 0, early: early != 0, last })
+    }
+}
+
+impl Standard for Instance {
+    fn shared(&mut self) -> &mut SharedInstance {
+        &mut self.shared
     }
 
     fn get(&mut self, base: BaseType, reference: u32, count: usize) -> Outcome<Values> {
@@ -298,28 +327,6 @@ impl Standard for Instance {
         let status =
             unsafe { enter(self.shared.pointer(), x.tolerance.is_some(), tolerance, x.start, x.stop.is_some(), stop) };
         judge("fmi3EnterInitializationMode", status)
-    }
-
-    fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped> {
-        let do_step = function!(self.do_step, "fmi3DoStep");
-        let (mut event, mut terminate, mut early, mut last) = (0, 0, 0, t);
-        // SAFETY: the instance is alive, there is room for each result. "No set state before this point" is false: a
-        // state may be set at any time.
-        let status = unsafe {
-            do_step(
-                self.shared.pointer(),
-                t,
-                h,
-                false,
-                &raw mut event,
-                &raw mut terminate,
-                &raw mut early,
-                &raw mut last,
-            )
-        };
-        judge("fmi3DoStep", status)?;
-        self.last_successful_time = last;
-        Ok(Stepped { terminate: terminate != 0, event: event != 0, early: early != 0, last })
     }
 
     fn last_successful_time(&mut self) -> Outcome<f64> {

@@ -37,6 +37,7 @@ impl Status {
     pub const FATAL: Self = Self(4);
 
     /// Whether the call succeeded: OK or Warning.
+    #[inline]
     pub fn is_ok(self) -> bool {
         matches!(self, Self::OK | Self::WARNING)
     }

@@ -13,11 +13,13 @@ mod signatures;
 
 use crate::Error;
 use crate::folder::Folder;
+use crate::instance::Stepped;
 use crate::standard::{Kind, Outcome, Refusal, Standard};
 use log::Log;
 use model_description::FmiVersion;
 use shared::SharedFunctions;
 use std::ffi::CString;
+use std::ops::{Deref, DerefMut};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -77,17 +79,72 @@ impl Functions {
         log: &Arc<Log>,
         logging: bool,
         kind: Kind,
-    ) -> Outcome<Box<dyn Standard + Send>> {
+    ) -> Outcome<AnyInstance> {
         let (library, version) = match self {
             Self::V2(functions) => (&functions.library, FmiVersion::V2),
             Self::V3(functions) => (&functions.library, FmiVersion::V3),
         };
         promised(library, version, kind).map_err(Refusal::Impossible)?;
         match self {
-            Self::V2(functions) => fmi2::Instance::new(functions.clone(), name, token, resources, log, logging, kind)
-                .map(|i| Box::new(i) as _),
-            Self::V3(functions) => fmi3::Instance::new(functions.clone(), name, token, resources, log, logging, kind)
-                .map(|i| Box::new(i) as _),
+            Self::V2(functions) => {
+                fmi2::Instance::new(functions.clone(), name, token, resources, log, logging, kind).map(AnyInstance::V2)
+            }
+            Self::V3(functions) => {
+                fmi3::Instance::new(functions.clone(), name, token, resources, log, logging, kind).map(AnyInstance::V3)
+            }
+        }
+    }
+}
+
+/// An instance of either standard. What a simulation calls at every communication point is known here; all else goes
+/// through [`Standard`].
+pub(crate) enum AnyInstance {
+    V2(fmi2::Instance),
+    V3(fmi3::Instance),
+}
+
+impl AnyInstance {
+    #[inline]
+    pub(crate) fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
+        match self {
+            Self::V2(instance) => instance.get_reals(references, values),
+            Self::V3(instance) => instance.get_reals(references, values),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+        match self {
+            Self::V2(instance) => instance.set_reals(references, values),
+            Self::V3(instance) => instance.set_reals(references, values),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped> {
+        match self {
+            Self::V2(instance) => instance.do_step(t, h),
+            Self::V3(instance) => instance.do_step(t, h),
+        }
+    }
+}
+
+impl Deref for AnyInstance {
+    type Target = dyn Standard + Send;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::V2(instance) => instance,
+            Self::V3(instance) => instance,
+        }
+    }
+}
+
+impl DerefMut for AnyInstance {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        match self {
+            Self::V2(instance) => instance,
+            Self::V3(instance) => instance,
         }
     }
 }

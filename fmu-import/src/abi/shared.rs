@@ -28,6 +28,7 @@ impl<T: Copy> Function<T> {
 }
 
 /// The refusal of a call whose function the library does not have.
+#[cold]
 pub(super) fn missing(name: &str) -> Refusal {
     Refusal::Impossible(format!("the function {name} is missing"))
 }
@@ -144,6 +145,7 @@ impl SharedInstance {
     }
 
     /// For a call while this is borrowed mutably.
+    #[inline]
     pub(super) fn pointer(&self) -> InstancePointer {
         self.instance.0
     }
