@@ -40,16 +40,22 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// Unknown reference, another type, or another number of values than `out` has room for.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         if references.len() != out.len() || self.arrays {
-            self.check_count(references, out.len())?;
-            self.refresh();
-            return self.get_each(references, out);
+            return self.get_counted(references, out);
         }
         self.refresh();
         let done = T::read_reals(&mut self.current.block, references, out);
         if done == out.len() { Ok(()) } else { self.get_each(&references[done..], &mut out[done..]) }
+    }
+
+    #[inline(never)]
+    fn get_counted<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+        self.check_count(references, out.len())?;
+        self.refresh();
+        self.get_each(references, out)
     }
 
     /// The same for any variables, whose number was checked.
