@@ -40,18 +40,27 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// Unknown reference, another type, or another number of values than `out` has room for.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
-        self.refresh();
-        if references.len() == out.len() && T::read_reals(&mut self.current.block, references, out) == out.len() {
-            return Ok(());
+        if references.len() != out.len() || self.arrays {
+            return self.get_counted(references, out);
         }
-        self.get_each(references, out)
+        self.refresh();
+        let done = T::read_reals(&mut self.current.block, references, out);
+        if done == out.len() { Ok(()) } else { self.get_each(&references[done..], &mut out[done..]) }
     }
 
     #[inline(never)]
-    fn get_each<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+    fn get_counted<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         self.check_count(references, out.len())?;
+        self.refresh();
+        self.get_each(references, out)
+    }
+
+    /// The same for any variables, whose number was checked.
+    #[inline(never)]
+    fn get_each<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         let (mut references, mut out) = (references, out);
         while let Some((&reference, others)) = references.split_first() {
             let count = if self.arrays { self.elements(reference)? } else { 1 };
