@@ -131,7 +131,7 @@ impl SampleGrid {
     /// Seconds from instant `k` to `now`: on the right side of +-[`width`](Self::width), but otherwise to the rounding of
     /// `now`. One subtraction unless it leaves a doubt.
     #[inline]
-    pub(crate) fn past(&self, k: u64, now: Elapsed) -> f64 {
+    pub(crate) fn past(self, k: u64, now: Elapsed) -> f64 {
         let product = count(k) * self.period;
         let past = now.high - product;
         // Twice what the low part of `now` and the rounding of the product can add.
@@ -140,7 +140,7 @@ impl SampleGrid {
     }
 
     #[cold]
-    fn past_exactly(&self, k: u64, now: Elapsed) -> f64 {
+    fn past_exactly(self, k: u64, now: Elapsed) -> f64 {
         now.minus_periods(k, self.period)
     }
 
