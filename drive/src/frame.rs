@@ -333,7 +333,7 @@ impl<S: Scalar> Phases<S> {
     #[inline]
     pub fn to_stator(self) -> Vector<Stator, S> {
         let Self { a, b, c } = self;
-        Vector::new((a * 2.0 - b - c) / S::from(3.0), (b - c) / S::from(SQRT_3))
+        Vector::new((a * 2.0 - b - c) * (1.0 / 3.0), (b - c) * (1.0 / SQRT_3))
     }
 
     /// Inverse Clarke transform, without a zero sequence.

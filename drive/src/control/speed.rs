@@ -84,13 +84,20 @@ impl SpeedController {
     pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limits: (f64, f64), T_s: f64) -> (f64, f64) {
         let ((low, high), error) = (limits, w_ref - w);
         let wanted = gains.k_p * (gains.b * w_ref - w) + self.integral;
-        let i_q_ref = at_least(at_most(wanted, high), low);
+        let i_q_ref = if wanted >= low && wanted <= high { wanted } else { limited(wanted, low, high) };
         let further_in = (wanted - i_q_ref) * error > 0.0;
         if !further_in {
             self.integral += T_s * gains.k_i * error;
         }
         (i_q_ref, wanted)
     }
+}
+
+/// Out of line: as a branch, it lets the current loop begin before the limits are known.
+#[cold]
+#[inline(never)]
+fn limited(wanted: f64, low: f64, high: f64) -> f64 {
+    at_least(at_most(wanted, high), low)
 }
 
 impl SpeedController {
