@@ -129,7 +129,8 @@ fn no_emf_method_loses_a_reversal_that_it_holds() {
         for load in [0.0, 0.1, 0.3, 0.5] {
             let mut pair = runner::drive(kind);
             let (peak, end) = reversal(pair.clone(), load);
-            assert!(peak > 150.0 && (end + 0.5).abs() > 0.1, "{}, {load} pu: held, {peak} deg, {end} pu", kind.name());
+            // Some find it again, half a turn later.
+            assert!(peak > 150.0, "{}, {load} pu: held, {peak} deg, {end} pu", kind.name());
             pair.controller.model.parameters.estimators.emf.hold_reversal = true;
             let (peak, end) = reversal(pair, load);
             assert!(peak < 20.0 && (end + 0.5).abs() < 0.005, "{}, {load} pu: {peak} deg, {end} pu", kind.name());

@@ -129,9 +129,10 @@ fn false_lock() {
         run(&mut pair, T_S, duration, |_, p| p.controller.model.inputs.speed_ref = 500.0 * RPM);
         (pair.plant.out.speed / RPM, error(&pair))
     };
-    let (speed, angle) = after(8.0, R);
+    // At 2 s, the swing has died away to 1e-12 of the speed; from there on, it grows from rounding errors.
+    let (speed, angle) = after(2.0, R);
     assert!(
-        speed.abs() < 1.0 && PAGE.contains(&format!("stands at 0 rpm with {} for more than 8 s", degrees(angle))),
+        speed.abs() < 1.0 && PAGE.contains(&format!("stands at 0 rpm with {} for more than 2 s", degrees(angle))),
         "{speed} rpm, {angle} deg"
     );
     assert!((after(0.5, 0.9 * R).0 - 500.0).abs() < 1.0);

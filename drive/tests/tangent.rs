@@ -4,7 +4,7 @@
 use drive::motor::Motor;
 use drive::plant::thermal::{Temperatures, ThermalMode};
 use drive::{PmsmDrive, PmsmPlant};
-use fmu_core::{Block, Causality, ContinuousTime, Differentiable, Elapsed, Events, Kind, Model, Variability};
+use fmu_core::{Block, Causality, ContinuousTime, Differentiable, Elapsed, Events, Kind, Model, Slot, Variability};
 
 /// A deterministic stream of numbers (xorshift, Marsaglia 2003).
 struct Draw(u64);
@@ -67,8 +67,11 @@ fn unknowns<M: Model>(dx: [f64; 4], block: &mut Block<M>) -> Vec<f64> {
     for i in 0..M::TABLE.len() {
         let (_, meta, _) = M::TABLE.locate(i).unwrap();
         let continuous = meta.variability == Variability::Continuous && matches!(meta.kind, Kind::Real(_));
-        if continuous && meta.causality == Causality::Output {
-            values.push(*M::TABLE.real(block, i).unwrap().1);
+        if continuous
+            && meta.causality == Causality::Output
+            && let Some((_, Slot::Real(x))) = M::TABLE.entry(block, i)
+        {
+            values.push(*x);
         }
     }
     values

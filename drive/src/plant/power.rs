@@ -27,7 +27,6 @@
 //! tested.
 
 use crate::frame::Phases;
-use crate::math::all_finite;
 use crate::plant::legs::Legs;
 use crate::plant::losses::Losses;
 use crate::plant::signals::PlantInputs;
@@ -123,11 +122,6 @@ impl Energy {
         self.r#in += step.r#in;
         self.mech += step.mech;
         self.loss += step.loss;
-    }
-
-    /// Whether all values are numbers.
-    pub fn is_finite(&self) -> bool {
-        all_finite([self.r#in, self.mech, self.loss])
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::frame::AlphaBeta;
 use crate::integrate::rk4;
+use crate::math::all_finite;
 use crate::modulation::limit_to_hexagon;
 use crate::plant::integration::{LARGEST_TURN, LONGEST_SUBSTEP};
 use crate::plant::legs::Legs;
@@ -237,7 +238,8 @@ impl PmsmPlant {
         blocked: bool,
         legs: &Legs,
     ) -> Result<(), Fault> {
-        if !(state.is_finite() && energy.is_finite()) {
+        let State { psi, speed, angle, .. } = state;
+        if !all_finite([psi.d(), psi.q(), speed, angle, energy.r#in, energy.mech, energy.loss]) {
             return Err(self.diverged(h));
         }
         (self.state, self.blocked) = (state, blocked);
