@@ -39,7 +39,7 @@
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
 use crate::estimator::resistance::{FILTER, STANDSTILL};
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Injection, Kind, Sample};
+use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Kind, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use crate::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND};
@@ -136,14 +136,7 @@ impl Estimating for FluxObserver {
         self.v = psi_a * (c * r);
         self.psi_M -= T_s * par.flux_observer.magnet * r * psi_M / (1.0 + others * others);
         self.tracker.correct(context, par.tracker.bandwidth, -inverse * psi_a.cross(e), sample.tau_ref);
-        Estimate {
-            theta: self.tracker.theta,
-            axis,
-            w: self.tracker.w,
-            half: None,
-            i: sample.i,
-            injection: Injection::None,
-        }
+        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, ..Estimate::default() }
     }
 
     #[inline]

@@ -22,7 +22,7 @@
 //! leaves the circle but not the square.
 
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Sample};
 use crate::frame::{AlphaBeta, Axis, Estimated};
 use crate::math::atan2;
 use fmu_core::unit::PER_SECOND;
@@ -81,14 +81,7 @@ impl Estimating for GradientObserver {
         }
         let eta = axis.from_stator(self.eta);
         self.tracker.correct(context, par.tracker.bandwidth, atan2(eta.q(), eta.d()), sample.tau_ref);
-        Estimate {
-            theta: self.tracker.theta,
-            axis,
-            w: self.tracker.w,
-            half: None,
-            i: sample.i,
-            injection: Injection::None,
-        }
+        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, ..Estimate::default() }
     }
 }
 

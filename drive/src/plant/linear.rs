@@ -10,11 +10,17 @@
 
 use crate::frame::{AlphaBeta, Axis, Rotor};
 use crate::math::{reciprocal, tanh};
+use crate::modulation::limit_to_hexagon;
 use crate::motor::Motor;
+use crate::plant::integration::{LARGEST_TURN, LONGEST_SUBSTEP};
+use crate::plant::legs::Legs;
 use crate::plant::losses::{self, Losses};
+use crate::plant::model::PmsmPlant;
 use crate::plant::power::Energy;
 use crate::plant::rates::{Circuit, Passed, integral};
+use crate::plant::state::State;
 use crate::plant::tables::PlantParameters;
+use fmu_core::{Fault, Step};
 use serde::{Deserialize, Serialize};
 
 /// Constants of machine and shaft, from the parameters.
@@ -151,7 +157,7 @@ impl<const NEAR: bool> LinearHeld<'_, NEAR> {
     }
 }
 
-/// What passes at an instant: the current in A, the product of its square, the friction loss in W.
+/// What passes at an instant: the current in A and the friction loss in W.
 pub(super) struct Through {
     i: AlphaBeta,
     p_friction: f64,
@@ -181,6 +187,76 @@ impl<const NEAR: bool> Circuit for LinearHeld<'_, NEAR> {
         let friction = over(|k| k.p_friction);
         let energy = Energy { r#in: 1.5 * self.u.dot(charge), mech: self.tau_load * turned, loss: cu + friction };
         Passed { energy, losses: Losses { cu, friction, ..Losses::none() } }
+    }
+}
+
+impl PmsmPlant {
+    /// A communication step of `h` (s) of a `linear` machine on ideal legs, which switch.
+    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[inline(always)]
+    fn pass_linear(&self, linear: &Linear, coulomb: &mut Coulomb, h: f64) -> Result<(State, Passed), Fault> {
+        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
+        let w = (f64::from(self.warm.motor.n_p) * self.state.speed).abs();
+        if h <= LONGEST_SUBSTEP && w * h <= LARGEST_TURN {
+            return Ok(self.drive_linear(linear, coulomb, &self.state, h, u));
+        }
+        let mut left = Self::count(h, LONGEST_SUBSTEP.min(LARGEST_TURN / w))?;
+        let (h, mut state, mut passed) = (h / left, self.state, Passed::default());
+        while left > 0.0 {
+            let (next, Passed { energy, losses }) = self.drive_again(linear, coulomb, &state, h, u);
+            state = next;
+            passed.energy.add(&energy);
+            passed.losses.add(&losses);
+            left -= 1.0;
+        }
+        Ok((state, passed))
+    }
+
+    /// `PmsmPlant::step` of a linear machine on ideal legs, which switch; `None` for other machines.
+    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[inline(always)]
+    pub(super) fn step_linear(&mut self, step: &Step) -> Option<Result<(), Fault>> {
+        let linear = self.warm.linear.as_ref().filter(|_| self.inputs.enable)?;
+        let mut coulomb = self.coulomb;
+        let (state, Passed { energy, losses }) = match self.pass_linear(linear, &mut coulomb, step.h) {
+            Ok(passed) => passed,
+            Err(fault) => return Some(Err(fault)),
+        };
+        self.coulomb = coulomb;
+        let legs = Legs::switching(&self.parameters.inverter, self.inputs.u_dc);
+        Some(self.conclude(step.h, state, &energy, losses, false, &legs))
+    }
+
+    /// `PmsmPlant::drive` of a `linear` machine under the voltage `u` (V).
+    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[inline(always)]
+    fn drive_linear(
+        &self,
+        linear: &Linear,
+        coulomb: &mut Coulomb,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+    ) -> (State, Passed) {
+        let tau_load = self.inputs.tau_load;
+        if linear.is_near_standstill(start.speed) {
+            self.drive(start, h, &linear.held::<true>(u, tau_load, start.speed, coulomb))
+        } else {
+            self.drive(start, h, &linear.held::<false>(u, tau_load, start.speed, coulomb))
+        }
+    }
+
+    /// [`drive_linear`](Self::drive_linear) in a loop.
+    #[inline(never)]
+    fn drive_again(
+        &self,
+        linear: &Linear,
+        coulomb: &mut Coulomb,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+    ) -> (State, Passed) {
+        self.drive_linear(linear, coulomb, start, h, u)
     }
 }
 

@@ -6,7 +6,6 @@ use crate::math::all_finite;
 use crate::modulation::limit_to_hexagon;
 use crate::plant::integration::{LARGEST_TURN, LONGEST_SUBSTEP};
 use crate::plant::legs::Legs;
-use crate::plant::linear::{Coulomb, Linear};
 use crate::plant::losses::flow::Lossy;
 use crate::plant::losses::{self, Losses};
 use crate::plant::machine;
@@ -65,7 +64,7 @@ impl PmsmPlant {
 
     /// Number of integration steps of at most `longest` (s) in `h` (s).
     #[inline(never)]
-    fn count(h: f64, longest: f64) -> Result<f64, Fault> {
+    pub(super) fn count(h: f64, longest: f64) -> Result<f64, Fault> {
         let count = (h / longest - 1e-9).ceil().max(1.0);
         if count > MAX_SUBSTEPS {
             let limit = MAX_SUBSTEPS * longest;
@@ -158,78 +157,10 @@ impl PmsmPlant {
         Ok(())
     }
 
-    /// A communication step of `h` (s) of a `linear` machine on ideal legs, which switch.
-    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
-    #[inline(always)]
-    fn pass_linear(&self, linear: &Linear, coulomb: &mut Coulomb, h: f64) -> Result<(State, Passed), Fault> {
-        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
-        let w = (f64::from(self.warm.motor.n_p) * self.state.speed).abs();
-        if h <= LONGEST_SUBSTEP && w * h <= LARGEST_TURN {
-            return Ok(self.drive_linear(linear, coulomb, &self.state, h, u));
-        }
-        let mut left = Self::count(h, LONGEST_SUBSTEP.min(LARGEST_TURN / w))?;
-        let (h, mut state, mut passed) = (h / left, self.state, Passed::default());
-        while left > 0.0 {
-            let (next, Passed { energy, losses }) = self.drive_again(linear, coulomb, &state, h, u);
-            state = next;
-            passed.energy.add(&energy);
-            passed.losses.add(&losses);
-            left -= 1.0;
-        }
-        Ok((state, passed))
-    }
-
-    /// [`step`](Self::step) of a linear machine on ideal legs, which switch; `None` for other machines.
-    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
-    #[inline(always)]
-    pub(super) fn step_linear(&mut self, step: &Step) -> Option<Result<(), Fault>> {
-        let linear = self.warm.linear.as_ref().filter(|_| self.inputs.enable)?;
-        let mut coulomb = self.coulomb;
-        let (state, Passed { energy, losses }) = match self.pass_linear(linear, &mut coulomb, step.h) {
-            Ok(passed) => passed,
-            Err(fault) => return Some(Err(fault)),
-        };
-        self.coulomb = coulomb;
-        let legs = Legs::switching(&self.parameters.inverter, self.inputs.u_dc);
-        Some(self.conclude(step.h, state, &energy, losses, false, &legs))
-    }
-
-    /// [`drive`](Self::drive) of a `linear` machine under the voltage `u` (V).
-    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
-    #[inline(always)]
-    fn drive_linear(
-        &self,
-        linear: &Linear,
-        coulomb: &mut Coulomb,
-        start: &State,
-        h: f64,
-        u: AlphaBeta,
-    ) -> (State, Passed) {
-        let tau_load = self.inputs.tau_load;
-        if linear.is_near_standstill(start.speed) {
-            self.drive(start, h, &linear.held::<true>(u, tau_load, start.speed, coulomb))
-        } else {
-            self.drive(start, h, &linear.held::<false>(u, tau_load, start.speed, coulomb))
-        }
-    }
-
-    /// [`drive_linear`](Self::drive_linear) in a loop.
-    #[inline(never)]
-    fn drive_again(
-        &self,
-        linear: &Linear,
-        coulomb: &mut Coulomb,
-        start: &State,
-        h: f64,
-        u: AlphaBeta,
-    ) -> (State, Passed) {
-        self.drive_linear(linear, coulomb, start, h, u)
-    }
-
     /// Takes the `state` at the end of a step of `h` (s), in which `energy` passed with its `losses`.
     #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
     #[inline(always)]
-    fn conclude(
+    pub(super) fn conclude(
         &mut self,
         h: f64,
         state: State,
