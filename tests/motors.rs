@@ -1,6 +1,9 @@
 //! Every machine in motors/ with the values that `fmu tune` gives it: no chatter, and power that is accounted for.
 #![allow(missing_docs, non_snake_case)]
 
+use drive::plant::power::Powers;
+use drive::plant::signals::PlantOutputs;
+use drive::plant::tables::PlantParameters;
 use drive::{Pair, PmsmDrive};
 use drive_study::tune::{self, motor::MotorFile, rules::Tuned};
 use fmu_core::{Block, Elapsed, Step};
@@ -66,22 +69,28 @@ fn no_voltage_chatters() {
     }
 }
 
-/// Mean of p_in (W) and of what it lacks of p_mech + p_loss (W) from 3 s on, for one second.
+/// Mean of p_in (W), and of what it lacks of p_mech + p_loss and the change of the stored energy (W), from 4 s on, for one second.
 struct Balance {
     p_in: f64,
     missing: f64,
 }
 
 /// The machine at rated load and 0.7 of the rated speed, which all reach without field weakening; steps of `h` (s).
-fn balance(machine: &Machine, h: f64, step: &mut impl FnMut(f64, f64) -> (f64, f64)) -> Balance {
+fn balance(machine: &Machine, h: f64, step: &mut impl FnMut(f64, f64) -> PlantOutputs) -> Balance {
     let (mut sum, mut n, mut k) = (Balance { p_in: 0.0, missing: 0.0 }, 0.0, 0_u32);
+    let PlantParameters { motor, mechanics, .. } = machine.tuned.pair().plant.model.parameters;
+    let mut stored = 0.0;
     while f64::from(k) * h < 5.0 {
         let t = f64::from(k) * h;
-        let (p_in, missing) = step(
+        let out = step(
             0.7 * machine.speed * ((t - 0.6) / 1.5).clamp(0.0, 1.0),
             machine.torque * ((t - 2.5) / 0.5).clamp(0.0, 1.0),
         );
+        let (Powers { p_in, p_mech, p_loss, .. }, before) = (out.powers, stored);
+        let magnetic = 0.75 * (motor.L_d * out.i_d * out.i_d + motor.L_q * out.i_q * out.i_q);
+        stored = magnetic + 0.5 * mechanics.J * out.speed * out.speed;
         if t > 4.0 {
+            let missing = p_in - p_mech - p_loss - (stored - before) / h;
             sum = Balance { p_in: sum.p_in + p_in, missing: sum.missing + missing };
             n += 1.0;
         }
@@ -105,8 +114,7 @@ fn mean_power_is_balanced_at_any_step() {
                 let step = Step { start: now, h };
                 drive.step(&step).unwrap();
                 now = step.end();
-                let p = &drive.out.plant.powers;
-                (p.p_in, p.p_in - p.p_mech - p.p_loss)
+                drive.out.plant.clone()
             });
             check(&machine, h, "drive", &of_drive);
             let (mut pair, u_dc): (Pair, f64) = (machine.tuned.pair(), machine.u_dc());
@@ -115,8 +123,7 @@ fn mean_power_is_balanced_at_any_step() {
                 let of_pair = balance(&machine, h, &mut |speed_ref, tau_load| {
                     pair.set_inputs(speed_ref, tau_load, u_dc);
                     pair.step(h).unwrap();
-                    let p = &pair.plant.out.powers;
-                    (p.p_in, p.p_in - p.p_mech - p.p_loss)
+                    pair.plant.out.clone()
                 });
                 check(&machine, h, "pair", &of_pair);
             }
@@ -128,5 +135,5 @@ fn check(machine: &Machine, h: f64, who: &str, balance: &Balance) {
     let (name, Balance { p_in, missing }) = (&machine.tuned.name, balance);
     println!("{name}, {who} in steps of {h} s: mean p_in {p_in:.1} W, of which {missing:.3} W are not accounted for");
     assert!(*p_in > 0.7 * machine.speed * machine.torque, "{name} is loaded: {p_in} W");
-    assert!(missing.abs() <= 1e-3 * p_in, "{name}, {who} in steps of {h} s: {missing} W of {p_in} W are missing");
+    assert!(missing.abs() <= 1e-5 * p_in, "{name}, {who} in steps of {h} s: {missing} W of {p_in} W are missing");
 }
