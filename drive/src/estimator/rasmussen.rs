@@ -279,4 +279,12 @@ mod tests {
             assert!((estimate.theta - 0.7).abs() < 1e-15 && estimate.w.abs() < 1e-9, "{estimate:?}");
         }
     }
+
+    #[test]
+    fn a_start_at_speed_is_without_transient() {
+        let errors =
+            beside(&RasmussenParameters::default(), &Motor::default(), 400.0, DqHat::new(-1.0, 3.0), 0.0, 0.02);
+        let most = errors.iter().map(|error| error.abs()).fold(0.0, f64::max);
+        assert!(most < 1e-4, "{most} rad");
+    }
 }
