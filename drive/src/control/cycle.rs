@@ -300,4 +300,16 @@ mod tests {
         controller.parameters.compensation.observe = false;
         assert!((controller.measure().u.alpha() - 10.0).abs() < 1e-12);
     }
+
+    /// With a delay of one sample, the command acts 1.5 samples later on the average: 1.5 * 0.1 ms * 400 rad/s.
+    #[test]
+    fn a_command_is_turned_to_where_it_acts() {
+        let mut controller = SensorlessController::default();
+        let half = Turn::new(0.5 * controller.parameters.T_s * 400.0);
+        let frame =
+            Frame { axis: Axis::at(0.0), theta: 0.0, w: 400.0, half, i: DqHat::ZERO, injection: Injection::None };
+        let (u, ..) = controller.modulate(Mode::Voltage(DqHat::new(10.0, 0.0)), &frame, DqHat::ZERO, false);
+        let u = u.to_stator();
+        assert!((u.beta().atan2(u.alpha()) - 0.06).abs() < 1e-12, "{u:?}");
+    }
 }
