@@ -301,6 +301,23 @@ mod tests {
         assert!((controller.measure().u.alpha() - 10.0).abs() < 1e-12);
     }
 
+    /// The voltage of the last interval is that of the sample just before it, of the one before that, or of the third last.
+    #[test]
+    fn the_delay_selects_the_command_that_acted() {
+        let mut controller = SensorlessController::default();
+        controller.inputs.u_dc = 325.0;
+        let (axis, half) = (Axis::at(0.0), Turn::new(0.0));
+        let frame = Frame { axis, theta: 0.0, w: 0.0, half, i: DqHat::ZERO, injection: Injection::None };
+        for u in [3.0, 2.0, 1.0] {
+            controller.modulate(Mode::Voltage(DqHat::new(u, 0.0)), &frame, DqHat::ZERO, false);
+        }
+        for (delay, u) in [(0, 1.0), (1, 2.0), (2, 3.0)] {
+            controller.parameters.delay = delay;
+            let acted = controller.measure().u;
+            assert!((acted.alpha() - u).abs() < 1e-12 && acted.beta().abs() < 1e-12, "delay {delay}: {acted:?}");
+        }
+    }
+
     /// With a delay of one sample, the command acts 1.5 samples later on the average: 1.5 * 0.1 ms * 400 rad/s.
     #[test]
     fn a_command_is_turned_to_where_it_acts() {

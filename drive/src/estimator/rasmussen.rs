@@ -209,6 +209,23 @@ mod tests {
         errors
     }
 
+    /// The frame in half a sample and in a whole one is that of its angle then, at a speed in either direction.
+    #[test]
+    fn the_frame_goes_on_at_the_estimated_speed() {
+        let (par, motor) = (EstimatorParameters::default(), Motor::default());
+        let context = context(&par, &motor);
+        for w in [800.0, -800.0] {
+            let i = AlphaBeta::new(3.0, -1.0);
+            let (mut observer, _) = Rasmussen::start(&context, &Sample { i, ..Sample::default() }, 0.7, w);
+            let Estimate { theta, axis, w, half, .. } = observer.update(&context, &Sample { i, ..Sample::default() });
+            assert!(w.abs() > 100.0 && half.is_some(), "{w} rad/s");
+            for (frame, turned) in half.map(|half| (axis.ahead(half), 0.5)).into_iter().chain([(observer.next, 1.0)]) {
+                let off = frame.along(1.0) - Axis::<Estimated>::at(theta + turned * T_S * w).along(1.0);
+                assert!(off.magnitude() < 1e-15, "{turned} samples later: {off:?}");
+            }
+        }
+    }
+
     /// Decay rate in 1/s between two stretches, from the largest error of each.
     fn decay(errors: &[f64], from: f64, to: f64, stretch: f64) -> f64 {
         let peak = |t: f64| errors[samples(t)..samples(t + stretch)].iter().fold(0.0_f64, |m, e| m.max(e.abs()));
