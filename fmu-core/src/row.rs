@@ -3,13 +3,18 @@
 //! Only causality/variability pairs that FMI 2.0.5, 2.2.7 and FMI 3.0.2, 2.4.7.4 allow have a constructor. Start
 //! values are not written here: they come from the model's `Default`.
 
-use crate::enumeration::{Choice, Enumerated, Field, Place};
-use crate::integer::{Getter, Whole};
+mod kinds;
+mod settings;
+mod slot;
+
+use crate::enumeration::Place;
+use crate::integer::Getter;
 use crate::reals::{Inputs, Interval};
 use crate::token::Hash;
 use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
-use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+pub(crate) use settings::demand;
+pub use slot::Slot;
 use std::mem::MaybeUninit;
 
 /// The interface of a part for a table that does not know its type.
@@ -33,70 +38,6 @@ pub(crate) enum Access<W: 'static> {
     Said(fn(&W) -> &str),
     Constant(&'static str),
     Part { len: usize, hash: Hash, node: &'static dyn Node<W> },
-}
-
-/// A value found by a table, ready to read or to write.
-#[derive(Debug)]
-pub enum Slot<'a> {
-    /// A real number.
-    Real(&'a mut f64),
-    /// A real number in single precision.
-    Float32(&'a mut f32),
-    /// An integer.
-    Integer(&'a mut dyn Whole),
-    /// A truth value.
-    Boolean(&'a mut bool),
-    /// An item of an enumeration.
-    Enumeration(&'a mut dyn Choice),
-    /// A text that can be set.
-    Text(&'a mut String),
-    /// A text that the model says.
-    Said(&'a str),
-}
-
-impl Slot<'_> {
-    /// Whether the value is one that the variable can be set to.
-    pub fn is_allowed(&self, meta: &Meta) -> bool {
-        match (self, meta.kind) {
-            (Self::Real(x), _) => meta.range.contains(**x),
-            (Self::Float32(x), _) => meta.range.contains_single(**x),
-            (Self::Integer(x), Kind::Integer(of)) => of.allows(x.get(), &meta.range),
-            _ => true,
-        }
-    }
-
-    /// The bits of the value, for comparisons; a hash of a text.
-    pub(crate) fn bits(&self) -> u64 {
-        let hash = |text: &str| {
-            let mut hasher = DefaultHasher::new();
-            text.hash(&mut hasher);
-            hasher.finish()
-        };
-        match self {
-            Self::Real(x) => x.to_bits(),
-            Self::Float32(x) => x.to_bits().into(),
-            Self::Integer(x) => u64::try_from(x.get() & i128::from(u64::MAX)).unwrap_or_default(),
-            Self::Boolean(x) => u64::from(**x),
-            Self::Enumeration(x) => x.get().cast_unsigned().into(),
-            Self::Text(x) => hash(x),
-            Self::Said(x) => hash(x),
-        }
-    }
-}
-
-/// The value as a message shows it; an enumeration as its number, a text in quotes.
-impl std::fmt::Display for Slot<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Real(x) => x.fmt(f),
-            Self::Float32(x) => x.fmt(f),
-            Self::Integer(x) => x.get().fmt(f),
-            Self::Boolean(x) => x.fmt(f),
-            Self::Enumeration(x) => x.get().fmt(f),
-            Self::Text(x) => write!(f, "{x:?}"),
-            Self::Said(x) => write!(f, "{x:?}"),
-        }
-    }
 }
 
 /// A row of the table of `W`: a variable, or the table of a part of `W`.
@@ -278,20 +219,6 @@ impl<W: 'static> Row<W> {
         Self::real((Causality::Input, Variability::Discrete), name, quantity, description, get)
     }
 
-    const fn boolean(
-        (causality, variability): (Causality, Variability),
-        name: &'static str,
-        description: &'static str,
-        get: fn(&mut W) -> &mut bool,
-    ) -> Self {
-        Self::new(name, description, causality, variability, Kind::Boolean, Access::Boolean(get))
-    }
-
-    /// A Boolean input.
-    pub const fn boolean_input(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut bool) -> Self {
-        Self::boolean((Causality::Input, Variability::Discrete), name, description, get)
-    }
-
     /// A continuous real output, calculated from the start on.
     pub const fn output(
         name: &'static str,
@@ -332,16 +259,6 @@ impl<W: 'static> Row<W> {
         Self::real((Causality::Local, Variability::Discrete), name, quantity, description, get)
     }
 
-    /// A Boolean output.
-    pub const fn boolean_output(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut bool) -> Self {
-        Self::boolean((Causality::Output, Variability::Discrete), name, description, get)
-    }
-
-    /// A Boolean variable that is no output.
-    pub const fn boolean_local(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut bool) -> Self {
-        Self::boolean((Causality::Local, Variability::Discrete), name, description, get)
-    }
-
     /// A real parameter, fixed after initialization.
     pub const fn parameter(
         name: &'static str,
@@ -352,184 +269,6 @@ impl<W: 'static> Row<W> {
         Self::real((Causality::Parameter, Variability::Fixed), name, quantity, description, get)
     }
 
-    const fn array(
-        (causality, variability): (Causality, Variability),
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        dimension: usize,
-        get: fn(&mut W) -> &mut [f64],
-    ) -> Self {
-        let mut row = Self::new(name, description, causality, variability, Kind::Real(quantity), Access::Reals(get));
-        row.meta.dimension = Some(dimension);
-        row
-    }
-
-    /// An array of continuous real inputs; `dimension` elements.
-    pub const fn array_input(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        dimension: usize,
-        get: fn(&mut W) -> &mut [f64],
-    ) -> Self {
-        Self::array((Causality::Input, Variability::Continuous), name, quantity, description, dimension, get)
-    }
-
-    /// An array of continuous real outputs; `dimension` elements.
-    pub const fn array_output(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        dimension: usize,
-        get: fn(&mut W) -> &mut [f64],
-    ) -> Self {
-        Self::array((Causality::Output, Variability::Continuous), name, quantity, description, dimension, get)
-    }
-
-    /// An array of continuous real variables that are no outputs; `dimension` elements.
-    pub const fn array_local(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        dimension: usize,
-        get: fn(&mut W) -> &mut [f64],
-    ) -> Self {
-        Self::array((Causality::Local, Variability::Continuous), name, quantity, description, dimension, get)
-    }
-
-    /// A fixed array of real parameters; `dimension` elements.
-    pub const fn array_parameter(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        dimension: usize,
-        get: fn(&mut W) -> &mut [f64],
-    ) -> Self {
-        Self::array((Causality::Parameter, Variability::Fixed), name, quantity, description, dimension, get)
-    }
-
-    /// A Boolean parameter.
-    pub const fn boolean_parameter(
-        name: &'static str,
-        description: &'static str,
-        get: fn(&mut W) -> &mut bool,
-    ) -> Self {
-        Self::boolean((Causality::Parameter, Variability::Fixed), name, description, get)
-    }
-
-    const fn enumeration<E: Enumerated>(
-        (causality, variability): (Causality, Variability),
-        name: &'static str,
-        description: &'static str,
-        field: &'static Field<W, E>,
-    ) -> Self {
-        let kind = Kind::Enumeration(E::ENUMERATION);
-        Self::new(name, description, causality, variability, kind, Access::Enumeration(field))
-    }
-
-    /// An enumeration input; `field` says where the model holds the enum.
-    pub const fn enumeration_input<E: Enumerated>(
-        name: &'static str,
-        description: &'static str,
-        field: &'static Field<W, E>,
-    ) -> Self {
-        Self::enumeration((Causality::Input, Variability::Discrete), name, description, field)
-    }
-
-    /// An enumeration output.
-    pub const fn enumeration_output<E: Enumerated>(
-        name: &'static str,
-        description: &'static str,
-        field: &'static Field<W, E>,
-    ) -> Self {
-        Self::enumeration((Causality::Output, Variability::Discrete), name, description, field)
-    }
-
-    /// An enumeration that is no output.
-    pub const fn enumeration_local<E: Enumerated>(
-        name: &'static str,
-        description: &'static str,
-        field: &'static Field<W, E>,
-    ) -> Self {
-        Self::enumeration((Causality::Local, Variability::Discrete), name, description, field)
-    }
-
-    /// An enumeration parameter.
-    pub const fn enumeration_parameter<E: Enumerated>(
-        name: &'static str,
-        description: &'static str,
-        field: &'static Field<W, E>,
-    ) -> Self {
-        Self::enumeration((Causality::Parameter, Variability::Fixed), name, description, field)
-    }
-
-    const fn single(
-        (causality, variability): (Causality, Variability),
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f32,
-    ) -> Self {
-        Self::new(name, description, causality, variability, Kind::Float32(quantity), Access::Float32(get))
-    }
-
-    /// A real input in single precision, which changes at sample instants. FMI 2.0 has double precision only: what the
-    /// importer sets is rounded.
-    pub const fn float32_input(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f32,
-    ) -> Self {
-        Self::single((Causality::Input, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A real output in single precision, which changes at sample instants.
-    pub const fn float32_output(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f32,
-    ) -> Self {
-        Self::single((Causality::Output, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A real variable in single precision that is no output and changes at sample instants.
-    pub const fn float32_local(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f32,
-    ) -> Self {
-        Self::single((Causality::Local, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A real parameter in single precision.
-    pub const fn float32_parameter(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f32,
-    ) -> Self {
-        Self::single((Causality::Parameter, Variability::Fixed), name, quantity, description, get)
-    }
-
-    /// A text parameter, fixed after initialization: a file name, a mode that has no list.
-    pub const fn text_parameter(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut String) -> Self {
-        Self::new(name, description, Causality::Parameter, Variability::Fixed, Kind::Text, Access::Text(get))
-    }
-
-    /// A text output. The model keeps it or chooses among constants: to say it allocates nothing in a step.
-    pub const fn text_output(name: &'static str, description: &'static str, say: fn(&W) -> &str) -> Self {
-        Self::new(name, description, Causality::Output, Variability::Discrete, Kind::Text, Access::Said(say))
-    }
-
-    /// A text that never changes, for inspection: a revision, a source.
-    pub const fn text_constant(name: &'static str, description: &'static str, text: &'static str) -> Self {
-        Self::new(name, description, Causality::Local, Variability::Constant, Kind::Text, Access::Constant(text))
-    }
-
     /// A parameter computed by the model's `derive`, constant during the simulation.
     pub const fn calculated(
         name: &'static str,
@@ -538,160 +277,5 @@ impl<W: 'static> Row<W> {
         get: fn(&mut W) -> &mut f64,
     ) -> Self {
         Self::real((Causality::CalculatedParameter, Variability::Fixed), name, quantity, description, get)
-    }
-
-    /// Makes a parameter tunable: it may change at communication points.
-    ///
-    /// # Panics
-    /// At compile time, if the variable is not a parameter, or is a text.
-    #[track_caller]
-    pub const fn tunable(mut self) -> Self {
-        let parameter = matches!(self.meta.causality, Causality::Parameter) && !matches!(self.meta.kind, Kind::Text);
-        demand(parameter, self.meta.name, "only a parameter that is no text can be tunable");
-        self.meta.variability = Variability::Tunable;
-        self
-    }
-
-    /// Makes a real input, output or local variable change at sample instants only.
-    ///
-    /// # Panics
-    /// At compile time, if the variable is not continuous.
-    #[track_caller]
-    pub const fn discrete(mut self) -> Self {
-        let continuous = matches!(self.meta.variability, Variability::Continuous);
-        demand(continuous, self.meta.name, "only a continuous variable can be made discrete");
-        self.meta.variability = Variability::Discrete;
-        self
-    }
-
-    /// Makes an array a matrix, or an array of more dimensions: its extents, of which the product is the number of elements.
-    /// The elements are row by row, as `as_flattened_mut` of `[[f64; COLUMNS]; ROWS]` gives them.
-    ///
-    /// # Panics
-    /// At compile time, if the variable is not an array, or if the extents do not give its number of elements.
-    #[track_caller]
-    pub const fn shape(mut self, extents: &'static [usize]) -> Self {
-        let (mut product, mut i) = (1, 0);
-        while i < extents.len() {
-            product *= extents[i];
-            i += 1;
-        }
-        let fits = matches!(self.meta.dimension, Some(n) if n == product);
-        demand(fits, self.meta.name, "the product of the extents is not the number of elements");
-        self.meta.shape = extents;
-        self
-    }
-
-    /// Values greater than `bound` only.
-    ///
-    /// # Panics
-    /// At compile time, as every bound: if the variable is not a number, or if no value is left.
-    #[track_caller]
-    pub const fn above(mut self, bound: f64) -> Self {
-        self.meta.range.min = bound;
-        self.meta.range.above = true;
-        self.bounded()
-    }
-
-    /// Values less than `bound` only.
-    ///
-    /// # Panics
-    /// At compile time, as [`above`](Self::above).
-    #[track_caller]
-    pub const fn below(mut self, bound: f64) -> Self {
-        self.meta.range.max = bound;
-        self.meta.range.below = true;
-        self.bounded()
-    }
-
-    /// Values of at least `bound`.
-    ///
-    /// # Panics
-    /// At compile time, as [`above`](Self::above).
-    #[track_caller]
-    pub const fn at_least(mut self, bound: f64) -> Self {
-        self.meta.range.min = bound;
-        self.bounded()
-    }
-
-    /// Values of at most `bound`.
-    ///
-    /// # Panics
-    /// At compile time, as [`above`](Self::above).
-    #[track_caller]
-    pub const fn at_most(mut self, bound: f64) -> Self {
-        self.meta.range.max = bound;
-        self.bounded()
-    }
-
-    #[track_caller]
-    const fn bounded(mut self) -> Self {
-        let number = matches!(self.meta.kind, Kind::Real(_) | Kind::Float32(_) | Kind::Integer(_));
-        demand(number, self.meta.name, "only a number can have a bound");
-        let Range { min, max, above, below } = self.meta.range;
-        demand(min < max || (min <= max && !above && !below), self.meta.name, "the bounds leave no value");
-        self.settable = Interval::of(&self.meta);
-        self
-    }
-
-    /// The variable is unbounded, like an angle that is not wrapped (FMI 3.0.2, 2.4.4 `unbounded`).
-    ///
-    /// # Panics
-    /// At compile time, if the variable is not real.
-    #[track_caller]
-    pub const fn unbounded(mut self) -> Self {
-        demand(self.is_real(), self.meta.name, "only a real variable can be unbounded");
-        self.meta.unbounded = true;
-        self
-    }
-
-    /// The output is a mean over the last communication step.
-    ///
-    /// # Panics
-    /// At compile time, if the variable is not a real output.
-    #[track_caller]
-    pub const fn mean(mut self) -> Self {
-        let output = matches!(self.meta.causality, Causality::Output) && matches!(self.meta.kind, Kind::Real(_));
-        demand(output, self.meta.name, "only a real output can be a mean");
-        self.meta.mean = true;
-        self
-    }
-
-    /// Typical magnitude, for solvers' scaling; not 0.
-    ///
-    /// # Panics
-    /// At compile time, if the variable is not real, or the value is 0.
-    #[track_caller]
-    pub const fn nominal(mut self, magnitude: f64) -> Self {
-        demand(self.is_real(), self.meta.name, "only a real variable has a nominal value");
-        demand(magnitude != 0.0, self.meta.name, "a nominal value must not be 0");
-        self.meta.nominal = Some(magnitude);
-        self
-    }
-
-    const fn is_real(&self) -> bool {
-        matches!(self.meta.kind, Kind::Real(_) | Kind::Float32(_))
-    }
-}
-
-/// A compile-time check of a row. The error is shown at the caller's place, which is the row, with the variable's name.
-#[track_caller]
-pub(crate) const fn demand(fits: bool, name: &str, why: &str) {
-    if fits {
-        return;
-    }
-    // A panic while compiling takes one text.
-    let (parts, mut text, mut len, mut part) = ([name, ": ", why], [0_u8; 256], 0, 0);
-    while part < parts.len() {
-        let (bytes, mut i) = (parts[part].as_bytes(), 0);
-        while i < bytes.len() && len < text.len() {
-            text[len] = bytes[i];
-            (i, len) = (i + 1, len + 1);
-        }
-        part += 1;
-    }
-    match std::str::from_utf8(text.split_at(len).0) {
-        Ok(text) => panic!("{}", text),
-        Err(_) => panic!("{}", why),
     }
 }

@@ -1,0 +1,162 @@
+//! What a row says besides its constructor, and the check of it while the model compiles.
+
+use crate::reals::Interval;
+use crate::row::Row;
+use crate::variable::{Causality, Kind, Range, Variability};
+
+impl<W: 'static> Row<W> {
+    /// Makes a parameter tunable: it may change at communication points.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not a parameter, or is a text.
+    #[track_caller]
+    pub const fn tunable(mut self) -> Self {
+        let parameter = matches!(self.meta.causality, Causality::Parameter) && !matches!(self.meta.kind, Kind::Text);
+        demand(parameter, self.meta.name, "only a parameter that is no text can be tunable");
+        self.meta.variability = Variability::Tunable;
+        self
+    }
+
+    /// Makes a real input, output or local variable change at sample instants only.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not continuous.
+    #[track_caller]
+    pub const fn discrete(mut self) -> Self {
+        let continuous = matches!(self.meta.variability, Variability::Continuous);
+        demand(continuous, self.meta.name, "only a continuous variable can be made discrete");
+        self.meta.variability = Variability::Discrete;
+        self
+    }
+
+    /// Makes an array a matrix, or an array of more dimensions: its extents, of which the product is the number of elements.
+    /// The elements are row by row, as `as_flattened_mut` of `[[f64; COLUMNS]; ROWS]` gives them.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not an array, or if the extents do not give its number of elements.
+    #[track_caller]
+    pub const fn shape(mut self, extents: &'static [usize]) -> Self {
+        let (mut product, mut i) = (1, 0);
+        while i < extents.len() {
+            product *= extents[i];
+            i += 1;
+        }
+        let fits = matches!(self.meta.dimension, Some(n) if n == product);
+        demand(fits, self.meta.name, "the product of the extents is not the number of elements");
+        self.meta.shape = extents;
+        self
+    }
+
+    /// Values greater than `bound` only.
+    ///
+    /// # Panics
+    /// At compile time, as every bound: if the variable is not a number, or if no value is left.
+    #[track_caller]
+    pub const fn above(mut self, bound: f64) -> Self {
+        self.meta.range.min = bound;
+        self.meta.range.above = true;
+        self.bounded()
+    }
+
+    /// Values less than `bound` only.
+    ///
+    /// # Panics
+    /// At compile time, as [`above`](Self::above).
+    #[track_caller]
+    pub const fn below(mut self, bound: f64) -> Self {
+        self.meta.range.max = bound;
+        self.meta.range.below = true;
+        self.bounded()
+    }
+
+    /// Values of at least `bound`.
+    ///
+    /// # Panics
+    /// At compile time, as [`above`](Self::above).
+    #[track_caller]
+    pub const fn at_least(mut self, bound: f64) -> Self {
+        self.meta.range.min = bound;
+        self.bounded()
+    }
+
+    /// Values of at most `bound`.
+    ///
+    /// # Panics
+    /// At compile time, as [`above`](Self::above).
+    #[track_caller]
+    pub const fn at_most(mut self, bound: f64) -> Self {
+        self.meta.range.max = bound;
+        self.bounded()
+    }
+
+    #[track_caller]
+    const fn bounded(mut self) -> Self {
+        let number = matches!(self.meta.kind, Kind::Real(_) | Kind::Float32(_) | Kind::Integer(_));
+        demand(number, self.meta.name, "only a number can have a bound");
+        let Range { min, max, above, below } = self.meta.range;
+        demand(min < max || (min <= max && !above && !below), self.meta.name, "the bounds leave no value");
+        self.settable = Interval::of(&self.meta);
+        self
+    }
+
+    /// The variable is unbounded, like an angle that is not wrapped (FMI 3.0.2, 2.4.4 `unbounded`).
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not real.
+    #[track_caller]
+    pub const fn unbounded(mut self) -> Self {
+        demand(self.is_real(), self.meta.name, "only a real variable can be unbounded");
+        self.meta.unbounded = true;
+        self
+    }
+
+    /// The output is a mean over the last communication step.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not a real output.
+    #[track_caller]
+    pub const fn mean(mut self) -> Self {
+        let output = matches!(self.meta.causality, Causality::Output) && matches!(self.meta.kind, Kind::Real(_));
+        demand(output, self.meta.name, "only a real output can be a mean");
+        self.meta.mean = true;
+        self
+    }
+
+    /// Typical magnitude, for solvers' scaling; not 0.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not real, or the value is 0.
+    #[track_caller]
+    pub const fn nominal(mut self, magnitude: f64) -> Self {
+        demand(self.is_real(), self.meta.name, "only a real variable has a nominal value");
+        demand(magnitude != 0.0, self.meta.name, "a nominal value must not be 0");
+        self.meta.nominal = Some(magnitude);
+        self
+    }
+
+    const fn is_real(&self) -> bool {
+        matches!(self.meta.kind, Kind::Real(_) | Kind::Float32(_))
+    }
+}
+
+/// A compile-time check of a row. The error is shown at the caller's place, which is the row, with the variable's name.
+#[track_caller]
+pub(crate) const fn demand(fits: bool, name: &str, why: &str) {
+    if fits {
+        return;
+    }
+    // A panic while compiling takes one text.
+    let (parts, mut text, mut len, mut part) = ([name, ": ", why], [0_u8; 256], 0, 0);
+    while part < parts.len() {
+        let (bytes, mut i) = (parts[part].as_bytes(), 0);
+        while i < bytes.len() && len < text.len() {
+            text[len] = bytes[i];
+            (i, len) = (i + 1, len + 1);
+        }
+        part += 1;
+    }
+    match std::str::from_utf8(text.split_at(len).0) {
+        Ok(text) => panic!("{}", text),
+        Err(_) => panic!("{}", why),
+    }
+}

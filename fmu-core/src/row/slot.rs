@@ -1,0 +1,70 @@
+//! A value that a table has found.
+
+use crate::enumeration::Choice;
+use crate::integer::Whole;
+use crate::variable::{Kind, Meta};
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+
+/// A value found by a table, ready to read or to write.
+#[derive(Debug)]
+pub enum Slot<'a> {
+    /// A real number.
+    Real(&'a mut f64),
+    /// A real number in single precision.
+    Float32(&'a mut f32),
+    /// An integer.
+    Integer(&'a mut dyn Whole),
+    /// A truth value.
+    Boolean(&'a mut bool),
+    /// An item of an enumeration.
+    Enumeration(&'a mut dyn Choice),
+    /// A text that can be set.
+    Text(&'a mut String),
+    /// A text that the model says.
+    Said(&'a str),
+}
+
+impl Slot<'_> {
+    /// Whether the value is one that the variable can be set to.
+    pub fn is_allowed(&self, meta: &Meta) -> bool {
+        match (self, meta.kind) {
+            (Self::Real(x), _) => meta.range.contains(**x),
+            (Self::Float32(x), _) => meta.range.contains_single(**x),
+            (Self::Integer(x), Kind::Integer(of)) => of.allows(x.get(), &meta.range),
+            _ => true,
+        }
+    }
+
+    /// The bits of the value, for comparisons; a hash of a text.
+    pub(crate) fn bits(&self) -> u64 {
+        let hash = |text: &str| {
+            let mut hasher = DefaultHasher::new();
+            text.hash(&mut hasher);
+            hasher.finish()
+        };
+        match self {
+            Self::Real(x) => x.to_bits(),
+            Self::Float32(x) => x.to_bits().into(),
+            Self::Integer(x) => u64::try_from(x.get() & i128::from(u64::MAX)).unwrap_or_default(),
+            Self::Boolean(x) => u64::from(**x),
+            Self::Enumeration(x) => x.get().cast_unsigned().into(),
+            Self::Text(x) => hash(x),
+            Self::Said(x) => hash(x),
+        }
+    }
+}
+
+/// The value as a message shows it; an enumeration as its number, a text in quotes.
+impl std::fmt::Display for Slot<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Real(x) => x.fmt(f),
+            Self::Float32(x) => x.fmt(f),
+            Self::Integer(x) => x.get().fmt(f),
+            Self::Boolean(x) => x.fmt(f),
+            Self::Enumeration(x) => x.get().fmt(f),
+            Self::Text(x) => write!(f, "{x:?}"),
+            Self::Said(x) => write!(f, "{x:?}"),
+        }
+    }
+}
