@@ -1,0 +1,273 @@
+//! The state machine of FMI, written down once more by hand, with the model run natively.
+
+use super::super::*;
+use fmu_core::{Block, Capabilities, Causality, Elapsed, Meta, Model, Next, SampleGrid, Slot, Step, Variability};
+
+/// What the driver must know of a model, besides its capabilities.
+pub trait Twin: Model + PartialEq {
+    const CAN: Capabilities<Self>;
+    /// Interfaces that the FMU has.
+    const KINDS: &'static [Kind];
+    /// References of all reals in the table, of arrays the first.
+    const REALS: &'static [u32];
+    /// Variables that are set most.
+    const SET: &'static [u32];
+    /// Values that they are set to, besides wrong ones.
+    const VALUES: &'static [f64];
+    /// Whether the next call of the model can succeed: parameters fit together, inputs lead to no fault.
+    fn is_healthy(&self) -> bool;
+    /// The parameters fit together.
+    fn fits(&self) -> bool;
+}
+
+#[derive(Clone)]
+pub struct Snapshot<M: Twin> {
+    pub kind: Kind,
+    pub state: char,
+    pub start: Option<f64>,
+    pub elapsed: Elapsed,
+    pub end: f64,
+    pub settled: f64,
+    pub pending: bool,
+    pub fresh: bool,
+    /// Initialization is over.
+    pub running: bool,
+    pub block: Block<M>,
+}
+
+impl<M: Twin> Snapshot<M> {
+    pub fn new(kind: Kind) -> Self {
+        let start = M::INFO.experiment.start;
+        Self {
+            kind,
+            state: 'i',
+            start: None,
+            elapsed: Elapsed::ZERO,
+            end: start,
+            settled: start,
+            pending: false,
+            fresh: true,
+            running: false,
+            block: Block::default(),
+        }
+    }
+
+    /// What a getter shows.
+    pub fn show(&mut self) {
+        if "in".contains(self.state) {
+            if self.fresh {
+                self.block.initialize();
+                self.fresh = false;
+            }
+        } else if self.kind.exchanges() && self.running {
+            match &M::CAN.continuous {
+                Some(continuous) => (continuous.observe)(&self.block.model, self.elapsed, &mut self.block.out),
+                None => self.block.model.output(self.elapsed, &mut self.block.out),
+            }
+        }
+    }
+
+    /// No variable is NaN.
+    pub fn is_storable(&self) -> bool {
+        let mut block = self.block.clone();
+        let real = |i| !matches!(M::TABLE.entry(&mut block, i), Some((_, Slot::Real(x))) if x.is_nan());
+        (0..M::TABLE.len()).all(real)
+    }
+
+    pub fn derivatives(&mut self) -> Result<Vec<f64>, c_int> {
+        let mut dx = vec![0.0; M::CAN.states().len()];
+        if let Some(continuous) = &M::CAN.continuous {
+            (continuous.derivatives)(&self.block.model, self.elapsed, &mut dx).map_err(|_| DISCARD)?;
+        }
+        if dx.iter().all(|x| x.is_finite()) { Ok(dx) } else { Err(DISCARD) }
+    }
+
+    pub fn indicators(&self) -> Vec<f64> {
+        let mut z = vec![0.0; M::CAN.indicators().len()];
+        if let Some(events) = &M::CAN.events {
+            (events.indicators)(&self.block.model, self.elapsed, &mut z);
+        }
+        z
+    }
+
+    pub fn states(&mut self) -> Vec<f64> {
+        M::CAN.states().iter().map(|state| *(state.at)(&mut self.block.model)).collect()
+    }
+
+    /// The values of a real reference.
+    pub fn reals(&mut self, reference: u32) -> Result<Vec<f64>, c_int> {
+        let (table, states) = (M::TABLE.len(), M::CAN.states().len());
+        let index = match reference.checked_sub(1) {
+            None => return Ok(vec![self.end]),
+            Some(index) => usize::try_from(index).unwrap(),
+        };
+        let (flat, element) = (self.kind.version() == 2, M::TABLE.element(index));
+        if index < table {
+            let n = M::TABLE.entry(&mut self.block, index).unwrap().0.dimension.filter(|_| !flat).unwrap_or(1);
+            if !flat && element.is_some_and(|element| element > 0) {
+                return Err(ERROR);
+            }
+            let one = |i| match M::TABLE.entry(&mut self.block, i) {
+                Some((_, Slot::Real(x))) => Ok(*x),
+                _ => Err(ERROR),
+            };
+            return (index..index + n).map(one).collect();
+        }
+        if index < table + states {
+            return self.derivatives().map(|dx| vec![dx[index - table]]);
+        }
+        // Event indicators are variables in FMI 3.0 only.
+        if flat {
+            return Err(ERROR);
+        }
+        self.indicators().get(index - table - states).map(|z| vec![*z]).ok_or(ERROR)
+    }
+
+    fn due(&self, k: u64, at: Elapsed) -> bool {
+        M::CAN.samples.as_ref().is_some_and(|s| SampleGrid { period: (s.period)(&self.block.model) }.reached(k, at))
+    }
+
+    fn tune(&mut self) -> Result<(), c_int> {
+        if self.fresh {
+            if !self.block.model.fits() {
+                return Err(ERROR);
+            }
+            self.block.model.derive();
+            self.fresh = false;
+        }
+        Ok(())
+    }
+
+    pub fn begin(&mut self) {
+        self.settled = self.settled.max(self.end);
+        self.pending = true;
+        if let Some(events) = &M::CAN.events {
+            (events.begin)(&mut self.block.model, self.elapsed);
+        }
+        self.output();
+    }
+
+    /// In Co-Simulation, outputs are those of the last step or event.
+    fn output(&mut self) {
+        self.block.model.output(self.elapsed, &mut self.block.out);
+    }
+
+    pub fn update(&mut self) -> Result<Update, c_int> {
+        self.tune()?;
+        let events = M::CAN.events.as_ref().unwrap();
+        let outcome = (events.event)(&mut self.block.model, self.elapsed).map_err(|_| ERROR)?;
+        let start = self.start.unwrap();
+        let next = match (events.next)(&self.block.model, self.elapsed) {
+            Next::Never => None,
+            Next::Grid { k, period } => Some(f64::mul_add(f64::from(u32::try_from(k).unwrap()), period, start)),
+            Next::At(time) => Some(start + time.seconds()),
+        };
+        self.pending = outcome.again;
+        self.output();
+        Ok(Update { again: outcome.again, terminate: outcome.terminate, states_changed: outcome.states_changed, next })
+    }
+
+    /// FMI 3.0.2, 4.2.1; the first instant that the step meets ends it, if it may.
+    pub fn step(&mut self, t: f64, h: f64) -> Result<Stepped, c_int> {
+        let rounding = 2.0 * f64::EPSILON * t.abs();
+        let fits = h > 0.0 && h.is_finite() && t.is_finite() && t + h > t;
+        if !fits || (t - self.end).abs() > h / 100.0 + rounding {
+            return Err(ERROR);
+        }
+        self.tune()?;
+        let (start, end, last) = (self.elapsed, self.elapsed.plus(h), self.end);
+        let (event, early) = match self.kind {
+            Kind::Cs3 { event, early } if M::CAN.event_mode() => (event, early),
+            _ => (false, false),
+        };
+        let mut stepped = Stepped { end: t + h, ..Stepped::default() };
+        self.end = t + h;
+        let mut reached = end;
+        if event || early {
+            let samples = M::CAN.samples.as_ref().unwrap();
+            let period = (samples.period)(&self.block.model);
+            let before = |k: u64, model: &Self| model.due(k, end) && SampleGrid { period }.passed(k, end);
+            loop {
+                let k = (samples.samples)(&self.block.model);
+                let at_start = self.due(k, start);
+                if before(k, self) && (at_start || !early) {
+                    (samples.show)(&mut self.block.model);
+                    if (samples.sample)(&mut self.block.model).is_err() {
+                        // Time has not passed.
+                        self.end = last;
+                        return Err(ERROR);
+                    }
+                } else if self.due(k, end) {
+                    stepped.event = event;
+                    if before(k, self) {
+                        stepped.early = true;
+                        reached = Elapsed::periods(k, period);
+                        stepped.end = f64::mul_add(f64::from(u32::try_from(k).unwrap()), period, self.start.unwrap());
+                        self.end = stepped.end;
+                    }
+                    if !event {
+                        (samples.show)(&mut self.block.model);
+                    }
+                    break;
+                } else {
+                    break;
+                }
+            }
+        } else if self.block.model.advance(&Step { start, h }).is_err() {
+            self.end = last;
+            return Err(ERROR);
+        }
+        self.elapsed = reached;
+        self.output();
+        Ok(stepped)
+    }
+
+    /// The status of setting one value, without setting it.
+    fn judge(&mut self, index: usize, value: f64) -> c_int {
+        let (state, exchanges) = (self.state, self.kind.exchanges());
+        let row = M::CAN.rows().unwrap().contains(&index);
+        let Some((meta, Slot::Real(x))) = M::TABLE.entry(&mut self.block, index) else { return ERROR };
+        let Meta { causality, variability, range, .. } = *meta;
+        let may = match (causality, variability) {
+            (Causality::Input, Variability::Continuous) => "invcs".contains(state),
+            (Causality::Input, _) => "invs".contains(state) || (exchanges && state == 'c' && *x == value),
+            (Causality::Parameter, Variability::Tunable) => "invs".contains(state),
+            (Causality::Parameter, _) => "in".contains(state),
+            _ => exchanges && row && "vc".contains(state),
+        };
+        match (may, range.contains(value)) {
+            (true, true) => OK,
+            (true, false) if state == 'c' => DISCARD,
+            _ if exchanges && state == 'c' && causality == Causality::Input => DISCARD,
+            _ => ERROR,
+        }
+    }
+
+    pub fn set(&mut self, references: &[u32], values: &[f64]) -> c_int {
+        let mut places = Vec::new();
+        let mut next = values.iter();
+        for &reference in references {
+            let index = usize::try_from(reference).unwrap().wrapping_sub(1);
+            let of = M::TABLE.entry(&mut self.block, index).and_then(|(meta, _)| meta.dimension);
+            let n = of.filter(|_| self.kind.version() == 3).unwrap_or(1);
+            places.extend((0..n).zip(next.by_ref()).map(|(i, value)| (index.wrapping_add(i), *value)));
+        }
+        for &(index, value) in &places {
+            match self.judge(index, value) {
+                OK => {}
+                status => return status,
+            }
+        }
+        let rows = M::CAN.rows().unwrap();
+        for (index, value) in places {
+            self.fresh |= "in".contains(self.state);
+            if let Some(i) = rows.iter().position(|row| *row == index) {
+                *(M::CAN.states()[i].at)(&mut self.block.model) = value;
+            } else if let Some((meta, Slot::Real(x))) = M::TABLE.entry(&mut self.block, index) {
+                *x = value;
+                self.fresh |= meta.causality == Causality::Parameter;
+            }
+        }
+        OK
+    }
+}
