@@ -123,13 +123,10 @@ fn rated_load_at_once_at_standstill() {
     }
 }
 
-/// Without noise: with it, the measured bandwidth depends on the seed, 42 to 64 Hz for the heterodyne demodulation.
 #[test]
 fn speed_bandwidths() {
     for method in &METHODS {
-        let mut pair = method.pair();
-        let sensor = &mut pair.controller.model.parameters.sensor;
-        (sensor.noise, sensor.resolution) = (0.0, 0.0);
+        let pair = method.pair();
         method.near("bandwidth, PLL", speed_bandwidth(&pair, 0.1), method.pll, 0.1 * method.pll);
         let (speed_loop, low, high) = method.observer;
         let bandwidth = speed_bandwidth(&with_mechanical_observer(pair, TAU * speed_loop), 0.1);
