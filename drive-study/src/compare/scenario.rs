@@ -98,7 +98,12 @@ pub static SCENARIOS: &[Scenario] = &[
     row("dead-compensated", DEAD, "compensated, rated load at 0.1 pu", |s, _| parameters::dead_time(s, true)),
     row("reversal-dead", DEAD, "compensated, the reversal", |s, _| running::reversal(&s.with_dead_time(true))),
     row("bandwidth", BANDWIDTH, "with the speed loop of all other scenarios, without noise", running::bandwidth),
-    row("bandwidth-fast", BANDWIDTH, "with the speed loop for which the review quotes one, without noise", running::bandwidth_fast),
+    row(
+        "bandwidth-fast",
+        BANDWIDTH,
+        "with the speed loop for which the review quotes one, without noise",
+        running::bandwidth_fast,
+    ),
     row("signal", SIGNAL, "at standstill, without load and noise", |s, _| signal::cost(s)),
     row("signal-trace", SIGNAL, "Fig. 8 and 11: at 0.05 pu", |s, _| signal::response(s)),
 ];
