@@ -103,12 +103,12 @@ fn fmi_sim() {
     }
 }
 
-/// fmi-sim 0.7 does not know `A` and `K` of a unit, `unit`, `displayUnit` and `unbounded` of a variable in FMI 3.0.
+/// fmi-sim 0.7 does not know `A` and `K` of a unit, `unit`, `displayUnit`, `unbounded` and `nominal` of a variable in FMI 3.0.
 fn without_units(xml: &str) -> Vec<u8> {
     let (before, rest) = xml.split_once("<UnitDefinitions>").unwrap();
     let (_, after) = rest.split_once("</UnitDefinitions>").unwrap();
     let mut text = format!("{before}{after}");
-    for attribute in [" unit=\"", " displayUnit=\"", " unbounded=\""] {
+    for attribute in [" unit=\"", " displayUnit=\"", " unbounded=\"", " nominal=\""] {
         let mut parts = text.split(attribute);
         let mut kept = parts.next().unwrap().to_owned();
         kept.extend(parts.map(|part| part.split_once('"').unwrap().1));
