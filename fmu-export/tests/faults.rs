@@ -14,6 +14,7 @@ use fmu_core::Description;
 use fmu_export::abi::types::*;
 use std::process::Command;
 use std::ptr::{null, null_mut};
+use std::rc::Rc;
 
 #[test]
 fn a_panic_is_an_error_and_a_reset_recovers() {
@@ -151,7 +152,7 @@ fn nothing_is_printed() {
         for version in [2, 3] {
             let journal = Journal::default();
             let it = Fmu::open(version, c"a", &token(), &raw const journal, false, true);
-            let fmu = Fmu { version, it, journal: Box::default() };
+            let fmu = Fmu { version, it, journal: Rc::default() };
             assert_eq!((fmu.set_mode(PANICKY), fmu.enter(0.0, None), fmu.exit()), (OK, OK, OK));
             assert_eq!((fmu.step(0.0, 0.1), fmu.set(&[X], &[0.0]), fmu.reset()), (ERROR, ERROR, OK));
         }

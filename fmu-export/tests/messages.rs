@@ -13,10 +13,11 @@ use common::*;
 use fmu_export::abi::types::*;
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
+use std::rc::Rc;
 
 /// An instance with logging on, its messages so far included.
 fn talking(version: u8) -> Fmu {
-    let journal = Box::<Journal>::default();
+    let journal = Rc::<Journal>::default();
     let it = Fmu::open(version, c"drive 1", &token(), &raw const *journal, true, true);
     Fmu { version, it, journal }
 }
@@ -27,7 +28,7 @@ fn drain(journal: &Journal) -> Vec<Message> {
 
 fn free(version: u8, it: Instance) {
     assert!(!it.is_null());
-    drop(Fmu { version, it, journal: Box::default() });
+    drop(Fmu { version, it, journal: Rc::default() });
 }
 
 #[test]

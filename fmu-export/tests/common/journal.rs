@@ -13,7 +13,8 @@ pub struct Message {
     pub text: String,
 }
 
-/// What the logger was told; its address is the environment pointer.
+/// What the logger was told; its address is the environment pointer, so an [`Rc`](std::rc::Rc) holds it: to move a box would say
+/// that nobody else looks into it.
 #[derive(Default)]
 pub struct Journal(pub RefCell<Vec<Message>>);
 

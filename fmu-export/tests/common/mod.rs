@@ -12,6 +12,7 @@ pub use journal::*;
 use model::Probe;
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
+use std::rc::Rc;
 use std::sync::Once;
 
 fmu_export::export!(Probe);
@@ -42,12 +43,12 @@ pub fn loud() {
 pub struct Fmu {
     pub version: u8,
     pub it: Instance,
-    pub journal: Box<Journal>,
+    pub journal: Rc<Journal>,
 }
 
 impl Fmu {
     pub fn new(version: u8) -> Self {
-        let journal = Box::<Journal>::default();
+        let journal = Rc::<Journal>::default();
         let it = Self::open(version, c"probe", &token(), &*journal, true, false);
         assert!(!it.is_null());
         Self { version, it, journal }

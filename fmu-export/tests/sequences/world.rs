@@ -9,6 +9,7 @@ use fmu_export::abi::types::*;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ptr::{null, null_mut, without_provenance_mut};
+use std::rc::Rc;
 
 /// How often each function ended with OK, Discard and Error.
 #[derive(Default)]
@@ -151,7 +152,7 @@ impl World {
             assert!(messages.iter().all(|m| m.status == ERROR));
         }
         let logging = wrong % 2 == 1;
-        let journal = Box::<Journal>::default();
+        let journal = Rc::<Journal>::default();
         let it = Fmu::open(version, c"probe", &token(), &raw const *journal, true, logging);
         assert!(!it.is_null());
         assert_eq!(journal.0.borrow_mut().drain(..).count(), usize::from(logging && has_logger(version)));

@@ -17,6 +17,7 @@ use fmu_export::abi::types::*;
 pub use journal::*;
 use std::ffi::CString;
 use std::ptr::{null, null_mut};
+use std::rc::Rc;
 
 pub const OK: c_int = 0;
 pub const DISCARD: c_int = 2;
@@ -68,7 +69,7 @@ pub struct Stepped {
 pub struct Fmu {
     pub kind: Kind,
     pub it: Instance,
-    pub journal: Box<Journal>,
+    pub journal: Rc<Journal>,
 }
 
 /// The function of one of the standards.
@@ -87,7 +88,7 @@ impl Fmu {
     pub fn with(kind: Kind, logger: bool, on: bool) -> Self {
         fmu_export::abi::quiet();
         drop(std::panic::take_hook());
-        let journal = Box::<Journal>::default();
+        let journal = Rc::<Journal>::default();
         let it = Self::open(kind, &journal, logger, on);
         assert!(!it.is_null(), "{kind:?}: {:?}", journal.0.borrow());
         Self { kind, it, journal }
