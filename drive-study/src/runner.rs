@@ -272,7 +272,7 @@ fn speed_gain(pair: Pair, speed: f64, frequency: f64) -> f64 {
 }
 
 /// Bandwidth (-3 dB) of the closed speed loop in Hz around `speed` (pu), with ideal sensors: with noise, the result depends on
-/// the seed, 42 to 64 Hz for the heterodyne demodulation, because a run of half a second has its gain to 15 % only.
+/// the seed, 42 to 64 Hz for the heterodyne demodulation, because a run of half a second determines the gain only to 15 %.
 pub fn speed_bandwidth(pair: &Pair, speed: f64) -> f64 {
     const HALF_POWER: f64 = std::f64::consts::FRAC_1_SQRT_2;
     let mut pair = pair.clone();

@@ -123,7 +123,7 @@ def test_g4_overhead_of_a_run(archives):
 
 
 def test_g5_two_threads_take_no_more_cpu(archives):
-    """The least time of each: threads that wait for each other always take more, what else runs on the machine only now and then."""
+    """Compares the least times: threads that wait for each other always take longer; other load on the machine comes and goes."""
     plan, rows, goal = drive(archives, 0.05), table(400), 1.10 if LONG else 1.5
     one, two = [], []
     while len(one) < 5 or len(one) < 60 and min(two) > goal * min(one):

@@ -301,7 +301,7 @@ mod tests {
         assert!((controller.measure().u.alpha() - 10.0).abs() < 1e-12);
     }
 
-    /// The voltage of the last interval is that of the sample just before it, of the one before that, or of the third last.
+    /// The newest command acted in the last interval; with a delay of 1 or 2, the second or third newest.
     #[test]
     fn the_delay_selects_the_command_that_acted() {
         let mut controller = SensorlessController::default();

@@ -1,4 +1,4 @@
-//! What a row says besides its constructor, and the check of it while the model compiles.
+//! What a row states after its constructor; the compiler checks it.
 
 use crate::reals::Interval;
 use crate::row::Row;

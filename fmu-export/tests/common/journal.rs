@@ -13,8 +13,8 @@ pub struct Message {
     pub text: String,
 }
 
-/// What the logger was told; its address is the environment pointer, so an [`Rc`](std::rc::Rc) holds it: to move a box would say
-/// that nobody else looks into it.
+/// What the logger was told. Its address is the environment pointer, so it lives in an [`Rc`](std::rc::Rc): moving a `Box`
+/// asserts that no other pointer to the content is in use.
 #[derive(Default)]
 pub struct Journal(pub RefCell<Vec<Message>>);
 

@@ -1,4 +1,4 @@
-//! One call of one instance, right or wrong: what it takes and what it has to say.
+//! One call of one instance with arguments that are right or wrong, and the status that the standard demands.
 
 use super::super::*;
 use super::Draw;
