@@ -42,7 +42,7 @@ impl SteppedPlant {
         if mechanics.imposed { 0.0 } else { 0.5 * mechanics.J * self.block.out.speed * self.block.out.speed }
     }
 
-    /// Energy in J that is stored or has left: what `energy.in` must be, but for a constant.
+    /// Energy in J that is stored or has left: what `energy_in` must be, but for a constant.
     fn accounted(&self) -> f64 {
         let energy = &self.block.out.energy;
         energy.mech + energy.loss + self.magnetic() + self.kinetic()

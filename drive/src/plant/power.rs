@@ -14,7 +14,7 @@
 //!
 //! With a held voltage and a turning rotor, the power changes within the step, so an instantaneous value does not
 //! represent it. The outputs are therefore means over the plant's last step, integrated with the state by the same
-//! method, and `energy.in`, `energy.mech` and `energy.loss` are the time integrals of the powers. Before the first
+//! method, and `energy_in`, `energy_mech` and `energy_loss` are the time integrals of the powers. Before the first
 //! step, the powers are the initial values. In Model Exchange, where the importer integrates, the powers are those of the
 //! instant, and the energies stay 0: an importer that wants them integrates the powers. i_dc is also defined for
 //! u_dc = 0 V: the link still carries the current of the legs connected to it; in this case it is the value at the end of
@@ -165,7 +165,7 @@ pub const POWERS: &Table<Powers> = &Table::new(
 
 type E = Row<Energy>;
 
-/// Variables of the energies; their owner supplies the prefix `energy.`.
+/// Variables of the energies; their owner supplies the prefix `energy_`.
 pub const ENERGY: &Table<Energy> = &Table::new(
     const {
         &[

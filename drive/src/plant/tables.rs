@@ -78,7 +78,7 @@ pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
                 "Torque of the shaft on the load: tau_load, or with mechanics.imposed tau_e minus friction",
                 |o| &mut o.tau_shaft,
             ),
-            O::part("energy.", &Part { table: ENERGY, lens: |o| &mut o.energy }),
+            O::part("energy_", &Part { table: ENERGY, lens: |o| &mut o.energy }),
         ]
     },
 );
