@@ -15,7 +15,7 @@ use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
+/// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
 
 /// Everything that an importer can know about a model.
