@@ -161,7 +161,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 12;
+    const STATE_VERSION: u16 = 13;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -523,8 +523,8 @@ mod tests {
             angle += 1e-3 * speed;
             let (ours, theirs) = (&drive.out.plant, &pair.plant.out);
             assert!((ours.angle - angle).abs() < 1e-9 && (ours.theta_e - theirs.theta_e).abs() < 1e-9);
-            assert!((ours.tau_shaft - theirs.tau_shaft).abs() < 1e-6, "{ours:?} {theirs:?}");
+            assert!((ours.powers.tau_shaft - theirs.powers.tau_shaft).abs() < 1e-6, "{ours:?} {theirs:?}");
         }
-        assert!(drive.out.plant.tau_shaft.abs() > 1.0, "{:?}", drive.out.plant);
+        assert!(drive.out.plant.powers.tau_shaft.abs() > 1.0, "{:?}", drive.out.plant);
     }
 }

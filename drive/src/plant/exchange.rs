@@ -91,13 +91,14 @@ impl PmsmPlant {
 
     /// The outputs at an instant; their powers are those of the instant.
     fn outputs<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> PlantOutputs<S> {
-        let Rates { p_in, p_mech, p_loss, losses, i, .. } = self.rates(inputs, at);
+        let Rates { p_in, p_mech, p_loss, losses, tau_shaft, i, .. } = self.rates(inputs, at);
         let i = if self.parameters.iron.is_none() { at.i } else { at.axis.from_stator(i) };
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let p_in = p_in + 0.0.into();
         let currents = || Phases::from_stator(at.axis.to_stator(i));
         let i_dc = dc_current(p_in, inputs, &self.legs(inputs), currents);
-        self.shown(inputs, at, i, self.temperatures(inputs), Powers { i_dc, p_in, p_mech, p_loss, losses })
+        let powers = Powers { i_dc, p_in, p_mech, p_loss, losses, tau_shaft };
+        self.shown(inputs, at, i, self.temperatures(inputs), powers)
     }
 
     /// [`ContinuousTime::derivatives`] under these `inputs`.

@@ -73,10 +73,8 @@ pub struct PlantOutputs<S = f64> {
     pub i_d: S,
     /// q-axis stator current in A.
     pub i_q: S,
-    /// Power between DC link, machine and shaft, mean over the last step.
+    /// Power between DC link, machine and shaft and torque of the shaft, means over the last step.
     pub powers: Powers<S>,
-    /// Torque of the shaft on the load in N.m.
-    pub tau_shaft: S,
     /// Energy since the start.
     pub energy: Energy,
     /// Efficiency of the powers.
@@ -129,8 +127,8 @@ impl PlantOutputs<Dual> {
                 p_mech: powers.p_mech.change,
                 p_loss: powers.p_loss.change,
                 losses: powers.losses.map(|p| p.change),
+                tau_shaft: powers.tau_shaft.change,
             },
-            tau_shaft: self.tau_shaft.change,
             energy: Energy::default(),
             efficiency: self.efficiency.change,
             temperatures: self.temperatures.map(|T| T.change),
