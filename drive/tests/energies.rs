@@ -8,8 +8,11 @@ use drive::control::tables::Limits;
 use drive::estimator::Kind as Estimator;
 use drive::frame::{AlphaBeta, Phases};
 use drive::motor::Motor;
+use drive::plant::power::Energy;
+use drive::plant::tables::PlantParameters;
+use drive::pmsm_drive::Means;
 use drive::{PmsmDrive, PmsmPlant};
-use fmu_core::{Block, Elapsed, Step};
+use fmu_core::{Block, CompletedSteps, ContinuousTime, Elapsed, Events, Model, Step};
 
 const RPM: f64 = std::f64::consts::PI / 30.0;
 
@@ -159,5 +162,272 @@ fn a_free_shaft_has_the_torque_of_the_load() {
         let step = Step { start: Elapsed::ZERO.plus(1e-3 * f64::from(k)), h: 1e-3 };
         drive.step(&step).unwrap();
         assert_eq!(drive.out.plant.powers.tau_shaft.to_bits(), drive.model.inputs.tau_load.to_bits());
+    }
+}
+
+/// An importer for Model Exchange: Runge-Kutta steps of at most `longest` (s), which land on the model's events.
+struct Importer<M: Model> {
+    block: Block<M>,
+    now: Elapsed,
+    longest: f64,
+    /// Number of integration steps that are told as one; 0: no completed step is told.
+    told: u32,
+    done: u32,
+}
+
+impl<M: CompletedSteps + Events> Importer<M> {
+    fn new(model: M, longest: f64, told: u32) -> Self {
+        let mut block = Block { model, ..Block::default() };
+        block.initialize();
+        let mut importer = Self { block, now: Elapsed::ZERO, longest, told, done: 0 };
+        importer.event(|_| ());
+        importer
+    }
+
+    /// An event, with inputs that jump.
+    fn event(&mut self, set: impl FnOnce(&mut M)) {
+        let (model, now) = (&mut self.block.model, self.now);
+        model.complete(now).unwrap();
+        model.begin(now);
+        set(model);
+        while model.event(now).unwrap().again {}
+        model.complete(now).unwrap();
+    }
+
+    /// Integrates over `h` (s) with inputs that `set` gives at every time (s), with an event at its end if one is due.
+    fn run(&mut self, h: f64, set: impl Fn(&mut M, f64)) {
+        let end = self.now.plus(h);
+        loop {
+            let left = end.since(self.now);
+            if left <= 1e-9 * h {
+                break;
+            }
+            let next = self.block.model.next(self.now).left(self.now).unwrap_or(left).min(left);
+            let steps = (next / self.longest - 1e-9).ceil().max(1.0);
+            self.rk4(next / steps, &set);
+            self.done += 1;
+            if self.told > 0 && self.done.is_multiple_of(self.told) {
+                self.block.model.complete(self.now).unwrap();
+            }
+            if self.block.model.next(self.now).is_due(self.now) {
+                self.event(|_| ());
+            }
+        }
+        self.block.model.observe(self.now, &mut self.block.out);
+    }
+
+    fn rk4(&mut self, h: f64, set: &impl Fn(&mut M, f64)) {
+        let (model, start) = (&mut self.block.model, self.now);
+        let x: [f64; 4] = std::array::from_fn(|i| *(M::STATES[i].at)(model));
+        let (mut sum, mut k) = ([0.0; 4], [0.0; 4]);
+        let at = |model: &mut M, share: f64, k: &[f64; 4]| {
+            for (i, state) in M::STATES.iter().enumerate() {
+                *(state.at)(model) = x[i] + share * h * k[i];
+            }
+            model.settle();
+            let now = start.plus(share * h);
+            set(model, now.seconds());
+            now
+        };
+        for (share, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+            let now = at(model, share, &k);
+            model.derivatives(now, &mut k).unwrap();
+            sum = std::array::from_fn(|i| sum[i] + weight * k[i]);
+        }
+        self.now = at(model, 1.0, &sum.map(|k| k / 6.0));
+    }
+}
+
+#[test]
+fn the_plant_counts_the_same_in_model_exchange() {
+    // The importer's steps are fine; it tells each, every tenth, or none but the events at T_s.
+    let T_s = 1e-4;
+    for (name, set) in KINDS {
+        for imposed in [false, true] {
+            let model = || {
+                let mut plant = plant(set).model;
+                (plant.parameters.mechanics.imposed, plant.parameters.initial.speed) = (imposed, 150.0);
+                plant.inputs.tau_load = 0.7;
+                plant
+            };
+            for told in [1, 10, 0] {
+                let mut stepped = Block { model: model(), ..Block::default() };
+                voltage(&mut stepped.model, 0.0, 150.0);
+                stepped.initialize();
+                let mut exchanged = Importer::new(stepped.model.clone(), 2e-6, told);
+                for k in 0..300 {
+                    let t = T_s * f64::from(k);
+                    let ahead = |t: f64| 150.0 * t;
+                    voltage(&mut stepped.model, ahead(t), 150.0);
+                    exchanged.event(|plant| voltage(plant, ahead(t), 150.0));
+                    let step = Step { start: exchanged.now, h: T_s };
+                    stepped.step(&step).unwrap();
+                    exchanged.run(T_s, |plant, t| plant.inputs.angle_shaft = ahead(t));
+                }
+                exchanged.event(|_| ());
+                exchanged.block.model.observe(exchanged.now, &mut exchanged.block.out);
+                let (ours, theirs) = (exchanged.block.out.energy, stepped.out.energy);
+                let passed = theirs.r#in.abs().max(theirs.loss).max(theirs.mech.abs());
+                let off = [ours.r#in - theirs.r#in, ours.mech - theirs.mech, ours.loss - theirs.loss];
+                println!("{name}, imposed {imposed}, told {told}: {off:?} J of {theirs:?}");
+                let allowed = if name == "dead time" || name == "losses" { 1e-4 } else { 1e-6 };
+                assert!(
+                    off.iter().all(|x| x.abs() < allowed * passed),
+                    "{name} {imposed} {told}: {off:?} J of {theirs:?}"
+                );
+            }
+        }
+    }
+}
+
+/// Energies in J of a free plant after 20 ms in Model Exchange under the input `u` (V) of the time (s), of which every `told`th
+/// integration step of 2 us is told.
+fn counted(told: u32, u: impl Fn(f64) -> AlphaBeta) -> [f64; 3] {
+    let mut model = plant(|_| ()).model;
+    (model.parameters.mechanics.imposed, model.parameters.initial.speed) = (false, 150.0);
+    model.inputs.u = Phases::from_stator(u(0.0));
+    let mut importer = Importer::new(model, 2e-6, told);
+    importer.run(0.02, |plant, t| plant.inputs.u = Phases::from_stator(u(t)));
+    importer.event(|_| ());
+    importer.block.model.observe(importer.now, &mut importer.block.out);
+    let Energy { r#in, mech, loss } = importer.block.out.energy;
+    [r#in, mech, loss]
+}
+
+#[test]
+fn inputs_between_completed_steps_are_straight_lines() {
+    let turning = |t: f64| AlphaBeta::new(75.0 * (450.0 * t + 1.7).cos(), 75.0 * (450.0 * t + 1.7).sin());
+    let apart = |told: u32, u: &dyn Fn(f64) -> AlphaBeta| {
+        let (ours, fine) = (counted(told, u), counted(1, u));
+        assert!(fine[0].abs() > 1.0, "{fine:?}");
+        ours.iter().zip(fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / fine[0].abs()
+    };
+    // Lines: as exact in one step of 20 ms as in 10 000 of 2 us.
+    let line = |t: f64| AlphaBeta::new(20.0 - 3000.0 * t, 60.0 + 2000.0 * t);
+    let held = |_: f64| AlphaBeta::new(5.0, 60.0);
+    for u in [&line as &dyn Fn(f64) -> AlphaBeta, &held] {
+        let off = apart(10_000, u);
+        assert!(off < 1e-6, "{off}");
+    }
+    // Curves: of second order in the step for the power of the chord, of third for the current that it drives.
+    let [coarse, fine] = [20, 10].map(|told| apart(told, &turning));
+    println!("curved inputs: {coarse} at 40 us, {fine} at 20 us");
+    assert!((3.9..8.1).contains(&(coarse / fine)), "{coarse}, {fine}");
+    assert!(fine < 2.0 * (450.0_f64 * 2e-5).powi(2) / 12.0, "{fine}");
+}
+
+#[test]
+fn what_a_solver_tries_is_not_counted() {
+    let mut importer = Importer::new(plant(|_| ()).model, 2e-6, 1);
+    voltage(&mut importer.block.model, 0.0, 150.0);
+    importer.run(1e-3, |plant, t| plant.inputs.angle_shaft = 150.0 * t);
+    let mut tried = importer.block.clone();
+    // Other states, inputs and times, and back: a step that is rejected, or an event that is searched for.
+    let (before, inputs) = (tried.model.clone(), tried.model.inputs.clone());
+    for k in 1..50 {
+        *(PmsmPlant::STATES[0].at)(&mut tried.model) = 0.01 * f64::from(k);
+        *(PmsmPlant::STATES[2].at)(&mut tried.model) = 7.0 * f64::from(k);
+        tried.model.settle();
+        (tried.model.inputs.u.a, tried.model.inputs.u_dc) = (300.0, 500.0);
+        tried.model.derivatives(importer.now.plus(1e-5 * f64::from(k)), &mut [0.0; 4]).unwrap();
+        tried.model.observe(importer.now, &mut tried.out);
+        assert_eq!(tried.out.energy, importer.block.out.energy);
+    }
+    for (i, state) in PmsmPlant::STATES.iter().enumerate() {
+        *(state.at)(&mut tried.model) = *(PmsmPlant::STATES[i].at)(&mut before.clone());
+    }
+    tried.model.settle();
+    tried.model.inputs = inputs;
+    assert_eq!(tried.model, before);
+    // Told twice, or told without the time going on, is told once.
+    tried.model.complete(importer.now).unwrap();
+    tried.model.complete(importer.now).unwrap();
+    assert_eq!(tried.model, before);
+}
+
+#[test]
+fn blocking_diodes_lose_what_remains() {
+    // 2 A at 20 rad/s when the gates open: what is stored returns to the link, and the rest is lost in the event.
+    let run = |told: u32| {
+        let mut model = plant(|_| ()).model;
+        (model.parameters.mechanics.imposed, model.parameters.initial.speed) = (false, 20.0);
+        model.inputs.u = Phases { a: 30.0, b: 20.0, c: -50.0 };
+        let mut importer = Importer::new(model, 1e-7, told);
+        importer.run(1e-3, |_, _| ());
+        importer.event(|plant| plant.inputs.enable = false);
+        let mut z = [0.0; 2];
+        while {
+            importer.block.model.indicators(importer.now, &mut z);
+            z.iter().any(|z| *z > 0.0)
+        } {
+            importer.run(1e-6, |_, _| ());
+        }
+        importer.event(|_| ());
+        importer.run(1e-3, |_, _| ());
+        importer.event(|_| ());
+        importer.block.model.observe(importer.now, &mut importer.block.out);
+        importer.block
+    };
+    for told in [1, 10, 0] {
+        let block = run(told);
+        let PlantParameters { mechanics, .. } = &block.model.parameters;
+        let Energy { r#in, mech, loss } = block.out.energy;
+        let kinetic = 0.5 * mechanics.J * (block.out.speed * block.out.speed - 400.0);
+        assert!(block.out.i == Phases::default(), "{:?}", block.out.i);
+        let rest = r#in - mech - loss - kinetic;
+        println!("told {told}: {rest} J of {in} J, {loss} J lost");
+        assert!(rest.abs() < 2e-6 * r#in && loss > 1e-3, "told {told}: {rest} J of {in} J, {loss} J lost");
+    }
+}
+
+/// The means, and the powers and the torque that the outputs show.
+fn shown(drive: &Block<PmsmDrive>) -> ([f64; 4], [f64; 4]) {
+    let (Means { p_in, p_mech, p_loss, tau_shaft }, now) = (drive.out.means, &drive.out.plant.powers);
+    ([p_in, p_mech, p_loss, tau_shaft], [now.p_in, now.p_mech, now.p_loss, now.tau_shaft])
+}
+
+#[test]
+fn the_means_of_both_interfaces_agree() {
+    let T_s = 1e-4;
+    for rpm in [3000.0, 9000.0, 11_400.0] {
+        let speed = rpm * RPM;
+        let mut stepped = Block { model: traction(), ..Block::default() };
+        stepped.model.inputs.speed_shaft = speed;
+        stepped.initialize();
+        let exchanged = [1, 0].map(|told| Importer::new(stepped.model.clone(), 12.5e-6, told));
+        let mut exchanged = exchanged;
+        assert_eq!(shown(&stepped).0, [0.0; 4], "before the first period is over");
+        let mut now = Elapsed::ZERO;
+        let mut ripple = 0.0_f64;
+        for k in 0..3000 {
+            stepped.model.inputs.angle_shaft = speed * T_s * f64::from(k);
+            let step = Step { start: now, h: T_s };
+            stepped.step(&step).unwrap();
+            now = step.end();
+            let (theirs, held) = shown(&stepped);
+            assert_eq!(theirs, held, "in Co-Simulation, the powers are means over T_s");
+            for importer in &mut exchanged {
+                importer.block.model.observe(importer.now, &mut importer.block.out);
+                let early = shown(&importer.block).0;
+                assert!(k > 0 || early == [0.0; 4], "before the first period is over: {early:?}");
+                importer.run(T_s, |drive, t| drive.inputs.angle_shaft = speed * t);
+                let (ours, instant) = shown(&importer.block);
+                for (a, b) in ours.iter().zip(theirs) {
+                    assert!((a - b).abs() < 1e-3 * b.abs() || k < 2000, "{rpm} rpm, period {k}: {ours:?}, {theirs:?}");
+                }
+                ripple = ripple.max((instant[0] / ours[0] - 1.0).abs());
+                if k == 2999 {
+                    println!(
+                        "{rpm} rpm: {ours:?} in Model Exchange, {theirs:?} in Co-Simulation, {instant:?} at the instant"
+                    );
+                }
+            }
+        }
+        for importer in &exchanged {
+            let (ours, theirs) = (importer.block.out.plant.energy, stepped.out.plant.energy);
+            for (a, b) in [(ours.r#in, theirs.r#in), (ours.mech, theirs.mech), (ours.loss, theirs.loss)] {
+                assert!((a / b - 1.0).abs() < 1e-3, "{rpm} rpm: {ours:?}, {theirs:?}");
+            }
+        }
     }
 }

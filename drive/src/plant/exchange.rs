@@ -22,7 +22,10 @@ use crate::plant::state::Instant;
 use crate::plant::tables::PlantParameters;
 use crate::plant::thermal::ThermalMode;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
-use fmu_core::{ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar, State};
+use fmu_core::{
+    CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar,
+    State,
+};
 
 /// Shift of the indicators in the direction of the decision that an event took, so that none stays at 0.
 const SHIFT: f64 = 1e-9;
@@ -177,6 +180,13 @@ impl ContinuousTime for PmsmPlant {
     }
 }
 
+impl CompletedSteps for PmsmPlant {
+    fn complete(&mut self, now: Elapsed) -> Result<(), Fault> {
+        let inputs = self.inputs.clone();
+        self.complete_under(&inputs, now)
+    }
+}
+
 impl Differentiable for PmsmPlant {
     fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut PlantOutputs) -> Result<(), Fault> {
         *outputs = self.tangent_under(&self.inputs.changing(&along.inputs), along, dx);
@@ -211,7 +221,11 @@ impl Events for PmsmPlant {
         }
         self.blocked = self.blocks(&self.inputs);
         if self.blocked {
-            state.psi = self.idle_flux(&self.motor(&self.inputs), state.speed);
+            let motor = self.motor(&self.inputs);
+            let idle = self.idle_flux(&motor, state.speed);
+            let stored = |psi| machine::magnetic_energy(&motor, &self.parameters.saturation, psi);
+            self.energy.loss += stored(state.psi) - stored(idle);
+            state.psi = idle;
         }
         let states_changed = state != self.state;
         self.state = state;

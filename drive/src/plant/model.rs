@@ -3,6 +3,7 @@
 use crate::frame::{Dq, Phases, Rotor, Vector};
 use crate::math::wrap;
 use crate::motor::Motor;
+use crate::plant::counters::Point;
 use crate::plant::inverter::Inverter;
 use crate::plant::legs::Legs;
 use crate::plant::linear::Coulomb;
@@ -34,6 +35,8 @@ pub struct PmsmPlant {
     pub(super) powers: Powers,
     /// Since the start.
     pub(super) energy: Energy,
+    /// In Model Exchange, the last point of the importer's solution.
+    pub(super) point: Point,
     /// Temperatures and the machine at them, held over a step.
     pub(super) warm: Warm,
     /// Current (A) at the terminals less that of the flux linkage, at the end of a step.
@@ -203,7 +206,7 @@ impl Model for PmsmPlant {
         };
         let psi = if self.inputs.enable { machine::flux(motor, Dq::ZERO) } else { self.idle_flux(motor, speed) };
         self.state = State::new(motor, psi, speed, angle);
-        self.energy = Energy::default();
+        (self.energy, self.point) = (Energy::default(), Point::default());
         self.blocked = self.blocks(&self.inputs);
         self.by_iron = self.current_by_iron();
         // No current yet: only the shaft has a power.

@@ -16,8 +16,8 @@
 //! represent them. The outputs are therefore means over the plant's last step, integrated with the state by the same
 //! method; `energy_in`, `energy_mech` and `energy_loss` are the time integrals of the powers. A drive train that integrates
 //! tau_shaft over the angle of its shaft receives `energy_mech`. Before the first step, the powers are the initial values.
-//! In Model Exchange, where the importer integrates, the powers and tau_shaft are those of the instant, and the energies
-//! stay 0: an importer that wants them integrates the powers. i_dc is also defined for u_dc = 0 V: the link still carries
+//! In Model Exchange, where the importer integrates, the powers and tau_shaft are those of the instant, and the energies are
+//! counted over the importer's steps ([`counters`](crate::plant::counters)). i_dc is also defined for u_dc = 0 V: the link still carries
 //! the current of the legs connected to it; in this case it is the value at the end of the step.
 //!
 //! Two events transfer energy instantly and count in the step in which they occur: a jump of the imposed angle, where
@@ -178,19 +178,20 @@ pub const ENERGY: &Table<Energy> = &Table::new(
             E::output(
                 "in",
                 &JOULE,
-                "Energy from the DC link since the start, the integral of p_in; 0 in Model Exchange",
+                "Energy from the DC link since the start, the integral of p_in; in Model Exchange up to the last completed integrator step \
+                 or event, as exact as in Co-Simulation with inputs that are held or ramp between two of them",
                 |e| &mut e.r#in,
             ),
             E::output(
                 "mech",
                 &JOULE,
-                "Energy delivered to the load since the start, the integral of p_mech; 0 in Model Exchange",
+                "Energy delivered to the load since the start, the integral of p_mech; in Model Exchange as energy_in",
                 |e| &mut e.mech,
             ),
             E::output(
                 "loss",
                 &JOULE,
-                "Energy lost since the start, the integral of p_loss; 0 in Model Exchange",
+                "Energy lost since the start, the integral of p_loss; in Model Exchange as energy_in",
                 |e| &mut e.loss,
             ),
         ]

@@ -43,15 +43,25 @@ impl PlantInputs {
 
     /// These inputs with the change `along` of the continuous ones.
     pub fn changing(&self, along: &Self) -> PlantInputs<Dual> {
-        let (u, v) = (&self.u, &along.u);
+        self.zip(along, Dual::new)
+    }
+
+    /// On the straight line from these inputs to those at its `end`, at the `share` (0..1) of the way; the gates stay.
+    pub fn toward(&self, end: &Self, share: f64) -> Self {
+        self.zip(end, |a, b| a + (b - a) * share)
+    }
+
+    /// Each continuous input and that of `other` by `f`.
+    fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> PlantInputs<T> {
+        let (u, v) = (&self.u, &other.u);
         PlantInputs {
-            u: Phases { a: Dual::new(u.a, v.a), b: Dual::new(u.b, v.b), c: Dual::new(u.c, v.c) },
-            u_dc: Dual::new(self.u_dc, along.u_dc),
-            tau_load: Dual::new(self.tau_load, along.tau_load),
-            speed_shaft: Dual::new(self.speed_shaft, along.speed_shaft),
-            angle_shaft: Dual::new(self.angle_shaft, along.angle_shaft),
+            u: Phases { a: f(u.a, v.a), b: f(u.b, v.b), c: f(u.c, v.c) },
+            u_dc: f(self.u_dc, other.u_dc),
+            tau_load: f(self.tau_load, other.tau_load),
+            speed_shaft: f(self.speed_shaft, other.speed_shaft),
+            angle_shaft: f(self.angle_shaft, other.angle_shaft),
             enable: self.enable,
-            thermal: self.thermal.changing(&along.thermal),
+            thermal: self.thermal.zip(&other.thermal, f),
         }
     }
 }

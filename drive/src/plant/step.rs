@@ -47,7 +47,7 @@ impl PmsmPlant {
     /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s).
     #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
     #[inline(always)]
-    fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
+    pub(super) fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
         let PlantParameters { motor, inverter, .. } = &self.parameters;
         let w = (f64::from(motor.n_p) * speed).abs();
         let threshold = if lossy { inverter.devices.threshold() } else { 0.0 };
@@ -175,7 +175,7 @@ impl PmsmPlant {
 
     #[cold]
     #[inline(never)]
-    fn diverged(&self, h: f64) -> Fault {
+    pub(super) fn diverged(&self, h: f64) -> Fault {
         Fault::new(format!(
             "the machine's state left the finite numbers within a step of {h} s; the step before it ended with {}",
             self.state.tell()
