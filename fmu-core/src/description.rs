@@ -60,6 +60,8 @@ pub struct ModelExchange {
     pub indicators: Vec<u32>,
     /// Co-simulation with Event Mode and early return (FMI 3.0).
     pub event_mode: bool,
+    /// The importer is to tell completed integrator steps.
+    pub completed_steps: bool,
 }
 
 /// A variable of the description.
@@ -247,6 +249,7 @@ impl Description {
             derivatives: (0..states.len()).map(after).collect(),
             indicators: (0..can.indicators().len()).map(|i| after(states.len() + i)).collect(),
             event_mode: can.event_mode(),
+            completed_steps: can.complete.is_some(),
         });
         let info = M::INFO;
         Ok(Self {

@@ -99,10 +99,14 @@ fn number_of_indicators(description: &Description, version: FmiVersion) -> Optio
 
 /// FMI 2.0.5, 3.3.1; FMI 3.0.2, 2.4.2 and 3.4.
 fn model_exchange(description: &Description, exchange: &ModelExchange, version: FmiVersion) -> Element {
+    let (flag, needed) = match version {
+        FmiVersion::V2 => ("completedIntegratorStepNotNeeded", false),
+        FmiVersion::V3 => ("needsCompletedIntegratorStep", true),
+    };
     let element = Element::new("ModelExchange")
         .with("modelIdentifier", &*description.name)
         .with("needsExecutionTool", "false")
-        .with_some("completedIntegratorStepNotNeeded", (version == FmiVersion::V2).then_some("true"))
+        .with_some(flag, (needed == exchange.completed_steps).then_some("true"))
         .with("canBeInstantiatedOnlyOncePerProcess", "false");
     derivatives(states_and_memory(element, version), exchange, version)
 }
