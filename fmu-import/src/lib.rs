@@ -33,6 +33,7 @@ mod folder;
 pub mod guard;
 mod instance;
 mod integration;
+pub mod machine;
 pub mod platform;
 mod quantity;
 pub mod ssp;
