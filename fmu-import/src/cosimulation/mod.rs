@@ -43,7 +43,7 @@ pub use crate::integration::Solver;
 pub use grid::Settings;
 pub use method::{Integration, Method};
 pub use plan::{Plan, Target, Worker};
-pub use recording::{Column, Recording};
+pub use recording::{Column, Recording, item};
 pub use run::{Ended, Point};
 pub use schedule::Schedule;
 
