@@ -236,27 +236,19 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
             }),
             V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)
                 .at_least(0.0),
-            V::input("speed_shaft", &SPEED, "Speed of the shaft; read with plant.mechanics.imposed only", |m| {
-                &mut m.model.inputs.speed_shaft
-            }),
-            V::input(
-                "angle_shaft",
-                &RADIAN,
-                "Angle of the shaft, mechanical; read with plant.mechanics.imposed only",
-                |m| &mut m.model.inputs.angle_shaft,
-            )
-            .unbounded(),
-            V::input(
-                "tau_ref",
-                &NEWTON_METER,
-                "Torque reference; read with controller.speed_loop.torque_mode only",
-                |m| &mut m.model.inputs.tau_ref,
-            ),
+            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
+                .read_with("mechanics.imposed", "true"),
+            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
+                .unbounded()
+                .read_with("mechanics.imposed", "true"),
+            V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
+                .read_with("speed_loop.torque_mode", "true"),
             V::boolean_input(
                 "enable",
                 "The drive operates; false: the controller stays in its initial state, and the gates are off once enabled is false",
                 |m| &mut m.model.inputs.enable,
-            ),
+            )
+            .optional(),
             V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),
             V::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |m| &mut m.out.controller }),
             V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),

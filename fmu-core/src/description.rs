@@ -8,6 +8,7 @@ use crate::Fault;
 use crate::capability::{Capabilities, Exported};
 use crate::integer::IntegerType;
 use crate::model::{Block, Experiment, Model};
+use crate::need::Need;
 use crate::probe;
 use crate::row::{Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
@@ -194,6 +195,7 @@ impl Description {
         let references = |of: &Option<Vec<usize>>| of.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
         let table = M::TABLE;
         let mut variables: Vec<Variable> = Vec::new();
+        let mut needs: Vec<(usize, Need<'static>)> = Vec::new();
         for index in 0..table.len() {
             let Some((name, meta, element)) = table.locate(index) else { continue };
             let Some((_, slot)) = table.entry(&mut block, index) else { continue };
@@ -210,6 +212,9 @@ impl Description {
                 join(&mut array.initial_dependencies, references(&initial[index]));
                 join(&mut array.dependencies, references(&between[index]));
                 continue;
+            }
+            if meta.need != Need::Always {
+                needs.push((variables.len(), meta.need));
             }
             let state = states.iter().position(|&row| row == index);
             variables.push(Variable {
@@ -242,6 +247,10 @@ impl Description {
             }
         }
         check_types(&variables)?;
+        for (i, need) in needs {
+            let words = words(&variables[i].name, need, &variables)?;
+            variables[i].description += &words;
+        }
         let terminals = terminals::describe(M::TERMINALS, &variables)?;
         let after = |i: usize| reference(table.len() + i);
         let model_exchange = can.model_exchange().then(|| ModelExchange {
@@ -326,6 +335,29 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
         derivative: None,
         reinit: false,
     }
+}
+
+/// The words of the need of `input`, with the full name of the parameter: the one that has the name of the table, or ends with
+/// it after the prefix of a part.
+fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, Fault> {
+    let Need::With { parameter, value } = need else { return Ok(need.to_string()) };
+    let named = |v: &&Variable| {
+        let rest = v.name.strip_suffix(parameter);
+        v.causality == Causality::Parameter && rest.is_some_and(|rest| rest.is_empty() || rest.ends_with('.'))
+    };
+    let found: Vec<&Variable> = variables.iter().filter(named).collect();
+    let [found] = found[..] else {
+        return Err(Fault::new(format!("{input} is read with {parameter}, of which there are {}", found.len())));
+    };
+    let has = match &found.kind {
+        VariableKind::Boolean => ["true", "false"].contains(&value),
+        VariableKind::Enumeration { items, .. } => items.iter().any(|(_, name, _)| name == value),
+        _ => false,
+    };
+    if !has {
+        return Err(Fault::new(format!("{input} is read with {} = {value}, which it never is", found.name)));
+    }
+    Ok(Need::With { parameter: &found.name, value }.to_string())
 }
 
 /// Value reference of the table's variable `index`; of `time` for [`probe::NOW`].

@@ -208,6 +208,6 @@ def _child(plan, pipe):
 def _dead(plan, row, number, code):
     """The result of a row that killed its process."""
     cause = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended the process with exit code {code}"
-    run, *numbers, error = plan.meta(list(row))
-    values = {name: np.asarray(row[name], dtype=float) if name in row else np.array([np.nan]) for name in numbers}
-    return {run: np.array([number]), **values, error: np.array([cause], dtype=object)}
+    missing = {name: np.array([np.nan if empty.dtype == float else ""], empty.dtype) for name, empty in plan.meta(list(row)).items()}
+    known = {name: np.asarray(column, missing[name].dtype) for name, column in row.items()}
+    return {**missing, **known, "run": np.array([number]), "error": np.array([cause], dtype=object)}

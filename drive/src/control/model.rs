@@ -303,23 +303,18 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
             V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
             V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
-            V::input(
-                "theta_meas",
-                &RADIAN,
-                "Electrical rotor angle of a sensor; read only by the estimator Sensored",
-                |m| &mut m.model.inputs.theta_meas,
-            ),
-            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor; read only by the estimator Sensored", |m| {
-                &mut m.model.inputs.speed_meas
-            }),
-            V::input("tau_ref", &NEWTON_METER, "Torque reference; read only with speed_loop.torque_mode", |m| {
-                &mut m.model.inputs.tau_ref
-            }),
+            V::input("theta_meas", &RADIAN, "Electrical rotor angle of a sensor", |m| &mut m.model.inputs.theta_meas)
+                .read_with("estimator", "Sensored"),
+            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
+                .read_with("estimator", "Sensored"),
+            V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
+                .read_with("speed_loop.torque_mode", "true"),
             V::boolean_input(
                 "enable",
                 "The controller runs; false: it commands 0 V, and starts anew when set to true",
                 |m| &mut m.model.inputs.enable,
-            ),
+            )
+            .optional(),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
             V::part("weakening.", &Part { table: WEAKENING, lens: |m| &mut m.model.parameters.weakening }),
