@@ -1,7 +1,7 @@
 """PmsmDrive with a load behind a torsional spring: which communication step the two ways of coupling allow (docs/import.md).
 
-A compliant shaft: the rotor turns inside the FMU, the torque of the spring is `tau_load`. With this torque held over h the map of
-rotor angle and speed from step to step has the determinant 1 - d h / J + c h^2 / 2J, below 1 for h < 2 d / c. An imposed
+A compliant shaft: the rotor turns inside the FMU, the torque of the spring is `tau_load`. Held over h, it gives the
+map of rotor angle and speed over a step the determinant 1 - d h / J + c h^2 / 2J, which is below 1 for h < 2 d / c. An imposed
 shaft: the rotor belongs to the train, which gets `tau_shaft`. The drive starts to 1000 rpm and gets 1 N.m; the train is
 integrated exactly between the communication points.
 """
