@@ -77,4 +77,5 @@ run = ca.integrator("run", "cvodes", dae, 0.0, t_end / INTERVALS, {"abstol": 1e-
 end = REST
 for k in range(INTERVALS):
     end = run(x0=end, u=voltages[:, k])["xf"]
-print(f"CVODES with these voltages: {float(end[0]):.3f} rad/s, i_d {float(end[2] - PSI_M) / L:.2f} A, i_q {float(end[3]) / L:.2f} A")
+i_d, i_q = float(end[2] - PSI_M) / L, float(end[3]) / L
+print(f"CVODES with these voltages: {float(end[0]):.3f} rad/s, i_d {i_d:.2f} A, i_q {i_q:.2f} A")
