@@ -212,8 +212,22 @@ fn in_part(part: &str, fault: &Fault) -> Fault {
     Fault::new(format!("{part}.{fault}"))
 }
 
+/// Back EMF over the voltage of the DC link above which the drive does not decide on the speed of its shaft.
+const DRIVEN: f64 = 3.0;
+
 impl Warns for PmsmDrive {
     fn warn(&self, log: &mut Warnings<'_>) {
+        let (plant, u_dc, lock_lost) = (&self.pair.plant.model, self.inputs.u_dc, self.pair.controller.out.lock_lost);
+        let (speed, emf) = plant.speed_and_emf();
+        if lock_lost >= 1.0 && emf > DRIVEN * u_dc {
+            let remedy = if plant.parameters.mechanics.imposed { "" } else { " or use plant.mechanics.imposed" };
+            return log.warn("driven", || {
+                format!(
+                    "lock_lost = {lock_lost:.2}: at {speed} rad/s the back EMF is {emf:.0} V line to line, and u_dc = {u_dc} V \
+                     cannot hold the shaft: its load drives it, or the coupling is unstable; shorten the communication step{remedy}"
+                )
+            });
+        }
         self.pair.controller.model.warn(log);
     }
 }

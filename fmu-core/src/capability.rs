@@ -76,7 +76,7 @@ pub struct Capabilities<M: Model> {
     pub samples: Option<Samples<M>>,
     /// Of a [`Differentiable`] model.
     pub tangent: Option<Tangent<M>>,
-    /// Of a model with [`CompletedSteps`].
+    /// Of a model that follows [`CompletedSteps`].
     pub complete: Option<Complete<M>>,
     /// Of a model that [`Warns`].
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,

@@ -1,5 +1,5 @@
-//! Torque, powers and energies of the packed FMUs, in both standards: what a drive train integrates is what the energies count,
-//! and Model Exchange says the same as Co-Simulation.
+//! The packed FMUs in a drive train, in both standards: what it integrates of the torque is what the energies count, Model
+//! Exchange says the same as Co-Simulation, and a coupling that diverges ends with an error that says so.
 #![allow(missing_docs)]
 
 mod common;
@@ -174,6 +174,30 @@ fn the_plant_of_a_pair_counts_too() {
             let [a, b] = [&exchanged, &stepped].map(|run| *column(run, name).last().unwrap());
             println!("{standard}: {name} {a} J in Model Exchange, {b} J in Co-Simulation");
             assert!((a - b).abs() < 1e-4 * b.abs() && b > 1.0, "{standard}: {name} {a} J, {b} J");
+        }
+    }
+}
+
+#[test]
+fn a_diverging_coupling_is_an_error() {
+    // 1e7 N.m on the shaft, as a coupling gives it that has just diverged.
+    let run = |standard: &str, name: &str, method: Method| {
+        let mut system = System::new(method);
+        system.add("d", &open(standard, name), false).unwrap();
+        system.set("d.tau_load", "1e7").unwrap();
+        system.record_as("d.speed", "speed").unwrap();
+        let settings = Settings { start: 0.0, stop: 1.0, step: 1e-2, sequential: false };
+        system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap_err().to_string()
+    };
+    for standard in ["fmi2", "fmi3"] {
+        for name in ["PmsmPlant", "PmsmDrive"] {
+            let message = run(standard, name, Method::default());
+            println!("{standard}, {name}: {message}");
+            let remedy = "the coupling is unstable; shorten the communication step or use mechanics.imposed";
+            assert!(message.contains("the shaft turns at -") && message.contains(remedy), "{message}");
+            let message = run(standard, name, exchange());
+            println!("{standard}, {name}, Model Exchange: {message}");
+            assert!(message.contains("beyond the 333333.3333333333 rad/s of any machine"), "{message}");
         }
     }
 }
