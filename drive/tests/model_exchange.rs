@@ -266,12 +266,12 @@ fn an_imposed_shaft_replaces_the_mechanical_states() {
         let (a, b) = (&plant.stepped.out, &plant.integrated.out);
         let (di, dw) = apart(a, b);
         assert!(di < 1e-5 && dw == 0.0, "{k}: {di} A, {dw} rad/s");
-        assert!((a.angle - b.angle).abs() < 1e-9 && (a.tau_shaft - b.tau_shaft).abs() < 1e-5, "{a:?} {b:?}");
+        assert!((a.angle - b.angle).abs() < 1e-9 && (a.tau_e - b.tau_e).abs() < 1e-5, "{a:?} {b:?}");
         // The state goes with the angle of the shaft too.
         let state = *(PmsmPlant::STATES[3].at)(&mut plant.integrated.model);
         assert!((state - b.angle).abs() < 1e-9, "{state} {}", b.angle);
     }
-    assert!(plant.stepped.out.tau_shaft.abs() > 0.5, "{:?}", plant.stepped.out);
+    assert!(plant.stepped.out.tau_e.abs() > 0.5, "{:?}", plant.stepped.out);
 }
 
 /// One step of `h` (s) of Heun's method with an input that moves.

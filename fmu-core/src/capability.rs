@@ -3,7 +3,7 @@
 //! A capability is a trait of its own, named in the line that exports the model. What a model does not name costs it
 //! nothing: its entry is `None`, known to the compiler.
 
-use crate::continuous::{ContinuousTime, Differentiable, State};
+use crate::continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 use crate::events::{Events, Indicator, Next, Outcome, Sampled};
 use crate::log::Warnings;
 use crate::variable::{Causality, Kind, Meta, Variability};
@@ -73,6 +73,8 @@ pub struct Capabilities<M: Model> {
     pub samples: Option<Samples<M>>,
     /// Of a [`Differentiable`] model.
     pub tangent: Option<Tangent<M>>,
+    /// [`CompletedSteps::complete`].
+    pub complete: Option<fn(&mut M, Elapsed) -> Result<(), Fault>>,
     /// Of a model that [`Warns`].
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,
 }
@@ -80,7 +82,8 @@ pub struct Capabilities<M: Model> {
 #[allow(non_snake_case, reason = "each method bears the name of its trait, as the line that exports a model has it")]
 impl<M: Model> Capabilities<M> {
     /// Co-simulation only.
-    pub const NONE: Self = Self { continuous: None, events: None, samples: None, tangent: None, warn: None };
+    pub const NONE: Self =
+        Self { continuous: None, events: None, samples: None, tangent: None, complete: None, warn: None };
 
     /// Adds [`ContinuousTime`].
     pub const fn ContinuousTime(self) -> Self
@@ -133,6 +136,14 @@ impl<M: Model> Capabilities<M> {
         M: Differentiable,
     {
         Self { tangent: Some(M::tangent), ..self }
+    }
+
+    /// Adds [`CompletedSteps`].
+    pub const fn CompletedSteps(self) -> Self
+    where
+        M: CompletedSteps,
+    {
+        Self { complete: Some(M::complete), ..self }
     }
 
     /// Adds [`Warns`].
@@ -211,7 +222,7 @@ impl<M: Model> Capabilities<M> {
             hash = hash.text(self.indicators()[i].name);
             i += 1;
         }
-        hash
+        if self.complete.is_some() { hash.text("CompletedSteps") } else { hash }
     }
 }
 

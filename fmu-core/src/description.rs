@@ -14,7 +14,7 @@ use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
 
-/// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
+/// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
 
 /// Everything that an importer can know about a model.
@@ -61,6 +61,8 @@ pub struct ModelExchange {
     pub indicators: Vec<u32>,
     /// Co-simulation with Event Mode and early return (FMI 3.0).
     pub event_mode: bool,
+    /// The importer is to tell completed integrator steps.
+    pub completed_steps: bool,
 }
 
 /// A variable of the description.
@@ -246,6 +248,7 @@ impl Description {
             derivatives: (0..states.len()).map(after).collect(),
             indicators: (0..can.indicators().len()).map(|i| after(states.len() + i)).collect(),
             event_mode: can.event_mode(),
+            completed_steps: can.complete.is_some(),
         });
         let info = M::INFO;
         Ok(Self {

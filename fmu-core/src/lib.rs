@@ -74,9 +74,9 @@
 //! # Ok::<(), Fault>(())
 //! ```
 //!
-//! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`] and
-//! [`Warns`] are what a model can do besides; [`Model::load`] reads files that the FMU brings along, and a [`preset`] is one of
-//! them.
+//! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
+//! [`CompletedSteps`] and [`Warns`] are what a model can do besides; [`Model::load`] reads files that the FMU brings along, and
+//! a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`table`], [`terminal`], [`model`],
 //! [`continuous`], [`events`], [`capability`], [`description`]. No motor, no XML, no C, no `unsafe`.
@@ -107,7 +107,7 @@ pub mod unit;
 pub mod variable;
 
 pub use capability::{Capabilities, Exported, Plain, Warns};
-pub use continuous::{ContinuousTime, Differentiable, State};
+pub use continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 pub use description::Description;
 pub use dual::{Dual, Scalar};
 pub use enumeration::{Choice, Enumerated, Field};

@@ -127,10 +127,7 @@ impl<E: Exported> Instance<E> {
         self.current.block.initialize();
         self.current.dirty = false;
         self.log.event(|| message::start(&self.name, &mut self.current, self.made.as_deref()));
-        if self.current.life.handles_events() {
-            self.enter_event();
-        }
-        Ok(())
+        if self.current.life.handles_events() { self.enter_event() } else { Ok(()) }
     }
 
     /// Ends the simulation.

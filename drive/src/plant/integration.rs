@@ -157,8 +157,7 @@ impl PmsmPlant {
                 sides = then;
             }
             start = end;
-            passed.energy.add(&step.energy);
-            passed.losses.add(&step.losses);
+            passed.add(&step);
             *state = next;
             left -= h;
             if left <= 1e-9 * h {
