@@ -12,13 +12,23 @@ use fmu_core::preset::{self, FILE};
 use fmu_core::variable::{Causality, position};
 use fmu_import::{Fmu, Kind, Unpacked, Values, describe, printable, suggest};
 use model_description::{FmiVersion, Generation, ModelDescription};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 const DESCRIPTION: &str = "modelDescription.xml";
 const PAGE: &str = "documentation/index.html";
 const BINARIES: &str = "binaries/";
+
+/// The default experiment of the new FMU: what feeds it, and its times in s.
+pub struct Course {
+    /// CSV with time first and a column for each input.
+    pub stimuli: String,
+    /// Stop time.
+    pub stop: f64,
+    /// Communication step, if it is not that of the archive.
+    pub step: Option<f64>,
+}
 
 /// An FMU, and the start values that it is to have.
 pub struct Preset {
@@ -33,6 +43,8 @@ pub struct Preset {
     reader: ModelDescription,
     /// Names and values by value reference, which is the order of the table.
     values: BTreeMap<u32, (String, String)>,
+    /// Which of them are of an earlier preset.
+    earlier: BTreeSet<u32>,
 }
 
 impl Preset {
@@ -68,12 +80,18 @@ impl Preset {
                 values.insert(reference(variable, element.unwrap_or(0)), (name, value));
             }
         }
-        Ok(Self { file: file.into(), md, files, unpacked, own, reader, values })
+        let earlier = values.keys().copied().collect();
+        Ok(Self { file: file.into(), md, files, unpacked, own, reader, values, earlier })
     }
 
     /// The model as it is without a preset.
     pub fn own(&self) -> &Description {
         &self.own
+    }
+
+    /// The names that an earlier preset has set and this one has not.
+    pub fn earlier(&self) -> Vec<&str> {
+        self.earlier.iter().filter_map(|place| self.values.get(place)).map(|(name, _)| name.as_str()).collect()
     }
 
     /// Sets the start value of a variable, of an array with all of its elements, or of an element: what a user writes, in
@@ -105,20 +123,26 @@ impl Preset {
         let places: Vec<usize> = element.map_or_else(|| (0..variable.elements()).collect(), |one| vec![one]);
         ensure!(elements.len() == places.len(), "{name} has {} elements, not {}", places.len(), elements.len());
         for (place, text) in places.into_iter().zip(elements) {
+            self.earlier.remove(&reference(variable, place));
             self.values.insert(reference(variable, place), (element_name(variable, place), text));
         }
         Ok(())
     }
 
     /// Writes the FMU with these start values to `out`; nothing is written unless all of them are allowed. `title` is the name
-    /// that users see, `stimuli` a file with what feeds the reference result; without them, those of the archive. Returns a line
-    /// for every start value that differs from the model's own.
+    /// that users see; without it and without `course`, those of the archive stay. Returns a line for every start value that
+    /// differs from the model's own.
     ///
     /// # Errors
     /// The binary knows no presets; a value is not allowed, or the FMU refuses them together; the file cannot be written.
-    pub fn write(self, title: Option<&str>, stimuli: Option<&Path>, out: &Path) -> Result<Vec<String>> {
+    pub fn write(self, title: Option<&str>, course: Option<&Course>, out: &Path) -> Result<Vec<String>> {
         let moment = Moment::of_environment()?;
-        let description = self.described(title)?;
+        let mut description = self.described(title)?;
+        let of_archive = &self.md.default_experiment;
+        let experiment = &mut description.experiment;
+        let stop = course.map(|course| course.stop).or(of_archive.stop);
+        let step = course.and_then(|course| course.step).or(of_archive.step);
+        (experiment.stop, experiment.step) = (stop.unwrap_or(experiment.stop), step.unwrap_or(experiment.step));
         let changes = changes(&description, &self.own);
         let mut files: BTreeMap<String, Entry> = self
             .files
@@ -136,7 +160,7 @@ impl Preset {
         let archive = dir.path().join("preset.fmu");
         pack::write(&archive, &pack::archive(&files, moment)?)?;
         self.starts(&archive)?;
-        files.extend(self.reference(&archive, &description, stimuli, dir.path())?);
+        files.extend(self.reference(&archive, &description, course, dir.path())?);
         pack::write(out, &pack::archive(&files, moment)?)?;
         Ok(changes)
     }
@@ -185,19 +209,15 @@ impl Preset {
         &self,
         archive: &Path,
         description: &Description,
-        stimuli: Option<&Path>,
+        course: Option<&Course>,
         dir: &Path,
     ) -> Result<BTreeMap<String, Entry>> {
         let packed = self.files.iter().find(|(name, _)| name.starts_with(FOLDER) && name.ends_with("_in.csv"));
-        let stimuli = match (stimuli, packed) {
-            (Some(given), _) => given.to_owned(),
-            (None, Some((_, bytes))) => {
-                let path = dir.join(reference::STIMULI);
-                fs::write(&path, bytes)?;
-                path
-            }
-            (None, None) => PathBuf::new(),
-        };
+        let stimuli = dir.join(reference::STIMULI);
+        // Without a file, the inputs keep their start values.
+        if let Some(bytes) = course.map(|course| course.stimuli.as_bytes()).or(packed.map(|(_, bytes)| &bytes[..])) {
+            fs::write(&stimuli, bytes)?;
+        }
         reference::files(archive, description, &stimuli, None).or_else(|why| {
             let name = self.file.display();
             message::note(&printable(&format!("{name}: the archive gets no reference result: {why:#}")));

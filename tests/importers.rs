@@ -21,8 +21,7 @@ fn references() -> PathBuf {
 #[test]
 fn ecos_libcosim_fmucontainer_pathsim_and_fmuloader() {
     let file = references();
-    let files =
-        ["test_ecos.py", "test_libcosim.py", "test_fmucontainer.py", "test_pathsim.py", "test_fmuloader.py"];
+    let files = ["test_ecos.py", "test_libcosim.py", "test_fmucontainer.py", "test_pathsim.py", "test_fmuloader.py"];
     pytest("importers", "importers", &files, &[("FMU_REFERENCE", &file)]);
 }
 

@@ -301,8 +301,7 @@ fn model_exchange() {
         // The order of the states, not that of the variables; an output that is a state depends on itself.
         let states = [named("der(inner)", &["u_dc", "speed", "inner"]), named("der(speed)", &[])];
         assert_eq!(unknowns(&md.derivatives), states, "S01");
-        let sector: &[&str] =
-            if two { &["enable", "inner"] } else { &["time", "enable", "bandwidth", "inner"] };
+        let sector: &[&str] = if two { &["enable", "inner"] } else { &["time", "enable", "bandwidth", "inner"] };
         let outputs = [named("speed", &["speed"]), named("sector", sector), named("ready", &[])];
         assert_eq!(unknowns(&md.outputs), outputs, "S01");
         let initial: Vec<_> = unknowns(&md.initial_unknowns).into_iter().map(|(name, _)| name).collect();

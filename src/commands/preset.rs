@@ -2,10 +2,11 @@
 
 mod motor;
 
-use crate::preset::Preset as Made;
+use crate::preset::{Course, Preset as Made};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use drive_study::tune::{self, rules::Tuned};
+use fmu_import::cosimulation::Schedule;
 use fmu_import::printable;
 use fmu_import::ssp::ssv;
 use std::path::{Path, PathBuf};
@@ -46,8 +47,8 @@ pub struct Preset {
     /// Name that importers show (modelName) [default: that of FILE.fmu]
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
-    /// CSV file that feeds the default experiment of the reference result [default: that of FILE.fmu; with --motor one that fits
-    /// the machine]
+    /// CSV file that feeds the default experiment, which lasts until its last time, for the reference result [default: that of
+    /// FILE.fmu; with --motor one that fits the machine]
     #[arg(long, value_name = "FILE.csv")]
     pub stimuli: Option<PathBuf>,
     /// File to write [default: NAME.fmu]
@@ -67,6 +68,7 @@ pub fn run(args: &Preset) -> Result<String> {
     let out = args.out.clone().or_else(|| args.name.as_ref().map(|name| format!("{name}.fmu").into()));
     let out = out.context("--out NEW.fmu is missing")?;
     let tuned = args.motor.as_deref().map(tune::tune).transpose()?;
+    let given = args.stimuli.as_deref().map(course).transpose()?;
     let mut preset = Made::open(&args.file)?;
     if let Some(path) = &args.ssv {
         let of = || path.display().to_string();
@@ -76,14 +78,12 @@ pub fn run(args: &Preset) -> Result<String> {
             preset.set(&p.name, &p.value, p.unit.as_deref()).with_context(line)?;
         }
     }
-    if let Some(tuned) = &tuned {
-        motor::set(&mut preset, tuned)?;
-    }
+    let of_motor = tuned.map(|tuned| motor::set(&mut preset, &tuned)).transpose()?;
     for text in &args.set {
         let (name, value) = text.split_once('=').ok_or_else(|| anyhow!("{text}: is not --set NAME=VALUE"))?;
         preset.set(name.trim(), value.trim(), None).with_context(|| format!("--set {text}"))?;
     }
-    let changes = write(preset, tuned.as_ref(), args.name.as_deref(), args.stimuli.as_deref(), &out)?;
+    let changes = preset.write(args.name.as_deref(), given.or(of_motor).as_ref(), &out)?;
     let lines = changes.iter().map(|line| format!("  {}\n", printable(line)));
     Ok(lines.chain([format!("{}\n", out.display())]).collect())
 }
@@ -94,25 +94,19 @@ pub fn run(args: &Preset) -> Result<String> {
 /// As [`run`].
 pub fn of_machine(file: &Path, tuned: &Tuned, out: &Path) -> Result<()> {
     let mut preset = Made::open(file)?;
-    motor::set(&mut preset, tuned)?;
-    write(preset, Some(tuned), None, None, out).map(drop)
+    let course = motor::set(&mut preset, tuned)?;
+    preset.write(None, Some(&course), out).map(drop)
 }
 
-fn write(
-    preset: Made,
-    tuned: Option<&Tuned>,
-    name: Option<&str>,
-    stimuli: Option<&Path>,
-    out: &Path,
-) -> Result<Vec<String>> {
-    let dir = tempfile::tempdir()?;
-    let mut fed = stimuli.map(Path::to_owned);
-    if let (None, Some(tuned)) = (stimuli, tuned) {
-        let path = dir.path().join("stimuli.csv");
-        std::fs::write(&path, motor::stimuli(preset.own(), tuned))?;
-        fed = Some(path);
-    }
-    preset.write(name, fed.as_deref(), out)
+/// The default experiment that a file feeds.
+fn course(path: &Path) -> Result<Course> {
+    let of = || format!("--stimuli {}", path.display());
+    let stimuli = std::fs::read_to_string(path).with_context(of)?;
+    let wrong = |cause: String| anyhow!("--stimuli {cause}");
+    Schedule::read_csv(path).map_err(wrong)?;
+    let last = stimuli.lines().rfind(|line| !line.trim().is_empty()).and_then(|line| line.split([',', ';']).next());
+    let stop = last.and_then(|time| time.trim().parse().ok()).with_context(|| format!("{}: has no last time", of()))?;
+    Ok(Course { stimuli, stop, step: None })
 }
 
 /// A name for users that is also one for files on every system, because the reference files have it.
