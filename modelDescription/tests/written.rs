@@ -52,6 +52,18 @@ fn header() {
     }
 }
 
+/// What users see has a name of its own; the binary keeps its name.
+#[test]
+fn a_title_is_the_name_of_the_model() {
+    for version in VERSIONS {
+        let titled = Description { title: Some("My <motor>".into()), ..exchange_sample() };
+        let md = read(write(&titled, version, &generation())).unwrap();
+        assert_eq!(md.model_name, "My <motor>");
+        let identifiers = [md.co_simulation, md.model_exchange].map(|interface| interface.unwrap().model_identifier);
+        assert_eq!(identifiers, [exchange_sample().name, exchange_sample().name]);
+    }
+}
+
 #[test]
 fn capabilities() {
     for (version, state) in VERSIONS.into_iter().zip(["FMUstate", "FMUState"]) {
