@@ -1,5 +1,9 @@
 //! `documentation/index.html`: a self-contained page generated from the description.
 
+mod preset;
+
+pub use preset::preset;
+
 use fmu_core::IntegerType;
 use fmu_core::description::{Description, Member, Value, Variable, VariableKind};
 use fmu_core::terminal::MemberKind;
@@ -16,7 +20,7 @@ const STYLE: &str = include_str!("documentation.css");
 
 /// The whole page.
 pub fn page(d: &Description, version: FmiVersion) -> String {
-    let name = escape(&d.name);
+    let name = escape(d.model_name());
     let exchange = if d.model_exchange.is_some() { " and Model Exchange" } else { "" };
     let head = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\

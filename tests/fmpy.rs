@@ -27,6 +27,11 @@ fn losses_and_temperatures() {
 }
 
 #[test]
+fn drive_trains() {
+    pytest("fmpy", "trains", &["test_drive_train.py"], &[]);
+}
+
+#[test]
 fn model_exchange_and_events() {
     pytest("fmpy", "exchange", &["test_model_exchange.py", "test_casadi.py"], &[]);
 }

@@ -1,5 +1,5 @@
-//! The packed FMUs in importers other than FMPy: Ecos, libcosim, an fmucontainer, PathSim, and on demand jaxonomy, fmi-sim and
-//! rust-fmi. Each runs a start-up and a load step, and is compared with the native run of the same exchange order.
+//! The packed FMUs in importers other than FMPy: Ecos, libcosim, an fmucontainer, PathSim, fmuloader, and on demand sofirpy,
+//! gemseo-fmu, jaxonomy, fmi-sim and rust-fmi. Each runs a start-up and a load step, and is compared with the native run of the same exchange order.
 #![allow(missing_docs)]
 
 mod common;
@@ -19,9 +19,9 @@ fn references() -> PathBuf {
 }
 
 #[test]
-fn ecos_libcosim_fmucontainer_and_pathsim() {
+fn ecos_libcosim_fmucontainer_pathsim_and_fmuloader() {
     let file = references();
-    let files = ["test_ecos.py", "test_libcosim.py", "test_fmucontainer.py", "test_pathsim.py"];
+    let files = ["test_ecos.py", "test_libcosim.py", "test_fmucontainer.py", "test_pathsim.py", "test_fmuloader.py"];
     pytest("importers", "importers", &files, &[("FMU_REFERENCE", &file)]);
 }
 
@@ -34,6 +34,20 @@ fn pathsim_in_model_exchange() {
     build::run(&template).unwrap();
     let variables = [("FMU_REFERENCE", &*references()), ("FMU_OWN", &*own)];
     pytest("importers", "pathsim-exchange", &["test_pathsim_exchange.py"], &variables);
+}
+
+/// sofirpy runs pair and drive of FMI 2.0.
+#[test]
+#[ignore = "needs PyPI, and installs 450 MB: a minute or two"]
+fn sofirpy() {
+    pytest_with("sofirpy.txt", "importers", "sofirpy", &["test_sofirpy.py"], &[("FMU_REFERENCE", &references())]);
+}
+
+/// gemseo-fmu runs the drive of FMI 2.0.
+#[test]
+#[ignore = "needs PyPI, and installs 1.1 GB: some minutes"]
+fn gemseo() {
+    pytest_with("gemseo.txt", "importers", "gemseo", &["test_gemseo.py"], &[("FMU_REFERENCE", &references())]);
 }
 
 /// jaxonomy runs the whole drive.

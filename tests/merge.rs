@@ -50,7 +50,7 @@ fn replace(files: &mut Files, name: &str, from: &str, to: &str) {
 
 fn merged(files: &[&Path], out: &Path) -> Result<(), String> {
     let files = files.iter().map(|p| p.to_path_buf()).collect();
-    merge::run(&Merge { files, out: out.into() }).map_err(|e| format!("{e:#}"))
+    merge::run(&Merge { files, out: out.into(), linux64: None }).map_err(|e| format!("{e:#}"))
 }
 
 /// A copy of the plant for another platform, built an hour later.

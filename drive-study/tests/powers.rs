@@ -42,7 +42,7 @@ impl SteppedPlant {
         if mechanics.imposed { 0.0 } else { 0.5 * mechanics.J * self.block.out.speed * self.block.out.speed }
     }
 
-    /// Energy in J that is stored or has left: what `energy.in` must be, but for a constant.
+    /// Energy in J that is stored or has left: what `energy_in` must be, but for a constant.
     fn accounted(&self) -> f64 {
         let energy = &self.block.out.energy;
         energy.mech + energy.loss + self.magnetic() + self.kinetic()
@@ -270,16 +270,16 @@ fn imposed(h: f64, steps: u32) -> (f64, f64, f64) {
     plant.block.initialize();
     let PlantParameters { motor, mechanics, .. } = plant.block.model.parameters.clone();
     let (mut apart, mut speed, mut off, mut fastest) = (0.0_f64, run[0].0, 0.0_f64, 0.0_f64);
-    let mut tau = plant.block.out.tau_shaft;
     for &(w, angle, u, i) in &run {
         off = off.max((speed - w).abs());
         let inputs = &mut plant.block.model.inputs;
         (inputs.u, inputs.speed_shaft, inputs.angle_shaft) = (Phases::from_stator(u), w, angle);
         plant.step(h);
-        let (out, tau_last) = (&plant.block.out, tau);
-        tau = out.tau_shaft;
-        speed += h * (0.5 * (tau + tau_last) - 0.4) / mechanics.J;
-        fastest = fastest.max((tau - 0.4).abs() / mechanics.J);
+        let out = &plant.block.out;
+        // The torque is the mean over the step.
+        let acceleration = (out.powers.tau_shaft - 0.4) / mechanics.J;
+        speed += h * acceleration;
+        fastest = fastest.max(acceleration.abs());
         apart = apart.max((out.i.a - i.a).abs()).max((out.i.b - i.b).abs()).max((out.i.c - i.c).abs());
     }
     let psi = motor.psi_M + (motor.L_q - motor.L_d) * 10.0;

@@ -6,11 +6,13 @@
 //! plant and controller also stop at the sample instants in between; an importer's exchange cannot do this.
 //!
 //! In Model Exchange, the importer integrates the plant's states. At every sample instant, an event passes the voltages
-//! of the last sample to the plant and its currents to the controller, in the order of [`Pair::step`].
+//! of the last sample to the plant and its currents to the controller, in the order of [`Pair::step`]: [`exchange`].
 
-use crate::PmsmPlant;
-#[cfg(doc)]
-use crate::SensorlessController;
+mod exchange;
+mod period;
+
+pub use period::Means;
+
 use crate::control::signals::ControllerOutputs;
 use crate::control::tables::{
     self, ADAPTATION_OUTPUTS, ControllerParameters, ENABLED, LATER_OUTPUTS, LIMITED, LOCK_LOST,
@@ -22,14 +24,15 @@ use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::thermal::{THERMAL_INPUTS, THERMAL_OUTPUTS, ThermalInputs};
-use crate::plant::{power::Powers, tables as plant, tables::PlantParameters};
-use fmu_core::events::{bounded, grid};
+use crate::plant::{tables as plant, tables::PlantParameters};
+#[cfg(doc)]
+use crate::{PmsmPlant, SensorlessController};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, RADIAN, SPEED, VOLT};
 use fmu_core::{
-    Block, ContinuousTime, Differentiable, Elapsed, Events, Experiment, Fault, Indicator, Info, Interface, Model, Next,
-    Outcome, Part, Row, SampleGrid, Sampled, State, Step, Table, Terminal, Warns,
+    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, SampleGrid, Step, Table, Terminal, Warns,
 };
+use period::{MEANS, Period};
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of samples in one communication step.
@@ -78,6 +81,8 @@ pub struct DriveOutputs {
     pub plant: PlantOutputs,
     /// The controller's.
     pub controller: ControllerOutputs,
+    /// Means over the last sample period, in both interfaces.
+    pub means: Means,
 }
 
 /// A complete sensorless drive.
@@ -90,31 +95,6 @@ pub struct PmsmDrive {
     /// Model Exchange: voltages of the plant, and whether its gates switch, since the last sample.
     before: (Phases, bool),
     period: Period,
-}
-
-/// Mean powers over the sample periods; a communication step may end within a period.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Period {
-    /// Mean over the last complete period.
-    last: Powers,
-    /// Mean over the current period so far.
-    mean: Powers,
-    /// Elapsed part of the current period in s.
-    time: f64,
-}
-
-impl Period {
-    /// Adds the `powers` of a step of `h` (s), at whose end a period may end.
-    fn add(&mut self, powers: Powers, h: f64, ends: bool) {
-        self.time += h;
-        // A step of a whole period is taken unchanged, to the last bit.
-        let mean = if self.time > h { self.mean.with(powers, h / self.time) } else { powers };
-        if ends {
-            (self.last, self.time) = (mean, 0.0);
-        } else {
-            self.mean = mean;
-        }
-    }
 }
 
 impl PmsmDrive {
@@ -133,14 +113,6 @@ impl PmsmDrive {
         let DriveInputs { tau_load, u_dc, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
         let PlantInputs { u, enable, .. } = self.pair.plant.model.inputs;
         PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, thermal }
-    }
-
-    /// The outputs of the controller's last sample become visible and act on the plant.
-    fn show(&mut self, now: Elapsed) {
-        let Pair { plant, controller, .. } = &mut self.pair;
-        controller.model.show();
-        controller.model.output(now, &mut controller.out);
-        plant.model.inputs.apply(&controller.out);
     }
 }
 
@@ -161,7 +133,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 12;
+    const STATE_VERSION: u16 = 13;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -181,7 +153,7 @@ impl Model for PmsmDrive {
     fn initialize(&mut self) {
         self.set_inputs();
         self.pair.initialize();
-        self.period = Period { last: self.pair.plant.out.powers, ..Period::default() };
+        self.period = Period::new(self.pair.plant.out.powers);
         self.before = (self.pair.plant.model.inputs.u, self.pair.plant.model.inputs.enable);
     }
 
@@ -189,6 +161,7 @@ impl Model for PmsmDrive {
         let (Block { model, out: plant }, powers) = (&self.pair.plant, self.period.last);
         out.plant = plant.with(powers, model.heat(&model.inputs, &plant.temperatures, &powers.losses));
         out.controller.clone_from(&self.pair.controller.out);
+        out.means = self.period.means();
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
@@ -239,84 +212,22 @@ fn in_part(part: &str, fault: &Fault) -> Fault {
     Fault::new(format!("{part}.{fault}"))
 }
 
-impl ContinuousTime for PmsmDrive {
-    const STATES: &'static [State<Self>] = &[
-        State::of_part(&PmsmPlant::STATES[0], |m: &mut Self| (PmsmPlant::STATES[0].at)(&mut m.pair.plant.model)),
-        State::of_part(&PmsmPlant::STATES[1], |m: &mut Self| (PmsmPlant::STATES[1].at)(&mut m.pair.plant.model)),
-        State::of_part(&PmsmPlant::STATES[2], |m: &mut Self| (PmsmPlant::STATES[2].at)(&mut m.pair.plant.model)),
-        State::of_part(&PmsmPlant::STATES[3], |m: &mut Self| (PmsmPlant::STATES[3].at)(&mut m.pair.plant.model)),
-    ];
-
-    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
-        self.pair.plant.model.derivatives_under(&self.plant_inputs(), dx)
-    }
-
-    fn settle(&mut self) {
-        self.pair.plant.model.settle();
-    }
-
-    fn observe(&self, _now: Elapsed, outputs: &mut DriveOutputs) {
-        outputs.plant = self.pair.plant.model.outputs_under(&self.plant_inputs());
-        outputs.controller.clone_from(&self.pair.controller.out);
-    }
-
-    fn integrands(&self, _now: Elapsed, outputs: &mut DriveOutputs) {
-        outputs.plant.energy = self.pair.plant.model.outputs_under(&self.plant_inputs()).powers.into();
-    }
-}
-
-impl Differentiable for PmsmDrive {
-    fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut DriveOutputs) -> Result<(), Fault> {
-        // The controller's outputs are held.
-        let change = PlantInputs { u: Phases::default(), ..along.plant_inputs() };
-        let inputs = self.plant_inputs().changing(&change);
-        outputs.plant = self.pair.plant.model.tangent_under(&inputs, &along.pair.plant.model, dx);
-        outputs.controller = ControllerOutputs::default();
-        Ok(())
-    }
-}
-
-impl Events for PmsmDrive {
-    const INDICATORS: &'static [Indicator] = PmsmPlant::INDICATORS;
-
-    fn indicators(&self, _now: Elapsed, z: &mut [f64]) {
-        self.pair.plant.model.indicators_under(&self.plant_inputs(), z);
-    }
-
-    fn begin(&mut self, now: Elapsed) {
-        let controller = &self.pair.controller.model;
-        if grid(controller).reached(controller.samples(), now) {
-            self.show(now);
-        }
-    }
-
-    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault> {
-        self.set_inputs();
-        bounded(&self.pair.controller.model, now)?;
-        let grid = grid(&self.pair.controller.model);
-        while grid.reached(self.pair.controller.model.samples(), now) {
-            self.show(now);
-            // With iron loss, the currents depend on the voltages: the controller samples them before they change.
-            let shown = self.pair.plant.model.inputs.clone();
-            let Pair { plant, controller, .. } = &mut self.pair;
-            (plant.model.inputs.u, plant.model.inputs.enable) = self.before;
-            plant.model.observe(now, &mut plant.out);
-            plant.model.inputs = shown;
-            controller.model.inputs.measure(plant.out.measured());
-            controller.model.sample()?;
-            let PlantInputs { u, enable, .. } = plant.model.inputs;
-            self.before = (u, enable);
-        }
-        self.pair.plant.model.event(now)
-    }
-
-    fn next(&self, now: Elapsed) -> Next {
-        self.pair.controller.model.next(now)
-    }
-}
+/// Back EMF over the voltage of the DC link above which the drive does not decide on the speed of its shaft.
+const DRIVEN: f64 = 3.0;
 
 impl Warns for PmsmDrive {
     fn warn(&self, log: &mut Warnings<'_>) {
+        let (plant, u_dc, lock_lost) = (&self.pair.plant.model, self.inputs.u_dc, self.pair.controller.out.lock_lost);
+        let (speed, emf) = plant.speed_and_emf();
+        if lock_lost >= 1.0 && emf > DRIVEN * u_dc {
+            let remedy = if plant.parameters.mechanics.imposed { "" } else { " or use plant.mechanics.imposed" };
+            return log.warn("driven", || {
+                format!(
+                    "lock_lost = {lock_lost:.2}: at {speed} rad/s the back EMF is {emf:.0} V line to line, and u_dc = {u_dc} V \
+                     cannot hold the shaft: its load drives it, or the coupling is unstable; shorten the communication step{remedy}"
+                )
+            });
+        }
         self.pair.controller.model.warn(log);
     }
 }
@@ -382,6 +293,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 &Part { table: ESTIMATORS, lens: |m| &mut m.model.pair.controller.model.parameters.estimators },
             ),
             V::part("", &Part { table: LATEST, lens: |m| &mut m.model.pair.controller.model.parameters }),
+            V::part("", &Part { table: MEANS, lens: |m| &mut m.out.means }),
         ]
     },
 );
@@ -515,8 +427,8 @@ mod tests {
             angle += 1e-3 * speed;
             let (ours, theirs) = (&drive.out.plant, &pair.plant.out);
             assert!((ours.angle - angle).abs() < 1e-9 && (ours.theta_e - theirs.theta_e).abs() < 1e-9);
-            assert!((ours.tau_shaft - theirs.tau_shaft).abs() < 1e-6, "{ours:?} {theirs:?}");
+            assert!((ours.powers.tau_shaft - theirs.powers.tau_shaft).abs() < 1e-6, "{ours:?} {theirs:?}");
         }
-        assert!(drive.out.plant.tau_shaft.abs() > 1.0, "{:?}", drive.out.plant);
+        assert!(drive.out.plant.powers.tau_shaft.abs() > 1.0, "{:?}", drive.out.plant);
     }
 }

@@ -266,12 +266,12 @@ fn an_imposed_shaft_replaces_the_mechanical_states() {
         let (a, b) = (&plant.stepped.out, &plant.integrated.out);
         let (di, dw) = apart(a, b);
         assert!(di < 1e-5 && dw == 0.0, "{k}: {di} A, {dw} rad/s");
-        assert!((a.angle - b.angle).abs() < 1e-9 && (a.tau_shaft - b.tau_shaft).abs() < 1e-5, "{a:?} {b:?}");
+        assert!((a.angle - b.angle).abs() < 1e-9 && (a.tau_e - b.tau_e).abs() < 1e-5, "{a:?} {b:?}");
         // The state goes with the angle of the shaft too.
         let state = *(PmsmPlant::STATES[3].at)(&mut plant.integrated.model);
         assert!((state - b.angle).abs() < 1e-9, "{state} {}", b.angle);
     }
-    assert!(plant.stepped.out.tau_shaft.abs() > 0.5, "{:?}", plant.stepped.out);
+    assert!(plant.stepped.out.tau_e.abs() > 0.5, "{:?}", plant.stepped.out);
 }
 
 /// One step of `h` (s) of Heun's method with an input that moves.
@@ -413,20 +413,24 @@ fn a_lost_rotor_is_warned_of() {
         found
     };
     let mut block = controller();
-    assert_eq!(warnings(&block.model), []);
-    // A voltage that no machine current answers.
-    block.model.inputs = ControllerInputs { speed_ref: 100.0, ..ControllerInputs::default() };
     let mut now = Elapsed::ZERO;
-    while block.out.lock_lost < 1.0 {
-        let step = Step { start: now, h: T_S };
-        block.step(&step).unwrap();
-        now = step.end();
-        assert!(now.seconds() < 1.0);
+    // A voltage that no machine current answers. At speed, no wrong resistance explains it.
+    for (speed_ref, resistance) in [(10.0, true), (100.0, false)] {
+        (block, now) = (controller(), Elapsed::ZERO);
+        assert_eq!(warnings(&block.model), []);
+        block.model.inputs = ControllerInputs { speed_ref, ..ControllerInputs::default() };
+        while block.out.lock_lost < 1.0 {
+            let step = Step { start: now, h: T_S };
+            block.step(&step).unwrap();
+            now = step.end();
+            assert!(now.seconds() < 1.0);
+        }
+        let found = warnings(&block.model);
+        println!("{found:?}");
+        assert!(found.len() == 1 && found[0].0 == "lock_lost", "{found:?}");
+        assert!(found[0].1.contains("rad/s") && found[0].1.contains("L_q = 0.006 H"), "{found:?}");
+        assert_eq!(found[0].1.contains("R_s = 1.8 Ohm"), resistance, "{found:?}");
     }
-    let found = warnings(&block.model);
-    println!("{found:?}");
-    assert!(found.len() == 1 && found[0].0 == "lock_lost", "{found:?}");
-    assert!(found[0].1.contains("rad/s") && found[0].1.contains("R_s = 1.8 Ohm"), "{found:?}");
     // A current beyond all measure: the estimate turns too fast, the controller restarts.
     block.model.inputs.i = Phases { a: 1e12, b: -1e12, c: 3e11 };
     let mut keys = Vec::new();

@@ -280,12 +280,22 @@ impl Instance<'_> {
             Some(status)
         })?;
         self.must("SerializedFMUStateSize", status)?;
-        let mut out = (Vec::new(), true);
+        let (mut out, mut too_large) = ((Vec::new(), true), None);
         let status = self.call(&format!("SerializeFMUState(size={size})"), |raw| {
-            let (status, bytes, intact) = raw.serialize(self.handle, state, size)?;
-            out = (bytes, intact);
-            Some(status)
+            match raw.serialize(self.handle, state, size) {
+                Ok(done) => done.map(|(status, bytes, intact)| {
+                    out = (bytes, intact);
+                    status
+                }),
+                Err(why) => {
+                    too_large = Some(why);
+                    Some(Status::ERROR)
+                }
+            }
         })?;
+        if let Some(why) = too_large {
+            return Err(NotDetermined(why));
+        }
         self.must("SerializeFMUState", status)?;
         if !out.1 {
             return Err(NotDetermined(format!("SerializeFMUState wrote past its {size} bytes")));

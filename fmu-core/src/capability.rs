@@ -3,7 +3,7 @@
 //! A capability is a trait of its own, named in the line that exports the model. What a model does not name costs it
 //! nothing: its entry is `None`, known to the compiler.
 
-use crate::continuous::{ContinuousTime, Differentiable, State};
+use crate::continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 use crate::events::{Events, Indicator, Next, Outcome, Sampled};
 use crate::log::Warnings;
 use crate::variable::{Causality, Kind, Meta, Variability};
@@ -62,6 +62,9 @@ pub struct Samples<M: Model> {
 /// [`Differentiable::tangent`].
 pub type Tangent<M> = fn(&M, Elapsed, &M, &mut [f64], &mut <M as Model>::Outputs) -> Result<(), Fault>;
 
+/// [`CompletedSteps::complete`].
+pub type Complete<M> = fn(&mut M, Elapsed) -> Result<(), Fault>;
+
 /// The capabilities of the model `M`: `Capabilities::NONE.ContinuousTime().Events()`. A method exists only if the model
 /// implements the trait of its name.
 pub struct Capabilities<M: Model> {
@@ -73,6 +76,8 @@ pub struct Capabilities<M: Model> {
     pub samples: Option<Samples<M>>,
     /// Of a [`Differentiable`] model.
     pub tangent: Option<Tangent<M>>,
+    /// Of a model that follows [`CompletedSteps`].
+    pub complete: Option<Complete<M>>,
     /// Of a model that [`Warns`].
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,
 }
@@ -80,7 +85,8 @@ pub struct Capabilities<M: Model> {
 #[allow(non_snake_case, reason = "each method bears the name of its trait, as the line that exports a model has it")]
 impl<M: Model> Capabilities<M> {
     /// Co-simulation only.
-    pub const NONE: Self = Self { continuous: None, events: None, samples: None, tangent: None, warn: None };
+    pub const NONE: Self =
+        Self { continuous: None, events: None, samples: None, tangent: None, complete: None, warn: None };
 
     /// Adds [`ContinuousTime`].
     pub const fn ContinuousTime(self) -> Self
@@ -133,6 +139,14 @@ impl<M: Model> Capabilities<M> {
         M: Differentiable,
     {
         Self { tangent: Some(M::tangent), ..self }
+    }
+
+    /// Adds [`CompletedSteps`].
+    pub const fn CompletedSteps(self) -> Self
+    where
+        M: CompletedSteps,
+    {
+        Self { complete: Some(M::complete), ..self }
     }
 
     /// Adds [`Warns`].
@@ -211,7 +225,7 @@ impl<M: Model> Capabilities<M> {
             hash = hash.text(self.indicators()[i].name);
             i += 1;
         }
-        hash
+        if self.complete.is_some() { hash.text("CompletedSteps") } else { hash }
     }
 }
 

@@ -62,6 +62,20 @@ pub trait ContinuousTime: Model {
     fn integrands(&self, _now: Elapsed, _outputs: &mut Self::Outputs) {}
 }
 
+/// A continuous model that follows the solution in Model Exchange, for example to count what passes between two of its points.
+///
+/// A solver also tries states that it gives up again; a model without this trait cannot tell them apart. In Co-Simulation,
+/// [`Model::advance`] knows the solution, and nothing here is called.
+pub trait CompletedSteps: ContinuousTime {
+    /// The solution passes through the present states, inputs and time: a step of the importer's solver is complete, or Event
+    /// Mode begins (before [`Events::begin`](crate::Events::begin)) or ends. Time stands still or goes on from call to call.
+    /// An importer that ignores the request for completed steps calls at events only.
+    ///
+    /// # Errors
+    /// Gives the reason why the model cannot go on.
+    fn complete(&mut self, now: Elapsed) -> Result<(), Fault>;
+}
+
 /// A continuous model that knows its own tangent, for example with [`Dual`](crate::Dual) numbers. For a model that
 /// does not, the exporter takes a central difference.
 pub trait Differentiable: ContinuousTime {

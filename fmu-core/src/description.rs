@@ -14,16 +14,17 @@ use crate::row::{Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
-/// Value reference of the independent variable `time`; the table's variable `i` has value reference `i + 1`.
+/// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
 
 /// Everything that an importer can know about a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Description {
-    /// Name and model identifier.
+    /// Model identifier, and the name that users see unless there is a title.
     pub name: String,
+    /// Name of this FMU for its users, as a preset may have one of its own.
+    pub title: Option<String>,
     /// One sentence.
     pub description: String,
     /// Version of the model.
@@ -61,6 +62,8 @@ pub struct ModelExchange {
     pub indicators: Vec<u32>,
     /// Co-simulation with Event Mode and early return (FMI 3.0).
     pub event_mode: bool,
+    /// The importer is to tell completed integrator steps.
+    pub completed_steps: bool,
 }
 
 /// A variable of the description.
@@ -163,7 +166,7 @@ impl Description {
     /// # Errors
     /// As [`exported`](Self::exported).
     pub fn of<M: Model>() -> Result<Self, Fault> {
-        Self::with(&Capabilities::<M>::NONE, None)
+        Self::with(&Capabilities::<M>::NONE, fresh()?)
     }
 
     /// Describes a model as it is exported; start values come from its `Default`, dependencies from probing it.
@@ -172,20 +175,18 @@ impl Description {
     /// Reports problems that no compile-time check can find: a name shared by two parts, a start value outside its
     /// range, a type definition named like a variable, a terminal with missing variables, a state without a row.
     pub fn exported<E: Exported>() -> Result<Self, Fault> {
-        Self::loaded::<E>(None)
+        Self::instantiated::<E>(fresh()?)
     }
 
-    /// As [`exported`](Self::exported), with the folder of the model's resources.
+    /// As [`exported`](Self::exported), with the start values and the resources that `block` has.
     ///
     /// # Errors
-    /// As [`exported`](Self::exported) and [`Model::load`].
-    pub fn loaded<E: Exported>(resources: Option<&Path>) -> Result<Self, Fault> {
-        Self::with(&E::CAN, resources)
+    /// As [`exported`](Self::exported).
+    pub fn instantiated<E: Exported>(block: Block<E::Model>) -> Result<Self, Fault> {
+        Self::with(&E::CAN, block)
     }
 
-    fn with<M: Model>(can: &Capabilities<M>, resources: Option<&Path>) -> Result<Self, Fault> {
-        let mut block = Block::<M>::default();
-        block.model.load(resources)?;
+    fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>) -> Result<Self, Fault> {
         let states = can.rows()?;
         let initial = probe::initial_dependencies(can, &block, &states);
         let between = probe::dependencies(can, &block, &states);
@@ -256,10 +257,12 @@ impl Description {
             derivatives: (0..states.len()).map(after).collect(),
             indicators: (0..can.indicators().len()).map(|i| after(states.len() + i)).collect(),
             event_mode: can.event_mode(),
+            completed_steps: can.complete.is_some(),
         });
         let info = M::INFO;
         Ok(Self {
             name: info.name.into(),
+            title: None,
             description: info.description.into(),
             version: info.version.into(),
             author: info.author.into(),
@@ -273,6 +276,11 @@ impl Description {
             icon: M::ICON.map(Into::into),
             model_exchange,
         })
+    }
+
+    /// The name that users see.
+    pub fn model_name(&self) -> &str {
+        self.title.as_deref().unwrap_or(&self.name)
     }
 
     /// The variable of this name.
@@ -297,6 +305,13 @@ impl Variable {
     pub fn elements(&self) -> usize {
         self.shape.iter().product()
     }
+}
+
+/// A model without resources.
+fn fresh<M: Model>() -> Result<Block<M>, Fault> {
+    let mut block = Block::<M>::default();
+    block.model.load(None)?;
+    Ok(block)
 }
 
 /// The dependencies of an array are those of its elements together.

@@ -74,8 +74,9 @@
 //! # Ok::<(), Fault>(())
 //! ```
 //!
-//! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`] and
-//! [`Warns`] are what a model can do besides; [`Model::load`] reads files that the FMU brings along.
+//! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
+//! [`CompletedSteps`] and [`Warns`] are what a model can do besides; [`Model::load`] reads files that the FMU brings along, and
+//! a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`table`], [`terminal`], [`model`],
 //! [`continuous`], [`events`], [`capability`], [`description`]. No motor, no XML, no C, no `unsafe`.
@@ -94,6 +95,7 @@ pub mod integrate;
 pub mod log;
 pub mod model;
 pub mod need;
+pub mod preset;
 mod probe;
 pub mod reals;
 pub mod resource;
@@ -106,7 +108,7 @@ pub mod unit;
 pub mod variable;
 
 pub use capability::{Capabilities, Exported, Plain, Warns};
-pub use continuous::{ContinuousTime, Differentiable, State};
+pub use continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 pub use description::Description;
 pub use dual::{Dual, Scalar};
 pub use enumeration::{Choice, Enumerated, Field};

@@ -1,7 +1,8 @@
 //! The instantiation token: a hash of the interface, computed while compiling.
 //!
 //! Binaries of one model built separately, for several platforms, have the same token; a changed name, unit, range or
-//! version changes it. The token is a 128-bit FNV-1a hash, written as a GUID.
+//! version changes it. The token is a 128-bit FNV-1a hash, written as a GUID. Every number enters it with a fixed width, so that
+//! 32-bit and 64-bit compilers compute one token.
 
 use crate::integer::IntegerType;
 use crate::unit::Quantity;
@@ -28,7 +29,12 @@ impl Hash {
 
     /// Hash of this and a text with its length.
     pub const fn text(self, text: &str) -> Self {
-        self.bytes(text.as_bytes()).bytes(&text.len().to_le_bytes())
+        self.bytes(text.as_bytes()).count(text.len())
+    }
+
+    /// Hash of this and a number of bytes, elements or extents, in 64 bits whatever the platform's `usize` has.
+    const fn count(self, n: usize) -> Self {
+        self.bytes(&(n as u64).to_le_bytes())
     }
 
     /// Hash of this and another hash.
@@ -59,11 +65,11 @@ impl Hash {
             .number(range.min)
             .number(range.max)
             .number(nominal)
-            .bytes(&dimension.to_le_bytes());
+            .count(dimension);
         // Nothing for what older tables do not have: their tokens stay.
         let (mut hash, mut i) = (hash, 0);
         while i < meta.shape.len() {
-            hash = hash.bytes(&meta.shape[i].to_le_bytes());
+            hash = hash.count(meta.shape[i]);
             i += 1;
         }
         match meta.kind {
@@ -137,6 +143,8 @@ impl Token {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::unit::VOLT;
+    use crate::{Row, Table};
 
     #[test]
     fn known_fnv_vectors() {
@@ -144,6 +152,29 @@ mod tests {
         // FNV-1a 128 of "foobar", draft-eastlake-fnv.
         assert_eq!(Hash::START.bytes(b"foobar").0, 0x343e_1662_793c_64bf_6f0d_3597_ba44_6f18);
     }
+
+    struct Probe {
+        u: f64,
+        map: [f64; 3],
+        weights: [f64; 6],
+    }
+
+    const TABLE: &Table<Probe> = &Table::new(
+        const {
+            &[
+                Row::input("u", &VOLT, "", |m: &mut Probe| &mut m.u),
+                Row::array_parameter("map", &VOLT, "", 3, |m: &mut Probe| &mut m.map),
+                Row::array_parameter("weights", &VOLT, "", 6, |m: &mut Probe| &mut m.weights).shape(&[2, 3]),
+            ]
+        },
+    );
+
+    /// The compiler judges this for every target: one with a `usize` of 32 bits hashes lengths, dimensions and extents as one
+    /// with 64 bits does. The values come from an FNV-1a written in Python over the fields in the order of `meta`.
+    const _: () = {
+        assert!(Hash::START.text("foobar").0 == 0x3517_208d_a565_faad_4add_dad2_61f9_235e, "the length of a text");
+        assert!(TABLE.hash().0 == 0x2cc7_0a10_6bbc_fb72_0707_9a93_1d41_6613, "dimensions and extents");
+    };
 
     #[test]
     fn guid_has_its_form() {

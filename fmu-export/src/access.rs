@@ -1,4 +1,4 @@
-//! Getting and setting variables by value reference: 0 is `time`, `i + 1` the variable `i` of the table, of the states'
+//! Getting and setting variables by value reference: 0 is `time` in FMI 3.0 and nothing in FMI 2.0, `i + 1` the variable `i` of the table, of the states'
 //! derivatives after it, or of the event indicators after them.
 
 use crate::instance::{Instance, Refusal};
@@ -13,6 +13,11 @@ use std::mem::MaybeUninit;
 #[inline]
 pub(crate) const fn index(reference: u32) -> usize {
     (reference as usize).wrapping_sub(1)
+}
+
+/// Whether the reference is that of `time`, which archives of FMI 2.0 do not have.
+pub(crate) fn is_time(reference: u32, standard: Standard) -> bool {
+    reference == TIME && standard == Standard::Fmi3
 }
 
 /// Whether a variable may be set in this state (FMI 2.0.5, 2.2.7, 3.2.3 and 4.2.4; FMI 3.0.2, 2.4.7.4).
@@ -89,7 +94,7 @@ impl<E: Exported> Instance<E> {
             }
             .into());
         }
-        let time = reference == TIME;
+        let time = is_time(reference, self.standard);
         let x = if time { Some(self.current.end) } else { self.calculated(index)? };
         match x {
             Some(x) => T::from_real(x).ok_or_else(|| message::real(time, T::CARRIES).into()),
@@ -205,7 +210,7 @@ impl<E: Exported> Instance<E> {
                 }
                 Some(_) => message::range::<E::Model>(index, meta, value),
             },
-            None if reference == TIME => message::real(true, T::CARRIES),
+            None if is_time(reference, self.standard) => message::real(true, T::CARRIES),
             None => self.beside_table(reference, T::CARRIES, true),
         }
     }
@@ -230,7 +235,7 @@ impl<E: Exported> Instance<E> {
         let Some(&reference) = references.first() else { return Ok(()) };
         match table::<E>().entry(&mut self.current.block, index(reference)) {
             Some((meta, _)) => Err(message::type_of::<E::Model>(index(reference), meta, carries)),
-            None if reference == TIME => Err(message::real(true, carries)),
+            None if is_time(reference, self.standard) => Err(message::real(true, carries)),
             None => Err(self.beside_table(reference, carries, false)),
         }
     }

@@ -20,7 +20,11 @@ pub struct Update {
 
 impl<E: Exported> Instance<E> {
     /// Event Mode begins.
-    pub fn enter_event(&mut self) {
+    ///
+    /// # Errors
+    /// What the model reports.
+    pub fn enter_event(&mut self) -> Result<(), Fault> {
+        self.complete()?;
         let current = &mut self.current;
         current.settled = current.settled.max(current.end);
         current.pending = true;
@@ -28,6 +32,15 @@ impl<E: Exported> Instance<E> {
             (events.begin)(&mut current.block.model, current.elapsed);
         }
         self.changed();
+        Ok(())
+    }
+
+    /// In Model Exchange, tells the model that the solution passes through the present point.
+    fn complete(&mut self) -> Result<(), Fault> {
+        let Some(complete) = E::CAN.complete.filter(|_| self.exchanges()) else { return Ok(()) };
+        complete(&mut self.current.block.model, self.current.elapsed)?;
+        self.stale = true;
+        Ok(())
     }
 
     /// Updates the discrete states with the inputs as they are set. Tunable parameters take effect here, all together.
@@ -72,7 +85,7 @@ impl<E: Exported> Instance<E> {
     pub fn leave_event(&mut self) -> Result<(), Fault> {
         for _ in 0..MAX_ITERATIONS {
             if !self.current.pending && !self.current.dirty {
-                return Ok(());
+                return self.complete();
             }
             self.update_discrete()?;
         }
@@ -108,9 +121,14 @@ impl<E: Exported> Instance<E> {
     }
 
     /// An integrator step is complete: no earlier time will be set.
-    pub fn completed_step(&mut self) {
+    ///
+    /// # Errors
+    /// What the model reports.
+    pub fn completed_step(&mut self) -> Result<(), Fault> {
+        self.complete()?;
         self.current.settled = self.current.settled.max(self.current.end);
         self.warn();
+        Ok(())
     }
 
     /// Sets all states.

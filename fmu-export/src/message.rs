@@ -52,10 +52,11 @@ pub(crate) fn narrow<M: Model>(index: usize, value: i128, of: IntegerType) -> Fa
 /// No variable has this value reference.
 #[cold]
 pub(crate) fn unknown<E: Exported>(reference: u32, standard: Standard) -> Fault {
-    // Event indicators are variables in FMI 3.0 only.
-    let indicators = if standard == Standard::Fmi3 { E::CAN.indicators().len() } else { 0 };
+    // Time and the event indicators are variables in FMI 3.0 only.
+    let (first, indicators) =
+        if standard == Standard::Fmi3 { (TIME, E::CAN.indicators().len()) } else { (TIME + 1, 0) };
     let last = E::Model::TABLE.len() + E::CAN.states().len() + indicators;
-    Fault::new(format!("value reference {reference} does not exist; 0 to {last} do"))
+    Fault::new(format!("value reference {reference} does not exist; {first} to {last} do"))
 }
 
 /// The reference belongs to an element that has no reference of its own in FMI 3.0.
@@ -103,13 +104,13 @@ pub(crate) fn count(given: usize, needed: usize) -> Fault {
     Fault::value("nValues", given, format_args!("{needed} for these value references"))
 }
 
-/// How an instance starts: what differs from the start values.
-pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>) -> String {
-    let mut fresh = Snapshot::<M>::default();
+/// How an instance starts: what differs from the start values, which are those of the model's `Default` unless it was `made` so.
+pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: Option<&Block<M>>) -> String {
+    let mut fresh = made.cloned().unwrap_or_default();
     let mut changes = Vec::new();
     for index in 0..M::TABLE.len() {
         let (Some((meta, new)), Some((_, old))) =
-            (M::TABLE.entry(&mut current.block, index), M::TABLE.entry(&mut fresh.block, index))
+            (M::TABLE.entry(&mut current.block, index), M::TABLE.entry(&mut fresh, index))
         else {
             continue;
         };

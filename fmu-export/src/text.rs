@@ -1,9 +1,8 @@
 //! Getting and setting texts. Those that were got are kept until the next are.
 
-use crate::access::{index, open};
+use crate::access::{index, is_time, open};
 use crate::instance::{Instance, Refusal};
 use crate::message;
-use fmu_core::description::TIME;
 use fmu_core::{Causality, Exported, Fault, Kind, Model, Slot};
 use std::ffi::{CStr, CString};
 
@@ -76,7 +75,7 @@ impl<E: Exported> Instance<E> {
         match E::Model::TABLE.locate(index) {
             Some((_, meta, _)) if meta.kind == Kind::Text => {}
             Some((_, meta, _)) => return Err(message::type_of::<E::Model>(index, meta, CARRIES)),
-            None if reference == TIME => return Err(message::real(true, CARRIES)),
+            None if is_time(reference, self.standard) => return Err(message::real(true, CARRIES)),
             None => return Err(self.beside_table(reference, CARRIES, false)),
         }
         let found = E::Model::TABLE.entry(&mut self.current.block, index);

@@ -21,13 +21,13 @@ fn no_allocation_while_simulating() {
         let fmu = Fmu::started(version);
         let mut state = null_mut();
         assert_eq!(fmu.save(&mut state), OK);
-        let mut values = [0.0; 6];
+        let mut values = [0.0; 5];
         let before = calls();
         for k in 0..100 {
             let t = f64::from(k) * 0.1;
             assert_eq!(fmu.set(&[U, K, U, K, U, GAIN], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), OK);
             assert_eq!(fmu.step(t, 0.1), OK);
-            assert_eq!(fmu.try_get(&[TIME, X, U, K, GAIN, DOUBLE_GAIN], &mut values), OK);
+            assert_eq!(fmu.try_get(&[X, U, K, GAIN, DOUBLE_GAIN], &mut values), OK);
             assert_eq!((fmu.save(&mut state), fmu.restore(state)), (OK, OK));
         }
         assert_eq!(calls(), before);

@@ -26,7 +26,7 @@ const BALL2: &[Line] = &[
     ("fmi2EnterInitializationMode", "", '.', |f| unsafe { fmi2EnterInitializationMode(f.it) }),
     ("fmi2Terminate", "vcs", 't', Fmu::terminate),
     ("fmi2Reset", "invcste", 'i', Fmu::reset),
-    ("fmi2GetReal", "nvcste", '.', |f| f.try_get(&[TIME, H, V, E, DER_H, DER_V], &mut [0.0; 6])),
+    ("fmi2GetReal", "nvcste", '.', |f| f.try_get(&[H, V, E, DER_H, DER_V], &mut [0.0; 5])),
     ("fmi2GetInteger", "nvcste", '.', |f| unsafe { fmi2GetInteger(f.it, &BOUNCES, 1, &mut Fmi2Integer(0)) }),
     ("fmi2GetBoolean", "nvcste", '.', |f| unsafe { fmi2GetBoolean(f.it, &RESTING, 1, &mut Fmi2Boolean(0)) }),
     ("fmi2GetString", "nvcste", '.', |f| unsafe { fmi2GetString(f.it, null(), 0, null_mut()) }),
@@ -238,8 +238,8 @@ fn bad_input_is_an_error_that_names_its_cause() {
         ('c', "c changes at events only", |f| f.set(&[C], &[0.1])),
         ('c', "m is a fixed parameter", |f| f.set(&[M], &[0.1])),
         ('c', "e is an output", |f| f.set(&[E], &[0.1])),
-        ('c', "value reference 22 does not exist; 0 to ", |f| f.set(&[UNKNOWN], &[0.1])),
-        ('c', "value reference 22 does not exist; 0 to ", |f| f.try_get(&[UNKNOWN], &mut [0.1])),
+        ('c', "value reference 22 does not exist; ", |f| f.set(&[UNKNOWN], &[0.1])),
+        ('c', "value reference 22 does not exist; ", |f| f.try_get(&[UNKNOWN], &mut [0.1])),
         ('c', "time = NaN", |f| f.set_time(f64::NAN)),
         ('c', "time = inf", |f| f.set_time(f64::INFINITY)),
         ('c', "time = -0.1", |f| f.set_time(-0.1)),
@@ -261,7 +261,7 @@ fn bad_input_is_an_error_that_names_its_cause() {
     for kind in ME {
         for (state, what, call) in wrong {
             let fmu = Fmu::in_state(kind, state);
-            let values = || [TIME, H, V, U, K, C, E, HELD].map(|vr| fmu.get(vr).to_bits());
+            let values = || [H, V, U, K, C, E, HELD].map(|vr| fmu.get(vr).to_bits());
             let before = values();
             assert_eq!(call(&fmu), ERROR, "{what} {kind:?}");
             let error = fmu.error();
@@ -326,7 +326,7 @@ fn time_goes_back_to_the_last_completed_step() {
         let fmu = Fmu::running(kind, 2.0);
         assert_eq!((fmu.set_time(2.2), fmu.set_time(2.1), fmu.set_time(2.0)), (OK, OK, OK));
         assert_eq!((fmu.set_time(2.2), fmu.completed(), fmu.set_time(2.25), fmu.set_time(2.2)), (OK, OK, OK, OK));
-        assert_eq!(fmu.get(TIME), 2.2);
+        assert!(kind == Kind::Me2 || fmu.get(TIME) == 2.2);
         assert_eq!(fmu.set_time(2.2 - 1e-15), OK, "a rounding error");
         assert_eq!(fmu.set_time(2.1), ERROR);
         assert!(fmu.error().contains("time = 2.1 is not allowed: finite and not before 2.2"));
@@ -527,13 +527,10 @@ fn warnings_come_once_a_second() {
             } else {
                 assert_eq!(fmu.step(t, 0.01).0, OK);
             }
+            let now = if kind.exchanges() { t } else { t + 0.01 };
             for message in fmu.messages() {
                 assert_eq!((message.status, message.category.as_str()), (1, "logStatusWarning"));
-                assert!(
-                    message.text.starts_with(&format!("it: at {} s: the ball ", fmu.get(TIME))),
-                    "{}",
-                    message.text
-                );
+                assert!(message.text.starts_with(&format!("it: at {now} s: the ball ")), "{}", message.text);
                 heard.push((message.text.contains("above the ground"), t));
             }
         }

@@ -24,7 +24,8 @@ fn a_panic_is_an_error_and_a_reset_recovers() {
         let mut before = null_mut();
         assert_eq!((fmu.save(&mut before), fmu.step(0.0, 0.1)), (OK, ERROR));
         assert_eq!(fmu.error(), format!("fmi{version}DoStep: a fault in the model's code (panic): the model panicked"));
-        assert_eq!((fmu.state(), fmu.get(TIME)), ('e', 0.0));
+        assert_eq!(fmu.state(), 'e');
+        assert!(version == 2 || fmu.get(TIME) == 0.0);
         // Back in Step Mode, where inputs can be set and fixed parameters cannot.
         assert_eq!((fmu.restore(before), fmu.set(&[U], &[1.0]), fmu.set(&[R], &[1.0])), (OK, OK, ERROR));
         assert_eq!((fmu.free_state(&mut before), fmu.reset(), fmu.enter(0.0, None), fmu.exit()), (OK, OK, OK, OK));

@@ -22,7 +22,7 @@ fn run(fmu: &Fmu, from: u32, to: u32, promise: bool) -> Vec<u64> {
         let t = f64::from(k) * H;
         assert_eq!(fmu.set(&[U, GAIN], &[t.sin(), 1.0 + t]), OK);
         assert_eq!(fmu.step_promising(t, H, promise), OK);
-        bits.extend([X, DOUBLE_GAIN, TIME].map(|vr| fmu.get(vr).to_bits()));
+        bits.extend([fmu.get(X), fmu.get(DOUBLE_GAIN), fmu.time()].map(f64::to_bits));
     }
     bits
 }
@@ -116,14 +116,15 @@ fn a_tunable_parameter_takes_effect_in_the_next_step() {
 fn tunable_parameters_that_do_not_fit_are_refused_by_the_step_which_changes_nothing() {
     for version in [2, 3] {
         let fmu = resistive(version);
-        let (x, count) = (fmu.get(X), fmu.get(TIME));
+        let (x, count) = (fmu.get(X), fmu.time());
         assert_eq!(fmu.set(&[GAIN], &[6.0]), OK);
         let mut pending = null_mut();
         assert_eq!(fmu.save(&mut pending), OK);
         let bytes = fmu.bytes();
         assert_eq!(fmu.step(H, H), ERROR);
         assert_eq!(fmu.error(), format!("fmi{version}DoStep: gain times motor.R is greater than 50"));
-        assert_eq!((fmu.get(X), fmu.get(TIME), fmu.get(GAIN), fmu.get(DOUBLE_GAIN)), (x, count, 6.0, 2.0));
+        assert_eq!((fmu.get(X), fmu.get(GAIN), fmu.get(DOUBLE_GAIN)), (x, 6.0, 2.0));
+        assert!(version == 2 || fmu.get(TIME) == count);
         assert_eq!(fmu.state(), 'e');
         // What was saved before the step still waits for its judgment, as bytes too; there is time to mend it.
         let mut stored = null_mut();

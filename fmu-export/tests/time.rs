@@ -18,9 +18,9 @@ fn a_step_begins_where_the_last_one_ended() {
             let h = 1e-3;
             let fmu = Fmu::new(version);
             assert_eq!((fmu.enter(start, None), fmu.exit()), (OK, OK));
-            assert_eq!(fmu.get(TIME), start);
+            assert_eq!(fmu.time(), start);
             assert_eq!(fmu.step(start, h), OK);
-            assert_eq!(fmu.get(TIME), start + h);
+            assert_eq!(fmu.time(), start + h);
             assert_eq!(fmu.step(start + h, h), OK);
             for away in [0.02 * h, -0.02 * h, h, -h, f64::NAN, f64::INFINITY] {
                 let fmu = Fmu::new(version);
@@ -32,7 +32,8 @@ fn a_step_begins_where_the_last_one_ended() {
                     message.contains("DoStep: currentCommunicationPoint = ")
                         && message.contains("the last step ended at")
                 );
-                assert_eq!((fmu.get(TIME), fmu.get(X)), (start + h, x));
+                assert_eq!(fmu.get(X), x);
+                assert!(version == 2 || fmu.get(TIME) == start + h);
                 assert_eq!(fmu.state(), 'e');
             }
         }
@@ -74,7 +75,7 @@ fn a_million_accumulated_steps() {
             assert_eq!(fmu.step(t, h), OK, "step {k} at {t}");
             t += h;
         }
-        assert_eq!(fmu.get(TIME), t);
+        assert_eq!(fmu.time(), t);
         assert_ne!(t, stop);
         assert_eq!(fmu.step(t, h), ERROR);
         assert!(fmu.error().contains("beyond the stop time"));

@@ -24,14 +24,14 @@ pub struct Generation {
 
 /// modelDescription.xml of an FMU; the same arguments give the same text.
 pub fn write(description: &Description, version: FmiVersion, generation: &Generation) -> String {
-    let units = types::units(description);
+    let units = types::units(description, version);
     let definitions = types::definitions(description, version);
     let root = header(description, version, generation).children(
         // The order of the schemas.
         [
             description.model_exchange.as_ref().map(|exchange| model_exchange(description, exchange, version)),
             Some(co_simulation(description, version)),
-            Some(units),
+            units,
             definitions,
             Some(log_categories(version)),
             Some(experiment(description)),
@@ -44,11 +44,17 @@ pub fn write(description: &Description, version: FmiVersion, generation: &Genera
     print(&root)
 }
 
-/// Whether the standard has room for the start values: an Integer of FMI 2.0 has 32 bits.
+/// Whether the standard has room for the variables: FMI 2.0 needs at least one, and its Integer has 32 bits.
 ///
 /// # Errors
 /// Names the variable, its value and the remedy.
 pub fn fits(description: &Description, version: FmiVersion) -> Result<(), String> {
+    if version == FmiVersion::V2 && description.variables.is_empty() {
+        let name = &description.name;
+        return Err(format!(
+            "{name} has no variable, and FMI 2.0 needs at least one: add one, or build for FMI 3.0 only, which has time"
+        ));
+    }
     let narrow = |value: &Value| matches!(value, Value::Integer(x) if i32::try_from(*x).is_err());
     for v in description.variables.iter().filter(|_| version == FmiVersion::V2) {
         if let (VariableKind::Integer(of), Some(Value::Integer(x))) =
@@ -72,7 +78,7 @@ fn header(description: &Description, version: FmiVersion, generation: &Generatio
     };
     Element::new("fmiModelDescription")
         .with("fmiVersion", version.to_string())
-        .with("modelName", &*description.name)
+        .with("modelName", description.model_name())
         .with(token, &*description.token)
         .with_text("description", &description.description)
         .with_text("author", &description.author)
@@ -93,10 +99,14 @@ fn number_of_indicators(description: &Description, version: FmiVersion) -> Optio
 
 /// FMI 2.0.5, 3.3.1; FMI 3.0.2, 2.4.2 and 3.4.
 fn model_exchange(description: &Description, exchange: &ModelExchange, version: FmiVersion) -> Element {
+    let (flag, needed) = match version {
+        FmiVersion::V2 => ("completedIntegratorStepNotNeeded", false),
+        FmiVersion::V3 => ("needsCompletedIntegratorStep", true),
+    };
     let element = Element::new("ModelExchange")
         .with("modelIdentifier", &*description.name)
         .with("needsExecutionTool", "false")
-        .with_some("completedIntegratorStepNotNeeded", (version == FmiVersion::V2).then_some("true"))
+        .with_some(flag, (needed == exchange.completed_steps).then_some("true"))
         .with("canBeInstantiatedOnlyOncePerProcess", "false");
     derivatives(states_and_memory(element, version), exchange, version)
 }

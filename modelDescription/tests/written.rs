@@ -52,6 +52,18 @@ fn header() {
     }
 }
 
+/// What users see has a name of its own; the binary keeps its name.
+#[test]
+fn a_title_is_the_name_of_the_model() {
+    for version in VERSIONS {
+        let titled = Description { title: Some("My <motor>".into()), ..exchange_sample() };
+        let md = read(write(&titled, version, &generation())).unwrap();
+        assert_eq!(md.model_name, "My <motor>");
+        let identifiers = [md.co_simulation, md.model_exchange].map(|interface| interface.unwrap().model_identifier);
+        assert_eq!(identifiers, [exchange_sample().name, exchange_sample().name]);
+    }
+}
+
 #[test]
 fn capabilities() {
     for (version, state) in VERSIONS.into_iter().zip(["FMUstate", "FMUState"]) {
@@ -105,12 +117,15 @@ const EXPECTED: [Expected; 12] = [
 fn variables_come_back() {
     for version in VERSIONS {
         let (md, sample) = (sample_read(version), sample());
-        // OMSimulator counts value references of FMI 3.0 from 1: time, which is 0, stands behind all others there.
-        let place = if version == FmiVersion::V2 { 0 } else { md.variables.len() - 1 };
-        let time = &md.variables[place];
-        assert_eq!((time.name.as_str(), time.value_reference, time.unit.as_deref()), ("time", 0, Some("s")), "V03");
-        assert_eq!((time.causality, time.variability), (Causality::Independent, Variability::Continuous), "V03");
-        assert_eq!((&time.start, time.initial), (&None, None), "V03");
+        if version == FmiVersion::V2 {
+            assert!(md.variables.iter().all(|v| v.causality != Causality::Independent && v.value_reference > 0), "V03");
+        } else {
+            // OMSimulator counts value references of FMI 3.0 from 1: time, which is 0, stands behind all others.
+            let time = md.variables.last().unwrap();
+            assert_eq!((time.name.as_str(), time.value_reference, time.unit.as_deref()), ("time", 0, Some("s")), "V03");
+            assert_eq!((time.causality, time.variability), (Causality::Independent, Variability::Continuous), "V03");
+            assert_eq!((&time.start, time.initial), (&None, None), "V03");
+        }
         for (name, base, causality, variability, initial, start) in EXPECTED {
             let array = name == "filter.b" && version == FmiVersion::V2;
             let v = md.variable(if array { "filter.b[1]" } else { name }).unwrap();
@@ -143,7 +158,7 @@ fn arrays() {
     let two = sample_read(FmiVersion::V2);
     for (i, start) in start.into_iter().enumerate() {
         let at = two.variables.iter().position(|v| v.name == format!("filter.b[{}]", i + 1)).unwrap();
-        assert_eq!(at, 4 + i, "V01: elements are contiguous");
+        assert_eq!(at, 3 + i, "V01: elements are contiguous");
         assert_eq!(usize::try_from(two.variables[at].value_reference), Ok(4 + i));
         assert_eq!(two.variables[at].start.as_ref().unwrap().parse(), Ok(start));
     }
@@ -154,7 +169,9 @@ fn units_and_types() {
     for version in VERSIONS {
         let md = sample_read(version);
         let names: Vec<_> = md.units.iter().map(|u| u.name.as_str()).collect();
-        assert_eq!(names, ["s", "V", "rad/s", "%"], "V09: used ones only, each once");
+        // Only time is in seconds.
+        let seconds: &[&str] = if version == FmiVersion::V3 { &["s"] } else { &[] };
+        assert_eq!(names, [seconds, &["V", "rad/s", "%"]].concat(), "V09: used ones only, each once");
         let base = |name: &str| md.unit(name).unwrap().base.unwrap();
         assert_eq!(
             (base("V").exponents, base("V").factor.to_bits()),
@@ -203,11 +220,12 @@ fn structure() {
                 of.iter().map(name).collect()
             })
             .collect();
-        let gain = match version {
-            FmiVersion::V2 => vec!["motor.n_p", "filter.b[1]", "filter.b[3]"],
-            FmiVersion::V3 => vec!["motor.n_p", "filter.b"],
+        // FMI 2.0 has no variable for time, so no unknown can name it.
+        let (gain, sector) = match version {
+            FmiVersion::V2 => (vec!["motor.n_p", "filter.b[1]", "filter.b[3]"], vec!["bandwidth"]),
+            FmiVersion::V3 => (vec!["motor.n_p", "filter.b"], vec!["time", "bandwidth"]),
         };
-        assert_eq!(dependencies, [gain, vec![], vec!["time", "bandwidth"], vec!["enable"]], "S03");
+        assert_eq!(dependencies, [gain, vec![], sector, vec!["enable"]], "S03");
     }
 }
 
@@ -253,8 +271,13 @@ fn a_model_without_outputs_has_no_empty_list() {
     for version in VERSIONS {
         let text = write(&bare, version, &generation());
         assert!(text.contains("<ModelStructure/>") && !text.contains("TypeDefinitions"), "X01: {text}");
-        assert_eq!(read(&text).unwrap().variables.len(), 1);
+        let time = usize::from(version == FmiVersion::V3);
+        assert_eq!(read(&text).map(|md| md.variables.len()).ok(), Some(time));
     }
+    // The schema of FMI 2.0 wants a variable.
+    let refusal = fits(&bare, FmiVersion::V2).unwrap_err();
+    assert!(refusal.contains(" has no variable, and FMI 2.0 needs at least one"), "{refusal}");
+    assert_eq!(fits(&bare, FmiVersion::V3), Ok(()));
 }
 
 /// FMI 2.0.5, 2.2.1, 2.2.7 and 2.2.8; FMI 3.0.2, 2.4.7.5 and 2.4.8.
@@ -278,8 +301,7 @@ fn model_exchange() {
         // The order of the states, not that of the variables; an output that is a state depends on itself.
         let states = [named("der(inner)", &["u_dc", "speed", "inner"]), named("der(speed)", &[])];
         assert_eq!(unknowns(&md.derivatives), states, "S01");
-        let sector: &[&str] =
-            if two { &["time", "enable", "inner"] } else { &["time", "enable", "bandwidth", "inner"] };
+        let sector: &[&str] = if two { &["enable", "inner"] } else { &["time", "enable", "bandwidth", "inner"] };
         let outputs = [named("speed", &["speed"]), named("sector", sector), named("ready", &[])];
         assert_eq!(unknowns(&md.outputs), outputs, "S01");
         let initial: Vec<_> = unknowns(&md.initial_unknowns).into_iter().map(|(name, _)| name).collect();

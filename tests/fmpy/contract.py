@@ -63,7 +63,7 @@ PLANT = [
     *outputs("A", "i_dc"),
     *outputs("W", "p_in", "p_mech", "p_loss"),
     *outputs("N.m", "tau_shaft"),
-    *outputs("J", "energy.in", "energy.mech", "energy.loss"),
+    *outputs("J", "energy_in", "energy_mech", "energy_loss"),
     *motor(2.0),
     parameter("mechanics.J", "kg.m2", 1.5e-3),
     parameter("mechanics.B", "N.m.s/rad", 2e-4),

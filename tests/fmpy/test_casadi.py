@@ -1,7 +1,13 @@
-"""PmsmPlant in CasADi: its equations, exact Jacobians (forward, in FMI 3.0 adjoint too) and a run of its CVODES.
+"""PmsmPlant in CasADi: its equations, exact Jacobians (forward, in FMI 3.0 adjoint too), a run of its CVODES, an optimal
+control problem.
 
 The reference is the machine in rotor axes, written down here: d psi_d/dt = u_d - R_s i_d + w psi_q and so on.
 """
+
+import re
+import subprocess
+import sys
+from pathlib import Path
 
 import casadi
 import numpy as np
@@ -14,6 +20,9 @@ STATES = ("speed", "angle", "psi_d", "psi_q")
 INPUTS = {"u_a": 30.0, "u_b": -10.0, "u_c": -20.0, "u_dc": 325.0, "tau_load": 0.7, "speed_shaft": 0.0, "angle_shaft": 0.0}
 # Read with other values of thermal.mode only.
 INPUTS |= {f"T_{name}": 293.15 for name in ("coolant", *(f"{part}_imposed" for part in ("winding", "stator", "magnet", "inverter")))}
+# CasADi 3.8.2 needs them: see the tests at the end.
+OPTIONS = {"enable_forward": False, "enable_reverse": False}
+EXAMPLE = Path(__file__).parents[2] / "examples" / "casadi_minimum_time.py"
 POINTS = np.random.default_rng(1).uniform(
     [-150.0, -3.0, 0.1, -0.05], [150.0, 3.0, 0.2, 0.05], (20, 4)
 )
@@ -109,3 +118,59 @@ def test_cvodes(plant, archives, standard):
     assert abs(result["speed"][-1]) > 1.0
     for name, value in zip(STATES, end):
         assert value == pytest.approx(result[name][-1], rel=1e-6), name
+
+
+def defects(equations, n):
+    """The Jacobian of the trapezoidal rule over n points with steps of 1 ms, by states and voltages."""
+    x, u = casadi.MX.sym("x", 4, n), casadi.MX.sym("u", 3, n)
+    slopes = equations.map(n)(x, casadi.vertcat(u, casadi.repmat(list(INPUTS.values())[3:], 1, n)))
+    rest = x[:, 1:] - x[:, :-1] - 0.5e-3 * (slopes[:, 1:] + slopes[:, :-1])
+    return casadi.Function("defects", [x, u], [casadi.jacobian(casadi.vec(rest), casadi.veccat(x, u))])
+
+
+@STANDARDS
+def test_mapped_equations(plant, standard):
+    """What direct transcription differentiates."""
+    x, u = casadi.SX.sym("x", 4), casadi.SX.sym("u", len(INPUTS))
+    by_hand = casadi.Function("by_hand", [x, u], [casadi.vertcat(*derivatives(x, u))])
+    point = POINTS.T, np.random.default_rng(2).uniform(-30.0, 30.0, (3, len(POINTS)))
+    exact = np.array(defects(by_hand, len(POINTS))(*point))
+    close(defects(plant.create("equations", ["x", "u"], ["ode"], OPTIONS), len(POINTS))(*point), exact, 1e-12)
+    # When this fails, CasADi is right without the options: tell docs/import.md.
+    wrong = np.array(defects(plant.create("equations", ["x", "u"], ["ode"]), len(POINTS))(*point))
+    assert np.abs(wrong - exact).max() > 0.1
+
+
+@STANDARDS
+def test_why_casadi_needs_options(plant, standard):
+    """With a seed of zero it does not call the FMU, and returns the derivative of its last call (eval_ad in its fmu.cpp); with
+    adjoint derivatives it writes those of every direction of `reverse(n)` to the first (eval_task in its fmu_function.cpp).
+    """
+    x, u, zero, seeds = POINTS[3], list(INPUTS.values()), np.zeros(len(INPUTS)), np.eye(4)[:, :2]
+    by_x = np.array(reference()(x, u)[1])
+    right = plant.create("right", ["x", "u"], ["ode"], OPTIONS)
+    wrong = plant.create("wrong", ["x", "u"], ["ode"])
+    for equations in (right, wrong):
+        ode, forward = equations(x, u), equations.forward(1)
+        close(forward(x, u, ode, np.eye(4)[0], zero), by_x[:, :1], 1e-9)
+        close(forward(x, u, ode, np.zeros(4), zero), by_x[:, :1] * (equations is wrong), 1e-9)
+    backward = [np.array(equations.reverse(2)(x, u, ode, seeds)[0]) for equations in (right, wrong)]
+    close(backward[0], by_x.T @ seeds, 1e-9)
+    assert np.abs(backward[1] - by_x.T @ seeds).max() > 1.0 or standard == 2
+
+
+@STANDARDS
+def test_the_example(archives, standard):
+    """With 7.5 A the torque is at most 1.5 n_p psi_M 7.5 A; the start takes little more than with this torque throughout."""
+    done = subprocess.run(
+        [sys.executable, EXAMPLE, archives / f"fmi{standard}"], capture_output=True, text=True, timeout=500
+    )
+    assert done.returncode == 0, done.stderr
+    print(done.stdout)
+    iterations, t_end = re.search(r"(\d+) iterations of IPOPT: 150 rad/s after ([\d.]+) ms", done.stdout).groups()
+    speed = np.linspace(0.0, 150.0, 10_001)
+    slowness = J / (1.5 * n_p * psi_M * 7.5 - B * speed - tau_coulomb * np.tanh(speed / w_coulomb))
+    least = 1e3 * np.sum((slowness[1:] + slowness[:-1]) / 2.0) * (speed[1] - speed[0])
+    assert least < float(t_end) < 1.02 * least
+    assert int(iterations) < 100
+    assert "CVODES with these voltages: 150.000 rad/s" in done.stdout

@@ -78,14 +78,14 @@ def test_cycle(archives, standard):
     speed = v * GEAR / WHEEL
     torque = force * WHEEL / GEAR + J_ROTOR * a * GEAR / WHEEL
     temperatures = ["T_winding", "T_stator", "T_magnet"]
-    names = ["tau_shaft", "p_in", *LOSSES, "energy.in", "energy.mech", "energy.loss", "u_share", *temperatures]
+    names = ["tau_shaft", "p_in", *LOSSES, "energy_in", "energy_mech", "energy_loss", "u_share", *temperatures]
     result = run(archives / f"fmi{standard}" / "PmsmDrive.fmu", speed, torque, names, correct=True)
 
     assert speed.max() > 3.3 * 3075.0 * RPM  # base speed
     assert result["u_share"].max() < 0.96
     assert np.sqrt(np.mean((result["tau_shaft"] - torque[:-1]) ** 2)) < 0.1
     p_in = result["p_in"] * H / KWH
-    assert result["energy.in"][-1] / KWH == pytest.approx(ENERGY, rel=1e-3)
+    assert result["energy_in"][-1] / KWH == pytest.approx(ENERGY, rel=1e-3)
     assert p_in.clip(min=0.0).sum() == pytest.approx(DRAWN, rel=1e-3)
     assert p_in.clip(max=0.0).sum() == pytest.approx(RETURNED, rel=2e-3)
     # A voltage that is held for 0.1 ms while the rotor turns by x = 0.33 rad has the fundamental sin(x/2) / (x/2), 0.4 %
@@ -94,7 +94,7 @@ def test_cycle(archives, standard):
         assert result[name].sum() * H / KWH == pytest.approx(energy, rel=0.01), name
     assert result["p_friction"].sum() * H / KWH == pytest.approx(LOSSES["p_friction"], rel=1e-4)
     # No current flows at either end: nothing is stored.
-    balance = result["energy.in"][-1] - result["energy.mech"][-1] - result["energy.loss"][-1]
+    balance = result["energy_in"][-1] - result["energy_mech"][-1] - result["energy_loss"][-1]
     assert abs(balance) < 1e-7 * (DRAWN - RETURNED) * KWH
     expected = heated({name: result[name] for name in LOSSES})
     assert [result[name][-1] for name in temperatures] == pytest.approx(expected, abs=0.01)

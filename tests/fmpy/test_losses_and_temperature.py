@@ -66,7 +66,7 @@ def drive(archives, standard, stop, interval, start, output):
 def test_loss_split(archives, standard):
     start = {f"plant.inverter.{name}": value for name, value in INVERTER.items()}
     start |= {f"plant.mechanics.{name}": value for name, value in FRICTION.items()}
-    energies = ["energy.in", "energy.mech", "energy.loss"]
+    energies = ["energy_in", "energy_mech", "energy_loss"]
     output = [*LOSSES, *energies, "tau_shaft", "efficiency", "Q_coolant"]
     result = drive(archives, standard, 0.12, 1e-4, start, output)
     # Three periods of the currents.

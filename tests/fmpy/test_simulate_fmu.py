@@ -91,7 +91,7 @@ def test_power_and_energy_of_the_drive_are_balanced(archives, standard, step):
     """To 1000 rpm in 1 s and 2 N.m: the energies balance to 1e-6, the mean powers to 0.1 %, and each is the other's integral."""
     rpm, out = np.pi / 30.0, ["speed", "i_d", "i_q", "voltage_limited", "current_limited"]
     powers = ["p_in", "p_mech", "p_loss"]
-    energies = ["energy.in", "energy.mech", "energy.loss"]
+    energies = ["energy_in", "energy_mech", "energy_loss"]
     names = [("time", float), ("speed_ref", float), ("tau_load", float)]
     table = np.array([(0.0, 0.0, 0.0), (1.0, 1000 * rpm, 0.0), (1.5, 1000 * rpm, 2.0), (2.5, 1000 * rpm, 2.0)], dtype=names)
     result = simulate_fmu(
@@ -103,9 +103,9 @@ def test_power_and_energy_of_the_drive_are_balanced(archives, standard, step):
         output=out + powers + energies,
     )
     stored = 0.75 * 6e-3 * (result["i_d"] ** 2 + result["i_q"] ** 2) + 0.5 * 1.5e-3 * result["speed"] ** 2
-    balance = result["energy.in"] - result["energy.mech"] - result["energy.loss"] - (stored - stored[0])
-    assert result["energy.in"][-1] > 200.0
-    assert np.abs(balance).max() < 1e-6 * result["energy.in"][-1]
+    balance = result["energy_in"] - result["energy_mech"] - result["energy_loss"] - (stored - stored[0])
+    assert result["energy_in"][-1] > 200.0
+    assert np.abs(balance).max() < 1e-6 * result["energy_in"][-1]
     steady = result["time"] > 2.0
     p_in, p_mech, p_loss = (result[name][steady].mean() for name in powers)
     assert abs(p_in - p_mech - p_loss) < 1e-3 * p_in

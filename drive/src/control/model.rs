@@ -280,13 +280,16 @@ impl Warns for SensorlessController {
             });
             return;
         }
-        let Motor { R_s, L_d, L_q, psi_M, .. } = self.parameters.motor;
+        let Motor { n_p, R_s, L_d, L_q, psi_M } = self.parameters.motor;
+        // A wrong resistance moves the voltage by no more than R_s i: nothing beside a back EMF of twice that.
+        let emf = psi_M * (f64::from(n_p) * out.speed_est).abs();
+        let tells = emf <= 2.0 * R_s * par.limit.i;
         log.warn("lock_lost", || {
+            let resistance = if tells { format!("R_s = {R_s} Ohm, ") } else { String::new() };
             format!(
                 "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage, or the speed is not reached; \
                  the rotor is not where theta_est = {} rad and speed_est = {} rad/s say, the load exceeds the torque, or the \
-                 controller's R_s = {R_s} Ohm, L_d = {L_d} H, \
-                 L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine",
+                 controller's {resistance}L_d = {L_d} H, L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine",
                 out.lock_lost, out.theta_est, out.speed_est
             )
         });

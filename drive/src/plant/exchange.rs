@@ -22,7 +22,10 @@ use crate::plant::state::Instant;
 use crate::plant::tables::PlantParameters;
 use crate::plant::thermal::ThermalMode;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
-use fmu_core::{ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar, State};
+use fmu_core::{
+    CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar,
+    State,
+};
 
 /// Shift of the indicators in the direction of the decision that an event took, so that none stays at 0.
 const SHIFT: f64 = 1e-9;
@@ -91,18 +94,26 @@ impl PmsmPlant {
 
     /// The outputs at an instant; their powers are those of the instant.
     fn outputs<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> PlantOutputs<S> {
-        let Rates { p_in, p_mech, p_loss, losses, i, .. } = self.rates(inputs, at);
+        let Rates { p_in, p_mech, p_loss, losses, tau_shaft, i, .. } = self.rates(inputs, at);
         let i = if self.parameters.iron.is_none() { at.i } else { at.axis.from_stator(i) };
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let p_in = p_in + 0.0.into();
         let currents = || Phases::from_stator(at.axis.to_stator(i));
         let i_dc = dc_current(p_in, inputs, &self.legs(inputs), currents);
-        self.shown(inputs, at, i, self.temperatures(inputs), Powers { i_dc, p_in, p_mech, p_loss, losses })
+        let powers = Powers { i_dc, p_in, p_mech, p_loss, losses, tau_shaft };
+        self.shown(inputs, at, i, self.temperatures(inputs), powers)
     }
 
     /// [`ContinuousTime::derivatives`] under these `inputs`.
     pub(crate) fn derivatives_under(&self, inputs: &PlantInputs, dx: &mut [f64]) -> Result<(), Fault> {
-        let slopes = self.slopes(inputs, &self.present(inputs));
+        let at = self.present(inputs);
+        if self.is_too_fast(at.speed) {
+            let (speed, fastest) = (at.speed, self.fastest());
+            return Err(Fault::new(format!(
+                "the shaft turns at {speed} rad/s, beyond the {fastest} rad/s of any machine: there are no derivatives"
+            )));
+        }
+        let slopes = self.slopes(inputs, &at);
         if !crate::math::all_finite(slopes) {
             return Err(Fault::new(format!("the machine has no finite derivatives at {}", self.state.tell())));
         }
@@ -176,6 +187,13 @@ impl ContinuousTime for PmsmPlant {
     }
 }
 
+impl CompletedSteps for PmsmPlant {
+    fn complete(&mut self, now: Elapsed) -> Result<(), Fault> {
+        let inputs = self.inputs.clone();
+        self.complete_under(&inputs, now)
+    }
+}
+
 impl Differentiable for PmsmPlant {
     fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut PlantOutputs) -> Result<(), Fault> {
         *outputs = self.tangent_under(&self.inputs.changing(&along.inputs), along, dx);
@@ -210,7 +228,11 @@ impl Events for PmsmPlant {
         }
         self.blocked = self.blocks(&self.inputs);
         if self.blocked {
-            state.psi = self.idle_flux(&self.motor(&self.inputs), state.speed);
+            let motor = self.motor(&self.inputs);
+            let idle = self.idle_flux(&motor, state.speed);
+            let stored = |psi| machine::magnetic_energy(&motor, &self.parameters.saturation, psi);
+            self.energy.loss += stored(state.psi) - stored(idle);
+            state.psi = idle;
         }
         let states_changed = state != self.state;
         self.state = state;

@@ -186,7 +186,7 @@ impl<const NEAR: bool> Circuit for LinearHeld<'_, NEAR> {
         let cu = 1.5 * self.linear.R_s * over(|k| k.i.dot(k.i));
         let friction = over(|k| k.p_friction);
         let energy = Energy { r#in: 1.5 * self.u.dot(charge), mech: self.tau_load * turned, loss: cu + friction };
-        Passed { energy, losses: Losses { cu, friction, ..Losses::none() } }
+        Passed { energy, losses: Losses { cu, friction, ..Losses::none() }, impulse: 0.0 }
     }
 }
 
@@ -200,13 +200,12 @@ impl PmsmPlant {
         if h <= LONGEST_SUBSTEP && w * h <= LARGEST_TURN {
             return Ok(self.drive_linear(linear, coulomb, &self.state, h, u));
         }
-        let mut left = Self::count(h, LONGEST_SUBSTEP.min(LARGEST_TURN / w))?;
+        let mut left = self.count(h, LONGEST_SUBSTEP, self.state.speed)?;
         let (h, mut state, mut passed) = (h / left, self.state, Passed::default());
-        while left > 0.0 {
-            let (next, Passed { energy, losses }) = self.drive_again(linear, coulomb, &state, h, u);
+        while left > 0.0 && !self.is_too_fast(state.speed) {
+            let (next, step) = self.drive_again(linear, coulomb, &state, h, u);
             state = next;
-            passed.energy.add(&energy);
-            passed.losses.add(&losses);
+            passed.add(&step);
             left -= 1.0;
         }
         Ok((state, passed))
@@ -218,13 +217,13 @@ impl PmsmPlant {
     pub(super) fn step_linear(&mut self, step: &Step) -> Option<Result<(), Fault>> {
         let linear = self.warm.linear.as_ref().filter(|_| self.inputs.enable)?;
         let mut coulomb = self.coulomb;
-        let (state, Passed { energy, losses }) = match self.pass_linear(linear, &mut coulomb, step.h) {
+        let (state, passed) = match self.pass_linear(linear, &mut coulomb, step.h) {
             Ok(passed) => passed,
             Err(fault) => return Some(Err(fault)),
         };
         self.coulomb = coulomb;
         let legs = Legs::switching(&self.parameters.inverter, self.inputs.u_dc);
-        Some(self.conclude(step.h, state, &energy, losses, false, &legs))
+        Some(self.conclude(step.h, state, &passed, false, &legs))
     }
 
     /// `PmsmPlant::drive` of a `linear` machine under the voltage `u` (V).

@@ -49,10 +49,10 @@ impl Mechanics {
         speed.chain(self.tau_coulomb * share, self.tau_coulomb * (1.0 - share * share) / self.w_coulomb)
     }
 
-    /// Torque of the shaft on the load in N.m: `tau_load`, or `tau_e` minus `friction` (N.m) with an imposed speed.
+    /// Torque of the shaft on the load in N.m: `tau_load`, or with an imposed speed what the machine gives, `given` (N.m).
     #[inline]
-    pub fn tau_shaft<S: Scalar>(&self, tau_e: S, tau_load: S, friction: S) -> S {
-        if self.imposed { tau_e - friction } else { tau_load }
+    pub fn tau_shaft(&self, given: f64, tau_load: f64) -> f64 {
+        if self.imposed { given } else { tau_load }
     }
 }
 
@@ -88,6 +88,8 @@ pub struct Shaft<'a, S = f64> {
 pub struct Motion<S = f64> {
     /// Acceleration in rad/s2; 0 with an imposed speed.
     pub acceleration: S,
+    /// Torque on the load in N.m.
+    pub tau_shaft: S,
     /// Power to the load in W.
     pub p_shaft: S,
     /// Friction loss in W.
@@ -124,10 +126,11 @@ impl<'a, S: Scalar> Shaft<'a, S> {
         let friction = speed * viscous(self.B, self.k_w, speed) + coulomb;
         let p_friction = friction * speed;
         if self.mechanics.imposed {
-            return Motion { acceleration: 0.0.into(), p_shaft: (tau_e - friction) * speed, p_friction };
+            let tau_shaft = tau_e - friction;
+            return Motion { acceleration: 0.0.into(), tau_shaft, p_shaft: tau_shaft * speed, p_friction };
         }
         let acceleration = (tau_e - self.tau_load - friction) * self.by_J;
-        Motion { acceleration, p_shaft: self.tau_load * speed, p_friction }
+        Motion { acceleration, tau_shaft: self.tau_load, p_shaft: self.tau_load * speed, p_friction }
     }
 
     /// Share of the Coulomb torque at a `speed` (rad/s) near standstill.
@@ -179,14 +182,15 @@ mod tests {
         for start in [-50.0, -6.01, -0.2, 0.0, 1e-3, 0.4, 5.9, 30.0] {
             let shaft = Shaft::new(&m, 0.4, start);
             for speed in [start, start + 0.1, start - 0.14, start + 3.0, -start, start * 2.0] {
-                let Motion { acceleration, p_shaft, p_friction } = shaft.motion(speed, 1.0);
+                let Motion { acceleration, p_shaft, p_friction, .. } = shaft.motion(speed, 1.0);
                 let friction = m.friction(speed);
                 assert!((acceleration - (1.0 - 0.4 - friction) / m.J).abs() < 1e-12, "{start} {speed}");
                 assert!((p_shaft - 0.4 * speed).abs() < 1e-15 && (p_friction - friction * speed).abs() < 1e-14);
             }
         }
         let imposed = Mechanics { imposed: true, ..m };
-        let Motion { acceleration, p_shaft, .. } = Shaft::new(&imposed, 0.4, 2.0).motion(2.0, 1.0);
+        let Motion { acceleration, tau_shaft, p_shaft, .. } = Shaft::new(&imposed, 0.4, 2.0).motion(2.0, 1.0);
+        assert!((tau_shaft - 1.0 + imposed.friction(2.0)).abs() < 1e-15);
         assert!(acceleration == 0.0 && (p_shaft - 2.0 * (1.0 - imposed.friction(2.0))).abs() < 1e-15);
     }
 }

@@ -1,5 +1,6 @@
 //! The plant: machine, mechanics and inverter, and the model `PmsmPlant` built from them.
 
+pub mod counters;
 pub mod exchange;
 mod integration;
 pub mod inverter;

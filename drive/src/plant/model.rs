@@ -3,6 +3,7 @@
 use crate::frame::{Dq, Phases, Rotor, Vector};
 use crate::math::wrap;
 use crate::motor::Motor;
+use crate::plant::counters::Point;
 use crate::plant::inverter::Inverter;
 use crate::plant::legs::Legs;
 use crate::plant::linear::Coulomb;
@@ -34,6 +35,8 @@ pub struct PmsmPlant {
     pub(super) powers: Powers,
     /// Since the start.
     pub(super) energy: Energy,
+    /// In Model Exchange, the last point of the importer's solution.
+    pub(super) point: Point,
     /// Temperatures and the machine at them, held over a step.
     pub(super) warm: Warm,
     /// Current (A) at the terminals less that of the flux linkage, at the end of a step.
@@ -116,10 +119,9 @@ impl PmsmPlant {
         temperatures: Temperatures<S>,
         powers: Powers<S>,
     ) -> PlantOutputs<S> {
-        let PlantParameters { motor, saturation, mechanics, .. } = &self.parameters;
+        let PlantParameters { motor, saturation, .. } = &self.parameters;
         let &Instant { psi, speed, angle, axis, .. } = at;
         let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::new(motor, saturation).torque(psi, at.i));
-        let friction = if mechanics.imposed { mechanics.friction(speed) } else { 0.0.into() };
         PlantOutputs {
             i: Phases::from_stator(axis.to_stator(i)),
             speed,
@@ -129,7 +131,6 @@ impl PmsmPlant {
             i_d: i.d(),
             i_q: i.q(),
             powers,
-            tau_shaft: mechanics.tau_shaft(tau_e, inputs.tau_load, friction),
             energy: self.energy,
             efficiency: efficiency(powers.p_in, powers.p_mech),
             temperatures,
@@ -141,6 +142,12 @@ impl PmsmPlant {
     #[inline]
     pub(crate) fn powers(&self) -> Powers {
         self.powers
+    }
+
+    /// Mechanical speed (rad/s) and amplitude of the line-to-line back EMF (V).
+    pub(crate) fn speed_and_emf(&self) -> (f64, f64) {
+        let (Motor { n_p, psi_M, .. }, speed) = (&self.warm.motor, self.state.speed);
+        (speed, 3.0_f64.sqrt() * psi_M * (f64::from(*n_p) * speed).abs())
     }
 
     /// What the sensors of a controller measure: the same as in the outputs, to the last bit.
@@ -177,7 +184,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 9;
+    const STATE_VERSION: u16 = 10;
 
     fn derive(&mut self) {
         (self.sw, self.coulomb) = (switching::Last::default(), Coulomb::default());
@@ -185,6 +192,12 @@ impl Model for PmsmPlant {
     }
 
     fn validate(&self) -> Result<(), Fault> {
+        let initial = &self.parameters.initial;
+        let fastest = self.fastest();
+        if initial.speed.abs() > fastest && !self.parameters.mechanics.imposed {
+            let allowed = format!("at most {fastest} rad/s in magnitude, the speed of any machine with this motor.n_p");
+            return Err(Fault::value("initial.speed", format!("{} rad/s", initial.speed), allowed));
+        }
         self.parameters.thermal.validate()?;
         self.judge_temperatures(&self.inputs)
     }
@@ -205,14 +218,15 @@ impl Model for PmsmPlant {
         };
         let psi = if self.inputs.enable { machine::flux(motor, Dq::ZERO) } else { self.idle_flux(motor, speed) };
         self.state = State::new(motor, psi, speed, angle);
-        self.energy = Energy::default();
+        (self.energy, self.point) = (Energy::default(), Point::default());
         self.blocked = self.blocks(&self.inputs);
         self.by_iron = self.current_by_iron();
         // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
-        let tau_shaft = mechanics.tau_shaft(0.0, self.inputs.tau_load, friction);
+        let tau_shaft = mechanics.tau_shaft(0.0 - friction, self.inputs.tau_load);
         let losses = Losses { friction: friction * speed, ..Losses::default() };
-        self.powers = Powers { p_mech: tau_shaft * speed, p_loss: losses.friction, losses, ..Powers::default() };
+        self.powers =
+            Powers { p_mech: tau_shaft * speed, p_loss: losses.friction, losses, tau_shaft, ..Powers::default() };
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {

@@ -12,13 +12,13 @@
 //! 0.75 (L_d i_d^2 + L_q i_q^2) without saturation. With an imposed speed, tau_shaft is tau_e minus friction and the
 //! kinetic energy belongs to the drive train; otherwise tau_shaft is tau_load, and J stores the rest.
 //!
-//! With a held voltage and a turning rotor, the power changes within the step, so an instantaneous value does not
-//! represent it. The outputs are therefore means over the plant's last step, integrated with the state by the same
-//! method, and `energy.in`, `energy.mech` and `energy.loss` are the time integrals of the powers. Before the first
-//! step, the powers are the initial values. In Model Exchange, where the importer integrates, the powers are those of the
-//! instant, and the energies stay 0: an importer that wants them integrates the powers. i_dc is also defined for
-//! u_dc = 0 V: the link still carries the current of the legs connected to it; in this case it is the value at the end of
-//! the step.
+//! With a held voltage and a turning rotor, power and torque change within the step, so an instantaneous value does not
+//! represent them. The outputs are therefore means over the plant's last step, integrated with the state by the same
+//! method; `energy_in`, `energy_mech` and `energy_loss` are the time integrals of the powers. A drive train that integrates
+//! tau_shaft over the angle of its shaft receives `energy_mech`. Before the first step, the powers are the initial values.
+//! In Model Exchange, where the importer integrates, the powers and tau_shaft are those of the instant, and the energies are
+//! counted over the importer's steps ([`counters`](crate::plant::counters)). i_dc is also defined for u_dc = 0 V: the link still carries
+//! the current of the legs connected to it; in this case it is the value at the end of the step.
 //!
 //! Two events transfer energy instantly and count in the step in which they occur: a jump of the imposed angle, where
 //! the magnetic field does work on the shaft, and blocking diodes, where the energy of the remaining current is lost.
@@ -47,14 +47,18 @@ pub struct Powers<S = f64> {
     pub p_loss: S,
     /// Each loss in W.
     pub losses: Losses<S>,
+    /// Torque of the shaft on the load in N.m.
+    pub tau_shaft: S,
 }
 
 impl Powers {
-    /// Means over a step of `h` (s) in which `energy` passed, with its `losses`; `i` gives the stator currents (A) at its end.
+    /// Means over a step of `h` (s) in which `energy` passed, with its `losses` and the mean torque `tau_shaft` (N.m); `i` gives
+    /// the stator currents (A) at its end.
     #[inline]
     pub fn mean(
         energy: &Energy,
         losses: Losses,
+        tau_shaft: f64,
         h: f64,
         inputs: &PlantInputs,
         legs: &Legs,
@@ -64,7 +68,8 @@ impl Powers {
         let rate = 1.0 / h;
         let p_in = energy.r#in * rate + 0.0;
         let i_dc = dc_current(p_in, inputs, legs, i);
-        Self { i_dc, p_in, p_mech: energy.mech * rate, p_loss: energy.loss * rate, losses: losses.map(|e| e * rate) }
+        let (p_mech, p_loss) = (energy.mech * rate, energy.loss * rate);
+        Self { i_dc, p_in, p_mech, p_loss, losses: losses.map(|e| e * rate), tau_shaft }
     }
 
     /// The mean of this value and `last`, which has the weight `share` (0..1).
@@ -77,6 +82,7 @@ impl Powers {
             p_mech: mean(self.p_mech, last.p_mech),
             p_loss: mean(self.p_loss, last.p_loss),
             losses: self.losses.with(&last.losses, mean),
+            tau_shaft: mean(self.tau_shaft, last.tau_shaft),
         }
     }
 }
@@ -165,26 +171,27 @@ pub const POWERS: &Table<Powers> = &Table::new(
 
 type E = Row<Energy>;
 
-/// Variables of the energies; their owner supplies the prefix `energy.`.
+/// Variables of the energies; their owner supplies the prefix `energy_`.
 pub const ENERGY: &Table<Energy> = &Table::new(
     const {
         &[
             E::output(
                 "in",
                 &JOULE,
-                "Energy from the DC link since the start, the integral of p_in; 0 in Model Exchange",
+                "Energy from the DC link since the start, the integral of p_in; in Model Exchange up to the last completed integrator step \
+                 or event, as exact as in Co-Simulation with inputs that are held or ramp between two of them",
                 |e| &mut e.r#in,
             ),
             E::output(
                 "mech",
                 &JOULE,
-                "Energy delivered to the load since the start, the integral of p_mech; 0 in Model Exchange",
+                "Energy delivered to the load since the start, the integral of p_mech; in Model Exchange as energy_in",
                 |e| &mut e.mech,
             ),
             E::output(
                 "loss",
                 &JOULE,
-                "Energy lost since the start, the integral of p_loss; 0 in Model Exchange",
+                "Energy lost since the start, the integral of p_loss; in Model Exchange as energy_in",
                 |e| &mut e.loss,
             ),
         ]

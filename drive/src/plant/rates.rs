@@ -28,6 +28,8 @@ pub(super) struct Rates<S = f64> {
     pub(super) d_psi: Vector<Stator, S>,
     /// Acceleration in rad/s2.
     pub(super) acceleration: S,
+    /// Torque of the shaft on the load in N.m.
+    pub(super) tau_shaft: S,
     /// Power from the DC link, to the load, lost, in W.
     pub(super) p_in: S,
     pub(super) p_mech: S,
@@ -44,6 +46,18 @@ pub(super) struct Passed {
     pub(super) energy: Energy,
     /// In J.
     pub(super) losses: Losses,
+    /// Integral of the torque of an imposed shaft, in N.m.s.
+    pub(super) impulse: f64,
+}
+
+impl Passed {
+    /// Adds what passed in a further step.
+    #[inline]
+    pub(super) fn add(&mut self, step: &Self) {
+        self.energy.add(&step.energy);
+        self.losses.add(&step.losses);
+        self.impulse += step.impulse;
+    }
 }
 
 impl<S: Scalar> Held<'_, S> {
@@ -52,31 +66,34 @@ impl<S: Scalar> Held<'_, S> {
     #[expect(clippy::inline_always, reason = "its four calls take half of the time of a step")]
     #[inline(always)]
     pub(super) fn rates(&self, axis: Axis<Rotor, S>, psi: Vector<Rotor, S>, i: Vector<Rotor, S>, speed: S) -> Rates<S> {
-        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
+        let Motion { acceleration, tau_shaft, p_shaft, p_friction } =
+            self.shaft.motion(speed, self.machine.torque(psi, i));
         let applied = |i| self.legs.map_or(self.u, |legs| self.u - legs.loss(i));
         if let Some(lossy) = self.lossy {
             let u = applied(axis.to_stator(lossy.steady(psi, i, speed)));
             let Flow { i, d_psi, p_in, losses } = lossy.flow(self.machine.resistance(), u, axis.to_stator(i), speed);
             let losses = Losses { friction: p_friction, ..losses };
-            return Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i };
+            return Rates { d_psi, acceleration, tau_shaft, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i };
         }
         let i = axis.to_stator(i);
         let u = applied(i);
         let losses = Losses { cu: self.machine.copper_loss(i), friction: p_friction, ..Losses::none() };
         let d_psi = self.machine.flux_derivative(u, i);
-        Rates { d_psi, acceleration, p_in: u.dot(i) * 1.5, p_mech: p_shaft, p_loss: losses.cu + p_friction, losses, i }
+        let (p_in, p_loss) = (u.dot(i) * 1.5, losses.cu + p_friction);
+        Rates { d_psi, acceleration, tau_shaft, p_in, p_mech: p_shaft, p_loss, losses, i }
     }
 
     /// The same while the diodes block: the current `i` (A) of the flux linkage `psi` (Wb) flows through the iron only,
     /// which brakes with its loss.
     pub(super) fn idle_rates(&self, psi: Vector<Rotor, S>, i: Vector<Rotor, S>, speed: S) -> Rates<S> {
         let tau_e = self.machine.torque(psi, i);
-        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, tau_e);
+        let Motion { acceleration, tau_shaft, p_shaft, p_friction } = self.shaft.motion(speed, tau_e);
         let losses = Losses { iron: S::from(0.0) - tau_e * speed, friction: p_friction, ..Losses::none() };
         let none = Vector::fixed(Vector::ZERO);
         Rates {
             d_psi: none,
             acceleration,
+            tau_shaft,
             p_in: 0.0.into(),
             p_mech: p_shaft,
             p_loss: losses.iron + p_friction,
@@ -140,7 +157,7 @@ fn passed<const LOSSY: bool>(stages: &[Rates; 4], h: f64) -> Passed {
     } else {
         Losses { cu: energy.loss - friction, friction, ..Losses::none() }
     };
-    Passed { energy, losses }
+    Passed { energy, losses, impulse: over(|k| k.tau_shaft) }
 }
 
 /// Inverter, machine and shaft while the currents keep their sides.
@@ -158,10 +175,12 @@ impl Circuit for Between<'_> {
     fn slopes(&self, axis: Axis<Rotor>, psi: AlphaBeta, speed: f64) -> (AlphaBeta, f64, Rates) {
         let psi = self.machine.from_stator(axis, psi);
         let i = self.machine.current(psi);
-        let Motion { acceleration, p_shaft, p_friction } = self.shaft.motion(speed, self.machine.torque(psi, i));
+        let Motion { acceleration, tau_shaft, p_shaft, p_friction } =
+            self.shaft.motion(speed, self.machine.torque(psi, i));
         let Flow { i, d_psi, p_in, losses } = self.region.flow(axis.to_stator(i));
         let losses = Losses { friction: p_friction, ..losses };
-        let rates = Rates { d_psi, acceleration, p_in, p_mech: p_shaft, p_loss: losses.sum(), losses, i };
+        let p_loss = losses.sum();
+        let rates = Rates { d_psi, acceleration, tau_shaft, p_in, p_mech: p_shaft, p_loss, losses, i };
         (d_psi, acceleration, rates)
     }
 

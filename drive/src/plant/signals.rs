@@ -43,15 +43,25 @@ impl PlantInputs {
 
     /// These inputs with the change `along` of the continuous ones.
     pub fn changing(&self, along: &Self) -> PlantInputs<Dual> {
-        let (u, v) = (&self.u, &along.u);
+        self.zip(along, Dual::new)
+    }
+
+    /// On the straight line from these inputs to those at its `end`, at the `share` (0..1) of the way; the gates stay.
+    pub fn toward(&self, end: &Self, share: f64) -> Self {
+        self.zip(end, |a, b| a + (b - a) * share)
+    }
+
+    /// Each continuous input and that of `other` by `f`.
+    fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> PlantInputs<T> {
+        let (u, v) = (&self.u, &other.u);
         PlantInputs {
-            u: Phases { a: Dual::new(u.a, v.a), b: Dual::new(u.b, v.b), c: Dual::new(u.c, v.c) },
-            u_dc: Dual::new(self.u_dc, along.u_dc),
-            tau_load: Dual::new(self.tau_load, along.tau_load),
-            speed_shaft: Dual::new(self.speed_shaft, along.speed_shaft),
-            angle_shaft: Dual::new(self.angle_shaft, along.angle_shaft),
+            u: Phases { a: f(u.a, v.a), b: f(u.b, v.b), c: f(u.c, v.c) },
+            u_dc: f(self.u_dc, other.u_dc),
+            tau_load: f(self.tau_load, other.tau_load),
+            speed_shaft: f(self.speed_shaft, other.speed_shaft),
+            angle_shaft: f(self.angle_shaft, other.angle_shaft),
             enable: self.enable,
-            thermal: self.thermal.changing(&along.thermal),
+            thermal: self.thermal.zip(&other.thermal, f),
         }
     }
 }
@@ -73,10 +83,8 @@ pub struct PlantOutputs<S = f64> {
     pub i_d: S,
     /// q-axis stator current in A.
     pub i_q: S,
-    /// Power between DC link, machine and shaft, mean over the last step.
+    /// Power between DC link, machine and shaft and torque of the shaft, means over the last step.
     pub powers: Powers<S>,
-    /// Torque of the shaft on the load in N.m.
-    pub tau_shaft: S,
     /// Energy since the start.
     pub energy: Energy,
     /// Efficiency of the powers.
@@ -129,8 +137,8 @@ impl PlantOutputs<Dual> {
                 p_mech: powers.p_mech.change,
                 p_loss: powers.p_loss.change,
                 losses: powers.losses.map(|p| p.change),
+                tau_shaft: powers.tau_shaft.change,
             },
-            tau_shaft: self.tau_shaft.change,
             energy: Energy::default(),
             efficiency: self.efficiency.change,
             temperatures: self.temperatures.map(|T| T.change),

@@ -23,17 +23,22 @@ use nalgebra::SVector;
 /// Maximum number of substeps in one communication step: 1000 s of simulated time.
 const MAX_SUBSTEPS: f64 = 1e7;
 
+/// Greatest electrical speed in rad/s, 160 kHz: nine times that of the fastest drives there are, which turn at a million rpm
+/// with one pole pair. Only a diverging coupling gets there. It bounds the work of a step, whatever the inputs are: at most
+/// 4e6 integration steps per second of its size, and 16e6 with losses.
+const FASTEST: f64 = 1e6;
+
 impl PmsmPlant {
-    /// The state at the beginning of a step and the energy needed to reach it: an imposed shaft takes the angle of the
+    /// The state at the beginning of a step and what passes until it is reached: an imposed shaft takes the angle of the
     /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
     /// linkage, which cannot jump; the magnetic field then does work on the shaft.
     #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
     #[inline(always)]
-    fn at_the_shaft(&self) -> (State, Energy) {
+    fn at_the_shaft(&self) -> (State, Passed) {
         let PlantParameters { saturation, mechanics, .. } = &self.parameters;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         if !mechanics.imposed {
-            return (self.state, Energy::default());
+            return (self.state, Passed::default());
         }
         let motor = &self.warm.motor;
         let axis = axis_at(motor, angle_shaft);
@@ -41,13 +46,13 @@ impl PmsmPlant {
         let psi = machine.from_stator(axis, machine.to_stator(self.state.axis, self.state.psi));
         let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
         let energy = Energy { mech: stored(self.state.psi) - stored(psi), ..Energy::default() };
-        (State { psi, speed: speed_shaft, angle: angle_shaft, axis }, energy)
+        (State { psi, speed: speed_shaft, angle: angle_shaft, axis }, Passed { energy, ..Passed::default() })
     }
 
     /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s).
     #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
     #[inline(always)]
-    fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
+    pub(super) fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
         let PlantParameters { motor, inverter, .. } = &self.parameters;
         let w = (f64::from(motor.n_p) * speed).abs();
         let threshold = if lossy { inverter.devices.threshold() } else { 0.0 };
@@ -59,12 +64,16 @@ impl PmsmPlant {
         if h <= longest && w * h <= LARGEST_TURN {
             return Ok(1.0);
         }
-        Self::count(h, longest.min(LARGEST_TURN / w))
+        self.count(h, longest, speed)
     }
 
-    /// Number of integration steps of at most `longest` (s) in `h` (s).
+    /// Number of integration steps of at most `longest` (s) in `h` (s) that begin at the mechanical `speed` (rad/s).
     #[inline(never)]
-    pub(super) fn count(h: f64, longest: f64) -> Result<f64, Fault> {
+    pub(super) fn count(&self, h: f64, longest: f64, speed: f64) -> Result<f64, Fault> {
+        if self.is_too_fast(speed) {
+            return Err(self.too_fast(speed));
+        }
+        let longest = longest.min(LARGEST_TURN / (f64::from(self.parameters.motor.n_p) * speed).abs());
         let count = (h / longest - 1e-9).ceil().max(1.0);
         if count > MAX_SUBSTEPS {
             let limit = MAX_SUBSTEPS * longest;
@@ -90,14 +99,14 @@ impl PmsmPlant {
             lossy: None,
             shaft: Shaft::new(&self.parameters.mechanics, self.inputs.tau_load, start.speed),
         };
-        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost, 0.0]), h, |x| {
+        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost, 0.0, 0.0]), h, |x| {
             let i = self.idle_current(motor, x[0]);
             let rates = held.idle_rates(machine::flux(motor, i), i, x[0]);
-            SVector::from([rates.acceleration, x[0], rates.p_mech, rates.p_loss, rates.losses.iron])
+            SVector::from([rates.acceleration, x[0], rates.p_mech, rates.p_loss, rates.losses.iron, rates.tau_shaft])
         });
         let state = State::new(motor, self.idle_flux(motor, x[0]), x[0], x[1]);
         let losses = Losses { cu: lost, iron: x[4], friction: x[3] - lost - x[4], ..Losses::none() };
-        (state, Passed { energy: Energy { r#in: 0.0, mech: x[2], loss: x[3] }, losses })
+        (state, Passed { energy: Energy { r#in: 0.0, mech: x[2], loss: x[3] }, losses, impulse: x[5] })
     }
 
     /// A communication step; `LOSSY`: with the gates off or with losses besides that of a constant resistance.
@@ -112,8 +121,7 @@ impl PmsmPlant {
         } else {
             None
         };
-        let (mut state, mut energy) = self.at_the_shaft();
-        let mut losses = Losses::none();
+        let (mut state, mut passed) = self.at_the_shaft();
         let mut left = self.substeps(step.h, state.speed, &legs, lossy.is_some())?;
         let h = step.h / left;
         let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
@@ -122,66 +130,84 @@ impl PmsmPlant {
             && self.inputs.enable
             && let Some(lossy) = &lossy
         {
-            let (passed, current) = self.switch(&mut state, step.h, u, &legs, lossy);
-            energy.add(&passed.energy);
-            (losses, by_iron, left) = (passed.losses, Some(current), 0.0);
+            let (switched, current) = self.switch(&mut state, step.h, u, &legs, lossy);
+            passed.add(&switched);
+            (by_iron, left) = (Some(current), 0.0);
         }
-        while left > 0.0 {
-            let (next, passed) = match (LOSSY, self.inputs.enable, lossy.as_ref()) {
+        while left > 0.0 && !self.is_too_fast(state.speed) {
+            let (next, driven) = match (LOSSY, self.inputs.enable, lossy.as_ref()) {
                 (false, ..) => self.drive_held::<false>(&state, h, u, &legs, None),
                 (true, true, lossy) => self.drive_lossy(&state, h, u, &legs, lossy),
                 (true, false, lossy) => self.coast(&state, h, &legs, lossy),
             };
             state = next;
-            energy.add(&passed.energy);
-            if LOSSY {
-                losses.add(&passed.losses);
-            } else {
-                losses.friction += passed.losses.friction;
-            }
+            passed.add(&driven);
             left -= 1.0;
         }
         let lost = if !LOSSY || self.inputs.enable { None } else { self.remaining(&state, &legs) };
         if let Some(lost) = lost {
             state.psi = self.idle_flux(&self.warm.motor, state.speed);
-            energy.loss += lost;
-            losses.cu += lost;
+            passed.energy.loss += lost;
+            passed.losses.cu += lost;
         }
         if !LOSSY {
-            losses.cu = energy.loss - losses.friction;
+            passed.losses.cu = passed.energy.loss - passed.losses.friction;
         }
-        self.conclude(step.h, state, &energy, losses, lost.is_some(), &legs)?;
+        self.conclude(step.h, state, &passed, lost.is_some(), &legs)?;
         if LOSSY && !self.parameters.iron.is_none() {
             self.by_iron = by_iron.unwrap_or_else(|| self.current_by_iron());
         }
         Ok(())
     }
 
-    /// Takes the `state` at the end of a step of `h` (s), in which `energy` passed with its `losses`.
+    /// Takes the `state` at the end of a step of `h` (s) and what `passed` in it.
     #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
     #[inline(always)]
     pub(super) fn conclude(
         &mut self,
         h: f64,
         state: State,
-        energy: &Energy,
-        losses: Losses,
+        passed: &Passed,
         blocked: bool,
         legs: &Legs,
     ) -> Result<(), Fault> {
-        let State { psi, speed, angle, .. } = state;
+        let (State { psi, speed, angle, .. }, energy) = (state, &passed.energy);
+        if self.is_too_fast(speed) {
+            return Err(self.too_fast(speed));
+        }
         if !all_finite([psi.d(), psi.q(), speed, angle, energy.r#in, energy.mech, energy.loss]) {
             return Err(self.diverged(h));
         }
         (self.state, self.blocked) = (state, blocked);
         self.energy.add(energy);
-        self.powers = Powers::mean(energy, losses, h, &self.inputs, legs, || self.currents());
+        let tau_shaft = self.parameters.mechanics.tau_shaft(passed.impulse * (1.0 / h), self.inputs.tau_load);
+        self.powers = Powers::mean(energy, passed.losses, tau_shaft, h, &self.inputs, legs, || self.currents());
         Ok(())
+    }
+
+    /// Whether the mechanical `speed` (rad/s) is beyond [`FASTEST`].
+    #[inline]
+    pub(super) fn is_too_fast(&self, speed: f64) -> bool {
+        (f64::from(self.warm.motor.n_p) * speed).abs() > FASTEST
+    }
+
+    /// Refuses a step that begins or ends at such a speed.
+    #[cold]
+    #[inline(never)]
+    fn too_fast(&self, speed: f64) -> Fault {
+        let cause = format!("the shaft turns at {speed} rad/s, beyond the {} rad/s of any machine", self.fastest());
+        let remedy = if self.parameters.mechanics.imposed { "" } else { " or use mechanics.imposed" };
+        Fault::new(format!("{cause}: the coupling is unstable; shorten the communication step{remedy}"))
+    }
+
+    /// [`FASTEST`] as a mechanical speed in rad/s.
+    pub(super) fn fastest(&self) -> f64 {
+        FASTEST / f64::from(self.parameters.motor.n_p)
     }
 
     #[cold]
     #[inline(never)]
-    fn diverged(&self, h: f64) -> Fault {
+    pub(super) fn diverged(&self, h: f64) -> Fault {
         Fault::new(format!(
             "the machine's state left the finite numbers within a step of {h} s; the step before it ended with {}",
             self.state.tell()

@@ -68,17 +68,19 @@ pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
             O::output("theta_e", &RADIAN, "Electrical rotor angle from phase a to the d axis, in (-pi, pi]", |o| {
                 &mut o.theta_e
             }),
-            O::output("tau_e", &NEWTON_METER, "Electromagnetic torque", |o| &mut o.tau_e),
+            O::output("tau_e", &NEWTON_METER, "Electromagnetic torque at the instant", |o| &mut o.tau_e),
             O::output("i_d", &AMPERE, "d-axis stator current", |o| &mut o.i_d),
             O::output("i_q", &AMPERE, "q-axis stator current", |o| &mut o.i_q),
             O::part("", &Part { table: POWERS, lens: |o| &mut o.powers }),
             O::output(
                 "tau_shaft",
                 &NEWTON_METER,
-                "Torque of the shaft on the load: tau_load, or with mechanics.imposed tau_e minus friction",
-                |o| &mut o.tau_shaft,
-            ),
-            O::part("energy.", &Part { table: ENERGY, lens: |o| &mut o.energy }),
+                "Torque of the shaft on the load: tau_load, or with mechanics.imposed tau_e minus friction; mean over the last \
+                 step, as p_mech (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
+                |o| &mut o.powers.tau_shaft,
+            )
+            .mean(),
+            O::part("energy_", &Part { table: ENERGY, lens: |o| &mut o.energy }),
         ]
     },
 );

@@ -336,7 +336,7 @@ fn wrong_size(session: &Session) -> Result<(), NotDetermined> {
             let state = instance.save()?;
             let mut intact = true;
             let status = instance.call(&format!("SerializeFMUState(size={size} of {n})"), |raw| {
-                let (status, _, whole) = raw.serialize(instance.handle, state, size)?;
+                let (status, _, whole) = raw.serialize(instance.handle, state, size).ok().flatten()?;
                 intact = whole;
                 Some(status)
             })?;

@@ -274,7 +274,9 @@ pub(super) fn null_instance(session: &Session) -> Result<(), NotDetermined> {
                 "SerializedFMUstateSize" | "SerializedFMUStateSize" => {
                     raw.state_size(null, SavedState::NULL).map(|(s, _)| s)
                 }
-                "SerializeFMUstate" | "SerializeFMUState" => raw.serialize(null, SavedState::NULL, 8).map(|(s, ..)| s),
+                "SerializeFMUstate" | "SerializeFMUState" => {
+                    raw.serialize(null, SavedState::NULL, 8).map_err(NotDetermined)?.map(|(s, ..)| s)
+                }
                 "DeSerializeFMUstate" | "DeserializeFMUState" => {
                     raw.deserialize(null, Some(&[0; 8]), 8).map(|(s, _)| s)
                 }

@@ -244,12 +244,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn enter_event(entry: impl Function, instance: Instance) -> c_int {
         // SAFETY: the importer's instance.
-        unsafe {
-            enter::<E, _>(entry, instance, |instance| {
-                instance.enter_event();
-                Ok(())
-            })
-        }
+        unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.enter_event()?)) }
     }
 
     pub unsafe fn enter_continuous(entry: impl Function, instance: Instance) -> c_int {
@@ -300,8 +295,7 @@ impl<E: Exported> Abi<E> {
                 let end = place(end, "terminateSimulation")?;
                 place(event, "enterEventMode")?.write(false.into());
                 end.write(false.into());
-                instance.completed_step();
-                Ok(())
+                Ok(instance.completed_step()?)
             })
         }
     }

@@ -230,6 +230,20 @@ impl Fmu {
         value
     }
 
+    /// The last communication point: the variable of FMI 3.0, the status of FMI 2.0.
+    pub fn try_time(&self, time: &mut f64) -> c_int {
+        match self.version {
+            2 => unsafe { fmi2GetRealStatus(self.it, 2, time) },
+            _ => self.try_get(&[model::TIME], std::slice::from_mut(time)),
+        }
+    }
+
+    pub fn time(&self) -> f64 {
+        let mut time = f64::NAN;
+        assert_eq!(self.try_time(&mut time), OK);
+        time
+    }
+
     pub fn save(&self, state: &mut FmuState) -> c_int {
         unsafe { if self.version == 2 { fmi2GetFMUstate(self.it, state) } else { fmi3GetFMUState(self.it, state) } }
     }
@@ -303,7 +317,7 @@ impl Fmu {
         }
         let mut end = 0.0;
         // Not allowed in every state; then the state is restored.
-        self.try_get(&[model::TIME], std::slice::from_mut(&mut end));
+        self.try_time(&mut end);
         assert_eq!(self.restore(here), OK);
         let attempts: [(char, &dyn Fn() -> c_int); 3] =
             [('s', &|| self.step(end, 1e-3)), ('n', &|| self.exit()), ('i', &|| self.enter(0.0, None))];

@@ -106,7 +106,7 @@ impl Snapshot {
     /// Bits of one value as a type, or `None`: another type, or no such variable.
     pub(crate) fn value(&self, version: u8, kind: Kind, reference: u32) -> Option<u64> {
         Some(match (kind, reference) {
-            (Kind::Real, TIME) => self.end.to_bits(),
+            (Kind::Real, TIME) if version == 3 => self.end.to_bits(),
             (Kind::Real, U | K | X | R | 8..=10 | GAIN | DOUBLE_GAIN) => self.real(reference).to_bits(),
             (Kind::Integer, COUNT | N) => u64::from(self.integer(reference).cast_unsigned()),
             (Kind::Integer, MODE) if version == 2 => u64::from(self.integer(reference).cast_unsigned()),

@@ -454,7 +454,7 @@ impl Drop for World {
 /// The variables by type as a standard has them: FMI 2.0 knows no arrays.
 fn lists(version: u8) -> [(Kind, &'static [u32]); 4] {
     let reals: &[u32] = if version == 2 {
-        &[TIME, U, K, X, R, MAP, MAP + 1, MAP + 2, GAIN, DOUBLE_GAIN]
+        &[U, K, X, R, MAP, MAP + 1, MAP + 2, GAIN, DOUBLE_GAIN]
     } else {
         &[TIME, U, K, X, R, MAP, GAIN, DOUBLE_GAIN]
     };

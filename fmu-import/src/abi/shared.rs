@@ -109,6 +109,25 @@ impl SharedFunctions {
     }
 }
 
+/// Largest serialized state in bytes, 1 GiB. The size is what an FMU says, and memory for it must not take the process down.
+const LARGEST_STATE: usize = 1 << 30;
+
+/// What fills room for bytes.
+pub(super) const FILL: u8 = 0xc5;
+
+/// Room for a serialized state of this `size` with `more` bytes behind it.
+///
+/// # Errors
+/// The size is more than [`LARGEST_STATE`], or there is no memory for it.
+pub(super) fn room(size: usize, more: usize) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    if size > LARGEST_STATE || bytes.try_reserve_exact(size + more).is_err() {
+        return Err(format!("the FMU state has {size} bytes, more than {LARGEST_STATE} or than there is memory for"));
+    }
+    bytes.resize(size + more, FILL);
+    Ok(bytes)
+}
+
 /// A pointer that an FMU gave out, to an instance or to a saved state. Only the FMU follows it.
 #[derive(Clone, Copy)]
 pub(crate) struct Handle(*mut c_void);
@@ -193,7 +212,7 @@ impl SharedInstance {
         let mut size = 0;
         // SAFETY: the instance and the state are alive; there is room for the size.
         judge(self.functions.state_size.name, unsafe { size_of(self.pointer(), state.0, &raw mut size) })?;
-        let mut bytes = vec![0_u8; size];
+        let mut bytes = room(size, 0).map_err(Refusal::Impossible)?;
         // SAFETY: as above; the buffer has the size that the FMU asked for.
         let status = unsafe { serialize(self.pointer(), state.0, bytes.as_mut_ptr(), size) };
         judge(self.functions.serialize.name, status).map(|()| bytes)

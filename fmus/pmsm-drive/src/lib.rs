@@ -1,3 +1,3 @@
 //! The FMU PmsmDrive.
 
-fmu_export::export!(drive::PmsmDrive: ContinuousTime + Events + Differentiable + Warns);
+fmu_export::export!(drive::PmsmDrive: ContinuousTime + Events + Differentiable + CompletedSteps + Warns);

@@ -81,8 +81,9 @@ struct Numbering<'a> {
 impl<'a> Numbering<'a> {
     fn of(description: &'a Description, version: FmiVersion) -> Self {
         let states = description.model_exchange.as_ref().map_or(&[][..], |exchange| &exchange.states);
-        let mut index = 1; // time is the first
-        let mut known = BTreeMap::from([(TIME, if version == FmiVersion::V2 { index } else { TIME })]);
+        let mut index = 0;
+        // FMI 2.0 has no variable for time, so nothing can name it there.
+        let mut known: BTreeMap<u32, u32> = (version == FmiVersion::V3).then_some((TIME, TIME)).into_iter().collect();
         let mut variables = Vec::new();
         for v in &description.variables {
             let mut numbers = Vec::new();

@@ -10,9 +10,10 @@ use fmu_core::Description;
 use fmu_core::description::VariableKind;
 use fmu_core::unit::{Exponents, SECOND};
 
-/// `UnitDefinitions`: the unit of time, and those of the variables.
-pub(super) fn units(description: &Description) -> Element {
-    let mut units = vec![unit(SECOND.unit.name, SECOND.unit.exponents, SECOND.unit.factor)];
+/// `UnitDefinitions`: those of the variables, time among them in FMI 3.0. It must not be empty: `None` without a unit.
+pub(super) fn units(description: &Description, version: FmiVersion) -> Option<Element> {
+    let second = unit(SECOND.unit.name, SECOND.unit.exponents, SECOND.unit.factor);
+    let mut units: Vec<Element> = (version == FmiVersion::V3).then_some(second).into_iter().collect();
     for variable in &description.variables {
         let VariableKind::Real { unit: name, exponents, factor, display, .. } = &variable.kind else { continue };
         if name.is_empty() {
@@ -28,7 +29,7 @@ pub(super) fn units(description: &Description) -> Element {
             units[at].children.push(display_unit(display, *factor, *offset));
         }
     }
-    Element::new("UnitDefinitions").children(units)
+    (!units.is_empty()).then(|| Element::new("UnitDefinitions").children(units))
 }
 
 /// `base value = factor * value`; what is not written is 0, or 1 for the factor.

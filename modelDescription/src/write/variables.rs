@@ -1,5 +1,7 @@
-//! `ModelVariables`: the variables in the order of their value references, and time: first in FMI 2.0, last in FMI 3.0.
-//! OMSimulator treats value references of FMI 3.0 as positions in the list, counted from 1 (ComponentFMU3CS.cpp,
+//! `ModelVariables`: the variables in the order of their value references, and in FMI 3.0 time behind them.
+//!
+//! FMI 3.0 requires the independent variable, FMI 2.0 allows it. Our archives of FMI 2.0 have none: OpenModelica's importer
+//! makes a component of every variable, and Modelica reserves the name `time`. OMSimulator treats value references of FMI 3.0 as positions in the list, counted from 1 (ComponentFMU3CS.cpp,
 //! `initializeDependencyGraph_outputs`). With time, whose value reference is 0, at the end, the two agree.
 //!
 //! FMI 2.0.5, 2.2.7; FMI 3.0.2, 2.4.7. Unit and display unit are written on the variable as well as in its type
@@ -25,25 +27,20 @@ pub(super) fn variables(description: &Description, version: FmiVersion) -> Eleme
     });
     let all = Element::new("ModelVariables");
     match version {
-        FmiVersion::V2 => all.children([time(version)]).children(variables),
-        FmiVersion::V3 => all.children(variables).children([time(version)]),
+        FmiVersion::V2 => all.children(variables),
+        FmiVersion::V3 => all.children(variables).children([time()]),
     }
 }
 
 /// The independent variable: no start value, no `initial`.
-fn time(version: FmiVersion) -> Element {
-    let named = |element: &str| {
-        Element::new(element)
-            .with("name", "time")
-            .with("valueReference", TIME.to_string())
-            .with("description", "Simulation time")
-            .with("causality", "independent")
-            .with("variability", "continuous")
-    };
-    match version {
-        FmiVersion::V2 => named("ScalarVariable").children([Element::new("Real").with("unit", SECOND.unit.name)]),
-        FmiVersion::V3 => named("Float64").with("unit", SECOND.unit.name),
-    }
+fn time() -> Element {
+    Element::new("Float64")
+        .with("name", "time")
+        .with("valueReference", TIME.to_string())
+        .with("description", "Simulation time")
+        .with("causality", "independent")
+        .with("variability", "continuous")
+        .with("unit", SECOND.unit.name)
 }
 
 /// FMI 2.0 has no arrays: one scalar per element, `name[1]` the first (2.0.5, 2.2.9).
@@ -71,10 +68,10 @@ fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
     (0..v.elements()).zip(0..).map(of_array).collect()
 }
 
-/// Position in the list of FMI 2.0, from 1; time is the first.
+/// Position in the list of FMI 2.0, from 1.
 fn index(description: &Description, reference: u32) -> usize {
     let before = description.variables.iter().take_while(|v| v.value_reference != reference);
-    2 + before.map(Variable::elements).sum::<usize>()
+    1 + before.map(Variable::elements).sum::<usize>()
 }
 
 /// One variable of FMI 3.0, scalar or array.

@@ -128,6 +128,7 @@ pub(crate) fn sample() -> Description {
     ];
     Description {
         name: "Sample".into(),
+        title: None,
         description: AWKWARD.into(),
         version: "1.2.3".into(),
         author: "A & B".into(),
@@ -169,15 +170,25 @@ pub(crate) fn exchange_sample() -> Description {
         derivative("der(speed)", 16, 11, &[]),
         variable("edge", 17, local, real(&ONE)),
     ]);
-    let exchange =
-        ModelExchange { states: vec![14, 11], derivatives: vec![15, 16], indicators: vec![17], event_mode: false };
+    let exchange = ModelExchange {
+        states: vec![14, 11],
+        derivatives: vec![15, 16],
+        indicators: vec![17],
+        event_mode: false,
+        completed_steps: true,
+    };
     Description { name: "Exchange".into(), model_exchange: Some(exchange), ..description }
 }
 
 /// The sample as a sampled model: time events, no states.
 pub(crate) fn sampled_sample() -> Description {
-    let exchange =
-        ModelExchange { states: Vec::new(), derivatives: Vec::new(), indicators: Vec::new(), event_mode: true };
+    let exchange = ModelExchange {
+        states: Vec::new(),
+        derivatives: Vec::new(),
+        indicators: Vec::new(),
+        event_mode: true,
+        completed_steps: false,
+    };
     let mut description = sample();
     for v in description.variables.iter_mut().filter(|v| v.causality == Causality::Output) {
         v.dependencies = Some(Vec::new());

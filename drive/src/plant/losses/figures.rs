@@ -181,9 +181,9 @@ fn blocked_the_iron_brakes() {
         block.initialize();
         block.step(&fmu_core::Step { start: fmu_core::Elapsed::ZERO, h: 1e-3 }).unwrap();
         let out = &block.out;
-        println!("{rpm} rpm: {} W, {} N.m", out.powers.losses.iron, out.tau_shaft);
+        println!("{rpm} rpm: {} W, {} N.m", out.powers.losses.iron, out.powers.tau_shaft);
         assert!((out.powers.losses.iron / watt - 1.0).abs() < 5e-5, "{} W", out.powers.losses.iron);
-        assert!((out.tau_shaft - torque).abs() < 1e-5, "{} N.m", out.tau_shaft);
+        assert!((out.powers.tau_shaft - torque).abs() < 1e-5, "{} N.m", out.powers.tau_shaft);
         assert_eq!((out.i_d, out.i_q, out.powers.p_in), (0.0, 0.0, 0.0));
     }
 }

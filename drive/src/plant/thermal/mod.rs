@@ -26,7 +26,7 @@ use crate::motor::Motor;
 use crate::plant::losses::Losses;
 use crate::plant::signals::PlantOutputs;
 use fmu_core::unit::{KELVIN, ONE, PER_KELVIN, WATT};
-use fmu_core::{Dual, Fault, Field, Part, Row, Scalar, Table, enumeration};
+use fmu_core::{Fault, Field, Part, Row, Scalar, Table, enumeration};
 use network::{NETWORK, Network};
 use serde::{Deserialize, Serialize};
 
@@ -95,13 +95,13 @@ impl Temperatures {
         Self { winding: T, stator: T, magnet: T, inverter: T }
     }
 
-    /// With the change `along`.
-    fn changing(&self, along: &Self) -> Temperatures<Dual> {
+    /// Each of them and of `other` by `f`.
+    fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> Temperatures<T> {
         Temperatures {
-            winding: Dual::new(self.winding, along.winding),
-            stator: Dual::new(self.stator, along.stator),
-            magnet: Dual::new(self.magnet, along.magnet),
-            inverter: Dual::new(self.inverter, along.inverter),
+            winding: f(self.winding, other.winding),
+            stator: f(self.stator, other.stator),
+            magnet: f(self.magnet, other.magnet),
+            inverter: f(self.inverter, other.inverter),
         }
     }
 }
@@ -153,10 +153,9 @@ impl Default for ThermalInputs {
 }
 
 impl ThermalInputs {
-    /// With the change `along`.
-    pub fn changing(&self, along: &Self) -> ThermalInputs<Dual> {
-        let coolant = Dual::new(self.coolant, along.coolant);
-        ThermalInputs { coolant, imposed: self.imposed.changing(&along.imposed) }
+    /// Each of them and of `other` by `f`.
+    pub fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> ThermalInputs<T> {
+        ThermalInputs { coolant: f(self.coolant, other.coolant), imposed: self.imposed.zip(&other.imposed, f) }
     }
 }
 

@@ -98,6 +98,7 @@ impl<M: Twin> Snapshot<M> {
     pub fn reals(&mut self, reference: u32) -> Result<Vec<f64>, c_int> {
         let (table, states) = (M::TABLE.len(), M::CAN.states().len());
         let index = match reference.checked_sub(1) {
+            None if self.kind.version() == 2 => return Err(ERROR),
             None => return Ok(vec![self.end]),
             Some(index) => usize::try_from(index).unwrap(),
         };

@@ -6,6 +6,8 @@ use model_description::{BaseType, FmiVersion};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Buffer {
     pub(super) words: Vec<u64>,
+    /// C name of the type.
+    kind: &'static str,
     width: usize,
     count: usize,
 }
@@ -17,12 +19,22 @@ const CANARIES: usize = 32;
 impl Buffer {
     /// Room for `count` values of a type, filled with a pattern.
     pub fn room(base: BaseType, version: FmiVersion, count: usize) -> Self {
-        let width = width(base, version);
-        Self { words: vec![CANARY; (count * width).div_ceil(8) + CANARIES], width, count }
+        let (kind, width) = (type_name(base, version), width(base, version));
+        Self { words: vec![CANARY; (count * width).div_ceil(8) + CANARIES], kind, width, count }
     }
 
     /// Values from their bits, the low ones of each.
+    ///
+    /// # Panics
+    /// A text that is not NULL: only [`Raw::set_strings`](super::Raw::set_strings) passes pointers.
     pub fn of(base: BaseType, version: FmiVersion, bits: &[u64]) -> Self {
+        let pointers = matches!(base, BaseType::String | BaseType::Binary) && bits.iter().any(|b| *b != 0);
+        assert!(!pointers, "a pointer cannot be made from a number");
+        Self::with_bits(base, version, bits)
+    }
+
+    /// As [`of`](Self::of), for pointers too.
+    pub(super) fn with_bits(base: BaseType, version: FmiVersion, bits: &[u64]) -> Self {
         let mut buffer = Self::room(base, version, bits.len());
         for (i, value) in bits.iter().enumerate() {
             let at = i * buffer.width;
@@ -48,6 +60,11 @@ impl Buffer {
     /// Number of values that fit, including the bytes after them.
     pub(super) fn capacity(&self) -> usize {
         8 * self.words.len() / self.width
+    }
+
+    /// Whether the values are those of a C type of this name.
+    pub(super) fn holds(&self, kind: &str) -> bool {
+        self.kind == kind
     }
 }
 

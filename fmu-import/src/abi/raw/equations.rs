@@ -66,7 +66,7 @@ impl Raw {
                 };
                 let place = if null { ptr::null_mut() } else { &raw mut info };
                 // SAFETY: FMI 2.0's type; the struct is ours or NULL.
-                let status = unsafe { f(instance.pointer(), place) };
+                let status = unsafe { f(self.owned().pointer(instance), place) };
                 let updated = Updated {
                     again: info.new_discrete_states_needed,
                     terminate: info.terminate_simulation,
@@ -84,7 +84,7 @@ impl Raw {
                     flags.each_mut().map(|flag| if null { ptr::null_mut() } else { ptr::from_mut(flag) });
                 let time = if null { ptr::null_mut() } else { &raw mut next };
                 // SAFETY: FMI 3.0's type; the places are ours or NULL.
-                let status = unsafe { f(instance.pointer(), a, b, c, d, e, time) };
+                let status = unsafe { f(self.owned().pointer(instance), a, b, c, d, e, time) };
                 let [again, terminate, nominals_changed, states_changed, next_event_time_defined] =
                     flags.map(i32::from);
                 let next_event_time = next;
@@ -105,7 +105,7 @@ impl Raw {
     pub fn set_time(&self, instance: Handle, t: f64) -> Option<Status> {
         let f: SetTime = self.function("SetTime")?;
         // SAFETY: the type of both standards.
-        Some(unsafe { f(instance.pointer(), t) })
+        Some(unsafe { f(self.owned().pointer(instance), t) })
     }
 
     /// States, derivatives, event indicators or nominals: an array, which may be NULL, and its length.
@@ -116,7 +116,7 @@ impl Raw {
         let f: GetVector = self.function(name.as_str())?;
         // SAFETY: all functions that `Vector` names have this type, up to the mutability of the array, which is ours, at
         // least n elements long, or NULL.
-        Some(unsafe { f(instance.pointer(), array_mut(values, n), n) })
+        Some(unsafe { f(self.owned().pointer(instance), array_mut(values, n), n) })
     }
 
     /// `CompletedIntegratorStep`: `enterEventMode` and `terminateSimulation` as the FMU wrote them; with `null`, both get NULL.
@@ -132,7 +132,7 @@ impl Raw {
                 let mut flags = [c_int::from(UNTOUCHED); 2];
                 let [a, b] = flags.each_mut().map(|flag| if null { ptr::null_mut() } else { ptr::from_mut(flag) });
                 // SAFETY: the standard's type; the places are ours or NULL.
-                let status = unsafe { f(instance.pointer(), c_int::from(no_prior), a, b) };
+                let status = unsafe { f(self.owned().pointer(instance), c_int::from(no_prior), a, b) };
                 Some((status, flags))
             }
             FmiVersion::V3 => {
@@ -140,7 +140,7 @@ impl Raw {
                 let mut flags = [UNTOUCHED; 2];
                 let [a, b] = flags.each_mut().map(|flag| if null { ptr::null_mut() } else { ptr::from_mut(flag) });
                 // SAFETY: the standard's type; the places are ours or NULL.
-                let status = unsafe { f(instance.pointer(), no_prior, a, b) };
+                let status = unsafe { f(self.owned().pointer(instance), no_prior, a, b) };
                 Some((status, flags.map(i32::from)))
             }
         }
@@ -151,7 +151,7 @@ impl Raw {
         let f: v3::Count = self.function(name.as_str())?;
         let mut count = usize::MAX;
         // SAFETY: FMI 3.0's type; the place is ours or NULL.
-        let status = unsafe { f(instance.pointer(), if null { ptr::null_mut() } else { &raw mut count }) };
+        let status = unsafe { f(self.owned().pointer(instance), if null { ptr::null_mut() } else { &raw mut count }) };
         Some((status, count))
     }
 
@@ -169,7 +169,8 @@ impl Raw {
     ) -> Option<Status> {
         let SensitivityArguments { unknowns: (unknowns, n_unknowns), knowns: (knowns, n_knowns), seed: (seed, n_seed) } =
             arguments;
-        let (i, u, k) = (instance.pointer(), array(unknowns, n_unknowns), array(knowns, n_knowns));
+        let owned = self.owned();
+        let (i, u, k) = (owned.pointer(instance), array(unknowns, n_unknowns), array(knowns, n_knowns));
         // SAFETY: of both: the standard's type; arrays are NULL or have the lengths that are passed. In FMI 2.0 the lists tell
         // the lengths of seed and sensitivity.
         Some(unsafe {
@@ -201,6 +202,6 @@ impl Raw {
     ) -> Option<Status> {
         let f: v2::InputDerivatives = self.function("SetRealInputDerivatives")?;
         // SAFETY: FMI 2.0's type; the arrays are NULL or have n elements.
-        Some(unsafe { f(instance.pointer(), array(references, n), n, array(orders, n), array(values, n)) })
+        Some(unsafe { f(self.owned().pointer(instance), array(references, n), n, array(orders, n), array(values, n)) })
     }
 }

@@ -64,8 +64,7 @@ impl Raw {
             FmiVersion::V2 => self.instantiate2(arguments, [name, token, resources], environment),
             FmiVersion::V3 => self.instantiate3(arguments, [name, token, resources], environment),
         };
-        let address = pointer?.expose_provenance();
-        Ok((address != 0).then_some(Handle(address)))
+        Ok(self.owned().take_instance(pointer?))
     }
 
     fn instantiate2(

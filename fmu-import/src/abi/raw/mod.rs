@@ -1,9 +1,14 @@
 //! Raw calls of an FMU's binary, for the checker: every function of both standards, with arguments that a well-behaved
 //! importer would never pass.
 //!
-//! Arrays are as long as the count that goes with them, or NULL, and a function is named by a type whose values all have
-//! one C signature, so no call from here passes memory or arguments that the standard's function cannot take. The checker
-//! tests how the FMU reacts to NULL, a freed instance or a call in the wrong state; it calls from a process of its own.
+//! No argument that safe code can form makes a call undefined behavior by itself. Instances and saved states are places in
+//! a table that [`Raw`] owns: one that is freed, or of another binary, is refused before the call. Arrays are at least as
+//! long as the count that goes with them, or NULL; pointers to texts come from [`CStr`] only; a function is named by a type
+//! whose values all have one C signature. The calls of a `Raw` follow one another. The checker tests how the FMU reacts to
+//! NULL, to unknown value references, to a call in the wrong state; it calls from a process of its own.
+//!
+//! # Panics
+//! Every call panics if its instance or its state is freed or of another binary.
 
 mod buffer;
 mod callbacks;
@@ -11,6 +16,7 @@ mod equations;
 mod instantiate;
 mod names;
 mod optional;
+mod owned;
 mod processor;
 mod states;
 
@@ -19,6 +25,7 @@ pub use callbacks::{Event, allocations, take_events};
 pub use equations::{SensitivityArguments, Updated};
 pub use instantiate::{Arguments, Interface};
 pub use names::{Count, Optional, Sensitivity, Simple, StepStatus, Text, Vector};
+pub use owned::{Handle, SavedState};
 pub use processor::float_control;
 
 use super::log::Status;
@@ -27,35 +34,11 @@ use buffer::CANARY;
 use callbacks::optional;
 use libloading::Library;
 use model_description::{BaseType, FmiVersion};
+use owned::Owned;
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::path::Path;
 use std::ptr;
-
-/// An instance, as the address that the FMU gave.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Handle(usize);
-
-impl Handle {
-    /// NULL.
-    pub const NULL: Self = Self(0);
-
-    fn pointer(self) -> *mut c_void {
-        ptr::with_exposed_provenance_mut(self.0)
-    }
-}
-
-/// An FMU state, as the address that the FMU gave.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SavedState(usize);
-
-impl SavedState {
-    /// No state.
-    pub const NULL: Self = Self(0);
-
-    fn pointer(self) -> *mut c_void {
-        ptr::with_exposed_provenance_mut(self.0)
-    }
-}
+use std::sync::Mutex;
 
 /// Which results of `fmi3DoStep` get a pointer; the others get NULL.
 pub type ResultPointers = [bool; 4];
@@ -78,15 +61,20 @@ pub struct Stepped {
 pub struct Raw {
     library: Library,
     version: FmiVersion,
+    owned: Mutex<Owned>,
 }
 
 impl Raw {
+    fn of(library: Library, version: FmiVersion) -> Self {
+        Self { library, version, owned: Mutex::new(Owned::new()) }
+    }
+
     /// Loads a binary.
     ///
     /// # Errors
     /// The error message of the system.
     pub fn open(path: &Path, version: FmiVersion) -> Result<Self, String> {
-        crate::abi::library::load(path).map(|library| Self { library, version }).map_err(|e| e.cause())
+        crate::abi::library::load(path).map(|library| Self::of(library, version)).map_err(|e| e.cause())
     }
 
     /// Loads a binary with its symbols visible to all libraries loaded later, and resolved at once.
@@ -98,7 +86,7 @@ impl Raw {
         use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_NOW};
         // SAFETY: as `library::load`: the code has every right of this process.
         let library = unsafe { Library::open(Some(path), RTLD_NOW | RTLD_GLOBAL) };
-        library.map(|library| Self { library: library.into(), version }).map_err(|e| e.to_string())
+        library.map(|library| Self::of(library.into(), version)).map_err(|e| e.to_string())
     }
 
     /// Unloads the binary.
@@ -143,8 +131,10 @@ impl Raw {
     /// `FreeInstance`; `None` if it is missing.
     pub fn free(&self, instance: Handle) -> Option<()> {
         let f: FreeInstance = self.function("FreeInstance")?;
-        // SAFETY: an instance of this FMU, freed once, or NULL.
-        unsafe { f(instance.pointer()) };
+        let mut owned = self.owned();
+        let pointer = owned.forget_instance(instance);
+        // SAFETY: an instance of this FMU, which the table forgot with its states, or NULL.
+        unsafe { f(pointer) };
         Some(())
     }
 
@@ -156,7 +146,7 @@ impl Raw {
         }
         let f: OfInstance = self.function(name.as_str())?;
         // SAFETY: all functions that `Simple` names have this type.
-        Some(unsafe { f(instance.pointer()) })
+        Some(unsafe { f(self.owned().pointer(instance)) })
     }
 
     /// `fmi2SetupExperiment` or `fmi3EnterInitializationMode`.
@@ -174,11 +164,18 @@ impl Raw {
             match self.version {
                 FmiVersion::V2 => {
                     let f: v2::SetupExperiment = self.function("SetupExperiment")?;
-                    f(instance.pointer(), c_int::from(has_tolerance), tolerance, start, c_int::from(has_stop), stop)
+                    f(
+                        self.owned().pointer(instance),
+                        c_int::from(has_tolerance),
+                        tolerance,
+                        start,
+                        c_int::from(has_stop),
+                        stop,
+                    )
                 }
                 FmiVersion::V3 => {
                     let f: v3::EnterInitializationMode = self.function("EnterInitializationMode")?;
-                    f(instance.pointer(), has_tolerance, tolerance, start, has_stop, stop)
+                    f(self.owned().pointer(instance), has_tolerance, tolerance, start, has_stop, stop)
                 }
             }
         })
@@ -187,7 +184,8 @@ impl Raw {
     /// A getter: `references` and `values` may be NULL; `n` and `n_values` (FMI 3.0 only) may be less than their lengths.
     ///
     /// # Panics
-    /// An array is shorter than its count.
+    /// An array is shorter than its count, the buffer is of another type, or the type is Binary or Clock, whose functions
+    /// take other arguments.
     pub fn get(
         &self,
         instance: Handle,
@@ -197,13 +195,13 @@ impl Raw {
         values: Option<&mut Buffer>,
         n_values: usize,
     ) -> Option<Status> {
-        self.transfer(&format!("Get{}", type_name(base, self.version)), instance, references, n, values, n_values)
+        self.transfer(&self.owned(), "Get", instance, base, references, n, values, n_values)
     }
 
-    /// A setter, as [`get`](Self::get).
+    /// A setter, as [`get`](Self::get). Texts are NULL; [`set_strings`](Self::set_strings) sets others.
     ///
     /// # Panics
-    /// As [`get`](Self::get).
+    /// As [`get`](Self::get), or a text is not NULL.
     pub fn set(
         &self,
         instance: Handle,
@@ -213,32 +211,41 @@ impl Raw {
         values: Option<&mut Buffer>,
         n_values: usize,
     ) -> Option<Status> {
-        self.transfer(&format!("Set{}", type_name(base, self.version)), instance, references, n, values, n_values)
+        // A getter may have left pointers there, which are the FMU's.
+        let null = |buffer: &&mut Buffer| buffer.words[..n.max(n_values)].iter().all(|word| *word == 0);
+        assert!(base != BaseType::String || values.as_ref().is_none_or(null), "a pointer that is not ours");
+        self.transfer(&self.owned(), "Set", instance, base, references, n, values, n_values)
     }
 
+    #[expect(clippy::too_many_arguments, reason = "those of the C function")]
     fn transfer(
         &self,
-        name: &str,
+        owned: &Owned,
+        way: &str,
         instance: Handle,
+        base: BaseType,
         references: Option<&[u32]>,
         n: usize,
         values: Option<&mut Buffer>,
         n_values: usize,
     ) -> Option<Status> {
+        let kind = type_name(base, self.version);
+        assert!(!matches!(base, BaseType::Binary | BaseType::Clock), "{way}{kind} takes other arguments");
         assert!(references.is_none_or(|r| n <= r.len()), "there are fewer references than n");
         let references = references.map_or(ptr::null(), <[u32]>::as_ptr);
         let values = values.map_or(ptr::null_mut(), |buffer| {
+            assert!(buffer.holds(kind), "the buffer is not of the type {kind}");
             assert!(n_values.max(n) <= buffer.capacity(), "there are fewer values than n_values");
             buffer.words.as_mut_ptr().cast::<c_void>()
         });
+        let name = format!("{way}{kind}");
+        let instance = owned.pointer(instance);
         // SAFETY: the standards' types, whatever the values are: they only differ in what the pointer points to. The
         // arrays are NULL or have the lengths that are passed.
         Some(unsafe {
             match self.version {
-                FmiVersion::V2 => self.function::<v2::Get<c_void>>(name)?(instance.pointer(), references, n, values),
-                FmiVersion::V3 => {
-                    self.function::<v3::Get<c_void>>(name)?(instance.pointer(), references, n, values, n_values)
-                }
+                FmiVersion::V2 => self.function::<v2::Get<c_void>>(&name)?(instance, references, n, values),
+                FmiVersion::V3 => self.function::<v3::Get<c_void>>(&name)?(instance, references, n, values, n_values),
             }
         })
     }
@@ -254,8 +261,10 @@ impl Raw {
         for word in &mut buffer.words[..count] {
             *word = 0;
         }
-        let status =
-            self.get(instance, BaseType::String, Some(references), references.len(), Some(&mut buffer), count)?;
+        // Held until the texts are copied, which the next call may end.
+        let owned = self.owned();
+        let (list, n) = (Some(references), references.len());
+        let status = self.transfer(&owned, "Get", instance, BaseType::String, list, n, Some(&mut buffer), count)?;
         if !status.is_ok() {
             return Some((status, Vec::new()));
         }
@@ -265,14 +274,19 @@ impl Raw {
     }
 
     /// Sets texts; `None` for NULL. The buffer is overwritten afterwards.
+    ///
+    /// # Panics
+    /// There are fewer texts than references.
     pub fn set_strings(&self, instance: Handle, references: &[u32], texts: &[Option<&CStr>]) -> Option<Status> {
+        assert!(references.len() <= texts.len(), "there are fewer texts than references");
         let mut copies: Vec<Option<Vec<u8>>> =
             texts.iter().map(|t| t.map(|t| t.to_bytes_with_nul().to_vec())).collect();
         let address = |copy: &Option<Vec<u8>>| copy.as_ref().map_or(0, |c| c.as_ptr().expose_provenance() as u64);
         let bits: Vec<u64> = copies.iter().map(address).collect();
-        let mut buffer = Buffer::of(BaseType::String, self.version, &bits);
-        let status =
-            self.set(instance, BaseType::String, Some(references), references.len(), Some(&mut buffer), texts.len());
+        let mut buffer = Buffer::with_bits(BaseType::String, self.version, &bits);
+        let (list, n) = (Some(references), references.len());
+        let values = Some(&mut buffer);
+        let status = self.transfer(&self.owned(), "Set", instance, BaseType::String, list, n, values, texts.len());
         for copy in copies.iter_mut().flatten() {
             let end = copy.len().saturating_sub(1);
             copy[..end].fill(b'#');
@@ -295,13 +309,13 @@ impl Raw {
             match self.version {
                 FmiVersion::V2 => {
                     let f: v2::DoStep = self.function("DoStep")?;
-                    f(instance.pointer(), t, h, c_int::from(no_prior))
+                    f(self.owned().pointer(instance), t, h, c_int::from(no_prior))
                 }
                 FmiVersion::V3 => {
                     let f: v3::DoStep = self.function("DoStep")?;
                     let null = ptr::null_mut;
                     f(
-                        instance.pointer(),
+                        self.owned().pointer(instance),
                         t,
                         h,
                         no_prior,
@@ -335,14 +349,17 @@ impl Raw {
         Some(unsafe {
             match self.version {
                 FmiVersion::V2 => self.function::<v2::SetDebugLogging>("SetDebugLogging")?(
-                    instance.pointer(),
+                    self.owned().pointer(instance),
                     c_int::from(on),
                     n,
                     pointer,
                 ),
-                FmiVersion::V3 => {
-                    self.function::<v3::SetDebugLogging>("SetDebugLogging")?(instance.pointer(), on, n, pointer)
-                }
+                FmiVersion::V3 => self.function::<v3::SetDebugLogging>("SetDebugLogging")?(
+                    self.owned().pointer(instance),
+                    on,
+                    n,
+                    pointer,
+                ),
             }
         })
     }
@@ -352,6 +369,6 @@ impl Raw {
         let f: v2::GetStatus<u64> = self.function(name.as_str())?;
         let mut value = CANARY;
         // SAFETY: FMI 2.0's type but for the place, which has room for each of its values.
-        Some((unsafe { f(instance.pointer(), kind, &raw mut value) }, value))
+        Some((unsafe { f(self.owned().pointer(instance), kind, &raw mut value) }, value))
     }
 }

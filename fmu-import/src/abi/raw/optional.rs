@@ -11,7 +11,8 @@ impl Raw {
     pub fn output_derivatives(&self, instance: Handle, references: &[u32], order: c_int) -> Option<(Status, Vec<f64>)> {
         let n = references.len();
         let (orders, mut values) = (vec![order; n], vec![f64::NAN; n]);
-        let (i, vr, orders, out) = (instance.pointer(), references.as_ptr(), orders.as_ptr(), values.as_mut_ptr());
+        let owned = self.owned();
+        let (i, vr, orders, out) = (owned.pointer(instance), references.as_ptr(), orders.as_ptr(), values.as_mut_ptr());
         // SAFETY: the standards' types; all arrays have this length.
         let status = unsafe {
             match self.version {
@@ -39,7 +40,8 @@ impl Raw {
         }
         let (a, b): (Any, Any) = (room.as_mut_ptr().cast(), more.as_mut_ptr().cast());
         let (c, d): (Any, Any) = (third.as_mut_ptr().cast(), fourth.as_mut_ptr().cast());
-        let (vr, i, name) = (&raw const reference, instance.pointer(), function.as_str());
+        let owned = self.owned();
+        let (vr, i, name) = (&raw const reference, owned.pointer(instance), function.as_str());
         // SAFETY: every type is that of the standard, up to what a pointer to data leads to; each place has 512 bytes,
         // more than one value or 64 states need.
         Some(unsafe {

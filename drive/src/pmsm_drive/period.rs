@@ -1,0 +1,102 @@
+//! Means over the sample periods of `PmsmDrive`, and their variables.
+
+use crate::plant::counters::Total;
+use crate::plant::power::Powers;
+use fmu_core::unit::{NEWTON_METER, WATT};
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Means over the last sample period; 0 before its end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Means {
+    /// Power from the DC link in W.
+    pub p_in: f64,
+    /// Power at the shaft to the load in W.
+    pub p_mech: f64,
+    /// All losses in W.
+    pub p_loss: f64,
+    /// Torque of the shaft on the load in N.m.
+    pub tau_shaft: f64,
+}
+
+/// Mean powers over the sample periods; a communication step may end within a period.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Period {
+    /// Mean over the last complete period.
+    pub(super) last: Powers,
+    /// Whether there was one.
+    over: bool,
+    /// Mean over the current period so far.
+    mean: Powers,
+    /// Elapsed part of the current period in s.
+    time: f64,
+    /// Model Exchange: what had passed when the current period began.
+    start: Total,
+}
+
+impl Period {
+    /// Before the first, with the `powers` at the start.
+    pub(super) fn new(powers: Powers) -> Self {
+        Self { last: powers, ..Self::default() }
+    }
+
+    /// Adds the `powers` of a step of `h` (s), at whose end a period may end.
+    pub(super) fn add(&mut self, powers: Powers, h: f64, ends: bool) {
+        self.time += h;
+        // A step of a whole period is taken unchanged, to the last bit.
+        let mean = if self.time > h { self.mean.with(powers, h / self.time) } else { powers };
+        if ends {
+            (self.last, self.over, self.time) = (mean, true, 0.0);
+        } else {
+            self.mean = mean;
+        }
+    }
+
+    /// Model Exchange: a period ends, and `total` has passed since the start.
+    pub(super) fn end(&mut self, total: Total) {
+        let start = std::mem::replace(&mut self.start, total);
+        let time = total.time.since(start.time);
+        if time > 0.0 {
+            let mean = |end: f64, start: f64| (end - start) / time;
+            let (e, s) = (&total.energy, &start.energy);
+            let [p_in, p_mech, p_loss] = [mean(e.r#in, s.r#in), mean(e.mech, s.mech), mean(e.loss, s.loss)];
+            let tau_shaft = mean(total.impulse, start.impulse);
+            (self.last, self.over) = (Powers { p_in, p_mech, p_loss, tau_shaft, ..Powers::default() }, true);
+        }
+    }
+
+    /// What the means show.
+    pub(super) fn means(&self) -> Means {
+        let Powers { p_in, p_mech, p_loss, tau_shaft, .. } = self.last;
+        if self.over { Means { p_in, p_mech, p_loss, tau_shaft } } else { Means::default() }
+    }
+}
+
+type M = Row<Means>;
+
+/// The means over the last sample period.
+pub(super) const MEANS: &Table<Means> = &Table::new(
+    const {
+        &[
+            M::discrete_output(
+                "p_in_mean",
+                &WATT,
+                "Power from the DC link, mean over the last T_s in Co-Simulation and in Model Exchange; 0 before its end",
+                |m| &mut m.p_in,
+            ),
+            M::discrete_output(
+                "p_mech_mean",
+                &WATT,
+                "Power delivered to the load at the shaft, mean as p_in_mean",
+                |m| &mut m.p_mech,
+            ),
+            M::discrete_output("p_loss_mean", &WATT, "All losses, mean as p_in_mean", |m| &mut m.p_loss),
+            M::discrete_output(
+                "tau_shaft_mean",
+                &NEWTON_METER,
+                "Torque of the shaft on the load, mean as p_in_mean",
+                |m| &mut m.tau_shaft,
+            ),
+        ]
+    },
+);

@@ -1,0 +1,186 @@
+//! A model that follows the solution: which calls of an importer tell it a point, in both standards.
+#![allow(missing_docs)]
+#![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
+
+mod solver;
+
+use fmu_core::unit::{Exponents, Quantity, SECOND, Unit};
+use fmu_core::{
+    Block, CompletedSteps, ContinuousTime, Description, Elapsed, Events, Fault, Info, Model, Next, Outcome, Row, State,
+    Step, Table, integrate,
+};
+use serde::{Deserialize, Serialize};
+use solver::{CS, ERROR, Fmu, ME, OK};
+use std::ptr::null_mut;
+
+const ONE_PER_S: Quantity = Quantity::new("Rate", Unit::si("1/s", Exponents::mechanical(0, 0, -1, 0)));
+
+/// dx/dt = u, and the area under x by the trapezoidal rule between the points of the solution.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Meter {
+    u: f64,
+    x: f64,
+    area: f64,
+    points: i32,
+    last: (Elapsed, f64),
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Outputs {
+    area: f64,
+    points: i32,
+}
+
+const U: u32 = 1;
+const X: u32 = 2;
+const AREA: u32 = 3;
+const POINTS: u32 = 4;
+
+type Var = Row<Block<Meter>>;
+
+impl Model for Meter {
+    type Outputs = Outputs;
+    const INFO: Info = Info { name: "Meter", description: "An area under a curve", version: "1.0", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = &Table::new(
+        const {
+            &[
+                Var::input("u", &ONE_PER_S, "Slope", |m| &mut m.model.u),
+                Var::output("x", &SECOND, "Height", |m| &mut m.model.x),
+                Var::output("area", &SECOND, "Area below x", |m| &mut m.out.area),
+                Var::integer_output("points", "Points told", |m| &mut m.out.points),
+            ]
+        },
+    );
+
+    fn initialize(&mut self) {
+        *self = Self { u: self.u, ..Self::default() };
+    }
+
+    fn output(&self, _now: Elapsed, out: &mut Outputs) {
+        (out.area, out.points) = (self.area, self.points);
+    }
+
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        integrate::smooth::<Self, 1>(self, step, 0.1)
+    }
+}
+
+impl ContinuousTime for Meter {
+    const STATES: &'static [State<Self>] = &[State::new("x", &ONE_PER_S, |m: &mut Meter| &mut m.x).reinit()];
+
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = self.u;
+        Ok(())
+    }
+}
+
+impl CompletedSteps for Meter {
+    fn complete(&mut self, now: Elapsed) -> Result<(), Fault> {
+        if self.x > 1e3 {
+            return Err(Fault::value("x", self.x, "at most 1000"));
+        }
+        let (then, x) = self.last;
+        self.area += 0.5 * (x + self.x) * now.since(then);
+        (self.points, self.last) = (self.points + 1, (now, self.x));
+        Ok(())
+    }
+}
+
+impl Events for Meter {
+    /// Every event halves the height.
+    fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+        self.x *= 0.5;
+        Ok(Outcome { states_changed: true, ..Outcome::default() })
+    }
+
+    fn next(&self, _now: Elapsed) -> Next {
+        Next::Never
+    }
+}
+
+fmu_export::export!(Meter: ContinuousTime + Events + CompletedSteps);
+
+/// The area, and how many points were told.
+fn told(fmu: &Fmu) -> (f64, i32) {
+    (fmu.get(AREA), fmu.get_integer(POINTS))
+}
+
+fn point(fmu: &Fmu, t: f64, x: f64) {
+    assert_eq!((fmu.set_time(t), fmu.set_states(&[x])), (OK, OK));
+}
+
+#[test]
+fn completed_steps_and_events_are_told_and_trials_are_not() {
+    for kind in ME {
+        // The event that ends the initialization, and its end.
+        let fmu = Fmu::running(kind, 2.0);
+        assert_eq!(told(&fmu), (0.0, 2));
+        // A step that is tried at several times and given up, a shorter one that is complete.
+        for (t, x) in [(2.5, 7.0), (3.0, 9.0), (2.1, 1.0)] {
+            point(&fmu, t, x);
+            let _: [f64; 1] = fmu.derivatives();
+            assert_eq!(told(&fmu), (0.0, 2));
+        }
+        point(&fmu, 2.5, 4.0);
+        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.0, 3)));
+        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.0, 4)), "no time has passed");
+        // An event inside of the next step: beyond it, then back to it.
+        point(&fmu, 3.5, 6.0);
+        point(&fmu, 3.0, 5.0);
+        assert_eq!((fmu.event(), told(&fmu)), (OK, (3.25, 5)));
+        fmu.settle();
+        assert_eq!((fmu.leave(), fmu.get(X), told(&fmu)), (OK, 2.5, (3.25, 6)));
+        // From the height after the event on.
+        point(&fmu, 4.0, 3.5);
+        assert_eq!((fmu.completed(), told(&fmu)), (OK, (6.25, 7)));
+    }
+}
+
+#[test]
+fn a_saved_state_goes_on_from_its_point() {
+    for kind in ME {
+        let fmu = Fmu::running(kind, 0.0);
+        point(&fmu, 1.0, 4.0);
+        assert_eq!(fmu.completed(), OK);
+        point(&fmu, 1.5, 100.0);
+        let (mut saved, bytes) = (null_mut(), fmu.bytes());
+        assert_eq!(fmu.save(&mut saved), OK);
+        point(&fmu, 3.0, 8.0);
+        assert_eq!((fmu.completed(), told(&fmu).0), (OK, 14.0));
+        assert_eq!((fmu.restore(saved), told(&fmu).0), (OK, 2.0));
+        let (other, mut stored) = (Fmu::new(kind), null_mut());
+        assert_eq!((other.deserialize(&bytes, &mut stored), other.restore(stored)), (OK, OK));
+        for fmu in [&fmu, &other] {
+            point(fmu, 3.0, 8.0);
+            assert_eq!((fmu.completed(), told(fmu).0), (OK, 14.0));
+        }
+        assert_eq!((fmu.free_state(&mut saved), other.free_state(&mut stored)), (OK, OK));
+    }
+}
+
+#[test]
+fn a_point_that_the_model_refuses_is_an_error() {
+    for kind in ME {
+        let fmu = Fmu::running(kind, 0.0);
+        point(&fmu, 1.0, 2e3);
+        assert_eq!(fmu.completed(), ERROR);
+        let error = fmu.error();
+        assert!(error.contains("x = 2000 is not allowed: at most 1000"), "{error}");
+        let fmu = Fmu::running(kind, 0.0);
+        point(&fmu, 1.0, 2e3);
+        assert_eq!(fmu.event(), ERROR);
+    }
+}
+
+#[test]
+fn a_step_of_co_simulation_is_the_models_own() {
+    for kind in CS {
+        let fmu = Fmu::running(kind, 0.0);
+        assert_eq!((fmu.set(&[U], &[1.0]), fmu.step(0.0, 1.0).0, told(&fmu)), (OK, OK, (0.0, 0)));
+    }
+}
+
+#[test]
+fn the_description_asks_for_completed_steps() {
+    assert!(Description::exported::<fmi::This>().unwrap().model_exchange.unwrap().completed_steps);
+}

@@ -1,0 +1,143 @@
+//! What an FMU gave out and has not taken back: instances and saved states, as places in a table.
+//!
+//! Safe code holds no address, so it cannot pass one to the FMU that is wild, freed, or of another binary.
+
+use super::Raw;
+use std::ffi::c_void;
+use std::ptr;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{MutexGuard, PoisonError};
+
+/// A place in the table of one [`Raw`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Place {
+    /// Number of the `Raw`.
+    of: u64,
+    index: usize,
+}
+
+/// An instance of a [`Raw`], or NULL.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Handle(Option<Place>);
+
+impl Handle {
+    /// NULL.
+    pub const NULL: Self = Self(None);
+}
+
+/// An FMU state of a [`Raw`], or NULL.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SavedState(Option<Place>);
+
+impl SavedState {
+    /// No state.
+    pub const NULL: Self = Self(None);
+}
+
+/// A state that the FMU gave to an instance.
+#[derive(Debug)]
+struct State {
+    /// 0 after it was freed.
+    address: usize,
+    /// Index of the instance, with which the state ends.
+    instance: Option<usize>,
+}
+
+/// Instances and states of one [`Raw`].
+#[derive(Debug)]
+pub(super) struct Owned {
+    /// Number of the `Raw`, unlike that of every other.
+    of: u64,
+    /// Addresses of the instances; 0 after they were freed.
+    instances: Vec<usize>,
+    states: Vec<State>,
+}
+
+impl Owned {
+    pub(super) fn new() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self { of: NEXT.fetch_add(1, Ordering::Relaxed), instances: Vec::new(), states: Vec::new() }
+    }
+
+    /// Index of an instance that is alive; `None` for NULL.
+    ///
+    /// # Panics
+    /// The instance is freed or of another binary.
+    fn instance(&self, handle: Handle) -> Option<usize> {
+        let Place { of, index } = handle.0?;
+        assert!(of == self.of, "the instance is of another binary");
+        assert!(self.instances[index] != 0, "the instance is freed");
+        Some(index)
+    }
+
+    /// Address of an instance, or NULL.
+    ///
+    /// # Panics
+    /// As [`instance`](Self::instance).
+    pub(super) fn pointer(&self, handle: Handle) -> *mut c_void {
+        ptr::with_exposed_provenance_mut(self.instance(handle).map_or(0, |index| self.instances[index]))
+    }
+
+    /// Index of a state that is alive; `None` for NULL.
+    fn state_index(&self, state: SavedState) -> Option<usize> {
+        let Place { of, index } = state.0?;
+        assert!(of == self.of, "the state is of another binary");
+        assert!(self.states[index].address != 0, "the state is freed, by itself or with its instance");
+        Some(index)
+    }
+
+    /// Address of a state, or NULL.
+    ///
+    /// # Panics
+    /// The state is freed, by itself or with its instance, or of another binary.
+    pub(super) fn state(&self, state: SavedState) -> *mut c_void {
+        ptr::with_exposed_provenance_mut(self.state_index(state).map_or(0, |index| self.states[index].address))
+    }
+
+    /// Takes an instance from the FMU; `None` for NULL.
+    pub(super) fn take_instance(&mut self, pointer: *mut c_void) -> Option<Handle> {
+        let address = pointer.expose_provenance();
+        (address != 0).then(|| {
+            self.instances.push(address);
+            Handle(Some(Place { of: self.of, index: self.instances.len() - 1 }))
+        })
+    }
+
+    /// Forgets an instance and its states; returns its address, or NULL.
+    ///
+    /// # Panics
+    /// As [`instance`](Self::instance).
+    pub(super) fn forget_instance(&mut self, handle: Handle) -> *mut c_void {
+        let pointer = self.pointer(handle);
+        if let Some(index) = self.instance(handle) {
+            self.instances[index] = 0;
+            self.states.iter_mut().filter(|state| state.instance == Some(index)).for_each(|state| state.address = 0);
+        }
+        pointer
+    }
+
+    /// Takes a state that the FMU gave to an instance.
+    pub(super) fn take_state(&mut self, instance: Handle, pointer: *mut c_void) -> SavedState {
+        let address = pointer.expose_provenance();
+        if address == 0 {
+            return SavedState::NULL;
+        }
+        self.states.push(State { address, instance: self.instance(instance) });
+        SavedState(Some(Place { of: self.of, index: self.states.len() - 1 }))
+    }
+
+    /// Forgets a state.
+    pub(super) fn forget_state(&mut self, state: SavedState) {
+        if let Some(index) = self.state_index(state) {
+            self.states[index].address = 0;
+        }
+    }
+}
+
+impl Raw {
+    /// The table, for one call: the calls of a `Raw` follow one another, whatever thread they come from.
+    pub(super) fn owned(&self) -> MutexGuard<'_, Owned> {
+        // A refusal changes nothing, so the table is good after it.
+        self.owned.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
