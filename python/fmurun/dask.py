@@ -208,6 +208,7 @@ def _child(plan, pipe):
 def _dead(plan, row, number, code):
     """The result of a row that killed its process."""
     cause = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended the process with exit code {code}"
-    missing = {name: np.array([np.nan if empty.dtype == float else ""], empty.dtype) for name, empty in plan.meta(list(row)).items()}
+    blank = {"f": np.nan, "i": number, "O": ""}
+    missing = {name: np.array([blank[of.dtype.kind]], of.dtype) for name, of in plan.meta(list(row)).items()}
     known = {name: np.asarray(column, missing[name].dtype) for name, column in row.items()}
-    return {**missing, **known, "run": np.array([number]), "error": np.array([cause], dtype=object)}
+    return {**missing, **known, "error": np.array([cause], dtype=object)}

@@ -53,7 +53,7 @@ def test_nothing_is_wider_than_the_page(browser, path, width, scheme):
 
 def test_wide_tables_show_that_they_scroll(browser):
     """A shade at the edge, and the arrow keys scroll."""
-    page = opened(browser, FOLDER / "compare" / "compare.html", 800)
+    page = opened(browser, FOLDER / "compare" / "compare.html", 360)
     wide = [box for box in page.locator(".scroll").all() if box.evaluate("box => box.scrollWidth > box.clientWidth")]
     assert len(wide) > 1
     for box in wide:
