@@ -84,6 +84,9 @@ impl Moment {
 }
 
 /// All files of an FMU.
+///
+/// # Errors
+/// A library for macOS is not a Mach-O file, so that no universal library can be made.
 pub fn contents(
     description: &Description,
     binaries: &[(Platform, Vec<u8>)],
@@ -113,7 +116,7 @@ pub fn contents(
 /// universal library, and `linux64` that of the platform `linux64`.
 ///
 /// # Errors
-/// A library for macOS is none.
+/// A library for macOS is not a Mach-O file.
 pub fn libraries_of(
     name: &str,
     libraries: &BTreeMap<Platform, &[u8]>,

@@ -260,9 +260,9 @@ fn find<'a>(description: &'a Description, name: &str) -> Option<(&'a Variable, O
     if let Some(variable) = description.variable(name) {
         return Some((variable, None));
     }
-    let arrays = description.variables.iter().filter(|v| v.is_array() && name.starts_with(&v.name));
+    let mut arrays = description.variables.iter().filter(|v| v.is_array() && name.starts_with(&v.name));
     let element = |v: &'a Variable| (0..v.elements()).find(|&i| element_name(v, i) == name).map(|i| (v, Some(i)));
-    arrays.filter_map(element).next()
+    arrays.find_map(element)
 }
 
 fn element_name(variable: &Variable, element: usize) -> String {

@@ -300,7 +300,7 @@ fn targets(tools: &Tools, triples: &[String]) -> Result<Vec<Target>> {
 /// `--linux64 aarch64` needs a library for it, and its price is a note.
 fn has_arm(models: &[Model]) -> Result<()> {
     let has = |model: &Model, platform| model.binaries.iter().any(|(p, _)| *p == platform);
-    for model in models.iter().filter(|model| !has(model, Platform::ArmLinux)) {
+    if let Some(model) = models.iter().find(|model| !has(model, Platform::ArmLinux)) {
         let name = &model.description.name;
         bail!("--linux64 aarch64: {name} has no library for aarch64-linux; add --target aarch64-unknown-linux-gnu");
     }

@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 /// package, runs the file as it is. With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Ssp {
     /// FMI version of the FMUs: 2 or 3
     #[arg(long, value_name = "VERSION", default_value = "2", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
