@@ -10,12 +10,12 @@ import numpy as np
 
 folder, picture = sys.argv[1:]
 rows = np.genfromtxt(f"{folder}/results.csv", delimiter=",", skip_header=1, usecols=range(1, 7))
-angle, resistance, flux, inertia, load, error = rows.T
+start, resistance, flux, inertia, load, error = rows.T
 lost = (np.abs(error) > np.pi / 2).astype(float)
 print(f"{lost.mean():.2%} of {len(lost)} starts lose the rotor")
 
 figure, axes = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained")
-for axis, x, name in [(axes[0], np.degrees(angle), "start angle (deg)"), (axes[1], 1e3 * inertia, "inertia (g.m²)")]:
+for axis, x, name in [(axes[0], np.degrees(start), "start angle (deg)"), (axes[1], 1e3 * inertia, "inertia (g.m²)")]:
     edges = np.quantile(x, np.linspace(0, 1, 37))
     count, _ = np.histogram(x, edges)
     share, _ = np.histogram(x, edges, weights=lost)

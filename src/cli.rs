@@ -1,6 +1,6 @@
 //! The command line: one variant for each command.
 
-use crate::commands::{atlas, build, compare, info, merge, new, prove, reproduce, simulate, ssp, sweep, tune};
+use crate::commands::{atlas, build, compare, info, merge, new, preset, prove, reproduce, simulate, ssp, sweep, tune};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use fmu_check::{command as check, message, probe};
 use fmu_import::printable_lines;
@@ -31,6 +31,7 @@ enum Command {
     Atlas(atlas::Atlas),
     Tune(tune::Tune),
     Ssp(ssp::Ssp),
+    Preset(preset::Preset),
     Prove(prove::Prove),
     /// Writes what a shell needs to complete this command
     ///
@@ -108,6 +109,10 @@ pub fn main() -> ExitCode {
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Tune(args) => tune::run(&args).map(|good| ExitCode::from(u8::from(!good))),
+        Command::Preset(args) => preset::run(&args).map(|text| {
+            print!("{text}");
+            ExitCode::SUCCESS
+        }),
         Command::Prove(args) => prove::run(&args).map(|(folders, good)| {
             for folder in &folders {
                 println!("{}", folder.display());

@@ -1,5 +1,9 @@
 //! `documentation/index.html`: a self-contained page generated from the description.
 
+mod preset;
+
+pub use preset::preset;
+
 use fmu_core::IntegerType;
 use fmu_core::description::{Description, Member, Value, Variable, VariableKind};
 use fmu_core::terminal::MemberKind;
@@ -16,11 +20,12 @@ const STYLE: &str = include_str!("documentation.css");
 
 /// The whole page.
 pub fn page(d: &Description, version: FmiVersion) -> String {
-    let name = escape(&d.name);
+    let name = escape(d.model_name());
+    let exchange = if d.model_exchange.is_some() { " and Model Exchange" } else { "" };
     let head = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-         <header>\n{}<h1>{name}</h1>\n<p class=\"summary\">{}</p>\n<p>Version {} · FMI {version} for co-simulation · {}</p>\n\
+         <header>\n{}<h1>{name}</h1>\n<p class=\"summary\">{}</p>\n<p>Version {} · FMI {version} for Co-Simulation{exchange} · {}</p>\n\
          </header>\n",
         d.icon.as_deref().map(icon).unwrap_or_default(),
         escape(&d.description),
@@ -105,7 +110,7 @@ fn timing(d: &Description) -> String {
         "<h2>Recommended experiment and timing</h2>\n<table>\n\
          <tr><th>Start</th><td class=\"number\">{} s</td></tr>\n<tr><th>Stop</th><td class=\"number\">{} s</td></tr>\n\
          <tr><th>Communication step</th><td class=\"number\">{} s</td></tr>\n</table>\n\
-         <p>Inputs are held over a communication step. {outputs}</p>\n",
+         <p>Inputs are held over a communication step of Co-Simulation. {outputs}</p>\n",
         number(x.start),
         number(x.stop),
         number(x.step),

@@ -3,6 +3,7 @@
 //! - [`cli`]: the command line; [`commands`]: one module for each command; [`vendor`]: the crates that `fmu new` writes.
 //! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`], [`mod@reference`], [`release`]: from Rust sources to `.fmu`
 //!   files.
+//! - [`preset`]: an FMU with other start values, from its archive.
 //! - [`ssp`], [`ssv`]: write systems and parameter values.
 //!
 //! [`fmu_import`] runs FMUs, [`fmu_check`] checks them, and [`drive_study`] reproduces and compares drives.
@@ -17,6 +18,7 @@ pub mod icons;
 pub mod licenses;
 pub mod pack;
 pub mod picture;
+pub mod preset;
 pub mod reference;
 pub mod release;
 pub mod ssp;

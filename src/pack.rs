@@ -2,8 +2,9 @@
 
 use crate::documentation;
 use crate::licenses::Licenses;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use fmu_core::Description;
+use fmu_import::machine;
 use fmu_import::platform::Platform;
 use model_description::{FmiVersion, Generation, date_from_epoch};
 use std::collections::BTreeMap;
@@ -83,13 +84,17 @@ impl Moment {
 }
 
 /// All files of an FMU.
+///
+/// # Errors
+/// A library for macOS is not a Mach-O file, so that no universal library can be made.
 pub fn contents(
     description: &Description,
     binaries: &[(Platform, Vec<u8>)],
     licenses: &Licenses,
     version: FmiVersion,
     moment: Moment,
-) -> BTreeMap<String, Entry> {
+    linux64: Platform,
+) -> Result<BTreeMap<String, Entry>> {
     let generation = Generation { tool: TOOL.into(), date_and_time: moment.date_and_time() };
     let mut files = BTreeMap::from([
         ("modelDescription.xml".into(), Entry::text(model_description::write(description, version, &generation))),
@@ -100,12 +105,43 @@ pub fn contents(
         let spdx = licenses.spdx(description, &generation.date_and_time);
         files.insert("documentation/licenses/license.spdx".into(), Entry::text(spdx));
     }
-    for (platform, bytes) in binaries {
-        let (folder, name) = (platform.folders(version)[0], &description.name);
-        let path = format!("binaries/{folder}/{name}.{}", platform.extension());
-        files.insert(path, Entry { bytes: bytes.clone(), executable: true });
+    let libraries = binaries.iter().map(|(platform, bytes)| (*platform, bytes.as_slice())).collect();
+    for (path, bytes) in libraries_of(&description.name, &libraries, version, linux64)? {
+        files.insert(path, Entry { bytes, executable: true });
     }
-    files
+    Ok(files)
+}
+
+/// Where the libraries of a model identifier lie in an archive. In FMI 2.0 `darwin64` receives those of macOS, both as one
+/// universal library, and `linux64` that of the platform `linux64`.
+///
+/// # Errors
+/// A library for macOS is not a Mach-O file.
+pub fn libraries_of(
+    name: &str,
+    libraries: &BTreeMap<Platform, &[u8]>,
+    version: FmiVersion,
+    linux64: Platform,
+) -> Result<BTreeMap<String, Vec<u8>>> {
+    let folder = |platform: Platform| match (version, platform) {
+        (FmiVersion::V2, Platform::X64Linux | Platform::ArmLinux) if platform == linux64 => "linux64",
+        (FmiVersion::V2, Platform::X64Linux) => platform.tuple(),
+        _ => platform.folders(version)[0],
+    };
+    let mut folders: BTreeMap<&str, Vec<(Platform, &[u8])>> = BTreeMap::new();
+    for (&platform, &bytes) in libraries {
+        folders.entry(folder(platform)).or_default().push((platform, bytes));
+    }
+    let one = |(folder, images): (&str, Vec<(Platform, &[u8])>)| {
+        let path = format!("binaries/{folder}/{name}.{}", images[0].0.extension());
+        let bytes = match &images[..] {
+            [(_, bytes)] => bytes.to_vec(),
+            all => machine::universal(&all.iter().map(|(_, bytes)| *bytes).collect::<Vec<_>>())
+                .map_err(|why| anyhow!("{path}: one of the libraries for macOS {why}"))?,
+        };
+        Ok((path, bytes))
+    };
+    folders.into_iter().map(one).collect()
 }
 
 /// The files of a folder, with those of its folders, as `resources/` of an FMU. Hidden files stay out: systems and editors make

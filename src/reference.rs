@@ -41,7 +41,7 @@ pub fn files(
     stimuli: &Path,
     parameters: Option<(&str, &str)>,
 ) -> Result<BTreeMap<String, Entry>> {
-    let Description { name, experiment, .. } = description;
+    let (name, experiment) = (description.model_name(), &description.experiment);
     let fed = if stimuli.is_file() { Schedule::read_csv(stimuli).map_err(anyhow::Error::msg)? } else { Vec::new() };
     let result = thinned(&run(archive, experiment, fed)?, every(experiment));
     let mut texts = vec![(format!("{name}_ref.csv"), result)];

@@ -6,10 +6,10 @@ use crate::pack::{Entry, Moment, TOOL};
 use crate::ssv;
 use anyhow::{Context, Result};
 use drive_study::tune::rules::Value;
-use fmu_import::Fmu;
 use fmu_import::cosimulation::{Settings, System};
 use fmu_import::ssp::ssv::{Parameter, read};
 use fmu_import::ssp::{DESCRIPTION, FMU_TYPE, values};
+use fmu_import::{Fmu, Values as Read};
 use model_description::{
     BaseType, BaseUnit, Causality, Element, ModelDescription, ModelVariable, Unit, format_number, parse_number,
 };
@@ -48,6 +48,8 @@ pub struct Options {
     pub gates: bool,
     /// Whether the system has a size in a diagram.
     pub geometry: bool,
+    /// Whether the values of enumerations are the names of their items, as SSP 1.0 describes them. OMSimulator reads numbers only.
+    pub names: bool,
 }
 
 /// A connector of the system.
@@ -96,8 +98,10 @@ pub fn files(
     for v in parameters {
         let read = read(&v.text).map_err(|cause| anyhow::anyhow!("{}: {cause}", v.file))?;
         values::set(&mut system, &v.component, &v.file, &read)?;
+        let typed = typed(&system, &v.component, &read, options.names)?;
+        let typed = typed.iter().map(|(name, value)| (name.as_str(), value));
+        put(binding_file(&v.component), ssv::text_of(&v.component, typed).into_bytes());
         given.extend(read.into_iter().map(|p| (v.component.as_str(), p)));
-        put(binding_file(&v.component), v.text.clone().into_bytes());
     }
     start(&mut system, &descriptions).context("the system does not start with these values")?;
     let inputs = inputs(&descriptions, &connections);
@@ -110,6 +114,29 @@ pub fn files(
     let xml = description(&descriptions, &connections, &inputs, &outputs, &of_components, (options, step), moment);
     put(DESCRIPTION.into(), xml.into_bytes());
     Ok(files)
+}
+
+/// The values, each of the type that its variable has, whatever type the file gave it: OMSimulator converts none, and ignores
+/// a value of another type.
+fn typed(system: &System, component: &str, given: &[Parameter], names: bool) -> Result<Vec<(String, Value)>> {
+    let Some(instance) = system.instances().iter().find(|i| i.name() == component) else { return Ok(Vec::new()) };
+    let md = instance.description();
+    let one = |p: &Parameter| {
+        let items = md.variable(&p.name).and_then(|v| md.type_definition(v.declared_type.as_ref()?)).map(|d| &d.items);
+        let name = |value: i128| items?.iter().find(|i| i128::from(i.value) == value).map(|i| i.name.clone());
+        let value = match instance.parse(&p.name, &p.value)? {
+            Read::Reals(x) => x.first().copied().map(Value::Real),
+            Read::Integers(x) => x.first().and_then(|&x| match name(x).filter(|_| names) {
+                Some(item) => Some(Value::Item(item)),
+                None => i32::try_from(x).ok().map(Value::Integer),
+            }),
+            Read::Booleans(x) => x.first().copied().map(Value::Boolean),
+            Read::Strings(_) | Read::Binaries(_) => None,
+        };
+        let value = value.with_context(|| format!("line {}: {} has no value for an SSV file", p.line, p.name))?;
+        Ok((p.name.clone(), value))
+    };
+    given.iter().map(one).collect()
 }
 
 fn binding_file(name: &str) -> String {
@@ -182,7 +209,7 @@ fn step(descriptions: &[(&str, ModelDescription)], given: &[(&str, Parameter)]) 
 
 /// For OMSimulator: its master of fixed step, Jacobi, which carries all outputs over before all inputs. The command line reads the
 /// element inside (oms.xsd, SystemWC.cpp), the Python package the attributes under the name of its own choice (system.py).
-fn simulation_information(step: f64) -> Element {
+fn master(step: f64) -> Element {
     let master = Element::new("oms:FixedStepMaster")
         .with("description", "oms-ma")
         .with("stepSize", format_number(step))
@@ -192,6 +219,20 @@ fn simulation_information(step: f64) -> Element {
         .with("method", "oms_ma")
         .with("fixedStepSize", format_number(step))
         .children([master]);
+    for_omsimulator(information)
+}
+
+/// For OMSimulator: its file of results, with every communication point. Without it, OMSimulator warns of deprecated content
+/// (Model.cpp, `importFromSnapshot`).
+fn results() -> Element {
+    let information = Element::new("oms:SimulationInformation")
+        .with("resultFile", format!("{NAME}_res.mat"))
+        .with("loggingInterval", "0")
+        .with("bufferSize", "10");
+    for_omsimulator(information)
+}
+
+fn for_omsimulator(information: Element) -> Element {
     let annotation = Element::new("ssc:Annotation")
         .with("type", "org.openmodelica")
         .children([Element::new("oms:Annotations").children([information])]);
@@ -249,12 +290,13 @@ fn description(
         .children([Element::new("ssd:Elements").children(components)])
         .children([Element::new("ssd:Connections").children(all)])
         .children(options.geometry.then(|| corners("ssd:SystemGeometry", [0.0, 0.0, 400.0, 200.0])))
-        .children([simulation_information(step)]);
+        .children([master(step)]);
     let experiments = || descriptions.iter().map(|(_, md)| md.default_experiment);
     let time = |t: Option<f64>| t.map(format_number);
     let experiment = Element::new("ssd:DefaultExperiment")
         .with_some("startTime", time(experiments().filter_map(|x| x.start).reduce(f64::min)))
-        .with_some("stopTime", time(experiments().filter_map(|x| x.stop).reduce(f64::max)));
+        .with_some("stopTime", time(experiments().filter_map(|x| x.stop).reduce(f64::max)))
+        .children([results()]);
     let root = Element::new("ssd:SystemStructureDescription")
         .with("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription")
         .with("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon")

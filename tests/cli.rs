@@ -238,10 +238,42 @@ fn inputs_left_alone_and_long_steps_are_told() {
         "warning: d: the step of 0.002 s is longer than the stepSize of its DefaultExperiment, 0.001 s; --step 0.001 shows \
          whether the results depend on it"
     );
+    // What the description calls optional is told only while it is read, with a parameter that is set or a start value.
+    for optional in ["enable", "speed_shaft", "angle_shaft", "tau_ref", "T_coolant", "T_winding_imposed"] {
+        assert!(!told.contains(optional), "{optional}: {told}");
+    }
+    let told = warned(&["--set", "d.plant.mechanics.imposed=true", "--set", "d.plant.thermal.mode=Imposed"]);
+    for read in ["speed_shaft = 0 rad/s", "angle_shaft", "T_winding_imposed = 293.15 K"] {
+        assert!(told.contains(read), "{read}: {told}");
+    }
+    assert!(!told.contains("tau_ref") && !told.contains("T_coolant"), "{told}");
     // What is fed or set is no surprise, whatever its value; a step up to stepSize is none either.
     let told = warned(&["--input", "d.speed_ref=0:0,0.005:10", "--set", "d.tau_load=0", "--step", "0.001"]);
     assert!(told.lines().count() == 1 && told.contains("u_dc") && !told.contains("speed_ref ="), "{told}");
     assert!(!told.contains("tau_load"), "{told}");
+}
+
+/// The README's first run ends with what a person wants: the speed that was reached, and the page with a way to open it.
+#[test]
+fn the_first_run_of_the_readme() {
+    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
+    let block = readme.split("```sh\n").nth(1).unwrap().split("```").next().unwrap().replace("\\\n", " ");
+    let command = block.lines().find_map(|line| line.strip_prefix("cargo run --release -- simulate ")).unwrap();
+    let archives = common::archives().display().to_string();
+    let arguments = command.split_whitespace().map(|word| word.replace("target/fmu", &archives));
+    let dir = tempfile::tempdir().unwrap();
+    let mut run = Command::new(env!("CARGO_BIN_EXE_fmu"));
+    let output = run.arg("simulate").args(arguments).current_dir(dir.path()).output().unwrap();
+    let (said, told) = (text(&output.stdout), text(&output.stderr));
+    assert!(output.status.success() && told.is_empty(), "{told}");
+    let lines: Vec<&str> = said.lines().collect();
+    assert_eq!(lines[..2], ["at 1 s:", "  speed 1000 rpm, speed_ref 1000 rpm, speed_est 1000 rpm"], "{said}");
+    let [.., page, open, address] = &lines[..] else { panic!("{said}") };
+    let path = dir.path().canonicalize().unwrap().join("speed.html");
+    assert!(lines.len() <= 10 && path.exists(), "{said}");
+    assert_eq!(*page, "page: speed.html");
+    assert!(open.starts_with("open it with: ") && open.ends_with("/speed.html"), "{open}");
+    assert_eq!(*address, format!("or in a browser: file://{}", path.display()));
 }
 
 /// A single FMU needs no name before its variables; numbers have the units that the FMU shows; a tunable parameter changes.
@@ -481,8 +513,18 @@ fn an_atlas_is_written_or_refused() {
         ["atlas.csv", "atlas.md", "atlas.html", "atlas-Rasmussen.svg"]
             .map(|name| std::fs::read(out.join(name)).unwrap())
     };
-    let [.., page, _] = run("1", "a");
+    let [.., page, map] = run("1", "a");
     common::pages::stands_alone(&text(&page), |file| file == "atlas.csv");
+    // A map says what its dots mean, on the page, by itself and in the documentation.
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let kept = std::fs::read_to_string(root.join("docs/atlas-Rasmussen.svg")).unwrap();
+    for part in ["white dot: lost, and lock_lost does not tell it", "red dot: held, and lock_lost"] {
+        for drawn in [&text(&map), &text(&page), &kept] {
+            assert!(drawn.contains(part), "{part}");
+        }
+    }
+    let words = std::fs::read_to_string(root.join("docs/atlas.md")).unwrap();
+    assert!(words.contains("A white dot marks a lost cell that `lock_lost` does not tell"));
     assert!(run("1", "a") == run("2", "b"));
     for (arguments, parts) in [
         (&["--load="][..], &["--load has no value", "at least one", "leave the option out"][..]),

@@ -153,6 +153,98 @@ fn one_floor_of_glibc() {
     }
 }
 
+/// The head of every estimator's file has the numbers of the table in `limits.html`, which `fmu compare` prints and whose test
+/// runs the cells; so have the words about all methods without the frame-speed term.
+#[test]
+fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
+    let read = |path: &str| std::fs::read_to_string(root().join(path)).unwrap();
+    let head = |file: &str| -> String {
+        let text = read(&format!("drive/src/estimator/{file}.rs"));
+        let lines = text.lines().filter_map(|line| line.strip_prefix("//!"));
+        lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
+    };
+    let (list, limits) = (read("drive/src/estimator/mod.rs"), read("drive/docs/limits.html"));
+    let row = |kind: &str| -> Option<Vec<String>> {
+        let row = limits.split_once(&format!("<tr><td>{kind}</td><td>"))?.1.split_once("</td></tr>")?.0;
+        Some(row.split("</td><td>").map(Into::into).collect())
+    };
+    let (mut files, mut without) = (0, Vec::new());
+    for line in list.split("estimators! {\n").nth(1).unwrap().lines().filter(|line| line.contains("standstill")) {
+        let (kind, rest) = line.trim().split_once(' ').unwrap().1.split_once('(').unwrap();
+        let head = head(rest.split("::").next().unwrap());
+        let claims = head.matches("rated load down to").count() + head.matches("rated load from").count();
+        let held = row(kind).filter(|cells| cells[0] != "0.000");
+        let expected = held.as_ref().map(|cells| {
+            let [ideal, dead] = [&cells[0], &cells[1]];
+            format!("holds rated load down to {ideal} of the rated speed, {dead} with a compensated dead time")
+        });
+        assert_eq!(claims, usize::from(expected.is_some()), "{kind}: {head}");
+        let expected = expected.unwrap_or_default();
+        assert!(head.contains(&expected), "drive/src/estimator: the head of {kind} must say: {expected}");
+        if let Some(cells) = held.filter(|cells| cells[2] != "–") {
+            without.push((kind, cells[2].clone()));
+        }
+        files += 1;
+    }
+    assert_eq!(files, 17);
+    let of = |kind: &str| without.iter().find(|(name, _)| *name == kind).unwrap().1.clone();
+    let feedback = format!("without the frame term, to {}", of("VoltageFeedback"));
+    assert!(head("voltage_feedback").contains(&feedback), "{feedback}");
+    let mut others: Vec<String> = ["DirectEmf", "EmfObserver", "ExtendedEmf"].map(of).to_vec();
+    others.sort();
+    let range = format!("rated load below {} to {} of the rated speed", others[0], others[2]);
+    let page = read("docs/from-paper-to-code.md");
+    assert!(head("emf").contains(&range) && page.contains(&range), "{range}");
+}
+
+/// A page stands alone: it sends its reader to no page of another FMU, its diagram names every input, and no two of its anchors are
+/// equal; its head names the interfaces of the archive.
+#[test]
+fn pages_stand_alone() {
+    use std::io::Read as _;
+    let drawn =
+        |svg: &str, name: &str| svg.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(|word| word == name);
+    for (name, svg) in [
+        ("PmsmPlant", include_str!("../drive/docs/pmsm_plant.svg")),
+        ("SensorlessController", include_str!("../drive/docs/sensorless_controller.svg")),
+        ("PmsmDrive", include_str!("../drive/docs/pmsm_drive.svg")),
+    ] {
+        for standard in ["fmi2", "fmi3"] {
+            let archive = common::archives().join(standard).join(name).with_extension("fmu");
+            let mut archive = zip::ZipArchive::new(std::fs::File::open(archive).unwrap()).unwrap();
+            let mut page = String::new();
+            archive.by_name("documentation/index.html").unwrap().read_to_string(&mut page).unwrap();
+            let version = if standard == "fmi2" { "2.0" } else { "3.0" };
+            let head = format!("FMI {version} for Co-Simulation and Model Exchange · ");
+            assert!(page.contains(&head), "{name}: {head}");
+            let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
+            for elsewhere in ["page of", "documentation of", "their documentation"] {
+                let at = words.find(elsewhere).map(|at| &words[at..words.len().min(at + 80)]);
+                assert!(at.is_none(), "{name}: {at:?}");
+            }
+            let mut ids: Vec<&str> = page.split(" id=\"").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
+            let targets = page.split("href=\"#").skip(1).map(|rest| rest.split('"').next().unwrap());
+            for target in targets {
+                assert!(ids.contains(&target), "{name}: #{target} leads nowhere");
+            }
+            ids.sort_unstable();
+            let twice = ids.windows(2).find(|pair| pair[0] == pair[1]);
+            assert!(twice.is_none(), "{name}: {twice:?} is there twice");
+        }
+        let description = match name {
+            "PmsmPlant" => Description::of::<PmsmPlant>(),
+            "PmsmDrive" => Description::of::<PmsmDrive>(),
+            _ => Description::of::<SensorlessController>(),
+        };
+        let inputs = description.unwrap().variables;
+        for input in inputs.iter().filter(|v| v.causality == fmu_core::Causality::Input) {
+            // T_winding_imposed stands for the four of its kind.
+            let shown = input.name.strip_suffix("_imposed").map_or(input.name.as_str(), |_| "T_winding_imposed");
+            assert!(drawn(svg, shown), "the diagram of {name} lacks {}", input.name);
+        }
+    }
+}
+
 /// Every page in a browser at three widths, on light and dark paper: nothing wider than the page, nothing from a network, curves drawn;
 /// zoom, legend and keyboard of the page of a run. Pictures stay in `target/tmp/pages`.
 #[test]

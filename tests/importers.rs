@@ -58,6 +58,54 @@ fn jaxonomy() {
     pytest_with("jaxonomy.txt", "importers", "jaxonomy", &["test_jaxonomy.py"], &[("FMU_REFERENCE", &file)]);
 }
 
+/// OMSimulator runs the systems of `fmu ssp` as they are: no warning, and the values of `fmu simulate` to the 12 digits that it prints.
+#[test]
+#[ignore = "needs OMSimulator in PATH: half a minute"]
+fn omsimulator() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let value = |name: &str, typed: &str| format!("<ssv:Parameter name=\"{name}\"><ssv:{typed}/></ssv:Parameter>");
+    let values = value("speed_ref", "Real value=\"50\"") + &value("estimator", "Enumeration value=\"Sensored\"");
+    let uri = "http://ssp-standard.org/SSP1/SystemStructureParameterValues";
+    let set = format!("<ssv:ParameterSet xmlns:ssv=\"{uri}\" version=\"1.0\" name=\"x\"><ssv:Parameters>{values}");
+    fs::write(path("x.ssv"), set + "</ssv:Parameters></ssv:ParameterSet>").unwrap();
+    let of_controller = format!("controller={}", path("x.ssv"));
+    let fmu = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).output().unwrap();
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    for standard in ["2", "3"] {
+        let name = |what: &str| path(&format!("fmi{standard}{what}"));
+        let (ssp, csv, results, home) = (name(".ssp"), name(".csv"), name("-results.csv"), name("-home"));
+        let archives = common::archives().to_str().unwrap();
+        fmu(&["ssp", "--fmus", archives, "--fmi", standard, "--parameters", &of_controller, "--out", &ssp]);
+        fmu(&["simulate", &ssp, "--stop", "0.3", "--csv", &csv]);
+        fs::create_dir(&home).unwrap();
+        let mut command = Command::new("OMSimulator");
+        command.args(["--stopTime=0.3", &format!("--resultFile={results}"), &ssp]).current_dir(&home);
+        let output = command.output().expect("OMSimulator in PATH");
+        let said = String::from_utf8_lossy(&output.stdout);
+        let complaint = said.lines().find(|line| ["warning:", "error:"].iter().any(|word| line.starts_with(word)));
+        assert!(output.status.success() && complaint.is_none(), "FMI {standard}: {said}");
+        let [ours, theirs] = [csv, results].map(|file| fs::read_to_string(file).unwrap());
+        let theirs = theirs.replace(", ", ",");
+        // It writes instants twice, before and after the exchange, and may end with one more step of a rounding error.
+        let instants = |csv: &str| column(csv, "time").iter().map(|t| (t / 1e-4).round()).collect::<Vec<_>>();
+        let (at, at_theirs) = (instants(&ours), instants(&theirs));
+        for variable in ["speed", "speed_est", "i_d", "i_q", "tau_shaft", "p_in", "energy_in"] {
+            let (ours, theirs) =
+                (column(&ours, variable), column(&theirs, &format!("SensorlessDrive.SensorlessDrive.{variable}")));
+            let scale = ours.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            assert!(scale > 0.1, "{variable} moves");
+            for (k, x) in ours.iter().enumerate().take(ours.len() - 1) {
+                let row = at_theirs.iter().rposition(|instant| instant.total_cmp(&at[k]).is_eq()).expect("the instant");
+                assert!((x - theirs[row]).abs() < 1e-10 * scale, "FMI {standard}, {variable}: {x}, {}", theirs[row]);
+            }
+        }
+        println!("OMSimulator, FMI {standard}: {} instants equal", at.len() - 1);
+    }
+}
+
 /// A command of Cargo that builds bindings to C headers: libclang comes from PyPI, the headers of the compiler from gcc.
 fn cargo_with_libclang(arguments: &[&str]) -> Command {
     let python = environment(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rust-fmi/requirements.txt"));

@@ -3,11 +3,12 @@
 
 mod common;
 
+use fmu::commands::build::Linux64;
 use fmu::commands::merge::{self, Merge};
 use fmu::pack::{Entry, Moment, archive, write};
 use fmu_check as check;
 use fmu_import::platform::Platform;
-use fmu_import::{Fmu, contents};
+use fmu_import::{Fmu, contents, machine};
 use model_description::FmiVersion;
 use std::collections::BTreeMap;
 use std::fs;
@@ -50,7 +51,7 @@ fn replace(files: &mut Files, name: &str, from: &str, to: &str) {
 
 fn merged(files: &[&Path], out: &Path) -> Result<(), String> {
     let files = files.iter().map(|p| p.to_path_buf()).collect();
-    merge::run(&Merge { files, out: out.into() }).map_err(|e| format!("{e:#}"))
+    merge::run(&Merge { files, out: out.into(), linux64: None }).map_err(|e| format!("{e:#}"))
 }
 
 /// A copy of the plant for another platform, built an hour later.
@@ -163,4 +164,165 @@ fn what_does_not_fit_is_refused() {
     fs::write(&other, "no archive").unwrap();
     let error = merged(&[&plant("fmi2"), &other], &out).unwrap_err();
     assert!(error.contains("other.fmu: not a ZIP archive") && !out.exists(), "{error}");
+}
+
+/// The headers of a shared library of macOS, with a text behind them that tells two builds apart.
+fn dylib(platform: Platform, build: &str) -> Vec<u8> {
+    let cpu: u32 = if platform == Platform::ArmDarwin { 0x0100_000c } else { 0x0100_0007 };
+    let words = [0xfeed_facf, cpu, 3, 6, 0, 0, 0, 0];
+    words.iter().flat_map(|word: &u32| word.to_le_bytes()).chain(build.bytes()).collect()
+}
+
+/// The headers of a shared library of Linux.
+fn shared_object(platform: Platform) -> Vec<u8> {
+    let machine = if platform == Platform::ArmLinux { 183 } else { 62 };
+    let mut bytes = vec![0; 64];
+    bytes[..8].copy_from_slice(b"\x7fELF\x02\x01\x01\0");
+    (bytes[16], bytes[18], bytes[20]) = (3, machine, 1);
+    bytes[52] = 64;
+    bytes
+}
+
+/// A copy of the plant with other libraries than its own.
+fn with_libraries(standard: &str, version: FmiVersion, path: &Path, libraries: &[(&str, &[u8])]) {
+    changed(standard, path, |files| {
+        files.remove(&own(version)).unwrap();
+        files.extend(libraries.iter().map(|(name, bytes)| (format!("binaries/{name}"), bytes.to_vec())));
+    });
+}
+
+fn binaries(path: &Path) -> Files {
+    contents(path).unwrap().1.into_iter().filter(|(name, _)| name.starts_with("binaries/")).collect()
+}
+
+/// Importers of FMI 2.0 look into darwin64 on either processor: it holds a library for both.
+#[test]
+fn libraries_for_macos_become_a_universal_one() {
+    use Platform::{ArmDarwin, X64Darwin};
+    let dir = tempfile::tempdir().unwrap();
+    let [intel, arm, old, other, out] = ["intel", "arm", "old", "other", "out"].map(|n| dir.path().join(n));
+    let (x64, arm64) = (dylib(X64Darwin, "1"), dylib(ArmDarwin, "1"));
+    with_libraries("fmi2", FmiVersion::V2, &intel, &[("darwin64/PmsmPlant.dylib", &x64)]);
+    with_libraries("fmi2", FmiVersion::V2, &arm, &[("darwin64/PmsmPlant.dylib", &arm64)]);
+    with_libraries("fmi2", FmiVersion::V2, &old, &[("aarch64-darwin/PmsmPlant.dylib", &arm64)]);
+    let universal = machine::universal(&[&x64, &arm64]).unwrap();
+    let expected = Files::from([("binaries/darwin64/PmsmPlant.dylib".into(), universal)]);
+    for parts in [[&*intel, &arm], [&arm, &intel], [&old, &intel]] {
+        merged(&parts, &out).unwrap();
+        assert!(binaries(&out) == expected, "{parts:?}: {:?}", binaries(&out).keys());
+    }
+    // What is merged merges again with one of its parts, and not with another build for one of its processors.
+    let both = dir.path().join("both");
+    merged(&[&intel, &arm], &both).unwrap();
+    merged(&[&both, &intel, &plant("fmi2")], &out).unwrap();
+    assert_eq!(binaries(&out).len(), 2);
+    with_libraries("fmi2", FmiVersion::V2, &other, &[("darwin64/PmsmPlant.dylib", &dylib(ArmDarwin, "2"))]);
+    let error = merged(&[&both, &other], &out).unwrap_err();
+    assert!(
+        error.contains("binaries/darwin64/PmsmPlant.dylib: differs") && error.contains("in one of them only"),
+        "{error}"
+    );
+    let error = merged(&[&both, &old], &out).unwrap_err();
+    assert!(error.contains("is for aarch64-darwin, as binaries/darwin64 of"), "{error}");
+    // The checker looks at both images.
+    merged(&[&intel, &arm], &out).unwrap();
+    let b10 = |path: &Path| {
+        let options = check::Options { only: vec!["B10".into()], ..check::Options::default() };
+        check::run(path, &options).unwrap().text(false)
+    };
+    assert!(b10(&out).contains("1 checks: 1 passed"), "{}", b10(&out));
+    let mut cut = machine::universal(&[&x64, &arm64]).unwrap();
+    cut.truncate(5000);
+    with_libraries("fmi2", FmiVersion::V2, &other, &[("darwin64/PmsmPlant.dylib", &cut)]);
+    assert!(b10(&other).contains("lies outside"), "{}", b10(&other));
+    with_libraries("fmi2", FmiVersion::V2, &other, &[("darwin64/PmsmPlant.dylib", &shared_object(Platform::X64Linux))]);
+    assert!(b10(&other).contains("is Elf for X86_64"), "{}", b10(&other));
+    // In FMI 3.0 every processor has its folder.
+    let tuples = [("x86_64-darwin/PmsmPlant.dylib", &x64[..]), ("aarch64-darwin/PmsmPlant.dylib", &arm64)];
+    with_libraries("fmi3", FmiVersion::V3, &intel, &tuples[..1]);
+    with_libraries("fmi3", FmiVersion::V3, &arm, &tuples[1..]);
+    merged(&[&intel, &arm], &out).unwrap();
+    assert!(binaries(&out) == tuples.map(|(name, bytes)| (format!("binaries/{name}"), bytes.to_vec())).into());
+}
+
+/// `linux64` of FMI 2.0 is for the processor that `--linux64` names; an importer here finds the other one all the same.
+#[test]
+fn linux64_is_for_one_processor() {
+    use Platform::{ArmLinux, X64Linux};
+    let dir = tempfile::tempdir().unwrap();
+    let [intel, arm, out] = ["intel.fmu", "arm.fmu", "out.fmu"].map(|n| dir.path().join(n));
+    let (x64, arm64) = (shared_object(X64Linux), shared_object(ArmLinux));
+    with_libraries("fmi2", FmiVersion::V2, &intel, &[("linux64/PmsmPlant.so", &x64)]);
+    let place = |linux64: Option<Linux64>| {
+        let files = vec![intel.clone(), arm.clone()];
+        merge::run(&Merge { files, out: out.clone(), linux64 }).unwrap();
+        binaries(&out).into_iter().map(|(name, bytes)| (name, machine::platforms(&bytes))).collect::<Vec<_>>()
+    };
+    for folder in ["aarch64-linux", "linux64"] {
+        with_libraries("fmi2", FmiVersion::V2, &arm, &[(&format!("{folder}/PmsmPlant.so"), &arm64)]);
+        let expected = [("aarch64-linux", ArmLinux), ("linux64", X64Linux)];
+        let named = |(folder, p): (&str, Platform)| (format!("binaries/{folder}/PmsmPlant.so"), vec![p]);
+        assert_eq!(place(None), expected.map(named));
+        let expected = [("linux64", ArmLinux), ("x86_64-linux", X64Linux)];
+        assert_eq!(place(Some(Linux64::Arm)), expected.map(named));
+    }
+    // The plant's own library, for this machine, in either place.
+    if Platform::host() == X64Linux {
+        let bytes = contents(&plant("fmi2")).unwrap().1.remove(&own(FmiVersion::V2)).unwrap();
+        let libraries = [("linux64/PmsmPlant.so", &arm64[..]), ("x86_64-linux/PmsmPlant.so", &bytes)];
+        with_libraries("fmi2", FmiVersion::V2, &out, &libraries);
+        Fmu::open(&out).unwrap().instantiate("elsewhere", false).unwrap();
+        let program = Some(PathBuf::from(env!("CARGO_BIN_EXE_fmu")));
+        let only = ["B00", "B10", "L00"].map(String::from).to_vec();
+        let report = check::run(&out, &check::Options { only, program, ..Default::default() }).unwrap();
+        assert!(report.text(false).contains("3 checks: 3 passed"), "{}", report.text(false));
+        with_libraries("fmi2", FmiVersion::V2, &out, &libraries[..1]);
+        let error = Fmu::open(&out).err().expect("it is not for this machine").to_string();
+        let told = "binaries/linux64/PmsmPlant.so is for aarch64-linux, not for this platform (x86_64-linux)";
+        assert!(error.contains(told), "{error}");
+    }
+}
+
+/// `fmu build --library` packs them so, and `fmu info` names the processors.
+#[test]
+fn build_places_libraries_as_merge_does() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (_, files) = contents(&plant("fmi2")).unwrap();
+    fs::write(path("own"), &files[&own(FmiVersion::V2)]).unwrap();
+    let foreign =
+        Platform::ALL.into_iter().filter(|p| *p != Platform::host() && ["so", "dylib"].contains(&p.extension()));
+    let mut arguments = vec!["build".to_owned(), "--library".into(), path("own"), "--out".into(), path("out")];
+    for platform in foreign.clone() {
+        let bytes = if platform.extension() == "so" { shared_object(platform) } else { dylib(platform, "") };
+        fs::write(path(platform.tuple()), bytes).unwrap();
+        arguments.extend(["--library".to_owned(), format!("{platform}={}", path(platform.tuple()))]);
+    }
+    let run = |arguments: &[String]| {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let info = |standard: &str| {
+        let archive = path("out").to_owned() + &format!("/{standard}/PmsmPlant.fmu");
+        let (_, text, _) = run(&["info".to_owned(), archive]);
+        text.lines().find_map(|line| line.trim().strip_prefix("platforms")).unwrap().trim().to_owned()
+    };
+    if Platform::host() != Platform::X64Linux {
+        return;
+    }
+    let (code, _, said) = run(&arguments);
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(info("fmi2"), "aarch64-linux, darwin64 (x86_64-darwin and aarch64-darwin), linux64 (x86_64-linux)");
+    assert_eq!(info("fmi3"), "aarch64-darwin, aarch64-linux, x86_64-darwin, x86_64-linux");
+    let (code, _, said) = run(&[&arguments[..], &["--linux64".into(), "aarch64".into()]].concat());
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("note: linux64 of FMI 2.0 holds the libraries for aarch64: an importer on x86_64"), "{said}");
+    assert_eq!(info("fmi2"), "darwin64 (x86_64-darwin and aarch64-darwin), linux64 (aarch64-linux), x86_64-linux");
+    let (code, _, said) = run(&[&arguments[..5], &["--linux64".into(), "aarch64".into()]].concat());
+    assert_eq!(code, Some(2));
+    assert!(
+        said.contains("PmsmPlant has no library for aarch64-linux; add --target aarch64-unknown-linux-gnu"),
+        "{said}"
+    );
 }

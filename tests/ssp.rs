@@ -3,8 +3,10 @@
 
 mod common;
 
+use model_description::{BaseType, Element, ModelDescription};
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::Read;
+use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
@@ -97,8 +99,9 @@ fn its_connectors_are_those_of_pmsm_drive() {
     };
     let drive = fmu_core::Description::of::<drive::PmsmDrive>().unwrap();
     for (kind, causality) in [("input", fmu_core::Causality::Input), ("output", fmu_core::Causality::Output)] {
-        // `enable` stays inside, at its start value.
-        let outside = |v: &&fmu_core::description::Variable| v.causality == causality && v.name != "enable";
+        // `enable` stays inside, at its start value; the means over T_s are the drive's own.
+        let inside = |name: &str| name == "enable" || name.ends_with("_mean");
+        let outside = |v: &&fmu_core::description::Variable| v.causality == causality && !inside(&v.name);
         let mut expected: Vec<_> = drive.variables.iter().filter(outside).map(|v| v.name.clone()).collect();
         expected.sort();
         assert_eq!(of_kind(kind), expected, "{kind}");
@@ -111,7 +114,7 @@ fn what_not_every_importer_takes_is_an_option() {
     let folder = folder();
     let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     let motor = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/ipmsm-2.2kw.toml");
-    done(&["ssp", "--motor", motor, "--integers", "--gates", "--geometry", "--out", &path("all.ssp")]);
+    done(&["ssp", "--motor", motor, "--names", "--gates", "--geometry", "--out", &path("all.ssp")]);
     let (plain, all) = (ssp("motor.ssp"), ssp("all.ssp"));
     let structure = |path: &str| entry(path, "SystemStructure.ssd");
     for part in ["<ssd:SystemGeometry ", "startConnector=\"enabled\" endElement=\"plant\" endConnector=\"enable\""] {
@@ -123,9 +126,10 @@ fn what_not_every_importer_takes_is_an_option() {
     assert!(structure(&plain).contains(python));
     assert!(structure(&plain).contains(master), "the step is T_s");
     let values = |path: &str| entry(path, "resources/controller.ssv");
-    assert!(values(&plain).contains("<ssv:Parameter name=\"estimator\"><ssv:Enumeration value=\"ExtendedEmf\"/>"));
-    assert!(values(&all).contains("<ssv:Parameter name=\"estimator\"><ssv:Integer value=\"4\"/>"));
-    assert!(!values(&all).contains("Enumeration"));
+    assert!(values(&all).contains("<ssv:Parameter name=\"estimator\"><ssv:Enumeration value=\"ExtendedEmf\"/>"));
+    assert!(values(&plain).contains("<ssv:Parameter name=\"estimator\"><ssv:Integer value=\"4\"/>"));
+    done(&["ssp", "--motor", motor, "--integers", "--out", &path("integers.ssp")]);
+    assert!(values(&path("integers.ssp")) == values(&plain), "the default");
     // Nothing of it changes what comes out.
     let run = |path: &str| {
         let time = ["--input", "speed_ref=0:0,0.02:52.36", "--stop", "0.3", "--csv", "-"];
@@ -137,6 +141,133 @@ fn what_not_every_importer_takes_is_an_option() {
     std::fs::write(folder.join("slower.toml"), slower).unwrap();
     done(&["ssp", "--motor", &path("slower.toml"), "--out", &path("slower.ssp")]);
     assert!(structure(&ssp("slower.ssp")).contains("stepSize=\"0.0002\""));
+}
+
+/// What OMSimulator reads, from its sources: it stops at any other element, at a name that is no identifier and at a connector
+/// without a type, and it ignores a value of another type than the variable has.
+#[test]
+fn omsimulator_runs_it_as_it_is() {
+    let folder = folder();
+    let tuned = folder.join("tuned");
+    let motor = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/ipmsm-2.2kw.toml");
+    done(&["tune", motor, "--out", tuned.to_str().unwrap()]);
+    let of = |component: &str, fmu: &str| format!("{component}={}/ipmsm-2.2kw.{fmu}.ssv", tuned.display());
+    let given = [of("plant", "PmsmPlant"), of("controller", "SensorlessController")];
+    let (bound, geometry) = (folder.join("bound.ssp"), folder.join("geometry.ssp"));
+    done(&["ssp", "--parameters", &given[0], "--parameters", &given[1], "--out", bound.to_str().unwrap()]);
+    done(&["ssp", "--geometry", "--out", geometry.to_str().unwrap()]);
+    for name in ["fmi2.ssp", "fmi3.ssp", "motor.ssp", "bound.ssp"] {
+        assert_eq!(refusals(&ssp(name)), Vec::<String>::new(), "{name}");
+    }
+    assert_eq!(refusals(&ssp("geometry.ssp")), ["System.cpp: ssd:SystemGeometry in ssd:System"]);
+    // The values of a motor are the same, whichever way they come.
+    for component in ["plant", "controller"] {
+        let file = format!("resources/{component}.ssv");
+        assert!(entry(&ssp("motor.ssp"), &file) == entry(&ssp("bound.ssp"), &file), "{component}");
+    }
+    // Each name that OMSimulator refuses is found.
+    for (old, new, expected) in [
+        (
+            "name=\"tau_load\" kind=\"input\"",
+            "name=\"tau.load\" kind=\"input\"",
+            "ComRef.cpp: tau.load is no identifier",
+        ),
+        ("<ssc:Boolean/>", "", "Connector.cpp: enabled has no type"),
+        ("oms-ma", "oms-mav", "SystemWC.cpp: the master oms-mav"),
+    ] {
+        let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", old, new);
+        assert!(refusals(&path).iter().any(|found| found == expected), "{expected}: {:?}", refusals(&path));
+    }
+    let (old, new) = ("<ssv:Integer value=\"4\"/>", "<ssv:Enumeration value=\"ExtendedEmf\"/>");
+    let (_dir, path) = changed(&ssp("motor.ssp"), "resources/controller.ssv", old, new);
+    assert_eq!(refusals(&path), ["Values.cpp: controller.estimator is ssv:Enumeration, not ssv:Integer"]);
+}
+
+/// What OMSimulator refuses or ignores of an SSP, with its file that says so.
+fn refusals(path: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut refuse = |file: &str, what: String| found.push(format!("{file}: {what}"));
+    let root = Element::parse(&entry(path, "SystemStructure.ssd")).unwrap();
+    let mut only = |file: &str, parent: &Element, names: &[&str]| {
+        for child in parent.children.iter().filter(|child| !names.contains(&child.name.as_str())) {
+            refuse(file, format!("{} in {}", child.name, parent.name));
+        }
+    };
+    let (system, experiment) = (root.child("ssd:System").unwrap(), root.child("ssd:DefaultExperiment").unwrap());
+    let element = ["ssd:Connectors", "ssd:ElementGeometry", "ssd:ParameterBindings"];
+    only("Model.cpp", &root, &["ssd:System", "ssd:Units", "ssd:Enumerations", "ssd:DefaultExperiment"]);
+    only("System.cpp", system, &[&element[..], &["ssd:Elements", "ssd:Connections", "ssd:Annotations"]].concat());
+    let components: Vec<&Element> = system.child("ssd:Elements").unwrap().all("ssd:Component").collect();
+    for component in &components {
+        only("ComponentFMUCS.cpp", component, &element);
+    }
+    let is_identifier = |name: &str| {
+        name.starts_with(|c: char| c.is_ascii_alphabetic())
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+    };
+    let mut base = BTreeMap::new();
+    for owner in components.iter().copied().chain([system]) {
+        let owned = owner.get("name").unwrap();
+        let connectors: Vec<&Element> = owner.child("ssd:Connectors").unwrap().children.iter().collect();
+        let names = connectors.iter().map(|c| c.get("name").unwrap()).chain([owned]);
+        for name in names.filter(|name| !is_identifier(name)) {
+            refuse("ComRef.cpp", format!("{name} is no identifier"));
+        }
+        for connector in connectors {
+            let name = connector.get("name").unwrap();
+            assert!(["input", "output"].contains(&connector.get("kind").unwrap()), "{name}");
+            if !["ssc:Real", "ssc:Integer", "ssc:Boolean"].iter().any(|base| connector.child(base).is_some()) {
+                refuse("Connector.cpp", format!("{name} has no type"));
+            }
+        }
+        for binding in owner.child("ssd:ParameterBindings").into_iter().flat_map(|all| &all.children) {
+            assert!(binding.attributes.iter().all(|(name, _)| name == "source"), "Values.cpp knows no prefix");
+            let values = Element::parse(&entry(path, binding.get("source").unwrap())).unwrap();
+            for parameter in &values.child("ssv:Parameters").unwrap().children {
+                let port = format!("{owned}.{}", parameter.get("name").unwrap());
+                assert!(base.insert(port, parameter.children[0].name.clone()).is_none());
+            }
+        }
+        if let Some(source) = owner.get("source") {
+            let description = component_description(path, source);
+            for v in &description.variables {
+                let expected = match v.base {
+                    BaseType::Float64 => "ssv:Real",
+                    BaseType::Boolean => "ssv:Boolean",
+                    _ => "ssv:Integer",
+                };
+                let port = format!("{owned}.{}", v.name);
+                if let Some(given) = base.get(&port).filter(|given| *given != expected) {
+                    refuse("Values.cpp", format!("{port} is {given}, not {expected}"));
+                }
+            }
+        }
+    }
+    // Both annotations are there, of its own type and with its own element.
+    let own = |parent: &'_ Element| {
+        let annotation = parent.child("ssd:Annotations")?.child("ssc:Annotation")?.clone();
+        let is_own = annotation.get("type") == Some("org.openmodelica");
+        annotation.child("oms:Annotations")?.child("oms:SimulationInformation").filter(|_| is_own).cloned()
+    };
+    if own(experiment).is_none() {
+        refuse("Model.cpp", "deprecated content".into());
+    }
+    let master = own(system).unwrap().child("oms:FixedStepMaster").unwrap().get("description").unwrap().to_owned();
+    if master != "oms-ma" {
+        refuse("SystemWC.cpp", format!("the master {master}"));
+    }
+    found
+}
+
+/// The description of an FMU in an SSP.
+fn component_description(path: &str, source: &str) -> ModelDescription {
+    let mut bytes = Vec::new();
+    let mut ssp = zip::ZipArchive::new(File::open(path).unwrap()).unwrap();
+    ssp.by_name(source).unwrap().read_to_end(&mut bytes).unwrap();
+    let mut fmu = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
+    let mut xml = Vec::new();
+    fmu.by_name("modelDescription.xml").unwrap().read_to_end(&mut xml).unwrap();
+    model_description::read(&xml).unwrap()
 }
 
 /// A machine's values are in the file and in what the system does.

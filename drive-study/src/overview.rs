@@ -1,7 +1,9 @@
 //! What a first plot of a run shows: speed, torque, currents, angle error and power, of any drive with these names.
 
+use crate::figure::{Curve, Figure};
 use drive::math::wrap;
 use fmu_import::cosimulation::{Column, Recording};
+use std::fmt::Write as _;
 
 /// Panels, each with the variables that belong into it, without the names of their instances.
 const PANELS: [&[&str]; 4] = [
@@ -41,6 +43,30 @@ pub fn overview(recording: &Recording) -> Recording {
     Recording { columns, time: recording.time.clone(), ended_by: recording.ended_by.clone() }
 }
 
+/// Where the curves of a first plot end: a line per panel, in its unit. Names are without that of the instance `alone`.
+pub fn at_the_end(figure: &Figure, alone: Option<&str>) -> String {
+    let time = figure.panels.first().map_or(f64::NAN, |panel| panel.window.1);
+    let mut text = format!("at {} s:", four(time));
+    for panel in &figure.panels {
+        let unit = if panel.unit == "no unit" { String::new() } else { format!(" {}", panel.unit) };
+        let value = |curve: &Curve| {
+            let name = alone.and_then(|instance| curve.name.strip_prefix(instance)?.strip_prefix('.'));
+            let name = name.unwrap_or(&curve.name);
+            format!("{name} {}{unit}", four(curve.y.last().copied().unwrap_or(f64::NAN)))
+        };
+        let values: Vec<String> = panel.curves.iter().map(value).collect();
+        let _ = write!(text, "\n  {}", values.join(", "));
+    }
+    text
+}
+
+/// A number with four digits.
+fn four(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    let plain = rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs()) || !x.is_finite();
+    if plain { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
 /// The name without that of its instance.
 pub(crate) fn last(name: &str) -> &str {
     name.rsplit('.').next().unwrap_or(name)
@@ -55,6 +81,7 @@ mod tests {
             name: (*name).into(),
             unit: (*unit).into(),
             display: None,
+            items: Vec::new(),
             values: vec![0.0, 3.0],
         };
         Recording { time: vec![0.0, 1.0], columns: names.iter().map(column).collect(), ended_by: None }
@@ -73,6 +100,15 @@ mod tests {
         turned.columns[4].values = vec![0.1, -3.2];
         let error = overview(&turned).columns.pop().unwrap();
         assert!((error.values[1] - (std::f64::consts::TAU - 6.2)).abs() < 1e-12, "wrapped: {error:?}");
+    }
+
+    #[test]
+    fn the_end_is_a_line_per_panel() {
+        let mut run = recording(&[("d.speed", "rad/s"), ("d.speed_est", "rad/s"), ("d.tau_e", "N.m")]);
+        run.columns[1].values[1] = 2.999_96;
+        let figure = Figure::of(&overview(&run));
+        assert_eq!(at_the_end(&figure, Some("d")), "at 1 s:\n  speed 3 rad/s, speed_est 3 rad/s\n  tau_e 3 N.m");
+        assert!(at_the_end(&figure, None).contains("\n  d.tau_e 3 N.m"));
     }
 
     #[test]

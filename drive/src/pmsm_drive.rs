@@ -212,8 +212,22 @@ fn in_part(part: &str, fault: &Fault) -> Fault {
     Fault::new(format!("{part}.{fault}"))
 }
 
+/// Back EMF over the voltage of the DC link above which the drive does not decide on the speed of its shaft.
+const DRIVEN: f64 = 3.0;
+
 impl Warns for PmsmDrive {
     fn warn(&self, log: &mut Warnings<'_>) {
+        let (plant, u_dc, lock_lost) = (&self.pair.plant.model, self.inputs.u_dc, self.pair.controller.out.lock_lost);
+        let (speed, emf) = plant.speed_and_emf();
+        if lock_lost >= 1.0 && emf > DRIVEN * u_dc {
+            let remedy = if plant.parameters.mechanics.imposed { "" } else { " or use plant.mechanics.imposed" };
+            return log.warn("driven", || {
+                format!(
+                    "lock_lost = {lock_lost:.2}: at {speed} rad/s the back EMF is {emf:.0} V line to line, and u_dc = {u_dc} V \
+                     cannot hold the shaft: its load drives it, or the coupling is unstable; shorten the communication step{remedy}"
+                )
+            });
+        }
         self.pair.controller.model.warn(log);
     }
 }
@@ -236,27 +250,19 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
             }),
             V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)
                 .at_least(0.0),
-            V::input("speed_shaft", &SPEED, "Speed of the shaft; read with plant.mechanics.imposed only", |m| {
-                &mut m.model.inputs.speed_shaft
-            }),
-            V::input(
-                "angle_shaft",
-                &RADIAN,
-                "Angle of the shaft, mechanical; read with plant.mechanics.imposed only",
-                |m| &mut m.model.inputs.angle_shaft,
-            )
-            .unbounded(),
-            V::input(
-                "tau_ref",
-                &NEWTON_METER,
-                "Torque reference; read with controller.speed_loop.torque_mode only",
-                |m| &mut m.model.inputs.tau_ref,
-            ),
+            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
+                .read_with("mechanics.imposed", "true"),
+            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
+                .unbounded()
+                .read_with("mechanics.imposed", "true"),
+            V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
+                .read_with("speed_loop.torque_mode", "true"),
             V::boolean_input(
                 "enable",
                 "The drive operates; false: the controller stays in its initial state, and the gates are off once enabled is false",
                 |m| &mut m.model.inputs.enable,
-            ),
+            )
+            .optional(),
             V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),
             V::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |m| &mut m.out.controller }),
             V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),

@@ -1,6 +1,6 @@
 //! Torque of an imposed shaft and energies: what a drive train integrates is what the energies count, in Co-Simulation and in
 //! Model Exchange.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::float_cmp)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 
 use drive::control::current::CurrentLoop;

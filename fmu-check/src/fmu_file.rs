@@ -1,11 +1,11 @@
 //! The file under check: archive, description as XML tree and as parsed, and the unpacked folders.
 
 use crate::zip_headers::{Archive, contents, copy, is_inside};
-use fmu_import::Folder;
 use fmu_import::platform::Platform;
+use fmu_import::{Folder, machine};
 use model_description::{Element, Error, FmiVersion, Interface, ModelDescription, limits};
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 const DESCRIPTION: &str = "modelDescription.xml";
@@ -36,6 +36,13 @@ impl Binary {
             fs::read(&self.path).map_err(|e| e.to_string())
         };
         read().map_err(|cause| format!("{}: {cause}", self.name))
+    }
+
+    /// The platforms that it is for, from its headers.
+    fn platforms(&self) -> io::Result<Vec<Platform>> {
+        let mut head = Vec::new();
+        File::open(&self.path)?.take(machine::HEAD).read_to_end(&mut head)?;
+        Ok(machine::platforms(&head))
     }
 }
 
@@ -167,16 +174,17 @@ impl FmuFile {
         description.co_simulation.as_ref().or(description.model_exchange.as_ref())
     }
 
-    /// The binary of an interface for this machine, as it is named in the archive.
+    /// The binary of an interface for this machine, as it is named in the archive: that of the first folder with a library for
+    /// this processor, or that of the first folder.
     pub(super) fn host_binary(&self, interface: &Interface) -> Result<&Binary, String> {
         let host = Platform::host();
         let file = format!("{}.{}", interface.model_identifier, host.extension());
         let folders = host.folders(self.version);
-        let fits = |b: &&Binary| folders.iter().any(|folder| b.name == format!("binaries/{folder}/{file}"));
-        self.binaries
-            .iter()
-            .find(fits)
-            .ok_or_else(|| format!("the archive has no binary for this platform: binaries/{}/{file}", folders[0]))
+        let named = |folder: &&str| self.binaries.iter().find(|b| b.name == format!("binaries/{folder}/{file}"));
+        let there: Vec<&Binary> = folders.iter().filter_map(named).collect();
+        let fits = |b: &&&Binary| b.platforms().is_ok_and(|platforms| platforms.contains(&host));
+        let found = there.iter().find(fits).or(there.first()).copied();
+        found.ok_or_else(|| format!("the archive has no binary for this platform: binaries/{}/{file}", folders[0]))
     }
 }
 

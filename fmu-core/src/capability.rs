@@ -62,6 +62,9 @@ pub struct Samples<M: Model> {
 /// [`Differentiable::tangent`].
 pub type Tangent<M> = fn(&M, Elapsed, &M, &mut [f64], &mut <M as Model>::Outputs) -> Result<(), Fault>;
 
+/// [`CompletedSteps::complete`].
+pub type Complete<M> = fn(&mut M, Elapsed) -> Result<(), Fault>;
+
 /// The capabilities of the model `M`: `Capabilities::NONE.ContinuousTime().Events()`. A method exists only if the model
 /// implements the trait of its name.
 pub struct Capabilities<M: Model> {
@@ -73,8 +76,8 @@ pub struct Capabilities<M: Model> {
     pub samples: Option<Samples<M>>,
     /// Of a [`Differentiable`] model.
     pub tangent: Option<Tangent<M>>,
-    /// [`CompletedSteps::complete`].
-    pub complete: Option<fn(&mut M, Elapsed) -> Result<(), Fault>>,
+    /// Of a model that follows [`CompletedSteps`].
+    pub complete: Option<Complete<M>>,
     /// Of a model that [`Warns`].
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,
 }

@@ -8,12 +8,12 @@ use crate::Fault;
 use crate::capability::{Capabilities, Exported};
 use crate::integer::IntegerType;
 use crate::model::{Block, Experiment, Model};
+use crate::need::Need;
 use crate::probe;
 use crate::row::{Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
@@ -21,8 +21,10 @@ pub const TIME: u32 = 0;
 /// Everything that an importer can know about a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Description {
-    /// Name and model identifier.
+    /// Model identifier, and the name that users see unless there is a title.
     pub name: String,
+    /// Name of this FMU for its users, as a preset may have one of its own.
+    pub title: Option<String>,
     /// One sentence.
     pub description: String,
     /// Version of the model.
@@ -164,7 +166,7 @@ impl Description {
     /// # Errors
     /// As [`exported`](Self::exported).
     pub fn of<M: Model>() -> Result<Self, Fault> {
-        Self::with(&Capabilities::<M>::NONE, None)
+        Self::with(&Capabilities::<M>::NONE, fresh()?)
     }
 
     /// Describes a model as it is exported; start values come from its `Default`, dependencies from probing it.
@@ -173,20 +175,18 @@ impl Description {
     /// Reports problems that no compile-time check can find: a name shared by two parts, a start value outside its
     /// range, a type definition named like a variable, a terminal with missing variables, a state without a row.
     pub fn exported<E: Exported>() -> Result<Self, Fault> {
-        Self::loaded::<E>(None)
+        Self::instantiated::<E>(fresh()?)
     }
 
-    /// As [`exported`](Self::exported), with the folder of the model's resources.
+    /// As [`exported`](Self::exported), with the start values and the resources that `block` has.
     ///
     /// # Errors
-    /// As [`exported`](Self::exported) and [`Model::load`].
-    pub fn loaded<E: Exported>(resources: Option<&Path>) -> Result<Self, Fault> {
-        Self::with(&E::CAN, resources)
+    /// As [`exported`](Self::exported).
+    pub fn instantiated<E: Exported>(block: Block<E::Model>) -> Result<Self, Fault> {
+        Self::with(&E::CAN, block)
     }
 
-    fn with<M: Model>(can: &Capabilities<M>, resources: Option<&Path>) -> Result<Self, Fault> {
-        let mut block = Block::<M>::default();
-        block.model.load(resources)?;
+    fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>) -> Result<Self, Fault> {
         let states = can.rows()?;
         let initial = probe::initial_dependencies(can, &block, &states);
         let between = probe::dependencies(can, &block, &states);
@@ -194,6 +194,7 @@ impl Description {
         let references = |of: &Option<Vec<usize>>| of.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
         let table = M::TABLE;
         let mut variables: Vec<Variable> = Vec::new();
+        let mut needs: Vec<(usize, Need<'static>)> = Vec::new();
         for index in 0..table.len() {
             let Some((name, meta, element)) = table.locate(index) else { continue };
             let Some((_, slot)) = table.entry(&mut block, index) else { continue };
@@ -210,6 +211,9 @@ impl Description {
                 join(&mut array.initial_dependencies, references(&initial[index]));
                 join(&mut array.dependencies, references(&between[index]));
                 continue;
+            }
+            if meta.need != Need::Always {
+                needs.push((variables.len(), meta.need));
             }
             let state = states.iter().position(|&row| row == index);
             variables.push(Variable {
@@ -242,6 +246,10 @@ impl Description {
             }
         }
         check_types(&variables)?;
+        for (i, need) in needs {
+            let words = words(&variables[i].name, need, &variables)?;
+            variables[i].description += &words;
+        }
         let terminals = terminals::describe(M::TERMINALS, &variables)?;
         let after = |i: usize| reference(table.len() + i);
         let model_exchange = can.model_exchange().then(|| ModelExchange {
@@ -254,6 +262,7 @@ impl Description {
         let info = M::INFO;
         Ok(Self {
             name: info.name.into(),
+            title: None,
             description: info.description.into(),
             version: info.version.into(),
             author: info.author.into(),
@@ -267,6 +276,11 @@ impl Description {
             icon: M::ICON.map(Into::into),
             model_exchange,
         })
+    }
+
+    /// The name that users see.
+    pub fn model_name(&self) -> &str {
+        self.title.as_deref().unwrap_or(&self.name)
     }
 
     /// The variable of this name.
@@ -291,6 +305,13 @@ impl Variable {
     pub fn elements(&self) -> usize {
         self.shape.iter().product()
     }
+}
+
+/// A model without resources.
+fn fresh<M: Model>() -> Result<Block<M>, Fault> {
+    let mut block = Block::<M>::default();
+    block.model.load(None)?;
+    Ok(block)
 }
 
 /// The dependencies of an array are those of its elements together.
@@ -326,6 +347,29 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
         derivative: None,
         reinit: false,
     }
+}
+
+/// The words of the need of `input`, with the full name of the parameter: the one that has the name of the table, or ends with
+/// it after the prefix of a part.
+fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, Fault> {
+    let Need::With { parameter, value } = need else { return Ok(need.to_string()) };
+    let named = |v: &&Variable| {
+        let rest = v.name.strip_suffix(parameter);
+        v.causality == Causality::Parameter && rest.is_some_and(|rest| rest.is_empty() || rest.ends_with('.'))
+    };
+    let found: Vec<&Variable> = variables.iter().filter(named).collect();
+    let [found] = found[..] else {
+        return Err(Fault::new(format!("{input} is read with {parameter}, of which there are {}", found.len())));
+    };
+    let has = match &found.kind {
+        VariableKind::Boolean => ["true", "false"].contains(&value),
+        VariableKind::Enumeration { items, .. } => items.iter().any(|(_, name, _)| name == value),
+        _ => false,
+    };
+    if !has {
+        return Err(Fault::new(format!("{input} is read with {} = {value}, which it never is", found.name)));
+    }
+    Ok(Need::With { parameter: &found.name, value }.to_string())
 }
 
 /// Value reference of the table's variable `index`; of `time` for [`probe::NOW`].

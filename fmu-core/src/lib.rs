@@ -75,7 +75,8 @@
 //! ```
 //!
 //! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
-//! [`CompletedSteps`] and [`Warns`] are what a model can do besides; [`Model::load`] reads files that the FMU brings along.
+//! [`CompletedSteps`] and [`Warns`] are what a model can do besides; [`Model::load`] reads files that the FMU brings along, and
+//! a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`table`], [`terminal`], [`model`],
 //! [`continuous`], [`events`], [`capability`], [`description`]. No motor, no XML, no C, no `unsafe`.
@@ -93,6 +94,8 @@ pub mod integer;
 pub mod integrate;
 pub mod log;
 pub mod model;
+pub mod need;
+pub mod preset;
 mod probe;
 pub mod reals;
 pub mod resource;
@@ -113,6 +116,7 @@ pub use events::{Events, Indicator, Next, Outcome, Sampled};
 pub use fault::Fault;
 pub use integer::{IntegerType, Whole};
 pub use model::{Block, Experiment, Info, Interface, Model};
+pub use need::Need;
 pub use reals::Inputs;
 pub use resource::Resource;
 pub use row::{Row, Slot};

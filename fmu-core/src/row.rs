@@ -9,6 +9,7 @@ mod slot;
 
 use crate::enumeration::Place;
 use crate::integer::Getter;
+use crate::need::Need;
 use crate::reals::{Inputs, Interval};
 use crate::token::Hash;
 use crate::unit::Quantity;
@@ -178,6 +179,7 @@ impl<W: 'static> Row<W> {
             nominal: None,
             unbounded: false,
             mean: false,
+            need: Need::Always,
             dimension: None,
             shape: &[],
         };

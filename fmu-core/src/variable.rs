@@ -1,6 +1,7 @@
 //! The properties of a variable except the location of its value: causality, variability, type, range.
 
 use crate::integer::IntegerType;
+use crate::need::Need;
 use crate::unit::Quantity;
 use serde::{Deserialize, Serialize};
 
@@ -148,6 +149,8 @@ pub struct Meta {
     pub unbounded: bool,
     /// The value is a mean over the last communication step.
     pub mean: bool,
+    /// Whether an importer must feed it.
+    pub need: Need<'static>,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,
     /// Extents of a matrix, which is stored row by row; empty for a scalar, and for an array with one extent.

@@ -7,7 +7,7 @@ use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
 use fmu_core::log::Warnings;
 use fmu_core::resource::Shelf;
-use fmu_core::{Exported, Fault, Interface, Model, Range, SampleGrid, Step};
+use fmu_core::{Block, Exported, Fault, Interface, Model, Range, SampleGrid, Step};
 use std::ffi::CString;
 
 /// Why a call failed.
@@ -60,9 +60,10 @@ pub struct Instance<E: Exported> {
     pub(crate) scratch: Option<Box<Scratch<E::Model>>>,
     /// The texts that were got last.
     pub(crate) texts: Vec<CString>,
-    /// What the model loaded, if anything: the resources for states from bytes, and the model for a reset.
+    /// The resources that the model loaded, for states from bytes.
     pub(crate) shelf: Shelf,
-    pub(crate) loaded: Option<Box<E::Model>>,
+    /// The model as it was instantiated, for a reset, if that is not its `Default`.
+    pub(crate) made: Option<Box<Block<E::Model>>>,
     /// Keys of the warnings of the last second, and the times of their messages.
     warned: Vec<(&'static str, f64)>,
 }
@@ -92,7 +93,7 @@ impl<E: Exported> Instance<E> {
             scratch: None,
             texts: Vec::new(),
             shelf: Shelf::default(),
-            loaded: None,
+            made: None,
             warned: Vec::new(),
         }
     }
@@ -125,7 +126,7 @@ impl<E: Exported> Instance<E> {
         self.current.judged()?;
         self.current.block.initialize();
         self.current.dirty = false;
-        self.log.event(|| message::start(&self.name, &mut self.current));
+        self.log.event(|| message::start(&self.name, &mut self.current, self.made.as_deref()));
         if self.current.life.handles_events() { self.enter_event() } else { Ok(()) }
     }
 
@@ -136,10 +137,8 @@ impl<E: Exported> Instance<E> {
 
     /// Restores the state after instantiation; name and logger stay.
     pub fn reset(&mut self) {
-        self.current = Snapshot::new(self.current.life.interface());
-        if let Some(loaded) = &self.loaded {
-            self.current.block.model.clone_from(loaded);
-        }
+        let made = self.made.as_deref().cloned().unwrap_or_default();
+        self.current = Snapshot::of(self.current.life.interface(), made);
         self.stale = false;
         self.warned.clear();
         self.log.event(|| format!("{}: reset", self.name));

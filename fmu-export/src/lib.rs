@@ -87,6 +87,7 @@ pub mod instance;
 pub mod lifecycle;
 pub mod log;
 mod message;
+mod preset;
 pub mod registry;
 mod resources;
 pub mod sensitivity;

@@ -104,13 +104,13 @@ pub(crate) fn count(given: usize, needed: usize) -> Fault {
     Fault::value("nValues", given, format_args!("{needed} for these value references"))
 }
 
-/// How an instance starts: what differs from the start values.
-pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>) -> String {
-    let mut fresh = Snapshot::<M>::default();
+/// How an instance starts: what differs from the start values, which are those of the model's `Default` unless it was `made` so.
+pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: Option<&Block<M>>) -> String {
+    let mut fresh = made.cloned().unwrap_or_default();
     let mut changes = Vec::new();
     for index in 0..M::TABLE.len() {
         let (Some((meta, new)), Some((_, old))) =
-            (M::TABLE.entry(&mut current.block, index), M::TABLE.entry(&mut fresh.block, index))
+            (M::TABLE.entry(&mut current.block, index), M::TABLE.entry(&mut fresh, index))
         else {
             continue;
         };

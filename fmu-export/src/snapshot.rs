@@ -73,6 +73,11 @@ impl<M: Model> Default for Snapshot<M> {
 impl<M: Model> Snapshot<M> {
     /// After instantiation for this interface.
     pub fn new(interface: Interface) -> Self {
+        Self::of(interface, Block::default())
+    }
+
+    /// As [`new`](Self::new), of a model that is not its `Default`.
+    pub fn of(interface: Interface, block: Block<M>) -> Self {
         Self {
             life: Life::new(interface),
             experiment: None,
@@ -82,7 +87,7 @@ impl<M: Model> Snapshot<M> {
             pending: false,
             slopes: Vec::new(),
             dirty: true,
-            block: Block::default(),
+            block,
         }
     }
 }

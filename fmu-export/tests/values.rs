@@ -269,7 +269,8 @@ fn values_can_be_read_after_the_end_and_after_an_error() {
         assert_eq!(fmu.terminate(), OK);
         assert_eq!((fmu.get(X), fmu.time()), (x, 0.5));
         assert_eq!(fmu.terminate(), ERROR);
-        assert_eq!((fmu.get(X), fmu.time()), (x, 0.5));
+        assert_eq!(fmu.get(X), x);
+        assert!(version == 2 || fmu.get(TIME) == 0.5);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Error;
 use crate::folder::Folder;
+use crate::machine;
 use crate::platform::Platform;
 use model_description::limits::{self, UNPACKED, XML};
 use model_description::{FmiVersion, Interface, ModelDescription, TerminalsAndIcons};
@@ -90,11 +91,11 @@ impl Archive {
 
     /// Extracts the binaries for this platform and the resources.
     pub(super) fn extract(&mut self) -> Result<Extracted, Error> {
-        let wrong = |e: &dyn std::fmt::Display| Error::file(&self.path, e);
         let description = self.description.clone();
-        let binary = |interface: &Option<Interface>| interface.as_ref().map(|i| self.binary(&i.model_identifier));
+        let mut binary = |interface: &Option<Interface>| interface.as_ref().map(|i| self.binary(&i.model_identifier));
         let co_simulation = binary(&description.co_simulation).transpose()?;
         let model_exchange = binary(&description.model_exchange);
+        let wrong = |e: &dyn std::fmt::Display| Error::file(&self.path, e);
         if co_simulation.is_none() && model_exchange.is_none() {
             let has = interfaces(&description);
             return Err(wrong(&format!("has neither Co-Simulation nor Model Exchange; it has {has}")));
@@ -116,15 +117,28 @@ impl Archive {
     }
 
     /// Folder and file name of the binary with this model identifier for this platform.
-    fn binary(&self, model_identifier: &str) -> Result<(&'static str, String), Error> {
+    fn binary(&mut self, model_identifier: &str) -> Result<(&'static str, String), Error> {
         let host = Platform::host();
         let folders = host.folders(self.description.version);
         let name = format!("{model_identifier}.{}", host.extension());
-        let has = |folder: &&&str| self.names.iter().any(|n| *n == format!("binaries/{folder}/{name}"));
-        match folders.iter().find(has) {
-            Some(&folder) => Ok((folder, name)),
-            None => Err(Error::file(&self.path, self.missing_binary(folders[0], &name))),
+        let mut others = None;
+        for &folder in &folders {
+            let entry = format!("binaries/{folder}/{name}");
+            let Some(index) = self.names.iter().position(|n| *n == entry) else { continue };
+            let wrong = |e: &dyn std::fmt::Display| Error::file(&self.path, format!("{entry}: {e}"));
+            let mut head = Vec::new();
+            let file = self.zip.by_index(index).map_err(|e| wrong(&e))?;
+            file.take(machine::HEAD).read_to_end(&mut head).map_err(|e| wrong(&e))?;
+            let platforms = machine::platforms(&head);
+            // The loader tells what is wrong with a file that is no library.
+            if platforms.is_empty() || platforms.contains(&host) {
+                return Ok((folder, name));
+            }
+            let platforms: Vec<&str> = platforms.into_iter().map(Platform::tuple).collect();
+            let is_for = format!("{entry} is for {}, not for this platform ({host})", platforms.join(" and "));
+            others.get_or_insert(is_for);
         }
+        Err(Error::file(&self.path, others.unwrap_or_else(|| self.missing_binary(folders[0], &name))))
     }
 
     /// Every file, with its name.

@@ -33,6 +33,7 @@ mod folder;
 pub mod guard;
 mod instance;
 mod integration;
+pub mod machine;
 pub mod platform;
 mod quantity;
 pub mod ssp;
@@ -47,6 +48,7 @@ pub use abi::raw;
 pub use error::Error;
 pub use folder::Folder;
 pub use instance::{CompletedStep, Instance, State, Stepped, Update};
+pub use quantity::suggest;
 pub use standard::Kind;
 pub use text::{printable, printable_lines};
 pub use value::Values;
@@ -70,6 +72,31 @@ pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u
     let mut archive = Archive::open(path)?;
     let files = archive.files()?;
     Ok((Arc::unwrap_or_clone(archive.description), files))
+}
+
+/// An archive in a folder of its own, for [`describe`].
+pub struct Unpacked {
+    folder: Folder,
+    /// The library for this platform.
+    pub library: PathBuf,
+}
+
+impl Unpacked {
+    /// Unpacks the library for this platform and the resources.
+    ///
+    /// # Errors
+    /// The file is missing, no archive, has no readable description, or no binary for this platform.
+    pub fn new(path: &Path) -> Result<Self, Error> {
+        let Extracted { folder, co_simulation, model_exchange, .. } = Archive::open(path)?.extract()?;
+        let library = co_simulation.map(Ok).or(model_exchange).transpose()?;
+        let library = library.ok_or_else(|| Error::file(path, "has no binary"))?;
+        Ok(Self { folder, library })
+    }
+
+    /// The folder of its resources.
+    pub fn resources(&self) -> PathBuf {
+        self.folder.path().join("resources")
+    }
 }
 
 /// An FMU with its description and its loaded binary. Every opening loads a copy of the binary of its own; clones share it.

@@ -46,9 +46,11 @@ impl Platform {
         }
     }
 
-    /// That of a folder under `binaries/`, if it is one of these.
+    /// That of a folder under `binaries/`, if it is one of these; x86_64 for the names of FMI 2.0 that do not say.
     pub fn of_folder(folder: &str, version: FmiVersion) -> Option<Self> {
-        Self::ALL.into_iter().find(|p| p.folders(version).contains(&folder))
+        let first = |p: &Self| p.folders(version)[0] == folder;
+        let any = |p: &Self| p.folders(version).contains(&folder);
+        Self::ALL.into_iter().find(first).or_else(|| Self::ALL.into_iter().find(any))
     }
 
     /// The platform tuple of FMI 3.0 (FMI 3.0.2, 2.5.1.4.1).
@@ -63,16 +65,17 @@ impl Platform {
         }
     }
 
-    /// The folders under `binaries/` to look in, the one to write to first. FMI 2.0.5, 2.3 names three of 64 bits and
-    /// lets others take the tuples of FMI 3.0.
+    /// The folders under `binaries/` to look in, the one to write to first. FMI 2.0.5, 2.3 names three of 64 bits, which say
+    /// nothing of the processor, and lets others take the tuples of FMI 3.0. Many importers know those three only, on ARM too.
     pub fn folders(self, version: FmiVersion) -> Vec<&'static str> {
         match (version, self) {
             (FmiVersion::V2, Self::X64Linux) => vec!["linux64", self.tuple()],
             (FmiVersion::V2, Self::X64Windows) => vec!["win64", self.tuple()],
-            (FmiVersion::V2, Self::X64Darwin) => vec!["darwin64", self.tuple()],
-            // Universal binaries live in darwin64.
-            (FmiVersion::V2, Self::ArmDarwin) => vec![self.tuple(), "darwin64"],
-            _ => vec![self.tuple()],
+            // A universal library is for both processors.
+            (FmiVersion::V2, Self::X64Darwin | Self::ArmDarwin) => vec!["darwin64", self.tuple()],
+            (FmiVersion::V2, Self::ArmLinux) => vec![self.tuple(), "linux64"],
+            (FmiVersion::V2, Self::ArmWindows) => vec![self.tuple(), "win64"],
+            (FmiVersion::V3, _) => vec![self.tuple()],
         }
     }
 
@@ -111,7 +114,8 @@ mod tests {
     #[test]
     fn names_of_the_standards() {
         assert_eq!(Platform::X64Linux.folders(FmiVersion::V2)[0], "linux64");
-        assert_eq!(Platform::ArmDarwin.folders(FmiVersion::V2)[0], "aarch64-darwin");
+        assert_eq!(Platform::ArmDarwin.folders(FmiVersion::V2), ["darwin64", "aarch64-darwin"]);
+        assert_eq!(Platform::ArmLinux.folders(FmiVersion::V2), ["aarch64-linux", "linux64"]);
         for platform in Platform::ALL {
             assert_eq!(platform.folders(FmiVersion::V3), [platform.tuple()]);
             assert_eq!(platform.tuple().parse(), Ok(platform));
@@ -119,8 +123,13 @@ mod tests {
         assert!("x86_64-plan9".parse::<Platform>().is_err());
         for platform in Platform::ALL {
             for version in [FmiVersion::V2, FmiVersion::V3] {
-                assert_eq!(Platform::of_folder(platform.folders(version)[0], version), Some(platform));
+                assert_eq!(Platform::of_folder(platform.tuple(), version), Some(platform));
             }
+        }
+        for (folder, platform) in
+            [("linux64", Platform::X64Linux), ("win64", Platform::X64Windows), ("darwin64", Platform::X64Darwin)]
+        {
+            assert_eq!(Platform::of_folder(folder, FmiVersion::V2), Some(platform));
         }
         assert_eq!(Platform::of_folder("x86_64-linux", FmiVersion::V2), Some(Platform::X64Linux));
         assert_eq!(Platform::of_folder("linux64", FmiVersion::V3), None);

@@ -43,7 +43,7 @@ pub(crate) fn convert(
 }
 
 /// `; did you mean a or b?` with the names that resemble what was written, or nothing.
-pub(crate) fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> String {
+pub fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> String {
     let (whole, last) = (written.to_lowercase(), last_part(written).to_lowercase());
     let likeness = |name: &str| {
         let lower = name.to_lowercase();

@@ -77,7 +77,10 @@ impl Values {
 
     /// As [`parse`](Self::parse), with the names that the description has for an enumeration, and with its units behind
     /// numbers: `1000 rpm`.
-    pub(crate) fn read(text: &str, variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse); names the units that the variable has.
+    pub fn read(text: &str, variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
         let definition = variable.declared_type.as_ref().and_then(|t| description.type_definition(t));
         let items = definition.map(|d| d.items.iter().map(|i| (i.name.clone(), i.value)).collect::<Vec<_>>());
         if variable.base.is_float()

@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Version of what `sweep.json` says.
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 /// A part takes about this long, in s: what a kill costs at most.
 const PART_SECONDS: f64 = 5.0;
 const MOST_ROWS: u64 = 100_000;

@@ -6,7 +6,7 @@ use crate::error::invalid;
 use crate::measure::{Measure, State};
 use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
-use fmu_import::cosimulation::{self, Recording, Schedule, Settings, Target, Worker};
+use fmu_import::cosimulation::{self, Recording, Schedule, Settings, Target, Worker, item};
 use fmu_import::ssp::load::{Connectors, Loaded};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -30,13 +30,25 @@ struct Shared {
     notes: Vec<String>,
 }
 
+/// Names of the columns that all results have; neither a measure nor a varied variable may have one.
+pub(crate) const OWN: [&str; 3] = ["run", "end", "error"];
+
 /// Name and unit of a column of results.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Column {
     /// Name.
     pub name: String,
     /// Unit; empty for none.
     pub unit: String,
+    /// Numbers and names of an enumeration's values, of which results show the names; empty for other types.
+    pub items: Vec<(i64, String)>,
+}
+
+impl Column {
+    /// The name of the enumeration's value `x`.
+    pub fn item(&self, x: f64) -> Option<&str> {
+        item(&self.items, x)
+    }
 }
 
 /// A variable that runs set, found by [`Plan::bind`]: one of an FMU, or an input of an SSP's system, which may feed several.
@@ -101,6 +113,9 @@ impl Plan {
         let mut recorded: Vec<String> = Vec::new();
         let mut measures = Vec::new();
         for (name, measure) in &definition.measure.0 {
+            if OWN.contains(&name.as_str()) {
+                return invalid(format!("measure: {name} is a column of all results ({}): rename it", OWN.join(", ")));
+            }
             let wrong = |cause: String| Error::Invalid(format!("measure: {name}: {cause}"));
             measures.push(of(measure, &settings, &mut recorded).map_err(wrong)?);
         }
@@ -116,16 +131,18 @@ impl Plan {
         };
         let Loaded { system, connectors, notes, .. } = loaded;
         let system = Arc::new(system.into_plan(&settings)?);
-        let unit = |name: &str| {
-            let column = system.columns().iter().find(|c| c.name == name);
-            column.map(|c| c.unit.clone()).unwrap_or_default()
-        };
+        let of = |name: &str| system.columns().iter().find(|c| c.name == name);
         let columns = measures.iter().zip(&definition.measure.0).map(|((measure, sum), (name, _))| {
             // The unit of a sum of several units, or of a sum with factors, is unknown.
-            let units: Vec<String> = sum.terms.iter().map(|(_, name)| unit(name)).collect();
+            let units: Vec<&str> = sum.terms.iter().map(|(_, name)| of(name).map_or("", |c| &c.unit)).collect();
             let plain = sum.terms.iter().all(|(factor, _)| factor.abs().to_bits() == 1.0_f64.to_bits());
             let same = plain && units.iter().all(|other| *other == units[0]);
-            Column { name: name.clone(), unit: measure.unit(if same { &units[0] } else { "" }) }
+            let items = match &sum.terms[..] {
+                [(1.0, name)] if measure.is_a_value() => of(name).map(|c| c.items.clone()),
+                _ => None,
+            };
+            let unit = measure.unit(if same { units[0] } else { "" });
+            Column { name: name.clone(), unit, items: items.unwrap_or_default() }
         });
         let columns = columns.collect();
         let measures = measures.into_iter().map(|(measure, _)| measure).collect();
@@ -136,6 +153,11 @@ impl Plan {
     /// Names and units of the measures.
     pub fn measures(&self) -> &[Column] {
         &self.0.columns
+    }
+
+    /// The columns of a trace.
+    pub(crate) fn traced(&self) -> impl Iterator<Item = &cosimulation::Column> {
+        self.0.trace.iter().map(|column| &self.0.system.columns()[*column])
     }
 
     /// Start, stop and step.
@@ -177,8 +199,9 @@ impl Plan {
             if all.iter().any(|other| other.column.name == name) {
                 return invalid(format!("{name} is varied twice"));
             }
-            let unit = targets.first().map(|target| system.unit(target)).unwrap_or_default();
-            all.push(Variable { column: Column { name: name.into(), unit }, targets });
+            let of = targets.first().map(|target| system.column(target));
+            let (unit, items) = of.map(|c| (c.unit, c.items)).unwrap_or_default();
+            all.push(Variable { column: Column { name: name.into(), unit, items }, targets });
         }
         Ok(all)
     }

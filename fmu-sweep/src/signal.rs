@@ -64,6 +64,11 @@ impl Signal {
         Self { terms: sum.terms.iter().map(|(factor, name)| (*factor, column(name))).collect(), wrap }
     }
 
+    /// Whether it is wrapped.
+    pub(crate) fn wraps(&self) -> bool {
+        self.wrap.is_some()
+    }
+
     /// The value at a communication point.
     pub(crate) fn at(&self, values: &[f64]) -> f64 {
         let sum = self.terms.iter().fold(0.0, |sum, (factor, column)| sum + factor * values[*column]);

@@ -2,7 +2,9 @@
 
 use crate::definition::{Runs, Trace, Which};
 use crate::error::invalid;
+use crate::plan::OWN;
 use crate::{Column, Definition, Error, Outcome, Outcomes, Plan, Rows, Runner, Variable};
+use fmu_import::cosimulation::item;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
 use std::fs::File;
@@ -52,6 +54,10 @@ impl Sweep {
             plan.number(&variable[0], text).map_err(|e| e.to_string())
         };
         let rows = Rows::new(design, &definition.vary, &folder, &number)?;
+        if let Some(name) = rows.names().find(|name| OWN.contains(name)) {
+            let own = OWN.join(", ");
+            return invalid(format!("vary: {name} is a column of all results ({own}): write INSTANCE.{name}"));
+        }
         let variables = plan.bind(rows.names())?;
         if definition.measure.0.is_empty() && definition.trace.is_none() {
             return invalid("expected a table [measure]: nothing is measured");
@@ -118,20 +124,12 @@ impl Sweep {
         self.plan.run_rows(&self.variables, count, &row, threads, progress)
     }
 
-    /// All columns of the results: `run`, the varied variables, the measures, `end`, `error`. Where a measure has one of these
-    /// names, an underscore follows it.
+    /// All columns of the results: `run`, the varied variables, the measures, `end`, `error`.
     pub fn columns(&self) -> Vec<Column> {
         let varied = self.variables.iter().map(|variable| variable.column.clone());
-        let named: Vec<Column> = varied.chain(self.plan.measures().iter().cloned()).collect();
-        let plain = |name: &str, unit: &str| {
-            let mut name = name.to_owned();
-            while named.iter().any(|column| column.name == name) {
-                name.push('_');
-            }
-            Column { name, unit: unit.into() }
-        };
-        let (run, last) = (plain("run", ""), [plain("end", "s"), plain("error", "")]);
-        std::iter::once(run).chain(named).chain(last).collect()
+        let [run, end, error] = OWN.map(|name| Column { name: name.into(), ..Column::default() });
+        let end = Column { unit: "s".into(), ..end };
+        std::iter::once(run).chain(varied).chain(self.plan.measures().iter().cloned()).chain([end, error]).collect()
     }
 
     /// The header of the results, with its line break.
@@ -170,13 +168,13 @@ impl Sweep {
     /// The line of a row, with its line break.
     pub(crate) fn line(&self, row: u64, values: &[f64], outcome: &Outcome) -> String {
         let mut line = row.to_string();
-        let mut number = |x: f64| {
+        let mut put = |(column, x): (&Column, &f64)| {
             line.push(',');
-            push_number(&mut line, x);
+            push_value(&mut line, &column.items, *x);
         };
-        values.iter().copied().for_each(&mut number);
+        self.variables.iter().map(|variable| &variable.column).zip(values).for_each(&mut put);
         match &outcome.result {
-            Ok(measures) => measures.iter().copied().for_each(number),
+            Ok(measures) => self.plan.measures().iter().zip(measures).for_each(put),
             Err(_) => line.extend(std::iter::repeat_n(',', self.plan.measures().len())),
         }
         line.push(',');
@@ -243,9 +241,9 @@ impl Writer<'_> {
         let outcome = runner.run(values, &mut |t, traced| {
             if wanted.is_some() && point % every == 0 {
                 push_number(trace, t);
-                traced.for_each(|x| {
+                sweep.plan.traced().zip(traced).for_each(|(column, x)| {
                     trace.push(',');
-                    push_number(trace, x);
+                    push_value(trace, &column.items, x);
                 });
                 trace.push('\n');
             }
@@ -259,6 +257,14 @@ impl Writer<'_> {
             crate::files::write(&folder.join(format!("run-{row:08}.csv")), text.as_bytes())?;
         }
         Ok(sweep.line(row, values, &outcome))
+    }
+}
+
+/// The name of an enumeration's value, or a number. A name that CSV would have to quote stays a number: cells are split at commas.
+fn push_value(text: &mut String, items: &[(i64, String)], x: f64) {
+    match item(items, x).filter(|name| !name.contains([',', '"', '\n'])) {
+        Some(name) => text.push_str(name),
+        None => push_number(text, x),
     }
 }
 

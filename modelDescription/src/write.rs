@@ -78,7 +78,7 @@ fn header(description: &Description, version: FmiVersion, generation: &Generatio
     };
     Element::new("fmiModelDescription")
         .with("fmiVersion", version.to_string())
-        .with("modelName", &*description.name)
+        .with("modelName", description.model_name())
         .with(token, &*description.token)
         .with_text("description", &description.description)
         .with_text("author", &description.author)

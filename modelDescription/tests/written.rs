@@ -52,6 +52,18 @@ fn header() {
     }
 }
 
+/// What users see has a name of its own; the binary keeps its name.
+#[test]
+fn a_title_is_the_name_of_the_model() {
+    for version in VERSIONS {
+        let titled = Description { title: Some("My <motor>".into()), ..exchange_sample() };
+        let md = read(write(&titled, version, &generation())).unwrap();
+        assert_eq!(md.model_name, "My <motor>");
+        let identifiers = [md.co_simulation, md.model_exchange].map(|interface| interface.unwrap().model_identifier);
+        assert_eq!(identifiers, [exchange_sample().name, exchange_sample().name]);
+    }
+}
+
 #[test]
 fn capabilities() {
     for (version, state) in VERSIONS.into_iter().zip(["FMUstate", "FMUState"]) {
@@ -289,8 +301,7 @@ fn model_exchange() {
         // The order of the states, not that of the variables; an output that is a state depends on itself.
         let states = [named("der(inner)", &["u_dc", "speed", "inner"]), named("der(speed)", &[])];
         assert_eq!(unknowns(&md.derivatives), states, "S01");
-        let sector: &[&str] =
-            if two { &["enable", "inner"] } else { &["time", "enable", "bandwidth", "inner"] };
+        let sector: &[&str] = if two { &["enable", "inner"] } else { &["time", "enable", "bandwidth", "inner"] };
         let outputs = [named("speed", &["speed"]), named("sector", sector), named("ready", &[])];
         assert_eq!(unknowns(&md.outputs), outputs, "S01");
         let initial: Vec<_> = unknowns(&md.initial_unknowns).into_iter().map(|(name, _)| name).collect();

@@ -162,10 +162,13 @@ class Plan:
         Returns:
             a dictionary of arrays: `run`, the columns of the table, the measures, `end` (time reached, s) and, as the last,
             `error`. A run that fails has NaN for its measures and one line as its error, otherwise "". Same bits for any number
-            of threads. A variable or measure named `run`, `end` or `error` keeps its name, and that column gets `_` behind it.
+            of threads. Enumerations have their names, in the table and in measures of their values ("" where a run fails).
         """
         columns = {str(name): column for name, column in _columns(table).items()}
         runs = columns.pop("run", None)
+        for name in columns:
+            if name in ("end", "error"):
+                raise ValueError(f"{name} is a column of all results: name the FMU, fmus={{'x': file}}, and the column x.{name}")
         values = [_values(name, column, self._core, self._name(name)) for name, column in columns.items()]
         if not values:
             raise ValueError("the table has no column; expected one with the values of each varied variable")
@@ -177,19 +180,18 @@ class Plan:
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, not {threads}")
         measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0)
-        return dict(zip(self._columns(columns), [runs, *values, *measures, end, np.array(errors, dtype=object)]))
+        results = [*self._named(dict(zip(columns, values))).values(), *map(_named, self._core.measure_items, measures)]
+        return dict(zip(["run", *columns, *self.measures, "end", "error"], [runs, *results, end, np.array(errors, dtype=object)]))
 
-    def _columns(self, varied):
-        """Names of the columns of results; `run`, `end` and `error` give way to variables and measures of these names."""
-        named = [*varied, *self.measures]
-        run, end, error = (_free(name, named) for name in ("run", "end", "error"))
-        return [run, *named, end, error]
+    def _named(self, columns):
+        """Columns of varied variables, enumerations with their names."""
+        return {name: _named(self._core.items(self._name(name)), column) for name, column in columns.items()}
 
     def rows(self, first, count):
         """Rows of the design of a file: as many of the `count` rows from number `first` on as there are, with their `run`."""
         start, columns = self._core.rows(first, count)
         n = len(next(iter(columns.values()), []))
-        return {"run": start + np.arange(n), **columns}
+        return {"run": start + np.arange(n), **self._named(columns)}
 
     def __len__(self):
         """Number of rows of the design."""
@@ -203,13 +205,18 @@ class Plan:
     def meta(self, columns=None):
         """What `run_many` returns for no rows: the columns and their types. `columns` are the varied, by default the design's."""
         columns = self._core.varied if columns is None else columns
-        run, *numbers, error = self._columns(columns)
-        empty = {name: np.empty(0) for name in numbers}
-        return {run: np.empty(0, dtype=np.int64), **empty, error: np.empty(0, dtype=object)}
+        varied = self._named({name: np.empty(0) for name in columns})
+        measures = {name: _named(items, np.empty(0)) for name, items in zip(self.measures, self._core.measure_items)}
+        last = {"end": np.empty(0), "error": np.empty(0, dtype=object)}
+        return {"run": np.empty(0, dtype=np.int64), **varied, **measures, **last}
 
 
-def _free(name, taken):
-    return name if name not in taken else _free(name + "_", taken)
+def _named(items, column):
+    """Numbers with the names of an enumeration, if `items` has any: "" for NaN, the number as text where there is no name."""
+    if not items:
+        return column
+    names = dict(items)
+    return np.array([names.get(x, "" if x != x else f"{x:.17g}") for x in column.tolist()], dtype=object)
 
 
 def _files(fmus):

@@ -208,6 +208,7 @@ def _child(plan, pipe):
 def _dead(plan, row, number, code):
     """The result of a row that killed its process."""
     cause = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended the process with exit code {code}"
-    run, *numbers, error = plan.meta(list(row))
-    values = {name: np.asarray(row[name], dtype=float) if name in row else np.array([np.nan]) for name in numbers}
-    return {run: np.array([number]), **values, error: np.array([cause], dtype=object)}
+    blank = {"f": np.nan, "i": number, "O": ""}
+    missing = {name: np.array([blank[of.dtype.kind]], of.dtype) for name, of in plan.meta(list(row)).items()}
+    known = {name: np.asarray(column, missing[name].dtype) for name, column in row.items()}
+    return {**missing, **known, "error": np.array([cause], dtype=object)}

@@ -145,6 +145,17 @@ impl Plan {
         self.plan.outputs().to_vec()
     }
 
+    /// Numbers and names of an enumeration's values, of a variable that runs set; empty for other types.
+    fn items(&self, name: &str) -> PyResult<Vec<(i64, String)>> {
+        gate(|| Ok(self.plan.bind([name]).map_err(failed)?.swap_remove(0).column.items))
+    }
+
+    /// Those of each measure that is a value of an enumeration.
+    #[getter]
+    fn measure_items(&self) -> Vec<Vec<(i64, String)>> {
+        self.plan.measures().iter().map(|column| column.items.clone()).collect()
+    }
+
     /// The number that a text stands for as the value of a variable.
     fn number(&self, name: &str, text: &str) -> PyResult<f64> {
         gate(|| {

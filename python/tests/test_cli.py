@@ -36,9 +36,11 @@ def sweep(standard, tmp_path):
         'd.plant.motor.R_s' = {{ normal = [3.0, 0.1] }}
         'd.plant.initial.theta_e' = {{ uniform = [-3.1, 3.1] }}
         'd.plant.mechanics.J' = {{ values = [1e-3, 2e-3, -1.0] }}
+        'd.controller.estimator' = {{ values = ['Rasmussen', 'FluxObserver'] }}
         [measure]
         peak = {{ of = 'd.speed', is = 'max' }}
-        error = {{ of = 'd.theta_est - d.theta_e', wrap = '2pi', is = 'rms' }}
+        estimator = {{ of = 'd.controller.estimator', is = 'final' }}
+        angle = {{ of = 'd.theta_est - d.theta_e', wrap = '2pi', is = 'rms' }}
     """))
     return path
 
@@ -54,15 +56,18 @@ def test_sweep_is_run_many(sweep, tmp_path):
     assert {"run", "d.plant.motor.R_s", "peak", "end"} <= set(measured)
     assert measured["run"] == tuple(map(str, results["run"]))
     assert header == list(results)
-    assert header[-1] == "error_"
-    ok = np.array([not error for error in results["error_"]])
+    assert header[-1] == "error"
+    ok = np.array([not error for error in results["error"]])
     assert 0 < ok.sum() < 60
     for name in ("d.plant.motor.R_s", "d.plant.initial.theta_e", "d.plant.mechanics.J"):
         assert [float(x) for x in measured[name]] == results[name].tolist()
     of_command = np.array([float(x or "nan") for x in measured["peak"]])
     assert of_command[ok].tobytes() == results["peak"][ok].tobytes()
     assert np.isnan(of_command[~ok]).all()
-    assert [line[-1] for line in lines] == results["error_"].tolist()
+    assert [line[-1] for line in lines] == results["error"].tolist()
+    assert set(measured["d.controller.estimator"]) == {"Rasmussen", "FluxObserver"}
+    for name in ("d.controller.estimator", "estimator"):
+        assert list(measured[name]) == results[name].tolist()
 
 
 def test_simulate_is_simulate(standard, tmp_path):

@@ -32,7 +32,7 @@ def resistances():
 def same(one, other):
     assert list(one) == list(other)
     for name in one:
-        if name == "error":
+        if one[name].dtype == object:
             assert one[name].tolist() == other[name].tolist()
         else:
             assert one[name].tobytes() == other[name].tobytes(), name
@@ -107,6 +107,28 @@ def test_bad_rows_are_rows(standard, resistances):
     assert "motor.R_s = -1 is not allowed" in mixed["error"][1]
     assert np.isnan(mixed["peak"][bad]).all()
     assert mixed["peak"][~bad].tobytes() == good["peak"].tobytes()
+
+
+def test_enumerations_keep_their_names(standard):
+    measures = MEASURES | {"estimator": ("c.estimator", "final")}
+    plan = pair(standard, measures=measures)
+    estimators = ["Rasmussen", "FluxObserver", "99"]
+    runs = plan.run_many({"c.estimator": estimators})
+    assert runs["c.estimator"].tolist() == estimators
+    assert runs["estimator"].tolist() == [*estimators[:2], ""]
+    same(plan.run_many({"c.estimator": [1, 15, 99]}), runs)
+    same(plan.run_many({"c.estimator": runs["c.estimator"][:2]}), {name: column[:2] for name, column in runs.items()})
+    same(plan.meta(["c.estimator"]), {name: column[:0] for name, column in runs.items()})
+    assert pa.table(runs)["c.estimator"].to_pylist() == runs["c.estimator"].tolist()
+
+
+def test_no_column_is_renamed(standard):
+    plan = pair(standard)
+    with pytest.raises(ValueError, match="error is a column of all results: name the FMU"):
+        plan.run_many({"error": [1.0]})
+    for name in ("run", "end", "error"):
+        with pytest.raises(FmuError, match=rf"measure: {name} is a column of all results \(run, end, error\): rename it"):
+            pair(standard, measures={name: "p.speed"})
 
 
 def test_the_pickle_is_small_and_knows_its_files(standard, tmp_path):

@@ -9,7 +9,7 @@ use crate::target::{Target, Tools, ZIG};
 use crate::workspace::{Package, Workspace, output_folder};
 use crate::{reference, release};
 use anyhow::{Context, Result, anyhow, bail};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use fmu_check::message;
 use fmu_core::Description;
 use fmu_import::elf::{FLOOR, Needs};
@@ -48,6 +48,11 @@ use std::path::{Path, PathBuf};
 /// them, the programs fmu, cargo-fmu and fmu-check for this computer, which need no other library with cargo-zigbuild.
 ///   fmu build --release-dir release
 ///
+/// Archives of FMI 2.0 hold one universal library for both processors of macOS. Many importers look for Linux libraries of FMI 2.0
+/// in linux64 only, whatever the processor. `--linux64 aarch64` puts the library for ARM there; that for x86_64 moves to
+/// x86_64-linux, so such importers no longer run the archive on x86_64:
+///   fmu build --target x86_64-unknown-linux-gnu,aarch64-unknown-linux-gnu --linux64 aarch64 --out for-arm
+///
 /// With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
@@ -73,9 +78,34 @@ pub struct Build {
     /// Target to build for instead of this computer; separate several with commas or repeat the option
     #[arg(long, value_name = "TRIPLE", value_delimiter = ',', conflicts_with = "library")]
     pub target: Vec<String>,
+    /// Processor of the library in the folder linux64 of FMI 2.0: x86_64 or aarch64 [default: x86_64]
+    #[arg(long, value_name = "PROCESSOR")]
+    pub linux64: Option<Linux64>,
     /// Write everything of a release to this folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["package", "library", "out"])]
     pub release_dir: Option<PathBuf>,
+}
+
+/// The processor that the folder `linux64` of FMI 2.0 is for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Linux64 {
+    /// x86_64.
+    #[default]
+    #[value(name = "x86_64")]
+    X64,
+    /// 64-bit ARM.
+    #[value(name = "aarch64")]
+    Arm,
+}
+
+impl Linux64 {
+    /// The platform of its libraries.
+    pub const fn platform(self) -> Platform {
+        match self {
+            Self::X64 => Platform::X64Linux,
+            Self::Arm => Platform::ArmLinux,
+        }
+    }
 }
 
 /// Targets of a release.
@@ -127,6 +157,10 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     for note in notes(&models) {
         message::note(&note);
     }
+    let linux64 = args.linux64.unwrap_or_default().platform();
+    if linux64 == Platform::ArmLinux && versions.contains(&FmiVersion::V2) {
+        has_arm(&models)?;
+    }
     let mut written = Vec::new();
     for model in &models {
         let reference = reference(model, versions[0], moment)?;
@@ -135,7 +169,8 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
             model_description::fits(&model.description, version).map_err(|e| anyhow!("{name}: {e}"))?;
             let folder = if version == FmiVersion::V2 { "fmi2" } else { "fmi3" };
             let path = out.join(folder).join(format!("{name}.fmu"));
-            let mut files = pack::contents(&model.description, &model.binaries, &model.licenses, version, moment);
+            let mut files =
+                pack::contents(&model.description, &model.binaries, &model.licenses, version, moment, linux64)?;
             files.extend(icons::files(&model.description, version)?);
             files.extend(model.resources.clone());
             files.extend(reference.clone());
@@ -151,7 +186,7 @@ fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTree
     let Model { description, stimuli, .. } = model;
     let dir = tempfile::tempdir()?;
     let archive = dir.path().join("reference.fmu");
-    let mut files = pack::contents(description, &model.own, &model.licenses, version, moment);
+    let mut files = pack::contents(description, &model.own, &model.licenses, version, moment, Platform::host())?;
     files.extend(model.resources.clone());
     pack::write(&archive, &pack::archive(&files, moment)?)?;
     let parameters = tune::example_for(description)?;
@@ -167,9 +202,9 @@ fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTree
 fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
     let (workspace, tools, moment) = (Workspace::find()?, Tools::find()?, Moment::of_environment()?);
     let target = if args.target.is_empty() { available(&tools) } else { args.target.clone() };
-    let (fmus, fmi) = (args.fmus.clone(), args.fmi.clone());
+    let (fmus, fmi, linux64) = (args.fmus.clone(), args.fmi.clone(), args.linux64);
     let mut packages: Vec<String> = choose(&workspace.fmus(), &fmus)?.iter().map(|p| p.name.clone()).collect();
-    let mut written = run(&Build { fmus, fmi, target, out: Some(folder.into()), ..Build::default() })?;
+    let mut written = run(&Build { fmus, fmi, target, linux64, out: Some(folder.into()), ..Build::default() })?;
     for (package, name) in PROGRAMS {
         if !workspace.package(package).is_some_and(|p| workspace.is_member(p)) {
             continue;
@@ -260,6 +295,22 @@ fn targets(tools: &Tools, triples: &[String]) -> Result<Vec<Target>> {
         }
     }
     Ok(targets)
+}
+
+/// `--linux64 aarch64` needs a library for it, and its price is a note.
+fn has_arm(models: &[Model]) -> Result<()> {
+    let has = |model: &Model, platform| model.binaries.iter().any(|(p, _)| *p == platform);
+    if let Some(model) = models.iter().find(|model| !has(model, Platform::ArmLinux)) {
+        let name = &model.description.name;
+        bail!("--linux64 aarch64: {name} has no library for aarch64-linux; add --target aarch64-unknown-linux-gnu");
+    }
+    if models.iter().any(|model| has(model, Platform::X64Linux)) {
+        message::note(
+            "linux64 of FMI 2.0 holds the libraries for aarch64: an importer on x86_64 that does not look into x86_64-linux \
+             too cannot load these archives",
+        );
+    }
+    Ok(())
 }
 
 /// What the Linux binaries need of the importing system beyond glibc 2.17: one line for all binaries with the same needs.

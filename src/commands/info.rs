@@ -2,7 +2,8 @@
 
 use anyhow::Result;
 use clap::Args;
-use fmu_import::printable;
+use fmu_import::platform::Platform;
+use fmu_import::{machine, printable};
 use model_description::{
     BaseType, Causality, Dimension, Interface, ModelDescription, ModelVariable, Variability, read_terminals,
 };
@@ -80,9 +81,15 @@ fn head(md: &ModelDescription, files: &BTreeMap<String, Vec<u8>>, size: u64) -> 
     let interfaces = [interface("Co-Simulation", &md.co_simulation), interface("Model Exchange", &md.model_exchange)];
     let interfaces: Vec<String> = interfaces.into_iter().flatten().collect();
     line("standard", format!("FMI {}; {}", md.version, interfaces.join(" and ")));
-    let folders = files.keys().filter_map(|name| name.strip_prefix("binaries/")?.split_once('/'));
-    let platforms: BTreeSet<&str> = folders.map(|(folder, _)| folder).collect();
-    let sources = files.keys().any(|name| name.starts_with("sources/")).then_some("sources");
+    // The names of FMI 2.0 do not tell the processor.
+    let folder = |(name, bytes): (&String, &Vec<u8>)| {
+        let (folder, _) = name.strip_prefix("binaries/")?.split_once('/')?;
+        let platforms: Vec<&str> = machine::platforms(bytes).into_iter().map(Platform::tuple).collect();
+        let told = platforms.is_empty() || platforms == [folder];
+        Some(if told { folder.to_owned() } else { format!("{folder} ({})", platforms.join(" and ")) })
+    };
+    let platforms: BTreeSet<String> = files.iter().filter_map(folder).collect();
+    let sources = files.keys().any(|name| name.starts_with("sources/")).then(|| "sources".to_owned());
     line("platforms", platforms.into_iter().chain(sources).collect::<Vec<_>>().join(", "));
     let by = [("version", &md.model_version), ("by", &md.author), ("license", &md.license)];
     for (name, value) in by {

@@ -1,10 +1,11 @@
 //! `fmu merge`: one archive out of several of the same FMU, each with binaries for other platforms.
 
+use super::build::Linux64;
 use crate::pack::{self, Entry, Moment};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
-use fmu_import::contents;
 use fmu_import::platform::Platform;
+use fmu_import::{contents, machine};
 use model_description::{FmiVersion, ModelDescription};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,7 +16,8 @@ const BINARIES: &str = "binaries/";
 /// Merges builds of one FMU for different platforms into a single FMU.
 ///
 /// The FMUs must have the same FMI version, token (GUID) and files, except for binaries/ and the generation date; the latest date
-/// is kept. Otherwise the command writes nothing. The same FMUs give the same bytes in any order.
+/// is kept. Otherwise the command writes nothing. The same FMUs give the same bytes in any order. In FMI 2.0, the libraries for both
+/// processors of macOS become one universal library.
 ///
 ///   fmu merge linux/PmsmPlant.fmu windows/PmsmPlant.fmu --out PmsmPlant.fmu
 #[derive(Debug, Args)]
@@ -27,6 +29,9 @@ pub struct Merge {
     /// File to write
     #[arg(long, value_name = "FILE.fmu")]
     pub out: PathBuf,
+    /// Processor of the library in the folder linux64 of FMI 2.0, as for `fmu build`: x86_64 or aarch64 [default: x86_64]
+    #[arg(long, value_name = "PROCESSOR")]
+    pub linux64: Option<Linux64>,
 }
 
 /// An FMU to merge.
@@ -52,14 +57,14 @@ pub fn run(args: &Merge) -> Result<()> {
         let executable = name.starts_with(BINARIES);
         (name, Entry { bytes, executable })
     };
-    let files = merge(parts)?.into_iter().map(entry).collect();
+    let files = merge(parts, args.linux64.unwrap_or_default().platform())?.into_iter().map(entry).collect();
     pack::write(&args.out, &pack::archive(&files, moment)?)?;
     println!("{}", args.out.display());
     Ok(())
 }
 
 /// The files of all parts.
-fn merge(mut parts: Vec<Part>) -> Result<BTreeMap<String, Vec<u8>>> {
+fn merge(mut parts: Vec<Part>, linux64: Platform) -> Result<BTreeMap<String, Vec<u8>>> {
     for later in 1..parts.len() {
         for earlier in 0..later {
             let (a, b) = (&parts[earlier], &parts[later]);
@@ -70,7 +75,18 @@ fn merge(mut parts: Vec<Part>) -> Result<BTreeMap<String, Vec<u8>>> {
     }
     // The base is the latest FMU: the result keeps its date.
     parts.sort_by(|a, b| (date(a), &a.files).cmp(&(date(b), &b.files)));
-    Ok(parts.into_iter().flat_map(|part| part.files).collect())
+    let mut files: BTreeMap<String, Vec<u8>> = parts.iter().flat_map(|part| part.files.clone()).collect();
+    let mut by_stem: BTreeMap<&str, BTreeMap<Platform, &[u8]>> = BTreeMap::new();
+    for part in &parts {
+        for library in libraries(part)? {
+            files.remove(library.path);
+            by_stem.entry(library.stem).or_default().insert(library.platform, library.bytes);
+        }
+    }
+    for (stem, all) in by_stem {
+        files.extend(pack::libraries_of(stem, &all, parts[0].description.version, linux64)?);
+    }
+    Ok(files)
 }
 
 fn date(part: &Part) -> &str {
@@ -129,21 +145,57 @@ fn dateless(bytes: &[u8], date: &str) -> Vec<u8> {
     }
 }
 
-/// Requires that the binaries of a platform that both FMUs have are equal.
-fn other_platforms(a: &Part, b: &Part) -> Result<()> {
-    let version = a.description.version;
-    let folder = |name: &str| Some(name.strip_prefix(BINARIES)?.split_once('/')?.0.to_owned());
-    for (name, bytes) in &b.files {
-        let Some(of_b) = folder(name) else { continue };
-        if a.files.get(name).is_some_and(|other| other != bytes) {
-            bail!("{}: {name}: differs from that of {}; give {of_b} in one of them only", b.name, a.name);
+/// A library that is named after the FMU, of one platform.
+struct Library<'a> {
+    /// Its path in the archive.
+    path: &'a str,
+    /// Its name without extension.
+    stem: &'a str,
+    platform: Platform,
+    bytes: &'a [u8],
+}
+
+/// The libraries of a part; a universal one is one for each processor. What a library does not tell, its folder does.
+fn libraries(part: &Part) -> Result<Vec<Library<'_>>> {
+    let md = &part.description;
+    let interfaces = [&md.co_simulation, &md.model_exchange, &md.scheduled_execution].into_iter().flatten();
+    let stems: Vec<&str> = interfaces.map(|interface| interface.model_identifier.as_str()).collect();
+    let mut found = Vec::new();
+    for (path, bytes) in &part.files {
+        let Some((folder, file)) = path.strip_prefix(BINARIES).and_then(|rest| rest.split_once('/')) else { continue };
+        let Some(of_folder) = Platform::of_folder(folder, md.version) else { continue };
+        let stem = file.strip_suffix(of_folder.extension()).and_then(|stem| stem.strip_suffix('.'));
+        let Some(stem) = stem.filter(|stem| stems.contains(stem)) else { continue };
+        let images = machine::images(bytes).map_err(|why| anyhow!("{}: {path}: {why}", part.name))?;
+        for bytes in images {
+            let of = machine::platforms(bytes).first().copied().filter(|p| p.folders(md.version).contains(&folder));
+            found.push(Library { path, stem, platform: of.unwrap_or(of_folder), bytes });
         }
-        // FMI 2.0 has two names for some platforms.
-        let Some(platform) = Platform::of_folder(&of_b, version) else { continue };
-        let is_other = |f: &String| *f != of_b && Platform::of_folder(f, version) == Some(platform);
-        if let Some(of_a) = a.files.keys().filter_map(|name| folder(name)).find(is_other) {
-            let what = format!("is for {platform}, as binaries/{of_a} of {} is", a.name);
-            return Err(anyhow!("{}: {name}: {what}; give it in one of them only", b.name));
+    }
+    Ok(found)
+}
+
+/// Requires that both FMUs have the same of what both have below `binaries/`.
+fn other_platforms(a: &Part, b: &Part) -> Result<()> {
+    let (of_a, of_b) = (libraries(a)?, libraries(b)?);
+    for theirs in &of_b {
+        let fits = |l: &&Library<'_>| (l.stem, l.platform) == (theirs.stem, theirs.platform);
+        let Some(ours) = of_a.iter().find(fits) else { continue };
+        let folder = |path: &str| path.rsplit_once('/').map_or(String::new(), |(folder, _)| folder.to_owned());
+        let (here, there) = (folder(theirs.path), folder(ours.path));
+        if here != there {
+            let what = format!("is for {}, as {there} of {} is", theirs.platform, a.name);
+            bail!("{}: {}: {what}; give it in one of them only", b.name, theirs.path);
+        }
+        if ours.bytes != theirs.bytes {
+            let name = here.trim_start_matches(BINARIES);
+            bail!("{}: {}: differs from that of {}; give {name} in one of them only", b.name, theirs.path, a.name);
+        }
+    }
+    let is_library = |path: &str| of_b.iter().any(|l| l.path == path);
+    for (name, bytes) in b.files.iter().filter(|(name, _)| name.starts_with(BINARIES) && !is_library(name)) {
+        if a.files.get(name).is_some_and(|other| other != bytes) {
+            bail!("{}: {name}: differs from that of {}; give it in one of them only", b.name, a.name);
         }
     }
     Ok(())

@@ -6,6 +6,7 @@ pub mod compare;
 pub mod info;
 pub mod merge;
 pub mod new;
+pub mod preset;
 pub mod prove;
 pub mod reproduce;
 pub mod simulate;

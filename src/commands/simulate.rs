@@ -1,22 +1,21 @@
 //! `fmu simulate`: co-simulates FMUs, or integrates those for Model Exchange.
 
+mod output;
 mod worker;
 
 use crate::Failed;
-use crate::{pack, picture};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use drive_study::figure::Figure;
-use drive_study::{overview, page, plot};
+use drive_study::overview;
 use fmu_check::message;
-use fmu_import::cosimulation::{Integration, Method, Point, Recording, Schedule, Settings, Solver, System};
+use fmu_import::cosimulation::{Integration, Method, Point, Schedule, Settings, Solver, System};
 use fmu_import::guard::Allowance;
 use fmu_import::ssp::load::Loaded;
 use fmu_import::ssp::{ssv, values};
 use fmu_import::{Fmu, Kind, Message, journal, printable, printable_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use model_description::ModelVariable;
-use std::io::{self, BufWriter, IsTerminal, Write};
+use std::io::{self, IsTerminal, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -37,8 +36,9 @@ use std::time::{Duration, Instant};
 ///
 /// Ctrl-C ends the run at the next communication point and writes what was computed; a second Ctrl-C ends the command at once.
 ///
-/// After the run, warnings on standard error list inputs that kept their start values because nothing feeds or sets them, and a
-/// step that is longer than the DefaultExperiment of an FMU.
+/// After the run, warnings on standard error list inputs that kept their start values because nothing feeds or sets them, unless
+/// their descriptions call them optional, and a step that is longer than the DefaultExperiment of an FMU. The command ends with
+/// the last values: those of the curves if it draws a first plot, otherwise of all that is recorded. Then it names its files.
 ///
 /// The FMUs run in a process of their own, with limits on memory, open files and new processes. When they crash it, hang it or end it,
 /// the command names the FMU and the call, removes their temporary files and has exit status 2. What they print goes to standard
@@ -208,7 +208,7 @@ pub fn run(args: &Simulate) -> Result<()> {
     worker::guarded(args)
 }
 
-fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
+fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     // An FMU may change it; the files of the command are named from here.
     let home = std::env::current_dir()?;
     let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, |fmus| method(args, fmus))?;
@@ -245,11 +245,24 @@ fn simulate(args: &Simulate, out: impl Write) -> Result<()> {
     let recording = outcome?;
     journal::writes();
     std::env::set_current_dir(&home)?;
-    let written = write(recording, for_plot, args, out);
+    let bad = recording.columns.iter().find(|c| c.values.last().is_some_and(|x| !x.is_finite()));
+    let bad = bad.map(|column| format!("{} is not finite at the end", column.name));
+    let alone = if let [instance] = system.instances() { Some(instance.name()) } else { None };
+    let written = output::write(recording, for_plot, alone, args, &mut out);
     for text in warnings(&system, &settings) {
         message::warning(&printable(&text));
     }
-    written?;
+    // Last what the user is after.
+    let written = written?;
+    let text = printable_lines(&written);
+    if args.csv.as_deref() == Some(Path::new("-")) {
+        eprintln!("{text}");
+    } else {
+        writeln!(out, "{text}").context("standard output")?;
+    }
+    if let Some(bad) = bad {
+        return Err(Failed(bad).into());
+    }
     match interrupted {
         Some(time) => Err(Failed(format!("interrupted at {time} s, where the results end")).into()),
         None => Ok(()),
@@ -352,69 +365,6 @@ fn column(port: &str, file: &str) -> Result<Schedule, String> {
     match names.iter().position(|name| *name == port).or_else(|| (names.len() == 1).then_some(0)) {
         Some(index) => Ok(columns.swap_remove(index).1),
         None => Err(format!("has the columns {}; name one of them {port}", names.join(", "))),
-    }
-}
-
-fn write(mut recording: Recording, for_plot: usize, args: &Simulate, mut out: impl Write) -> Result<()> {
-    let plotted = (args.plot.is_some() || args.html.is_some()).then(|| {
-        if args.record.is_empty() && !args.all {
-            Figure::of(&overview::overview(&recording))
-        } else {
-            Figure::of(&recording)
-        }
-    });
-    recording.columns.truncate(recording.columns.len() - for_plot);
-    let mut to_stdout = false;
-    match args.csv.as_deref() {
-        Some(path) if path == Path::new("-") => {
-            to_stdout = true;
-            match recording.write_csv(&mut BufWriter::new(&mut out)) {
-                // A reader such as `head` closes the pipe early.
-                Err(e) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
-                other => other.context("standard output")?,
-            }
-        }
-        Some(path) => {
-            let mut bytes = Vec::new();
-            recording.write_csv(&mut bytes)?;
-            pack::write(path, &bytes)?;
-        }
-        None => {}
-    }
-    if let (Some(path), Some(plotted)) = (&args.plot, &plotted) {
-        let svg = plot::svg(plotted)?;
-        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
-            let png = picture::with_text(&svg).with_context(|| path.display().to_string())?;
-            pack::write(path, &png)?;
-        } else {
-            pack::write(path, svg.as_bytes())?;
-        }
-    }
-    if let (Some(path), Some(plotted)) = (&args.html, &plotted) {
-        let names: Vec<&str> = args.fmus.iter().map(|file| file.rsplit(['/', '\\']).next().unwrap_or(file)).collect();
-        let figure =
-            page::figure(plotted, "The plot needs JavaScript; fmu simulate --plot FILE.svg draws it without.")?;
-        let ended = recording
-            .ended_by
-            .as_ref()
-            .map(|name| format!("<p>{} asked to end the simulation.</p>\n", page::escape(name)));
-        let body = format!("{}{figure}", ended.unwrap_or_default());
-        pack::write(path, page::page(&names.join(", "), &body).as_bytes())?;
-    }
-    let mut table = recording.last_values();
-    if let Some(name) = &recording.ended_by {
-        table = format!("{table}\n{name} asked to end the simulation");
-    }
-    let table = printable_lines(&table);
-    if to_stdout {
-        eprintln!("{table}");
-    } else {
-        writeln!(out, "{table}").context("standard output")?;
-    }
-    let bad = recording.columns.iter().find(|c| c.values.last().is_some_and(|x| !x.is_finite()));
-    match bad {
-        Some(column) => Err(Failed(format!("{} is not finite at the end", column.name)).into()),
-        None => Ok(()),
     }
 }
 

@@ -19,10 +19,11 @@ use std::path::{Path, PathBuf};
 /// With FMUs that are packed already:
 ///   fmu ssp --fmus target/fmu --fmi 3 --out drive.ssp
 ///
-/// SSP 1.0 is older than FMI 3.0, and many SSP importers accept only FMUs of FMI 2.0. OMSimulator's command line runs the file
-/// unchanged; add --integers if a motor is given. With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
+/// SSP 1.0 is older than FMI 3.0, and many SSP importers accept only FMUs of FMI 2.0. OMSimulator, its command line and its Python
+/// package, runs the file as it is. With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Ssp {
     /// FMI version of the FMUs: 2 or 3
     #[arg(long, value_name = "VERSION", default_value = "2", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
@@ -37,8 +38,12 @@ pub struct Ssp {
     /// Values for controller or plant as SSV of SSP 1.0 (repeatable)
     #[arg(long, value_name = "COMPONENT=FILE.ssv")]
     pub parameters: Vec<String>,
-    /// Write the motor's enumerations as integers, for importers that cannot read names (OMSimulator)
-    #[arg(long, requires = "motor")]
+    /// Write values of enumerations by name, as SSP 1.0 describes them, instead of by number; some importers read no names
+    /// (OMSimulator)
+    #[arg(long)]
+    pub names: bool,
+    /// The default; older scripts pass it
+    #[arg(long, hide = true, conflicts_with = "names")]
     pub integers: bool,
     /// Connect `enabled` of the controller to `enable` of the plant, for a drive that can be switched off; some importers do
     /// not support Boolean connections
@@ -70,7 +75,7 @@ pub fn run(args: &Ssp) -> Result<()> {
             .context("the FMUs of the drive cannot be built here; --fmus DIR takes those of a folder")?;
         dir.path().join(standard)
     };
-    let options = Options { gates: args.gates, geometry: args.geometry };
+    let options = Options { gates: args.gates, geometry: args.geometry, names: args.names };
     let files = ssp::files(&folder, &values, options, moment)?;
     pack::write(&args.out, &pack::archive(&files, moment)?)?;
     println!("{}", args.out.display());
@@ -99,7 +104,7 @@ fn values(args: &Ssp) -> Result<Vec<Values>> {
             file: motor.display().to_string(),
             text: ssv::text(&format!("{} {component}", tuned.name), settings),
         };
-        let (plant, controller) = tune::needed(&tuned, args.integers)?;
+        let (plant, controller) = tune::needed(&tuned, false)?;
         return Ok(vec![of("controller", &controller), of("plant", &plant)]);
     }
     let mut values: Vec<Values> = Vec::new();

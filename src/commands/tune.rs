@@ -1,5 +1,6 @@
 //! The command `fmu tune`: parameter values of the FMUs for a motor.
 
+use super::preset;
 use crate::workspace::output_folder;
 use crate::{pack, ssv};
 use anyhow::{Result, anyhow};
@@ -22,6 +23,10 @@ use std::path::{Path, PathBuf};
 /// With --check it also tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu. Exit status
 /// 1 if the drive loses what no note announces.
 ///
+/// With --fmu it writes an FMU with these start values instead, which needs no parameter file: see `fmu preset`.
+///
+///   fmu tune motors/ipmsm-2.2kw.toml --fmu target/fmu/fmi3/PmsmDrive.fmu --out MyMotor.fmu
+///
 ///   fmu tune motors/ipmsm-2.2kw.toml --out target/tune
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
 ///     --parameters PmsmPlant=target/tune/ipmsm-2.2kw.PmsmPlant.ssv \
@@ -36,9 +41,12 @@ pub struct Tune {
     /// Print the motor file of a 2.2 kW machine and exit
     #[arg(long, exclusive = true)]
     pub example: bool,
-    /// Output folder [default: tune in Cargo's target folder]
-    #[arg(long, value_name = "DIR")]
+    /// Output folder [default: tune in Cargo's target folder]; with --fmu the file to write
+    #[arg(long, value_name = "DIR|NEW.fmu")]
     pub out: Option<PathBuf>,
+    /// Write this FMU, PmsmDrive, PmsmPlant or SensorlessController, with the values as its start values
+    #[arg(long, value_name = "FILE.fmu", requires = "out", conflicts_with = "integers")]
+    pub fmu: Option<PathBuf>,
     /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
@@ -64,7 +72,13 @@ pub fn run(args: &Tune) -> Result<bool> {
     };
     let tuned = tune::tune(motor)?;
     let out = args.out.clone().map_or_else(|| output_folder("tune"), Ok)?;
-    let files = write(&tuned, &out, args.integers)?;
+    let files = match &args.fmu {
+        Some(fmu) => {
+            preset::of_machine(fmu, &tuned, &out)?;
+            vec![out]
+        }
+        None => write(&tuned, &out, args.integers)?,
+    };
     println!("{}\n{}", tuned.name, tuned.source);
     for (model, settings) in [("PmsmPlant", &tuned.plant), ("SensorlessController", &tuned.controller)] {
         println!("\n{model}");
@@ -109,6 +123,14 @@ fn tried(tuned: &Tuned) -> bool {
 /// # Errors
 /// A model cannot be described.
 pub fn example_for(description: &Description) -> Result<Option<(String, String)>> {
+    let Some(place) = place(description)? else { return Ok(None) };
+    let tuned = rules::tune(&MotorFile::parse(EXAMPLE, Path::new("ipmsm-2.2kw.toml"))?)?;
+    let (_, text) = texts(&tuned, false)?.swap_remove(place);
+    Ok(Some((tuned.name, text)))
+}
+
+/// Which of the three models an FMU is, in the order of [`texts`].
+pub(super) fn place(description: &Description) -> Result<Option<usize>> {
     let of = |found: Result<Description, _>| found.map_err(|e: fmu_core::Fault| anyhow!("{e}"));
     let known = [
         of(Description::of::<PmsmDrive>())?,
@@ -117,10 +139,7 @@ pub fn example_for(description: &Description) -> Result<Option<(String, String)>
     ];
     let names = |d: &Description| d.variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
     let is_it = |d: &Description| d.name == description.name && names(description).starts_with(&names(d));
-    let Some(place) = known.iter().position(is_it) else { return Ok(None) };
-    let tuned = rules::tune(&MotorFile::parse(EXAMPLE, Path::new("ipmsm-2.2kw.toml"))?)?;
-    let (_, text) = texts(&tuned, false)?.swap_remove(place);
-    Ok(Some((tuned.name, text)))
+    Ok(known.iter().position(is_it))
 }
 
 /// Writes `NAME.PmsmDrive.ssv`, `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder; returns their paths.

@@ -51,6 +51,22 @@ def test_nothing_is_wider_than_the_page(browser, path, width, scheme):
     page.close()
 
 
+def test_wide_tables_show_that_they_scroll(browser):
+    """A shade at the edge, and the arrow keys scroll."""
+    page = opened(browser, FOLDER / "compare" / "compare.html", 360)
+    wide = [box for box in page.locator(".scroll").all() if box.evaluate("box => box.scrollWidth > box.clientWidth")]
+    assert len(wide) > 1
+    for box in wide:
+        attachments = box.evaluate("box => getComputedStyle(box).backgroundAttachment")
+        assert attachments == "local, local, scroll, scroll"
+        assert box.get_attribute("role") == "region"
+        assert box.get_attribute("aria-label")
+        box.focus()
+        page.keyboard.press("ArrowRight")
+        page.wait_for_function("box => box.scrollLeft > 0", arg=box.element_handle())
+    page.close()
+
+
 @pytest.fixture
 def run(browser):
     page = opened(browser, FOLDER / "run.html", 900)

@@ -77,4 +77,4 @@ const STARTS: &str = "stop = 0.4\nstep = 1e-3\ninput.'d.speed_ref' = '0:0,0.05:1
     'd.controller.motor.R_s' = { same = 'd.plant.motor.R_s', times = 0.9 }\n\
     'd.tau_load' = { values = [0, 0.5, 1] }\n\
     [measure]\npeak = { of = 'd.speed', is = 'max' }\nlast = { of = 'd.speed', is = 'final' }\n\
-    error = { of = 'd.theta_est - d.theta_e', wrap = '2pi', is = 'rms', after = 0.005 }\n";
+    angle = { of = 'd.theta_est - d.theta_e', wrap = '2pi', is = 'rms', after = 0.005 }\n";

@@ -32,7 +32,6 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
             let expected = whole.iter().find(|(other, _)| *other == name);
             assert!(expected.is_some_and(|(_, expected)| *expected == bytes), "half a part: {name}");
         }
-        assert_eq!(names(&temporary), [""; 0], "a kill leaves nothing");
     };
     let mut child = start();
     let begun = Instant::now();
@@ -62,6 +61,8 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
     }
     println!("{there} parts at the first kill, {kills} more kills");
     assert_eq!(folder.results("killed"), whole);
+    // A process that is killed while it unpacks an archive leaves it to the next one.
+    assert_eq!(names(&temporary), [""; 0], "kills leave nothing");
     assert!(
         !names(&folder.path("killed")).iter().any(|name| name.starts_with('.')),
         "{:?}",
@@ -116,7 +117,7 @@ fn jobs_processes_and_a_program_give_the_same_bits() {
     let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
     assert_eq!(plan.run_many(&variables, &slices, 1, &go_on).unwrap(), outcomes);
     let named: Vec<String> = sweep.columns().into_iter().map(|column| column.name).collect();
-    assert_eq!(named[4..], ["peak", "last", "error", "end", "error_"], "the measure has the name of a column");
+    assert_eq!(named[4..], ["peak", "last", "angle", "end", "error"]);
     let rows = folder.rows("two");
     for k in 0..300 {
         let cells: Vec<f64> = rows[100 + k].split(',').take(8).map(|cell| cell.parse().unwrap()).collect();

@@ -37,11 +37,46 @@ fn systems_of_several_fmus_and_ssp_files_are_swept() {
     );
     fs::write(folder.path("ssp.toml"), system).unwrap();
     ends(&mut folder.sweep(&folder.path("ssp.toml"), "ssp"), 0);
+    let estimators = |out: &str| -> Vec<String> {
+        let of = |row: &String| row.split(',').nth(2).unwrap().to_owned();
+        folder.rows(out).iter().map(of).collect()
+    };
+    assert!(estimators("pair").iter().all(|name| ["Rasmussen", "DirectEmf"].contains(&name.as_str())));
+    assert_eq!(estimators("pair"), estimators("ssp"));
     let last = |line: &String, column: usize| line.split(',').nth(column).unwrap().to_owned();
     let of_pair: Vec<String> = folder.rows("pair").iter().map(|line| last(line, 5)).collect();
     let of_ssp: Vec<String> = folder.rows("ssp").iter().map(|line| last(line, 4)).collect();
     assert_eq!(of_pair, of_ssp);
     assert!(of_pair.windows(2).any(|w| w[0] != w[1]), "the rows differ: {of_pair:?}");
+}
+
+/// Enumerations have their names in the results, in measures of their values and in traces; a list of names runs again.
+#[test]
+fn enumerations_keep_their_names() {
+    let folder = Folder::new();
+    let tail = "[measure]\nfirst = { of = 'd.controller.estimator', is = 'at', time = 0 }\n\
+        mean = { of = 'd.controller.estimator', is = 'mean' }\nspeed = { of = 'd.speed', is = 'final' }\n\
+        [trace]\nof = ['d.controller.estimator', 'd.speed']\nruns = [1]\n";
+    let head = "stop = 0.01\nstep = 1e-3\ninput.'d.speed_ref' = '50'\n";
+    let file = folder.define(
+        "grid.toml",
+        &format!("{head}design.kind = 'grid'\nvary.'d.controller.estimator' = {{ values = ['Rasmussen', 13, 'DirectEmf'] }}\n{tail}"),
+    );
+    ends(&mut folder.sweep(&file, "grid"), 0);
+    let rows = folder.rows("grid");
+    for (row, beginning) in
+        rows.iter().zip(["0,Rasmussen,Rasmussen,1,", "1,Sensored,Sensored,13,", "2,DirectEmf,DirectEmf,2,"])
+    {
+        assert!(row.starts_with(beginning), "{row}");
+    }
+    let trace = fs::read_to_string(folder.path("grid/traces/run-00000001.csv")).unwrap();
+    assert!(trace.lines().nth(1).unwrap().starts_with("0,Sensored,0"), "{trace}");
+    let whole = fs::read_to_string(folder.path("grid/results.csv")).unwrap();
+    let list: String = whole.lines().map(|line| line.split(',').nth(1).unwrap().to_owned() + "\n").collect();
+    fs::write(folder.path("list.csv"), list).unwrap();
+    let file = folder.define("list.toml", &format!("{head}design = {{ kind = 'list', file = 'list.csv' }}\n{tail}"));
+    ends(&mut folder.sweep(&file, "list"), 0);
+    assert_eq!(folder.rows("list"), rows);
 }
 
 #[test]
@@ -130,8 +165,8 @@ fn the_files_of_the_documentation_run() {
     let fewer = file.replace("runs = 100000", "runs = 256").replace("../target/fmu/fmi3/", "");
     fs::write(folder.path("example.toml"), fewer).unwrap();
     assert_eq!(ends(&mut folder.sweep(&folder.path("example.toml"), "example"), 0), "");
-    let error = |row: &String| row.split(',').nth(6).unwrap().parse::<f64>().unwrap();
-    let lost = folder.rows("example").iter().filter(|row| error(row).abs() > std::f64::consts::FRAC_PI_2).count();
+    let angle = |row: &String| row.split(',').nth(6).unwrap().parse::<f64>().unwrap();
+    let lost = folder.rows("example").iter().filter(|row| angle(row).abs() > std::f64::consts::FRAC_PI_2).count();
     println!("{lost} of 256 starts lost");
     assert!((1..20).contains(&lost), "{lost} of 256 starts lost");
 }

@@ -1,5 +1,5 @@
 //! The map of a drive: a panel per scenario, start angle, speed and load; R^/R to the right, psi^/psi upwards; red where
-//! the drive is lost, a dot where `lock_lost` does not tell the truth.
+//! the drive is lost, a dot where `lock_lost` does not tell the truth. A legend says so.
 
 use super::Atlas;
 use super::cell::{Cell, Scenario};
@@ -20,7 +20,29 @@ const HEADING: f64 = 34.0;
 const STYLE: &str = ".atlas text{fill:#1d2429;font:11px system-ui,sans-serif}.atlas .head{font-weight:600;font-size:13px}\
     .atlas .paper{fill:#fff}.atlas .h{fill:#cfe3d6}.atlas .l{fill:#d03030}.atlas .d{fill:#fff}.atlas .h+.d{fill:#d03030}\
     @media (prefers-color-scheme:dark){.atlas text{fill:#e3e7ea}.atlas .paper{fill:#15191c}.atlas .h{fill:#2c4a3a}\
-    .atlas .l{fill:#e05050}.atlas .d{fill:#000}.atlas .h+.d{fill:#e05050}}";
+    .atlas .l{fill:#d84848}.atlas .h+.d{fill:#f07070}}";
+
+/// Class of a cell, whether it has a dot, and what that means.
+const LEGEND: [(&str, bool, &str); 4] = [
+    ("h", false, "held"),
+    ("l", false, "lost, and lock_lost tells it: it is 1 or more within 1 s"),
+    ("l", true, "white dot: lost, and lock_lost does not tell it within 1 s"),
+    ("h", true, "red dot: held, and lock_lost is 1 or more all the same, a false alarm"),
+];
+/// Height of a line of the legend, and width of its longest.
+const LINE: f64 = 18.0;
+const LEGEND_WIDTH: f64 = 450.0;
+
+/// A cell with its upper left corner at `(x, y)`.
+fn square((x, y): (f64, f64), class: &str, dot: bool) -> String {
+    let side = SIDE - 1.0;
+    let mut text = format!("<rect class=\"{class}\" x=\"{x}\" y=\"{y}\" width=\"{side}\" height=\"{side}\"/>");
+    if dot {
+        let (x, y) = (x + 0.5 * side, y + 0.5 * side);
+        let _ = write!(text, "\n<circle class=\"d\" cx=\"{x}\" cy=\"{y}\" r=\"3\"/>");
+    }
+    text + "\n"
+}
 
 /// Different values in the order of their size.
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -78,8 +100,13 @@ pub fn svg(atlas: &Atlas) -> String {
     let (panel_width, panel_height) = (LEFT + (SIDE * count(&R)).max(title), TOP + SIDE * count(&psi) + BELOW);
     let rows = count(&speeds) * count(&angles);
     let block = HEADING + rows * panel_height;
-    let (width, mut height) = ((panel_width * count(&loads) + 10.0).max(320.0), 10.0);
+    let (width, mut height) = ((panel_width * count(&loads) + 10.0).max(LEGEND_WIDTH), 10.0);
     let mut body = String::new();
+    for (class, dot, meaning) in LEGEND {
+        body += &square((6.0, height), class, dot);
+        let _ = writeln!(body, "<text x=\"26\" y=\"{}\">{meaning}</text>", height + 10.0);
+        height += LINE;
+    }
     for scenario in scenarios {
         let _ = writeln!(
             body,
@@ -107,12 +134,7 @@ pub fn svg(atlas: &Atlas) -> String {
             let x = x + SIDE * index(&R, cell.R);
             let y = y + SIDE * (count(&psi) - 1.0 - index(&psi, cell.psi));
             let class = if verdict.lost.is_some() { "l" } else { "h" };
-            let side = SIDE - 1.0;
-            let _ = writeln!(body, "<rect class=\"{class}\" x=\"{x}\" y=\"{y}\" width=\"{side}\" height=\"{side}\"/>");
-            if !verdict.told() {
-                let (x, y) = (x + 0.5 * side, y + 0.5 * side);
-                let _ = writeln!(body, "<circle class=\"d\" cx=\"{x}\" cy=\"{y}\" r=\"3\"/>");
-            }
+            body += &square((x, y), class, !verdict.told());
         }
         height += block + 10.0;
     }

@@ -216,8 +216,8 @@ pub fn page(atlases: &[Atlas]) -> String {
         let (name, machine) = (escape(&drive.name), escape(&drive.machine));
         let _ = write!(
             html,
-            "<h2>{swatch}{name} ({machine})</h2>\n<p>Red: lost. A dot: lock_lost is not true. Speed n and load are shares of the \
-             rated values.</p>\n<div class=\"scroll\" tabindex=\"0\">{}</div>\n",
+            "<h2>{swatch}{name} ({machine})</h2>\n<p>Red: lost. A white dot: lost, and lock_lost does not tell it within 1 s. A \
+             red dot on a held cell: a false alarm. Speed n and load are shares of the rated values.</p>\n<div class=\"scroll\" tabindex=\"0\">{}</div>\n",
             map::svg(atlas)
         );
     }

@@ -52,8 +52,11 @@ pub fn page(cells: &[Cell], plots: &[Plot]) -> Result<String> {
 
 /// A table with a column for each quantity of each scenario.
 fn grid(block: &Block<'_>) -> String {
-    let mut html = String::from(
-        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th class=\"name\" rowspan=\"2\">estimator</th>",
+    // Whoever has no mouse scrolls it with the arrow keys.
+    let mut html = format!(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\"><table>\n\
+         <thead><tr><th class=\"name\" rowspan=\"2\">estimator</th>",
+        escape(block.title)
     );
     for (id, measures) in &block.headings {
         let _ = write!(html, "<th class=\"first\" colspan=\"{}\">{id}</th>", measures.len().max(1));

@@ -50,10 +50,15 @@ pub fn needed(tuned: &Tuned, integers: bool) -> Result<(Vec<Setting>, Vec<Settin
 /// A model cannot be described.
 pub fn of_drive(tuned: &Tuned, integers: bool) -> Result<Vec<(String, Value)>> {
     let (plant, controller) = needed(tuned, integers)?;
+    Ok(joined(&plant, &controller))
+}
+
+/// Settings of plant and controller with the names that they have in `PmsmDrive`.
+pub fn joined(plant: &[Setting], controller: &[Setting]) -> Vec<(String, Value)> {
     let named = |prefix: &str, setting: &Setting| (format!("{prefix}{}", setting.name), setting.value.clone());
     let of_plant = plant.iter().map(|s| named(if s.name == "u_dc" { "" } else { "plant." }, s));
     let of_controller = controller.iter().filter(|s| s.name != "u_dc").map(|s| named("controller.", s));
-    Ok(of_plant.chain(of_controller).collect())
+    of_plant.chain(of_controller).collect()
 }
 
 fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {

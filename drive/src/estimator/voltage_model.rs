@@ -5,7 +5,7 @@
 //! gives the angle: e = -s dv_d / (psi_M |w|) corrects the frame ([`follower`](crate::estimator::follower)).
 //! Correction to the paper: the q row of (24) is L_q p i_q + w L_d i_d; (25) is exact only with the frame-speed term.
 //!
-//! Limits: the method holds rated load from 0.03 of the rated speed, 0.05 with a compensated inverter. L_q + 20 %
+//! Limits: it holds rated load down to 0.010 of the rated speed, 0.010 with a compensated dead time. L_q + 20 %
 //! shifts the angle by 5.5 deg and makes rated load oscillate above 0.75 of the rated speed. The derivative of the
 //! current makes the speed noisy.
 

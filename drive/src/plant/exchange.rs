@@ -106,7 +106,14 @@ impl PmsmPlant {
 
     /// [`ContinuousTime::derivatives`] under these `inputs`.
     pub(crate) fn derivatives_under(&self, inputs: &PlantInputs, dx: &mut [f64]) -> Result<(), Fault> {
-        let slopes = self.slopes(inputs, &self.present(inputs));
+        let at = self.present(inputs);
+        if self.is_too_fast(at.speed) {
+            let (speed, fastest) = (at.speed, self.fastest());
+            return Err(Fault::new(format!(
+                "the shaft turns at {speed} rad/s, beyond the {fastest} rad/s of any machine: there are no derivatives"
+            )));
+        }
+        let slopes = self.slopes(inputs, &at);
         if !crate::math::all_finite(slopes) {
             return Err(Fault::new(format!("the machine has no finite derivatives at {}", self.state.tell())));
         }

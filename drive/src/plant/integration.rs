@@ -160,7 +160,7 @@ impl PmsmPlant {
             passed.add(&step);
             *state = next;
             left -= h;
-            if left <= 1e-9 * h {
+            if left <= 1e-9 * h || self.is_too_fast(state.speed) {
                 let i = state.axis.to_stator(machine.current(state.psi));
                 let emf = match &between {
                     Some(between) => between.region.emf(i),

@@ -200,9 +200,9 @@ impl PmsmPlant {
         if h <= LONGEST_SUBSTEP && w * h <= LARGEST_TURN {
             return Ok(self.drive_linear(linear, coulomb, &self.state, h, u));
         }
-        let mut left = Self::count(h, LONGEST_SUBSTEP.min(LARGEST_TURN / w))?;
+        let mut left = self.count(h, LONGEST_SUBSTEP, self.state.speed)?;
         let (h, mut state, mut passed) = (h / left, self.state, Passed::default());
-        while left > 0.0 {
+        while left > 0.0 && !self.is_too_fast(state.speed) {
             let (next, step) = self.drive_again(linear, coulomb, &state, h, u);
             state = next;
             passed.add(&step);

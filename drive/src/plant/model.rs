@@ -144,6 +144,12 @@ impl PmsmPlant {
         self.powers
     }
 
+    /// Mechanical speed (rad/s) and amplitude of the line-to-line back EMF (V).
+    pub(crate) fn speed_and_emf(&self) -> (f64, f64) {
+        let (Motor { n_p, psi_M, .. }, speed) = (&self.warm.motor, self.state.speed);
+        (speed, 3.0_f64.sqrt() * psi_M * (f64::from(*n_p) * speed).abs())
+    }
+
     /// What the sensors of a controller measure: the same as in the outputs, to the last bit.
     #[inline]
     pub(crate) fn measured(&self) -> Measured {
@@ -186,6 +192,12 @@ impl Model for PmsmPlant {
     }
 
     fn validate(&self) -> Result<(), Fault> {
+        let initial = &self.parameters.initial;
+        let fastest = self.fastest();
+        if initial.speed.abs() > fastest && !self.parameters.mechanics.imposed {
+            let allowed = format!("at most {fastest} rad/s in magnitude, the speed of any machine with this motor.n_p");
+            return Err(Fault::value("initial.speed", format!("{} rad/s", initial.speed), allowed));
+        }
         self.parameters.thermal.validate()?;
         self.judge_temperatures(&self.inputs)
     }

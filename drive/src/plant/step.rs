@@ -23,6 +23,11 @@ use nalgebra::SVector;
 /// Maximum number of substeps in one communication step: 1000 s of simulated time.
 const MAX_SUBSTEPS: f64 = 1e7;
 
+/// Greatest electrical speed in rad/s, 160 kHz: nine times that of the fastest drives there are, which turn at a million rpm
+/// with one pole pair. Only a diverging coupling gets there. It bounds the work of a step, whatever the inputs are: at most
+/// 4e6 integration steps per second of its size, and 16e6 with losses.
+const FASTEST: f64 = 1e6;
+
 impl PmsmPlant {
     /// The state at the beginning of a step and what passes until it is reached: an imposed shaft takes the angle of the
     /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
@@ -59,12 +64,16 @@ impl PmsmPlant {
         if h <= longest && w * h <= LARGEST_TURN {
             return Ok(1.0);
         }
-        Self::count(h, longest.min(LARGEST_TURN / w))
+        self.count(h, longest, speed)
     }
 
-    /// Number of integration steps of at most `longest` (s) in `h` (s).
+    /// Number of integration steps of at most `longest` (s) in `h` (s) that begin at the mechanical `speed` (rad/s).
     #[inline(never)]
-    pub(super) fn count(h: f64, longest: f64) -> Result<f64, Fault> {
+    pub(super) fn count(&self, h: f64, longest: f64, speed: f64) -> Result<f64, Fault> {
+        if self.is_too_fast(speed) {
+            return Err(self.too_fast(speed));
+        }
+        let longest = longest.min(LARGEST_TURN / (f64::from(self.parameters.motor.n_p) * speed).abs());
         let count = (h / longest - 1e-9).ceil().max(1.0);
         if count > MAX_SUBSTEPS {
             let limit = MAX_SUBSTEPS * longest;
@@ -125,7 +134,7 @@ impl PmsmPlant {
             passed.add(&switched);
             (by_iron, left) = (Some(current), 0.0);
         }
-        while left > 0.0 {
+        while left > 0.0 && !self.is_too_fast(state.speed) {
             let (next, driven) = match (LOSSY, self.inputs.enable, lossy.as_ref()) {
                 (false, ..) => self.drive_held::<false>(&state, h, u, &legs, None),
                 (true, true, lossy) => self.drive_lossy(&state, h, u, &legs, lossy),
@@ -163,6 +172,9 @@ impl PmsmPlant {
         legs: &Legs,
     ) -> Result<(), Fault> {
         let (State { psi, speed, angle, .. }, energy) = (state, &passed.energy);
+        if self.is_too_fast(speed) {
+            return Err(self.too_fast(speed));
+        }
         if !all_finite([psi.d(), psi.q(), speed, angle, energy.r#in, energy.mech, energy.loss]) {
             return Err(self.diverged(h));
         }
@@ -171,6 +183,26 @@ impl PmsmPlant {
         let tau_shaft = self.parameters.mechanics.tau_shaft(passed.impulse * (1.0 / h), self.inputs.tau_load);
         self.powers = Powers::mean(energy, passed.losses, tau_shaft, h, &self.inputs, legs, || self.currents());
         Ok(())
+    }
+
+    /// Whether the mechanical `speed` (rad/s) is beyond [`FASTEST`].
+    #[inline]
+    pub(super) fn is_too_fast(&self, speed: f64) -> bool {
+        (f64::from(self.warm.motor.n_p) * speed).abs() > FASTEST
+    }
+
+    /// Refuses a step that begins or ends at such a speed.
+    #[cold]
+    #[inline(never)]
+    fn too_fast(&self, speed: f64) -> Fault {
+        let cause = format!("the shaft turns at {speed} rad/s, beyond the {} rad/s of any machine", self.fastest());
+        let remedy = if self.parameters.mechanics.imposed { "" } else { " or use mechanics.imposed" };
+        Fault::new(format!("{cause}: the coupling is unstable; shorten the communication step{remedy}"))
+    }
+
+    /// [`FASTEST`] as a mechanical speed in rad/s.
+    pub(super) fn fastest(&self) -> f64 {
+        FASTEST / f64::from(self.parameters.motor.n_p)
     }
 
     #[cold]

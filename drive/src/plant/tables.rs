@@ -169,16 +169,15 @@ pub const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
                 &mut m.model.inputs.tau_load
             }),
-            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft; read only with mechanics.imposed", |m| {
-                &mut m.model.inputs.speed_shaft
-            }),
-            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft; read only with mechanics.imposed", |m| {
-                &mut m.model.inputs.angle_shaft
-            })
-            .unbounded(),
+            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
+                .read_with("mechanics.imposed", "true"),
+            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
+                .unbounded()
+                .read_with("mechanics.imposed", "true"),
             V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
                 &mut m.model.inputs.enable
-            }),
+            })
+            .optional(),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
             V::part("", &Part { table: STATES, lens: |m| &mut m.model }),

@@ -4,6 +4,7 @@ use crate::check::{Check, Level, Levels, Run, Verdict};
 use crate::fmu_file::{Binary, FmuFile};
 use crate::session::{NotDetermined, Session};
 use fmu_import::elf::{FLOOR, NEEDED, dynamic, is_system, newest_glibc, strings};
+use fmu_import::machine;
 use fmu_import::raw::{Simple, Text};
 use model_description::FmiVersion;
 use object::elf;
@@ -59,7 +60,7 @@ fn libraries(fmu: &FmuFile) -> Vec<&Binary> {
     fmu.binaries.iter().filter(|b| base(b).is_some_and(|base| names.contains(&base.as_str()))).collect()
 }
 
-/// Findings about each of these libraries.
+/// Findings about each of these libraries, and about each image of a universal one.
 fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>) -> Verdict {
     let libraries = libraries(fmu);
     if libraries.is_empty() {
@@ -71,9 +72,15 @@ fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>)
             Ok(bytes) => bytes,
             Err(why) => return Verdict::NotDetermined(why),
         };
-        match object::File::parse(&*bytes) {
-            Ok(file) => findings.extend(rule(binary, &file).into_iter().map(|f| format!("{}: {f}", binary.name))),
-            Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
+        let images = match machine::images(&bytes) {
+            Ok(images) => images,
+            Err(why) => return Verdict::NotDetermined(format!("{}: {why}", binary.name)),
+        };
+        for image in images {
+            match object::File::parse(image) {
+                Ok(file) => findings.extend(rule(binary, &file).into_iter().map(|f| format!("{}: {f}", binary.name))),
+                Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
+            }
         }
     }
     Verdict::of(findings)
@@ -104,19 +111,19 @@ fn elf(fmu: &FmuFile, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<Strin
 fn format(fmu: &FmuFile) -> Verdict {
     let mut findings = Vec::new();
     for binary in libraries(fmu) {
+        // The names of FMI 2.0 tell the bits, not the processor.
         let expected = match binary.folder.as_str() {
-            "linux64" => Some((BinaryFormat::Elf, Architecture::X86_64)),
-            "win64" => Some((BinaryFormat::Pe, Architecture::X86_64)),
-            "linux32" => Some((BinaryFormat::Elf, Architecture::I386)),
-            "win32" => Some((BinaryFormat::Pe, Architecture::I386)),
-            // May be a universal binary.
-            "darwin64" => None,
+            "linux64" => Some((BinaryFormat::Elf, &BITS_64[..])),
+            "win64" => Some((BinaryFormat::Pe, &BITS_64[..])),
+            "darwin64" => Some((BinaryFormat::MachO, &BITS_64[..])),
+            "linux32" => Some((BinaryFormat::Elf, &BITS_32[..])),
+            "win32" => Some((BinaryFormat::Pe, &BITS_32[..])),
             other => {
                 let mut parts = other.split('-');
                 let architecture = match parts.next() {
-                    Some("x86_64") => Some(Architecture::X86_64),
-                    Some("aarch64") => Some(Architecture::Aarch64),
-                    Some("x86") => Some(Architecture::I386),
+                    Some("x86_64") => Some(&BITS_64[..1]),
+                    Some("aarch64") => Some(&BITS_64[1..]),
+                    Some("x86") => Some(&BITS_32[..]),
                     _ => None,
                 };
                 let format = match parts.next() {
@@ -128,25 +135,50 @@ fn format(fmu: &FmuFile) -> Verdict {
                 format.zip(architecture)
             }
         };
-        let Some((format, architecture)) = expected else { continue };
+        let Some((format, processors)) = expected else { continue };
         let bytes = match binary.bytes() {
             Ok(bytes) => bytes,
             Err(why) => return Verdict::NotDetermined(why),
         };
-        match object::File::parse(&*bytes) {
-            Err(e) => findings.push(format!("{}: is not a binary: {e}", binary.name)),
-            Ok(file) => {
-                if (file.format(), file.architecture()) != (format, architecture) {
-                    findings.push(format!("{}: is {:?} for {:?}", binary.name, file.format(), file.architecture()));
-                }
-                if !matches!(file.kind(), object::ObjectKind::Dynamic) {
-                    findings.push(format!("{}: is not a shared library but {:?}", binary.name, file.kind()));
-                }
+        let mut find = |what: String| findings.push(format!("{}: {what}", binary.name));
+        let images = match machine::images(&bytes) {
+            Ok(images) => images,
+            Err(why) => {
+                find(why);
+                continue;
             }
+        };
+        let mut others = Vec::new();
+        let all = images.len();
+        for image in images {
+            let file = match object::File::parse(image) {
+                Ok(file) => file,
+                Err(e) => {
+                    find(format!("is not a binary: {e}"));
+                    continue;
+                }
+            };
+            // A bundle of macOS, which dlopen loads too, is of no kind that the reader knows.
+            let bundle = file.format() == BinaryFormat::MachO && file.kind() == object::ObjectKind::Unknown;
+            if file.kind() != object::ObjectKind::Dynamic && !bundle {
+                find(format!("is not a shared library but {:?}", file.kind()));
+            }
+            if file.format() != format || !processors.contains(&file.architecture()) {
+                others.push(format!("is {:?} for {:?}", file.format(), file.architecture()));
+            }
+        }
+        // One image of a universal library is enough.
+        if others.len() == all {
+            others.into_iter().for_each(find);
         }
     }
     Verdict::of(findings)
 }
+
+/// Processors of 64 bits that FMUs are made for.
+const BITS_64: [Architecture; 2] = [Architecture::X86_64, Architecture::Aarch64];
+/// And of 32 bits.
+const BITS_32: [Architecture; 1] = [Architecture::I386];
 
 /// Names of exported symbols; macOS prefixes an underscore.
 fn exported(file: &object::File<'_>) -> Vec<String> {

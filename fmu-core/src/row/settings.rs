@@ -1,5 +1,6 @@
 //! What a row states after its constructor; the compiler checks it.
 
+use crate::need::Need;
 use crate::reals::Interval;
 use crate::row::Row;
 use crate::variable::{Causality, Kind, Range, Variability};
@@ -119,6 +120,33 @@ impl<W: 'static> Row<W> {
         let output = matches!(self.meta.causality, Causality::Output) && matches!(self.meta.kind, Kind::Real(_));
         demand(output, self.meta.name, "only a real output can be a mean");
         self.meta.mean = true;
+        self
+    }
+
+    /// The input need not be fed, because its start value is what is usually wanted. The description says so.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is no input.
+    #[track_caller]
+    pub const fn optional(self) -> Self {
+        self.needed(Need::Never)
+    }
+
+    /// The model reads the input only while a Boolean parameter is `true` or `false`, or an enumeration has the value of
+    /// this name. The description says so, with the parameter's full name.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is no input. Describing the model checks the parameter and the value.
+    #[track_caller]
+    pub const fn read_with(self, parameter: &'static str, value: &'static str) -> Self {
+        self.needed(Need::With { parameter, value })
+    }
+
+    #[track_caller]
+    const fn needed(mut self, need: Need<'static>) -> Self {
+        let input = matches!(self.meta.causality, Causality::Input);
+        demand(input, self.meta.name, "only an input can be left alone");
+        self.meta.need = need;
         self
     }
 

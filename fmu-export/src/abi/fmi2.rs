@@ -41,12 +41,12 @@ impl<E: Exported> Abi<E> {
             environment: callbacks.map_or(std::ptr::null_mut(), |c| c.environment),
             instance: name.unwrap_or_default().to_owned(),
         };
-        let judged = credentials::<E>(name, token).and_then(|name| {
+        let judged = credentials::<E>(name, token).and_then(|wanted| {
             let exchange = E::CAN.model_exchange();
             let fits = fmu_type == CO_SIMULATION || (exchange && fmu_type == MODEL_EXCHANGE);
             let or = if exchange { " or fmi2ModelExchange (0)" } else { ": the FMU has no Model Exchange" };
             let allowed = || Fault::value("fmuType", fmu_type, format_args!("fmi2CoSimulation (1){or}"));
-            if fits { Ok(name) } else { Err(allowed()) }
+            if fits { Ok(wanted) } else { Err(allowed()) }
         });
         let interface = if fmu_type == MODEL_EXCHANGE { Interface::ModelExchange } else { Interface::CoSimulation };
         open::<E>(entry, Log::new(Box::new(sink), logging_on), judged, resources, interface, false)

@@ -39,7 +39,7 @@ impl<E: Exported> Abi<E> {
             _ => None,
         });
         let judged = credentials::<E>(name, token);
-        let judged = judged.and_then(|name| refused.map_or(Ok(name), |why| Err(Fault::new(why))));
+        let judged = judged.and_then(|wanted| refused.map_or(Ok(wanted), |why| Err(Fault::new(why))));
         let log = Log::new(Box::new(Fmi3Sink { logger, environment }), logging_on.0 != 0);
         open::<E>(entry, log, judged, resources, interface, early_return)
     }

@@ -1,11 +1,13 @@
 //! The gate: every call on an instance passes here. NULL, re-entry, standard and lifecycle are checked, panics caught,
 //! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
 
+use super::Wanted;
 use crate::blob;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Allowed, Call, Next, Standard};
 use crate::log::{Log, Status};
 use crate::message;
+use crate::preset::Made;
 use crate::resources::folder;
 use crate::snapshot::Snapshot;
 use fmu_core::{Exported, Fault, Interface, Model};
@@ -126,25 +128,26 @@ fn panicked(payload: &(dyn Any + Send)) -> Fault {
 pub(crate) fn open<E: Exported>(
     entry: &'static Entry,
     log: Log,
-    name: Result<String, Fault>,
+    wanted: Result<Wanted, Fault>,
     resources: Option<&CStr>,
     interface: Interface,
     early_return: bool,
 ) -> *mut c_void {
-    let model = || {
-        let loaded = catch_unwind(|| {
-            let mut current = Snapshot::<E::Model>::new(interface);
-            current.block.model.load(folder(resources).as_deref())?;
-            let shelf = blob::shelf(&current.block.model);
-            Ok((current, shelf))
+    let make = |suffix: &str| {
+        let made = catch_unwind(|| {
+            let resources = folder(resources);
+            let mut block = Made::<E::Model>::asked(resources.as_deref(), suffix)?.block;
+            block.model.load(resources.as_deref())?;
+            let shelf = blob::shelf(&block.model);
+            Ok((block, shelf))
         });
-        loaded.unwrap_or_else(|payload| Err(panicked(payload.as_ref())))
+        made.unwrap_or_else(|payload| Err(panicked(payload.as_ref())))
     };
-    match name.and_then(|name| Ok((name, model()?))) {
-        Ok((name, (current, shelf))) => {
-            let loaded = (!shelf.is_empty()).then(|| Box::new(current.block.model.clone()));
-            let mut instance = Instance::<E>::new(entry.standard, name, log, current);
-            (instance.shelf, instance.loaded, instance.early_return) = (shelf, loaded, early_return);
+    match wanted.and_then(|Wanted { name, suffix }| Ok((name, make(&suffix)?, suffix))) {
+        Ok((name, (block, shelf), suffix)) => {
+            let made = (!shelf.is_empty() || !suffix.is_empty()).then(|| Box::new(block.clone()));
+            let mut instance = Instance::<E>::new(entry.standard, name, log, Snapshot::of(interface, block));
+            (instance.shelf, instance.made, instance.early_return) = (shelf, made, early_return);
             Box::into_raw(Box::new(Handle { busy: Cell::new(false), instance: UnsafeCell::new(instance) })).cast()
         }
         Err(fault) => {

@@ -12,8 +12,9 @@ mod pointer;
 pub mod types;
 
 use crate::blob;
+use crate::preset::Made;
 use crate::snapshot::Snapshot;
-use fmu_core::{Description, Exported, Fault, Model};
+use fmu_core::{Description, Exported, Fault, Interface, Model, preset};
 use std::ffi::{CStr, c_int, c_void};
 use std::marker::PhantomData;
 use std::panic::{catch_unwind, set_hook};
@@ -45,10 +46,13 @@ impl<E: Exported> Abi<E> {
         // SAFETY: the caller's promise.
         let resources = crate::resources::folder(unsafe { pointer::text(resources) });
         let json = catch_unwind(|| {
-            let description = Description::loaded::<E>(resources.as_deref())?;
-            if changes_on_loading::<E::Model>(resources.as_deref())? {
+            let mut made = Made::<E::Model>::described(resources.as_deref())?;
+            if changes_on_loading(&made, resources.as_deref())? {
                 return Err(Fault::new("load changes what a state saves: what it reads belongs into a Resource"));
             }
+            made.block.model.load(resources.as_deref())?;
+            let mut description = Description::instantiated::<E>(made.block)?;
+            description.token.push_str(&made.suffix);
             serde_json::to_string(&description).map_err(|e| Fault::new(e.to_string()))
         });
         let json = json.unwrap_or_else(|_| Err(Fault::new("a fault in the model's code (panic)")));
@@ -62,13 +66,13 @@ impl<E: Exported> Abi<E> {
 }
 
 /// Whether `load` changes more than resources: a reset would undo it, and a saved state hold it.
-fn changes_on_loading<M: Model>(resources: Option<&Path>) -> Result<bool, Fault> {
-    let fresh = Snapshot::<M>::default();
-    let mut loaded = Snapshot::<M>::default();
+fn changes_on_loading<M: Model>(made: &Made<M>, resources: Option<&Path>) -> Result<bool, Fault> {
+    let fresh = || Snapshot::of(Interface::CoSimulation, made.block.clone());
+    let mut loaded = fresh();
     loaded.block.model.load(resources)?;
-    let before = blob::write(&fresh)?;
+    let before = blob::write(&fresh())?;
     // A model whose bytes differ by themselves, as those of a hash map do, tells nothing.
-    Ok(before == blob::write(&Snapshot::<M>::default())? && before != blob::write(&loaded)?)
+    Ok(before == blob::write(&fresh())? && before != blob::write(&loaded)?)
 }
 
 /// A panic becomes a log message, so the hook that would print it is silenced. The hook is the binary's own: a cdylib
@@ -78,14 +82,22 @@ pub fn quiet() {
     ONCE.call_once(|| set_hook(Box::new(|_| {})));
 }
 
-/// The instance's name, if name and token are right.
-fn credentials<E: Exported>(name: Option<&CStr>, token: Option<&CStr>) -> Result<String, Fault> {
+/// What an importer says about the instance that it wants.
+pub(crate) struct Wanted {
+    /// Its name.
+    name: String,
+    /// What stands after the model's token; empty without a preset.
+    suffix: String,
+}
+
+/// Name and preset, if name and token are right.
+fn credentials<E: Exported>(name: Option<&CStr>, token: Option<&CStr>) -> Result<Wanted, Fault> {
     let name = name.map(CStr::to_string_lossy).filter(|name| !name.trim().is_empty());
     let Some(name) = name else { return Err(Fault::new("the instance name is missing: NULL, empty or blank")) };
-    let expected = E::TOKEN;
-    match token.map(CStr::to_string_lossy) {
-        Some(token) if token == expected.as_str() => Ok(name.into_owned()),
-        token => Err(Fault::new(format!(
+    let (expected, token) = (E::TOKEN, token.map(CStr::to_string_lossy));
+    match token.as_deref().and_then(|token| preset::suffix_of(token, expected.as_str())) {
+        Some(suffix) => Ok(Wanted { name: name.into_owned(), suffix: suffix.into() }),
+        None => Err(Fault::new(format!(
             "the instantiation token (GUID) is {}, and {} is expected: description and binary are of different builds",
             token.as_deref().unwrap_or("NULL"),
             expected.as_str()

@@ -480,7 +480,12 @@ impl Fmu {
         }
         let end = {
             let mut end = [0.0];
-            if self.try_get(&[0], &mut end) == ERROR {
+            // FMI 2.0 has no variable for time, and tells the last communication point.
+            let read = match self.kind.version() {
+                2 => unsafe { fmi2GetRealStatus(self.it, 2, &raw mut end[0]) },
+                _ => self.try_get(&[0], &mut end),
+            };
+            if read == ERROR {
                 assert_eq!(self.restore(here), OK);
             }
             end[0]

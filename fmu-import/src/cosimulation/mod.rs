@@ -43,12 +43,13 @@ pub use crate::integration::Solver;
 pub use grid::Settings;
 pub use method::{Integration, Method};
 pub use plan::{Plan, Target, Worker};
-pub use recording::{Column, Recording};
+pub use recording::{Column, Recording, item};
 pub use run::{Ended, Point};
 pub use schedule::Schedule;
 
 use crate::{Error, Fmu, Instance, Message, Values};
 use exchange::{Source, Wiring};
+use fmu_core::Need;
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 use parts::{Part, Parts, Port, kind};
 
@@ -197,14 +198,32 @@ impl System {
         Ok(self.wiring.feeds(port.instance, &port.name))
     }
 
-    /// The inputs of an instance that are neither fed nor set: they keep their start values.
+    /// The inputs of an instance that must be fed and are neither fed nor set: they keep their start values.
     pub fn untouched(&self, instance: usize) -> Vec<&ModelVariable> {
-        let touched = |name: &str| {
-            self.wiring.feeds(instance, name) || self.set.iter().any(|(p, _)| p.instance == instance && p.name == name)
-        };
+        let touched = |name: &str| self.wiring.feeds(instance, name) || self.value_set(instance, name).is_some();
         let is_free =
             |v: &&ModelVariable| v.causality == Causality::Input && v.base != BaseType::Clock && !touched(&v.name);
-        self.instances[instance].description().variables.iter().filter(is_free).collect()
+        let needed = |v: &&ModelVariable| match Need::of(v.description.as_deref().unwrap_or_default()) {
+            Need::Always => true,
+            Need::Never => false,
+            Need::With { parameter, value } => self.has_value(instance, parameter, value),
+        };
+        self.instances[instance].description().variables.iter().filter(is_free).filter(needed).collect()
+    }
+
+    /// The value that was set last.
+    fn value_set(&self, instance: usize, name: &str) -> Option<&Values> {
+        let of = |(port, _): &&(Port, Values)| port.instance == instance && port.name == name;
+        self.set.iter().rev().find(of).map(|(_, values)| values)
+    }
+
+    /// Whether a variable was set to this value, or else starts at it.
+    fn has_value(&self, instance: usize, name: &str, value: &str) -> bool {
+        let description = self.instances[instance].description();
+        let Some(variable) = description.variable(name) else { return false };
+        let read = |text: &str| Values::read(text, variable, description).ok();
+        let now = self.value_set(instance, name).cloned().or_else(|| read(variable.start.as_deref()?));
+        now.is_some() && now == read(value)
     }
 
     /// The inputs of these names that a connection or a schedule feeds, written `instance.variable`.

@@ -106,7 +106,10 @@ impl Parts {
         let variable = description.variable(&port.name);
         let unit = variable.and_then(|v| v.unit.clone());
         let display = variable.and_then(|v| description.display_unit(v, None));
-        Column { name: name.into(), unit: unit.unwrap_or_default(), display, values: Vec::new() }
+        let definition = variable.and_then(|v| description.type_definition(v.declared_type.as_ref()?));
+        let items = definition.map(|d| d.items.iter().map(|i| (i.value, i.name.clone())).collect());
+        let (unit, items) = (unit.unwrap_or_default(), items.unwrap_or_default());
+        Column { name: name.into(), unit, display, items, values: Vec::new() }
     }
 }
 

@@ -119,9 +119,9 @@ impl Plan {
         Ok(Target { port, written: written.into() })
     }
 
-    /// Unit of a target; empty if it has none.
-    pub fn unit(&self, target: &Target) -> String {
-        self.parts.column(&target.port, target.name()).unit
+    /// Units and, of an enumeration, names of the values of a target.
+    pub fn column(&self, target: &Target) -> Column {
+        self.parts.column(&target.port, target.name())
     }
 
     /// What a user writes for a target as the number that stands for it: `3.3`, `true`, or a name of an enumeration.

@@ -4,7 +4,7 @@ use model_description::DisplayUnit;
 use std::io::{self, Write};
 
 /// A recorded variable.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Column {
     /// `instance.variable`.
     pub name: String,
@@ -12,6 +12,8 @@ pub struct Column {
     pub unit: String,
     /// Display unit.
     pub display: Option<DisplayUnit>,
+    /// Numbers and names of an enumeration's values; empty for other types.
+    pub items: Vec<(i64, String)>,
     /// One value for each communication point.
     pub values: Vec<f64>,
 }
@@ -20,6 +22,11 @@ impl Column {
     /// The unit to show the values in.
     pub fn shown_unit(&self) -> &str {
         self.display.as_ref().map_or(&self.unit, |display| &display.name)
+    }
+
+    /// The name of the enumeration's value `x`.
+    pub fn item(&self, x: f64) -> Option<&str> {
+        item(&self.items, x)
     }
 }
 
@@ -70,13 +77,21 @@ impl Recording {
         let width = self.columns.iter().map(|c| c.name.len()).max().unwrap_or(0).min(200);
         let row = |c: &Column| {
             let x = c.values.last().copied().unwrap_or(f64::NAN);
+            let value = c.item(x).map_or_else(|| six(x), str::to_owned);
             let shown = c.display.as_ref().map(|d| format!("  = {} {}", six(d.show(x)), d.name));
-            format!("{:width$}  {:>12} {}{}", c.name, six(x), c.unit, shown.unwrap_or_default()).trim_end().to_owned()
+            format!("{:width$}  {:>12} {}{}", c.name, value, c.unit, shown.unwrap_or_default()).trim_end().to_owned()
         };
         let rows: Vec<String> = self.columns.iter().map(row).collect();
         let time = self.time.last().copied().unwrap_or(f64::NAN);
         format!("{:width$}  {:>12} s\n{}", "time", six(time), rows.join("\n"))
     }
+}
+
+/// The name of the value `x` among those of an enumeration.
+pub fn item(items: &[(i64, String)], x: f64) -> Option<&str> {
+    #[expect(clippy::cast_precision_loss, reason = "as the column has it")]
+    let named = items.iter().find(|(value, _)| (*value as f64).to_bits() == x.to_bits());
+    named.map(|(_, name)| name.as_str())
 }
 
 /// A number with six digits.
@@ -93,7 +108,8 @@ mod tests {
     fn recording() -> Recording {
         let display =
             Some(DisplayUnit { name: "rpm".into(), factor: 30.0 / std::f64::consts::PI, offset: 0.0, inverse: false });
-        let speed = Column { name: "p.speed".into(), unit: "rad/s".into(), display, values: Vec::new() };
+        let speed =
+            Column { name: "p.speed".into(), unit: "rad/s".into(), display, items: Vec::new(), values: Vec::new() };
         let mut recording = Recording::new([speed].into_iter());
         recording.push(0.0, &[0.1 + 0.2]);
         recording.push(1e-4, &[104.719_755_119_659_77]);
@@ -109,6 +125,13 @@ mod tests {
 
     #[test]
     fn last_values_are_for_people() {
-        assert_eq!(recording().last_values(), "time           0.0001 s\np.speed        104.72 rad/s  = 1000 rpm");
+        let mut recording = recording();
+        let items = vec![(1, "Off".into()), (2, "Network".into())];
+        let mode = Column { name: "p.mode".into(), items, values: vec![1.0, 2.0], ..Column::default() };
+        recording.columns.push(mode);
+        assert_eq!(
+            recording.last_values(),
+            "time           0.0001 s\np.speed        104.72 rad/s  = 1000 rpm\np.mode        Network"
+        );
     }
 }

@@ -128,6 +128,7 @@ pub(crate) fn sample() -> Description {
     ];
     Description {
         name: "Sample".into(),
+        title: None,
         description: AWKWARD.into(),
         version: "1.2.3".into(),
         author: "A & B".into(),

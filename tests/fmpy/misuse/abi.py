@@ -204,6 +204,13 @@ class Instance:
         assert self.access(way, REAL[self.version], references, array) == OK, self.messages
         return bytes(array)
 
+    def time(self):
+        """Status and last communication point: the variable of FMI 3.0, the status of FMI 2.0."""
+        now = (c.c_double * 1)()
+        if self.version == 2:
+            return self.call("GetRealStatus", 2, now), now[0]
+        return self.access("Get", REAL[3], [self.fmu.variables["time"].reference], now), now[0]
+
     # Life
 
     def set_up(self, start=0.0, stop=None):

@@ -284,43 +284,26 @@ type I = Row<ThermalInputs>;
 pub const THERMAL_INPUTS: &Table<ThermalInputs> = &Table::new(
     const {
         &[
-            I::input("T_coolant", &KELVIN, "Temperature of the coolant; read only with thermal.mode = Network", |i| {
-                &mut i.coolant
-            })
-            .at_least(0.0)
-            .nominal(300.0),
-            I::input(
-                "T_winding_imposed",
-                &KELVIN,
-                "Temperature of the winding; read only with thermal.mode = Imposed",
-                |i| &mut i.imposed.winding,
-            )
-            .at_least(0.0)
-            .nominal(300.0),
-            I::input(
-                "T_stator_imposed",
-                &KELVIN,
-                "Temperature of the stator iron; read only with thermal.mode = Imposed",
-                |i| &mut i.imposed.stator,
-            )
-            .at_least(0.0)
-            .nominal(300.0),
-            I::input(
-                "T_magnet_imposed",
-                &KELVIN,
-                "Temperature of the magnets; read only with thermal.mode = Imposed",
-                |i| &mut i.imposed.magnet,
-            )
-            .at_least(0.0)
-            .nominal(300.0),
-            I::input(
-                "T_inverter_imposed",
-                &KELVIN,
-                "Temperature of the inverter; read only with thermal.mode = Imposed",
-                |i| &mut i.imposed.inverter,
-            )
-            .at_least(0.0)
-            .nominal(300.0),
+            I::input("T_coolant", &KELVIN, "Temperature of the coolant", |i| &mut i.coolant)
+                .at_least(0.0)
+                .nominal(300.0)
+                .read_with("thermal.mode", "Network"),
+            I::input("T_winding_imposed", &KELVIN, "Temperature of the winding", |i| &mut i.imposed.winding)
+                .at_least(0.0)
+                .nominal(300.0)
+                .read_with("thermal.mode", "Imposed"),
+            I::input("T_stator_imposed", &KELVIN, "Temperature of the stator iron", |i| &mut i.imposed.stator)
+                .at_least(0.0)
+                .nominal(300.0)
+                .read_with("thermal.mode", "Imposed"),
+            I::input("T_magnet_imposed", &KELVIN, "Temperature of the magnets", |i| &mut i.imposed.magnet)
+                .at_least(0.0)
+                .nominal(300.0)
+                .read_with("thermal.mode", "Imposed"),
+            I::input("T_inverter_imposed", &KELVIN, "Temperature of the inverter", |i| &mut i.imposed.inverter)
+                .at_least(0.0)
+                .nominal(300.0)
+                .read_with("thermal.mode", "Imposed"),
         ]
     },
 );

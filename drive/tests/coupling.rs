@@ -1,0 +1,165 @@
+//! A coupling that diverges: the work of a step stays bounded, and the error says what to do.
+#![allow(missing_docs)]
+
+use drive::{PmsmDrive, PmsmPlant};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, Warns};
+
+const REMEDY: &str = "the coupling is unstable; shorten the communication step";
+
+/// The mechanical speed in rad/s that the error tells.
+fn told(message: &str) -> f64 {
+    message.split("turns at ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap()
+}
+
+/// Steps of `h` (s) on a shaft of 50 N.m/rad with 0.01 kg.m2 at its end, until one is refused: its number and the message.
+/// The importer exchanges angle and torque at the communication points.
+fn compliant(h: f64, set: impl Fn(&mut PmsmDrive)) -> (u32, String) {
+    let mut drive = Block::<PmsmDrive>::default();
+    drive.model.inputs.speed_ref = 100.0;
+    set(&mut drive.model);
+    drive.initialize();
+    let (mut now, mut speed, mut angle) = (Elapsed::ZERO, 0.0, 0.0);
+    for k in 0..2000 {
+        let tau = 50.0 * (drive.out.plant.angle - angle);
+        drive.model.inputs.tau_load = tau;
+        let step = Step { start: now, h };
+        let before = drive.model.pair.plant.clone();
+        if let Err(fault) = drive.step(&step) {
+            // The plant stands where its last step ended.
+            assert!(drive.out.plant.speed.abs() < 1e6 && before.out == drive.out.plant);
+            return (k, fault.message().to_owned());
+        }
+        now = step.end();
+        speed += tau / 0.01 * h;
+        angle += speed * h;
+    }
+    (2000, String::new())
+}
+
+#[test]
+fn a_diverging_coupling_ends_with_its_cause() {
+    for (h, losses) in [(5e-3, false), (1e-2, false), (1e-2, true)] {
+        let (k, message) = compliant(h, |drive| {
+            if losses {
+                drive.pair.plant.model.parameters.iron.G_e = 1.3e-4;
+                drive.pair.plant.model.parameters.inverter.devices.r_transistor = 0.08;
+            }
+        });
+        println!("h = {h} s: step {k}: {message}");
+        assert!((10..200).contains(&k) && message.contains(REMEDY) && message.contains("use mechanics.imposed"));
+        assert!(told(&message).abs() < 1e7, "well before 1e9 rad/s: {message}");
+    }
+    // The same shaft at 1 ms is a drive train like any other.
+    let (k, message) = compliant(1e-3, |_| ());
+    assert_eq!((k, message.as_str()), (2000, ""));
+}
+
+/// A name, and what it changes.
+type Kind = (&'static str, fn(&mut PmsmPlant));
+
+const KINDS: [Kind; 5] = [
+    ("linear", |_| ()),
+    ("saturated", |plant| plant.parameters.saturation.s_2 = 40.0),
+    ("dead time", |plant| plant.parameters.inverter.dead_time = 2e-6),
+    ("losses", |plant| plant.parameters.iron.G_e = 1.3e-4),
+    ("gates off", |plant| plant.inputs.enable = false),
+];
+
+#[test]
+fn an_absurd_load_is_refused_at_once() {
+    for (name, set) in KINDS {
+        for (tau_load, h) in [(1e7, 1e-2), (-1e7, 1e-4), (1e12, 1e-2), (1e300, 1.0)] {
+            let mut plant = Block::<PmsmPlant>::default();
+            set(&mut plant.model);
+            plant.initialize();
+            plant.model.inputs.tau_load = tau_load;
+            let before = plant.clone();
+            let mut done = 0;
+            let fault = loop {
+                match plant.step(&Step { start: Elapsed::ZERO, h }) {
+                    Ok(()) => done += 1,
+                    Err(fault) => break fault,
+                }
+                assert!(done < 2, "{name}, {tau_load} N.m: {:?}", plant.out);
+            };
+            assert!(fault.message().contains(REMEDY) || tau_load > 1e200, "{name}, {tau_load} N.m: {fault}");
+            plant.model.output(Elapsed::ZERO, &mut plant.out);
+            assert!(done > 0 || plant.out == before.out, "a refused step changes nothing");
+        }
+    }
+}
+
+#[test]
+fn an_imposed_speed_beyond_any_machine_is_refused() {
+    for (name, set) in KINDS {
+        for speed in [4e5, -1e9, 1e300] {
+            let mut plant = Block::<PmsmPlant>::default();
+            set(&mut plant.model);
+            plant.model.parameters.mechanics.imposed = true;
+            plant.initialize();
+            plant.model.inputs.speed_shaft = speed;
+            for h in [1e-12, 1e-4, 1e-2] {
+                let fault = plant.step(&Step { start: Elapsed::ZERO, h }).unwrap_err();
+                let message = fault.message();
+                assert!(message.contains(REMEDY) && !message.contains("imposed"), "{name}, {h} s: {message}");
+                assert_eq!(told(message).to_bits(), f64::to_bits(speed));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_fastest_machines_run() {
+    // A million rpm with one pole pair, and 30 000 rpm with 20.
+    for (n_p, speed) in [(1, 1.05e5), (20, 3142.0)] {
+        let mut plant = Block::<PmsmPlant>::default();
+        let parameters = &mut plant.model.parameters;
+        (parameters.motor.n_p, parameters.initial.speed) = (n_p, speed);
+        plant.model.validate().unwrap();
+        plant.initialize();
+        plant.step(&Step { start: Elapsed::ZERO, h: 1e-3 }).unwrap();
+    }
+    let mut plant = PmsmPlant::default();
+    plant.parameters.initial.speed = -4e5;
+    let fault = plant.validate().unwrap_err();
+    assert!(fault.message().starts_with("initial.speed = -400000 rad/s is not allowed: at most 333333"), "{fault}");
+}
+
+#[test]
+fn model_exchange_has_no_derivatives_there() {
+    let mut plant = PmsmPlant::default();
+    plant.initialize();
+    *(PmsmPlant::STATES[2].at)(&mut plant) = 1e6;
+    let fault = plant.derivatives(Elapsed::ZERO, &mut [0.0; 4]).unwrap_err();
+    assert!(fault.message().starts_with("the shaft turns at 1000000 rad/s, beyond the 333333"), "{fault}");
+    *(PmsmPlant::STATES[2].at)(&mut plant) = 1e5;
+    plant.derivatives(Elapsed::ZERO, &mut [0.0; 4]).unwrap();
+}
+
+#[test]
+fn a_lost_rotor_at_speed_is_not_blamed_on_the_resistance() {
+    let mut drive = Block::<PmsmDrive>::default();
+    drive.model.inputs.speed_ref = 100.0;
+    drive.initialize();
+    let mut told = Vec::new();
+    let (mut now, mut speed, mut angle) = (Elapsed::ZERO, 0.0, 0.0);
+    let mut result = Ok(());
+    while result.is_ok() {
+        let tau = 50.0 * (drive.out.plant.angle - angle);
+        drive.model.inputs.tau_load = tau;
+        let step = Step { start: now, h: 5e-3 };
+        result = drive.step(&step);
+        now = step.end();
+        speed += tau / 0.01 * step.h;
+        angle += speed * step.h;
+        let mut sink = |key: &'static str, text: &dyn Fn() -> String| told.push((key, text()));
+        drive.model.warn(&mut Warnings::to(&mut sink));
+    }
+    println!("{:?} {:?}", told.first(), told.last());
+    let keys: Vec<_> = told.iter().map(|(key, _)| *key).collect();
+    assert!(keys.contains(&"lock_lost") && keys.contains(&"driven"), "{keys:?}");
+    assert!(told.iter().all(|(_, text)| !text.contains("R_s")), "{told:?}");
+    let driven: Vec<_> = told.iter().filter(|(key, _)| *key == "driven").collect();
+    assert!(driven.iter().all(|(_, text)| text.contains("shorten the communication step")), "{driven:?}");
+}

@@ -1,0 +1,155 @@
+//! The start values that an instance is made with: those of the model's `Default`, or of the [preset](fmu_core::preset) that
+//! the importer's token asks for.
+
+use crate::lifecycle::State;
+use crate::message;
+use fmu_core::preset::{self, Entry, FILE, MOST};
+use fmu_core::{Block, Causality, Fault, Kind, Meta, Model, Slot};
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// A module for WebAssembly has no files, whatever its importer names.
+const READS_FILES: bool = !cfg!(target_family = "wasm");
+
+/// A model before it loads its resources.
+pub(crate) struct Made<M: Model> {
+    pub(crate) block: Block<M>,
+    /// What stands after the model's token; empty without a preset.
+    pub(crate) suffix: String,
+}
+
+impl<M: Model> Made<M> {
+    /// The model for an importer whose token has this suffix.
+    ///
+    /// # Errors
+    /// The token asks for a preset, which is not in the folder, is another one, or has a name or a value that is not allowed.
+    pub(crate) fn asked(resources: Option<&Path>, suffix: &str) -> Result<Self, Fault> {
+        if suffix.is_empty() {
+            return Ok(Self { block: Block::default(), suffix: String::new() });
+        }
+        if !READS_FILES {
+            return Err(Fault::new(format!(
+                "the token asks for the preset in resources/{FILE}, and a WebAssembly module reads no files: take the FMU \
+                 without its preset, and set the start values"
+            )));
+        }
+        let Some(folder) = resources else {
+            return Err(Fault::new(format!(
+                "the token asks for the preset in resources/{FILE}, the start values of this FMU, and the importer names no \
+                 folder of resources (NULL, empty, or the URI of no file): it must pass that of the unpacked archive"
+            )));
+        };
+        let path = folder.join(FILE);
+        let bytes = content(&path).map_err(|e| {
+            of(
+                &path,
+                format!(
+                    "{e}; this file of the archive has the FMU's preset, its start values, for which the token asks"
+                ),
+            )
+        })?;
+        let found = preset::suffix(&bytes);
+        if found != suffix {
+            return Err(of(
+                &path,
+                format!(
+                    "its hash is {}, and the token asks for the preset {}: the file was changed, or is of another archive; \
+                     unpack the archive anew, or write it with `fmu preset`",
+                    &found[1..],
+                    &suffix[1..]
+                ),
+            ));
+        }
+        Self::of(&path, &bytes, found)
+    }
+
+    /// The model for its description, with the preset in the folder, if there is one.
+    ///
+    /// # Errors
+    /// The preset cannot be read, or has a name or a value that is not allowed.
+    pub(crate) fn described(resources: Option<&Path>) -> Result<Self, Fault> {
+        let path: Option<PathBuf> = resources.filter(|_| READS_FILES).map(|folder| folder.join(FILE));
+        let Some(path) = path.filter(|path| path.exists()) else { return Self::asked(None, "") };
+        let bytes = content(&path).map_err(|e| of(&path, e))?;
+        let suffix = preset::suffix(&bytes);
+        Self::of(&path, &bytes, suffix)
+    }
+
+    fn of(path: &Path, bytes: &[u8], suffix: String) -> Result<Self, Fault> {
+        let mut block = Block::default();
+        preset::read(bytes).and_then(|entries| apply(&mut block, &entries)).map_err(|fault| of(path, fault))?;
+        Ok(Self { block, suffix })
+    }
+}
+
+fn of(path: &Path, why: impl Display) -> Fault {
+    Fault::new(format!("{}: {why}", path.display()))
+}
+
+/// The bytes of the file, and one more than are allowed of a larger one.
+fn content(path: &Path) -> io::Result<Vec<u8>> {
+    // Opening a pipe would wait for its writer.
+    if !path.metadata()?.is_file() {
+        return Err(io::Error::other("is not a file"));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MOST + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Sets the start values as an importer would after instantiation.
+fn apply<M: Model>(block: &mut Block<M>, entries: &[Entry]) -> Result<(), Fault> {
+    let len = M::TABLE.len();
+    let (mut set, mut next) = (vec![false; len], 0);
+    for Entry { line, name, value } in entries {
+        let wrong = |fault: Fault| Fault::new(format!("line {line}: {fault}"));
+        // `fmu preset` writes the variables in the order of the table.
+        let found = (next..len).chain(0..next).find(|&index| message::name::<M>(index) == *name);
+        let index = found.ok_or_else(|| wrong(Fault::new(format!("{} has no variable {name}", M::INFO.name))))?;
+        if std::mem::replace(&mut set[index], true) {
+            return Err(wrong(Fault::new(format!("{name} has a value already"))));
+        }
+        let Some((meta, slot)) = M::TABLE.entry(block, index) else { continue };
+        if !matches!(meta.causality, Causality::Input | Causality::Parameter) {
+            return Err(wrong(message::fixed::<M>(index, meta, State::Instantiated)));
+        }
+        write(meta, slot, value).map_err(|allowed| wrong(Fault::value(name, value, allowed)))?;
+        next = index + 1;
+    }
+    Ok(())
+}
+
+/// Writes a value of the preset.
+///
+/// # Errors
+/// What is allowed instead.
+fn write(meta: &Meta, mut slot: Slot<'_>, text: &str) -> Result<(), String> {
+    let allowed = || message::allowed(meta);
+    match &mut slot {
+        Slot::Real(x) => **x = parsed(text, "a number")?,
+        Slot::Float32(x) => **x = parsed(text, "a number")?,
+        Slot::Integer(x) => {
+            if !x.set(parsed(text, "an integer")?) {
+                let Kind::Integer(of) = meta.kind else { return Err(allowed()) };
+                let (min, max) = of.within(&meta.range);
+                return Err(format!("{min} to {max}"));
+            }
+        }
+        Slot::Boolean(x) => **x = parsed(text, "true or false")?,
+        Slot::Enumeration(x) => {
+            if !text.parse().is_ok_and(|value| x.set(value)) {
+                return Err(allowed());
+            }
+        }
+        Slot::Text(x) => text.clone_into(x),
+        Slot::Said(_) => return Err("a text that only the model says".into()),
+    }
+    if slot.is_allowed(meta) { Ok(()) } else { Err(allowed()) }
+}
+
+fn parsed<T: FromStr>(text: &str, expected: &str) -> Result<T, String> {
+    text.parse().map_err(|_| expected.into())
+}

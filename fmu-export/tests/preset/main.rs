@@ -1,0 +1,276 @@
+//! Presets through the C functions: start values of every type from a file of the resources, before `load`, after a reset and
+//! beside saved states; and what is refused, with its cause.
+#![allow(missing_docs)]
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    clippy::borrow_as_ptr,
+    reason = "an importer calls C functions, rightly or not"
+)]
+#![allow(clippy::float_cmp, reason = "the bits of a start value")]
+
+mod importer;
+mod model;
+
+use fmi::*;
+use fmu_core::description::Value;
+use fmu_core::{Description, preset};
+use fmu_export::abi::types::*;
+use importer::*;
+use model::All;
+use std::ffi::CString;
+use std::fs;
+use std::ptr::null_mut;
+
+fmu_export::export!(All: Events);
+
+/// A value of every type.
+const ALL: [(&str, &str); 9] = [
+    ("u", "-7.5"),
+    ("real", "0.30000000000000004"),
+    ("single", "0.2"),
+    ("n", "12"),
+    ("small", "200"),
+    ("large", "18446744073709551615"),
+    ("on", "true"),
+    ("fan", "2"),
+    ("label", "two\nlines \u{3c8}"),
+];
+
+#[test]
+fn every_type_starts_with_its_value_before_load_and_after_a_reset() {
+    let all = [&ALL[..], &[("weights[1,2]", "-3e-7"), ("weights[2,2]", "8")]].concat();
+    for way in WAYS {
+        let it = entered(way, with(way, &all).unwrap());
+        let expected = [
+            "-7.5",
+            "0.30000000000000004",
+            "0.6000000000000001",
+            "-2.2500003000000004",
+            // `load` sees the preset.
+            "0.30000000000000004",
+            "[12, 200, 2]",
+            "true",
+            "[1.0, -3e-7, 3.0, 8.0]",
+            "0.20000000298023224",
+            "two\nlines \u{3c8}",
+        ];
+        assert_eq!(values(way, it), expected, "{way:?}");
+        if !is_two(way) {
+            let mut large = 0;
+            assert_eq!((unsafe { fmi3GetUInt64(it, &LARGE, 1, &mut large, 1) }, large), (0, u64::MAX));
+        }
+        set(way, it, REAL, 9.0);
+        set(way, it, U, 8.0);
+        assert_eq!((real(way, it, DOUBLED), exit(way, it)), (18.0, 0));
+        for _ in 0..2 {
+            // The file is gone: the instance keeps its start values.
+            reset(way, it);
+            entered(way, it);
+            assert_eq!(values(way, it), expected, "{way:?}");
+        }
+        free(way, it);
+    }
+}
+
+/// The preset is what an importer's sets would be.
+#[test]
+fn a_preset_is_equal_to_sets() {
+    for way in WAYS {
+        let preset = entered(way, with(way, &[("u", "4"), ("real", "0.1"), ("weights[2,1]", "5")]).unwrap());
+        let set_later = open(way, &plain(), None).unwrap();
+        set(way, set_later, U, 4.0);
+        set(way, set_later, REAL, 0.1);
+        let weights = [1.0, 2.0, 5.0, 4.0];
+        unsafe {
+            if is_two(way) {
+                assert_eq!(fmi2SetReal(set_later, &(WEIGHTS + 2), 1, &weights[2]), 0);
+            } else {
+                assert_eq!(fmi3SetFloat64(set_later, &WEIGHTS, 1, weights.as_ptr(), 4), 0);
+            }
+        }
+        entered(way, set_later);
+        // What `load` saw is another matter.
+        let but_seen = |it| values(way, it).into_iter().enumerate().filter(|(i, _)| *i != 4).collect::<Vec<_>>();
+        assert_eq!(but_seen(preset), but_seen(set_later));
+        free(way, preset);
+        free(way, set_later);
+    }
+}
+
+#[test]
+fn a_plain_token_has_no_preset_whatever_is_in_the_folder() {
+    let folder = Folder::new(preset::write([("real", "9")]).as_bytes());
+    let broken = Folder::new(b"nonsense");
+    for way in WAYS {
+        let (preset, broken) = (folder.name(way), broken.name(way));
+        for resources in [None, Some(""), Some("/does/not/exist"), Some(&preset), Some(&broken)] {
+            let it = entered(way, open(way, &plain(), resources).unwrap());
+            assert_eq!(real(way, it, REAL), 2.0, "{way:?} {resources:?}");
+            free(way, it);
+        }
+    }
+}
+
+#[test]
+fn a_token_without_its_preset_is_refused_with_the_cause() {
+    let text = preset::write([("real", "9")]);
+    let (token, other) = (token(text.as_bytes()), preset::write([("real", "8")]));
+    let (empty, other) = (Folder::new(b""), Folder::new(other.as_bytes()));
+    fs::remove_file(empty.0.join(preset::FILE)).unwrap();
+    let directory = Folder::new(b"");
+    fs::remove_file(directory.0.join(preset::FILE)).unwrap();
+    fs::create_dir(directory.0.join(preset::FILE)).unwrap();
+    let large = Folder::new(&vec![b'x'; (1 << 20) + 1]);
+    for way in WAYS {
+        let no_folder = "resources/fmu-preset.txt, the start values of this FMU, and the importer names no folder";
+        let changed = "its hash is {";
+        let names = [&empty, &other, &directory, &large].map(|folder| folder.name(way));
+        for (resources, why) in [
+            (None, no_folder),
+            (Some(""), no_folder),
+            (Some("http://example.org/resources"), no_folder),
+            (Some("/does/not/exist"), "/does/not/exist/fmu-preset.txt: No such file or directory"),
+            (Some(&names[0]), "fmu-preset.txt: No such file or directory (os error 2); this file of the archive has"),
+            (Some(&names[1]), changed),
+            (Some(&names[2]), "fmu-preset.txt: is not a file"),
+            (Some(&names[3]), changed),
+        ] {
+            let said = open(way, &token, resources).unwrap_err();
+            assert!(said.contains(why), "{way:?} {resources:?}: {said}");
+        }
+        let folder = Folder::new(text.as_bytes());
+        let it = entered(way, open(way, &token, Some(&folder.name(way))).unwrap());
+        assert_eq!(real(way, it, REAL), 9.0);
+        free(way, it);
+        // Another token is another token, preset or not.
+        let wrong = [format!("{token}x"), format!("{}x", plain()), token[38..].to_owned(), format!("{}+", plain())];
+        for wrong in wrong {
+            let said = open(way, &wrong, Some(&folder.name(way))).unwrap_err();
+            assert!(said.contains("its hash is") || said.contains("are of different builds"), "{said}");
+        }
+    }
+}
+
+#[test]
+fn names_and_values_that_are_not_allowed_are_refused_when_they_are_read() {
+    for (name, value, why) in [
+        ("nothing", "1", "line 2: All has no variable nothing"),
+        ("", "1", "line 2: All has no variable "),
+        ("time", "1", "line 2: All has no variable time"),
+        ("weights", "1", "line 2: All has no variable weights"),
+        ("weights[3,1]", "1", "line 2: All has no variable weights[3,1]"),
+        ("y", "1", "line 2: y is an output and cannot be set"),
+        ("doubled", "1", "line 2: doubled is a calculated parameter and cannot be set"),
+        ("made", "x", "line 2: made cannot be set"),
+        ("real", "0", "line 2: real = 0 is not allowed: greater than 0"),
+        ("real", "NaN", "line 2: real = NaN is not allowed: greater than 0"),
+        ("real", "inf", "line 2: real = inf is not allowed: greater than 0"),
+        ("real", "1e999", "line 2: real = 1e999 is not allowed: greater than 0"),
+        ("real", "", "line 2: real =  is not allowed: a number"),
+        ("real", " 1", "line 2: real =  1 is not allowed: a number"),
+        ("u", "1001", "line 2: u = 1001 is not allowed: at most 1000"),
+        ("single", "0.31", "line 2: single = 0.31 is not allowed: at most 0.3"),
+        ("single", "-1e39", "line 2: single = -1e39 is not allowed: at most 0.3"),
+        ("n", "2.5", "line 2: n = 2.5 is not allowed: an integer"),
+        ("n", "0", "line 2: n = 0 is not allowed: at least 1"),
+        ("n", "2147483648", "line 2: n = 2147483648 is not allowed: 1 to 2147483647"),
+        ("small", "201", "line 2: small = 201 is not allowed: 0 to 200"),
+        ("small", "-1", "line 2: small = -1 is not allowed: 0 to 200"),
+        (
+            "large",
+            "18446744073709551616",
+            "line 2: large = 18446744073709551616 is not allowed: 0 to 18446744073709551615",
+        ),
+        ("on", "1", "line 2: on = 1 is not allowed: true or false"),
+        ("fan", "3", "line 2: fan = 3 is not allowed: 1 (Off), 2 (On)"),
+        ("fan", "On", "line 2: fan = On is not allowed: 1 (Off), 2 (On)"),
+    ] {
+        for way in WAYS {
+            let said = with(way, &[(name, value)]).unwrap_err();
+            assert!(said.contains(&format!("fmu-preset.txt: {why}")), "{name} = {value}: {said}");
+        }
+        assert!(described(&[(name, value)]).unwrap_err().contains(why));
+    }
+    let twice = with(Way::Three, &[("n", "2"), ("u", "1"), ("n", "2")]).unwrap_err();
+    assert!(twice.ends_with("line 4: n has a value already"), "{twice}");
+    for bytes in [&b"nonsense"[..], b"fmu preset 1\nn\t2", b"fmu preset 9\n"] {
+        let folder = Folder::new(bytes);
+        let said = open(Way::Two, &token(bytes), Some(&folder.name(Way::Two))).unwrap_err();
+        assert!(said.contains("fmu-preset.txt: "), "{said}");
+    }
+}
+
+extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {
+    unsafe { (*context.cast::<Vec<u8>>()).extend_from_slice(std::slice::from_raw_parts(bytes, len)) }
+}
+
+/// The description of the model with this preset in its resources.
+fn described(values: &[(&str, &str)]) -> Result<Description, String> {
+    let text = preset::write(values.iter().copied());
+    let (folder, mut bytes) = (Folder::new(text.as_bytes()), Vec::new());
+    let resources = CString::new(folder.name(Way::Two)).unwrap();
+    match unsafe { fmu_description(collect, (&raw mut bytes).cast(), resources.as_ptr()) } {
+        0 => Ok(serde_json::from_slice(&bytes).unwrap()),
+        _ => Err(String::from_utf8(bytes).unwrap()),
+    }
+}
+
+#[test]
+fn the_description_has_the_start_values_and_the_token() {
+    let (own, preset) = (Description::exported::<This>().unwrap(), described(&ALL).unwrap());
+    assert_eq!(preset.token, token(preset::write(ALL).as_bytes()));
+    for (variable, start) in preset.variables.iter().zip(own.variables) {
+        let value = ALL.iter().find(|(name, _)| *name == variable.name);
+        assert_eq!(variable.start != start.start, value.is_some(), "{}", variable.name);
+        assert_eq!((&variable.kind, variable.value_reference), (&start.kind, start.value_reference));
+    }
+    let start = |name: &str| preset.variable(name).unwrap().start.clone().unwrap();
+    assert_eq!(start("large"), [Value::Integer(u64::MAX.into())]);
+    assert_eq!(start("fan"), [Value::Integer(2)]);
+    assert_eq!(start("label"), [Value::Text("two\nlines \u{3c8}".into())]);
+    let said = described(&[("label", "\u{1}")]).unwrap_err();
+    assert!(said.contains("has a character that XML does not have"), "{said}");
+}
+
+/// A state holds all values, and goes to every instance of the model; a reset returns to the instance's own preset.
+#[test]
+fn saved_states_work() {
+    let one = entered(Way::Three, with(Way::Three, &[("real", "6"), ("label", "one")]).unwrap());
+    let other = entered(Way::Three, with(Way::Three, &[("real", "7")]).unwrap());
+    unsafe {
+        set(Way::Three, one, U, 5.0);
+        let (mut state, mut length) = (null_mut(), 0);
+        assert_eq!(fmi3GetFMUState(one, &mut state), 0);
+        assert_eq!(fmi3SerializedFMUStateSize(one, state, &mut length), 0);
+        let mut bytes = vec![0; length];
+        assert_eq!(fmi3SerializeFMUState(one, state, bytes.as_mut_ptr(), length), 0);
+        let before = values(Way::Three, one);
+        set(Way::Three, one, REAL, 1.0);
+        assert_eq!(fmi3SetFMUState(one, state), 0);
+        assert_eq!(values(Way::Three, one), before);
+        let mut read = null_mut();
+        assert_eq!(fmi3DeserializeFMUState(other, bytes.as_ptr(), length, &mut read), 0);
+        assert_eq!(fmi3SetFMUState(other, read), 0);
+        assert_eq!((real(Way::Three, other, REAL), real(Way::Three, other, U)), (6.0, 5.0));
+        // What `load` read is the instance's own.
+        assert_eq!(real(Way::Three, other, SEEN), 7.0);
+        assert_eq!((fmi3FreeFMUState(one, &mut state), fmi3FreeFMUState(other, &mut read)), (0, 0));
+        reset(Way::Three, other);
+        assert_eq!(real(Way::Three, entered(Way::Three, other), REAL), 7.0);
+        assert_eq!(exit(Way::Three, other), 0);
+    }
+    free(Way::Three, one);
+    free(Way::Three, other);
+}
+
+#[test]
+fn the_log_tells_what_differs_from_the_preset() {
+    for (value, told) in [(6.0, "all start values unchanged"), (2.0, "with real = 2")] {
+        let it = with(Way::Three, &[("real", "6")]).unwrap();
+        set(Way::Three, it, REAL, value);
+        entered(Way::Three, it);
+        assert_eq!(exit(Way::Three, it), 0);
+        assert!(SAID.take().iter().any(|line| line.contains("initialized") && line.ends_with(told)));
+        free(Way::Three, it);
+    }
+}

@@ -1,0 +1,134 @@
+//! `fmu preset`: an FMU with other start values.
+
+mod motor;
+
+use crate::preset::{Course, Preset as Made};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use clap::Args;
+use drive_study::tune::{self, rules::Tuned};
+use fmu_import::cosimulation::Schedule;
+use fmu_import::printable;
+use fmu_import::ssp::ssv;
+use std::path::{Path, PathBuf};
+
+/// Writes an FMU with other start values, from an FMU of this program.
+///
+/// The new FMU starts with these values in every importer, also in those that read no parameter file: they are in its description
+/// and in its instances, and a reset returns to them. An importer may still set others. Binaries stay as they are: the values are
+/// a file of the archive's resources, without which the binary refuses to run. The result of the default experiment is computed
+/// anew, and documentation/index.html lists the new start values.
+///
+/// A value is written as for `fmu simulate --set`: a number, with one of the variable's units if needed (1000rpm), true or false, a
+/// name or a number of an enumeration, a text; the elements of an array with commas, or one element as NAME[2] or NAME[1,2]. The
+/// values of --ssv or --motor come before those of --set. In an FMU that is a preset already, its other values stay.
+///
+/// A wrong name, a value that is not allowed, or values that the FMU refuses together: nothing is written.
+///
+/// The drive with another machine, and then with another estimator:
+///   fmu preset target/fmu/fmi2/PmsmDrive.fmu --motor motors/ipmsm-2.2kw.toml --name Pump --out Pump.fmu
+///   fmu preset Pump.fmu --set controller.estimator=FluxObserver --set plant.mechanics.J=0.02 --out Pump2.fmu
+/// The values of a parameter file:
+///   fmu preset PmsmPlant.fmu --ssv target/tune/ipmsm-2.2kw.PmsmPlant.ssv --out MyPlant.fmu
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub struct Preset {
+    /// FMU of `fmu build`, or of this command
+    #[arg(value_name = "FILE.fmu")]
+    pub file: PathBuf,
+    /// Start value of an input or a parameter (repeatable)
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    /// Parameter file (SSV of SSP 1.0) with start values
+    #[arg(long, value_name = "FILE.ssv")]
+    pub ssv: Option<PathBuf>,
+    /// Motor file, as for `fmu tune`, for `PmsmDrive`, `PmsmPlant` and `SensorlessController`
+    #[arg(long, value_name = "MOTOR.toml", conflicts_with = "ssv")]
+    pub motor: Option<PathBuf>,
+    /// Name that importers show (modelName) [default: that of FILE.fmu]
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// CSV file that feeds the default experiment, which lasts until its last time, for the reference result [default: that of
+    /// FILE.fmu; with --motor one that fits the machine]
+    #[arg(long, value_name = "FILE.csv")]
+    pub stimuli: Option<PathBuf>,
+    /// File to write [default: NAME.fmu]
+    #[arg(long, value_name = "NEW.fmu", required_unless_present = "name")]
+    pub out: Option<PathBuf>,
+}
+
+/// Runs the command; returns the start values that differ, and the file.
+///
+/// # Errors
+/// The FMU is not of this program, or has no binary for this computer; a name or a value is wrong; a file cannot be written.
+pub fn run(args: &Preset) -> Result<String> {
+    if args.set.is_empty() && args.ssv.is_none() && args.motor.is_none() {
+        bail!("nothing to preset: give --set NAME=VALUE, --ssv FILE.ssv or --motor MOTOR.toml");
+    }
+    args.name.as_deref().map_or(Ok(()), judge)?;
+    let out = args.out.clone().or_else(|| args.name.as_ref().map(|name| format!("{name}.fmu").into()));
+    let out = out.context("--out NEW.fmu is missing")?;
+    let tuned = args.motor.as_deref().map(tune::tune).transpose()?;
+    let given = args.stimuli.as_deref().map(course).transpose()?;
+    let mut preset = Made::open(&args.file)?;
+    if let Some(path) = &args.ssv {
+        let of = || path.display().to_string();
+        let text = std::fs::read_to_string(path).with_context(of)?;
+        for p in ssv::read(&text).map_err(|cause| anyhow!("{}: {cause}", of()))? {
+            let line = || format!("{}: line {}", of(), p.line);
+            preset.set(&p.name, &p.value, p.unit.as_deref()).with_context(line)?;
+        }
+    }
+    let of_motor = tuned.map(|tuned| motor::set(&mut preset, &tuned)).transpose()?;
+    for text in &args.set {
+        let (name, value) = text.split_once('=').ok_or_else(|| anyhow!("{text}: is not --set NAME=VALUE"))?;
+        preset.set(name.trim(), value.trim(), None).with_context(|| format!("--set {text}"))?;
+    }
+    let changes = preset.write(args.name.as_deref(), given.or(of_motor).as_ref(), &out)?;
+    let lines = changes.iter().map(|line| format!("  {}\n", printable(line)));
+    Ok(lines.chain([format!("{}\n", out.display())]).collect())
+}
+
+/// The FMU with the values of a machine, for `fmu tune --fmu`.
+///
+/// # Errors
+/// As [`run`].
+pub fn of_machine(file: &Path, tuned: &Tuned, out: &Path) -> Result<()> {
+    let mut preset = Made::open(file)?;
+    let course = motor::set(&mut preset, tuned)?;
+    preset.write(None, Some(&course), out).map(drop)
+}
+
+/// The default experiment that a file feeds.
+fn course(path: &Path) -> Result<Course> {
+    let of = || format!("--stimuli {}", path.display());
+    let stimuli = std::fs::read_to_string(path).with_context(of)?;
+    let wrong = |cause: String| anyhow!("--stimuli {cause}");
+    Schedule::read_csv(path).map_err(wrong)?;
+    let last = stimuli.lines().rfind(|line| !line.trim().is_empty()).and_then(|line| line.split([',', ';']).next());
+    let stop = last.and_then(|time| time.trim().parse().ok()).with_context(|| format!("{}: has no last time", of()))?;
+    Ok(Course { stimuli, stop, step: None })
+}
+
+/// A name for users that is also one for files on every system, because the reference files have it.
+fn judge(name: &str) -> Result<()> {
+    let plain = |b: u8| (b' '..=b'~').contains(&b) && !br#"/\:*?"<>|"#.contains(&b);
+    ensure!(
+        name.bytes().all(plain) && (1..=100).contains(&name.len()) && name.trim() == name && !name.starts_with('.'),
+        "--name {name}: a name has 1 to 100 letters of ASCII, none of / \\ : * ? \" < > |, no blank at its ends and no dot \
+         before it, because files have it"
+    );
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_name_is_one_for_files() {
+        for good in ["Pump", "My motor, 2.2 kW (new)", &"x".repeat(100)] {
+            super::judge(good).unwrap();
+        }
+        for bad in ["", " x", "x ", ".x", "a/b", "a\\b", "C:x", "a\nb", "\u{fc}", &"x".repeat(101)] {
+            assert!(super::judge(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! An FMU with other start values, made from its archive: the same binaries with a [preset](fmu_core::preset) among their
+//! resources, and a description that says so.
+
+use crate::documentation;
+use crate::pack::{self, Entry, Moment, TOOL};
+use crate::reference::{self, FOLDER};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use fmu_check::message;
+use fmu_core::Description;
+use fmu_core::description::{Value, Variable, VariableKind};
+use fmu_core::preset::{self, FILE};
+use fmu_core::variable::{Causality, position};
+use fmu_import::{Fmu, Kind, Unpacked, Values, describe, printable, suggest};
+use model_description::{FmiVersion, Generation, ModelDescription};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const DESCRIPTION: &str = "modelDescription.xml";
+const PAGE: &str = "documentation/index.html";
+const BINARIES: &str = "binaries/";
+
+/// The default experiment of the new FMU: what feeds it, and its times in s.
+pub struct Course {
+    /// CSV with time first and a column for each input.
+    pub stimuli: String,
+    /// Stop time.
+    pub stop: f64,
+    /// Communication step, if it is not that of the archive.
+    pub step: Option<f64>,
+}
+
+/// An FMU, and the start values that it is to have.
+pub struct Preset {
+    /// The archive, for messages.
+    file: PathBuf,
+    md: ModelDescription,
+    files: BTreeMap<String, Vec<u8>>,
+    unpacked: Unpacked,
+    /// The model as it is without a preset.
+    own: Description,
+    /// The same as FMI 3.0 has it, with arrays, to read what users write.
+    reader: ModelDescription,
+    /// Names and values by value reference, which is the order of the table.
+    values: BTreeMap<u32, (String, String)>,
+    /// Which of them are of an earlier preset.
+    earlier: BTreeSet<u32>,
+}
+
+impl Preset {
+    /// Opens an FMU of this exporter, with the values that it already presets.
+    ///
+    /// # Errors
+    /// The file is not an FMU of this exporter with a binary for this computer.
+    pub fn open(file: &Path) -> Result<Self> {
+        let (md, files) = fmu_import::contents(file)?;
+        let unpacked = Unpacked::new(file)?;
+        let path = unpacked.resources().join(FILE);
+        let old = fs::read(&path).ok();
+        if old.is_some() {
+            fs::remove_file(&path)?;
+        }
+        let name = file.display();
+        let own = describe(&unpacked.library, Some(&unpacked.resources())).map_err(|e| {
+            anyhow!("{name}: {}: a preset is for FMUs of this program (fmu build)", cause(&e.to_string(), &unpacked))
+        })?;
+        let suffix = preset::suffix_of(&md.token, &own.token)
+            .with_context(|| format!("{name}: {DESCRIPTION} and binary are of different builds: build the FMU anew"))?;
+        let reader = model_description::write(&own, FmiVersion::V3, &generation(Moment::fixed(0)));
+        let reader = model_description::read(reader)?;
+        let mut values = BTreeMap::new();
+        if !suffix.is_empty() {
+            let old = old.filter(|bytes| preset::suffix(bytes) == suffix);
+            let old =
+                old.with_context(|| format!("{name}: resources/{FILE} is missing, or not that of {DESCRIPTION}"))?;
+            for preset::Entry { name, value, .. } in
+                preset::read(&old).map_err(|e| anyhow!("{}: {e}", file.display()))?
+            {
+                let (variable, element) = find(&own, &name).with_context(|| format!("{name} in resources/{FILE}"))?;
+                values.insert(reference(variable, element.unwrap_or(0)), (name, value));
+            }
+        }
+        let earlier = values.keys().copied().collect();
+        Ok(Self { file: file.into(), md, files, unpacked, own, reader, values, earlier })
+    }
+
+    /// The model as it is without a preset.
+    pub fn own(&self) -> &Description {
+        &self.own
+    }
+
+    /// The names that an earlier preset has set and this one has not.
+    pub fn earlier(&self) -> Vec<&str> {
+        self.earlier.iter().filter_map(|place| self.values.get(place)).map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// Sets the start value of a variable, of an array with all of its elements, or of an element: what a user writes, in
+    /// `unit` if that is given.
+    ///
+    /// # Errors
+    /// Names the variable and the value, and what is expected.
+    pub fn set(&mut self, name: &str, text: &str, unit: Option<&str>) -> Result<()> {
+        let model = &self.own.name;
+        let Some((variable, element)) = find(&self.own, name) else {
+            let names = self.own.variables.iter().filter(|v| v.causality.is_settable()).map(|v| v.name.as_str());
+            bail!("{model} has no variable {name}{}", suggest(name, names));
+        };
+        let what = match variable.causality {
+            Causality::Input | Causality::Parameter => None,
+            Causality::Output => Some("an output"),
+            Causality::CalculatedParameter => Some("a calculated parameter"),
+            Causality::Local => Some("a local variable"),
+        };
+        if let Some(what) = what {
+            bail!("{name} is {what}: a preset has start values of inputs and parameters");
+        }
+        let read = self.reader.variable(&variable.name).context(variable.name.clone())?;
+        let own_unit = read.unit.as_deref().unwrap_or("1");
+        if let Some(unit) = unit.filter(|unit| *unit != own_unit) {
+            bail!("{name} is given in {unit}, and {model} has it in {own_unit}: convert the value");
+        }
+        let elements = texts(&Values::read(text, read, &self.reader).map_err(anyhow::Error::msg)?, variable);
+        let places: Vec<usize> = element.map_or_else(|| (0..variable.elements()).collect(), |one| vec![one]);
+        ensure!(elements.len() == places.len(), "{name} has {} elements, not {}", places.len(), elements.len());
+        for (place, text) in places.into_iter().zip(elements) {
+            self.earlier.remove(&reference(variable, place));
+            self.values.insert(reference(variable, place), (element_name(variable, place), text));
+        }
+        Ok(())
+    }
+
+    /// Writes the FMU with these start values to `out`; nothing is written unless all of them are allowed. `title` is the name
+    /// that users see; without it and without `course`, those of the archive stay. Returns a line for every start value that
+    /// differs from the model's own.
+    ///
+    /// # Errors
+    /// The binary knows no presets; a value is not allowed, or the FMU refuses them together; the file cannot be written.
+    pub fn write(self, title: Option<&str>, course: Option<&Course>, out: &Path) -> Result<Vec<String>> {
+        let moment = Moment::of_environment()?;
+        let mut description = self.described(title)?;
+        let of_archive = &self.md.default_experiment;
+        let experiment = &mut description.experiment;
+        let stop = course.map(|course| course.stop).or(of_archive.stop);
+        let step = course.and_then(|course| course.step).or(of_archive.step);
+        (experiment.stop, experiment.step) = (stop.unwrap_or(experiment.stop), step.unwrap_or(experiment.step));
+        let changes = changes(&description, &self.own);
+        let mut files: BTreeMap<String, Entry> = self
+            .files
+            .iter()
+            .filter(|(name, _)| !name.starts_with(FOLDER))
+            .map(|(name, bytes)| (name.clone(), entry(name, bytes.clone())))
+            .collect();
+        let version = self.md.version;
+        let mut put = |name: &str, text: String| files.insert(name.into(), entry(name, text.into_bytes()));
+        put(DESCRIPTION, model_description::write(&description, version, &generation(moment)));
+        put(&format!("resources/{FILE}"), self.text());
+        let documentation = documentation::preset(&description, &self.own);
+        put(PAGE, documentation::page(&Description { documentation, ..description.clone() }, version));
+        let dir = tempfile::tempdir()?;
+        let archive = dir.path().join("preset.fmu");
+        pack::write(&archive, &pack::archive(&files, moment)?)?;
+        self.starts(&archive)?;
+        files.extend(self.reference(&archive, &description, course, dir.path())?);
+        pack::write(out, &pack::archive(&files, moment)?)?;
+        Ok(changes)
+    }
+
+    /// The file of the preset.
+    fn text(&self) -> String {
+        preset::write(self.values.values().map(|(name, value)| (name.as_str(), value.as_str())))
+    }
+
+    /// What the binary says of itself with the preset: it judges every name and value.
+    fn described(&self, title: Option<&str>) -> Result<Description> {
+        let (name, text) = (self.file.display(), self.text());
+        fs::write(self.unpacked.resources().join(FILE), &text)?;
+        let described = describe(&self.unpacked.library, Some(&self.unpacked.resources()));
+        let mut description = described.map_err(|e| anyhow!("{name}: {}", cause(&e.to_string(), &self.unpacked)))?;
+        let token = self.own.token.clone() + &preset::suffix(text.as_bytes());
+        ensure!(
+            description.token == token,
+            "{name}: its binary knows no presets, because an earlier version made it: build the FMU anew"
+        );
+        let title = title.unwrap_or(&self.md.model_name);
+        description.title = (title != description.name).then(|| title.to_owned());
+        model_description::fits(&description, self.md.version).map_err(|e| anyhow!("{name}: {e}"))?;
+        Ok(description)
+    }
+
+    /// Requires that the FMU initializes with the preset, where it does without.
+    fn starts(&self, archive: &Path) -> Result<()> {
+        let (fmu, name) = (Fmu::open(archive)?, self.file.display());
+        for (kind, what) in [(Kind::default(), "Co-Simulation"), (Kind::ModelExchange, "Model Exchange")] {
+            let steps = kind == Kind::default();
+            let interface = if steps { &self.md.co_simulation } else { &self.md.model_exchange };
+            let Some(why) = interface.as_ref().and_then(|_| initialized(&fmu, kind).err()) else { continue };
+            if initialized(&Fmu::open(&self.file)?, kind).is_err() {
+                continue;
+            }
+            let why = format!("{name}: the FMU does not initialize for {what} with these start values: {why}");
+            ensure!(!steps, "{why}");
+            message::note(&printable(&why));
+        }
+        Ok(())
+    }
+
+    /// The reference files, run anew.
+    fn reference(
+        &self,
+        archive: &Path,
+        description: &Description,
+        course: Option<&Course>,
+        dir: &Path,
+    ) -> Result<BTreeMap<String, Entry>> {
+        let packed = self.files.iter().find(|(name, _)| name.starts_with(FOLDER) && name.ends_with("_in.csv"));
+        let stimuli = dir.join(reference::STIMULI);
+        // Without a file, the inputs keep their start values.
+        if let Some(bytes) = course.map(|course| course.stimuli.as_bytes()).or(packed.map(|(_, bytes)| &bytes[..])) {
+            fs::write(&stimuli, bytes)?;
+        }
+        reference::files(archive, description, &stimuli, None).or_else(|why| {
+            let name = self.file.display();
+            message::note(&printable(&format!("{name}: the archive gets no reference result: {why:#}")));
+            Ok(BTreeMap::new())
+        })
+    }
+}
+
+/// Whether an instance of this kind initializes.
+fn initialized(fmu: &Fmu, kind: Kind) -> Result<(), fmu_import::Error> {
+    let mut instance = fmu.instantiate_as(kind, "preset", false)?;
+    instance.setup(fmu.description().default_experiment.start.unwrap_or(0.0), None)?;
+    instance.enter_initialization()?;
+    instance.exit_initialization()
+}
+
+fn generation(moment: Moment) -> Generation {
+    Generation { tool: TOOL.into(), date_and_time: moment.date_and_time() }
+}
+
+fn entry(name: &str, bytes: Vec<u8>) -> Entry {
+    Entry { bytes, executable: name.starts_with(BINARIES) }
+}
+
+/// Why a library cannot be described, without the place where it was unpacked and without the line of the preset.
+fn cause(error: &str, unpacked: &Unpacked) -> String {
+    let library = unpacked.library.display().to_string();
+    let rest = error.strip_prefix(&library).map_or(error, |rest| rest.trim_start_matches([':', ' ']));
+    match rest.split_once(&format!("{FILE}: ")) {
+        Some((_, why)) => match why.strip_prefix("line ").and_then(|why| why.split_once(": ")) {
+            Some((_, why)) => why.into(),
+            None => why.into(),
+        },
+        None => rest.into(),
+    }
+}
+
+/// The variable of this name, or the array and which of its elements it is.
+fn find<'a>(description: &'a Description, name: &str) -> Option<(&'a Variable, Option<usize>)> {
+    if let Some(variable) = description.variable(name) {
+        return Some((variable, None));
+    }
+    let mut arrays = description.variables.iter().filter(|v| v.is_array() && name.starts_with(&v.name));
+    let element = |v: &'a Variable| (0..v.elements()).find(|&i| element_name(v, i) == name).map(|i| (v, Some(i)));
+    arrays.find_map(element)
+}
+
+fn element_name(variable: &Variable, element: usize) -> String {
+    if variable.is_array() {
+        variable.name.clone() + &position(&variable.shape, element)
+    } else {
+        variable.name.clone()
+    }
+}
+
+fn reference(variable: &Variable, element: usize) -> u32 {
+    variable.value_reference + u32::try_from(element).unwrap_or_default()
+}
+
+/// A line for every start value that differs.
+fn changes(preset: &Description, own: &Description) -> Vec<String> {
+    let pairs = preset.variables.iter().zip(&own.variables).filter(|(new, old)| new.start != old.start);
+    let line = |(new, old): (&Variable, &Variable)| {
+        let unit = match &new.kind {
+            VariableKind::Real { unit, .. } if !unit.is_empty() => format!(" {unit}"),
+            _ => String::new(),
+        };
+        format!("{} = {}{unit} (was {})", new.name, shown(new), shown(old))
+    };
+    pairs.map(line).collect()
+}
+
+/// The start value, an enumeration by name.
+fn shown(variable: &Variable) -> String {
+    let item = |x: i128| match &variable.kind {
+        VariableKind::Enumeration { items, .. } => {
+            items.iter().find(|(value, ..)| i128::from(*value) == x).map(|(_, name, _)| name.clone())
+        }
+        _ => None,
+    };
+    let one = |value: &Value| match value {
+        Value::Real(x) => format!("{x:?}"),
+        Value::Integer(x) => item(*x).unwrap_or_else(|| x.to_string()),
+        Value::Boolean(x) => x.to_string(),
+        Value::Text(x) => format!("{x:?}"),
+    };
+    variable.start.iter().flatten().map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// The elements as the file has them, rounded to the type of the variable.
+fn texts(values: &Values, variable: &Variable) -> Vec<String> {
+    #[expect(clippy::cast_possible_truncation, reason = "rounds")]
+    let real = |x: &f64| match variable.kind {
+        VariableKind::Real { single: true, .. } => format!("{:?}", *x as f32),
+        _ => format!("{x:?}"),
+    };
+    match values {
+        Values::Reals(x) => x.iter().map(real).collect(),
+        Values::Integers(x) => x.iter().map(i128::to_string).collect(),
+        Values::Booleans(x) => x.iter().map(bool::to_string).collect(),
+        Values::Strings(x) => x.clone(),
+        Values::Binaries(_) => Vec::new(),
+    }
+}
