@@ -16,7 +16,8 @@
 use crate::control::envelope::{Envelope, Limit, Warm};
 use crate::control::reference::{max_torque, max_torque_per_ampere};
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
-use crate::estimator::{Class, Kind};
+use crate::estimator::tracker::TrackerKind;
+use crate::estimator::Kind;
 use crate::frame::DqHat;
 use fmu_core::unit::{ONE, RAD_PER_S};
 use fmu_core::{Fault, Row, Table};
@@ -40,7 +41,7 @@ const LEAST_CHANGE: f64 = 0.01;
 const LEAST_SPEED: f64 = 1e-3;
 
 /// Least torque per ampere of i_q, as a share of that of the magnet alone.
-const LEAST_TORQUE: f64 = 0.2;
+pub(super) const LEAST_TORQUE: f64 = 0.2;
 
 /// Parameters of field weakening.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -73,6 +74,38 @@ pub struct WeakeningGains {
     voltage: [f64; 3],
     /// Least useful i_d in A.
     least: f64,
+    tracker: TrackerGains,
+}
+
+/// The bandwidth of a tracker that bears the slope of the torque over the angle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct TrackerGains {
+    /// Half of the speed loop's share in rad/s.
+    half: f64,
+    /// Square of the bandwidth per slope in rad2/s2 per N.m/rad.
+    per_slope: f64,
+    /// Greatest bandwidth in rad/s.
+    most: f64,
+}
+
+/// Margin of a tracker's bandwidth.
+const MARGIN: f64 = 1.5;
+
+impl TrackerGains {
+    fn new(par: &ControllerParameters) -> Self {
+        let ControllerParameters { estimators, speed_loop, T_s, .. } = par;
+        let inertia = par.J / f64::from(par.motor.n_p);
+        let hybrid = par.estimator == Kind::Hybrid;
+        let rho = if hybrid { estimators.hybrid.bandwidth } else { estimators.tracker.bandwidth };
+        let most = (0.05 / T_s).min(estimators.emf.bandwidth / 3.0);
+        if estimators.tracker.kind == TrackerKind::MechanicalObserver {
+            return Self { half: 0.0, per_slope: 0.375 * MARGIN / inertia, most };
+        }
+        let w_s = if speed_loop.torque_mode { 0.0 } else { speed_loop.bandwidth };
+        let share = w_s * (0.5 + 2.0 / speed_loop.t_is);
+        let margin = if MARGIN * share > rho { rho / share } else { MARGIN };
+        Self { half: 0.5 * margin * share, per_slope: margin / inertia, most }
+    }
 }
 
 impl WeakeningGains {
@@ -93,11 +126,19 @@ impl WeakeningGains {
             per_torque: 1.0 / motor.torque_constant(),
             voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
             least: -limit.i.min(motor.psi_M / motor.L_d),
+            tracker: TrackerGains::new(par),
         }
     }
 }
 
 impl WeakeningGains {
+    /// Least bandwidth in rad/s of a tracker with the currents `i` (A).
+    #[inline]
+    pub fn tracker(&self, i: DqHat) -> f64 {
+        let TrackerGains { half, per_slope, most } = self.tracker;
+        (half + (half * half + per_slope * self.envelope.slope(i).max(0.0)).sqrt()).min(most)
+    }
+
     /// Electrical speed in rad/s below which all of today's references fit the voltage `U` (V).
     pub fn onset(&self, U: f64) -> f64 {
         let [copper, cross, flux] = self.voltage;
@@ -251,7 +292,7 @@ pub fn share(u: f64, u_dc: f64) -> f64 {
 /// # Errors
 /// States which parameters do not fit together, and what to do.
 pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
-    let ControllerParameters { weakening: own, motor, limit, estimator, zero_speed, .. } = par;
+    let ControllerParameters { weakening: own, motor, limit, estimator, .. } = par;
     if !own.used {
         return Ok(());
     }
@@ -262,12 +303,6 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
     if own.k_t < own.k_u {
         let least = table.tell(par, |p| &mut p.weakening.k_u);
         return Err(table.fault(par, |p| &mut p.weakening.k_t, format!("at least {least}")));
-    }
-    if estimator.class() == Class::Injection {
-        return Err(Fault::new(format!(
-            "{use_is} with {estimator_is}: injection leaves no voltage for field weakening; choose Hybrid, or set the first \
-             to false"
-        )));
     }
     if *estimator == Kind::Hybrid && u_dc > 0.0 {
         // Above this speed the references may need field weakening; an injection leaves them less voltage.
@@ -302,16 +337,6 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
         return Err(Fault::new(format!(
             "{limit_is} with {use_is} and L_q < L_d: the torque of i_q vanishes at the current -psi_M / (L_d - L_q); at most \
              {most:.4} A (0.8 psi_M / (L_d - L_q))"
-        )));
-    }
-    if estimator.class() == Class::FluxObserver
-        && zero_speed.i_0 * (motor.L_q - motor.L_d) > (1.0 - LEAST_TORQUE) * motor.psi_M
-    {
-        return Err(Fault::new(format!(
-            "{} with {use_is} and L_q > L_d: the torque of i_q vanishes at the current psi_M / (L_q - L_d); at most {:.4} A \
-             (0.8 psi_M / (L_q - L_d))",
-            table.tell(par, |p| &mut p.zero_speed.i_0),
-            -most
         )));
     }
     Ok(())

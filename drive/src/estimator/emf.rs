@@ -25,10 +25,10 @@
 //! The angle's gain fades with the EMF, and the speed goes on through zero with e_q, so that theta^ is its integral: the
 //! error grows with the time spent there, by (R - R^) i / psi_M in rad/s. It is for passing zero, not for staying.
 
-use crate::control::tables::{ALL_PARAMETERS, ControllerParameters, PARAMETERS};
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Kind, Sample};
+use crate::estimator::{Context, Estimate, Sample};
 use crate::frame::DqHat;
 use crate::math::{atan2, exp};
 use fmu_core::unit::RAD_PER_S;
@@ -162,25 +162,6 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
         return Err(PARAMETERS.fault(par, |p| &mut p.estimators.tracker.bandwidth, allowed));
     }
     Ok(())
-}
-
-/// Checks that the estimator can hold a reversal if it is asked to.
-///
-/// # Errors
-/// The estimator does not take the direction from the sign of an EMF.
-pub fn validate_reversal(kind: Kind, par: &ControllerParameters) -> Result<(), Fault> {
-    use Kind::{DirectEmf, EmfObserver, ExtendedEmf, SlidingMode, VoltageFeedback};
-    if !par.estimators.emf.hold_reversal
-        || matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | SlidingMode)
-    {
-        return Ok(());
-    }
-    let allowed = format!(
-        "false with {}: it does not take the direction of rotation from the sign of the EMF; set it to false, or take \
-         DirectEmf, EmfObserver, ExtendedEmf, VoltageFeedback or SlidingMode",
-        ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
-    );
-    Err(ALL_PARAMETERS.fault(par, |p| &mut p.estimators.emf.hold_reversal, allowed))
 }
 
 /// Pole of a sampled first-order system with the bandwidth `w` (rad/s).

@@ -81,7 +81,7 @@ impl Estimating for GradientObserver {
             self.eta = self.eta * (1.0 + (gain * off).max(-0.5));
         }
         let eta = axis.from_stator(self.eta);
-        self.tracker.correct(context, par.tracker.bandwidth, atan2(eta.q(), eta.d()), sample.tau_ref);
+        self.tracker.correct(context, par.tracker.bandwidth, atan2(eta.q(), eta.d()), sample);
         Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, ..Estimate::default() }
     }
 }
