@@ -135,8 +135,8 @@ impl SensorlessController {
         // A running drive has to live with its DC link.
         weakening::validate(par, if self.state.samples == 0 { u_dc } else { 0.0 })?;
         // The start value holds no estimator back that does not read it.
-        let set = estimator.class() == Class::FluxObserver || *zero_speed != ZeroSpeed::default();
-        if set && zero_speed.i_0 > limit.i {
+        let reads = estimator.class() == Class::FluxObserver;
+        if zero_speed.i_0 > limit.i && (reads || zero_speed.i_0 > ZeroSpeed::default().i_0) {
             return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
         }
         zero_speed::validate(par)
