@@ -192,24 +192,21 @@ mod tests {
     /// give what the run held.
     #[test]
     fn the_inputs_say_the_steps_of_their_reference() {
-        let experiment = Experiment { start: 0.0, stop: 1.0, step: 0.1 };
+        let experiment = Experiment { start: 0.0, stop: 1.0, step: 0.25 };
         let lines = |points: &[(f64, f64)]| Schedule::lines(points.to_vec()).unwrap();
         let fed = [
-            ("a".to_owned(), lines(&[(0.0, 0.0), (0.2, 0.0), (0.4, 10.0), (1.0, 10.0)])),
+            ("a".to_owned(), lines(&[(0.0, 0.0), (0.25, 0.0), (0.75, 10.0), (1.0, 10.0)])),
             ("b".to_owned(), lines(&[(0.0, 1.0), (0.5, 1.0), (0.5001, 2.0)])),
         ];
         let csv = held(&fed, &experiment);
-        assert_eq!(
-            csv,
-            "0,0,1\n0.2998,0,1\n0.2999,5,1\n0.3998,5,1\n0.3999,10,1\n0.5998,10,1\n0.5999,10,2\n1,10,2\n"
-        );
+        assert_eq!(csv, "0,0,1\n0.4995,0,1\n0.49975,5,1\n0.7495,5,1\n0.74975,10,2\n1,10,2\n");
         let rows: Vec<Vec<f64>> =
             csv.lines().map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect();
         for (column, (_, schedule)) in fed.iter().enumerate() {
             let read = lines(&rows.iter().map(|row| (row[0], row[column + 1])).collect::<Vec<_>>());
-            for n in 0..100 {
-                let t = 0.01 * f64::from(n);
-                let point = (f64::from(n / 10)) * 0.1;
+            for n in 0..160 {
+                let t = f64::from(n) / 160.0;
+                let point = 0.25 * f64::from(n / 40);
                 assert!((read.at(t) - schedule.at(point)).abs() < 1e-12, "{t} s: {}", read.at(t));
             }
         }

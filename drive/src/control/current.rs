@@ -174,9 +174,14 @@ type P = Row<CurrentLoop>;
 pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
     const {
         &[
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the current loop, at most 2 pi 0.06 / T_s with timing.delay = 1", |p| &mut p.bandwidth)
-                .above(0.0)
-                .tunable(),
+            P::parameter(
+                "bandwidth",
+                &RAD_PER_S,
+                "Bandwidth of the current loop, at most 2 pi 0.06 / T_s with timing.delay = 1",
+                |p| &mut p.bandwidth,
+            )
+            .above(0.0)
+            .tunable(),
             P::boolean_parameter(
                 "active_resistance",
                 "false: Kp = wc L, Ki = wc R; true: Ki = wc^2 L with active resistance wc L - R",

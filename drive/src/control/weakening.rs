@@ -12,11 +12,13 @@
 //! follows: dI/dt = w_s (limited - wanted), besides the hold of [`speed`](crate::control::speed).
 //!
 //! A limit is computed at every sample while it acts, else at every eighth one and when the voltage has changed by 1 %.
+//!
+//! The tracker's bandwidth while weakening: [`tracking`](crate::control::tracking).
 
 use crate::control::envelope::{Envelope, Limit, Warm};
 use crate::control::reference::{max_torque, max_torque_per_ampere};
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
-use crate::estimator::tracker::TrackerKind;
+use crate::control::tracking::LeastTracker;
 use crate::estimator::Kind;
 use crate::frame::DqHat;
 use fmu_core::unit::{ONE, RAD_PER_S};
@@ -74,38 +76,8 @@ pub struct WeakeningGains {
     voltage: [f64; 3],
     /// Least useful i_d in A.
     least: f64,
-    tracker: TrackerGains,
-}
-
-/// The bandwidth of a tracker that bears the slope of the torque over the angle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct TrackerGains {
-    /// Half of the speed loop's share in rad/s.
-    half: f64,
-    /// Square of the bandwidth per slope in rad2/s2 per N.m/rad.
-    per_slope: f64,
-    /// Greatest bandwidth in rad/s.
-    most: f64,
-}
-
-/// Margin of a tracker's bandwidth.
-const MARGIN: f64 = 1.5;
-
-impl TrackerGains {
-    fn new(par: &ControllerParameters) -> Self {
-        let ControllerParameters { estimators, speed_loop, T_s, .. } = par;
-        let inertia = par.J / f64::from(par.motor.n_p);
-        let hybrid = par.estimator == Kind::Hybrid;
-        let rho = if hybrid { estimators.hybrid.bandwidth } else { estimators.tracker.bandwidth };
-        let most = (0.05 / T_s).min(estimators.emf.bandwidth / 3.0);
-        if estimators.tracker.kind == TrackerKind::MechanicalObserver {
-            return Self { half: 0.0, per_slope: 0.375 * MARGIN / inertia, most };
-        }
-        let w_s = if speed_loop.torque_mode { 0.0 } else { speed_loop.bandwidth };
-        let share = w_s * (0.5 + 2.0 / speed_loop.t_is);
-        let margin = if MARGIN * share > rho { rho / share } else { MARGIN };
-        Self { half: 0.5 * margin * share, per_slope: margin / inertia, most }
-    }
+    /// Least bandwidth of the tracker.
+    pub(super) tracker: LeastTracker,
 }
 
 impl WeakeningGains {
@@ -126,17 +98,16 @@ impl WeakeningGains {
             per_torque: 1.0 / motor.torque_constant(),
             voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
             least: -limit.i.min(motor.psi_M / motor.L_d),
-            tracker: TrackerGains::new(par),
+            tracker: LeastTracker::new(par),
         }
     }
 }
 
 impl WeakeningGains {
-    /// Least bandwidth in rad/s of a tracker with the currents `i` (A).
+    /// Least bandwidth in rad/s of the tracker with the currents `i` (A).
     #[inline]
     pub fn tracker(&self, i: DqHat) -> f64 {
-        let TrackerGains { half, per_slope, most } = self.tracker;
-        (half + (half * half + per_slope * self.envelope.slope(i).max(0.0)).sqrt()).min(most)
+        self.tracker.at(self.envelope.slope(i))
     }
 
     /// Electrical speed in rad/s below which all of today's references fit the voltage `U` (V).

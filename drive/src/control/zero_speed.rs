@@ -76,9 +76,14 @@ type P = Row<ZeroSpeed>;
 pub const ZERO_SPEED: &Table<ZeroSpeed> = &Table::new(
     const {
         &[
-            P::parameter("i_0", &AMPERE, "d-axis current reference of Rasmussen and FluxObserver at standstill, eq (25)", |p| &mut p.i_0)
-                .at_least(0.0)
-                .tunable(),
+            P::parameter(
+                "i_0",
+                &AMPERE,
+                "d-axis current reference of Rasmussen and FluxObserver at standstill, eq (25)",
+                |p| &mut p.i_0,
+            )
+            .at_least(0.0)
+            .tunable(),
             P::parameter(
                 "w_0",
                 &SPEED,

@@ -151,7 +151,12 @@ mod tests {
             tracker.advance(context.T_s);
             theta += context.T_s * w + 0.5 * context.T_s * context.T_s * acceleration;
             w += context.T_s * acceleration;
-            tracker.correct(&context, par.tracker.bandwidth, theta - tracker.theta, &Sample { tau_ref, ..Sample::default() });
+            tracker.correct(
+                &context,
+                par.tracker.bandwidth,
+                theta - tracker.theta,
+                &Sample { tau_ref, ..Sample::default() },
+            );
         }
         (theta - tracker.theta, w - tracker.w)
     }
