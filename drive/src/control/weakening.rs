@@ -321,7 +321,7 @@ pub const WEAKENING: &Table<WeakeningParameters> = &Table::new(
         &[
             P::boolean_parameter(
                 "use",
-                "Field weakening: i_d and the torque limits follow the voltage of u_dc; false: no i_d beyond current.mtpa",
+                "Field weakening: i_d and the torque limits follow the voltage of u_dc, injection methods refuse it; false: no i_d beyond current.mtpa",
                 |p| &mut p.used,
             ),
             P::parameter(

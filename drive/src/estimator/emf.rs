@@ -188,7 +188,7 @@ pub const EMF: &Table<EmfParameters> = &Table::new(
             .above(0.0),
             P::boolean_parameter(
                 "frame_term",
-                "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18)",
+                "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18); false: methods with this term alone",
                 |p| &mut p.frame_term,
             ),
         ]
@@ -201,7 +201,7 @@ pub const REVERSAL: &Table<EmfParameters> = &Table::new(
         &[
             P::boolean_parameter(
                 "hold_reversal",
-                "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held",
+                "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; others than the EMF methods refuse it",
                 |p| &mut p.hold_reversal,
             ),
             P::parameter(

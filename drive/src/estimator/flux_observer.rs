@@ -176,9 +176,12 @@ pub const FLUX_OBSERVER: &Table<FluxObserverParameters> = &Table::new(
             P::parameter("k_w", &ONE, "Feedback gain of the flux error per electrical speed", |p| &mut p.k_w)
                 .at_least(0.0)
                 .tunable(),
-            P::parameter("magnet", &PER_SECOND, "Rate at which FluxObserver adapts psi_M; 0: motor.psi_M", |p| {
-                &mut p.magnet
-            })
+            P::parameter(
+                "magnet",
+                &PER_SECOND,
+                "Rate at which FluxObserver adapts psi_M, the others refuse it; 0: motor.psi_M",
+                |p| &mut p.magnet,
+            )
             .at_least(0.0),
         ]
     },

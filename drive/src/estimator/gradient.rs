@@ -109,7 +109,7 @@ pub const GRADIENT: &Table<GradientParameters> = &Table::new(
             .tunable(),
             P::boolean_parameter(
                 "clamped",
-                "Both components of the flux limited to the magnet's, as in open motor controllers; no gradient",
+                "GradientObserver, the others refuse it: both components of the flux limited to the magnet's, as in open motor controllers",
                 |p| &mut p.clamped,
             ),
         ]

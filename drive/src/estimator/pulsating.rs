@@ -107,7 +107,7 @@ pub const PULSATING: &Table<PulsatingParameters> = &Table::new(
     const {
         &[P::enumeration_parameter(
             "demodulation",
-            "Demodulation of the carrier current",
+            "Demodulation of the carrier current; the second is refused with other estimators than PulsatingInjection",
             &Field(|p| &mut p.demodulation),
         )]
     },

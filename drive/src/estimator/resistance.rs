@@ -228,7 +228,7 @@ pub const LATER_ADAPTATION: &Table<ResistanceParameters> = &Table::new(
             P::parameter(
                 "tracking",
                 &ONE,
-                "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed; 0: it stays constant there",
+                "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed, others refuse it; 0: it stays constant there",
                 |p| &mut p.tracking,
             )
             .at_least(0.0)
@@ -252,13 +252,13 @@ pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
         &[
             P::boolean_parameter(
                 "resistance",
-                "Rasmussen (while standstill is asked for) and FluxObserver adapt the resistance; false: motor.R_s",
+                "Rasmussen (while standstill is asked for) and FluxObserver adapt the resistance, the others refuse it; false: motor.R_s",
                 |p| &mut p.resistance,
             ),
             P::parameter(
                 "k_a",
                 &ONE,
-                "Voltage on the q axis near standstill as a share of R_s i_q: lets the d-axis current carry the load",
+                "Rasmussen: voltage on the q axis near standstill as a share of R_s i_q, lets the d-axis current carry the load; others refuse it",
                 |p| &mut p.k_a,
             )
             .at_least(0.0)

@@ -119,12 +119,15 @@ pub const TRACKER: &Table<TrackerParameters> = &Table::new(
         &[
             P::enumeration_parameter(
                 "kind",
-                "Tracker of angle and speed from the angle error",
+                "Tracker of angle and speed from the angle error; estimators without a tracker refuse the second",
                 &Field(|p| &mut p.kind),
             ),
-            P::parameter("bandwidth", &RAD_PER_S, "Magnitude of the tracker's double or triple pole", |p| {
-                &mut p.bandwidth
-            })
+            P::parameter(
+                "bandwidth",
+                &RAD_PER_S,
+                "Magnitude of the tracker's double or triple pole; field weakening raises it where angle errors make torque",
+                |p| &mut p.bandwidth,
+            )
             .above(0.0)
             .tunable(),
         ]
