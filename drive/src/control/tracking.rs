@@ -167,7 +167,7 @@ mod tests {
         ];
         for (machine, points) in machines().iter().zip(points) {
             for &(rpm, tau) in points {
-                for kind in [Kind::ExtendedEmf, Kind::FluxObserver, Kind::GradientObserver, Kind::SlidingMode] {
+                for kind in [Kind::ExtendedEmf, Kind::FluxObserver, Kind::SlidingMode] {
                     let (tracker, rho) = (TrackerKind::Pll, TAU * 20.0);
                     let mut point = Point { machine, rpm, tau, kind, tracker, rho, w_s: 0.0 };
                     // With t_is = 4, the part of the speed loop is w_s.
