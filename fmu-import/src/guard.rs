@@ -349,7 +349,7 @@ mod unix {
             end();
         };
         std::thread::scope(|scope| {
-            let started = patiently(|| std::thread::Builder::new().spawn_scoped(scope, &watch).map(|_| ()));
+            let started = patiently(|| std::thread::Builder::new().spawn_scoped(scope, watch).map(|_| ()));
             if let Err(e) = started {
                 end();
                 let _ = child.wait();
