@@ -170,7 +170,9 @@ fn a_system_without_room_is_no_finding() {
     let program = dir.join("fmu");
     fs::copy(env!("CARGO_BIN_EXE_fmu"), &program).unwrap();
     let open = |path: &Path| fs::set_permissions(path, fs::Permissions::from_mode(0o777)).unwrap();
-    [dir.clone(), dir.join("temporary"), dir.join("work")].iter().for_each(|path| open(path));
+    for path in [dir.clone(), dir.join("temporary"), dir.join("work")] {
+        open(&path);
+    }
     // Nobody else has this number.
     let user = 0x6000_0000 + std::process::id();
     let check = |script: &str| {
@@ -185,7 +187,8 @@ fn a_system_without_room_is_no_finding() {
         said
     };
     let options = "check \"$1\" --only B00,L00,B08p --patience 90 --memory 1";
-    let busy = check(&format!("ulimit -u 12; for k in 1 2 3 4 5 6 7 8 9 10; do (sleep 2 &); done; exec \"$0\" {options}"));
+    let busy =
+        check(&format!("ulimit -u 12; for k in 1 2 3 4 5 6 7 8 9 10; do (sleep 2 &); done; exec \"$0\" {options}"));
     assert!(busy.contains("after a complete run: the working directory changed"), "{busy}");
     assert!(!busy.contains("2 not determined") && !busy.contains("1 not determined"), "{busy}");
     let full = check(&format!("ulimit -u 1; exec \"$0\" {}", options.replace("B00,L00,", "")));

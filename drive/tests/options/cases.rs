@@ -233,7 +233,9 @@ pub(super) const CASES: &[Case] = &[
             [sum / n, 0.0]
         },
         // A carrier that crosses zero within a sample leaves an error of its own.
-        acts: |kind, [without, _], [with, _]| with < without || kind.class().injects() && with < 0.2 && (with - without).abs() > 0.0,
+        acts: |kind, [without, _], [with, _]| {
+            with < without || kind.class().injects() && with < 0.2 && (with - without).abs() > 0.0
+        },
     },
     Case {
         option: "compensation.calibrate",
