@@ -212,8 +212,8 @@ fn what_does_not_fit_together_is_refused() {
     let mut untouched = pair.clone();
     let fault = tune(&mut pair, "tracker.bandwidth", |_| 400.0).unwrap_err();
     assert!(fault.message().contains("tracker.bandwidth = 400 rad/s"), "{fault}");
-    let fault = tune(&mut pair, "limit.i", |_| 1.0).unwrap_err();
-    assert!(fault.message().contains("zero_speed.i_0"), "{fault}");
+    let fault = tune(&mut pair, "current.bandwidth", |_| 4e3).unwrap_err();
+    assert!(fault.message().contains("current.bandwidth = 4000 rad/s"), "{fault}");
     run(&mut pair, inputs, 100);
     run(&mut untouched, inputs, 100);
     assert_eq!(pair.controller.out, untouched.controller.out);
