@@ -13,7 +13,7 @@ use std::hint::black_box;
 use std::ptr::null;
 use timing::time;
 
-fmu_export::export!(PmsmPlant: ContinuousTime + Events + Differentiable);
+fmu_export::export!(PmsmPlant: ContinuousTime + Events + Differentiable + CompletedSteps);
 
 fn main() {
     let no = Fmi2Boolean(0);

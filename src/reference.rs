@@ -43,17 +43,20 @@ pub fn files(
 ) -> Result<BTreeMap<String, Entry>> {
     let (name, experiment) = (description.model_name(), &description.experiment);
     let fed = if stimuli.is_file() { Schedule::read_csv(stimuli).map_err(anyhow::Error::msg)? } else { Vec::new() };
+    let inputs = held(&fed, experiment);
     let result = thinned(&run(archive, experiment, fed)?, every(experiment));
     let mut texts = vec![(format!("{name}_ref.csv"), result)];
-    let mut related =
-        vec![(format!("{name}_ref.csv"), "text/csv", "result", "Result of the default experiment".to_owned())];
+    let step = experiment.step;
+    let of = format!("Result of the default experiment in communication steps of {step} s");
+    let mut related = vec![(format!("{name}_ref.csv"), "text/csv", "result", of)];
     let mut stimulus = String::new();
     if stimuli.is_file() {
         let file = format!("{name}_in.csv");
         stimulus = format!("    <Stimuli source=\"{file}\"/>\n");
-        texts.push((file, fs::read_to_string(stimuli)?));
+        let text = fs::read_to_string(stimuli)?;
+        texts.push((file, format!("{}\n{inputs}", text.lines().next().unwrap_or_default())));
     }
-    let Experiment { start, stop, step } = experiment;
+    let Experiment { start, stop, .. } = experiment;
     let experiments = format!(
         "{XML}<Experiments name=\"Smoke test\" description=\"One run in Co-Simulation\">\n  <Experiment name=\"Default\" \
          startTime=\"{start}\" stopTime=\"{stop}\" stepSize=\"{step}\">\n{stimulus}    <References source=\"{name}_ref.csv\"/>\n  \
@@ -64,7 +67,7 @@ pub fn files(
         "smoke-test.exp".into(),
         "application/x-ma-hs-experiments",
         "experiment/smoke-test",
-        "The default experiment with its inputs and its result".into(),
+        format!("The default experiment with its inputs, held over communication steps of {step} s, and its result"),
     ));
     if let Some((set, text)) = parameters {
         texts.push((format!("{set}.ssv"), text.into()));
@@ -118,6 +121,45 @@ pub fn run(archive: &Path, experiment: &Experiment, fed: Vec<(String, Schedule)>
     system.run(&settings, |_| Ok(ControlFlow::Continue(()))).context("the default experiment")
 }
 
+/// Share of a step for a change of the inputs, and from there to the communication point.
+const EDGE: f64 = 1e-3;
+
+/// Rows of the inputs as the run feeds them: held over its communication steps. A change is over just before its communication
+/// point, so an importer with shorter steps feeds the same, and straight lines connect the rows.
+fn held(fed: &[(String, Schedule)], experiment: &Experiment) -> String {
+    let Experiment { start, stop, step } = *experiment;
+    let at = |t: f64| fed.iter().map(|(_, schedule)| schedule.at(t)).collect::<Vec<f64>>();
+    let digits = (4.0 - step.log10()).ceil().clamp(0.0, 17.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 17")]
+    let digits = digits as usize;
+    let mut csv = String::new();
+    let mut row = |t: f64, values: &[f64]| {
+        let time = format!("{t:.digits$}");
+        let time = if digits > 0 { time.trim_end_matches('0').trim_end_matches('.') } else { &time };
+        csv.push_str(time);
+        for x in values {
+            // Writing to a String does not fail.
+            let _ = write!(csv, ",{x}");
+        }
+        csv.push('\n');
+    };
+    let mut last = at(start);
+    row(start, &last);
+    let mut k = 1.0;
+    while start + k * step < stop + EDGE * step {
+        let t = start + k * step;
+        let now = at(t);
+        if now != last {
+            row(t - 2.0 * EDGE * step, &last);
+            row(t - EDGE * step, &now);
+            last = now;
+        }
+        k += 1.0;
+    }
+    row(stop, &last);
+    csv
+}
+
 /// Communication steps from one row of the result to the next.
 pub fn every(experiment: &Experiment) -> usize {
     let steps = ((experiment.stop - experiment.start) / experiment.step).round();
@@ -140,4 +182,33 @@ fn thinned(recording: &Recording, every: usize) -> String {
         csv.push('\n');
     }
     csv
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ramp over two steps and a jump: at every communication point of the reference and between them, lines through the rows
+    /// give what the run held.
+    #[test]
+    fn the_inputs_say_the_steps_of_their_reference() {
+        let experiment = Experiment { start: 0.0, stop: 1.0, step: 0.25 };
+        let lines = |points: &[(f64, f64)]| Schedule::lines(points.to_vec()).unwrap();
+        let fed = [
+            ("a".to_owned(), lines(&[(0.0, 0.0), (0.25, 0.0), (0.75, 10.0), (1.0, 10.0)])),
+            ("b".to_owned(), lines(&[(0.0, 1.0), (0.5, 1.0), (0.5001, 2.0)])),
+        ];
+        let csv = held(&fed, &experiment);
+        assert_eq!(csv, "0,0,1\n0.4995,0,1\n0.49975,5,1\n0.7495,5,1\n0.74975,10,2\n1,10,2\n");
+        let rows: Vec<Vec<f64>> =
+            csv.lines().map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+        for (column, (_, schedule)) in fed.iter().enumerate() {
+            let read = lines(&rows.iter().map(|row| (row[0], row[column + 1])).collect::<Vec<_>>());
+            for n in 0..160 {
+                let t = f64::from(n) / 160.0;
+                let point = 0.25 * f64::from(n / 40);
+                assert!((read.at(t) - schedule.at(point)).abs() < 1e-12, "{t} s: {}", read.at(t));
+            }
+        }
+    }
 }

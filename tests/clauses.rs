@@ -34,13 +34,14 @@ fn numbers(text: &str) -> Vec<(usize, &str)> {
     found
 }
 
-/// Two dots or more, as in 4.2.4; not a release of a standard, which has a 0 somewhere, a clause of ZIP's, or a table's cell with a version.
+/// Two dots or more, as in 4.2.4; not a release of a standard, which has a 0 somewhere, a clause of ZIP's, a
+/// release of a tool, or a table's cell with a version.
 fn is_bare_clause(before: &str, number: &str, after: &str) -> bool {
     let cell = before.ends_with("| ") && after.starts_with(" |");
     number.matches('.').count() >= 2
         && number.starts_with(['2', '3', '4', '5'])
         && !number.split('.').any(|part| part == "0")
-        && !before.ends_with("APPNOTE ")
+        && !["APPNOTE ", "CasADi ", "gemseo-fmu "].iter().any(|name| before.ends_with(name))
         && !cell
 }
 

@@ -183,7 +183,7 @@ fn a_diverging_coupling_is_an_error() {
     // 1e7 N.m on the shaft, as a coupling gives it that has just diverged.
     let run = |standard: &str, name: &str, method: Method| {
         let mut system = System::new(method);
-        system.add("d", &open(standard, name), false).unwrap();
+        system.add("d", &open(standard, name), true).unwrap();
         system.set("d.tau_load", "1e7").unwrap();
         system.record_as("d.speed", "speed").unwrap();
         let settings = Settings { start: 0.0, stop: 1.0, step: 1e-2, sequential: false };

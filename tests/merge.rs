@@ -304,7 +304,7 @@ fn build_places_libraries_as_merge_does() {
         (output.status.code(), text(output.stdout), text(output.stderr))
     };
     let info = |standard: &str| {
-        let archive = path("out").to_owned() + &format!("/{standard}/PmsmPlant.fmu");
+        let archive = path("out") + &format!("/{standard}/PmsmPlant.fmu");
         let (_, text, _) = run(&["info".to_owned(), archive]);
         text.lines().find_map(|line| line.trim().strip_prefix("platforms")).unwrap().trim().to_owned()
     };

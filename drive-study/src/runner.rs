@@ -40,7 +40,8 @@ pub fn drive(kind: Kind) -> Pair {
     (par.motor, par.J) = (machine(), 15e-3);
     par.current.bandwidth = TAU * 200.0;
     par.current.active_resistance = true;
-    par.current.mtpa = true;
+    // Its figures are those of the low-speed law alone.
+    par.current.mtpa = kind != Kind::FluxObserver;
     (par.speed_loop.bandwidth, par.speed_loop.t_is, par.speed_loop.b) = (TAU * 5.0, 4.0, 1.0);
     (par.limit.i_q, par.limit.i, par.limit.tau) = (15.0, 15.0, 1.6 * RATED_TORQUE);
     (par.sensor.noise, par.sensor.resolution) = (0.01, 40.0 / 4096.0);

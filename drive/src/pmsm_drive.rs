@@ -95,7 +95,22 @@ pub struct PmsmDrive {
     /// Model Exchange: voltages of the plant, and whether its gates switch, since the last sample.
     before: (Phases, bool),
     period: Period,
+    overload: Overload,
 }
+
+/// Whether the load has been far above the torque that the drive gives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+enum Overload {
+    #[default]
+    Never,
+    /// For the first time, at the last step.
+    Now,
+    /// Before.
+    Before,
+}
+
+/// Load in units of `tau_max` above which it is reported.
+const FAR: f64 = 2.0;
 
 impl PmsmDrive {
     fn set_inputs(&mut self) {
@@ -113,6 +128,18 @@ impl PmsmDrive {
         let DriveInputs { tau_load, u_dc, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
         let PlantInputs { u, enable, .. } = self.pair.plant.model.inputs;
         PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, thermal }
+    }
+
+    /// Watches the load after a step; a start sequence and a drive at rest have no torque limits.
+    fn watch_load(&mut self) {
+        let Self { inputs: DriveInputs { tau_load, .. }, pair, overload, .. } = self;
+        let ControllerOutputs { tau_max, tau_min, .. } = pair.controller.out;
+        let acts = !pair.plant.model.parameters.mechanics.imposed && tau_max > 0.0 && tau_min < 0.0;
+        *overload = match *overload {
+            Overload::Never if acts && (*tau_load > FAR * tau_max || *tau_load < FAR * tau_min) => Overload::Now,
+            Overload::Now => Overload::Before,
+            same => same,
+        };
     }
 }
 
@@ -133,7 +160,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 13;
+    const STATE_VERSION: u16 = 14;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -142,7 +169,17 @@ impl Model for PmsmDrive {
 
     fn validate(&self) -> Result<(), Fault> {
         self.pair.plant.model.validate().map_err(|fault| in_part("plant", &fault))?;
-        self.pair.controller.model.validate_on(self.inputs.u_dc).map_err(|fault| in_part("controller", &fault))
+        self.pair.controller.model.validate_on(self.inputs.u_dc).map_err(|fault| in_part("controller", &fault))?;
+        let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
+        if plant.motor.n_p != controller.motor.n_p {
+            return Err(Fault::new(format!(
+                "plant.{} and controller.{}: the drive would run at another speed than its reference; set both to the same \
+                 number of pole pairs",
+                plant::PARAMETERS.tell(plant, |p| &mut p.motor.n_p),
+                tables::PARAMETERS.tell(controller, |p| &mut p.motor.n_p)
+            )));
+        }
+        Ok(())
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
@@ -154,6 +191,7 @@ impl Model for PmsmDrive {
         self.set_inputs();
         self.pair.initialize();
         self.period = Period::new(self.pair.plant.out.powers);
+        self.overload = Overload::default();
         self.before = (self.pair.plant.model.inputs.u, self.pair.plant.model.inputs.enable);
     }
 
@@ -204,6 +242,7 @@ impl Model for PmsmDrive {
             }
         }
         pair.output();
+        self.watch_load();
         Ok(())
     }
 }
@@ -229,6 +268,17 @@ impl Warns for PmsmDrive {
             });
         }
         self.pair.controller.model.warn(log);
+        if self.overload == Overload::Now {
+            let ControllerOutputs { tau_max, tau_min, .. } = self.pair.controller.out;
+            let tau_load = self.inputs.tau_load;
+            log.warn("tau_load", || {
+                format!(
+                    "tau_load = {tau_load} N.m is more than {FAR} times the torque that the drive gives, {tau_min} to {tau_max} N.m \
+                     (tau_min, tau_max): the load turns the shaft; lower it, check its unit, or raise controller.limit.i, \
+                     controller.limit.i_q and controller.limit.tau"
+                )
+            });
+        }
     }
 }
 

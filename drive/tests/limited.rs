@@ -1,7 +1,9 @@
 //! `voltage_limited` and `current_limited` say that the drive is at a limit, and only then.
 #![allow(missing_docs)]
 
-use drive::Pair;
+use drive::{Pair, PmsmDrive};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, Elapsed, Model, Step, Warns};
 
 const RPM: f64 = std::f64::consts::PI / 30.0;
 
@@ -57,4 +59,42 @@ fn a_low_link_limits_the_voltage() {
     // The EMF at 2000 rpm is 94 V; a hexagon of 150 V reaches 87 V in every direction.
     let (voltage, _) = shares(2000.0, 0.0, 150.0, 1.0, |_| ());
     assert!(voltage > 0.5, "{voltage}");
+}
+
+/// Warnings of `PmsmDrive` with their keys within a second at 1 ms, with the load `tau` (N.m) from 0.5 s on.
+fn warnings(tau: f64, set: impl FnOnce(&mut PmsmDrive)) -> Vec<(&'static str, String)> {
+    let mut drive = Block::<PmsmDrive>::default();
+    set(&mut drive.model);
+    drive.initialize();
+    drive.model.validate().unwrap();
+    let (mut now, mut told) = (Elapsed::ZERO, Vec::new());
+    for k in 0..1000_u32 {
+        drive.model.inputs.speed_ref = 50.0;
+        drive.model.inputs.tau_load = if k >= 500 { tau } else { 0.0 };
+        let step = Step { start: now, h: 1e-3 };
+        drive.step(&step).unwrap();
+        now = step.end();
+        let mut sink = |key: &'static str, message: &dyn Fn() -> String| told.push((key, message()));
+        drive.model.warn(&mut Warnings::to(&mut sink));
+    }
+    told
+}
+
+/// A load of twice what the drive gives is reported once, by name, in either direction; one that it can carry is not, nor one
+/// that an imposed shaft does not have.
+#[test]
+fn a_load_far_above_the_torque_is_reported_once() {
+    for (tau, reported) in [(100.0, true), (-100.0, true), (3.0, false), (-3.0, false)] {
+        let told = warnings(tau, |_| ());
+        let loads: Vec<_> = told.iter().filter(|(key, _)| *key == "tau_load").collect();
+        assert_eq!(loads.len(), usize::from(reported), "{tau} N.m: {told:?}");
+        for (_, message) in loads {
+            for part in [&format!("tau_load = {tau} N.m"), "tau_min", "4.05 N.m", "controller.limit.i"] {
+                assert!(message.contains(part), "{part}: {message}");
+            }
+        }
+    }
+    assert!(
+        !warnings(100.0, |d| d.pair.plant.model.parameters.mechanics.imposed = true).iter().any(|w| w.0 == "tau_load")
+    );
 }

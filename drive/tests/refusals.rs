@@ -1,13 +1,13 @@
 //! Parameters that do not fit together are refused before the start: with names from the table, values and the reason.
 #![allow(missing_docs, non_snake_case)]
 
-use drive::SensorlessController;
 use drive::control::start::StartMode;
 use drive::control::tables::{ALL_PARAMETERS, ControllerParameters};
 use drive::control::weakening::WeakeningParameters;
 use drive::estimator::tracker::TrackerKind;
 use drive::estimator::{Class, Kind};
 use drive::motor::Motor;
+use drive::{Pair, PmsmDrive, SensorlessController};
 use fmu_core::Model;
 use std::f64::consts::TAU;
 
@@ -233,4 +233,104 @@ fn what_another_estimator_adapts_or_holds() {
 fn a_sliding_mode_that_chatters() {
     let fast = |p: &mut ControllerParameters| p.estimators.sliding_mode.bandwidth = 11e3;
     refused(Kind::SlidingMode, fast, &["sliding_mode.bandwidth = 11000 rad/s", "at most 1 / T_s = 10000 rad/s"]);
+}
+
+#[test]
+fn a_sample_period_too_long_for_the_current_loop() {
+    // 2 pi 250 rad/s takes 0.24 ms with one sample of delay; the limit of the start values is exactly that.
+    for (T_s, delay, most) in [(1e-3, 1, Some("376.99")), (2.4e-4, 1, None), (2.5e-4, 1, Some("1507.9"))] {
+        let set = |p: &mut ControllerParameters| (p.T_s, p.delay) = (T_s, delay);
+        let mut controller = SensorlessController::default();
+        set(&mut controller.parameters);
+        match most {
+            None => controller.validate().unwrap(),
+            Some(most) => {
+                let message = controller.validate().expect_err("must be refused").message().to_owned();
+                for part in [
+                    "current.bandwidth = 1570.79",
+                    &format!("at most {most}"),
+                    "T_s = ",
+                    "timing.delay = 1",
+                    "lower it",
+                ] {
+                    assert!(message.contains(part), "{part}: {message}");
+                }
+            }
+        }
+    }
+    let late = |p: &mut ControllerParameters| (p.T_s, p.delay) = (2e-4, 2);
+    refused(
+        Kind::Sensored,
+        late,
+        &["current.bandwidth = 1570.79", "2 pi 0.037 / T_s", "T_s = 0.0002 s", "timing.delay = 2"],
+    );
+    let mut early = controller(Kind::Sensored);
+    (early.parameters.T_s, early.parameters.delay) = (4.5e-4, 0);
+    early.validate().unwrap();
+}
+
+/// At the greatest bandwidth, the current stays near its limit; the drive that is refused leaves it by far.
+#[test]
+fn the_current_loop_holds_its_limit_at_the_bound() {
+    let greatest = |T_s: f64, active: bool| {
+        let mut pair = Pair::default();
+        let par = &mut pair.controller.model.parameters;
+        (par.T_s, par.current.active_resistance) = (T_s, active);
+        pair.set_inputs(0.0, 0.0, 325.0);
+        pair.initialize();
+        let (mut t, mut most) = (0.0, 0.0_f64);
+        while t < 1.0 {
+            pair.set_inputs(if t > 0.2 { 80.0 } else { 0.0 }, if t > 0.6 { 2.0 } else { 0.0 }, 325.0);
+            pair.step(T_s).unwrap();
+            t += T_s;
+            most = most.max(pair.plant.out.i_d.hypot(pair.plant.out.i_q));
+        }
+        most
+    };
+    for active in [false, true] {
+        let (bound, beyond) = (greatest(2.4e-4, active), greatest(1e-3, active));
+        println!("active resistance {active}: {bound} A at the bound, {beyond} A at 1 ms, limit 7.5 A");
+        assert!(bound < 1.15 * 7.5 && beyond > 3.0 * 7.5, "{bound} {beyond} A");
+    }
+}
+
+#[test]
+fn pole_pairs_that_differ_within_a_drive() {
+    let mut drive = PmsmDrive::default();
+    drive.validate().unwrap();
+    drive.pair.controller.model.parameters.motor.n_p = 4;
+    let message = drive.validate().expect_err("must be refused").message().to_owned();
+    for part in ["plant.motor.n_p = 3", "controller.motor.n_p = 4", "the same number"] {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    drive.pair.plant.model.parameters.motor.n_p = 4;
+    drive.validate().unwrap();
+}
+
+/// The start value of a current that an estimator does not read does not keep its limit up.
+#[test]
+fn an_unread_start_value_is_accepted() {
+    for &kind in Kind::ALL {
+        let mut low = controller(kind);
+        (low.parameters.limit.i, low.parameters.limit.i_q) = (4.0, 4.0);
+        assert_eq!(low.validate().is_ok(), kind.class() != Class::FluxObserver, "{kind:?}");
+    }
+}
+
+#[test]
+fn a_low_speed_law_that_leaves_no_torque() {
+    // psi_M / (L_q - L_d) = 36.3 A.
+    let strong = |p: &mut ControllerParameters| (p.zero_speed.i_0, p.limit.i) = (30.0, 40.0);
+    for kind in [Kind::Rasmussen, Kind::FluxObserver] {
+        let mtpa = |p: &mut ControllerParameters| {
+            strong(p);
+            p.current.mtpa = true;
+        };
+        refused(kind, mtpa, &["zero_speed.i_0 = 30 A", "current.mtpa = true", "29.066"]);
+        let torque = |p: &mut ControllerParameters| {
+            strong(p);
+            p.speed_loop.torque_mode = true;
+        };
+        refused(kind, torque, &["zero_speed.i_0 = 30 A", "speed_loop.torque_mode = true", "29.066"]);
+    }
 }

@@ -51,20 +51,23 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     });
     let queue = Mutex::new(queue);
     let workers = std::thread::available_parallelism().map_or(2, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(|| {
-                while let Some((check, verdict)) = take(&queue) {
-                    let why = if is_exchange(check) { &exchanges } else { &simulates };
-                    let found = match (&runner, why) {
-                        (Err(cause), _) => Verdict::NotDetermined(cause.clone()).into(),
-                        (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone().into(),
-                        (Ok(runner), _) => runner.run(check),
-                    };
-                    store(verdict, found);
-                }
-            });
+    let work = || {
+        while let Some((check, verdict)) = take(&queue) {
+            let why = if is_exchange(check) { &exchanges } else { &simulates };
+            let found = match (&runner, why) {
+                (Err(cause), _) => Verdict::NotDetermined(cause.clone()).into(),
+                (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone().into(),
+                (Ok(runner), _) => runner.run(check),
+            };
+            store(verdict, found);
         }
+    };
+    std::thread::scope(|scope| {
+        // This thread works too: on a busy machine the system may have no other.
+        for _ in 1..workers {
+            let _ = std::thread::Builder::new().spawn_scoped(scope, work);
+        }
+        work();
     });
     let lost = || Verdict::NotDetermined("the probe did not report a result".into()).into();
     let mut found: Vec<_> = verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect();
@@ -80,11 +83,25 @@ type OfFile<'a> = (fn(&FmuFile) -> Verdict, &'a Mutex<Option<Judgement>>);
 /// Runs the checks of the file until the deadline, and for [`limits::STATIC_SECONDS`] at most, whatever an author of hostile files
 /// has thought of.
 fn check_file(fmu: &Arc<FmuFile>, checks: &[OfFile<'_>], deadline: Option<Instant>) {
+    if checks.is_empty() {
+        return;
+    }
     let (send, receive) = mpsc::channel();
     let functions: Vec<_> = checks.iter().map(|(function, _)| *function).collect();
-    let fmu = fmu.clone();
     // A thread cannot be ended from outside: one that takes too long ends with the process.
-    let thread = std::thread::spawn(move || functions.into_iter().try_for_each(|function| send.send(function(&fmu))));
+    let start = || {
+        let (fmu, functions, send) = (fmu.clone(), functions.clone(), send.clone());
+        let work = move || functions.into_iter().try_for_each(|function| send.send(function(&fmu)));
+        std::thread::Builder::new().spawn(work)
+    };
+    let thread = match guard::patiently(start) {
+        Ok(thread) => thread,
+        Err(e) => {
+            let why = format!("no thread can be started: {e}");
+            return checks.iter().for_each(|(_, place)| store(place, Verdict::NotDetermined(why.clone()).into()));
+        }
+    };
+    drop(send);
     let end = Instant::now() + Duration::from_secs(limits::STATIC_SECONDS);
     let (end, over) = match deadline {
         Some(deadline) if deadline < end => (deadline, OUT_OF_TIME.to_owned()),

@@ -12,14 +12,14 @@ use std::ffi::OsString;
 use std::io;
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, ExitStatus};
-use std::time::Duration;
-#[cfg(unix)]
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// First argument of a guard.
 const GUARD: &str = "@guard";
 /// How often a caller looks at its clock.
 const LOOK: Duration = Duration::from_millis(5);
+/// Time that a busy system may take until it has room for one more process or thread.
+const PRESSURE: Duration = Duration::from_secs(10);
 /// Time for a guard to end its child.
 #[cfg(unix)]
 const GRACE: Duration = Duration::from_secs(5);
@@ -95,12 +95,12 @@ impl Guarded {
         {
             let (channel, other) = std::os::unix::net::UnixStream::pair()?;
             command.stdin(std::process::Stdio::from(std::os::fd::OwnedFd::from(other)));
-            Ok(Self { child: command.spawn()?, channel, folder })
+            Ok(Self { child: patiently(|| command.spawn())?, channel, folder })
         }
         #[cfg(not(unix))]
         {
             command.stdin(std::process::Stdio::null());
-            Ok(Self { child: command.spawn()?, folder })
+            Ok(Self { child: patiently(|| command.spawn())?, folder })
         }
     }
 
@@ -214,6 +214,21 @@ pub fn signal_name(signal: i32) -> (String, &'static str) {
     (name.into(), meaning)
 }
 
+/// Starts a process or a thread. A busy system may have no room for one, and have it a moment later.
+///
+/// # Errors
+/// It cannot be started, or there is no room for ten seconds.
+pub fn patiently<T>(mut start: impl FnMut() -> io::Result<T>) -> io::Result<T> {
+    let begun = Instant::now();
+    loop {
+        match start() {
+            // EAGAIN.
+            Err(e) if e.kind() == io::ErrorKind::WouldBlock && begun.elapsed() < PRESSURE => std::thread::sleep(LOOK),
+            done => return done,
+        }
+    }
+}
+
 /// What the process of this command sends to its process group reaches no other; it calls [`end_with_parent`] itself. On Linux.
 pub fn own_group(command: &mut Command) {
     #[cfg(target_os = "linux")]
@@ -262,7 +277,7 @@ pub fn serve() -> Option<ExitCode> {
 
 #[cfg(unix)]
 mod unix {
-    use super::{Allowance, End, ExitCode, GRACE, GUARD, OsString, Report, io};
+    use super::{Allowance, End, ExitCode, GRACE, GUARD, OsString, Report, io, patiently};
     use crate::text::printable;
     use model_description::limits;
     use rustix::io::Errno;
@@ -316,22 +331,30 @@ mod unix {
         let _ = rustix::process::set_child_subreaper(Some(rustix::process::getpid()));
         let mut command = Command::new(std::env::current_exe().map_err(|e| e.to_string())?);
         command.args(&arguments[3..]).stdin(Stdio::null()).process_group(0);
-        let mut child = command.spawn().map_err(|e| e.to_string())?;
+        let mut child = patiently(|| command.spawn()).map_err(|e| e.to_string())?;
         let id = Pid::from_child(&child);
         let _ = (&*channel).write_all(format!("{STARTED}{}\n", child.id()).as_bytes());
         // Until the child is reaped, its number is its own.
         let running = Mutex::new(true);
         let is_running = || running.lock().unwrap_or_else(PoisonError::into_inner);
+        let end = || {
+            if *is_running() {
+                let _ = kill_process_group(id, Signal::KILL);
+                let _ = kill_process(id, Signal::KILL);
+            }
+        };
+        let watch = || {
+            // The caller says nothing: its end closes when it ends, or when it no longer wants the result.
+            let _ = (&*channel).read(&mut [0]);
+            end();
+        };
         std::thread::scope(|scope| {
-            scope.spawn(|| {
-                // The caller says nothing: its end closes when it ends, or when it no longer wants the result.
-                let _ = (&*channel).read(&mut [0]);
-                let running = is_running();
-                if *running {
-                    let _ = kill_process_group(id, Signal::KILL);
-                    let _ = kill_process(id, Signal::KILL);
-                }
-            });
+            let started = patiently(|| std::thread::Builder::new().spawn_scoped(scope, watch).map(|_| ()));
+            if let Err(e) = started {
+                end();
+                let _ = child.wait();
+                return Err(e.to_string());
+            }
             while let Err(Errno::INTR) = waitid(WaitId::Pid(id), WaitIdOptions::EXITED | WaitIdOptions::NOWAIT) {}
             let mut running = is_running();
             if !cfg!(target_os = "linux") {

@@ -120,7 +120,7 @@ impl<'a> Process<'a> {
             let mut command = Command::new(program);
             command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
             guard::own_group(&mut command);
-            let mut child = command.spawn().map_err(|e| Error::file(program, e))?;
+            let mut child = guard::patiently(|| command.spawn()).map_err(|e| Error::file(program, e))?;
             let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
                 return Err(Error::file(program, "has no standard input or output"));
             };

@@ -46,9 +46,11 @@ pub(crate) fn run<S>(
     } else {
         std::thread::scope(|scope| {
             let thread = &thread;
-            for index in 0..threads {
-                scope.spawn(move || thread(index));
+            // This thread works too: on a busy machine the system may have no other.
+            for index in 1..threads {
+                let _ = std::thread::Builder::new().spawn_scoped(scope, move || thread(index));
             }
+            thread(0);
         });
     }
     failed.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)

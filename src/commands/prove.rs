@@ -153,7 +153,7 @@ fn proof(example: &Example, md: &ModelDescription, python: &Path) -> Result<(Str
     let text = format!(
         "{name} {}, FMI {}, Co-Simulation\n{}\n\nExported by {TOOL} on {}. To test with it: {}.\n\n\
          {name}_ref.csv is the result from {start} s to {stop} s in communication steps of {step} s, {fed};\n\
-         {name}_ref.opt has these options. Straight lines connect the points of inputs.\n\n\
+         {name}_ref.opt has these options. Inputs are held over these steps; straight lines connect their points.\n\n\
          Importers that ran {name}.fmu from these files, with the largest deviation, relative to the largest value of a column:\n  {}\n\n\
          Validated by:\n  {}\n",
         md.model_version.as_deref().unwrap_or_default(),

@@ -39,7 +39,7 @@ fn each_fault_is_found_by_its_check() {
         (&["I01n"], &member("u_b", "u_b"), &member("u_a", "u_b")),
         (&["I01n"], "<Terminal name=\"sensor\"", "<Terminal name=\"phases\""),
         (&["I01k"], "matchingRule=\"plug\"", "matchingRule=\"socket\""),
-        (&["I01k"], "variableName=\"angle\"", "variableName=\"time\""),
+        (&["I01k"], "variableName=\"angle\"", "variableName=\"psi_d\""),
         (&["I01p"], "iconBaseName=\"shaft\"", "iconBaseName=\"flange\""),
         (&["I01p"], "<CoordinateSystem x1=\"-100\"", "<CoordinateSystem x1=\"100\""),
     ];

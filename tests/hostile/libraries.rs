@@ -2,6 +2,10 @@
 //! called.
 
 use crate::{XML, described, each, library};
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::Command;
 
 /// What an FMU does, the status of `fmu simulate`, and a part of what it says.
 const ACTS: &[(&str, i32, &str)] = &[
@@ -150,4 +154,43 @@ fn a_sandbox_has_no_network() {
     let refused = sandbox.status == 2 && sandbox.errors.contains("--sandbox is not available here: ");
     assert!(sandbox.status == 0 || refused, "{sandbox:?}");
     assert_eq!(sandbox.errors.lines().count(), usize::from(refused), "{sandbox:?}");
+}
+
+/// A system that has no room for threads and processes for a moment makes no finding and ends no check; one that has none makes
+/// everything undetermined. As another user, because such limits do not hold for root.
+#[test]
+fn a_system_without_room_is_no_finding() {
+    let root = fs::read_to_string("/proc/self/status").unwrap().contains("\nUid:\t0\t");
+    if library().is_none() || !root {
+        eprintln!("there is no C compiler, or this is not root: not tested");
+        return;
+    }
+    let place = described(XML);
+    let dir = place.fmu().parent().unwrap().to_owned();
+    let program = dir.join("fmu");
+    fs::copy(env!("CARGO_BIN_EXE_fmu"), &program).unwrap();
+    let open = |path: &Path| fs::set_permissions(path, fs::Permissions::from_mode(0o777)).unwrap();
+    for path in [dir.clone(), dir.join("temporary"), dir.join("work")] {
+        open(&path);
+    }
+    // Nobody else has this number.
+    let user = 0x6000_0000 + std::process::id();
+    let check = |script: &str| {
+        let setpriv = ["setpriv", &format!("--reuid={user}"), &format!("--regid={user}"), "--clear-groups"];
+        let mut command = Command::new(setpriv[0]);
+        command.args(&setpriv[1..]).args(["bash", "-c", script]).arg(&program).arg(place.fmu());
+        command.current_dir(dir.join("work")).env("TMPDIR", dir.join("temporary")).env("HOSTILE", "step chdir");
+        let output = command.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{script}: {said}{errors}");
+        said
+    };
+    let options = "check \"$1\" --only B00,L00,B08p --patience 90 --memory 1";
+    let busy =
+        check(&format!("ulimit -u 12; for k in 1 2 3 4 5 6 7 8 9 10; do (sleep 2 &); done; exec \"$0\" {options}"));
+    assert!(busy.contains("after a complete run: the working directory changed"), "{busy}");
+    assert!(!busy.contains("2 not determined") && !busy.contains("1 not determined"), "{busy}");
+    let full = check(&format!("ulimit -u 1; exec \"$0\" {}", options.replace("B00,L00,", "")));
+    assert!(full.contains("the probe could not be started: Resource temporarily unavailable"), "{full}");
 }

@@ -8,11 +8,14 @@
 //! the loop is first-order with bandwidth w_c (internal model control); active resistance and back-calculation are
 //! common practice in the field. u in V, i in A, w_c and w^ in rad/s (electrical).
 
+use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
 use crate::frame::{Axis, DqHat, Estimated};
+use crate::math::sin_cos;
 use crate::motor::Motor;
 use fmu_core::unit::{ONE, RAD_PER_S};
-use fmu_core::{Row, Table};
+use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// Parameters of the current loop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -139,15 +142,46 @@ impl CurrentController {
     }
 }
 
+/// Greatest w_c T_s as a share of the gain at which a loop without resistance oscillates: 2 pi 0.06 with one sample of delay.
+const GREATEST_GAIN: f64 = 0.12 * PI;
+
+/// Checks that the sample period is short enough for the bandwidth.
+///
+/// A sampled integrator with d samples of delay oscillates at the gain w_c T_s = 2 sin(pi / (4 d + 2)): 2, 1 and 0.618 for d
+/// = 0, 1 and 2. With active resistance, which doubles the gain, it does at 2, 0.456 and 0.268.
+///
+/// # Errors
+/// The loop would oscillate, or nearly so.
+pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+    let critical = 2.0 * sin_cos(PI / f64::from(4 * par.delay + 2)).0;
+    let most = GREATEST_GAIN * critical / par.T_s;
+    if par.current.bandwidth <= most * (1.0 + 1e-9) {
+        return Ok(());
+    }
+    let table = ALL_PARAMETERS;
+    let allowed = format!(
+        "at most {most:.4} rad/s (2 pi {:.3} / T_s) with {} and {}, or the current oscillates; lower it or T_s",
+        0.06 * critical,
+        table.tell(par, |p| &mut p.T_s),
+        table.tell(par, |p| &mut p.delay)
+    );
+    Err(table.fault(par, |p| &mut p.current.bandwidth, allowed))
+}
+
 type P = Row<CurrentLoop>;
 
 /// Variables of the current loop; their owner supplies the prefix `current.`.
 pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
     const {
         &[
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the current loop", |p| &mut p.bandwidth)
-                .above(0.0)
-                .tunable(),
+            P::parameter(
+                "bandwidth",
+                &RAD_PER_S,
+                "Bandwidth of the current loop, at most 2 pi 0.06 / T_s with timing.delay = 1",
+                |p| &mut p.bandwidth,
+            )
+            .above(0.0)
+            .tunable(),
             P::boolean_parameter(
                 "active_resistance",
                 "false: Kp = wc L, Ki = wc R; true: Ki = wc^2 L with active resistance wc L - R",
@@ -165,7 +199,7 @@ pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
             ),
             P::boolean_parameter(
                 "mtpa",
-                "Maximum torque per ampere; false: i_d = 0. The estimator Rasmussen uses zero_speed for i_d instead",
+                "Maximum torque per ampere; false: i_d = 0. With Rasmussen and FluxObserver, as far as zero_speed is not active",
                 |p| &mut p.mtpa,
             ),
         ]

@@ -101,7 +101,7 @@ impl SensorlessController {
     /// Values from the sensors and the previous samples.
     #[inline(always)]
     fn measure(&self) -> Sample {
-        let Self { inputs, parameters: par, state, .. } = self;
+        let Self { inputs, parameters: par, gains, state, .. } = self;
         let i = self.currents().to_stator();
         // The command applied since the last sample: the newest one if there is no delay.
         let [newest, older, oldest] = &state.commands;
@@ -125,6 +125,7 @@ impl SensorlessController {
             u_pi: state.u_pi,
             i_ref: state.i_ref,
             tau_ref: state.tau_ref,
+            rho: if state.weakening.weakens { gains.weakening.tracker(state.i_ref) } else { 0.0 },
             theta_meas: inputs.theta_meas,
             w_meas: f64::from(par.motor.n_p) * inputs.speed_meas,
             u_dc: inputs.u_dc,

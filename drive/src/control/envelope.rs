@@ -191,10 +191,17 @@ impl Envelope {
         Some(i_d)
     }
 
+    /// Change of the torque with the angle of the rotor ahead of the frame that holds the currents `i` (A), in N.m/rad: 0 at
+    /// maximum torque per ampere.
+    #[inline]
+    pub fn slope(&self, i: DqHat) -> f64 {
+        -self.k * (i.d() * (self.psi_M - self.dL * i.d()) + self.dL * i.q() * i.q())
+    }
+
     /// Whether i_d is less than that of maximum torque per ampere at the same torque.
     #[inline]
     pub fn beyond_mtpa(&self, i: DqHat) -> bool {
-        i.d() * (self.psi_M - self.dL * i.d()) + self.dL * i.q() * i.q() < 0.0
+        self.slope(i) > 0.0
     }
 
     /// i_q (A) for the torque `tau` (N.m) beside `i_d` (A).

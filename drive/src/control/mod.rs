@@ -13,5 +13,6 @@ pub mod speed;
 pub mod start;
 mod state;
 pub mod tables;
+pub mod tracking;
 pub mod weakening;
 pub mod zero_speed;

@@ -1,9 +1,9 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
-use crate::control::current::CurrentGains;
+use crate::control::current::{self, CurrentGains};
 use crate::control::lock::{LOST, Lock, LockGains, Reach};
 use crate::control::polarity;
-use crate::control::reference::max_torque;
+use crate::control::reference::{max_torque, max_torque_per_ampere};
 use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
 use crate::control::start::StartMode;
@@ -12,6 +12,7 @@ use crate::control::tables::{
     ADAPTATION_OUTPUTS, ControllerParameters, LATER_OUTPUTS, LATEST_PARAMETERS, OUTPUTS, PARAMETERS,
 };
 use crate::control::weakening::{self, WEAKENING, WeakeningGains};
+use crate::control::zero_speed::{self, ZeroSpeed};
 use crate::estimator::resistance::ADAPTATION;
 use crate::estimator::tables::LATER_ESTIMATOR_PARAMETERS;
 use crate::estimator::{Class, Estimator, Sample};
@@ -123,26 +124,22 @@ impl SensorlessController {
     pub(crate) fn validate_on(&self, u_dc: f64) -> Result<(), Fault> {
         let par = &self.parameters;
         let ControllerParameters { limit, zero_speed, estimator, start, .. } = par;
+        estimator.validate(par)?;
+        current::validate(par)?;
         if start.mode == StartMode::CurrentFrequency && start.i > limit.i {
             return Err(above_limit(par, |p| &mut p.start.i));
         }
         if start.mode == StartMode::Injection {
-            if !estimator.class().injects() {
-                return Err(Fault::new(format!(
-                    "{} and {}: the start by injection needs an estimator that injects",
-                    PARAMETERS.tell(par, |p| &mut p.start.mode),
-                    PARAMETERS.tell(par, |p| &mut p.estimator)
-                )));
-            }
             polarity::validate(par)?;
         }
-        estimator.validate(par)?;
         // A running drive has to live with its DC link.
         weakening::validate(par, if self.state.samples == 0 { u_dc } else { 0.0 })?;
-        if zero_speed.i_0 > limit.i {
+        // The start value holds no estimator back that does not read it.
+        let reads = estimator.class() == Class::FluxObserver;
+        if zero_speed.i_0 > limit.i && (reads || zero_speed.i_0 > ZeroSpeed::default().i_0) {
             return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
         }
-        Ok(())
+        zero_speed::validate(par)
     }
 }
 
@@ -169,15 +166,17 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 11;
+    const STATE_VERSION: u16 = 12;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
         // Finite, so that no current is no torque with any psi_M.
         let k = motor.torque_constant().min(f64::MAX);
         let observes_flux = estimator.class() == Class::FluxObserver;
-        let tau = if observes_flux { limit.tau } else { max_torque(motor, limit, current.mtpa) };
-        let weakening = WeakeningGains::new(&self.parameters, tau, current.mtpa && !observes_flux);
+        // With i_d of the low-speed law, the limits of the currents are those of each sample.
+        let by_law = observes_flux && !current.mtpa;
+        let tau = if by_law { limit.tau } else { max_torque(motor, limit, current.mtpa) };
+        let weakening = WeakeningGains::new(&self.parameters, tau, current.mtpa);
         let speed = SpeedGains::new(speed_loop, *J, k);
         let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
         let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p * k * i / J };
@@ -190,6 +189,7 @@ impl Model for SensorlessController {
             speed,
             k,
             i_tau: tau / k,
+            i_d_end: max_torque_per_ampere(motor, tau).d(),
             observes_flux,
             lock: LockGains::new(lock, motor, *T_s, reach),
             weakening,

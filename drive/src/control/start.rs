@@ -184,7 +184,11 @@ type P = Row<StartParameters>;
 pub const START: &Table<StartParameters> = &Table::new(
     const {
         &[
-            P::enumeration_parameter("mode", "Start sequence before the estimator takes over", &Field(|p| &mut p.mode)),
+            P::enumeration_parameter(
+                "mode",
+                "Start sequence before the estimator takes over; Injection needs an estimator that injects",
+                &Field(|p| &mut p.mode),
+            ),
             P::parameter("i", &AMPERE, "Magnitude of the rotating current vector, I-f start", |p| &mut p.i).above(0.0),
             P::parameter("t_align", &SECOND, "Duration of each of the two alignments, I-f start", |p| &mut p.t_align)
                 .above(0.0),

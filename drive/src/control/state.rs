@@ -11,7 +11,7 @@ use crate::control::tables::ControllerParameters;
 use crate::control::weakening::{Weakening, WeakeningGains};
 use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
-use crate::math::{at_most, within, wrap};
+use crate::math::{at_least, at_most, within, wrap};
 use crate::motor::Motor;
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +33,8 @@ pub(super) struct Gains {
     pub(super) k: f64,
     /// Maximum torque in N.m divided by the torque constant: the limit of the speed loop in A.
     pub(super) i_tau: f64,
+    /// i_d in A of the maximum torque, by maximum torque per ampere.
+    pub(super) i_d_end: f64,
     /// The estimator is a flux observer: it needs the low-speed law at standstill, where the others would only have its
     /// losses.
     pub(super) observes_flux: bool,
@@ -41,18 +43,55 @@ pub(super) struct Gains {
 }
 
 impl Gains {
-    /// Whether the references have maximum torque per ampere.
+    /// What a flux observer's low-speed law leaves at the estimated mechanical `speed` (rad/s); the others have none.
     #[inline]
-    fn mtpa(&self, par: &ControllerParameters) -> bool {
-        par.current.mtpa && !self.observes_flux
+    fn law(&self, par: &ControllerParameters, speed: f64) -> Law {
+        if !self.observes_flux {
+            return Law { limit: self.i_tau, ..Law::default() };
+        }
+        let share = par.zero_speed.share(speed);
+        let i_d = share * par.zero_speed.i_0;
+        let end = if par.current.mtpa { i_d + (1.0 - share) * self.i_d_end } else { i_d };
+        let i_q = par.limit.i_q_beside(end);
+        let most = if Self::exact(par) { par.motor.torque(end, i_q) / self.k } else { i_q };
+        Law { share, i_d, limit: at_least(at_most(most, self.i_tau), f64::MIN_POSITIVE) }
     }
 
-    /// References of the currents (A) without field weakening: of maximum torque per ampere for the torque of `i_q` (A), or
-    /// `i_d` and `i_q`.
+    /// Whether the torque counts the reluctance, beside i_d of the low-speed law too.
     #[inline]
-    fn currents(&self, par: &ControllerParameters, i_d: f64, i_q: f64) -> DqHat {
-        if self.mtpa(par) { max_torque_per_ampere(&par.motor, self.k * i_q) } else { DqHat::new(i_d, i_q) }
+    fn exact(par: &ControllerParameters) -> bool {
+        par.current.mtpa || par.speed_loop.torque_mode
     }
+
+    /// References of the currents (A) without field weakening for the torque of `i_q` (A): i_d of the `law`, and of maximum
+    /// torque per ampere as far as it is not active.
+    #[inline]
+    fn currents(&self, par: &ControllerParameters, law: &Law, i_q: f64) -> DqHat {
+        if par.current.mtpa && !self.observes_flux {
+            return max_torque_per_ampere(&par.motor, self.k * i_q);
+        }
+        if !(self.observes_flux && Self::exact(par)) {
+            return DqHat::new(law.i_d, i_q);
+        }
+        let mut i_d = law.i_d;
+        if par.current.mtpa {
+            // The limit is the end of the curve: no current exceeds its own limit before.
+            let most = max_torque_per_ampere(&par.motor, self.k * self.i_tau * (i_q / law.limit));
+            i_d += (1.0 - law.share) * most.d();
+        }
+        DqHat::new(i_d, self.k * i_q / par.motor.torque(i_d, 1.0))
+    }
+}
+
+/// The low-speed law at a sample.
+#[derive(Clone, Copy, Debug, Default)]
+struct Law {
+    /// Share of `zero_speed.i_0`.
+    share: f64,
+    /// i_d in A that it asks for.
+    i_d: f64,
+    /// Greatest torque in N.m that remains, divided by the torque constant.
+    limit: f64,
 }
 
 /// Parameters the estimator uses: at the first sample after retuning, still the previous ones.
@@ -274,14 +313,10 @@ impl State {
         if let Some(old) = old {
             self.speed.retune(old, &gains.speed, w_ref, speed);
         }
-        let (i_d_ref, limit) = if gains.observes_flux {
-            let i_d_ref = par.zero_speed.i_d_ref(speed);
-            (i_d_ref, at_most(par.limit.i_q_beside(i_d_ref), gains.i_tau))
-        } else {
-            (0.0, gains.i_tau)
-        };
+        let law = gains.law(par, speed);
+        let limit = law.limit;
         if par.weakening.used {
-            return self.weakened(gains, par, inputs, (speed, w_ref), (i_d_ref, limit), injection);
+            return self.weakened(gains, par, inputs, (speed, w_ref), &law, injection);
         }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
@@ -290,11 +325,11 @@ impl State {
             self.speed.update(&gains.speed, w_ref, speed, (-limit, limit), par.T_s)
         };
         let tau = gains.k * limit;
-        let i = gains.currents(par, i_d_ref, i_q_ref);
+        let i = gains.currents(par, &law, i_q_ref);
         References { i, limited: requested.abs() > limit, tau: (tau, tau), weakens: false }
     }
 
-    /// [`references`](Self::references) with field weakening, `limit` (A) of i_q beside `i_d_ref` (A).
+    /// [`references`](Self::references) with field weakening.
     #[inline(never)]
     fn weakened(
         &mut self,
@@ -302,12 +337,12 @@ impl State {
         par: &ControllerParameters,
         inputs: &ControllerInputs,
         (speed, w_ref): (f64, f64),
-        (i_d_ref, limit): (f64, f64),
+        law: &Law,
         injection: Injection,
     ) -> References {
         let w = f64::from(par.motor.n_p) * speed;
         let at = (w, inputs.u_dc, injection.magnitude());
-        let (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, limit, self.k);
+        let (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, law.limit, self.k);
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
             (requested.clamp(-low, high), requested)
@@ -318,9 +353,9 @@ impl State {
         };
         let limited = requested > high || requested < -low;
         self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
-        let (tau, mtpa) = (gains.k * i_q_ref, gains.mtpa(par));
-        let today = || gains.currents(par, i_d_ref, i_q_ref);
-        let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, mtpa, today);
+        let tau = gains.k * i_q_ref;
+        let today = || gains.currents(par, law, i_q_ref);
+        let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, par.current.mtpa, today);
         References { i, limited, tau: (gains.k * low, gains.k * high), weakens: self.weakening.weakens }
     }
 

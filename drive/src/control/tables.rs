@@ -94,7 +94,7 @@ const LATER_COMPENSATION: &Table<Compensation> = &Table::new(
         &[
             C::boolean_parameter(
                 "observe",
-                "The estimators subtract the dead-time voltage at the measured currents; false: they assume that the compensation is exact",
+                "The estimators and lock_lost subtract the dead-time voltage at the measured currents; false: they assume that the compensation is exact",
                 |p| &mut p.observe,
             ),
             C::boolean_parameter(

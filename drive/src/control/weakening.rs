@@ -12,11 +12,14 @@
 //! follows: dI/dt = w_s (limited - wanted), besides the hold of [`speed`](crate::control::speed).
 //!
 //! A limit is computed at every sample while it acts, else at every eighth one and when the voltage has changed by 1 %.
+//!
+//! The tracker's bandwidth while weakening: [`tracking`](crate::control::tracking).
 
 use crate::control::envelope::{Envelope, Limit, Warm};
 use crate::control::reference::{max_torque, max_torque_per_ampere};
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
-use crate::estimator::{Class, Kind};
+use crate::control::tracking::LeastTracker;
+use crate::estimator::Kind;
 use crate::frame::DqHat;
 use fmu_core::unit::{ONE, RAD_PER_S};
 use fmu_core::{Fault, Row, Table};
@@ -40,7 +43,7 @@ const LEAST_CHANGE: f64 = 0.01;
 const LEAST_SPEED: f64 = 1e-3;
 
 /// Least torque per ampere of i_q, as a share of that of the magnet alone.
-const LEAST_TORQUE: f64 = 0.2;
+pub(super) const LEAST_TORQUE: f64 = 0.2;
 
 /// Parameters of field weakening.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -73,6 +76,8 @@ pub struct WeakeningGains {
     voltage: [f64; 3],
     /// Least useful i_d in A.
     least: f64,
+    /// Least bandwidth of the tracker.
+    pub(super) tracker: LeastTracker,
 }
 
 impl WeakeningGains {
@@ -93,11 +98,18 @@ impl WeakeningGains {
             per_torque: 1.0 / motor.torque_constant(),
             voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
             least: -limit.i.min(motor.psi_M / motor.L_d),
+            tracker: LeastTracker::new(par),
         }
     }
 }
 
 impl WeakeningGains {
+    /// Least bandwidth in rad/s of the tracker with the currents `i` (A).
+    #[inline]
+    pub fn tracker(&self, i: DqHat) -> f64 {
+        self.tracker.at(self.envelope.slope(i))
+    }
+
     /// Electrical speed in rad/s below which all of today's references fit the voltage `U` (V).
     pub fn onset(&self, U: f64) -> f64 {
         let [copper, cross, flux] = self.voltage;
@@ -251,7 +263,7 @@ pub fn share(u: f64, u_dc: f64) -> f64 {
 /// # Errors
 /// States which parameters do not fit together, and what to do.
 pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
-    let ControllerParameters { weakening: own, motor, limit, estimator, zero_speed, .. } = par;
+    let ControllerParameters { weakening: own, motor, limit, estimator, .. } = par;
     if !own.used {
         return Ok(());
     }
@@ -262,12 +274,6 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
     if own.k_t < own.k_u {
         let least = table.tell(par, |p| &mut p.weakening.k_u);
         return Err(table.fault(par, |p| &mut p.weakening.k_t, format!("at least {least}")));
-    }
-    if estimator.class() == Class::Injection {
-        return Err(Fault::new(format!(
-            "{use_is} with {estimator_is}: injection leaves no voltage for field weakening; choose Hybrid, or set the first \
-             to false"
-        )));
     }
     if *estimator == Kind::Hybrid && u_dc > 0.0 {
         // Above this speed the references may need field weakening; an injection leaves them less voltage.
@@ -304,16 +310,6 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
              {most:.4} A (0.8 psi_M / (L_d - L_q))"
         )));
     }
-    if estimator.class() == Class::FluxObserver
-        && zero_speed.i_0 * (motor.L_q - motor.L_d) > (1.0 - LEAST_TORQUE) * motor.psi_M
-    {
-        return Err(Fault::new(format!(
-            "{} with {use_is} and L_q > L_d: the torque of i_q vanishes at the current psi_M / (L_q - L_d); at most {:.4} A \
-             (0.8 psi_M / (L_q - L_d))",
-            table.tell(par, |p| &mut p.zero_speed.i_0),
-            -most
-        )));
-    }
     Ok(())
 }
 
@@ -325,7 +321,7 @@ pub const WEAKENING: &Table<WeakeningParameters> = &Table::new(
         &[
             P::boolean_parameter(
                 "use",
-                "Field weakening: i_d and the torque limits follow the voltage of u_dc; false: no i_d beyond current.mtpa",
+                "Field weakening: i_d and the torque limits follow the voltage of u_dc, injection methods refuse it; false: no i_d beyond current.mtpa",
                 |p| &mut p.used,
             ),
             P::parameter(

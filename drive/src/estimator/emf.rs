@@ -25,10 +25,10 @@
 //! The angle's gain fades with the EMF, and the speed goes on through zero with e_q, so that theta^ is its integral: the
 //! error grows with the time spent there, by (R - R^) i / psi_M in rad/s. It is for passing zero, not for staying.
 
-use crate::control::tables::{ALL_PARAMETERS, ControllerParameters, PARAMETERS};
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Kind, Sample};
+use crate::estimator::{Context, Estimate, Sample};
 use crate::frame::DqHat;
 use crate::math::{atan2, exp};
 use fmu_core::unit::RAD_PER_S;
@@ -164,25 +164,6 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Checks that the estimator can hold a reversal if it is asked to.
-///
-/// # Errors
-/// The estimator does not take the direction from the sign of an EMF.
-pub fn validate_reversal(kind: Kind, par: &ControllerParameters) -> Result<(), Fault> {
-    use Kind::{DirectEmf, EmfObserver, ExtendedEmf, SlidingMode, VoltageFeedback};
-    if !par.estimators.emf.hold_reversal
-        || matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | SlidingMode)
-    {
-        return Ok(());
-    }
-    let allowed = format!(
-        "false with {}: it does not take the direction of rotation from the sign of the EMF; set it to false, or take \
-         DirectEmf, EmfObserver, ExtendedEmf, VoltageFeedback or SlidingMode",
-        ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
-    );
-    Err(ALL_PARAMETERS.fault(par, |p| &mut p.estimators.emf.hold_reversal, allowed))
-}
-
 /// Pole of a sampled first-order system with the bandwidth `w` (rad/s).
 #[inline]
 pub fn pole(w: f64, T_s: f64) -> f64 {
@@ -207,7 +188,7 @@ pub const EMF: &Table<EmfParameters> = &Table::new(
             .above(0.0),
             P::boolean_parameter(
                 "frame_term",
-                "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18)",
+                "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18); false: methods with this term alone",
                 |p| &mut p.frame_term,
             ),
         ]
@@ -220,7 +201,7 @@ pub const REVERSAL: &Table<EmfParameters> = &Table::new(
         &[
             P::boolean_parameter(
                 "hold_reversal",
-                "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held",
+                "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; others than the EMF methods refuse it",
                 |p| &mut p.hold_reversal,
             ),
             P::parameter(

@@ -36,14 +36,13 @@
 //! Limits: at w = 0 the angle is not observable; without current, neither is R. An offset of the current sensors acts like
 //! a wrong R^ that turns: 20 mA loses cells at 0.01 pu. L_q^ = 1.2 L_q loses rated motoring load at 0.02 and 0.05 pu.
 
-use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
 use crate::estimator::resistance::{FILTER, STANDSTILL};
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Kind, Sample};
+use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Sample};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use crate::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 
 /// Share of `rho_0` above which the magnet flux adapts more slowly.
@@ -135,7 +134,7 @@ impl Estimating for FluxObserver {
         }
         self.v = psi_a * (c * r);
         self.psi_M -= T_s * par.flux_observer.magnet * r * psi_M / (1.0 + others * others);
-        self.tracker.correct(context, par.tracker.bandwidth, -inverse * psi_a.cross(e), sample.tau_ref);
+        self.tracker.correct(context, par.tracker.bandwidth, -inverse * psi_a.cross(e), sample);
         Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, ..Estimate::default() }
     }
 
@@ -162,21 +161,6 @@ impl FluxObserver {
     }
 }
 
-/// Checks that the estimator adapts the magnet flux if it is asked to.
-///
-/// # Errors
-/// It is another estimator.
-pub fn validate_magnet(kind: Kind, par: &ControllerParameters) -> Result<(), Fault> {
-    if kind == Kind::FluxObserver || par.estimators.flux_observer.magnet == 0.0 {
-        return Ok(());
-    }
-    let allowed = format!(
-        "0 with {}, which does not adapt psi_M; set it to 0, or estimator = FluxObserver",
-        ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
-    );
-    Err(ALL_PARAMETERS.fault(par, |p| &mut p.estimators.flux_observer.magnet, allowed))
-}
-
 /// Stator flux linkage in Wb.
 #[inline]
 fn flux(motor: &Motor, psi_M: f64, i: DqHat) -> DqHat {
@@ -192,9 +176,12 @@ pub const FLUX_OBSERVER: &Table<FluxObserverParameters> = &Table::new(
             P::parameter("k_w", &ONE, "Feedback gain of the flux error per electrical speed", |p| &mut p.k_w)
                 .at_least(0.0)
                 .tunable(),
-            P::parameter("magnet", &PER_SECOND, "Rate at which FluxObserver adapts psi_M; 0: motor.psi_M", |p| {
-                &mut p.magnet
-            })
+            P::parameter(
+                "magnet",
+                &PER_SECOND,
+                "Rate at which FluxObserver adapts psi_M, the others refuse it; 0: motor.psi_M",
+                |p| &mut p.magnet,
+            )
             .at_least(0.0),
         ]
     },

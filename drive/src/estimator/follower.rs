@@ -98,7 +98,7 @@ pub const MATSUI: &Table<MatsuiParameters> = &Table::new(
             .tunable(),
             P::boolean_parameter(
                 "integral",
-                "Integrate the angle error, so that a speed bias causes no angle error; false: as printed",
+                "Integrate the angle error, so that a speed bias causes no angle error; false: as printed, VoltageModel and CurrentModel alone",
                 |p| &mut p.integral,
             ),
         ]

@@ -81,7 +81,7 @@ impl Estimating for GradientObserver {
             self.eta = self.eta * (1.0 + (gain * off).max(-0.5));
         }
         let eta = axis.from_stator(self.eta);
-        self.tracker.correct(context, par.tracker.bandwidth, atan2(eta.q(), eta.d()), sample.tau_ref);
+        self.tracker.correct(context, par.tracker.bandwidth, atan2(eta.q(), eta.d()), sample);
         Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, ..Estimate::default() }
     }
 }
@@ -109,7 +109,7 @@ pub const GRADIENT: &Table<GradientParameters> = &Table::new(
             .tunable(),
             P::boolean_parameter(
                 "clamped",
-                "Both components of the flux limited to the magnet's, as in open motor controllers; no gradient",
+                "GradientObserver, the others refuse it: both components of the flux limited to the magnet's, as in open motor controllers",
                 |p| &mut p.clamped,
             ),
         ]

@@ -87,7 +87,7 @@ impl Estimating for Hybrid {
         let e_emf = emf.angle_error(context, &x, tracker.w);
         let h = context.par.hybrid.share(tracker.w);
         let rho = (1.0 - h) * context.par.tracker.bandwidth + h * context.par.hybrid.bandwidth;
-        tracker.correct(context, rho, (1.0 - h) * e_injection + h * e_emf, sample.tau_ref);
+        tracker.correct(context, rho, (1.0 - h) * e_injection + h * e_emf, sample);
         self.estimate(context, sample, i)
     }
 

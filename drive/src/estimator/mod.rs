@@ -23,6 +23,7 @@ pub mod hybrid;
 pub mod interval;
 pub mod kalman;
 pub mod near_pwm;
+pub mod options;
 pub mod pulsating;
 pub mod rasmussen;
 pub mod resistance;
@@ -66,6 +67,8 @@ pub struct Sample {
     pub i_ref: DqHat,
     /// Torque reference of sample k - 1, limited, in N.m.
     pub tau_ref: f64,
+    /// Least bandwidth of a tracker in rad/s that field weakening asks for; 0: none.
+    pub rho: f64,
     /// Electrical angle from a sensor in rad.
     pub theta_meas: f64,
     /// Electrical speed from a sensor in rad/s.
@@ -234,12 +237,11 @@ macro_rules! estimators {
             /// Checks that the controller's parameters suit this estimator.
             ///
             /// # Errors
-            /// As for [`Estimating::validate`], or the tracker cannot work.
+            /// As for [`Estimating::validate`], or an option is not the estimator's, or the tracker cannot work.
             pub fn validate(self, par: &ControllerParameters) -> Result<(), Fault> {
                 tracker::validate(par)?;
-                resistance::validate(self, par)?;
-                emf::validate_reversal(self, par)?;
-                flux_observer::validate_magnet(self, par)?;
+                options::validate(par)?;
+                resistance::validate(par)?;
                 match self {
                     $(Self::$name => <$state>::validate(par),)*
                 }

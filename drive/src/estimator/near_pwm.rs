@@ -88,7 +88,7 @@ impl Estimating for NearPwmInjection {
         *products = [newest, products[0]];
         let sign = Admittance::of(context.motor).difference.signum();
         let e = 0.5 * atan2(sign * sum.q(), sign * sum.d());
-        tracker.correct(context, context.par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample.tau_ref);
+        tracker.correct(context, context.par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample);
 
         let i = Axis::<Estimated>::at(tracker.theta).from_stator(sample.i);
         let free = (i + currents[0] + currents[1]) * (1.0 / 3.0);

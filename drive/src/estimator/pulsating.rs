@@ -86,7 +86,7 @@ impl Estimating for PulsatingInjection {
         let epsilon = low_pass.update(&carrier, demodulated);
         let V = par.carrier.voltage;
         let e = epsilon / (2.0 * T_s * Admittance::of(motor).difference * V * V);
-        tracker.correct(context, par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample.tau_ref);
+        tracker.correct(context, par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample);
 
         let axis = Axis::<Estimated>::at(tracker.theta);
         let i = axis.from_stator(sample.i);
@@ -107,7 +107,7 @@ pub const PULSATING: &Table<PulsatingParameters> = &Table::new(
     const {
         &[P::enumeration_parameter(
             "demodulation",
-            "Demodulation of the carrier current",
+            "Demodulation of the carrier current; the second is refused with other estimators than PulsatingInjection",
             &Field(|p| &mut p.demodulation),
         )]
     },

@@ -46,7 +46,7 @@
 //! nothing tells when the rotor may stand: R^ stays `motor.R_s`.
 
 use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
-use crate::estimator::{Context, Kind, Sample};
+use crate::estimator::{Context, Sample};
 use crate::frame::DqHat;
 use crate::motor::Motor;
 use fmu_core::unit::{AMPERE, ONE, PER_SECOND};
@@ -189,34 +189,14 @@ impl Resistance {
     }
 }
 
-/// Checks that the estimator adapts the resistance if it is asked to, and that the clamps contain `motor.R_s`.
+/// Checks that the clamps contain `motor.R_s`.
 ///
 /// # Errors
 /// States which parameter is unsuitable, and what to do.
-pub fn validate(kind: Kind, par: &ControllerParameters) -> Result<(), Fault> {
+pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
     let adaptation = &par.estimators.adaptation;
     if !adaptation.resistance {
         return Ok(());
-    }
-    if !matches!(kind, Kind::Rasmussen | Kind::FluxObserver) {
-        return Err(ALL_PARAMETERS.fault(
-            par,
-            |p| &mut p.estimators.adaptation.resistance,
-            format!(
-                "{} has no resistance adaptation; set estimator = Rasmussen or FluxObserver, or adaptation.resistance = false",
-                ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
-            ),
-        ));
-    }
-    if adaptation.tracking > 0.0 && kind != Kind::Rasmussen {
-        return Err(ALL_PARAMETERS.fault(
-            par,
-            |p| &mut p.estimators.adaptation.tracking,
-            format!(
-                "0 with {}, which adapts the resistance at every speed by itself; set adaptation.tracking = 0, or estimator = Rasmussen",
-                ALL_PARAMETERS.tell(par, |p| &mut p.estimator)
-            ),
-        ));
     }
     if adaptation.min > 1.0 {
         return Err(ALL_PARAMETERS.fault(
@@ -248,7 +228,7 @@ pub const LATER_ADAPTATION: &Table<ResistanceParameters> = &Table::new(
             P::parameter(
                 "tracking",
                 &ONE,
-                "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed; 0: it stays constant there",
+                "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed, others refuse it; 0: it stays constant there",
                 |p| &mut p.tracking,
             )
             .at_least(0.0)
@@ -272,13 +252,13 @@ pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
         &[
             P::boolean_parameter(
                 "resistance",
-                "Rasmussen (while standstill is asked for) and FluxObserver adapt the resistance; false: motor.R_s",
+                "Rasmussen (while standstill is asked for) and FluxObserver adapt the resistance, the others refuse it; false: motor.R_s",
                 |p| &mut p.resistance,
             ),
             P::parameter(
                 "k_a",
                 &ONE,
-                "Voltage on the q axis near standstill as a share of R_s i_q: lets the d-axis current carry the load",
+                "Rasmussen: voltage on the q axis near standstill as a share of R_s i_q, lets the d-axis current carry the load; others refuse it",
                 |p| &mut p.k_a,
             )
             .at_least(0.0)

@@ -59,7 +59,7 @@ impl Estimating for RotatingInjection {
 
         let (V, D) = (par.carrier.voltage, Admittance::of(motor).difference);
         let e = epsilon / (2.0 * T_s * D * V * V) + tracker.w * T_s / carrier.alpha;
-        tracker.correct(context, par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample.tau_ref);
+        tracker.correct(context, par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample);
         let free = sample.i - notch.update(&carrier, sample.i);
         self.estimate(&carrier, free)
     }

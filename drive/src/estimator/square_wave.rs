@@ -111,7 +111,7 @@ impl Estimating for SquareWaveInjection {
         let Self { tracker, demodulation } = self;
         tracker.advance(context.T_s);
         let (e, i) = demodulation.update(context, sample, tracker.theta_last, tracker.theta);
-        tracker.correct(context, context.par.tracker.bandwidth, e, sample.tau_ref);
+        tracker.correct(context, context.par.tracker.bandwidth, e, sample);
         self.estimate(context, sample, i)
     }
 

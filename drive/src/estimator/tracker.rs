@@ -10,6 +10,7 @@
 
 use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::{Context, Estimate, Sample};
+use crate::math::at_least;
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Fault, Field, Row, Table, enumeration};
 use serde::{Deserialize, Serialize};
@@ -68,14 +69,14 @@ impl Tracker {
     }
 
     /// Corrects the state with the angle error `e` (rad) and the bandwidth `rho` (rad/s): the angle from the next
-    /// sample on, the speed immediately. `tau_ref` (N.m) is the torque reference.
+    /// sample on, the speed immediately. Field weakening may ask for a faster one.
     #[inline]
-    pub fn correct(&mut self, context: &Context, rho: f64, e: f64, tau_ref: f64) {
-        let T_s = context.T_s;
+    pub fn correct(&mut self, context: &Context, rho: f64, e: f64, sample: &Sample) {
+        let (T_s, rho) = (context.T_s, at_least(rho, sample.rho));
         if context.par.tracker.kind == TrackerKind::MechanicalObserver {
             let inertia = context.J / f64::from(context.motor.n_p);
             self.w_frame = self.w + 3.0 * rho * e;
-            self.w += T_s * ((tau_ref - self.tau_load) / inertia + 3.0 * rho * rho * e);
+            self.w += T_s * ((sample.tau_ref - self.tau_load) / inertia + 3.0 * rho * rho * e);
             self.tau_load -= T_s * inertia * rho * rho * rho * e;
         } else {
             self.w_frame = self.w + 2.0 * rho * e;
@@ -105,7 +106,7 @@ impl Tracker {
     /// the estimated angle and speed.
     #[inline]
     pub fn follow(&mut self, context: &Context, e: f64, sample: &Sample) -> Estimate {
-        self.correct(context, context.par.tracker.bandwidth, e, sample.tau_ref);
+        self.correct(context, context.par.tracker.bandwidth, e, sample);
         Estimate::new(self.theta, self.w, sample)
     }
 }
@@ -118,12 +119,15 @@ pub const TRACKER: &Table<TrackerParameters> = &Table::new(
         &[
             P::enumeration_parameter(
                 "kind",
-                "Tracker of angle and speed from the angle error",
+                "Tracker of angle and speed from the angle error; estimators without a tracker refuse the second",
                 &Field(|p| &mut p.kind),
             ),
-            P::parameter("bandwidth", &RAD_PER_S, "Magnitude of the tracker's double or triple pole", |p| {
-                &mut p.bandwidth
-            })
+            P::parameter(
+                "bandwidth",
+                &RAD_PER_S,
+                "Magnitude of the tracker's double or triple pole; field weakening raises it where angle errors make torque",
+                |p| &mut p.bandwidth,
+            )
             .above(0.0)
             .tunable(),
         ]
@@ -150,7 +154,12 @@ mod tests {
             tracker.advance(context.T_s);
             theta += context.T_s * w + 0.5 * context.T_s * context.T_s * acceleration;
             w += context.T_s * acceleration;
-            tracker.correct(&context, par.tracker.bandwidth, theta - tracker.theta, tau_ref);
+            tracker.correct(
+                &context,
+                par.tracker.bandwidth,
+                theta - tracker.theta,
+                &Sample { tau_ref, ..Sample::default() },
+            );
         }
         (theta - tracker.theta, w - tracker.w)
     }

@@ -223,10 +223,12 @@ impl Model for PmsmPlant {
         self.by_iron = self.current_by_iron();
         // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
-        let tau_shaft = mechanics.tau_shaft(0.0 - friction, self.inputs.tau_load);
+        let p_mech = mechanics.tau_shaft(0.0 - friction, self.inputs.tau_load) * speed;
         let losses = Losses { friction: friction * speed, ..Losses::default() };
-        self.powers =
-            Powers { p_mech: tau_shaft * speed, p_loss: losses.friction, losses, tau_shaft, ..Powers::default() };
+        let (at, _) = self.reached_with_iron();
+        let tau_e = self.machine().torque(at.psi, at.i);
+        let tau_shaft = mechanics.tau_shaft(tau_e - friction, self.inputs.tau_load);
+        self.powers = Powers { p_mech, p_loss: losses.friction, losses, tau_shaft, ..Powers::default() };
     }
 
     fn output(&self, _now: Elapsed, out: &mut PlantOutputs) {

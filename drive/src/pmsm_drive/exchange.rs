@@ -98,6 +98,7 @@ impl Events for PmsmDrive {
             controller.model.sample()?;
             let PlantInputs { u, enable, .. } = plant.model.inputs;
             self.before = (u, enable);
+            self.watch_load();
         }
         self.pair.plant.model.event(now)
     }

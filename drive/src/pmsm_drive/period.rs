@@ -6,7 +6,7 @@ use fmu_core::unit::{NEWTON_METER, WATT};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// Means over the last sample period; 0 before its end.
+/// Means over the last sample period; 0 before the first is over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Means {
     /// Power from the DC link in W.
@@ -81,7 +81,7 @@ pub(super) const MEANS: &Table<Means> = &Table::new(
             M::discrete_output(
                 "p_in_mean",
                 &WATT,
-                "Power from the DC link, mean over the last T_s in Co-Simulation and in Model Exchange; 0 before its end",
+                "Power from the DC link, mean over the last T_s in Co-Simulation and in Model Exchange; 0 before the first is over",
                 |m| &mut m.p_in,
             ),
             M::discrete_output(

@@ -20,7 +20,7 @@ pub(super) const CHECKS: &[Check] = &[
 /// Stack in bytes of the smallest thread that an importer may run the FMU in.
 const STACK: usize = 256 << 10;
 
-fn failed(e: &std::io::Error) -> NotDetermined {
+pub(super) fn failed(e: &std::io::Error) -> NotDetermined {
     NotDetermined(e.to_string())
 }
 

@@ -1,10 +1,14 @@
 //! Several instances, threads, copies, loading and unloading.
 
+use super::host::failed;
 use crate::check::{Check, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use crate::trajectory::trajectory;
+use fmu_import::guard::patiently;
 use fmu_import::raw::Raw;
+use std::sync::{Mutex, PoisonError};
+use std::thread::Builder;
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
@@ -60,12 +64,18 @@ fn threads(session: &Session) -> Result<(), NotDetermined> {
     let alone = trajectory(&session.stepping()?, 40)?;
     let duplicates = (0..4).map(|k| session.duplicate(k)).collect::<Result<Vec<_>, _>>()?;
     session.record_call("4 threads, each with an instance, 40 steps");
+    let duplicates: Vec<_> = duplicates.into_iter().map(|duplicate| Mutex::new(Some(duplicate))).collect();
     let results: Vec<Result<Vec<Vec<Vec<u64>>>, NotDetermined>> = std::thread::scope(|scope| {
-        let run = |duplicate: &Session| trajectory(&duplicate.stepping()?, 40);
-        let workers: Vec<_> = duplicates.into_iter().map(|duplicate| scope.spawn(move || run(&duplicate))).collect();
+        let run = |duplicate: &Mutex<Option<Session>>| {
+            let duplicate = duplicate.lock().unwrap_or_else(PoisonError::into_inner).take();
+            let duplicate = duplicate.ok_or_else(|| NotDetermined("the thread has no instance".into()))?;
+            trajectory(&duplicate.stepping()?, 40)
+        };
+        let start = |duplicate| patiently(|| Builder::new().spawn_scoped(scope, move || run(duplicate)));
+        let workers = duplicates.iter().map(start).collect::<Result<Vec<_>, _>>().map_err(|e| failed(&e))?;
         let panicked = || Err(NotDetermined("the thread panicked".into()));
-        workers.into_iter().map(|w| w.join().unwrap_or_else(|_| panicked())).collect()
-    });
+        Ok::<_, NotDetermined>(workers.into_iter().map(|w| w.join().unwrap_or_else(|_| panicked())).collect())
+    })?;
     for (k, rows) in results.into_iter().enumerate() {
         match rows {
             Err(why) => session.failed(&format!("thread {k}"), why),
@@ -80,15 +90,19 @@ fn moving_between_threads(session: &Session) -> Result<(), NotDetermined> {
     let (start, h, raw) = (session.start(), session.h(), &session.raw);
     session.record_call("DoStep in another thread");
     let stepped = std::thread::scope(|scope| {
-        scope.spawn(move || raw.do_step(handle, start, h, false, [true; 4]).map(|(s, _)| s)).join()
+        let step = move || raw.do_step(handle, start, h, false, [true; 4]).map(|(s, _)| s);
+        patiently(|| Builder::new().spawn_scoped(scope, step)).map(std::thread::ScopedJoinHandle::join)
     });
-    let status = stepped.ok().flatten();
+    let status = stepped.map_err(|e| failed(&e))?.ok().flatten();
     session.require(status.is_some_and(fmu_import::Status::is_ok), || {
         format!("DoStep in another thread returned {status:?}")
     });
     session.record_call("FreeInstance in a third thread");
-    let _ = std::thread::scope(|scope| scope.spawn(move || raw.free(handle)).join());
-    Ok(())
+    let freed = std::thread::scope(|scope| {
+        patiently(|| Builder::new().spawn_scoped(scope, move || raw.free(handle)))
+            .map(std::thread::ScopedJoinHandle::join)
+    });
+    freed.map(|_| ()).map_err(|e| failed(&e))
 }
 
 #[cfg(not(unix))]

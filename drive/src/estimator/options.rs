@@ -1,0 +1,143 @@
+//! Options that only some estimators have. With another one they are refused by name, so that none is ignored silently.
+//!
+//! An option is a variable that is off at its start value. Values of a method (bandwidths, voltages, noise densities) are no
+//! options: each estimator reads its own, and a set of values may hold those of several.
+
+use crate::control::start::StartMode;
+use crate::control::tables::{ALL_PARAMETERS, ControllerParameters as Par};
+use crate::estimator::pulsating::Demodulation;
+use crate::estimator::tracker::TrackerKind;
+use crate::estimator::{Class, Kind};
+use fmu_core::Fault;
+
+struct Choice {
+    /// Whether it is on.
+    asked: fn(&Par) -> bool,
+    /// Its name and value.
+    tell: fn(&Par) -> String,
+    /// Whether an estimator has it.
+    has: fn(Kind) -> bool,
+    /// What the others do not do.
+    why: &'static str,
+    /// How to turn it off.
+    off: &'static str,
+}
+
+const CHOICES: &[Choice] = &[
+    Choice {
+        asked: |p| p.start.mode == StartMode::Injection,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.start.mode),
+        has: |kind| kind.class().injects(),
+        why: "the start by injection needs an estimator that injects",
+        off: "set start.mode = CurrentFrequency or Direct",
+    },
+    Choice {
+        asked: |p| p.weakening.used,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.weakening.used),
+        has: |kind| kind.class() != Class::Injection,
+        why: "injection leaves no voltage for field weakening",
+        off: "set it to false",
+    },
+    Choice {
+        asked: |p| p.estimators.tracker.kind != TrackerKind::Pll,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.tracker.kind),
+        has: |kind| {
+            use Kind::{CurrentModel, KalmanFilter, Rasmussen, Sensored, VoltageModel};
+            !matches!(kind, Rasmussen | VoltageModel | CurrentModel | Sensored | KalmanFilter)
+        },
+        why: "it has no tracker",
+        off: "set it to Pll",
+    },
+    Choice {
+        asked: |p| p.estimators.adaptation.resistance,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.resistance),
+        has: |kind| matches!(kind, Kind::Rasmussen | Kind::FluxObserver),
+        why: "it does not adapt the resistance",
+        off: "set it to false",
+    },
+    Choice {
+        asked: |p| p.estimators.adaptation.tracking > 0.0,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.tracking),
+        has: |kind| kind == Kind::Rasmussen,
+        why: "only Rasmussen needs it; FluxObserver adapts the resistance at every speed",
+        off: "set adaptation.tracking = 0",
+    },
+    Choice {
+        asked: |p| p.estimators.adaptation.k_a > 0.0,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.k_a),
+        has: |kind| kind == Kind::Rasmussen,
+        why: "it does not turn the frame at rest",
+        off: "set adaptation.k_a = 0",
+    },
+    Choice {
+        asked: |p| p.estimators.flux_observer.magnet > 0.0,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.flux_observer.magnet),
+        has: |kind| kind == Kind::FluxObserver,
+        why: "it does not adapt psi_M",
+        off: "set it to 0",
+    },
+    Choice {
+        asked: |p| p.estimators.emf.hold_reversal,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.emf.hold_reversal),
+        has: |kind| {
+            use Kind::{DirectEmf, EmfObserver, ExtendedEmf, SlidingMode, VoltageFeedback};
+            matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | SlidingMode)
+        },
+        why: "it does not take the direction of rotation from the sign of the EMF",
+        off: "set it to false",
+    },
+    Choice {
+        asked: |p| !p.estimators.emf.frame_term,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.emf.frame_term),
+        has: |kind| {
+            use Kind::{CurrentModel, DirectEmf, EmfObserver, ExtendedEmf, Hybrid, VoltageFeedback, VoltageModel};
+            let by_emf = matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | Hybrid);
+            by_emf || matches!(kind, VoltageModel | CurrentModel)
+        },
+        why: "it has no such term",
+        off: "set it to true",
+    },
+    Choice {
+        asked: |p| !p.estimators.matsui.integral,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.matsui.integral),
+        has: |kind| matches!(kind, Kind::VoltageModel | Kind::CurrentModel),
+        why: "it has no such integral",
+        off: "set it to true",
+    },
+    Choice {
+        asked: |p| p.estimators.pulsating.demodulation != Demodulation::Heterodyne,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.pulsating.demodulation),
+        has: |kind| kind == Kind::PulsatingInjection,
+        why: "it has no pulsating carrier",
+        off: "set it to Heterodyne",
+    },
+    Choice {
+        asked: |p| p.estimators.gradient.clamped,
+        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.gradient.clamped),
+        has: |kind| kind == Kind::GradientObserver,
+        why: "it has no such clamp",
+        off: "set it to false",
+    },
+];
+
+/// Checks that the estimator has the options that are on.
+///
+/// # Errors
+/// It does not have one of them.
+pub fn validate(par: &Par) -> Result<(), Fault> {
+    let Some(choice) = CHOICES.iter().find(|choice| (choice.asked)(par) && !(choice.has)(par.estimator)) else {
+        return Ok(());
+    };
+    let names: Vec<&str> = Kind::ALL.iter().filter(|&&kind| (choice.has)(kind)).map(|kind| kind.name()).collect();
+    let names = match names.as_slice() {
+        [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
+        one => one.concat(),
+    };
+    Err(Fault::new(format!(
+        "{} is not allowed with {}: {}; {}, or set estimator = {names}",
+        (choice.tell)(par),
+        ALL_PARAMETERS.tell(par, |p| &mut p.estimator),
+        choice.why,
+        choice.off
+    )))
+}

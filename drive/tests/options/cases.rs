@@ -1,0 +1,450 @@
+//! The options, and the runs that show them.
+
+use super::{RATED, SLOW, T_S, U_DEAD, command, drive, imposed, off, run, turning};
+use drive::Pair;
+use drive::control::reference::{max_torque, max_torque_per_ampere};
+use drive::control::start::StartMode;
+use drive::control::tables::ControllerParameters as Par;
+use drive::estimator::Kind;
+use drive::estimator::pulsating::Demodulation;
+use drive::estimator::tracker::TrackerKind;
+use drive::math::wrap;
+use drive::motor::Motor;
+use std::f64::consts::TAU;
+
+/// What an option changes: figures of a run.
+pub(super) type Figures = [f64; 2];
+
+/// An option.
+pub(super) struct Case {
+    /// Name in the table.
+    pub(super) option: &'static str,
+    /// A drive on which it shows.
+    pub(super) on: fn(Kind) -> Pair,
+    /// Turns it on.
+    pub(super) ask: fn(&mut Par),
+    /// Runs the drive.
+    pub(super) figures: fn(Pair) -> Figures,
+    /// Whether figures without and with it are as they should be.
+    pub(super) acts: fn(Kind, Figures, Figures) -> bool,
+}
+
+/// Integral in A.s of the error of i_q after a step of the torque, with a resistance that the controller does not know.
+fn current_error(mut pair: Pair) -> Figures {
+    pair.plant.model.parameters.motor.R_s *= 1.5;
+    let mut sum = 0.0;
+    run(&mut pair, 0.4, |t, p| {
+        p.controller.model.inputs.tau_ref = if t > 0.2 { 7.0 } else { 0.0 };
+        sum += T_S * (p.controller.out.i_ref.q - p.controller.out.i.q);
+    });
+    [sum.abs(), 0.0]
+}
+
+/// The references after a torque of 10 N.m was asked for, and the greatest torque.
+fn references(mut pair: Pair) -> Figures {
+    pair.controller.model.inputs.tau_ref = 10.0;
+    run(&mut pair, 0.1, |_, _| ());
+    [pair.controller.out.i_ref.d, pair.controller.out.tau_max]
+}
+
+/// Mean angle error in degrees, and estimate, after a load step of 7 N.m.
+fn after_load(mut pair: Pair) -> Figures {
+    let (mut sum, mut n) = (0.0, 0.0);
+    run(&mut pair, 1.0, |t, p| {
+        p.plant.model.inputs.tau_load = if t > 0.3 { 7.0 } else { 0.0 };
+        if t > 0.3 {
+            (sum, n) = (sum + off(p), n + 1.0);
+        }
+    });
+    [sum / n, pair.controller.out.theta_est]
+}
+
+/// Mean torque in N.m under a request of 3 N.m, and its part that turns once in an electrical period.
+fn ripple(mut pair: Pair) -> Figures {
+    let w = 3.0 * pair.plant.model.parameters.initial.speed;
+    let (mut mean, mut sine, mut cosine, mut n) = (0.0, 0.0, 0.0, 0.0);
+    pair.controller.model.inputs.tau_ref = 3.0;
+    run(&mut pair, 0.3 + 2.0 * TAU / w, |t, p| {
+        if t > 0.3 {
+            let tau = p.plant.out.tau_e;
+            (mean, sine, cosine, n) = (mean + tau, sine + tau * (w * t).sin(), cosine + tau * (w * t).cos(), n + 1.0);
+        }
+    });
+    [mean / n, 2.0 * sine.hypot(cosine) / n]
+}
+
+/// i_d reference in A after 0.4 s of a start from an unknown angle, and the angle error in degrees at the end.
+fn start(mut pair: Pair) -> Figures {
+    pair.plant.model.parameters.initial.theta_e = 3.2;
+    let mut i_d = 0.0;
+    run(&mut pair, 3.0, |t, p| {
+        p.controller.model.inputs.speed_ref = if t > 1.0 { 0.3 * RATED } else { 0.0 };
+        if t < 0.4 {
+            i_d = p.controller.out.i_ref.d;
+        }
+    });
+    [i_d, off(&pair)]
+}
+
+/// R^ in Ohm at rest, and i_q (A) there, under a load of 2 N.m.
+fn at_rest(mut pair: Pair) -> Figures {
+    run(&mut pair, 4.0, |t, p| p.plant.model.inputs.tau_load = 2.0 * t.min(1.0));
+    [pair.controller.out.R_s_est, pair.controller.out.i.q]
+}
+
+fn slow(kind: Kind) -> Pair {
+    imposed(drive(kind), SLOW)
+}
+
+fn loaded(kind: Kind) -> Pair {
+    turning(drive(kind), 2.0 * SLOW)
+}
+
+fn with_dead_time(mut pair: Pair) -> Pair {
+    pair.plant.model.parameters.inverter.dead_time = 2e-6;
+    pair
+}
+
+pub(super) const CASES: &[Case] = &[
+    Case {
+        option: "current.active_resistance",
+        on: slow,
+        ask: |p| p.current.active_resistance = true,
+        figures: current_error,
+        // The error over w_c, whatever the resistance is; without it, 1.5 times as much by the wrong one.
+        acts: |_, [without, _], [with, _]| {
+            let expected = 7.0 / Motor::IPMSM_2_2_KW.torque_constant() / (TAU * 200.0);
+            (with / expected - 1.0).abs() < 0.1 && without > 1.4 * expected
+        },
+    },
+    Case {
+        option: "current.integral",
+        on: slow,
+        ask: |p| p.current.integral = 1.0,
+        figures: current_error,
+        acts: |_, [without, _], [with, _]| with < 0.6 * without,
+    },
+    Case {
+        option: "current.reference_feed_forward",
+        on: slow,
+        // The command of the sample at which the torque is asked for.
+        figures: |mut pair| {
+            run(&mut pair, 0.1, |t, p| p.controller.model.inputs.tau_ref = if t > 0.09985 { 5.0 } else { 0.0 });
+            [command(&pair).alpha(), command(&pair).beta()]
+        },
+        ask: |p| p.current.reference_feed_forward = !p.current.reference_feed_forward,
+        // |R + j w L_q| times the change of i_q.
+        acts: |_, without, with| {
+            let change = (with[0] - without[0]).hypot(with[1] - without[1]);
+            let expected = 3.6_f64.hypot(3.0 * SLOW * 51e-3) * 5.0 / Motor::IPMSM_2_2_KW.torque_constant();
+            (change / expected - 1.0).abs() < 0.2
+        },
+    },
+    Case {
+        option: "current.mtpa",
+        on: slow,
+        ask: |p| p.current.mtpa = true,
+        figures: references,
+        acts: |kind, [i_d, least], [by_mtpa, most]| {
+            let par = drive(kind).controller.model.parameters;
+            let expected = max_torque_per_ampere(&par.motor, 10.0).d();
+            let tau = |mtpa| max_torque(&par.motor, &par.limit, mtpa);
+            i_d.abs() < 1e-4
+                && (by_mtpa / expected - 1.0).abs() < 1e-3
+                && (least / tau(false) - 1.0).abs() < 1e-5
+                && (most / tau(true) - 1.0).abs() < 1e-5
+        },
+    },
+    Case {
+        option: "speed_loop.torque_mode",
+        on: |kind| {
+            let mut pair = slow(kind);
+            pair.controller.model.parameters.speed_loop.torque_mode = false;
+            pair
+        },
+        ask: |p| p.speed_loop.torque_mode = true,
+        figures: ripple,
+        acts: |_, [by_speed, _], [by_torque, _]| by_speed.abs() < 1.0 && (by_torque - 3.0).abs() < 0.15,
+    },
+    Case {
+        option: "speed_loop.ramp",
+        on: |kind| turning(drive(kind), SLOW),
+        ask: |p| p.speed_loop.ramp = 50.0,
+        figures: |mut pair| {
+            pair.controller.model.inputs.speed_ref = 2.0 * SLOW;
+            run(&mut pair, 0.05, |_, _| ());
+            [pair.plant.out.speed - SLOW, 0.0]
+        },
+        acts: |_, [at_once, _], [ramped, _]| at_once > 5.0 && ramped < 3.0 && ramped > 0.3,
+    },
+    Case {
+        option: "weakening.use",
+        on: |kind| imposed(drive(kind), RATED),
+        ask: |p| {
+            p.weakening.used = true;
+            if p.estimator == Kind::VoltageModel {
+                (p.limit.i, p.limit.i_q) = (10.5, 10.5);
+            }
+            if p.estimator == Kind::VoltageFeedback {
+                (p.weakening.k_u, p.weakening.k_t) = (0.9, 0.9);
+            }
+        },
+        figures: |mut pair| {
+            pair.controller.model.inputs.tau_ref = 24.0;
+            run(&mut pair, 0.3, |_, _| ());
+            [pair.controller.out.i_ref.d, pair.controller.out.tau_max]
+        },
+        acts: |_, [i_d, most], [weakened, less]| i_d.abs() < 1e-4 && weakened < -1.0 && less < most,
+    },
+    Case {
+        option: "compensation.u_dead",
+        on: |kind| with_dead_time(slow(kind)),
+        ask: |p| p.compensation.u_dead = U_DEAD,
+        // The PI has to give what the legs lose.
+        figures: |mut pair| {
+            let (mut sum, mut n) = (0.0, 0.0);
+            pair.controller.model.inputs.tau_ref = 5.0;
+            run(&mut pair, 0.6, |t, p| {
+                if t > 0.3 {
+                    (sum, n) = (sum + p.controller.out.u_share, n + 1.0);
+                }
+            });
+            [sum / n, 0.0]
+        },
+        acts: |_, [without, _], [with, _]| with < without - 0.02,
+    },
+    Case {
+        option: "compensation.observe",
+        on: |kind| {
+            let mut pair = with_dead_time(slow(kind));
+            pair.controller.model.parameters.compensation.u_dead = U_DEAD;
+            pair
+        },
+        ask: |p| p.compensation.observe = true,
+        // The voltage that the estimators and lock_lost take for the machine's.
+        figures: |mut pair| {
+            let (mut sum, mut n) = (0.0, 0.0);
+            pair.controller.model.inputs.tau_ref = 0.2;
+            run(&mut pair, 0.6, |t, p| {
+                if t > 0.3 {
+                    (sum, n) = (sum + p.controller.out.lock_lost, n + 1.0);
+                }
+            });
+            [sum / n, 0.0]
+        },
+        // A carrier that crosses zero within a sample leaves an error of its own.
+        acts: |kind, [without, _], [with, _]| {
+            with < without || kind.class().injects() && with < 0.2 && (with - without).abs() > 0.0
+        },
+    },
+    Case {
+        option: "compensation.calibrate",
+        on: |kind| {
+            let mut pair = slow(kind);
+            pair.controller.model.parameters.sensor.offset.a = 0.3;
+            pair.controller.model.parameters.theta_est = wrap(3.0 * SLOW * 0.05);
+            pair
+        },
+        ask: |p| p.compensation.calibrate = true,
+        figures: |mut pair| {
+            let w = 3.0 * SLOW;
+            let (mut sine, mut cosine, mut n) = (0.0, 0.0, 0.0);
+            (pair.controller.model.inputs.enable, pair.controller.model.inputs.tau_ref) = (false, 3.0);
+            run(&mut pair, 0.5 + 2.0 * TAU / w, |t, p| {
+                p.controller.model.inputs.enable = t > 0.05 - 0.5 * T_S;
+                if t > 0.5 {
+                    let tau = p.plant.out.tau_e;
+                    (sine, cosine, n) = (sine + tau * (w * t).sin(), cosine + tau * (w * t).cos(), n + 1.0);
+                }
+            });
+            [sine.hypot(cosine) / n, 0.0]
+        },
+        acts: |_, [without, _], [with, _]| without > 0.1 && with < 0.2 * without,
+    },
+    Case {
+        option: "timing.delay",
+        on: |kind| turning(drive(kind), SLOW),
+        ask: |p| p.delay = 2,
+        figures: |mut pair| {
+            run(&mut pair, T_S, |_, _| ());
+            [command(&pair).alpha(), command(&pair).beta()]
+        },
+        // The first command, the EMF at least, is turned by another w T_s.
+        acts: |_, without, with| {
+            let change = (with[0] - without[0]).hypot(with[1] - without[1]);
+            change > 0.9 * (3.0 * SLOW).powi(2) * T_S * 0.545
+        },
+    },
+    Case {
+        option: "limit.i",
+        on: slow,
+        ask: |p| p.limit.i = 6.0,
+        figures: |pair| [references(pair)[1], 0.0],
+        acts: |_, _, [tau_max, _]| (tau_max / (6.0 * Motor::IPMSM_2_2_KW.torque_constant()) - 1.0).abs() < 1e-5,
+    },
+    Case {
+        option: "limit.tau",
+        on: slow,
+        ask: |p| p.limit.tau = 2.0,
+        figures: |pair| [references(pair)[1], 0.0],
+        acts: |_, _, [tau_max, _]| (tau_max - 2.0).abs() < 1e-9,
+    },
+    Case {
+        option: "start.mode",
+        on: drive,
+        ask: |p| p.start.mode = StartMode::CurrentFrequency,
+        figures: start,
+        acts: |_, _, [i_d, error]| (i_d - 8.0).abs() < 1e-9 && error < 15.0,
+    },
+    Case {
+        option: "start.mode",
+        on: |kind| {
+            let mut pair = drive(kind);
+            let saturation = &mut pair.plant.model.parameters.saturation;
+            (saturation.s_2, saturation.s_3) = (40.0, 40.0);
+            pair.controller.model.parameters.s_2 = 40.0;
+            pair
+        },
+        ask: |p| p.start.mode = StartMode::Injection,
+        // From the wrong pole, the speed loop drives the rotor away from rest.
+        figures: |mut pair| {
+            let mut fastest = 0.0_f64;
+            pair.plant.model.parameters.initial.theta_e = 3.2;
+            run(&mut pair, 1.0, |_, p| fastest = fastest.max(p.plant.out.speed.abs()));
+            [fastest, off(&pair)]
+        },
+        acts: |_, [runaway, _], [rest, error]| runaway > 5.0 && rest < 5.0 && error < 1.0,
+    },
+    Case {
+        option: "tracker.kind",
+        on: |kind| {
+            let mut pair = turning(drive(kind), 0.5 * SLOW);
+            pair.controller.model.parameters.speed_loop.torque_mode = true;
+            pair
+        },
+        ask: |p| p.estimators.tracker.kind = TrackerKind::MechanicalObserver,
+        // The angle error while the drive accelerates: a PLL lags.
+        figures: |mut pair| {
+            let (mut sum, mut n) = (0.0, 0.0);
+            pair.controller.model.inputs.tau_ref = 1.5;
+            run(&mut pair, 0.25, |t, p| {
+                if t > 0.15 {
+                    (sum, n) = (sum + wrap(p.plant.out.theta_e - p.controller.out.theta_est).to_degrees(), n + 1.0);
+                }
+            });
+            [sum / n, 0.0]
+        },
+        acts: |_, [pll, _], [observer, _]| observer.abs() < 0.6 * pll.abs(),
+    },
+    Case {
+        option: "adaptation.resistance",
+        on: |kind| {
+            let mut pair = drive(kind);
+            pair.controller.model.parameters.motor.R_s *= 0.9;
+            pair
+        },
+        ask: |p| p.estimators.adaptation.resistance = true,
+        figures: at_rest,
+        acts: |_, [fixed, _], [adapted, _]| (fixed / 3.24 - 1.0).abs() < 1e-9 && (adapted / 3.6 - 1.0).abs() < 0.03,
+    },
+    Case {
+        option: "adaptation.k_a",
+        on: |kind| {
+            let mut pair = drive(kind);
+            pair.controller.model.parameters.estimators.adaptation.resistance = kind == Kind::Rasmussen;
+            pair
+        },
+        ask: |p| p.estimators.adaptation.k_a = 0.05,
+        figures: at_rest,
+        acts: |_, [_, without], [_, with]| with.abs() < 0.7 * without.abs(),
+    },
+    Case {
+        option: "adaptation.tracking",
+        on: |kind| {
+            let mut pair = turning(drive(kind), 0.02 * RATED);
+            pair.controller.model.parameters.estimators.adaptation.resistance = kind == Kind::Rasmussen;
+            pair
+        },
+        ask: |p| p.estimators.adaptation.tracking = 0.15,
+        figures: |mut pair| {
+            run(&mut pair, 4.0, |t, p| p.plant.model.inputs.tau_load = 7.0 * t.min(1.0));
+            [pair.controller.out.R_s_est, off(&pair)]
+        },
+        acts: |_, [held, _], [tracked, _]| (held / (0.8 * 3.6) - 1.0).abs() < 1e-9 && tracked > 0.9 * 3.6,
+    },
+    Case {
+        option: "flux_observer.magnet",
+        on: |kind| {
+            let mut pair = turning(drive(kind), 0.5 * RATED);
+            pair.controller.model.parameters.motor.psi_M *= 1.1;
+            pair
+        },
+        ask: |p| p.estimators.flux_observer.magnet = 5.0,
+        figures: |mut pair| {
+            run(&mut pair, 2.0, |t, p| p.plant.model.inputs.tau_load = 7.0 * t.min(1.0));
+            [off(&pair), 0.0]
+        },
+        acts: |_, [without, _], [with, _]| with < 0.2 * without,
+    },
+    Case {
+        option: "emf.hold_reversal",
+        on: |kind| turning(drive(kind), SLOW),
+        ask: |p| p.estimators.emf.hold_reversal = true,
+        figures: |mut pair| {
+            let mut passing = 0.0;
+            run(&mut pair, 2.0, |t, p| {
+                p.controller.model.inputs.speed_ref = SLOW * (1.0 - 4.0 * (t - 0.2)).clamp(-1.0, 1.0);
+                if t < 0.5 {
+                    passing = p.controller.out.theta_est;
+                }
+            });
+            [off(&pair), passing]
+        },
+        acts: |_, [_, without], [error, with]| error < 15.0 && (with - without).abs() > 1e-6,
+    },
+    Case {
+        option: "emf.frame_term",
+        on: |kind| turning(drive(kind), 1.5 * SLOW),
+        ask: |p| p.estimators.emf.frame_term = false,
+        figures: |mut pair| {
+            let (mut most, mut fast) = (0.0_f64, 0.0_f64);
+            run(&mut pair, 3.0, |t, p| {
+                p.plant.model.inputs.tau_load = 14.0 * (t - 0.3).clamp(0.0, 1.0);
+                if t > 2.0 {
+                    (most, fast) = (most.max(off(p)), fast.max((p.plant.out.speed - 1.5 * SLOW).abs()));
+                }
+            });
+            [most, fast]
+        },
+        // Rated load is held with the term, and lost without it where a tracker follows the EMF alone.
+        acts: |kind, [with, _], [without, _]| {
+            let tracks = !matches!(kind, Kind::VoltageModel | Kind::CurrentModel | Kind::Hybrid);
+            with < 15.0 && if tracks { without > 30.0 } else { without > 1.02 * with }
+        },
+    },
+    Case {
+        option: "matsui.integral",
+        on: |kind| {
+            let mut pair = loaded(kind);
+            pair.controller.model.parameters.motor.psi_M *= 0.97;
+            pair
+        },
+        ask: |p| p.estimators.matsui.integral = false,
+        figures: after_load,
+        acts: |_, [with, _], [without, _]| without > 1.1 * with,
+    },
+    Case {
+        option: "pulsating.demodulation",
+        on: loaded,
+        ask: |p| p.estimators.pulsating.demodulation = Demodulation::MeasurementAxes,
+        figures: after_load,
+        acts: |_, [_, one], [error, other]| error < 15.0 && (one - other).abs() > 1e-9,
+    },
+    Case {
+        option: "gradient.clamped",
+        on: loaded,
+        ask: |p| p.estimators.gradient.clamped = true,
+        figures: after_load,
+        acts: |_, [_, one], [error, other]| error < 15.0 && (one - other).abs() > 1e-9,
+    },
+];

@@ -1,0 +1,155 @@
+//! Every option of the controller with every estimator: it acts as it says, or it is refused by name.
+#![allow(missing_docs, non_snake_case)]
+
+mod cases;
+
+use cases::CASES;
+use drive::Pair;
+use drive::control::tables::ALL_PARAMETERS;
+use drive::estimator::kalman::KalmanParameters;
+use drive::estimator::{Class, Kind};
+use drive::frame::AlphaBeta;
+use drive::math::wrap;
+use drive::motor::Motor;
+use fmu_core::Kind as Type;
+use std::f64::consts::TAU;
+
+const T_S: f64 = 1e-4;
+/// Rated mechanical speed in rad/s.
+const RATED: f64 = TAU * 25.0;
+/// Speed in rad/s at which every method works.
+const SLOW: f64 = 0.1 * RATED;
+/// Voltage in V that a leg loses to the dead time of 2 us.
+const U_DEAD: f64 = 10.8;
+
+/// The 2.2 kW machine without friction, all options at their start values, with gains that suit the estimator.
+fn drive(kind: Kind) -> Pair {
+    let mut pair = Pair::default();
+    let plant = &mut pair.plant.model.parameters;
+    plant.motor = Motor::IPMSM_2_2_KW;
+    (plant.mechanics.J, plant.mechanics.B, plant.mechanics.tau_coulomb) = (0.015, 0.0, 0.0);
+    let par = &mut pair.controller.model.parameters;
+    (par.estimator, par.motor, par.J) = (kind, Motor::IPMSM_2_2_KW, 0.015);
+    par.current.bandwidth = TAU * 200.0;
+    (par.speed_loop.bandwidth, par.speed_loop.b) = (TAU * 5.0, 1.0);
+    (par.limit.i, par.limit.i_q, par.limit.tau) = (15.0, 15.0, 100.0);
+    (par.start.i, par.start.speed) = (8.0, 0.2 * RATED);
+    par.estimators.kalman = KalmanParameters::new(0.545, TAU * 20.0, 0.15 * RATED, 0.01, T_S);
+    match kind {
+        Kind::VoltageFeedback => {
+            (par.current.reference_feed_forward, par.current.integral) = (true, 0.2);
+            (par.estimators.tracker.bandwidth, par.estimators.emf.bandwidth) = (TAU * 15.0, TAU * 300.0);
+        }
+        Kind::FluxObserver => par.estimators.tracker.bandwidth = TAU * 60.0,
+        Kind::GradientObserver | Kind::Hybrid | Kind::SquareWaveInjection | Kind::NearPwmInjection => {
+            par.estimators.tracker.bandwidth = TAU * 40.0;
+        }
+        _ => {}
+    }
+    pair.set_inputs(0.0, 0.0, 540.0);
+    pair
+}
+
+/// Turning at `speed` (rad/s), which the estimator knows.
+fn turning(mut pair: Pair, speed: f64) -> Pair {
+    pair.plant.model.parameters.initial.speed = speed;
+    pair.controller.model.parameters.speed_est = speed;
+    pair.controller.model.inputs.speed_ref = speed;
+    pair
+}
+
+/// Turning at an imposed `speed` (rad/s), in torque mode.
+fn imposed(pair: Pair, speed: f64) -> Pair {
+    let mut pair = turning(pair, speed);
+    pair.plant.model.parameters.mechanics.imposed = true;
+    pair.controller.model.parameters.speed_loop.torque_mode = true;
+    // Faster than that, the low-speed law is over.
+    pair.controller.model.parameters.zero_speed.w_0 = 1.0;
+    pair
+}
+
+/// Runs for `seconds`; `each` sees the drive after every sample.
+fn run(pair: &mut Pair, seconds: f64, mut each: impl FnMut(f64, &mut Pair)) {
+    pair.start().unwrap();
+    let speed = pair.plant.model.parameters.initial.speed;
+    let mut k = 0_u32;
+    while f64::from(k) * T_S < seconds {
+        let inputs = &mut pair.plant.model.inputs;
+        (inputs.speed_shaft, inputs.angle_shaft) = (speed, speed * f64::from(k) * T_S);
+        pair.step(T_S).unwrap();
+        k += 1;
+        each(f64::from(k) * T_S, pair);
+    }
+}
+
+/// Magnitude of the angle error in degrees.
+fn off(pair: &Pair) -> f64 {
+    wrap(pair.plant.out.theta_e - pair.controller.out.theta_est).to_degrees().abs()
+}
+
+fn command(pair: &Pair) -> AlphaBeta {
+    pair.controller.out.u.to_stator()
+}
+
+#[test]
+fn every_option_acts_or_is_refused() {
+    let mut wrong = Vec::new();
+    for case in CASES {
+        let mut honored = 0;
+        for &kind in Kind::ALL {
+            let name = format!("{} with {}", case.option, kind.name());
+            let without = (case.on)(kind);
+            if let Err(fault) = without.clone().start() {
+                wrong.push(format!("{name}: the start value is refused: {}", fault.message()));
+                continue;
+            }
+            let mut with = without.clone();
+            (case.ask)(&mut with.controller.model.parameters);
+            if let Err(fault) = with.clone().start() {
+                let message = fault.message();
+                let estimator = format!("estimator = {} ({})", kind as i32, kind.name());
+                let parts = [format!("{} = ", case.option), estimator, "set ".into()];
+                if !parts.iter().all(|part| message.contains(part.as_str())) {
+                    wrong.push(format!("{name}: {message}"));
+                }
+                continue;
+            }
+            let (without, with) = ((case.figures)(without), (case.figures)(with));
+            println!("{name}: {without:.4?} {with:.4?}");
+            honored += 1;
+            if !(case.acts)(kind, without, with) {
+                wrong.push(format!("{name} does not act: {without:?} without, {with:?} with it"));
+            }
+        }
+        assert!(honored > 0, "{} acts nowhere", case.option);
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// A new switch or choice needs a case above.
+#[test]
+fn no_option_is_forgotten() {
+    for (name, meta, _) in (0..ALL_PARAMETERS.len()).filter_map(|i| ALL_PARAMETERS.locate(i)) {
+        if matches!(meta.kind, Type::Boolean | Type::Enumeration(_)) && name != "estimator" {
+            assert!(CASES.iter().any(|case| case.option == name), "{name}");
+        }
+    }
+    for case in CASES {
+        assert!(
+            (0..ALL_PARAMETERS.len()).any(|i| ALL_PARAMETERS.locate(i).is_some_and(|found| found.0 == case.option))
+        );
+    }
+}
+
+/// The d-axis current at standstill is that of `zero_speed` with the two estimators that its description names, and of none
+/// with the others.
+#[test]
+fn the_low_speed_law_is_that_of_the_flux_observers() {
+    for &kind in Kind::ALL {
+        let mut pair = drive(kind);
+        pair.controller.model.parameters.zero_speed.i_0 = 3.0;
+        run(&mut pair, 0.05, |_, _| ());
+        let i_d = if kind.class() == Class::FluxObserver { 3.0 } else { 0.0 };
+        assert!((pair.controller.out.i_ref.d - i_d).abs() < 0.1, "{kind:?}: {:?}", pair.controller.out.i_ref);
+    }
+}
