@@ -538,7 +538,7 @@ fn an_atlas_is_written_or_refused() {
         (&["--set", "R=1"], &["--set R: is not a parameter of SensorlessController"]),
         (
             &["--estimator", "ExtendedEmf", "--set", "adaptation.resistance=true"],
-            &["(ExtendedEmf) has no resistance adaptation"],
+            &["adaptation.resistance = true is not allowed with estimator = 4 (ExtendedEmf)"],
         ),
         (&["none.toml"], &["reading none.toml"]),
     ] {
