@@ -185,7 +185,8 @@ fn a_system_without_room_is_no_finding() {
         said
     };
     let options = "check \"$1\" --only B00,L00,B08p --patience 90 --memory 1";
-    let busy = check(&format!("ulimit -u 12; for k in 1 2 3 4 5 6 7 8 9 10; do (sleep 2 &); done; exec \"$0\" {options}"));
+    let busy =
+        check(&format!("ulimit -u 12; for k in 1 2 3 4 5 6 7 8 9 10; do (sleep 2 &); done; exec \"$0\" {options}"));
     assert!(busy.contains("after a complete run: the working directory changed"), "{busy}");
     assert!(!busy.contains("2 not determined") && !busy.contains("1 not determined"), "{busy}");
     let full = check(&format!("ulimit -u 1; exec \"$0\" {}", options.replace("B00,L00,", "")));
