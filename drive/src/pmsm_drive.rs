@@ -6,7 +6,8 @@
 //! plant and controller also stop at the sample instants in between; an importer's exchange cannot do this.
 //!
 //! In Model Exchange, the importer integrates the plant's states. At every sample instant, an event passes the voltages
-//! of the last sample to the plant and its currents to the controller, in the order of [`Pair::step`]: [`exchange`].
+//! of the last sample to the plant and its currents to the controller, in the order of [`Pair::step`]. Means over T_s
+//! are the same in both interfaces ([`Means`]).
 
 mod exchange;
 mod period;

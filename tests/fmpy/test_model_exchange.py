@@ -15,6 +15,8 @@ from scenarios import RPM, Scenario, schedule
 
 STANDARDS = pytest.mark.parametrize("standard", [2, 3], ids=["fmi2", "fmi3"])
 CURRENTS = ("i_a", "i_b", "i_c", "i_d", "i_q")
+ENERGIES = ("energy_in", "energy_mech", "energy_loss")
+MEANS = ("p_in_mean", "p_mech_mean", "p_loss_mean", "tau_shaft_mean")
 # From the worst angle to 1500 rpm; then half of the rated load.
 START = Scenario(
     duration=0.6,
@@ -52,7 +54,7 @@ def drive(folder, **arguments):
         stop_time=START.duration,
         input=DRIVE_INPUTS,
         start_values={"plant.initial.theta_e": np.pi},
-        output=["speed", *CURRENTS],
+        output=["speed", *CURRENTS, *ENERGIES, *MEANS],
         record_events=False,
         **arguments,
     )
@@ -79,7 +81,8 @@ def test_plant(archives, standard, solver):
         ],
         dtype=[*((name, float) for name in ("time", "u_a", "u_b", "u_c", "tau_load")), ("enable", bool)],
     )
-    arguments = {"stop_time": stop, "input": inputs, "output": ["speed", "angle", *CURRENTS], "record_events": False}
+    output = ["speed", "angle", *CURRENTS, *ENERGIES]
+    arguments = {"stop_time": stop, "input": inputs, "output": output, "record_events": False}
     archive = archives / f"fmi{standard}" / "PmsmPlant.fmu"
     result = simulate_fmu(
         archive,
@@ -99,6 +102,10 @@ def test_plant(archives, standard, solver):
     assert np.abs(reference["i_q"]).max() > 1.0
     for name in ("speed", "angle", *CURRENTS):
         assert np.abs(result[name] - reference[name]).max() < bound, name
+    # A completed step of FMPy is an output interval, whatever CVode does in it: 1 ms here.
+    for name in ENERGIES:
+        passed = np.abs(reference[name]).max()
+        assert passed > 1e-4 and np.abs(result[name] - reference[name]).max() < max(1e-5, bound) * passed, name
 
 
 @STANDARDS
@@ -134,6 +141,12 @@ def test_drive(archives, standard):
     assert np.abs(result["speed"] - reference["speed"]).max() < 1e-4
     for name in CURRENTS:
         assert np.abs(result[name] - reference[name]).max() < 1e-5, name
+    for name in ENERGIES:
+        assert np.abs(result[name] - reference[name]).max() < 1e-4 * reference[name][-1], name
+    steady = result["time"] > 0.55
+    for name in MEANS:
+        assert result[name][0] == 0.0, "before the first T_s is over"
+        assert np.abs(result[name] / reference[name] - 1.0)[steady].max() < 1e-3, name
 
 
 @STANDARDS

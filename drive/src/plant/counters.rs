@@ -14,6 +14,7 @@
 use crate::frame::AlphaBeta;
 use crate::integrate::rk4;
 use crate::math::all_finite;
+use crate::plant::integration::LONGEST_SUBSTEP;
 use crate::plant::machine::{self, Machine};
 use crate::plant::model::PmsmPlant;
 use crate::plant::power::Energy;
@@ -71,8 +72,12 @@ impl PmsmPlant {
         let psi = self.machine().to_stator(axis_at(motor, angle), state.psi);
         let speeds = if imposed { [inputs.speed_shaft, end.speed_shaft] } else { [state.speed, self.state.speed] };
         let speed = speeds[0].abs().max(speeds[1].abs());
-        let legs = self.legs(inputs);
-        let mut left = self.substeps(h, speed, &legs, self.lossy(inputs, &legs).is_some())?;
+        let mut left = if self.blocked && !inputs.enable {
+            self.count(h, LONGEST_SUBSTEP, speed)?
+        } else {
+            let legs = self.legs(inputs);
+            self.substeps(h, speed, &legs, self.lossy(inputs, &legs).is_some())?
+        };
         let step = h / left;
         let mut x = SVector::from([psi.alpha(), psi.beta(), state.speed, angle, 0.0, 0.0, 0.0, 0.0, 0.0]);
         while left > 0.0 {

@@ -6,6 +6,9 @@
 //! mechanical states; the stator flux linkage stays in the rotor frame, so angle_shaft must be the integral of
 //! speed_shaft between events.
 //!
+//! The energies are counted over completed steps of the solver ([`counters`](crate::plant::counters)). Beyond the speed of
+//! any machine there are no derivatives: the solver tries a shorter step.
+//!
 //! Whether the diodes block is decided in events only. While they block, the current is zero. Two indicators tell when
 //! this ends, or begins: the greatest current over the zone of [`legs`](crate::plant::legs), and the line-to-line back
 //! EMF over the DC-link voltage, both less 1.
