@@ -108,7 +108,7 @@ pub fn main() -> ExitCode {
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
-        Command::Tune(args) => tune::run(&args).map(|good| ExitCode::from(u8::from(!good))),
+        Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Preset(args) => preset::run(&args).map(|text| {
             print!("{text}");
             ExitCode::SUCCESS

@@ -185,29 +185,67 @@ fn a_wrong_file_is_told_with_place_and_remedy() {
     refused("J = 1.5e-3", "J = nan", &["m.toml:13:5", "mechanics.J"]);
     refused("torque = 2.5", "torque = -1", &["m.toml:20:10", "rating.torque", "greater than 0"]);
     refused("speed = 80.0", "speed = 180.0", &["m.toml:28:", "a third of bandwidth.observer", "lower the former"]);
-    refused("current = 7.5", "current = 4.0", &["rating.current", "raise it"]);
+    refused(
+        "current = 7.5",
+        "current = 4.0",
+        &["rating.current", "the maximum current", "K = 1.5 n_p psi_M", "raise it"],
+    );
     refused("observer = 300.0", "observer = 100.0", &["bandwidth"]);
     refused("speed = 314.159265", "speed = 3141.59", &["rating.speed", "u_dc"]);
     refused("[bandwidth]", "[control]\nestimator = \"Luenberger\"\n[bandwidth]", &["Luenberger", "choose Rasmussen"]);
     refused("[bandwidth]", "[bandwidth", &["m.toml:26:"]);
 }
 
+/// A motor of 150 W, whose rated torque takes more than its speed at 0.1 pu.
+const LIGHT: &str = "
+name = \"light-24v\"
+source = \"a data sheet\"
+[machine]
+n_p = 1
+R_s = 0.103
+L_d = 1.36e-5
+L_q = 1.36e-5
+psi_M = 2.75e-3
+[mechanics]
+J = 4.55e-7
+[rating]
+speed = 2380.0
+torque = 0.0617
+current = 27.7
+[dc_link]
+u_dc = 24.0
+";
+
 #[test]
 fn the_check_prints_what_holds_and_what_was_announced() {
     let motor = motors().into_iter().find(|p| p.ends_with("ipmsm-2.2kw.toml")).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().to_str().unwrap();
-    let checked = fmu(&["tune", motor.to_str().unwrap(), "--check", "--out", out]);
-    let text = String::from_utf8(checked.stdout).unwrap();
-    assert_eq!(checked.status.code(), Some(0), "{text}");
+    let light = dir.path().join("light.toml");
+    std::fs::write(&light, LIGHT).unwrap();
+    let checked = |motor: &Path, first: &str| {
+        let checked = fmu(&["tune", motor.to_str().unwrap(), "--check", "--out", out]);
+        let text = String::from_utf8(checked.stdout).unwrap();
+        assert_eq!(checked.status.code(), Some(0), "{text}");
+        let rows: Vec<_> = text.lines().filter(|line| line.contains(" pu  24 of 24 ")).collect();
+        let ends = [first, "deg   holds", "deg   holds"];
+        assert!(rows.len() == 3 && rows.iter().zip(ends).all(|(row, end)| row.ends_with(end)), "{text}");
+        text
+    };
+    let text = checked(&motor, "deg   holds");
+    assert!(!text.contains("will not hold") && text.contains("K = 1.5 n_p psi_M = 2.4525 N.m/A"), "{text}");
+    let text = checked(&light, "does not hold, as announced");
     for told in
-        ["note: will not hold LOAD at 0.1 pu: a step of the rated torque", "; let the load rise in 0.80 s or more"]
+        ["note: will not hold LOAD at 0.1 pu: a step of the rated torque", "; let the load rise in 0.083 s or more"]
     {
         assert!(text.contains(told), "{told:?} is not in {text}");
     }
-    let rows: Vec<_> = text.lines().filter(|line| line.contains(" pu  24 of 24 ")).collect();
-    let ends = ["does not hold, as announced", "deg   holds", "deg   holds"];
-    assert!(rows.len() == 3 && rows.iter().zip(ends).all(|(row, end)| row.ends_with(end)), "{text}");
+    // Without --check the notes are the same.
+    let told = fmu(&["tune", light.to_str().unwrap(), "--out", out]);
+    let plain = String::from_utf8(told.stdout).unwrap();
+    let notes =
+        |text: &str| text.lines().filter(|line| line.starts_with("note:")).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(notes(&plain), notes(&text));
     // A wrong unit, in one line.
     let absurd = dir.path().join("m.toml");
     let given = std::fs::read_to_string(&motor).unwrap();

@@ -325,6 +325,7 @@ fn the_traction_drive_reaches_two_and_a_half_times_its_base_speed() {
         par.estimator = kind;
         if kind == Kind::Sensored {
             par.start.mode = StartMode::Direct;
+            par.estimators.emf.hold_reversal = false;
         }
         assert!(par.weakening.used);
         let u_dc = pair.plant.model.inputs.u_dc;

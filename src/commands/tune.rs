@@ -8,8 +8,8 @@ use clap::Args;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController};
 use drive_study::tune::motor::MotorFile;
 use drive_study::tune::rules::{self, Setting, Value};
-use drive_study::tune::trial::{self, Trial, Verdict};
-use drive_study::tune::{self, rules::Tuned};
+use drive_study::tune::trial::{self, Trial};
+use drive_study::tune::{self, limits, rules::Tuned};
 use fmu_core::Description;
 use std::path::{Path, PathBuf};
 
@@ -17,11 +17,11 @@ use std::path::{Path, PathBuf};
 ///
 /// `fmu tune --example` prints a motor file to start from. MOTOR.toml contains motor, mechanics, ratings and DC link, and may contain the bandwidths of current loop, speed loop and
 /// observer; see the examples in motors/. The command writes NAME.PmsmDrive.ssv, NAME.PmsmPlant.ssv and
-/// NAME.SensorlessController.ssv (SSP 1.0) with the values that differ from the start values of the FMUs, for importers. It
-/// tells beforehand what the drive will not hold, as notes.
+/// NAME.SensorlessController.ssv (SSP 1.0) with the values that differ from the start values of the FMUs, for importers.
 ///
-/// With --check it also tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu. Exit status
-/// 1 if the drive loses what no note announces.
+/// The command tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu of the rated speed, and
+/// a load at rating.speed_max if that is given. What the drive does not hold it tells as notes, each with remedies that were
+/// tried too. --check prints the trial as a table.
 ///
 /// With --fmu it writes an FMU with these start values instead, which needs no parameter file: see `fmu preset`.
 ///
@@ -50,7 +50,7 @@ pub struct Tune {
     /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
-    /// Try the drive from 24 start angles at 0.1, 0.5 and 1 pu, with rated torque as a step
+    /// Print what the trial showed: starts from 24 angles at each speed, loads held, least speed, greatest angle error
     #[arg(long)]
     pub check: bool,
 }
@@ -58,19 +58,20 @@ pub struct Tune {
 /// The motor file of --example.
 const EXAMPLE: &str = include_str!("../../motors/ipmsm-2.2kw.toml");
 
-/// Start angles of --check.
+/// Start angles of the trial.
 const ANGLES: u32 = 24;
 
-/// Runs the command; false: the drive does not hold something that no note announces.
+/// Runs the command.
 ///
 /// # Errors
 /// The motor file is invalid, or a file cannot be written.
-pub fn run(args: &Tune) -> Result<bool> {
+pub fn run(args: &Tune) -> Result<()> {
     let Some(motor) = &args.motor else {
         print!("{EXAMPLE}");
-        return Ok(true);
+        return Ok(());
     };
-    let tuned = tune::tune(motor)?;
+    let motor = MotorFile::read(motor)?;
+    let tuned = rules::tune(&motor)?;
     let out = args.out.clone().map_or_else(|| output_folder("tune"), Ok)?;
     let files = match &args.fmu {
         Some(fmu) => {
@@ -86,35 +87,40 @@ pub fn run(args: &Tune) -> Result<bool> {
             println!("  {name:26}{:>14}  {rule}", shown(value));
         }
     }
-    for note in &tuned.notes {
+    let constant = shown(&Value::Real(rules::torque_constant(&motor.data)));
+    println!("\nK = 1.5 n_p psi_M = {constant} N.m/A: torque per ampere of i_q; R^: the R_s of the controller");
+    let trials = trial::all(&tuned, ANGLES);
+    let (limits, narrow) = limits::of(&motor, &tuned, &trials);
+    for note in tuned.notes.iter().chain(&narrow) {
         println!("\nnote: {note}");
     }
-    for limit in &tuned.limits {
+    for limit in &limits {
         println!("\nnote: {limit}");
     }
-    let good = !args.check || tried(&tuned);
+    if args.check {
+        table(&trials);
+    }
     println!();
     for file in &files {
         println!("{}", file.display());
     }
-    Ok(good)
+    Ok(())
 }
 
-/// Tries the drive and prints the table; false: it loses what no note announces.
-fn tried(tuned: &Tuned) -> bool {
+/// Prints what the trial showed.
+fn table(trials: &[Trial]) {
     println!("\nspeed   started    held load  least speed  angle error");
-    let mut good = true;
-    for level in trial::LEVELS {
-        let trial = trial::at(tuned, level, 0.0, ANGLES);
-        let verdict = trial.verdict(&tuned.limits);
-        good &= verdict != Verdict::Lost;
-        let Trial { angles, started, held, least, error, .. } = trial;
-        let error = if held > 0 { format!("{error:.1} deg") } else { "-".into() };
+    for trial in trials {
+        let Trial { task, angles, started, held, least, error, .. } = trial;
+        let least = if *started > 0 { format!("{least:8.3} pu") } else { format!("{:>11}", "-") };
+        let error = if *held > 0 { format!("{error:.1} deg") } else { "-".into() };
+        let verdict = if trial.starts() && trial.holds() { "holds" } else { "does not hold, as announced" };
+        let level = format!("{:.2}", task.level);
+        let level = level.trim_end_matches('0').trim_end_matches('.');
         println!(
-            "{level:3} pu  {started:2} of {angles:2}   {held:2} of {started:2}   {least:8.3} pu  {error:>11}   {verdict}"
+            "{level:>3} pu  {started:2} of {angles:2}   {held:2} of {started:2}   {least}  {error:>11}   {verdict}"
         );
     }
-    good
 }
 
 /// The values for one of the FMUs with the machine of --example: the name of the set and the SSV file. None for a model of any

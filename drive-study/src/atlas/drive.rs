@@ -64,6 +64,8 @@ impl Drive {
         let par = &mut pair.controller.model.parameters;
         par.estimator = kind;
         par.start.mode = StartMode::Direct;
+        // Other methods refuse it.
+        par.estimators.emf.hold_reversal &= kind == Kind::ExtendedEmf;
         Ok(Self {
             name: kind.name().into(),
             machine: tuned.name,

@@ -1,21 +1,26 @@
-//! What the tuned drive will not do, told before anyone tries it. [`trial`](super::trial) tries it.
+//! What the tuned drive will not do, told beforehand: what its [`trial`](super::trial) showed, why, and what helps
+//! ([`remedy`](super::remedy)).
 //!
-//! - **Load.** A step of the rated torque T makes the speed loop (double pole at w_s / 2) dip by 2/e T / (J w_s). An estimator
-//!   that lives on the EMF loses the rotor where the dip takes 0.6 of the speed; a flux observer, which holds zero speed,
-//!   where it takes twice the speed. A load that rises in t_r makes it dip by 4 T / (J w_s^2 t_r) at most.
+//! - **Load.** A step of the torque T makes the speed loop (double pole at w_s / 2) dip by 2/e T / (J w_s). An estimator that
+//!   lives on the EMF loses the rotor near zero speed; a flux observer may pass it. There, R^ below R turns the estimate by
+//!   c_1 (R - R^) i / (w^2 psi_M), to first order.
 //! - **Start, flux observer.** At rest, R^ below R drives the estimate away at (R - R^) i_0 / psi_M, and the rotor follows with
 //!   w_0 = sqrt(n_p K i_0 / J): the former must be less than the latter. The rules choose R^ for that; below 2 % nobody knows
-//!   R.
+//!   R. From the opposite angle, the speed loop turns i_q to its limit before the rotor has come round: at atan(i_q / i_d)
+//!   beside the rotor, that is no torque, and where R - R^ is small the estimate stays.
 //! - **Start, extended EMF.** A change of i_q acts on the estimated speed through (L_q - L_d) p i_q against the EMF; closed by
 //!   the speed loop, the gain is J w_s (L_q - L_d) rho^2 / (K n_p w psi_M). Above 40 at 0.1 pu, the drive does not come to
 //!   rest there after the hand-over.
-//!
-//! The limits 0.6, 2 and 40 are found by trial on the machines in `motors/`, with 0.3 to 30 times their inertia.
 
-use super::bandwidth::{Bandwidths, DIP_OF_A_STEP, acceleration};
-use super::motor::Data;
-use super::rules::torque_constant;
-use super::trial::LEVELS;
+use super::bandwidth::DIP_OF_A_STEP;
+use super::extended_emf::{GREATEST_GAIN, gain_per_bandwidth};
+use super::flux_observer::{LEAST_MARGIN, resistance_margin};
+use super::motor::{Data, MotorFile, Number};
+use super::remedy::{self, Cure};
+use super::rules::{Tuned, torque_constant};
+use super::trial::Trial;
+use drive::control::tables::ControllerParameters;
+use drive::estimator::Class;
 use std::fmt;
 
 /// What a limit is about.
@@ -23,7 +28,7 @@ use std::fmt;
 pub enum What {
     /// To start from any angle.
     Start,
-    /// To take rated torque as a step.
+    /// To take the load as a step.
     Load,
 }
 
@@ -45,120 +50,113 @@ pub struct Limit {
     pub level: f64,
     /// Why.
     pub reason: String,
-    /// What helps.
-    pub remedy: String,
-    /// Time in s in which the rated torque may rise instead, for a load.
-    pub rise: Option<f64>,
+    /// What helps: each was tried.
+    pub cures: Vec<Cure>,
 }
 
 impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "will not hold {} at {} pu: {}; {}", self.what, self.level, self.reason, self.remedy)
+        write!(f, "will not hold {} at {} pu: {}; ", self.what, short(self.level), self.reason)?;
+        if self.cures.is_empty() {
+            return f.write_str("no remedy was found: use a sensor (estimator Sensored) with a higher rating.current");
+        }
+        for (k, cure) in self.cures.iter().enumerate() {
+            write!(f, "{}{cure}", if k > 0 { ", or " } else { "" })?;
+        }
+        Ok(())
     }
 }
 
-/// Least share by which R^ can be kept below R.
-const LEAST_MARGIN: f64 = 0.02;
-
-/// Greatest loop gain through the EMF of the change of i_q, at 0.1 pu.
-pub const GREATEST_GAIN: f64 = 40.0;
-
-/// Greatest bandwidth of the observer in rad/s that a remedy asks for: 40 Hz.
-const FASTEST: f64 = 252.0;
-
-/// Share of R by which R^ is to be below it: 0.1, or what lets the rotor follow the estimate at rest.
-pub fn resistance_margin(data: &Data) -> f64 {
-    let i_0 = zero_speed_current(data);
-    let drift = data.machine.R_s.get_ref() * i_0 / data.machine.psi_M.get_ref();
-    (swing(data, i_0) / drift).min(0.1)
+/// A number with three digits.
+fn short(x: f64) -> f64 {
+    format!("{x:.2e}").parse().unwrap_or(x)
 }
 
-/// Current in A of the low-speed law: holds 1.35 times the rated torque.
-pub fn zero_speed_current(data: &Data) -> f64 {
-    1.35 * data.rating.torque.get_ref() / torque_constant(data)
-}
-
-/// Natural frequency in rad/s of the rotor on a current vector of `i` (A).
-pub fn swing(data: &Data, i: f64) -> f64 {
-    (f64::from(*data.machine.n_p.get_ref()) * torque_constant(data) * i / data.mechanics.J.get_ref()).sqrt()
-}
-
-/// Gain of the speed loop through the EMF that a change of i_q makes, per rad/s of w_s, at 0.1 pu and the tracker's `rho`
-/// (rad/s).
-pub fn gain_per_bandwidth(data: &Data, rho: f64) -> f64 {
-    let (machine, n_p) = (&data.machine, f64::from(*data.machine.n_p.get_ref()));
-    let saliency = (machine.L_q.get_ref() - machine.L_d.get_ref()).abs();
-    let emf = n_p * LEVELS[0] * data.rating.speed.get_ref() * machine.psi_M.get_ref();
-    data.mechanics.J.get_ref() * saliency * rho * rho / (torque_constant(data) * n_p * emf)
-}
-
-/// What the drive will not hold, and what it holds by a narrow margin.
-pub fn of(data: &Data, bandwidths: &Bandwidths, flux_observer: bool) -> (Vec<Limit>, Vec<String>) {
-    let (mut limits, mut notes) = (starts(data, bandwidths, flux_observer), Vec::new());
-    let (w_s, rated) = (bandwidths.speed.value, *data.rating.speed.get_ref());
-    let dip = DIP_OF_A_STEP * acceleration(data) / w_s;
-    let share = if flux_observer { 2.0 } else { 0.6 };
-    for level in LEVELS {
-        let speed = level * rated;
-        let reason = format!("a step of the rated torque takes 2/e T / (J w_s) = {dip:.3} of the {speed:.3} rad/s");
-        if dip > share * speed {
-            let excess = 1.1 * dip / (share * speed);
-            let rise = 4.0 * acceleration(data) / (w_s * w_s * 0.5 * share * speed);
-            let remedy =
-                format!("let the load rise in {rise:.2} s or more{}", others(data, bandwidths, excess, flux_observer));
-            limits.push(Limit { what: What::Load, level, reason, remedy, rise: Some(rise) });
-        } else if dip > speed {
+/// What the drive does not hold by its `trials`, and what it holds by a narrow margin.
+pub fn of(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> (Vec<Limit>, Vec<String>) {
+    let (mut limits, mut notes) = (Vec::new(), Vec::new());
+    let pair = tuned.pair();
+    let par = &pair.controller.model.parameters;
+    for trial in trials {
+        let level = trial.task.level;
+        let mut tell = |what, reason| {
+            let cures = remedy::found(motor, tuned, trials, trial, what);
+            limits.push(Limit { what, level, reason, cures });
+        };
+        if !trial.starts() {
+            tell(What::Start, of_start(&motor.data, par, trial));
+        }
+        if !trial.holds() {
+            tell(What::Load, of_load(&motor.data, par, trial));
+        } else if trial.least <= 0.0 {
             notes.push(format!(
-                "at {level} pu, {reason}: it falls through zero speed, where the estimate depends on R_s"
+                "at {} pu, {} takes the speed to {:.2} pu, through zero, where the estimate depends on R_s",
+                short(level),
+                step(trial),
+                trial.least
             ));
         }
     }
     (limits, notes)
 }
 
-/// Other remedies for a dip that is `excess` times too large, where they do not raise the gain of the start too far.
-fn others(data: &Data, bandwidths: &Bandwidths, excess: f64, flux_observer: bool) -> String {
-    let (w_s, rho) = (excess * bandwidths.speed.value, bandwidths.observer.value);
-    let faster = (3.0 * w_s).max(rho);
-    let calm = |rho: f64, w_s: f64| flux_observer || gain_per_bandwidth(data, rho) * w_s <= GREATEST_GAIN;
-    let by_speed = (faster <= FASTEST.max(rho) && calm(faster, w_s))
-        .then(|| format!(", or set bandwidth.speed to {w_s:.0} rad/s and bandwidth.observer to {faster:.0} rad/s"));
-    let by_inertia = calm(rho, w_s).then(|| {
-        let J = excess * data.mechanics.J.get_ref();
-        format!(", or count the load's inertia in mechanics.J: {J:.2e} kg.m2 would hold")
-    });
-    by_speed.unwrap_or_default() + &by_inertia.unwrap_or_default()
+fn step(trial: &Trial) -> String {
+    if trial.task.level > 1.0 {
+        format!("a step of {:.3} N.m", trial.task.torque)
+    } else {
+        "a step of the rated torque".into()
+    }
 }
 
-fn starts(data: &Data, bandwidths: &Bandwidths, flux_observer: bool) -> Vec<Limit> {
-    let limit = |level, reason: &str, remedy: &str| Limit {
-        what: What::Start,
-        level,
-        reason: reason.to_owned(),
-        remedy: remedy.to_owned(),
-        rise: None,
-    };
-    if flux_observer {
-        let margin = resistance_margin(data);
-        if margin >= LEAST_MARGIN {
-            return Vec::new();
-        }
-        let reason = format!(
-            "at rest, the estimate leaves the rotor unless R_s is known to {:.1} %: (R - R^) i_0 / psi_M against \
-             sqrt(n_p K i_0 / J)",
-            100.0 * margin
+fn of_load(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
+    let dip = DIP_OF_A_STEP * trial.task.torque / (data.mechanics.J.get_ref() * par.speed_loop.bandwidth);
+    let speed = trial.task.level * data.rating.speed.get_ref();
+    let part = |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref());
+    let friction = part(&data.mechanics.tau_coulomb) + part(&data.mechanics.B) * speed;
+    if trial.most < trial.task.torque + friction {
+        return format!(
+            "u_dc and rating.current leave {:.3} N.m, and load and friction take {:.3} N.m",
+            trial.most,
+            trial.task.torque + friction
         );
-        return LEVELS.map(|level| limit(level, &reason, "lower mechanics.J, or start with a sensor")).into();
     }
-    let rho = bandwidths.observer.value;
-    let gain = gain_per_bandwidth(data, rho) * bandwidths.speed.value;
+    let by_speed = format!("{} takes 2/e T / (J w_s) = {dip:.3} of the {speed:.3} rad/s", step(trial));
+    if par.estimator.class() != Class::FluxObserver {
+        return by_speed;
+    }
+    let (psi_M, w) = (data.machine.psi_M.get_ref(), f64::from(par.motor.n_p) * speed);
+    let lost = (data.machine.R_s.get_ref() - par.motor.R_s) * trial.task.torque / torque_constant(data);
+    let turned = par.estimators.rasmussen.c_1 * lost / (w * w * psi_M);
+    if turned < 0.05 {
+        return by_speed;
+    }
+    format!("{by_speed}, and c_1 (R - R^) i / (w^2 psi_M) = {turned:.2} rad turns the estimate")
+}
+
+fn of_start(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
+    let from = format!("from {} of {} angles, ", trial.angles - trial.started, trial.angles);
+    if par.estimator.class() == Class::FluxObserver {
+        let margin = resistance_margin(data);
+        if margin < LEAST_MARGIN {
+            return format!(
+                "{from}at rest, the estimate leaves the rotor unless R_s is known to {:.1} %: (R - R^) i_0 / psi_M against \
+                 sqrt(n_p K i_0 / J)",
+                100.0 * margin
+            );
+        }
+        let i_0 = par.zero_speed.i_0;
+        let beside = par.limit.i_q_beside(i_0).atan2(i_0).to_degrees();
+        return format!(
+            "{from}the speed loop is faster than the rotor, and the estimate stays near atan(i_q / i_0) = {beside:.0} deg beside \
+             it, where the currents give no torque"
+        );
+    }
+    let gain = gain_per_bandwidth(data, par.estimators.tracker.bandwidth) * par.speed_loop.bandwidth;
     if gain <= GREATEST_GAIN {
-        return Vec::new();
+        return format!("{from}the speed does not settle at its reference after the I-f start");
     }
-    let reason = format!(
-        "the speed loop acts on the estimate through (L_q - L_d) p i_q with the gain J w_s (L_q - L_d) rho^2 / (K n_p w psi_M) \
-         = {gain:.0}, more than {GREATEST_GAIN}"
-    );
-    let remedy = format!("lower bandwidth.speed to {:.3} rad/s", bandwidths.speed.value * GREATEST_GAIN / gain);
-    vec![limit(LEVELS[0], &reason, &remedy)]
+    format!(
+        "{from}the speed loop acts on the estimate through (L_q - L_d) p i_q with the gain J w_s (L_q - L_d) rho^2 / (K n_p w \
+         psi_M) = {gain:.0}, more than {GREATEST_GAIN}"
+    )
 }

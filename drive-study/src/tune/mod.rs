@@ -1,22 +1,29 @@
 //! From a machine and bandwidths to parameter values of the FMUs.
 //!
 //! - [`motor`]: the TOML file of a machine; [`plausible`]: whether its values are those of a machine; [`rules`]: how values
-//!   follow from it; [`bandwidth`]: the loops; [`iron`]: iron loss from a drag test; [`check`](mod@check): whether the models
-//!   have such variables; [`limits`]: what the drive will not hold; [`trial`]: the drive tried from many start angles;
-//!   [`Tuned::pair`](rules::Tuned::pair): the drive with these values, natively.
+//!   follow from it; [`bandwidth`]: the loops; [`flux_observer`] and [`extended_emf`]: the estimators; [`iron`]: iron loss from a drag test; [`check`](mod@check): whether the models
+//!   have such variables; [`voltage`]: what the DC link allows; [`Tuned::pair`](rules::Tuned::pair): the drive with these values,
+//!   natively.
+//! - [`trial`]: the drive tried from many start angles, timed by its own time constants ([`pace`]); [`limits`]: what it will not
+//!   hold, and why; [`remedy`]: what helps.
 
 pub mod bandwidth;
 pub mod check;
+pub mod extended_emf;
+pub mod flux_observer;
 pub mod iron;
 pub mod limits;
 pub mod motor;
 mod native;
+pub mod pace;
 pub mod plausible;
+pub mod remedy;
 pub mod rules;
 pub mod saturation;
 pub mod trial;
+pub mod voltage;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use drive::{PmsmPlant, SensorlessController};
 use fmu_core::description::{self, Variable, VariableKind};
 use fmu_core::{Description, Model};
@@ -29,9 +36,7 @@ use std::path::Path;
 /// # Errors
 /// Gives file, line and column, and the problem: a key, a type, a value, or inconsistent values.
 pub fn tune(path: &Path) -> Result<Tuned> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
-    let motor = MotorFile::parse(&text, path)?;
-    rules::tune(&motor)
+    rules::tune(&MotorFile::read(path)?)
 }
 
 /// The settings of plant and controller for importers: the values that differ from the start values of the FMUs. The

@@ -1,6 +1,6 @@
 //! The file of a machine: its data, its supply, and the bandwidths of its loops.
 
-use anyhow::{Result, anyhow};
+use anyhow::{Context, Result, anyhow};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -9,7 +9,7 @@ use toml::Spanned;
 pub type Number = Spanned<f64>;
 
 /// A machine's file, read.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct MotorFile {
     /// Its content.
     pub data: Data,
@@ -18,7 +18,7 @@ pub struct MotorFile {
 }
 
 /// The content of the file, in SI units; currents and fluxes are peak values.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Data {
     /// Short name, used for files.
@@ -46,7 +46,7 @@ pub struct Data {
 }
 
 /// The machine.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Machine {
@@ -63,7 +63,7 @@ pub struct Machine {
 }
 
 /// Inertia and friction.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Mechanics {
@@ -78,19 +78,28 @@ pub struct Mechanics {
 }
 
 /// Ratings.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rating {
-    /// Mechanical speed in rad/s.
+    /// Rated mechanical speed in rad/s.
     pub speed: Number,
-    /// Torque in N.m.
+    /// Highest mechanical speed in rad/s, with field weakening; `speed` if omitted.
+    pub speed_max: Option<Number>,
+    /// Rated torque in N.m.
     pub torque: Number,
-    /// Maximum magnitude of the current in A.
+    /// Maximum current in A, peak value of a phase: what inverter and magnets allow for a short time, not the rated current.
     pub current: Number,
 }
 
+impl Rating {
+    /// Highest mechanical speed in rad/s.
+    pub fn top(&self) -> f64 {
+        *self.speed_max.as_ref().unwrap_or(&self.speed).get_ref()
+    }
+}
+
 /// What feeds the inverter.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DcLink {
     /// Voltage in V.
@@ -98,7 +107,7 @@ pub struct DcLink {
 }
 
 /// Bandwidths of the loops, in rad/s; by the rules where omitted.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bandwidth {
     /// Current loop.
@@ -110,7 +119,7 @@ pub struct Bandwidth {
 }
 
 /// Saturation of the plant, in A/Wb2 and A/Wb3.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Saturation {
     /// Second-order d-axis coefficient.
@@ -122,7 +131,7 @@ pub struct Saturation {
 }
 
 /// Iron loss of the plant.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Iron {
     /// Drag test: pairs of mechanical speed in rad/s and iron loss in W.
@@ -130,7 +139,7 @@ pub struct Iron {
 }
 
 /// Overrides of what the rules choose.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Control {
@@ -153,6 +162,15 @@ impl MotorFile {
             let hint = if message.starts_with("missing") { "; motors/reference.toml shows every key" } else { "" };
             anyhow!("{}: {message}{hint}", place(path, text, offset))
         })
+    }
+
+    /// The file at `path`, read.
+    ///
+    /// # Errors
+    /// The file cannot be read, or those of [`parse`](Self::parse).
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
+        Self::parse(&text, path)
     }
 
     /// Position of a value: `file:line:column`.

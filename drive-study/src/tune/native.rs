@@ -15,6 +15,22 @@ impl Tuned {
         self.controller.iter().for_each(|setting| set(&mut pair.controller, setting));
         pair
     }
+
+    /// A real value of the controller.
+    pub fn real(&self, name: &str) -> Option<f64> {
+        self.controller.iter().find(|setting| setting.name == name).and_then(|setting| match setting.value {
+            Value::Real(x) => Some(x),
+            _ => None,
+        })
+    }
+
+    /// The drive with another value of the controller.
+    pub fn with(&self, name: &'static str, value: Value) -> Self {
+        let mut other = self.clone();
+        other.controller.retain(|setting| setting.name != name);
+        other.controller.push(Setting { name, value, rule: String::new(), origin: None });
+        other
+    }
 }
 
 fn set<M: Model>(block: &mut Block<M>, setting: &Setting) {

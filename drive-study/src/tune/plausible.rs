@@ -2,8 +2,9 @@
 //! kg.m2.
 //!
 //! Each check forms a ratio of the value to the others of the file, and says in which range that is for machines: L i / psi_M
-//! at the greatest current; R_s i against u_dc; the EMF at rated speed against u_dc / sqrt(3); the time in which the rated
-//! torque reaches the rated speed; the rated torque against that of the greatest current.
+//! at the maximum current; R_s i against u_dc; the EMF at rated speed against u_dc / sqrt(3); the time in which the rated
+//! torque reaches the rated speed; the rated torque against that of the maximum current; the
+//! highest speed against the rated speed.
 
 use super::motor::{Data, MotorFile, Number};
 use anyhow::{Result, bail};
@@ -51,6 +52,8 @@ fn short(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
+const SPEED: &[(&str, f64)] = &[("rpm", std::f64::consts::PI / 30.0), ("deg/s", std::f64::consts::PI / 180.0)];
+
 const INDUCTANCE: &[(&str, f64)] = &[("mH", 1e-3), ("uH", 1e-6)];
 
 fn checks(data: &Data) -> Vec<Check<'_>> {
@@ -69,7 +72,16 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
         range: (0.003, 30.0),
         units: INDUCTANCE,
     };
-    vec![
+    let top = rating.speed_max.as_ref().map(|value| Check {
+        name: "rating.speed_max",
+        value,
+        unit: "rad/s",
+        per_unit: 1.0 / speed,
+        what: "its multiple of rating.speed",
+        range: (1.0, 10.0),
+        units: SPEED,
+    });
+    let mut all = vec![
         Check {
             name: "dc_link.u_dc",
             value: &data.dc_link.u_dc,
@@ -95,7 +107,7 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
             per_unit: n_p * psi_M * 3.0_f64.sqrt() / u_dc,
             what: "the EMF over dc_link.u_dc / sqrt(3)",
             range: (0.02, 5.0),
-            units: &[("rpm", std::f64::consts::PI / 30.0), ("deg/s", std::f64::consts::PI / 180.0)],
+            units: SPEED,
         },
         inductance("machine.L_d", &machine.L_d),
         inductance("machine.L_q", &machine.L_q),
@@ -126,7 +138,9 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
             range: (1e-4, 1e3),
             units: &[("kg.cm2", 1e-4), ("g.cm2", 1e-7), ("g.m2", 1e-3)],
         },
-    ]
+    ];
+    all.extend(top);
+    all
 }
 
 #[cfg(test)]

@@ -1,48 +1,68 @@
-//! Tries a tuned drive: from every start angle it starts, turns at a share of the rated speed, and takes rated torque as a
-//! step.
+//! Tries a tuned drive: from every start angle it starts, turns at a share of the rated speed, and takes a load as a step.
 //!
-//! Held: at the end the speed is within 0.02 pu of its reference, and the estimate within 30 deg of the rotor.
+//! Held: in the end the speed is within 0.02 pu of its reference, and the estimate within 30 deg of the rotor. The end is 20
+//! times the slowest time constant ([`pace`](super::pace)) after the reference and again after the load; a run ends earlier
+//! where it has clearly settled, or runs away. Settled: over 4 time constants of the slower loop, the speed stays within 0.005
+//! pu of the reference and the angle error below 25 deg, and they move by less than 0.002 pu and 1 deg.
 
-use super::limits::{Limit, What};
+use super::pace::{Pace, begin};
 use super::rules::Tuned;
 use drive::Pair;
-use drive::control::start::StartMode;
 use drive::math::wrap;
-use std::f64::consts::{PI, TAU};
-use std::fmt;
+use std::f64::consts::TAU;
+use std::num::NonZero;
+use std::thread;
 
-/// The levels of speed in pu.
+/// The levels of speed in pu that every drive is tried at; besides, its highest speed.
 pub const LEVELS: [f64; 3] = [0.1, 0.5, 1.0];
 
-/// What happened against what was told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// It starts from all angles and holds the load.
-    Holds,
-    /// It does not, as was told.
-    Announced,
-    /// It does not, and nothing was told.
-    Lost,
-    /// It does, and was told not to.
-    FalseAlarm,
+/// End of a run in units of the slowest time constant.
+const HORIZON: f64 = 20.0;
+
+/// What has to be settled, in units of the time constant of the slower loop.
+const WINDOW: f64 = 4.0;
+
+/// Parts of the window; the oldest one is left as a new one begins.
+const PARTS: usize = 4;
+
+/// Tolerances of the end: speed in pu, angle in deg.
+const HELD: (f64, f64) = (0.02, 30.0);
+
+/// Tolerances of a run that has clearly settled.
+const CALM: (f64, f64) = (0.005, 25.0);
+
+/// Greatest movement in the window of a run that has clearly settled: speed in pu, angle in deg.
+const STILL: (f64, f64) = (0.002, 1.0);
+
+/// Distance from the reference in pu, besides its own size, from which no drive returns.
+const AWAY: f64 = 4.0;
+
+/// What is asked of the drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Task {
+    /// Speed in pu of the rated speed.
+    pub level: f64,
+    /// Load in N.m.
+    pub torque: f64,
+    /// Time in s in which the load rises; 0: a step.
+    pub rise: f64,
 }
 
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Holds => "holds",
-            Self::Announced => "does not hold, as announced",
-            Self::Lost => "does not hold, not announced",
-            Self::FalseAlarm => "holds, though announced otherwise",
-        })
+impl Tuned {
+    /// The tasks of a trial: rated torque as a step at each level, and at the highest speed the torque of the rated power.
+    pub fn tasks(&self) -> Vec<Task> {
+        let task = |level, torque| Task { level, torque, rise: 0.0 };
+        let top = self.top / self.speed;
+        let highest = (top > 1.0).then(|| task(top, self.top_torque));
+        LEVELS.map(|level| task(level, self.torque)).into_iter().chain(highest).collect()
     }
 }
 
-/// What a number of start angles gave at one level.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// What a number of start angles gave.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
-    /// Speed in pu.
-    pub level: f64,
+    /// What was asked.
+    pub task: Task,
     /// Start angles.
     pub angles: u32,
     /// How many of them started.
@@ -53,107 +73,194 @@ pub struct Trial {
     pub least: f64,
     /// Greatest angle error in deg after the load step where it was held.
     pub error: f64,
+    /// Greatest torque in N.m that the controller allows at this speed.
+    pub most: f64,
 }
 
 impl Trial {
-    /// What happened against what `limits` told.
-    pub fn verdict(&self, limits: &[Limit]) -> Verdict {
-        let told = |what| limits.iter().any(|limit| limit.what == what && limit.level.total_cmp(&self.level).is_eq());
-        let of = |what| match (self.does(what), told(what)) {
-            (true, false) => Verdict::Holds,
-            (false, true) => Verdict::Announced,
-            (false, false) => Verdict::Lost,
-            (true, true) => Verdict::FalseAlarm,
-        };
-        match of(What::Start) {
-            Verdict::Holds => of(What::Load),
-            start => start,
+    /// Whether the drive started from every angle.
+    pub fn starts(&self) -> bool {
+        self.started == self.angles
+    }
+
+    /// Whether it held the load wherever it started.
+    pub fn holds(&self) -> bool {
+        self.held == self.started
+    }
+}
+
+/// How a run went: whether it started, whether it held the load, least speed in pu and greatest angle error in deg after it, and
+/// the greatest torque in N.m.
+#[derive(Clone, Copy)]
+struct Run {
+    started: bool,
+    held: bool,
+    least: f64,
+    error: f64,
+    most: f64,
+}
+
+/// What is seen of the speed and the angle error in a part of the window.
+#[derive(Clone, Copy)]
+struct Part {
+    /// Distance of the speed from the reference in pu, greatest magnitude.
+    off: f64,
+    /// Angle error in deg, greatest magnitude.
+    ahead: f64,
+    /// Least and greatest speed in pu.
+    speed: (f64, f64),
+    /// Least and greatest angle error in deg.
+    angle: (f64, f64),
+}
+
+impl Part {
+    const NONE: Self = Self {
+        off: 0.0,
+        ahead: 0.0,
+        speed: (f64::INFINITY, f64::NEG_INFINITY),
+        angle: (f64::INFINITY, f64::NEG_INFINITY),
+    };
+
+    fn see(&mut self, reference: f64, speed: f64, angle: f64) {
+        self.off = self.off.max((speed - reference).abs());
+        self.ahead = self.ahead.max(angle.abs());
+        self.speed = (self.speed.0.min(speed), self.speed.1.max(speed));
+        self.angle = (self.angle.0.min(angle), self.angle.1.max(angle));
+    }
+
+    fn with(self, other: Self) -> Self {
+        Self {
+            off: self.off.max(other.off),
+            ahead: self.ahead.max(other.ahead),
+            speed: (self.speed.0.min(other.speed.0), self.speed.1.max(other.speed.1)),
+            angle: (self.angle.0.min(other.angle.0), self.angle.1.max(other.angle.1)),
         }
     }
 
-    /// Whether the drive does this from every angle.
-    pub fn does(&self, what: What) -> bool {
-        match what {
-            What::Start => self.started == self.angles,
-            What::Load => self.held == self.started,
+    fn held(&self) -> bool {
+        self.off <= HELD.0 && self.ahead <= HELD.1
+    }
+
+    fn settled(&self) -> bool {
+        let span = |(low, high): (f64, f64)| high - low;
+        self.off <= CALM.0 && self.ahead <= CALM.1 && span(self.speed) <= STILL.0 && span(self.angle) <= STILL.1
+    }
+}
+
+/// The drive of one run, and its clock.
+struct Bench<'a> {
+    tuned: &'a Tuned,
+    pair: Pair,
+    u_dc: f64,
+    T_s: f64,
+    /// Samples so far.
+    k: u32,
+}
+
+impl Bench<'_> {
+    fn now(&self) -> f64 {
+        f64::from(self.k) * self.T_s
+    }
+
+    /// One sample at the speed reference `level` (pu) with the load `torque` (N.m): speed in pu and angle error in deg; none if
+    /// the models give up.
+    fn step(&mut self, level: f64, torque: f64) -> Option<(f64, f64)> {
+        self.pair.set_inputs(level * self.tuned.speed, torque, self.u_dc);
+        self.pair.step(self.T_s).ok()?;
+        self.k += 1;
+        let ahead = wrap(self.pair.plant.out.theta_e - self.pair.controller.out.theta_est);
+        Some((self.pair.plant.out.speed / self.tuned.speed, ahead.to_degrees()))
+    }
+
+    /// Runs at `level` with `load` (N.m over the time in s since now), which is constant from `from` (s) on, until it has settled
+    /// or the end: whether it then stands at the reference. `see` gets speed and angle error.
+    fn until_settled(
+        &mut self,
+        level: f64,
+        from: f64,
+        load: impl Fn(f64) -> f64,
+        mut see: impl FnMut(f64, f64),
+    ) -> bool {
+        let pace = Pace::of(self.tuned, &self.pair, level, load(from));
+        let (begin, part) = (self.now(), WINDOW * pace.loops() / f64::from(u8::try_from(PARTS).unwrap_or(1)));
+        let (end, mut next) = (from + HORIZON * pace.slowest(), from + part);
+        let (mut parts, mut seen) = ([Part::NONE; PARTS], 0);
+        loop {
+            let t = self.now() - begin;
+            let Some((speed, angle)) = self.step(level, load(t)) else { return false };
+            see(speed, angle);
+            if t < from {
+                continue;
+            }
+            parts[0].see(level, speed, angle);
+            if parts[0].off > AWAY + level.abs() {
+                return false;
+            }
+            if t < next {
+                continue;
+            }
+            seen += 1;
+            let whole = parts.iter().fold(Part::NONE, |whole, &part| whole.with(part));
+            if seen >= PARTS && (whole.settled() || t >= end) {
+                return whole.held();
+            }
+            parts.rotate_right(1);
+            (parts[0], next) = (Part::NONE, next + part);
         }
     }
 }
 
-/// One life of the drive from the electrical angle `theta` (rad), with a load that rises in `rise` (s): whether it started,
-/// whether it held the load, least speed in pu and greatest angle error in deg after the step.
-fn one(tuned: &Tuned, level: f64, rise: f64, theta: f64) -> (bool, bool, f64, f64) {
+/// One run from the electrical angle `theta` (rad).
+fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
+    let mut run = Run { started: false, held: false, least: f64::INFINITY, error: 0.0, most: f64::INFINITY };
     let mut pair = tuned.pair();
     pair.plant.model.parameters.initial.theta_e = theta;
-    let u_dc = pair.plant.model.inputs.u_dc;
-    let (T_s, timing) = (pair.controller.model.parameters.T_s, Timing::of(tuned, &pair, level, rise));
-    let reference = level * tuned.speed;
-    let (mut started, mut held, mut least, mut error) = (true, true, f64::INFINITY, 0.0_f64);
     if pair.start().is_err() {
-        return (false, false, 0.0, 180.0);
+        return run;
     }
-    let mut k = 0_u32;
-    loop {
-        let t = f64::from(k) * T_s;
-        if t >= timing.end {
-            return (started, started && held, least, error);
-        }
-        let speed_ref = if t < timing.turn { 0.0 } else { reference };
-        let share = if t < timing.load { 0.0 } else { ((t - timing.load) / rise.max(f64::MIN_POSITIVE)).min(1.0) };
-        pair.set_inputs(speed_ref, share * tuned.torque, u_dc);
-        if pair.step(T_s).is_err() {
-            return (started && t > timing.load, false, least, 180.0);
-        }
-        k += 1;
-        let off = (pair.plant.out.speed - reference).abs() / tuned.speed;
-        let ahead = wrap(pair.plant.out.theta_e - pair.controller.out.theta_est).abs();
-        let bad = off > 0.02 || ahead > PI / 6.0;
-        if t < timing.load {
-            started &= t < timing.load - timing.window || !bad;
-        } else {
-            held &= t < timing.end - timing.window || !bad;
-            least = least.min(pair.plant.out.speed / tuned.speed);
-            error = error.max(ahead.to_degrees());
+    let (turn, ready) = begin(tuned, &pair, task.level);
+    let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, pair.controller.model.parameters.T_s);
+    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0 };
+    while bench.now() < turn {
+        if bench.step(0.0, 0.0).is_none() {
+            return run;
         }
     }
-}
-
-/// Instants in s: of the speed reference, of the load, the end; and the window that is judged before the last two.
-struct Timing {
-    turn: f64,
-    load: f64,
-    end: f64,
-    window: f64,
-}
-
-impl Timing {
-    fn of(tuned: &Tuned, pair: &Pair, level: f64, rise: f64) -> Self {
-        let par = &pair.controller.model.parameters;
-        let J = pair.plant.model.parameters.mechanics.J;
-        let settling = 12.0 / par.speed_loop.bandwidth;
-        let up = 1.5 * level * J * tuned.speed / tuned.torque + 2.0 * settling;
-        let start = &par.start;
-        let (turn, begin) = if start.mode == StartMode::CurrentFrequency {
-            (0.0, 2.0 * start.t_align + start.speed / start.acceleration + start.settle)
-        } else {
-            let rest = tuned.rest;
-            (rest, rest)
-        };
-        let load = begin + up;
-        Self { turn, load, end: load + rise + 2.0 * settling, window: 0.5 * settling }
+    run.started = bench.until_settled(task.level, ready - turn, |_| 0.0, |_, _| ());
+    if !run.started {
+        return run;
     }
+    let most = bench.pair.controller.out.tau_max;
+    let load = |t: f64| if t < task.rise { task.torque * t / task.rise } else { task.torque };
+    let (mut least, mut error) = (f64::INFINITY, 0.0_f64);
+    run.held = bench.until_settled(task.level, task.rise, load, |speed, angle| {
+        least = least.min(speed);
+        error = error.max(angle.abs());
+    });
+    Run { least, error, most, ..run }
 }
 
-/// Tries a level (pu) from `angles` start angles, evenly spaced, with a load that rises in `rise` (s): 0 is a step.
-pub fn at(tuned: &Tuned, level: f64, rise: f64, angles: u32) -> Trial {
-    let mut trial = Trial { level, angles, least: f64::INFINITY, ..Trial::default() };
-    for k in 0..angles {
-        let (started, held, least, error) = one(tuned, level, rise, f64::from(k) * TAU / f64::from(angles));
+/// Tries all tasks from `angles` start angles.
+pub fn all(tuned: &Tuned, angles: u32) -> Vec<Trial> {
+    tuned.tasks().iter().map(|task| at(tuned, task, angles)).collect()
+}
+
+/// Tries a task from `angles` start angles, evenly spaced, on all processors.
+pub fn at(tuned: &Tuned, task: &Task, angles: u32) -> Trial {
+    let run = |k: u32| one(tuned, task, f64::from(k) * TAU / f64::from(angles));
+    let threads = u32::try_from(thread::available_parallelism().map_or(1, NonZero::get)).unwrap_or(1).min(angles);
+    let runs: Vec<Run> = thread::scope(|scope| {
+        let of = |first| (first..angles).step_by(threads.max(1) as usize).map(run).collect::<Vec<_>>();
+        let all: Vec<_> = (0..threads).map(|first| scope.spawn(move || of(first))).collect();
+        all.into_iter().flat_map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    });
+    let mut trial =
+        Trial { task: *task, angles, started: 0, held: 0, least: f64::INFINITY, error: 0.0, most: f64::INFINITY };
+    for Run { started, held, least, error, most } in runs {
         trial.started += u32::from(started);
         trial.held += u32::from(held);
-        if started {
-            trial.least = trial.least.min(least);
-        }
+        trial.least = trial.least.min(least);
+        trial.most = trial.most.min(most);
         if held {
             trial.error = trial.error.max(error);
         }

@@ -8,7 +8,7 @@
 //!
 //! Limits: the angle requires an EMF. It holds rated load down to 0.010 of the rated speed, 0.020 with a compensated dead
 //! time. A reversal at light load is ambiguous by half a turn, unless `emf.hold_reversal` holds it. L_q + 20 % at rated
-//! load shifts the angle by 5.8 deg.
+//! load shifts the angle by 5.8 deg. The speed that `emf.hold_reversal` takes from the EMF is e_q / (psi_M + (L_d - L_q) i_d).
 
 use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, AxisObserver, Direction, pole};
@@ -16,6 +16,7 @@ use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
 use crate::frame::DqHat;
+use crate::math::at_least;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
@@ -60,6 +61,9 @@ impl ExtendedEmfObserver {
     }
 }
 
+/// Least flux linkage that makes the extended EMF, as a share of psi_M.
+const LEAST_FLUX: f64 = 0.2;
+
 /// State kept from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ExtendedEmf {
@@ -80,7 +84,13 @@ impl Estimating for ExtendedEmf {
         let Self { tracker, observer } = self;
         tracker.advance(context.T_s);
         let x = Interval::new(tracker.theta_last, tracker.theta, sample, context.T_s);
-        let e = observer.emf(context, &x, tracker.w);
+        let mut e = observer.emf(context, &x, tracker.w);
+        if context.par.emf.hold_reversal {
+            // The EMF of the magnet alone, which is what the speed is taken from.
+            let motor = context.motor;
+            let active = motor.psi_M + (motor.L_d - motor.L_q) * x.i.d();
+            e = e * (motor.psi_M / at_least(active, LEAST_FLUX * motor.psi_M));
+        }
         emf::follow(tracker, &mut observer.direction, context, e, sample)
     }
 
@@ -92,11 +102,25 @@ impl Estimating for ExtendedEmf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimator::testing::{comes_to_the_rotor, with_L_q};
+    use crate::estimator::EstimatorParameters;
+    use crate::estimator::testing::{beside, comes_to_the_rotor, salient, with_L_q};
+    use crate::frame::Dq;
 
     #[test]
     fn comes_to_the_rotor_without_bias() {
         comes_to_the_rotor::<ExtendedEmf>(47.0);
+    }
+
+    /// Near standstill, half of the speed comes from e_q. With i_d = -6 A, E_ex is 1.17 times the EMF of the magnet.
+    #[test]
+    fn a_held_reversal_counts_the_reluctance() {
+        let mut par = EstimatorParameters::default();
+        (par.emf.hold_reversal, par.emf.w_hold) = (true, 80.0);
+        for w in [60.0, 120.0, -60.0] {
+            let (angle, speed) = beside::<ExtendedEmf>(&par, &salient(), (w, Dq::new(-6.0, 8.0)), 0.1, 10_000);
+            assert!(angle.abs().to_degrees() < 0.02, "{w} rad/s: {} deg off", angle.to_degrees());
+            assert!(speed.abs() < 0.02, "{w} rad/s: {speed} rad/s off");
+        }
     }
 
     #[test]

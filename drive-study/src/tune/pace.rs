@@ -1,0 +1,95 @@
+//! How long the tuned drive takes: the time constants of its modes at a speed, by which a trial is timed.
+//!
+//! - **Speed loop.** s^2 + w_s s + w_s^2 / t_is = 0; with t_is = 4, a double pole at w_s / 2.
+//! - **Observer.** Rasmussen's flux poles at the electrical speed w: s^2 + c_1 s + w^2 = 0, so 2 / c_1 above w = c_1 / 2 and about
+//!   c_1 / w^2 below, where the back EMF says little; its speed adaptation: a double pole at w_n. The tracker of the extended
+//!   EMF: a double pole at rho.
+//! - **Mechanics.** J w / T, the time in which the rated torque brings the rotor to its speed. Under a load tau_L, which moves it
+//!   by the rated speed in either direction where the drive is lost, J w / T with the rated speed; and the dip 2/e tau_L / (J w_s)
+//!   is made good by what the load leaves of the greatest torque: in 2/e tau_L / (w_s (tau_max - tau_L)).
+
+use super::bandwidth::DIP_OF_A_STEP;
+use super::rules::Tuned;
+use drive::Pair;
+use drive::control::start::StartMode;
+use drive::estimator::Class;
+
+/// Least share of a load that the greatest torque is taken to leave.
+const LEAST_SPARE: f64 = 0.02;
+
+/// Time constants in s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Of the mechanics.
+    pub mechanics: f64,
+    /// Of the observer or tracker.
+    pub observer: f64,
+    /// Of the speed loop.
+    pub speed: f64,
+}
+
+impl Pace {
+    /// Of the tuned drive at `level` (pu of the rated speed), where `load` (N.m) comes.
+    pub fn of(tuned: &Tuned, pair: &Pair, level: f64, load: f64) -> Self {
+        let par = &pair.controller.model.parameters;
+        let (speed_loop, estimators) = (&par.speed_loop, &par.estimators);
+        let w = f64::from(par.motor.n_p) * level * tuned.speed;
+        let observer = if par.estimator.class() == Class::FluxObserver {
+            let rasmussen = &estimators.rasmussen;
+            slowest(rasmussen.c_1, w * w).max(1.0 / rasmussen.w_n)
+        } else {
+            1.0 / estimators.tracker.bandwidth
+        };
+        let spare = (pair.controller.out.tau_max - load).max(LEAST_SPARE * load);
+        let back = if load > 0.0 { DIP_OF_A_STEP * load / (speed_loop.bandwidth * spare) } else { 0.0 };
+        let speed = if load > 0.0 { level.max(1.0) } else { level } * tuned.speed;
+        Self {
+            mechanics: (pair.plant.model.parameters.mechanics.J * speed / tuned.torque).max(back),
+            observer,
+            speed: slowest(speed_loop.bandwidth, speed_loop.bandwidth * speed_loop.bandwidth / speed_loop.t_is),
+        }
+    }
+
+    /// The slower one of observer and speed loop.
+    pub fn loops(&self) -> f64 {
+        self.observer.max(self.speed)
+    }
+
+    /// The slowest one.
+    pub fn slowest(&self) -> f64 {
+        self.loops().max(self.mechanics)
+    }
+}
+
+/// Time constant in s of the slower root of s^2 + `a` s + `b` = 0.
+fn slowest(a: f64, b: f64) -> f64 {
+    let half = 0.5 * a;
+    // The product of the roots is b, their greater magnitude the sum.
+    if half * half > b { (half + (half * half - b).sqrt()) / b } else { 1.0 / half }
+}
+
+/// The instants in s at which the drive gets its speed reference, and at which its estimator has the rotor and a ramp has come
+/// to `level` (pu).
+pub fn begin(tuned: &Tuned, pair: &Pair, level: f64) -> (f64, f64) {
+    let par = &pair.controller.model.parameters;
+    let ramp = if par.speed_loop.ramp > 0.0 { level * tuned.speed / par.speed_loop.ramp } else { 0.0 };
+    let start = &par.start;
+    if start.mode == StartMode::CurrentFrequency {
+        (0.0, 2.0 * start.t_align + start.speed / start.acceleration + start.settle + ramp)
+    } else {
+        (tuned.rest, tuned.rest + ramp)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slower_root_decides() {
+        // (s + 2)(s + 10); a double root at 3; 2 +- j 5.
+        assert!((slowest(12.0, 20.0) - 0.5).abs() < 1e-12);
+        assert!((slowest(6.0, 9.0) - 1.0 / 3.0).abs() < 1e-12);
+        assert!((slowest(4.0, 29.0) - 0.5).abs() < 1e-12);
+    }
+}
