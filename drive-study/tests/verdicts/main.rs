@@ -214,7 +214,8 @@ fn compare(motor: &MotorFile, angles: u32) -> (u32, u32) {
     let (mut cells, mut remedies, mut row) = (0, 0, head(motor, &tuned));
     for trial in &trials {
         let (started, held) = long_from(motor, &tuned, &trial.task, angles);
-        row += &format!(" | {:.2}: {}/{} {started}/{held}", trial.task.level, trial.started, trial.held);
+        let cell = format!(" | {:.2}: {}/{} {started}/{held}", trial.task.level, trial.started, trial.held);
+        row.push_str(&cell);
         let told = |what| limits.iter().any(|l| l.what == what && l.level.total_cmp(&trial.task.level).is_eq());
         assert_eq!(trial.starts(), started == angles, "{row}");
         assert_eq!(trial.holds(), held == started, "{row}");
