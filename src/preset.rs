@@ -1,4 +1,4 @@
-//! An FMU with other start values, made from its archive: the same binaries with a [preset](fmu_core::preset) among their
+//! An FMU with other start values, made from its archive: the same binaries with a [`preset`] among their
 //! resources, and a description that says so.
 
 use crate::documentation;

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// anew, and documentation/index.html lists the new start values.
 ///
 /// A value is written as for `fmu simulate --set`: a number, with one of the variable's units if needed (1000rpm), true or false, a
-/// name or a number of an enumeration, a text; the elements of an array with commas, or one element as NAME[2] or NAME[1,2]. The
+/// name or a number of an enumeration, a text; the elements of an array with commas, or one element as `NAME[2]` or `NAME[1,2]`. The
 /// values of --ssv or --motor come before those of --set. In an FMU that is a preset already, its other values stay.
 ///
 /// A wrong name, a value that is not allowed, or values that the FMU refuses together: nothing is written.

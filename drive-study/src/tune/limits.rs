@@ -1,5 +1,5 @@
 //! What the tuned drive will not do, told beforehand: what its [`trial`](super::trial) showed, why, and what helps
-//! ([`remedy`](super::remedy)).
+//! ([`remedy`]).
 //!
 //! - **Load.** A step of the torque T makes the speed loop (double pole at w_s / 2) dip by 2/e T / (J w_s). An estimator that
 //!   lives on the EMF loses the rotor near zero speed; a flux observer may pass it. There, R^ below R turns the estimate by
