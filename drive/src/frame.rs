@@ -274,7 +274,7 @@ impl<F: Rotating, S: Scalar> Axis<F, S> {
 
     /// The stator vector of this `length` along the d-axis.
     #[inline]
-    pub fn along(self, length: f64) -> Vector<Stator, S> {
+    pub fn along(self, length: S) -> Vector<Stator, S> {
         Vector::new(self.cos * length, self.sin * length)
     }
 

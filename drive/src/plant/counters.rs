@@ -14,11 +14,12 @@
 use crate::frame::AlphaBeta;
 use crate::integrate::rk4;
 use crate::math::all_finite;
-use crate::plant::integration::LONGEST_SUBSTEP;
+use crate::plant::circuit::Rates;
+use crate::plant::integration::LONGEST_STEP;
+use crate::plant::losses::flow::Switches;
 use crate::plant::machine::{self, Machine};
 use crate::plant::model::PmsmPlant;
 use crate::plant::power::Energy;
-use crate::plant::rates::Rates;
 use crate::plant::signals::PlantInputs;
 use crate::plant::state::{Instant, State, axis_at};
 use fmu_core::{Elapsed, Fault};
@@ -69,14 +70,14 @@ impl PmsmPlant {
         let Point { inputs, state, .. } = start;
         let (imposed, motor) = (self.parameters.mechanics.imposed, &self.parameters.motor);
         let angle = if imposed { inputs.angle_shaft } else { state.angle };
-        let psi = self.machine().to_stator(axis_at(motor, angle), state.psi);
+        let psi = self.machine::<false>().to_stator(axis_at(motor, angle), state.psi);
         let speeds = if imposed { [inputs.speed_shaft, end.speed_shaft] } else { [state.speed, self.state.speed] };
         let speed = speeds[0].abs().max(speeds[1].abs());
         let mut left = if self.blocked && !inputs.enable {
-            self.count(h, LONGEST_SUBSTEP, speed)?
+            self.count(h, LONGEST_STEP, speed)?
         } else {
             let legs = self.legs(inputs);
-            self.substeps(h, speed, &legs, self.lossy(inputs, &legs).is_some())?
+            self.substeps(h, speed, &legs, &Switches::new(&self.parameters, inputs.enable, inputs.u_dc, legs))?
         };
         let step = h / left;
         let mut x = SVector::from([psi.alpha(), psi.beta(), state.speed, angle, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -85,7 +86,9 @@ impl PmsmPlant {
                 let inputs = inputs.toward(end, x[8] / h);
                 let speed = if imposed { inputs.speed_shaft } else { x[2] };
                 let rates = self.rates_at(&inputs, AlphaBeta::new(x[0], x[1]), speed, x[3]);
-                let Rates { d_psi, acceleration, p_in, p_mech, p_loss, tau_shaft, .. } = rates;
+                let Rates { d_psi, acceleration, p_in, losses, tau_given, .. } = rates;
+                let tau_shaft = self.parameters.mechanics.tau_shaft(tau_given, inputs.tau_load);
+                let (p_mech, p_loss) = (tau_shaft * speed, losses.sum());
                 SVector::from([d_psi.alpha(), d_psi.beta(), acceleration, speed, p_in, p_mech, p_loss, tau_shaft, 1.0])
             });
             left -= 1.0;
@@ -99,7 +102,7 @@ impl PmsmPlant {
     /// The rates with the flux linkage `psi` (Wb) in stator axes, the `speed` (rad/s) and the `angle` (rad).
     fn rates_at(&self, inputs: &PlantInputs, psi: AlphaBeta, speed: f64, angle: f64) -> Rates {
         let motor = self.motor(inputs);
-        let (machine, axis) = (Machine::new(&motor, &self.parameters.saturation), axis_at(&motor, angle));
+        let (machine, axis) = (Machine::<_>::new(&motor, &self.parameters.saturation), axis_at(&motor, angle));
         let idle = self.blocked && !inputs.enable;
         let (psi, i) = if idle {
             let i = self.idle_current(&motor, speed);

@@ -15,11 +15,12 @@
 
 use crate::frame::{Axis, Phases, Rotor, Vector};
 use crate::modulation::limit_to_hexagon;
+use crate::plant::circuit::{Circuit, Rates, blocked_rates};
+use crate::plant::losses::flow::{Dissipation, Path, Switches};
 use crate::plant::machine::{self, Machine};
-use crate::plant::mechanics::Shaft;
+use crate::plant::mechanics::{Shaft, Standstill};
 use crate::plant::model::PmsmPlant;
 use crate::plant::power::{Powers, dc_current};
-use crate::plant::rates::{Held, Rates};
 use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::state::Instant;
 use crate::plant::tables::PlantParameters;
@@ -49,7 +50,7 @@ impl PmsmPlant {
         // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
         let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
         let psi = if follows { self.idle_flux(motor, speed) } else { psi };
-        let i = if idle { self.idle_current(motor, speed) } else { Machine::new(motor, saturation).current(psi) };
+        let i = if idle { self.idle_current(motor, speed) } else { Machine::<_>::new(motor, saturation).current(psi) };
         Instant { psi, i, speed, angle, axis, idle }
     }
 
@@ -70,16 +71,18 @@ impl PmsmPlant {
     #[inline]
     pub(super) fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
         let PlantParameters { saturation, mechanics, .. } = &self.parameters;
-        let (motor, legs) = (&self.motor(inputs), self.legs(inputs));
-        let lossy = self.lossy(inputs, &legs);
-        let held = Held {
-            machine: Machine::new(motor, saturation),
+        let machine = Machine::<_>::new(&self.motor(inputs), saturation);
+        let shaft = Shaft::new(mechanics, inputs.tau_load, Standstill::new(mechanics, at.speed.value()));
+        if at.idle {
+            return blocked_rates(&machine, &shaft, at.psi, at.i, at.speed);
+        }
+        let path = Path {
             u: if inputs.enable { limit_to_hexagon(inputs.u, inputs.u_dc) } else { Vector::fixed(Vector::ZERO) },
-            legs: legs.drop().then_some(&legs),
-            lossy: lossy.as_ref(),
-            shaft: Shaft::new(mechanics, inputs.tau_load, at.speed.value()),
+            dissipation: Dissipation::at(&self.parameters, machine.resistance(), machine.electrical(at.speed)),
+            drops: Switches::new(&self.parameters, inputs.enable, inputs.u_dc, self.legs(inputs)),
         };
-        if at.idle { held.idle_rates(at.psi, at.i, at.speed) } else { held.rates(at.axis, at.psi, at.i, at.speed) }
+        let psi = machine.to_stator(at.axis, at.psi);
+        Circuit { machine, path, shaft }.rates(at.axis, psi, at.speed)
     }
 
     /// The derivatives of the states at an instant.
@@ -97,13 +100,15 @@ impl PmsmPlant {
 
     /// The outputs at an instant; their powers are those of the instant.
     fn outputs<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> PlantOutputs<S> {
-        let Rates { p_in, p_mech, p_loss, losses, tau_shaft, i, .. } = self.rates(inputs, at);
+        let Rates { p_in, losses, tau_given, i, .. } = self.rates(inputs, at);
+        let tau_shaft = self.parameters.mechanics.tau_shaft(tau_given, inputs.tau_load);
+        let p_mech = tau_shaft * at.speed;
         let i = if self.parameters.iron.is_none() { at.i } else { at.axis.from_stator(i) };
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let p_in = p_in + 0.0.into();
         let currents = || Phases::from_stator(at.axis.to_stator(i));
         let i_dc = dc_current(p_in, inputs, &self.legs(inputs), currents);
-        let powers = Powers { i_dc, p_in, p_mech, p_loss, losses, tau_shaft };
+        let powers = Powers { i_dc, p_in, p_mech, p_loss: losses.sum(), losses, tau_shaft };
         self.shown(inputs, at, i, self.temperatures(inputs), powers)
     }
 

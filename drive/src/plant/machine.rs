@@ -4,7 +4,7 @@
 //! i_q, tau_e = 1.5 n_p (psi_d i_q - psi_q i_d); [`saturation`](crate::plant::saturation) adds to the current. The flux
 //! linkages are the state, so the equations remain valid when the inductances saturate.
 
-use crate::frame::{AlphaBeta, Axis, Dq, Rotor, Stator, Vector};
+use crate::frame::{Axis, Dq, Rotor, Stator, Vector};
 use crate::math::reciprocal;
 use crate::motor::Motor;
 use crate::plant::saturation::Saturation;
@@ -20,7 +20,7 @@ pub fn flux<S: Scalar>(motor: &Motor<S>, i: Vector<Rotor, S>) -> Vector<Rotor, S
 /// Current (A) for the flux linkage `psi` (Wb).
 #[inline]
 pub fn current(motor: &Motor, saturation: &Saturation, psi: Dq) -> Dq {
-    Machine::new(motor, saturation).current(psi)
+    Machine::<_>::new(motor, saturation).current(psi)
 }
 
 /// Magnetic energy in J at the flux linkage `psi` (Wb), excluding that of the magnet: 0 without current.
@@ -47,38 +47,56 @@ impl Inverse {
 
 /// The machine with constants for many evaluations.
 #[derive(Clone, Copy, Debug)]
-pub struct Machine<'a, S = f64> {
-    motor: &'a Motor<S>,
-    /// `None` for a linear machine.
+pub struct Machine<'a, S = f64, const LINEAR: bool = false> {
+    /// `None` for a linear machine; never asked if `LINEAR`.
     saturation: Option<&'a Saturation>,
     psi_M: S,
     R_s: S,
-    by_L_d: f64,
     by_L_q: f64,
-    /// 1.5 n_p.
-    torque: f64,
+    /// 1/L_d - 1/L_q in 1/H.
+    saliency: f64,
+    n_p: f64,
 }
 
-impl<'a, S: Scalar> Machine<'a, S> {
+impl<'a, S: Scalar, const LINEAR: bool> Machine<'a, S, LINEAR> {
     /// From the parameters.
     #[inline]
-    pub fn new(motor: &'a Motor<S>, saturation: &'a Saturation) -> Self {
+    pub fn new(motor: &Motor<S>, saturation: &'a Saturation) -> Self {
         Self::with(motor, saturation, Inverse::of(motor))
     }
 
     /// With the reciprocals at hand.
     #[inline]
-    pub fn with(motor: &'a Motor<S>, saturation: &'a Saturation, Inverse { d, q }: Inverse) -> Self {
-        let Motor { n_p, R_s, psi_M, .. } = *motor;
+    pub fn with(motor: &Motor<S>, saturation: &'a Saturation, Inverse { d, q }: Inverse) -> Self {
+        let Motor { n_p, R_s, L_d: _, L_q: _, psi_M } = *motor;
         let saturation = (!saturation.is_none()).then_some(saturation);
-        Self { motor, saturation, psi_M, R_s, by_L_d: d, by_L_q: q, torque: 1.5 * f64::from(n_p) }
+        Self { saturation, psi_M, R_s, by_L_q: q, saliency: d - q, n_p: f64::from(n_p) }
     }
 
     /// Current (A) for the flux linkage `psi` (Wb).
     #[inline]
     pub fn current(&self, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
-        let linear = Vector::new((psi.d() - self.psi_M) * self.by_L_d, psi.q() * self.by_L_q);
-        self.saturation.map_or(linear, |saturation| linear + saturation.current(self.motor, psi))
+        let e = Vector::new(1.0.into(), 0.0.into());
+        let x = psi - e.scaled(self.psi_M);
+        self.linear_current(x, e) + self.saturation.map_or(Vector::fixed(Vector::ZERO), |saturation| saturation.current(x))
+    }
+
+    /// [`current`](Self::current) in stator axes, for the flux linkage `psi` (Wb) in stator axes with the magnet on `axis`.
+    #[inline]
+    pub fn stator_current(&self, axis: Axis<Rotor, S>, psi: Vector<Stator, S>) -> Vector<Stator, S> {
+        let x = psi - axis.along(self.psi_M);
+        let linear = self.linear_current(x, axis.along(1.0.into()));
+        match self.saturation {
+            Some(saturation) if !LINEAR => linear + axis.to_stator(saturation.current(axis.from_stator(x))),
+            _ => linear,
+        }
+    }
+
+    /// Current (A) of the machine without saturation, for the flux linkage `x` (Wb) beyond that of the magnet with the d-axis
+    /// in the direction `e`: x / L_q + (1 / L_d - 1 / L_q) (x . e) e, in any axes.
+    #[inline]
+    fn linear_current<F>(&self, x: Vector<F, S>, e: Vector<F, S>) -> Vector<F, S> {
+        x * self.by_L_q + e.scaled(x.dot(e) * self.saliency)
     }
 
     /// Resistance (Ohm) of the stator.
@@ -87,37 +105,31 @@ impl<'a, S: Scalar> Machine<'a, S> {
         self.R_s
     }
 
-    /// Derivative of the flux linkage (V) in stator axes at the voltage `u` (V) and the current `i` (A).
+    /// Electrical speed in rad/s at the mechanical `speed` (rad/s).
     #[inline]
-    pub fn flux_derivative(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Vector<Stator, S> {
-        u - i.scaled(self.R_s)
+    pub fn electrical<T: Scalar>(&self, speed: T) -> T {
+        speed * self.n_p
     }
 
-    /// Copper loss in W at the current `i` (A).
+    /// Electromagnetic torque in N.m at the flux linkage `psi` (Wb) and the current `i` (A) in the same axes.
     #[inline]
-    pub fn copper_loss(&self, i: Vector<Stator, S>) -> S {
-        i.dot(i) * (self.R_s * 1.5)
-    }
-
-    /// Electromagnetic torque in N.m at the flux linkage `psi` (Wb) and the current `i` (A).
-    #[inline]
-    pub fn torque<T: Scalar>(&self, psi: Vector<Rotor, T>, i: Vector<Rotor, T>) -> T {
-        psi.cross(i) * self.torque
+    pub fn torque<F, T: Scalar>(&self, psi: Vector<F, T>, i: Vector<F, T>) -> T {
+        psi.cross(i) * (1.5 * self.n_p)
     }
 }
 
-impl Machine<'_> {
+impl<S: Scalar, const LINEAR: bool> Machine<'_, S, LINEAR> {
     /// Flux linkage (Wb) in stator axes with the magnet on `axis`. The part of the magnet is transformed separately, both
     /// ways, so that a machine without current has none after a transformation either.
     #[inline]
-    pub fn to_stator(&self, axis: Axis<Rotor>, psi: Dq) -> AlphaBeta {
-        axis.to_stator(psi - Dq::new(self.psi_M, 0.0)) + axis.along(self.psi_M)
+    pub fn to_stator(&self, axis: Axis<Rotor, S>, psi: Vector<Rotor, S>) -> Vector<Stator, S> {
+        axis.to_stator(psi - Vector::new(self.psi_M, 0.0.into())) + axis.along(self.psi_M)
     }
 
     /// The inverse of [`to_stator`](Self::to_stator).
     #[inline]
-    pub fn from_stator(&self, axis: Axis<Rotor>, psi: AlphaBeta) -> Dq {
-        axis.from_stator(psi - axis.along(self.psi_M)) + Dq::new(self.psi_M, 0.0)
+    pub fn from_stator(&self, axis: Axis<Rotor, S>, psi: Vector<Stator, S>) -> Vector<Rotor, S> {
+        axis.from_stator(psi - axis.along(self.psi_M)) + Vector::new(self.psi_M, 0.0.into())
     }
 }
 
@@ -131,20 +143,7 @@ mod tests {
         let i = Dq::new(-2.0, 4.0);
         let expected = 1.5 * 3.0 * (0.15 * 4.0 + (6e-3 - 9e-3) * -2.0 * 4.0);
         let (linear, psi) = (Saturation::default(), flux(&motor, i));
-        assert!((Machine::new(&motor, &linear).torque(psi, i) - expected).abs() < 1e-14);
+        assert!((Machine::<_>::new(&motor, &linear).torque(psi, i) - expected).abs() < 1e-14);
         assert!((current(&motor, &linear, psi).q() - 4.0).abs() < 1e-14);
-    }
-
-    #[test]
-    fn steady_state_voltage() {
-        // Kim & Sul (1) with constant currents: u_d = R i_d - w L_q i_q, u_q = R i_q + w (L_d i_d + psi_M).
-        let motor = Motor { L_q: 9e-3, ..Motor::default() };
-        let (i, w) = (Dq::new(-1.0, 3.0), 200.0);
-        let u = Dq::new(-2.0 - w * 9e-3 * 3.0, 2.0 * 3.0 + w * (-6e-3 + 0.15));
-        let (linear, axis, psi) = (Saturation::default(), Axis::<Rotor>::at(0.4), flux(&motor, i));
-        // In stator axes, the flux linkage turns with the rotor.
-        let machine = Machine::new(&motor, &linear);
-        let rest = machine.flux_derivative(axis.to_stator(u), axis.to_stator(i)) - axis.to_stator(psi.turned() * w);
-        assert!(rest.magnitude() < 1e-13, "{rest:?}");
     }
 }

@@ -1,18 +1,18 @@
 //! The plant: machine, mechanics and inverter, and the model `PmsmPlant` built from them.
 
+mod circuit;
 pub mod counters;
 pub mod exchange;
 mod integration;
 pub mod inverter;
 pub mod iron;
+mod kinks;
 pub mod legs;
-mod linear;
 pub mod losses;
 pub mod machine;
 pub mod mechanics;
 pub mod model;
 pub mod power;
-mod rates;
 pub mod saturation;
 pub mod signals;
 mod state;

@@ -4,11 +4,8 @@ use crate::frame::{Dq, Phases, Rotor, Vector};
 use crate::math::wrap;
 use crate::motor::Motor;
 use crate::plant::counters::Point;
-use crate::plant::inverter::Inverter;
 use crate::plant::legs::Legs;
-use crate::plant::linear::Coulomb;
-use crate::plant::losses::flow::Lossy;
-use crate::plant::losses::{Losses, efficiency, switching};
+use crate::plant::losses::{Losses, efficiency};
 use crate::plant::machine::{self, Machine};
 use crate::plant::power::Energy;
 use crate::plant::power::Powers;
@@ -41,10 +38,6 @@ pub struct PmsmPlant {
     pub(super) warm: Warm,
     /// Current (A) at the terminals less that of the flux linkage, at the end of a step.
     pub(super) by_iron: Dq,
-    /// The switching loss at the last link voltage.
-    pub(super) sw: switching::Last,
-    /// The Coulomb torque about a speed at which a step near standstill began.
-    pub(super) coulomb: Coulomb,
 }
 
 impl PmsmPlant {
@@ -71,19 +64,11 @@ impl PmsmPlant {
         machine::flux(motor, self.idle_current(motor, speed))
     }
 
-    /// The losses besides that of a constant resistance, with the voltage drop of these `legs`.
-    #[inline]
-    pub(super) fn lossy<S: Scalar>(&self, inputs: &PlantInputs<S>, legs: &Legs<S>) -> Option<Lossy<'_, S>> {
-        let Inverter { devices, T_pwm, .. } = &self.parameters.inverter;
-        let sw = if inputs.enable { switching::per_ampere(devices, *T_pwm, inputs.u_dc) } else { 0.0.into() };
-        Lossy::new(&self.parameters, inputs.enable, inputs.u_dc, legs.i_zone(), sw)
-    }
-
     /// The present instant, at the end of a step.
     #[inline]
     pub(super) fn reached(&self) -> Instant {
         let State { psi, speed, angle, axis } = self.state;
-        let i = self.machine().current(psi);
+        let i = self.machine::<false>().current(psi);
         Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable }
     }
 
@@ -121,7 +106,7 @@ impl PmsmPlant {
     ) -> PlantOutputs<S> {
         let PlantParameters { motor, saturation, .. } = &self.parameters;
         let &Instant { psi, speed, angle, axis, .. } = at;
-        let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::new(motor, saturation).torque(psi, at.i));
+        let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::<_>::new(motor, saturation).torque(psi, at.i));
         PlantOutputs {
             i: Phases::from_stator(axis.to_stator(i)),
             speed,
@@ -184,10 +169,9 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 10;
+    const STATE_VERSION: u16 = 11;
 
     fn derive(&mut self) {
-        (self.sw, self.coulomb) = (switching::Last::default(), Coulomb::default());
         self.take(self.warm.at);
     }
 
@@ -226,7 +210,7 @@ impl Model for PmsmPlant {
         let p_mech = mechanics.tau_shaft(0.0 - friction, self.inputs.tau_load) * speed;
         let losses = Losses { friction: friction * speed, ..Losses::default() };
         let (at, _) = self.reached_with_iron();
-        let tau_e = self.machine().torque(at.psi, at.i);
+        let tau_e = self.machine::<false>().torque(at.psi, at.i);
         let tau_shaft = mechanics.tau_shaft(tau_e - friction, self.inputs.tau_load);
         self.powers = Powers { p_mech, p_loss: losses.friction, losses, tau_shaft, ..Powers::default() };
     }
@@ -240,13 +224,11 @@ impl Model for PmsmPlant {
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        if self.parameters.thermal.mode != ThermalMode::Constant {
-            return self.step_with_temperatures(step);
+        if self.parameters.thermal.mode == ThermalMode::Constant {
+            self.advance_at_temperature(step.h)
+        } else {
+            self.advance_with_temperatures(step.h)
         }
-        if let Some(done) = self.step_linear(step) {
-            return done;
-        }
-        self.step_general(step)
     }
 }
 

@@ -44,10 +44,10 @@ impl Saturation {
         self.s_2 == 0.0 && self.s_3 == 0.0 && self.s_dq == 0.0
     }
 
-    /// The current (A) beyond the linear machine's at the flux linkage `psi` (Wb).
+    /// The current (A) beyond the linear machine's, with the flux linkage `psi` (Wb) beyond that of the magnet.
     #[inline]
-    pub fn current<S: Scalar>(&self, motor: &Motor<S>, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
-        let (x, q) = (psi.d() - motor.psi_M, psi.q());
+    pub fn current<S: Scalar>(&self, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
+        let (x, q) = (psi.d(), psi.q());
         Vector::new((x * self.s_3 + S::from(self.s_2)) * x * x + q * (0.5 * self.s_dq) * q, x * self.s_dq * q)
     }
 
@@ -92,12 +92,13 @@ mod tests {
     fn is_reciprocal_and_tells_north_from_south() {
         let (motor, s) = (Motor::default(), Saturation { s_2: 40.0, s_3: 40.0, s_dq: 7.0 });
         let (psi, h) = (Dq::new(0.21, -0.08), 1e-6);
+        let current = |psi: Dq| s.current(psi - Dq::new(motor.psi_M, 0.0));
         let linear = |v: Dq| Dq::new(v.d() / motor.L_d, v.q() / motor.L_q);
-        let by = |v: Dq| (s.current(&motor, psi + v) - s.current(&motor, psi - v) + linear(v) * 2.0) * (0.5 / h);
+        let by = |v: Dq| (current(psi + v) - current(psi - v) + linear(v) * 2.0) * (0.5 / h);
         let (by_d, by_q) = (by(Dq::new(h, 0.0)), by(Dq::new(0.0, h)));
         assert!((by_d.q() - by_q.d()).abs() < 1e-9, "{by_d:?} {by_q:?}");
         let work = |v: Dq| (s.energy(&motor, psi + v) - s.energy(&motor, psi - v)) * (0.5 / h) / 1.5;
-        let i = s.current(&motor, psi);
+        let i = current(psi);
         assert!((work(Dq::new(h, 0.0)) - i.d()).abs() < 1e-9 && (work(Dq::new(0.0, h)) - i.q()).abs() < 1e-9);
         let of = |angle: f64| {
             let direction = Dq::new(angle.cos(), angle.sin());
@@ -105,7 +106,7 @@ mod tests {
         };
         let least = (0..3600).map(|k| of(f64::from(k).to_radians() / 10.0)).fold(f64::INFINITY, f64::min);
         assert!((s.least_inductance(&motor, psi) / least - 1.0).abs() < 1e-5, "{least} H");
-        let along = |x: f64| s.current(&motor, Dq::new(motor.psi_M + x, 0.0)).d();
+        let along = |x: f64| current(Dq::new(motor.psi_M + x, 0.0)).d();
         assert!(along(0.1) > 0.0 && along(0.1) > -along(-0.1));
     }
 }

@@ -1,23 +1,23 @@
 //! A communication step of the plant: the shaft, the number of integration steps, the gates, the means.
 
-use crate::frame::AlphaBeta;
+use crate::frame::{AlphaBeta, Dq};
 use crate::integrate::rk4;
 use crate::math::all_finite;
 use crate::modulation::limit_to_hexagon;
-use crate::plant::integration::{LARGEST_TURN, LONGEST_SUBSTEP};
+use crate::plant::circuit::{Circuit, Passed, Rates, blocked_rates};
+use crate::plant::integration::{LARGEST_TURN, LONGEST_STEP};
 use crate::plant::legs::Legs;
-use crate::plant::losses::flow::Lossy;
-use crate::plant::losses::{self, Losses};
+use crate::plant::losses::Losses;
+use crate::plant::losses::flow::{Dissipation, Ideal, Path, Switches};
 use crate::plant::machine;
-use crate::plant::mechanics::Shaft;
+use crate::plant::mechanics::{Coulomb, Shaft, Standstill, Whole};
 use crate::plant::model::PmsmPlant;
 use crate::plant::power::{Energy, Powers};
-use crate::plant::rates::{Held, Passed};
 use crate::plant::signals::PlantInputs;
 use crate::plant::state::{State, axis_at};
 use crate::plant::tables::PlantParameters;
 use crate::plant::thermal::ThermalMode;
-use fmu_core::{Fault, Step};
+use fmu_core::Fault;
 use nalgebra::SVector;
 
 /// Maximum number of substeps in one communication step: 1000 s of simulated time.
@@ -32,7 +32,7 @@ impl PmsmPlant {
     /// The state at the beginning of a step and what passes until it is reached: an imposed shaft takes the angle of the
     /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
     /// linkage, which cannot jump; the magnetic field then does work on the shaft.
-    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     fn at_the_shaft(&self) -> (State, Passed) {
         let PlantParameters { saturation, mechanics, .. } = &self.parameters;
@@ -42,28 +42,22 @@ impl PmsmPlant {
         }
         let motor = &self.warm.motor;
         let axis = axis_at(motor, angle_shaft);
-        let machine = self.machine();
+        let machine = self.machine::<false>();
         let psi = machine.from_stator(axis, machine.to_stator(self.state.axis, self.state.psi));
         let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
         let energy = Energy { mech: stored(self.state.psi) - stored(psi), ..Energy::default() };
         (State { psi, speed: speed_shaft, angle: angle_shaft, axis }, Passed { energy, ..Passed::default() })
     }
 
-    /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s).
-    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
-    #[inline(always)]
-    pub(super) fn substeps(&self, h: f64, speed: f64, legs: &Legs, lossy: bool) -> Result<f64, Fault> {
+    /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s), with a voltage that
+    /// follows the currents.
+    pub(super) fn substeps(&self, h: f64, speed: f64, legs: &Legs, switches: &Switches) -> Result<f64, Fault> {
         let PlantParameters { motor, inverter, .. } = &self.parameters;
-        let w = (f64::from(motor.n_p) * speed).abs();
-        let threshold = if lossy { inverter.devices.threshold() } else { 0.0 };
-        let longest = if legs.drop() || threshold > 0.0 {
-            Self::within_the_zone(motor, legs, threshold)
+        let longest = if switches.kinks() {
+            Self::longest_in_zone(motor, legs, inverter.devices.threshold())
         } else {
-            LONGEST_SUBSTEP
+            LONGEST_STEP
         };
-        if h <= longest && w * h <= LARGEST_TURN {
-            return Ok(1.0);
-        }
         self.count(h, longest, speed)
     }
 
@@ -84,84 +78,172 @@ impl PmsmPlant {
 
     /// One integration step of `h` (s) with the gates off.
     #[inline(never)]
-    fn coast(&self, start: &State, h: f64, legs: &Legs, lossy: Option<&Lossy<'_>>) -> (State, Passed) {
+    fn coast(&self, start: &State, h: f64, legs: &Legs, switches: Switches) -> (State, Passed) {
+        let (motor, machine) = (&self.warm.motor, self.machine::<false>());
+        let shaft = self.shaft(start.speed);
         let Some(lost) = self.remaining(start, legs) else {
-            return match lossy {
-                None => self.drive_held::<false>(start, h, AlphaBeta::ZERO, legs, None),
-                lossy => self.drive_lossy(start, h, AlphaBeta::ZERO, legs, lossy),
-            };
+            let dissipation = Dissipation::at(&self.parameters, machine.resistance(), machine.electrical(start.speed));
+            let path = Path { u: AlphaBeta::ZERO, dissipation, drops: switches };
+            return self.integrate_switches(start, h, &Circuit { machine, path, shaft });
         };
-        let motor = &self.warm.motor;
-        let held = Held {
-            machine: self.machine(),
-            u: AlphaBeta::ZERO,
-            legs: None,
-            lossy: None,
-            shaft: Shaft::new(&self.parameters.mechanics, self.inputs.tau_load, start.speed),
-        };
-        let x = rk4(SVector::from([start.speed, start.angle, 0.0, lost, 0.0, 0.0]), h, |x| {
+        let x = rk4(SVector::from([start.speed, start.angle, 0.0, 0.0, 0.0, 0.0]), h, |x| {
             let i = self.idle_current(motor, x[0]);
-            let rates = held.idle_rates(machine::flux(motor, i), i, x[0]);
-            SVector::from([rates.acceleration, x[0], rates.p_mech, rates.p_loss, rates.losses.iron, rates.tau_shaft])
+            let Rates { acceleration, losses, tau_given, .. } =
+                blocked_rates(&machine, &shaft, machine::flux(motor, i), i, x[0]);
+            let p_mech = shaft.tau_shaft(tau_given) * x[0];
+            SVector::from([acceleration, x[0], p_mech, losses.iron, losses.friction, tau_given])
         });
         let state = State::new(motor, self.idle_flux(motor, x[0]), x[0], x[1]);
-        let losses = Losses { cu: lost, iron: x[4], friction: x[3] - lost - x[4], ..Losses::none() };
-        (state, Passed { energy: Energy { r#in: 0.0, mech: x[2], loss: x[3] }, losses, impulse: x[5] })
+        let losses = Losses { cu: lost, iron: x[3], friction: x[4], ..Losses::none() };
+        (state, Passed { energy: Energy { r#in: 0.0, mech: x[2], loss: losses.sum() }, losses, impulse: x[5] })
     }
 
-    /// A communication step; `LOSSY`: with the gates off or with losses besides that of a constant resistance.
-    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    /// The shaft at speeds close to this `speed` (rad/s).
+    #[inline]
+    pub(super) fn shaft(&self, speed: f64) -> Shaft<'_, Standstill> {
+        let mechanics = &self.parameters.mechanics;
+        Shaft::new(mechanics, self.inputs.tau_load, Standstill::new(mechanics, speed))
+    }
+
+    /// An integration step of `h` (s) with ideal legs under the voltage `u` (V), of a machine that is linear or not.
+    #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
-    pub(super) fn step<const LOSSY: bool>(&mut self, step: &Step) -> Result<(), Fault> {
-        let PlantInputs { enable, u_dc, .. } = self.inputs;
-        let legs = self.legs(&self.inputs);
-        let lossy = if LOSSY {
-            let sw = if enable { self.sw.per_ampere(&self.parameters.inverter, u_dc) } else { 0.0 };
-            Lossy::new(&self.parameters, enable, u_dc, legs.i_zone(), sw)
+    fn integrate_ideal<C: Coulomb<f64>, const LINEAR: bool>(
+        &self,
+        start: &State,
+        h: f64,
+        u: AlphaBeta,
+        coulomb: C,
+    ) -> (State, Passed) {
+        let machine = self.machine::<LINEAR>();
+        let path = Path { u, dissipation: Dissipation { R: machine.resistance(), G: None }, drops: Ideal };
+        let shaft = Shaft::new(&self.parameters.mechanics, self.inputs.tau_load, coulomb);
+        self.integrate(start, h, &Circuit { machine, path, shaft })
+    }
+
+    /// [`integrate_ideal`](Self::integrate_ideal) of a linear machine.
+    #[expect(clippy::inline_always, reason = "as for `integrate`")]
+    #[inline(always)]
+    fn integrate_linear(&self, start: &State, h: f64, u: AlphaBeta) -> (State, Passed) {
+        let mechanics = &self.parameters.mechanics;
+        if mechanics.is_whole(start.speed) {
+            self.integrate_ideal::<_, true>(start, h, u, Whole::new(mechanics, start.speed))
         } else {
-            None
-        };
-        let (mut state, mut passed) = self.at_the_shaft();
-        let mut left = self.substeps(step.h, state.speed, &legs, lossy.is_some())?;
-        let h = step.h / left;
-        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
-        let mut by_iron = None;
-        if LOSSY
-            && self.inputs.enable
-            && let Some(lossy) = &lossy
-        {
-            let (switched, current) = self.switch(&mut state, step.h, u, &legs, lossy);
-            passed.add(&switched);
-            (by_iron, left) = (Some(current), 0.0);
+            self.integrate_ideal::<_, true>(start, h, u, Standstill::new(mechanics, start.speed))
         }
+    }
+
+    /// [`integrate_ideal`](Self::integrate_ideal) of any machine.
+    #[inline(never)]
+    fn integrate_any(&self, start: &State, h: f64, u: AlphaBeta) -> (State, Passed) {
+        let mechanics = &self.parameters.mechanics;
+        if self.parameters.saturation.is_none() {
+            self.integrate_linear(start, h, u)
+        } else if mechanics.is_whole(start.speed) {
+            self.integrate_ideal::<_, false>(start, h, u, Whole::new(mechanics, start.speed))
+        } else {
+            self.integrate_ideal::<_, false>(start, h, u, Standstill::new(mechanics, start.speed))
+        }
+    }
+
+    /// A communication step of `h` (s) with ideal legs, which switch.
+    #[expect(clippy::inline_always, reason = "as for `integrate`")]
+    #[inline(always)]
+    fn pass_ideal(&self, h: f64) -> Result<(State, Passed), Fault> {
+        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let is_one = Self::is_one_step(h, self.machine::<true>().electrical(self.state.speed));
+        if is_one && saturation.is_none() && !mechanics.imposed {
+            return Ok(self.integrate_linear(&self.state, h, u));
+        }
+        self.pass_ideal_in_steps(h, u)
+    }
+
+    /// [`pass_ideal`](Self::pass_ideal) in several integration steps, with saturation or with an imposed shaft.
+    #[inline(never)]
+    fn pass_ideal_in_steps(&self, h: f64, u: AlphaBeta) -> Result<(State, Passed), Fault> {
+        let (mut state, mut passed) = self.at_the_shaft();
+        let is_one = Self::is_one_step(h, self.machine::<true>().electrical(state.speed));
+        let mut left = if is_one { 1.0 } else { self.count(h, LONGEST_STEP, state.speed)? };
+        let h = h / left;
         while left > 0.0 && !self.is_too_fast(state.speed) {
-            let (next, driven) = match (LOSSY, self.inputs.enable, lossy.as_ref()) {
-                (false, ..) => self.drive_held::<false>(&state, h, u, &legs, None),
-                (true, true, lossy) => self.drive_lossy(&state, h, u, &legs, lossy),
-                (true, false, lossy) => self.coast(&state, h, &legs, lossy),
-            };
+            let (next, step) = self.integrate_any(&state, h, u);
             state = next;
-            passed.add(&driven);
+            passed.add(&step);
             left -= 1.0;
         }
-        let lost = if !LOSSY || self.inputs.enable { None } else { self.remaining(&state, &legs) };
-        if let Some(lost) = lost {
-            state.psi = self.idle_flux(&self.warm.motor, state.speed);
-            passed.energy.loss += lost;
-            passed.losses.cu += lost;
+        Ok((state, passed))
+    }
+
+    /// Whether one integration step does for `h` (s) at the electrical speed `w` (rad/s).
+    #[inline]
+    fn is_one_step(h: f64, w: f64) -> bool {
+        h <= LONGEST_STEP && w.abs() * h <= LARGEST_TURN
+    }
+
+    /// A communication step of `h` (s) with the gates off, with dead time or with losses.
+    #[inline(never)]
+    fn advance_general(&mut self, h: f64) -> Result<(), Fault> {
+        let PlantInputs { enable, u, u_dc, .. } = self.inputs;
+        let legs = self.legs(&self.inputs);
+        let switches = Switches::new(&self.parameters, enable, u_dc, legs);
+        let (mut state, mut passed) = self.at_the_shaft();
+        let count = self.substeps(h, state.speed, &legs, &switches)?;
+        let (mut lost, mut by_iron) = (None, Dq::ZERO);
+        if enable {
+            let (step, current) = self.pass_kinks(&mut state, h, limit_to_hexagon(u, u_dc), &legs, switches);
+            passed.add(&step);
+            by_iron = current;
+        } else {
+            let mut left = count;
+            while left > 0.0 && !self.is_too_fast(state.speed) {
+                let (next, step) = self.coast(&state, h / count, &legs, switches);
+                state = next;
+                passed.add(&step);
+                left -= 1.0;
+            }
+            lost = self.remaining(&state, &legs);
+            if let Some(lost) = lost {
+                state.psi = self.idle_flux(&self.warm.motor, state.speed);
+                passed.energy.loss += lost;
+                passed.losses.cu += lost;
+            }
         }
-        if !LOSSY {
-            passed.losses.cu = passed.energy.loss - passed.losses.friction;
+        self.conclude(h, state, &passed, lost.is_some(), &legs)?;
+        if !self.parameters.iron.is_none() {
+            self.by_iron = if enable { by_iron } else { self.current_by_iron() };
         }
-        self.conclude(step.h, state, &passed, lost.is_some(), &legs)?;
-        if LOSSY && !self.parameters.iron.is_none() {
-            self.by_iron = by_iron.unwrap_or_else(|| self.current_by_iron());
+        Ok(())
+    }
+
+    /// A communication step of `h` (s) with temperatures that stay.
+    #[expect(clippy::inline_always, reason = "as for `integrate`")]
+    #[inline(always)]
+    pub(super) fn advance_at_temperature(&mut self, h: f64) -> Result<(), Fault> {
+        if !(self.warm.ideal && self.inputs.enable) {
+            return self.advance_general(h);
+        }
+        let (state, passed) = self.pass_ideal(h)?;
+        let legs = Legs::switching(&self.parameters.inverter, self.inputs.u_dc);
+        self.conclude(h, state, &passed, false, &legs)
+    }
+
+    /// A communication step of `h` (s) with temperatures that change.
+    #[inline(never)]
+    pub(super) fn advance_with_temperatures(&mut self, h: f64) -> Result<(), Fault> {
+        let mode = self.parameters.thermal.mode;
+        if mode == ThermalMode::Imposed {
+            self.impose()?;
+        }
+        self.advance_at_temperature(h)?;
+        if mode == ThermalMode::Network {
+            self.warm_up(h)?;
         }
         Ok(())
     }
 
     /// Takes the `state` at the end of a step of `h` (s) and what `passed` in it.
-    #[expect(clippy::inline_always, reason = "as for `PmsmPlant::drive`")]
+    #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     pub(super) fn conclude(
         &mut self,
@@ -212,33 +294,6 @@ impl PmsmPlant {
             "the machine's state left the finite numbers within a step of {h} s; the step before it ended with {}",
             self.state.tell()
         ))
-    }
-
-    /// [`step`](Self::step) of any machine.
-    #[inline(never)]
-    pub(super) fn step_general(&mut self, step: &Step) -> Result<(), Fault> {
-        if self.inputs.enable && !losses::any(&self.parameters) {
-            self.step::<false>(step)
-        } else {
-            self.step::<true>(step)
-        }
-    }
-
-    /// The same with temperatures that change.
-    #[inline(never)]
-    pub(super) fn step_with_temperatures(&mut self, step: &Step) -> Result<(), Fault> {
-        let mode = self.parameters.thermal.mode;
-        if mode == ThermalMode::Imposed {
-            self.impose()?;
-        }
-        match self.step_linear(step) {
-            Some(done) => done?,
-            None => self.step_general(step)?,
-        }
-        if mode == ThermalMode::Network {
-            self.warm_up(step.h)?;
-        }
-        Ok(())
     }
 
     /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.

@@ -22,7 +22,7 @@
 
 use crate::frame::{AlphaBeta, Phases, SQRT_3, Stator, Vector};
 use crate::modulation::clamp_unit;
-use crate::plant::losses::region::Affine;
+use crate::plant::losses::sides::Affine;
 use fmu_core::Scalar;
 use fmu_core::unit::{AMPERE, JOULE, OHM, ONE, VOLT};
 use fmu_core::{Row, Table};

@@ -6,14 +6,14 @@
 use super::conduction::Devices;
 use crate::frame::{AlphaBeta, Axis, Dq, Rotor};
 use crate::motor::Motor;
+use crate::plant::circuit::{Circuit, Rates};
 use crate::plant::legs::Legs;
 use crate::plant::losses::conduction::Conduction;
 use crate::plant::losses::efficiency;
-use crate::plant::losses::switching;
+use crate::plant::losses::flow::{Dissipation, Path, Switches};
 use crate::plant::machine::{Machine, flux};
-use crate::plant::mechanics::Shaft;
+use crate::plant::mechanics::{Shaft, Standstill};
 use crate::plant::model::PmsmPlant;
-use crate::plant::rates::{Held, Rates};
 use crate::plant::tables::PlantParameters;
 use std::f64::consts::{PI, TAU};
 
@@ -83,8 +83,7 @@ impl Drive {
         let i = Dq::new(i_d, i_s.q() - g * (motor.psi_M + motor.L_d * i_d));
         let psi = flux(motor, i);
         let legs = Legs::switching(&par.inverter, *u_dc);
-        let sw = switching::per_ampere(&par.inverter.devices, par.inverter.T_pwm, *u_dc);
-        let lossy = super::flow::Lossy::new(par, true, *u_dc, legs.i_zone(), sw).unwrap();
+        let switches = Switches::new(par, true, *u_dc, legs);
         let conduction = Conduction::new(&par.inverter.devices, true, *u_dc, legs.i_zone()).unwrap();
         let count = 7200;
         let mut sum = [0.0; 7];
@@ -96,9 +95,12 @@ impl Drive {
             for _ in 0..20 {
                 u = ideal + conduction.drop(u, wanted);
             }
-            let (machine, shaft) = (Machine::new(motor, &par.saturation), Shaft::new(&par.mechanics, 0.0, speed));
-            let held = Held { machine, u, legs: None, lossy: Some(&lossy), shaft };
-            let Rates { p_in, p_mech, losses, d_psi, .. } = held.rates(axis, psi, i, speed);
+            let machine = Machine::<_>::new(motor, &par.saturation);
+            let shaft = Shaft::new(&par.mechanics, 0.0, Standstill::new(&par.mechanics, speed));
+            let path = Path { u, dissipation: Dissipation::at(par, motor.R_s, w), drops: switches };
+            let circuit = Circuit { machine, path, shaft };
+            let Rates { p_in, tau_given, losses, d_psi, .. } = circuit.rates(axis, axis.to_stator(psi), speed);
+            let p_mech = tau_given * speed;
             // Steady: d psi/dt = j w psi in stator axes, but for the resistance of the devices times G drop.
             let rest: AlphaBeta = d_psi - axis.to_stator(psi.turned() * w);
             assert!(rest.magnitude() < 1e-3, "{rest:?} V");

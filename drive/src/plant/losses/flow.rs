@@ -1,34 +1,137 @@
-//! The way of the power from the link to the flux linkage, with all losses of inverter and machine, at an instant.
+//! The way of the power from the link to the flux linkage at an instant: legs, devices, resistance, iron.
 //!
 //! ```text
 //! e = (u - drop - R i_m) / (1 + R G), R = R_s (1 + k_ac w^2)          i_s = i_m + G e          p_in = 1.5 u i_s + p_sw
 //! ```
 //!
-//! u is the voltage of the legs with dead time, i_m the current of the flux linkage. Dead time, and the diodes with the
-//! gates off, follow the current that i_s is in steady state, i_m + G j w psi; the devices' drop follows what i_s would be
-//! without it, from which i_s differs by G drop, mA. So everything is explicit, no loss is negative, and the balance p_in =
-//! p_cu + p_iron + p_cond + p_sw + 1.5 i_m e holds exactly. With i_m instead, the drops would be those of a current that is
-//! 10 % less at a fifth of the torque, and diodes would block the wrong current.
+//! u is the voltage of the legs with dead time, i_m the current of the flux linkage, G the conductance of the
+//! [`iron`](crate::plant::iron). Dead time, and the diodes with the gates off, follow the current that i_s is in steady
+//! state, i_m + G j w psi; the devices' drop follows what i_s would be without it, from which i_s differs by G drop, mA. So
+//! everything is explicit, no loss is negative, and the balance p_in = p_cu + p_iron + p_cond + p_sw + 1.5 i_m e holds
+//! exactly. With i_m instead, the drops would be those of a current that is 10 % less at a fifth of the torque, and diodes
+//! would block the wrong current.
 
-use crate::frame::{AlphaBeta, Rotor, Stator, Vector};
-use crate::plant::iron::Iron;
+use crate::frame::{Stator, Vector};
 use crate::plant::legs::Legs;
 use crate::plant::losses::conduction::Conduction;
-use crate::plant::losses::region::{Affine, Region, Sides};
 use crate::plant::losses::{Losses, switching};
 use crate::plant::tables::PlantParameters;
 use fmu_core::Scalar;
 
-/// Losses of inverter and machine over an integration step.
+/// What dissipates at a speed: the resistance of the winding and the conductance of the iron.
 #[derive(Clone, Copy, Debug)]
-pub struct Lossy<'a, S = f64> {
-    iron: &'a Iron,
-    /// Growth of the resistance with the square of the electrical speed in s2/rad2.
-    k_ac: f64,
-    n_p: f64,
-    conduction: Option<Conduction<S>>,
+pub struct Dissipation<S = f64> {
+    /// Resistance in Ohm.
+    pub R: S,
+    /// Conductance parallel to the flux linkage in S; `None` without iron loss.
+    pub G: Option<S>,
+}
+
+impl<S: Scalar> Dissipation<S> {
+    /// With the resistance `R_s` (Ohm) at standstill, at the electrical speed `w` (rad/s).
+    #[inline]
+    pub fn at(parameters: &PlantParameters, R_s: S, w: S) -> Self {
+        let (iron, k_ac) = (&parameters.iron, parameters.winding.k_ac);
+        let R = (w * w * k_ac + S::from(1.0)) * R_s;
+        Self { R, G: (!iron.is_none()).then(|| iron.conductance(w)) }
+    }
+
+    /// Current (A) at the terminals without a drop, with the voltage `u` (V) and the current `i` (A) of the flux linkage:
+    /// the one whose sign decides what legs and devices do.
+    #[inline]
+    pub fn guide(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Vector<Stator, S> {
+        let Some(G) = self.G else { return i };
+        (i + u.scaled(G)).scaled(S::from(1.0) / (self.R * G + S::from(1.0)))
+    }
+}
+
+/// What the legs take from the voltage reference.
+pub trait Drops<S> {
+    /// No device has a drop and nothing switches with a loss, known to the compiler.
+    const IDEAL: bool = false;
+
+    /// Voltage (V) of the legs with dead time, for the reference `u` (V); `steady` gives the current (A) at the terminals in
+    /// steady state.
+    fn legs(&self, u: Vector<Stator, S>, steady: impl FnOnce() -> Vector<Stator, S>) -> Vector<Stator, S>;
+
+    /// Voltage drop (V) of the devices, with the voltage `u` (V) of the legs and the current `i` (A).
+    fn devices(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Option<Vector<Stator, S>>;
+
+    /// Switching loss in W at the current `i` (A).
+    fn switching(&self, i: Vector<Stator, S>) -> Option<S>;
+}
+
+/// Legs without dead time and without a loss.
+pub struct Ideal;
+
+impl<S> Drops<S> for Ideal {
+    const IDEAL: bool = true;
+
+    #[inline]
+    fn legs(&self, u: Vector<Stator, S>, _steady: impl FnOnce() -> Vector<Stator, S>) -> Vector<Stator, S> {
+        u
+    }
+
+    #[inline]
+    fn devices(&self, _u: Vector<Stator, S>, _i: Vector<Stator, S>) -> Option<Vector<Stator, S>> {
+        None
+    }
+
+    #[inline]
+    fn switching(&self, _i: Vector<Stator, S>) -> Option<S> {
+        None
+    }
+}
+
+/// Legs whose voltage follows the current: dead time or the diodes with the gates off, devices, switching.
+#[derive(Clone, Copy, Debug)]
+pub struct Switches<S = f64> {
+    pub(super) legs: Legs<S>,
+    pub(super) conduction: Option<Conduction<S>>,
     /// Switching loss in W per ampere.
-    sw: S,
+    pub(super) sw: S,
+}
+
+impl<S: Scalar> Switches<S> {
+    /// With these `legs` at the DC-link voltage `u_dc` (V), switching or with the gates off.
+    pub fn new(parameters: &PlantParameters, switching: bool, u_dc: S, legs: Legs<S>) -> Self {
+        let inverter = &parameters.inverter;
+        let sw = if switching { switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc) } else { 0.0.into() };
+        Self { legs, conduction: Conduction::new(&inverter.devices, switching, u_dc, legs.i_zone()), sw }
+    }
+
+    /// Whether a voltage or a loss has a kink where a current changes its sign.
+    #[inline]
+    pub fn kinks(&self) -> bool {
+        self.legs.drop() || self.conduction.is_some() || self.sw.value() > 0.0
+    }
+}
+
+impl<S: Scalar> Drops<S> for Switches<S> {
+    #[inline]
+    fn legs(&self, u: Vector<Stator, S>, steady: impl FnOnce() -> Vector<Stator, S>) -> Vector<Stator, S> {
+        if self.legs.drop() { u - self.legs.loss(steady()) } else { u }
+    }
+
+    #[inline]
+    fn devices(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Option<Vector<Stator, S>> {
+        self.conduction.map(|conduction| conduction.drop(u, i))
+    }
+
+    #[inline]
+    fn switching(&self, i: Vector<Stator, S>) -> Option<S> {
+        Some(switching::magnitudes(i) * self.sw)
+    }
+}
+
+/// From the link to the flux linkage, under a held voltage.
+pub struct Path<D, S = f64> {
+    /// Voltage reference in stator axes, inside the hexagon, in V.
+    pub u: Vector<Stator, S>,
+    /// Winding and iron.
+    pub dissipation: Dissipation<S>,
+    /// Legs and devices.
+    pub drops: D,
 }
 
 /// Currents, voltages and losses at an instant.
@@ -43,85 +146,31 @@ pub struct Flow<S> {
     pub losses: Losses<S>,
 }
 
-impl<'a, S: Scalar> Lossy<'a, S> {
-    /// At the DC-link voltage `u_dc` (V), with switching legs or the gates off, whose voltages fall linearly below `i_zone`
-    /// (A), and with the switching loss `sw` (W per ampere); `None` without [`any`](super::any) of these losses.
-    pub fn new(parameters: &'a PlantParameters, switching: bool, u_dc: S, i_zone: S, sw: S) -> Option<Self> {
-        let PlantParameters { motor, inverter, iron, winding, .. } = parameters;
-        super::any(parameters).then(|| Self {
-            iron,
-            k_ac: winding.k_ac,
-            n_p: f64::from(motor.n_p),
-            conduction: Conduction::new(&inverter.devices, switching, u_dc, i_zone),
-            sw,
-        })
-    }
-
-    /// Whether the losses have kinks where a current changes its sign.
-    pub fn kinks(&self) -> bool {
-        self.conduction.is_some() || self.sw.value() > 0.0
-    }
-
-    /// Resistance (Ohm) and conductance (S) at the electrical speed `w` (rad/s), with the resistance `R_s` (Ohm) at
-    /// standstill.
-    #[inline]
-    pub fn circuit(&self, R_s: S, w: S) -> (S, S) {
-        let R = (w * w * self.k_ac + S::from(1.0)) * R_s;
-        (R, if self.iron.is_none() { 0.0.into() } else { self.iron.conductance(w) })
-    }
-
-    /// Current (A) at the terminals in steady state with the flux linkage `psi` (Wb), its current `i` (A) and the
-    /// mechanical `speed` (rad/s).
-    pub fn steady(&self, psi: Vector<Rotor, S>, i: Vector<Rotor, S>, speed: S) -> Vector<Rotor, S> {
-        if self.iron.is_none() {
-            return i;
-        }
-        let w = speed * self.n_p;
-        i + psi.turned().scaled(self.iron.conductance(w) * w)
-    }
-
-    /// With the resistance `R_s` (Ohm), the voltage `u` (V) of the legs, the current `i` (A) of the flux linkage and the
-    /// mechanical `speed` (rad/s).
-    pub fn flow(&self, R_s: S, u: Vector<Stator, S>, i: Vector<Stator, S>, speed: S) -> Flow<S> {
-        let w = speed * self.n_p;
-        let one = S::from(1.0);
-        let (R, G) = self.circuit(R_s, w);
-        let part = one / (R * G + one);
-        let driving = (u - i.scaled(R)).scaled(part);
-        let none = Vector::fixed(Vector::ZERO);
-        let drop = self.conduction.map_or(none, |conduction| conduction.drop(u, i + driving.scaled(G)));
-        let e = driving - drop.scaled(part);
-        let i = i + e.scaled(G);
+impl<S: Scalar, D: Drops<S>> Path<D, S> {
+    /// With the flux linkage `psi` (Wb), its current `i` (A) and the electrical speed `w` (rad/s).
+    #[expect(clippy::inline_always, reason = "as for `Circuit::rates`")]
+    #[inline(always)]
+    pub fn flow(&self, psi: Vector<Stator, S>, i: Vector<Stator, S>, w: S) -> Flow<S> {
+        let Self { u, dissipation: Dissipation { R, G }, drops } = self;
+        let u = drops.legs(*u, || G.map_or(i, |G| i + psi.turned().scaled(G * w)));
+        let part = G.map(|G| S::from(1.0) / (*R * G + S::from(1.0)));
+        // Behind the resistance of a winding with iron parallel to it.
+        let behind = |u: Vector<Stator, S>| part.map_or(u, |part| u.scaled(part));
+        let through = |e: Vector<Stator, S>| G.map_or(i, |G| i + e.scaled(G));
+        let driving = behind(u - i.scaled(*R));
+        let drop = drops.devices(u, through(driving));
+        let e = drop.map_or(driving, |drop| driving - behind(drop));
+        let i = through(e);
+        let zero = S::from(0.0);
+        let sw = drops.switching(i);
         let losses = Losses {
-            cu: i.dot(i) * R * 1.5,
-            iron: e.dot(e) * G * 1.5,
-            cond: drop.dot(i) * 1.5,
-            sw: switching::magnitudes(i) * self.sw,
-            friction: 0.0.into(),
+            cu: i.dot(i) * (*R * 1.5),
+            iron: G.map_or(zero, |G| e.dot(e) * (G * 1.5)),
+            cond: drop.map_or(zero, |drop| drop.dot(i) * 1.5),
+            sw: sw.unwrap_or(zero),
+            friction: zero,
         };
-        Flow { i, d_psi: e, p_in: u.dot(i) * 1.5 + losses.sw, losses }
+        let p_in = u.dot(i) * 1.5;
+        Flow { i, d_psi: e, p_in: sw.map_or(p_in, |sw| p_in + sw), losses }
     }
-}
-
-impl Lossy<'_> {
-    /// Inverter and machine while the currents keep their `sides`, with resistance and conductance of the `circuit` (Ohm, S)
-    /// and the voltage `u` (V) of the legs before dead time.
-    #[inline]
-    pub fn region(&self, circuit: (f64, f64), u: AlphaBeta, legs: &Legs, sides: &Sides) -> Region {
-        let signs = sides.legs();
-        let u = if legs.drop() { u - legs.loss_beyond(signs) } else { u };
-        let none = Affine { at_0: AlphaBeta::ZERO, by: [0.0; 3] };
-        let drop = self.conduction.as_ref().map_or(none, |conduction| conduction.affine(u, signs));
-        Region::new(u, circuit, drop, signs.to_stator() * (1.5 * self.sw))
-    }
-}
-
-/// The current (A) whose sides count: that at the terminals without any drop of the legs, with resistance and conductance
-/// of the `circuit` (Ohm, S) and the voltage `u` (V) of the legs before dead time, as a function of the current (A) of the
-/// flux linkage.
-#[inline]
-pub fn guide((R, G): (f64, f64), u: AlphaBeta) -> impl Fn(AlphaBeta) -> AlphaBeta {
-    let part = 1.0 / (R * G + 1.0);
-    let rest = u * (part * G);
-    move |i| i * part + rest
 }

@@ -5,8 +5,8 @@
 //! p_loss = p_cu + p_iron + p_cond + p_sw + p_friction
 //! ```
 //!
-//! [`iron`](crate::plant::iron), [`conduction`] and [`switching`] have the equations; [`flow`] joins them at an instant,
-//! [`region`] over a step. The efficiency is p_mech / p_in of a motor, p_in / p_mech of a generator, and 0 elsewhere: where
+//! [`iron`](crate::plant::iron), [`conduction`] and [`switching`] have the equations; [`flow`] joins them; between
+//! two kinks, [`sides`] makes legs and devices affine. The efficiency is p_mech / p_in of a motor, p_in / p_mech of a generator, and 0 elsewhere: where
 //! power comes in from both sides, where p_mech is below 1 uW, and where the ratio is above 1 because stored energy supplies
 //! the power.
 
@@ -14,10 +14,11 @@ pub mod conduction;
 #[cfg(test)]
 mod figures;
 pub mod flow;
-pub mod region;
+pub mod sides;
 pub mod switching;
 
-use crate::plant::tables::PlantParameters;
+use crate::plant::inverter::Inverter;
+use crate::plant::tables::{PlantParameters, Winding};
 use fmu_core::unit::WATT;
 use fmu_core::{Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
@@ -79,11 +80,13 @@ impl Losses {
     }
 }
 
-/// Whether there is a loss besides friction and that of a constant resistance.
-#[inline]
-pub fn any(parameters: &PlantParameters) -> bool {
-    let PlantParameters { inverter, mechanics, iron, winding, .. } = parameters;
-    !(iron.is_none() && inverter.devices.is_none() && winding.k_ac + mechanics.k_w == 0.0)
+/// Whether the legs are ideal and the winding's constant resistance is the machine's only loss: then a step is the quickest.
+/// Every parameter is named, so that a new one has to be thought of here.
+pub fn ideal(parameters: &PlantParameters) -> bool {
+    let PlantParameters { motor: _, saturation: _, inverter, mechanics: _, initial: _, iron, winding, thermal: _ } = parameters;
+    let Inverter { dead_time, T_pwm: _, i_zero: _, devices } = inverter;
+    let Winding { k_ac } = winding;
+    *dead_time == 0.0 && devices.is_none() && iron.is_none() && *k_ac == 0.0
 }
 
 /// Efficiency of a drive that takes `p_in` (W) from the link and gives `p_mech` (W) to the load.

@@ -9,40 +9,21 @@
 //! field's usual scaling of a data sheet's figure. With the gates off nothing switches.
 
 use crate::frame::{Phases, Stator, Vector};
-use crate::math::abs;
-use crate::plant::inverter::Inverter;
+use crate::math::{abs, exp, ln};
 use crate::plant::losses::conduction::Devices;
 use fmu_core::Scalar;
-use serde::{Deserialize, Serialize};
 
 /// Loss (W) per ampere of all phase currents' magnitudes, at the DC-link voltage `u_dc` (V) and the PWM period `T_pwm`
 /// (s).
 pub fn per_ampere<S: Scalar>(devices: &Devices, T_pwm: f64, u_dc: S) -> S {
     let &Devices { E_sw, i_sw, u_sw, k_sw, .. } = devices;
-    let (full, x) = (E_sw / T_pwm / i_sw, u_dc.value().max(0.0) / u_sw);
-    u_dc.chain(full * libm::pow(x, k_sw), full * k_sw * libm::pow(x, k_sw - 1.0) / u_sw)
-}
-
-/// The loss of [`per_ampere`] at the last DC-link voltage, whose power takes half of the time of a step.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Last {
-    /// In V, and in W per ampere; `None` after a change of the parameters.
-    known: Option<(f64, f64)>,
-}
-
-impl Last {
-    /// Loss in W per ampere with switching legs at the DC-link voltage `u_dc` (V).
-    #[expect(clippy::float_cmp, reason = "the same voltage, bit for bit")]
-    pub fn per_ampere(&mut self, inverter: &Inverter, u_dc: f64) -> f64 {
-        match self.known {
-            Some((known, sw)) if known == u_dc => sw,
-            _ => {
-                let sw = per_ampere(&inverter.devices, inverter.T_pwm, u_dc);
-                self.known = Some((u_dc, sw));
-                sw
-            }
-        }
+    if E_sw == 0.0 {
+        return 0.0.into();
     }
+    let (full, x) = (E_sw / T_pwm / i_sw, u_dc.value().max(0.0) / u_sw);
+    let power = if x > 0.0 { exp(k_sw * ln(x)) } else { 0.0 };
+    let slope = if x > 0.0 { k_sw * power / x } else { k_sw * f64::from(u8::from(k_sw <= 1.0)) };
+    u_dc.chain(full * power, full * slope / u_sw)
 }
 
 /// The sum of the phase currents' magnitudes (A).

@@ -5,8 +5,7 @@
 
 use super::{Heat, Temperatures, ThermalMode};
 use crate::motor::Motor;
-use crate::plant::linear::Linear;
-use crate::plant::losses::Losses;
+use crate::plant::losses::{self, Losses};
 use crate::plant::machine::{Inverse, Machine};
 use crate::plant::model::PmsmPlant;
 use crate::plant::signals::PlantInputs;
@@ -22,14 +21,14 @@ pub struct Warm {
     pub motor: Motor,
     /// Reciprocals of its inductances.
     inverse: Inverse,
-    /// Its constants, if it is linear.
-    pub(in crate::plant) linear: Option<Linear>,
+    /// [`losses::ideal`].
+    pub(in crate::plant) ideal: bool,
 }
 
 impl Default for Warm {
     fn default() -> Self {
         let motor = Motor::default();
-        Self { at: Temperatures::all(super::T_20), inverse: Inverse::of(&motor), motor, linear: None }
+        Self { at: Temperatures::all(super::T_20), inverse: Inverse::of(&motor), motor, ideal: false }
     }
 }
 
@@ -59,7 +58,7 @@ impl PmsmPlant {
 
     /// The machine at its temperatures.
     #[inline]
-    pub(in crate::plant) fn machine(&self) -> Machine<'_> {
+    pub(in crate::plant) fn machine<const LINEAR: bool>(&self) -> Machine<'_, f64, LINEAR> {
         Machine::with(&self.warm.motor, &self.parameters.saturation, self.warm.inverse)
     }
 
@@ -78,8 +77,8 @@ impl PmsmPlant {
     /// From now on, the parts have these temperatures (K).
     pub(in crate::plant) fn take(&mut self, at: Temperatures) {
         let motor = self.parameters.thermal.motor(&self.parameters.motor, &at);
-        let (inverse, linear) = (Inverse::of(&motor), Linear::new(&self.parameters, &motor));
-        self.warm = Warm { at, motor, inverse, linear };
+        let (inverse, ideal) = (Inverse::of(&motor), losses::ideal(&self.parameters));
+        self.warm = Warm { at, motor, inverse, ideal };
     }
 
     /// The temperatures (K) that parameters and `inputs` say, and the names of those of winding and magnets.

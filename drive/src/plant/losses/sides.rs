@@ -1,21 +1,18 @@
-//! Switching legs between two kinks, where every loss is a polynomial of the current.
+//! Signs of the currents: between two kinks, legs and devices are affine in the current.
 //!
 //! While each phase current stays on one side of the zone +-`inverter.i_zero`, dead time is a constant voltage, and so is
-//! the share of each device in a period. The drop of the devices, the voltage e behind the resistance and the current i_s
-//! at the terminals are then affine in the current i of the flux linkage:
+//! the share of each device in a period:
 //!
 //! ```text
-//! drop = a + D (i + G u) / (1 + R G)          e = (u - R i - drop) / (1 + R G)          i_s = i + G e
-//! a    = sign u_0 + on u_1, D = r_0 + sign on r_1 of each leg          on = 2 d - 1
+//! drop = a + D i          a = sign u_0 + on u_1, D = r_0 + sign on r_1 of each leg          on = 2 d - 1
 //! ```
 //!
-//! with half of the sum (0) and of the difference (1) of transistor and diode. The equations are those of [`flow`](super::flow)
-//! with R, G and the signs held. A classical Runge-Kutta step that contains a kink closes the energy balance to its second
-//! order only; one that ends there keeps the fourth.
+//! with half of the sum (0) and of the difference (1) of transistor and diode: [`Switches`] with the signs held. A classical
+//! Runge-Kutta step that contains a kink closes the energy balance to its second order only; one that ends there keeps the
+//! fourth.
 
 use crate::frame::{AlphaBeta, Phases};
-use crate::plant::losses::Losses;
-use crate::plant::losses::flow::Flow;
+use crate::plant::losses::flow::{Drops, Switches};
 
 /// The side of the zone on which the current of each leg is: 1 above, -1 below, 0 within.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -94,51 +91,43 @@ impl Affine {
     }
 }
 
-/// Inverter and machine while the currents keep their sides.
+/// Legs and devices while the currents keep their sides.
 #[derive(Clone, Copy, Debug)]
-pub struct Region {
+pub struct OneSided {
     /// Voltage of the legs with dead time in V.
     u: AlphaBeta,
-    R: f64,
-    G: f64,
-    /// In V.
-    e: Affine,
-    drop: Affine,
+    /// Drop of the devices in V.
+    drop: Option<Affine>,
     /// Switching loss in W per ampere.
     sw: AlphaBeta,
 }
 
-impl Region {
-    /// With the voltage `u` (V) of the legs, resistance `R` (Ohm), conductance `G` (S), voltage `drop` (V) of the devices
-    /// as a function of their current, and switching loss `sw` (W per ampere).
+impl Switches {
+    /// These legs and devices under the voltage `u` (V) while the currents keep their `sides`.
     #[inline]
-    pub fn new(u: AlphaBeta, (R, G): (f64, f64), drop: Affine, sw: AlphaBeta) -> Self {
-        let part = 1.0 / (R * G + 1.0);
-        let by = drop.by.map(|r| r * part);
-        let drop = Affine { at_0: drop.at(u * (part * G)), by };
-        let e = Affine { at_0: (u - drop.at_0) * part, by: [-(R + by[0]) * part, -by[1] * part, -(R + by[2]) * part] };
-        Self { u, R, G, e, drop, sw }
+    pub fn one_sided(&self, u: AlphaBeta, sides: &Sides) -> OneSided {
+        let Self { legs, conduction, sw } = self;
+        let signs = sides.legs();
+        let u = if legs.drop() { u - legs.loss_beyond(signs) } else { u };
+        let drop = conduction.as_ref().map(|conduction| conduction.affine(u, signs));
+        OneSided { u, drop, sw: signs.to_stator() * (1.5 * sw) }
+    }
+}
+
+impl Drops<f64> for OneSided {
+    #[inline]
+    fn legs(&self, _u: AlphaBeta, _steady: impl FnOnce() -> AlphaBeta) -> AlphaBeta {
+        self.u
     }
 
-    /// Voltage (V) behind the resistance with the current `i` (A) of the flux linkage.
     #[inline]
-    pub fn emf(&self, i: AlphaBeta) -> AlphaBeta {
-        self.e.at(i)
+    fn devices(&self, _u: AlphaBeta, i: AlphaBeta) -> Option<AlphaBeta> {
+        self.drop.map(|drop| drop.at(i))
     }
 
-    /// With the current `i` (A) of the flux linkage.
     #[inline]
-    pub fn flow(&self, i: AlphaBeta) -> Flow<f64> {
-        let (drop, e) = (self.drop.at(i), self.e.at(i));
-        let i = i + e * self.G;
-        let losses = Losses {
-            cu: i.dot(i) * (self.R * 1.5),
-            iron: e.dot(e) * (self.G * 1.5),
-            cond: drop.dot(i) * 1.5,
-            sw: self.sw.dot(i),
-            friction: 0.0,
-        };
-        Flow { i, d_psi: e, p_in: self.u.dot(i) * 1.5 + losses.sw, losses }
+    fn switching(&self, i: AlphaBeta) -> Option<f64> {
+        Some(self.sw.dot(i))
     }
 }
 
@@ -148,11 +137,11 @@ mod tests {
     use super::*;
     use crate::plant::legs::Legs;
     use crate::plant::losses::conduction::Devices;
-    use crate::plant::losses::flow::Lossy;
+    use crate::plant::losses::flow::{Dissipation, Path};
     use crate::plant::tables::PlantParameters;
 
     #[test]
-    fn beyond_the_zone_the_affine_flow_is_the_flow() {
+    fn beyond_the_zone_the_signs_say_what_the_currents_say() {
         let mut par = PlantParameters::default();
         (par.iron.G_e, par.iron.G_h, par.winding.k_ac) = (2e-4, 0.1, 1e-7);
         par.inverter.dead_time = 2e-6;
@@ -164,16 +153,17 @@ mod tests {
             E_sw: 1e-3,
             ..Devices::default()
         };
-        let legs = Legs::switching(&par.inverter, 325.0);
-        let lossy = Lossy::new(&par, true, 325.0, legs.i_zone(), 1.2).unwrap();
-        let u = AlphaBeta::new(70.0, -90.0);
+        let switches = Switches::new(&par, true, 325.0, Legs::switching(&par.inverter, 325.0));
+        let (u, w) = (AlphaBeta::new(70.0, -90.0), 300.0);
+        let dissipation = Dissipation::at(&par, 2.0, w);
         for k in 0..6_u32 {
             let angle = 0.2 + std::f64::consts::FRAC_PI_3 * f64::from(k);
             let i = AlphaBeta::new(5.0 * angle.cos(), 5.0 * angle.sin());
-            let sides = Sides::of(i, legs.i_zone());
+            let sides = Sides::of(i, par.inverter.i_zero);
             assert!(sides.apart(), "{sides:?}");
-            let got = lossy.region(lossy.circuit(2.0, 300.0), u, &legs, &sides).flow(i);
-            let wanted = lossy.flow(2.0, u - legs.loss(i), i, 100.0);
+            let drops = switches.one_sided(u, &sides);
+            let got = Path { u, dissipation, drops }.flow(AlphaBeta::ZERO, i, w);
+            let wanted = Path { u, dissipation, drops: switches }.flow(AlphaBeta::ZERO, i, w);
             let near = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
             assert!((got.i - wanted.i).magnitude() < 1e-13 && (got.d_psi - wanted.d_psi).magnitude() < 1e-12, "{i:?}");
             assert!(near(got.p_in, wanted.p_in) && near(got.losses.cond, wanted.losses.cond), "{i:?}");
