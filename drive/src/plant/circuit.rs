@@ -99,7 +99,7 @@ impl Passed {
     pub(super) fn over<D: Drops<f64>, C: Coulomb<f64>>(
         h: f64,
         turned: f64,
-        [a, b, c, d]: &[Rates; 4],
+        [a, b, c, d]: [&Rates; 4],
         shaft: &Shaft<'_, C>,
     ) -> Self {
         let over = |value: fn(&Rates) -> f64| h * (1.0 / 6.0) * (value(a) + 2.0 * (value(b) + value(c)) + value(d));

@@ -78,7 +78,8 @@ impl<'a, S: Scalar, const LINEAR: bool> Machine<'a, S, LINEAR> {
     pub fn current(&self, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
         let e = Vector::new(1.0.into(), 0.0.into());
         let x = psi - e.scaled(self.psi_M);
-        self.linear_current(x, e) + self.saturation.map_or(Vector::fixed(Vector::ZERO), |saturation| saturation.current(x))
+        self.linear_current(x, e)
+            + self.saturation.map_or(Vector::fixed(Vector::ZERO), |saturation| saturation.current(x))
     }
 
     /// [`current`](Self::current) in stator axes, for the flux linkage `psi` (Wb) in stator axes with the magnet on `axis`.

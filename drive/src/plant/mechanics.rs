@@ -56,6 +56,28 @@ impl Mechanics {
     }
 }
 
+/// Speed over w_coulomb up to which a step resolves the Coulomb torque: from here on, it is the whole one but for 1e-3.
+const RESOLVED: f64 = 4.0;
+
+/// Greatest change of the speed in a step there, over w_coulomb.
+const LARGEST_CHANGE: f64 = 0.25;
+
+impl Mechanics {
+    /// How long (s) a step may be that took `h` (s) from one speed to the other (rad/s), if it was too long for a Coulomb
+    /// torque that changes its sign: it ends where that begins, or is a small part of it. `None` if it was not.
+    #[inline]
+    pub fn shorter(&self, h: f64, from: f64, to: f64) -> Option<f64> {
+        let (edge, small) = (RESOLVED * self.w_coulomb, LARGEST_CHANGE * self.w_coulomb);
+        let (beyond, change) = (from.min(to) > edge || from.max(to) < -edge, (to - from).abs());
+        // A greater change is that of a coupling that diverges.
+        let resolved = change <= 1.01 * small || !(change < 1e5 * small.max(1.0));
+        if beyond || resolved || self.tau_coulomb == 0.0 || self.imposed {
+            return None;
+        }
+        Some((h * (from.abs() - edge).max(small) / change).min(0.5 * h))
+    }
+}
+
 /// Torque of viscous friction and windage in N.m at the `speed` (rad/s).
 #[inline]
 fn viscous<S: Scalar>(B: f64, k_w: f64, speed: S) -> S {
@@ -232,7 +254,9 @@ mod tests {
                 let Motion { acceleration, tau_given, p_friction } = shaft.motion(speed, 1.0);
                 let friction = m.friction(speed);
                 assert!((acceleration - (1.0 - 0.4 - friction) / m.J).abs() < 1e-12, "{start} {speed}");
-                assert!((shaft.tau_shaft(tau_given) - 0.4).abs() < 1e-15 && (p_friction - friction * speed).abs() < 1e-14);
+                assert!(
+                    (shaft.tau_shaft(tau_given) - 0.4).abs() < 1e-15 && (p_friction - friction * speed).abs() < 1e-14
+                );
             }
         }
         let imposed = Mechanics { imposed: true, ..m };

@@ -2,6 +2,7 @@
 
 mod circuit;
 pub mod counters;
+mod damping;
 pub mod exchange;
 mod integration;
 pub mod inverter;

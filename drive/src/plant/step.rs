@@ -154,7 +154,10 @@ impl PmsmPlant {
         let PlantParameters { saturation, mechanics, .. } = &self.parameters;
         let is_one = Self::is_one_step(h, self.machine::<true>().electrical(self.state.speed));
         if is_one && saturation.is_none() && !mechanics.imposed {
-            return Ok(self.integrate_linear(&self.state, h, u));
+            let (next, step) = self.integrate_linear(&self.state, h, u);
+            if mechanics.shorter(h, self.state.speed, next.speed).is_none() {
+                return Ok((next, step));
+            }
         }
         self.pass_ideal_in_steps(h, u)
     }
@@ -164,13 +167,18 @@ impl PmsmPlant {
     fn pass_ideal_in_steps(&self, h: f64, u: AlphaBeta) -> Result<(State, Passed), Fault> {
         let (mut state, mut passed) = self.at_the_shaft();
         let is_one = Self::is_one_step(h, self.machine::<true>().electrical(state.speed));
-        let mut left = if is_one { 1.0 } else { self.count(h, LONGEST_STEP, state.speed)? };
-        let h = h / left;
-        while left > 0.0 && !self.is_too_fast(state.speed) {
+        let count = if is_one { 1.0 } else { self.count(h, LONGEST_STEP, state.speed)? };
+        let (longest, mut left, mut limit) = (h / count, h, f64::INFINITY);
+        while left > 1e-9 * h && !self.is_too_fast(state.speed) {
+            let h = if left < longest * (1.0 + 1e-9) { left } else { longest }.min(limit);
             let (next, step) = self.integrate_any(&state, h, u);
-            state = next;
+            if let Some(shorter) = self.parameters.mechanics.shorter(h, state.speed, next.speed) {
+                limit = shorter;
+                continue;
+            }
+            (state, limit) = (next, f64::INFINITY);
             passed.add(&step);
-            left -= 1.0;
+            left -= h;
         }
         Ok((state, passed))
     }

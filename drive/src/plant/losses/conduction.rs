@@ -20,9 +20,9 @@
 //! The two-level model of a device (threshold and resistance) is that of the data sheets; the closed form is the field's,
 //! and a test repeats it. u in V, i in A.
 
-use crate::frame::{AlphaBeta, Phases, SQRT_3, Stator, Vector};
+use crate::frame::{AlphaBeta, Phases, Stator, Vector};
 use crate::modulation::clamp_unit;
-use crate::plant::losses::sides::Affine;
+use crate::plant::losses::sides::{Affine, symmetric};
 use fmu_core::Scalar;
 use fmu_core::unit::{AMPERE, JOULE, OHM, ONE, VOLT};
 use fmu_core::{Row, Table};
@@ -134,8 +134,7 @@ impl Conduction<f64> {
             ((transistor * self.u[1] + self.u[0]) * sign, transistor * self.r[1] + self.r[0])
         };
         let [(a, r_a), (b, r_b), (c, r_c)] = [leg(on.a, signs.a), leg(on.b, signs.b), leg(on.c, signs.c)];
-        let by = [(4.0 * r_a + r_b + r_c) / 6.0, (r_c - r_b) * (0.5 / SQRT_3), 0.5 * (r_b + r_c)];
-        Affine { at_0: Phases { a, b, c }.to_stator(), by }
+        Affine { at_0: Phases { a, b, c }.to_stator(), by: symmetric(Phases { a: r_a, b: r_b, c: r_c }) }
     }
 }
 

@@ -11,7 +11,7 @@
 //! exactly. With i_m instead, the drops would be those of a current that is 10 % less at a fifth of the torque, and diodes
 //! would block the wrong current.
 
-use crate::frame::{Stator, Vector};
+use crate::frame::{AlphaBeta, Stator, Vector};
 use crate::plant::legs::Legs;
 use crate::plant::losses::conduction::Conduction;
 use crate::plant::losses::{Losses, switching};
@@ -36,12 +36,23 @@ impl<S: Scalar> Dissipation<S> {
         Self { R, G: (!iron.is_none()).then(|| iron.conductance(w)) }
     }
 
-    /// Current (A) at the terminals without a drop, with the voltage `u` (V) and the current `i` (A) of the flux linkage:
-    /// the one whose sign decides what legs and devices do.
+    /// Voltage (V) behind the resistance of a winding with iron parallel to it, where `u` (V) is applied.
     #[inline]
-    pub fn guide(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Vector<Stator, S> {
-        let Some(G) = self.G else { return i };
-        (i + u.scaled(G)).scaled(S::from(1.0) / (self.R * G + S::from(1.0)))
+    fn behind(&self, u: Vector<Stator, S>) -> Vector<Stator, S> {
+        self.G.map_or(u, |G| u.scaled(S::from(1.0) / (self.R * G + S::from(1.0))))
+    }
+
+    /// Current (A) at the terminals with the current `i` (A) of the flux linkage and the voltage `e` (V) behind the resistance.
+    #[inline]
+    fn through(&self, i: Vector<Stator, S>, e: Vector<Stator, S>) -> Vector<Stator, S> {
+        self.G.map_or(i, |G| i + e.scaled(G))
+    }
+
+    /// Current (A) at the terminals in steady state with the flux linkage `psi` (Wb), its current `i` (A) and the electrical
+    /// speed `w` (rad/s).
+    #[inline]
+    fn steady(&self, psi: Vector<Stator, S>, i: Vector<Stator, S>, w: S) -> Vector<Stator, S> {
+        self.G.map_or(i, |G| i + psi.turned().scaled(G * w))
     }
 }
 
@@ -151,20 +162,17 @@ impl<S: Scalar, D: Drops<S>> Path<D, S> {
     #[expect(clippy::inline_always, reason = "as for `Circuit::rates`")]
     #[inline(always)]
     pub fn flow(&self, psi: Vector<Stator, S>, i: Vector<Stator, S>, w: S) -> Flow<S> {
-        let Self { u, dissipation: Dissipation { R, G }, drops } = self;
-        let u = drops.legs(*u, || G.map_or(i, |G| i + psi.turned().scaled(G * w)));
-        let part = G.map(|G| S::from(1.0) / (*R * G + S::from(1.0)));
-        // Behind the resistance of a winding with iron parallel to it.
-        let behind = |u: Vector<Stator, S>| part.map_or(u, |part| u.scaled(part));
-        let through = |e: Vector<Stator, S>| G.map_or(i, |G| i + e.scaled(G));
-        let driving = behind(u - i.scaled(*R));
-        let drop = drops.devices(u, through(driving));
-        let e = drop.map_or(driving, |drop| driving - behind(drop));
-        let i = through(e);
+        let Self { u, dissipation, drops } = self;
+        let &Dissipation { R, G } = dissipation;
+        let u = drops.legs(*u, || dissipation.steady(psi, i, w));
+        let driving = dissipation.behind(u - i.scaled(R));
+        let drop = drops.devices(u, dissipation.through(i, driving));
+        let e = drop.map_or(driving, |drop| driving - dissipation.behind(drop));
+        let i = dissipation.through(i, e);
         let zero = S::from(0.0);
         let sw = drops.switching(i);
         let losses = Losses {
-            cu: i.dot(i) * (*R * 1.5),
+            cu: i.dot(i) * (R * 1.5),
             iron: G.map_or(zero, |G| e.dot(e) * (G * 1.5)),
             cond: drop.map_or(zero, |drop| drop.dot(i) * 1.5),
             sw: sw.unwrap_or(zero),
@@ -172,5 +180,17 @@ impl<S: Scalar, D: Drops<S>> Path<D, S> {
         };
         let p_in = u.dot(i) * 1.5;
         Flow { i, d_psi: e, p_in: sw.map_or(p_in, |sw| p_in + sw), losses }
+    }
+}
+
+impl Path<&Switches> {
+    /// The currents (A) whose signs the dead time follows, and those that the devices follow; arguments as for
+    /// [`flow`](Self::flow).
+    #[inline]
+    pub fn guides(&self, psi: AlphaBeta, i: AlphaBeta, w: f64) -> [AlphaBeta; 2] {
+        let Self { u, dissipation, drops } = self;
+        let steady = dissipation.steady(psi, i, w);
+        let driving = dissipation.behind(drops.legs(*u, || steady) - i * dissipation.R);
+        [steady, dissipation.through(i, driving)]
     }
 }

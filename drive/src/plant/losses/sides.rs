@@ -11,67 +11,62 @@
 //! Runge-Kutta step that contains a kink closes the energy balance to its second order only; one that ends there keeps the
 //! fourth.
 
-use crate::frame::{AlphaBeta, Phases};
+use crate::frame::{AlphaBeta, Phases, SQRT_3};
 use crate::plant::losses::flow::{Drops, Switches};
 
-/// The side of the zone on which the current of each leg is: 1 above, -1 below, 0 within.
+/// The side of the zone on which the current of each leg is: 1 above, -1 below, 0 within; first that which the dead time
+/// follows, then that which the devices follow ([`Path::guides`](super::flow::Path::guides)).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sides([f64; 3]);
+pub struct Sides([[f64; 3]; 2]);
 
 impl Sides {
+    /// How far beyond its edge, as a share of the zone, a current may be at the end of a step.
+    const TOLERANCE: f64 = 0.02;
+
     /// Of the currents `i` (A) with the zone +-`zone` (A).
     #[inline]
-    pub fn of(i: AlphaBeta, zone: f64) -> Self {
+    pub fn of(i: [AlphaBeta; 2], zone: f64) -> Self {
         let side = |i: f64| f64::from(i8::from(i > zone) - i8::from(i < -zone));
-        let Phases { a, b, c } = Phases::from_stator(i);
-        Self([side(a), side(b), side(c)])
+        Self(i.map(|i| {
+            let Phases { a, b, c } = Phases::from_stator(i);
+            [side(a), side(b), side(c)]
+        }))
     }
 
     /// Whether no current is within the zone.
     #[inline]
     pub fn apart(&self) -> bool {
-        let [a, b, c] = self.0;
-        a * b * c != 0.0
+        self.0.iter().flatten().product::<f64>() != 0.0
     }
 
-    /// For each leg.
+    /// Where in a step, as a share of it, the first current meets the edge of its side, if one leaves it by more than the
+    /// tolerance: the currents go from `start` (A) to `end` (A). The point is half of the tolerance beyond the edge.
     #[inline]
-    pub fn legs(&self) -> Phases {
-        let [a, b, c] = self.0;
-        Phases { a, b, c }
-    }
-
-    /// Where in a step, as a share of it, the first current changes its side, if one does: the currents go from `start` (A)
-    /// to `end` (A). The side changes to that in the second value there.
-    #[expect(clippy::float_cmp, reason = "sides are exact")]
-    #[inline]
-    pub fn change(&self, start: AlphaBeta, end: AlphaBeta, zone: f64) -> Option<(f64, Self)> {
-        let next = Self::of(end, zone);
-        if next == *self {
-            return None;
-        }
-        let parts = |i| {
-            let Phases { a, b, c } = Phases::from_stator(i);
-            [a, b, c]
+    pub fn first_crossing(&self, start: [AlphaBeta; 2], end: [AlphaBeta; 2], zone: f64) -> Option<f64> {
+        let tolerance = Self::TOLERANCE * zone;
+        let leg = |side: f64, from: f64, to: f64| {
+            // The edges below and above: a side beyond the zone has one only.
+            let (below, above) = (if side > 0.0 { zone } else { -zone }, if side < 0.0 { -zone } else { zone });
+            let edge = if side <= 0.0 && to > above + tolerance {
+                above + 0.5 * tolerance
+            } else if side >= 0.0 && to < below - tolerance {
+                below - 0.5 * tolerance
+            } else {
+                return 1.0;
+            };
+            ((edge - from) / (to - from)).clamp(0.0, 1.0)
         };
-        let (start, end) = (parts(start), parts(end));
-        let (mut first, mut sides) = (1.0, *self);
-        for leg in 0..3 {
-            let (from, to) = (self.0[leg], next.0[leg]);
-            if from == to {
-                continue;
-            }
-            // The side that it leaves, or the one that it enters from within.
-            let edge = if from == 0.0 { to * zone } else { from * zone };
-            let share = ((edge - start[leg]) / (end[leg] - start[leg])).clamp(0.0, 1.0);
-            if share <= first {
-                first = share;
-                sides = *self;
-                sides.0[leg] = if from == 0.0 { to } else { 0.0 };
-            }
+        let mut share = 1.0_f64;
+        for ([a, b, c], (start, end)) in self.0.into_iter().zip(start.into_iter().zip(end)) {
+            let (start, end) = (Phases::from_stator(start), Phases::from_stator(end));
+            share = share.min(leg(a, start.a, end.a)).min(leg(b, start.b, end.b)).min(leg(c, start.c, end.c));
         }
-        Some((first, sides))
+        (share < 1.0).then_some(share)
     }
+}
+
+fn phases([a, b, c]: [f64; 3]) -> Phases {
+    Phases { a, b, c }
 }
 
 /// A vector that is affine in the current (A).
@@ -91,6 +86,12 @@ impl Affine {
     }
 }
 
+/// The matrix of resistances of the legs (Ohm) in stator axes: alpha alpha, alpha beta, beta beta.
+#[inline]
+pub fn symmetric(Phases { a, b, c }: Phases) -> [f64; 3] {
+    [(4.0 * a + b + c) * (1.0 / 6.0), (c - b) * (0.5 / SQRT_3), 0.5 * (b + c)]
+}
+
 /// Legs and devices while the currents keep their sides.
 #[derive(Clone, Copy, Debug)]
 pub struct OneSided {
@@ -107,10 +108,20 @@ impl Switches {
     #[inline]
     pub fn one_sided(&self, u: AlphaBeta, sides: &Sides) -> OneSided {
         let Self { legs, conduction, sw } = self;
-        let signs = sides.legs();
-        let u = if legs.drop() { u - legs.loss_beyond(signs) } else { u };
-        let drop = conduction.as_ref().map(|conduction| conduction.affine(u, signs));
-        OneSided { u, drop, sw: signs.to_stator() * (1.5 * sw) }
+        let [dead_time, devices] = sides.0.map(phases);
+        let u = if legs.drop() { u - legs.loss_beyond(dead_time) } else { u };
+        let drop = conduction.as_ref().map(|conduction| conduction.affine(u, devices));
+        OneSided { u, drop, sw: devices.to_stator() * (1.5 * sw) }
+    }
+
+    /// The currents (A) of [`Path::guides`](super::flow::Path::guides), each in place of another that has no kink.
+    #[inline]
+    pub fn guided(&self, [dead_time, devices]: [AlphaBeta; 2]) -> [AlphaBeta; 2] {
+        match (self.legs.drop(), self.conduction.is_some() || self.sw > 0.0) {
+            (true, true) => [dead_time, devices],
+            (true, false) => [dead_time; 2],
+            _ => [devices; 2],
+        }
     }
 }
 
@@ -132,7 +143,6 @@ impl Drops<f64> for OneSided {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "sides are exact")]
 mod tests {
     use super::*;
     use crate::plant::legs::Legs;
@@ -159,7 +169,7 @@ mod tests {
         for k in 0..6_u32 {
             let angle = 0.2 + std::f64::consts::FRAC_PI_3 * f64::from(k);
             let i = AlphaBeta::new(5.0 * angle.cos(), 5.0 * angle.sin());
-            let sides = Sides::of(i, par.inverter.i_zero);
+            let sides = Sides::of([i; 2], par.inverter.i_zero);
             assert!(sides.apart(), "{sides:?}");
             let drops = switches.one_sided(u, &sides);
             let got = Path { u, dissipation, drops }.flow(AlphaBeta::ZERO, i, w);
@@ -174,15 +184,18 @@ mod tests {
     #[test]
     fn the_first_current_at_an_edge_ends_a_step() {
         // a goes from 3 A to -1 A and meets 0.2 A at 0.7; b goes from 0 to 0.5 A, out of the zone at 0.4.
-        let phases = |a: f64, b: f64| Phases { a, b, c: -a - b }.to_stator();
+        let phases = |a: f64, b: f64| [Phases { a, b, c: -a - b }.to_stator(); 2];
         let (start, end) = (phases(3.0, 0.0), phases(-1.0, 0.5));
         let sides = Sides::of(start, 0.2);
-        let (share, next) = sides.change(start, end, 0.2).unwrap();
-        assert!((share - 0.4).abs() < 1e-12 && !sides.apart(), "{share}");
-        let Phases { a, b, c } = next.legs();
-        assert_eq!([a, b, c], [1.0, 1.0, -1.0]);
-        let (share, next) = next.change(start, end, 0.2).unwrap();
-        assert!((share - 0.7).abs() < 1e-12 && next.legs().a == 0.0, "{share}, {next:?}");
-        assert!(Sides::of(start, 0.2).change(start, phases(2.0, 0.1), 0.2).is_none());
+        let half = 0.5 * Sides::TOLERANCE * 0.2;
+        let share = sides.first_crossing(start, end, 0.2).unwrap();
+        assert!((share - 0.4 - half / 0.5).abs() < 1e-12 && !sides.apart(), "{share}");
+        // b has left the zone: a is the next, and its edge is the upper one.
+        let next = Sides::of(phases(1.4, 0.2 + half), 0.2);
+        assert_eq!(next.0, [[1.0, 1.0, -1.0]; 2]);
+        let share = next.first_crossing(start, end, 0.2).unwrap();
+        assert!((share - 0.7 - half / 4.0).abs() < 1e-12, "{share}");
+        assert!(sides.first_crossing(start, phases(2.0, 0.1), 0.2).is_none());
+        assert!(sides.first_crossing(start, phases(2.0, 0.2 + half), 0.2).is_none(), "within the tolerance");
     }
 }
