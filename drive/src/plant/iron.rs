@@ -46,7 +46,8 @@ impl Iron {
     /// Whether the iron loses nothing.
     #[inline]
     pub fn is_none(&self) -> bool {
-        self.G_e == 0.0 && self.G_h == 0.0
+        let &Self { G_e, G_h, w_0: _ } = self;
+        G_e == 0.0 && G_h == 0.0
     }
 
     /// Conductance (S) at the electrical speed `w` (rad/s).

@@ -41,7 +41,8 @@ impl Saturation {
     /// Whether the machine is linear.
     #[inline]
     pub fn is_none(&self) -> bool {
-        self.s_2 == 0.0 && self.s_3 == 0.0 && self.s_dq == 0.0
+        let &Self { s_2, s_3, s_dq } = self;
+        s_2 == 0.0 && s_3 == 0.0 && s_dq == 0.0
     }
 
     /// The current (A) beyond the linear machine's, with the flux linkage `psi` (Wb) beyond that of the magnet.

@@ -68,7 +68,7 @@ impl Devices {
     /// Whether they lose nothing.
     #[inline]
     pub fn is_none(&self) -> bool {
-        let &Self { u_transistor, r_transistor, u_diode, r_diode, E_sw, .. } = self;
+        let &Self { u_transistor, r_transistor, u_diode, r_diode, E_sw, i_sw: _, u_sw: _, k_sw: _ } = self;
         u_transistor + r_transistor + u_diode + r_diode + E_sw == 0.0
     }
 
