@@ -2,7 +2,7 @@
 #![allow(missing_docs, non_snake_case)]
 
 use drive::control::start::StartMode;
-use drive::control::tables::{ALL_PARAMETERS, ControllerParameters};
+use drive::control::tables::{ControllerParameters, PARAMETERS};
 use drive::control::weakening::WeakeningParameters;
 use drive::estimator::tracker::TrackerKind;
 use drive::estimator::{Class, Kind};
@@ -34,8 +34,7 @@ fn refused(kind: Kind, set: impl FnOnce(&mut ControllerParameters), parts: &[&st
         assert!(message.contains(part), "{part}: {message}");
     }
     let words: Vec<&str> = message.split_whitespace().map(|word| word.trim_end_matches([':', ',', ';', '.'])).collect();
-    let names: Vec<String> =
-        (0..ALL_PARAMETERS.len()).filter_map(|i| ALL_PARAMETERS.locate(i)).map(|found| found.0).collect();
+    let names: Vec<String> = (0..PARAMETERS.len()).filter_map(|i| PARAMETERS.locate(i)).map(|found| found.0).collect();
     for (word, next) in words.iter().zip(words.iter().skip(1).chain(&[""])) {
         let dotted = word.contains('.') && word.starts_with(|first: char| first.is_alphabetic()) && *word != "kg.m2";
         assert!(!(dotted || *next == "=") || names.iter().any(|name| name == word), "{word} is no variable: {message}");

@@ -8,7 +8,7 @@
 //! the loop is first-order with bandwidth w_c (internal model control); active resistance and back-calculation are
 //! common practice in the field. u in V, i in A, w_c and w^ in rad/s (electrical).
 
-use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::frame::{Axis, DqHat, Estimated};
 use crate::math::sin_cos;
 use crate::motor::Motor;
@@ -158,7 +158,7 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
     if par.current.bandwidth <= most * (1.0 + 1e-9) {
         return Ok(());
     }
-    let table = ALL_PARAMETERS;
+    let table = PARAMETERS;
     let allowed = format!(
         "at most {most:.4} rad/s (2 pi {:.3} / T_s) with {} and {}, or the current oscillates; lower it or T_s",
         0.06 * critical,

@@ -8,13 +8,9 @@ use crate::control::signals::{ControllerInputs, ControllerOutputs};
 use crate::control::speed::SpeedGains;
 use crate::control::start::StartMode;
 use crate::control::state::{Gains, InUse, State, context};
-use crate::control::tables::{
-    ADAPTATION_OUTPUTS, ControllerParameters, LATER_OUTPUTS, LATEST_PARAMETERS, OUTPUTS, PARAMETERS,
-};
-use crate::control::weakening::{self, WEAKENING, WeakeningGains};
+use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
+use crate::control::weakening::{self, WeakeningGains};
 use crate::control::zero_speed::{self, ZeroSpeed};
-use crate::estimator::resistance::ADAPTATION;
-use crate::estimator::tables::LATER_ESTIMATOR_PARAMETERS;
 use crate::estimator::{Class, Estimator, Sample};
 use crate::motor::Motor;
 use fmu_core::log::Warnings;
@@ -166,7 +162,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 12;
+    const STATE_VERSION: u16 = 13;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
@@ -301,15 +297,7 @@ type V = Row<Block<SensorlessController>>;
 const TABLE: &Table<Block<SensorlessController>> = &Table::new(
     const {
         &[
-            V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
-            V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
-            V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
-            V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
             V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
-            V::input("theta_meas", &RADIAN, "Electrical rotor angle of a sensor", |m| &mut m.model.inputs.theta_meas)
-                .read_with("estimator", "Sensored"),
-            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
-                .read_with("estimator", "Sensored"),
             V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
                 .read_with("speed_loop.torque_mode", "true"),
             V::boolean_input(
@@ -318,17 +306,16 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
                 |m| &mut m.model.inputs.enable,
             )
             .optional(),
+            V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
+            V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
+            V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
+            V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+            V::input("theta_meas", &RADIAN, "Electrical rotor angle of a sensor", |m| &mut m.model.inputs.theta_meas)
+                .read_with("estimator", "Sensored"),
+            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
+                .read_with("estimator", "Sensored"),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-            V::part("weakening.", &Part { table: WEAKENING, lens: |m| &mut m.model.parameters.weakening }),
-            V::part("", &Part { table: LATER_OUTPUTS, lens: |m| &mut m.out }),
-            V::part(
-                "adaptation.",
-                &Part { table: ADAPTATION, lens: |m| &mut m.model.parameters.estimators.adaptation },
-            ),
-            V::part("", &Part { table: ADAPTATION_OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |m| &mut m.model.parameters.estimators }),
-            V::part("", &Part { table: LATEST_PARAMETERS, lens: |m| &mut m.model.parameters }),
         ]
     },
 );

@@ -10,8 +10,7 @@ use crate::control::start::{START, StartParameters};
 use crate::control::weakening::{WEAKENING, WeakeningParameters};
 use crate::control::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use crate::estimator::Kind;
-use crate::estimator::resistance::{ADAPTATION, LATER_ADAPTATION};
-use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters, LATER_ESTIMATOR_PARAMETERS};
+use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
 use crate::math::{at_least, at_most};
 use crate::motor::{MOTOR, Motor};
 use crate::plant::saturation::A_PER_WB2;
@@ -84,14 +83,6 @@ const COMPENSATION: &Table<Compensation> = &Table::new(
                 &mut p.i_zero
             })
             .above(0.0),
-        ]
-    },
-);
-
-/// Variables of the compensation that are newer than [`COMPENSATION`]; their owner supplies the prefix `compensation.`.
-const LATER_COMPENSATION: &Table<Compensation> = &Table::new(
-    const {
-        &[
             C::boolean_parameter(
                 "observe",
                 "The estimators and lock_lost subtract the dead-time voltage at the measured currents; false: they assume that the compensation is exact",
@@ -102,16 +93,6 @@ const LATER_COMPENSATION: &Table<Compensation> = &Table::new(
                 "The controller measures the offsets of the current sensors while enable is false; false: offsets stay",
                 |p| &mut p.calibrate,
             ),
-        ]
-    },
-);
-
-/// Parameters that joined the controller last.
-pub const LATEST_PARAMETERS: &Table<ControllerParameters> = &Table::new(
-    const {
-        &[
-            Row::part("adaptation.", &Part { table: LATER_ADAPTATION, lens: |p| &mut p.estimators.adaptation }),
-            Row::part("compensation.", &Part { table: LATER_COMPENSATION, lens: |p| &mut p.compensation }),
         ]
     },
 );
@@ -127,36 +108,36 @@ pub struct ControllerParameters {
     pub estimator: Kind,
     /// Estimates of the machine.
     pub motor: Motor,
-    /// Parameters of the estimators.
-    pub estimators: EstimatorParameters,
-    /// Current sensors.
-    pub sensor: Sensor,
-    /// Dead-time compensation.
-    pub compensation: Compensation,
-    /// The current loop.
-    pub current: CurrentLoop,
-    /// The speed loop.
-    pub speed_loop: SpeedLoop,
-    /// Inertia in kg.m2 used to tune the speed loop, > 0.
-    pub J: f64,
-    /// Limits of the references.
-    pub limit: Limits,
-    /// The low-speed law.
-    pub zero_speed: ZeroSpeed,
-    /// Detection of a lost rotor.
-    pub lock: LockParameters,
-    /// The start.
-    pub start: StartParameters,
-    /// The start by injection.
-    pub polarity: PolarityParameters,
     /// Estimate of the second-order d-axis saturation coefficient in A/Wb2, >= 0; 0: unknown.
     pub s_2: f64,
-    /// Field weakening.
-    pub weakening: WeakeningParameters,
+    /// Inertia in kg.m2 used to tune the speed loop, > 0.
+    pub J: f64,
     /// Initial estimate of the electrical angle in rad.
     pub theta_est: f64,
     /// Initial estimate of the mechanical speed in rad/s.
     pub speed_est: f64,
+    /// Limits of the references.
+    pub limit: Limits,
+    /// The speed loop.
+    pub speed_loop: SpeedLoop,
+    /// The current loop.
+    pub current: CurrentLoop,
+    /// The low-speed law.
+    pub zero_speed: ZeroSpeed,
+    /// Field weakening.
+    pub weakening: WeakeningParameters,
+    /// The start.
+    pub start: StartParameters,
+    /// The start by injection.
+    pub polarity: PolarityParameters,
+    /// Detection of a lost rotor.
+    pub lock: LockParameters,
+    /// Current sensors.
+    pub sensor: Sensor,
+    /// Dead-time compensation.
+    pub compensation: Compensation,
+    /// Parameters of the estimators.
+    pub estimators: EstimatorParameters,
 }
 
 impl Default for ControllerParameters {
@@ -168,21 +149,21 @@ impl Default for ControllerParameters {
             delay: 1,
             estimator: Kind::Rasmussen,
             motor: Motor { R_s: 0.9 * motor.R_s, ..motor },
-            estimators: EstimatorParameters::default(),
-            sensor: Sensor::default(),
-            compensation: Compensation::default(),
-            current: CurrentLoop::default(),
-            speed_loop: SpeedLoop::default(),
-            J: 1.5e-3,
-            limit: Limits { i_q: 6.0, i: 7.5, tau: 1000.0 },
-            zero_speed: ZeroSpeed::default(),
-            lock: LockParameters::default(),
-            start: StartParameters::default(),
-            polarity: PolarityParameters::default(),
             s_2: 0.0,
-            weakening: WeakeningParameters::default(),
+            J: 1.5e-3,
             theta_est: 0.0,
             speed_est: 0.0,
+            limit: Limits { i_q: 6.0, i: 7.5, tau: 1000.0 },
+            speed_loop: SpeedLoop::default(),
+            current: CurrentLoop::default(),
+            zero_speed: ZeroSpeed::default(),
+            weakening: WeakeningParameters::default(),
+            start: StartParameters::default(),
+            polarity: PolarityParameters::default(),
+            lock: LockParameters::default(),
+            sensor: Sensor::default(),
+            compensation: Compensation::default(),
+            estimators: EstimatorParameters::default(),
         }
     }
 }
@@ -206,14 +187,20 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             .at_most(2.0),
             P::enumeration_parameter("estimator", "Estimator of rotor angle and speed", &Field(|p| &mut p.estimator)),
             P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
-            P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
-            P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
-            P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
-            P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
-            P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
+            P::parameter(
+                "saturation.s_2",
+                &A_PER_WB2,
+                "Second-order d-axis saturation coefficient (estimate), read by the start by injection; 0: unknown",
+                |p| &mut p.s_2,
+            )
+            .at_least(0.0),
             P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
                 .above(0.0)
                 .tunable(),
+            P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
+                &mut p.theta_est
+            }),
+            P::parameter("initial.speed_est", &SPEED, "First estimate of the mechanical speed", |p| &mut p.speed_est),
             P::parameter("limit.i_q", &AMPERE, "Maximum magnitude of the q-axis current", |p| &mut p.limit.i_q)
                 .above(0.0)
                 .tunable(),
@@ -225,68 +212,24 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::parameter("limit.tau", &NEWTON_METER, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
                 .above(0.0)
                 .tunable(),
+            P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
+            P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
-            P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
+            P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
             P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
             P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
-            P::parameter(
-                "saturation.s_2",
-                &A_PER_WB2,
-                "Second-order d-axis saturation coefficient (estimate), read by the start by injection; 0: unknown",
-                |p| &mut p.s_2,
-            )
-            .at_least(0.0),
-            P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
-                &mut p.theta_est
-            }),
-            P::parameter("initial.speed_est", &SPEED, "First estimate of the mechanical speed", |p| &mut p.speed_est),
-        ]
-    },
-);
-
-/// All parameters, for messages. The models append what joined later to their tables: value references of older variables
-/// stay.
-pub const ALL_PARAMETERS: &Table<ControllerParameters> = &Table::new(
-    const {
-        &[
-            P::part("", &Part { table: PARAMETERS, lens: |p| p }),
-            P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
-            P::part("adaptation.", &Part { table: ADAPTATION, lens: |p| &mut p.estimators.adaptation }),
-            P::part("", &Part { table: LATEST_PARAMETERS, lens: |p| p }),
-            P::part("", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
+            P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
+            P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
+            P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
+            P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
         ]
     },
 );
 
 type O = Row<ControllerOutputs>;
 
-/// Description of the output `lock_lost`, on the controller and on `PmsmDrive`.
-pub const LOCK_LOST: &str =
-    "Mismatch of the estimate with the applied voltage or the speed reference: 0 locked, 1 or more lost, 10 at most";
-
-/// Description of the output `enabled`, on the controller and on `PmsmDrive`.
-pub const ENABLED: &str = "The controller is running: the voltage references are its own";
-
-/// Outputs that report an active limit: the last outputs of the controller and of `PmsmDrive`.
-pub const LIMITED: &Table<ControllerOutputs> = &Table::new(
-    const {
-        &[
-            O::boolean_output(
-                "voltage_limited",
-                "The voltage hexagon of u_dc limited the voltage references of the last sample",
-                |o| &mut o.voltage_limited,
-            ),
-            O::boolean_output(
-                "current_limited",
-                "limit.i_q, limit.i, limit.tau or field weakening limited the current references of the last sample",
-                |o| &mut o.current_limited,
-            ),
-        ]
-    },
-);
-
-/// The controller's outputs.
-pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
+/// The voltage references, of the controller and of `PmsmDrive`.
+pub const VOLTAGES: &Table<ControllerOutputs> = &Table::new(
     const {
         &[
             O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| {
@@ -294,23 +237,24 @@ pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             }),
             O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
             O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
-            O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
-            O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
-                &mut o.theta_est
-            }),
-            O::discrete_output("i_d", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| &mut o.i.d),
-            O::discrete_output("i_q", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| &mut o.i.q),
-            O::discrete_output("i_d_ref", &AMPERE, "d-axis stator current reference", |o| &mut o.i_ref.d),
-            O::discrete_output("i_q_ref", &AMPERE, "q-axis stator current reference", |o| &mut o.i_ref.q),
-            O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
-            O::boolean_output("enabled", ENABLED, |o| &mut o.enabled),
-            O::part("", &Part { table: LIMITED, lens: |o| o }),
         ]
     },
 );
 
-/// Outputs that joined later, on the controller and on `PmsmDrive`.
-pub const LATER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
+/// The estimates, of the controller and of `PmsmDrive`.
+pub const ESTIMATES: &Table<ControllerOutputs> = &Table::new(
+    const {
+        &[
+            O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
+            O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
+                &mut o.theta_est
+            }),
+        ]
+    },
+);
+
+/// The limits and the state of the control, of the controller and of `PmsmDrive`.
+pub const STATUS: &Table<ControllerOutputs> = &Table::new(
     const {
         &[
             O::discrete_output("tau_max", &NEWTON_METER, "Greatest torque that the references may ask for now", |o| {
@@ -325,19 +269,47 @@ pub const LATER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
                 "Voltage that the current loop requests, before the hexagon, as a share of u_dc / sqrt(3)",
                 |o| &mut o.u_share,
             ),
+            O::boolean_output(
+                "voltage_limited",
+                "The voltage hexagon of u_dc limited the voltage references of the last sample",
+                |o| &mut o.voltage_limited,
+            ),
+            O::boolean_output(
+                "current_limited",
+                "limit.i_q, limit.i, limit.tau or field weakening limited the current references of the last sample",
+                |o| &mut o.current_limited,
+            ),
             O::boolean_output("weakens", "Field weakening lowers i_d_ref", |o| &mut o.weakens),
+            O::boolean_output("enabled", "The controller is running: the voltage references are its own", |o| {
+                &mut o.enabled
+            }),
+            O::discrete_output(
+                "lock_lost",
+                &ONE,
+                "Mismatch of the estimate with the applied voltage or the speed reference: 0 locked, 1 or more lost, 10 at most",
+                |o| &mut o.lock_lost,
+            ),
+            O::discrete_output(
+                "R_s_est",
+                &OHM,
+                "Stator resistance that the estimator uses: motor.R_s, or what adaptation.resistance makes of it",
+                |o| &mut o.R_s_est,
+            ),
         ]
     },
 );
 
-/// The output of the resistance adaptation, on the controller and on `PmsmDrive`.
-pub const ADAPTATION_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
+/// The controller's outputs.
+pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
     const {
-        &[O::discrete_output(
-            "R_s_est",
-            &OHM,
-            "Stator resistance that the estimator uses: motor.R_s, or what adaptation.resistance makes of it",
-            |o| &mut o.R_s_est,
-        )]
+        &[
+            O::part("", &Part { table: VOLTAGES, lens: |o| o }),
+            O::part("", &Part { table: ESTIMATES, lens: |o| o }),
+            O::discrete_output("i_d", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| &mut o.i.d),
+            O::discrete_output("i_q", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| &mut o.i.q),
+            O::discrete_output("i_d_ref", &AMPERE, "d-axis stator current reference", |o| &mut o.i_ref.d),
+            O::discrete_output("i_q_ref", &AMPERE, "q-axis stator current reference", |o| &mut o.i_ref.q),
+            O::part("", &Part { table: STATUS, lens: |o| o }),
+        ]
     },
 );

@@ -17,7 +17,7 @@
 
 use crate::control::envelope::{Envelope, Limit, Warm};
 use crate::control::reference::{max_torque, max_torque_per_ampere};
-use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::control::tracking::LeastTracker;
 use crate::estimator::Kind;
 use crate::frame::DqHat;
@@ -267,7 +267,7 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
     if !own.used {
         return Ok(());
     }
-    let table = ALL_PARAMETERS;
+    let table = PARAMETERS;
     let estimator_is = table.tell(par, |p| &mut p.estimator);
     let limit_is = table.tell(par, |p| &mut p.limit.i);
     let use_is = table.tell(par, |p| &mut p.weakening.used);

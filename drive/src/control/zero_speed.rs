@@ -5,7 +5,7 @@
 //! With maximum torque per ampere, the share 1 - exp(-|w_r^| / w_0) of its i_d is added, and i_q gives the torque beside
 //! both; the greatest torque is that of the current limit.
 
-use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::control::weakening::LEAST_TORQUE;
 use crate::estimator::Class;
 use crate::math::exp;
@@ -53,7 +53,7 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
     if estimator.class() != Class::FluxObserver || !by_torque || zero_speed.i_0 * share <= 1.0 - LEAST_TORQUE {
         return Ok(());
     }
-    let table = ALL_PARAMETERS;
+    let table = PARAMETERS;
     let with = if weakening.used {
         table.tell(par, |p| &mut p.weakening.used)
     } else if current.mtpa {

@@ -191,14 +191,6 @@ pub const EMF: &Table<EmfParameters> = &Table::new(
                 "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18); false: methods with this term alone",
                 |p| &mut p.frame_term,
             ),
-        ]
-    },
-);
-
-/// Those that joined later.
-pub const REVERSAL: &Table<EmfParameters> = &Table::new(
-    const {
-        &[
             P::boolean_parameter(
                 "hold_reversal",
                 "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; others than the EMF methods refuse it",

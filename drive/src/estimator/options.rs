@@ -4,7 +4,7 @@
 //! options: each estimator reads its own, and a set of values may hold those of several.
 
 use crate::control::start::StartMode;
-use crate::control::tables::{ALL_PARAMETERS, ControllerParameters as Par};
+use crate::control::tables::{ControllerParameters as Par, PARAMETERS};
 use crate::estimator::pulsating::Demodulation;
 use crate::estimator::tracker::TrackerKind;
 use crate::estimator::{Class, Kind};
@@ -26,21 +26,21 @@ struct Choice {
 const CHOICES: &[Choice] = &[
     Choice {
         asked: |p| p.start.mode == StartMode::Injection,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.start.mode),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.start.mode),
         has: |kind| kind.class().injects(),
         why: "the start by injection needs an estimator that injects",
         off: "set start.mode = CurrentFrequency or Direct",
     },
     Choice {
         asked: |p| p.weakening.used,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.weakening.used),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.weakening.used),
         has: |kind| kind.class() != Class::Injection,
         why: "injection leaves no voltage for field weakening",
         off: "set it to false",
     },
     Choice {
         asked: |p| p.estimators.tracker.kind != TrackerKind::Pll,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.tracker.kind),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.tracker.kind),
         has: |kind| {
             use Kind::{CurrentModel, KalmanFilter, Rasmussen, Sensored, VoltageModel};
             !matches!(kind, Rasmussen | VoltageModel | CurrentModel | Sensored | KalmanFilter)
@@ -50,35 +50,35 @@ const CHOICES: &[Choice] = &[
     },
     Choice {
         asked: |p| p.estimators.adaptation.resistance,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.resistance),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.resistance),
         has: |kind| matches!(kind, Kind::Rasmussen | Kind::FluxObserver),
         why: "it does not adapt the resistance",
         off: "set it to false",
     },
     Choice {
         asked: |p| p.estimators.adaptation.tracking > 0.0,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.tracking),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.tracking),
         has: |kind| kind == Kind::Rasmussen,
         why: "only Rasmussen needs it; FluxObserver adapts the resistance at every speed",
         off: "set adaptation.tracking = 0",
     },
     Choice {
         asked: |p| p.estimators.adaptation.k_a > 0.0,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.k_a),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.k_a),
         has: |kind| kind == Kind::Rasmussen,
         why: "it does not turn the frame at rest",
         off: "set adaptation.k_a = 0",
     },
     Choice {
         asked: |p| p.estimators.flux_observer.magnet > 0.0,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.flux_observer.magnet),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.flux_observer.magnet),
         has: |kind| kind == Kind::FluxObserver,
         why: "it does not adapt psi_M",
         off: "set it to 0",
     },
     Choice {
         asked: |p| p.estimators.emf.hold_reversal,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.emf.hold_reversal),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.emf.hold_reversal),
         has: |kind| {
             use Kind::{DirectEmf, EmfObserver, ExtendedEmf, SlidingMode, VoltageFeedback};
             matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | SlidingMode)
@@ -88,7 +88,7 @@ const CHOICES: &[Choice] = &[
     },
     Choice {
         asked: |p| !p.estimators.emf.frame_term,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.emf.frame_term),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.emf.frame_term),
         has: |kind| {
             use Kind::{CurrentModel, DirectEmf, EmfObserver, ExtendedEmf, Hybrid, VoltageFeedback, VoltageModel};
             let by_emf = matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | Hybrid);
@@ -99,21 +99,21 @@ const CHOICES: &[Choice] = &[
     },
     Choice {
         asked: |p| !p.estimators.matsui.integral,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.matsui.integral),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.matsui.integral),
         has: |kind| matches!(kind, Kind::VoltageModel | Kind::CurrentModel),
         why: "it has no such integral",
         off: "set it to true",
     },
     Choice {
         asked: |p| p.estimators.pulsating.demodulation != Demodulation::Heterodyne,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.pulsating.demodulation),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.pulsating.demodulation),
         has: |kind| kind == Kind::PulsatingInjection,
         why: "it has no pulsating carrier",
         off: "set it to Heterodyne",
     },
     Choice {
         asked: |p| p.estimators.gradient.clamped,
-        tell: |p| ALL_PARAMETERS.tell(p, |p| &mut p.estimators.gradient.clamped),
+        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.gradient.clamped),
         has: |kind| kind == Kind::GradientObserver,
         why: "it has no such clamp",
         off: "set it to false",
@@ -136,7 +136,7 @@ pub fn validate(par: &Par) -> Result<(), Fault> {
     Err(Fault::new(format!(
         "{} is not allowed with {}: {}; {}, or set estimator = {names}",
         (choice.tell)(par),
-        ALL_PARAMETERS.tell(par, |p| &mut p.estimator),
+        PARAMETERS.tell(par, |p| &mut p.estimator),
         choice.why,
         choice.off
     )))

@@ -45,7 +45,7 @@
 //! Not observable: R^ without current or while a speed is asked for; theta~ at rest; psi_M^ at rest. In torque mode
 //! nothing tells when the rotor may stand: R^ stays `motor.R_s`.
 
-use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::{Context, Sample};
 use crate::frame::DqHat;
 use crate::motor::Motor;
@@ -199,14 +199,14 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
         return Ok(());
     }
     if adaptation.min > 1.0 {
-        return Err(ALL_PARAMETERS.fault(
+        return Err(PARAMETERS.fault(
             par,
             |p| &mut p.estimators.adaptation.min,
             "at most 1, so that motor.R_s lies between the clamps; lower it, or correct motor.R_s",
         ));
     }
     if adaptation.max < 1.0 {
-        return Err(ALL_PARAMETERS.fault(
+        return Err(PARAMETERS.fault(
             par,
             |p| &mut p.estimators.adaptation.max,
             "at least 1, so that motor.R_s lies between the clamps; raise it, or correct motor.R_s",
@@ -214,37 +214,12 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
     }
     if !(adaptation.min..=adaptation.max).contains(&adaptation.start) {
         let allowed = format!("{} to {}, the clamps adaptation.min and adaptation.max", adaptation.min, adaptation.max);
-        return Err(ALL_PARAMETERS.fault(par, |p| &mut p.estimators.adaptation.start, allowed));
+        return Err(PARAMETERS.fault(par, |p| &mut p.estimators.adaptation.start, allowed));
     }
     Ok(())
 }
 
 type P = Row<ResistanceParameters>;
-
-/// The adaptation's variables that are newer than [`ADAPTATION`]; their owner adds the prefix `adaptation.`.
-pub const LATER_ADAPTATION: &Table<ResistanceParameters> = &Table::new(
-    const {
-        &[
-            P::parameter(
-                "tracking",
-                &ONE,
-                "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed, others refuse it; 0: it stays constant there",
-                |p| &mut p.tracking,
-            )
-            .at_least(0.0)
-            .at_most(1.0),
-            P::parameter(
-                "flux",
-                &ONE,
-                "Error of psi_M that the tracking does not take for one of the resistance, as a share of motor.psi_M",
-                |p| &mut p.flux,
-            )
-            .at_least(0.0)
-            .at_most(1.0)
-            .tunable(),
-        ]
-    },
-);
 
 /// The adaptation's variables; their owner adds the prefix `adaptation.`.
 pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
@@ -287,6 +262,23 @@ pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
                 |p| &mut p.k_c,
             )
             .above(0.0)
+            .tunable(),
+            P::parameter(
+                "tracking",
+                &ONE,
+                "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed, others refuse it; 0: it stays constant there",
+                |p| &mut p.tracking,
+            )
+            .at_least(0.0)
+            .at_most(1.0),
+            P::parameter(
+                "flux",
+                &ONE,
+                "Error of psi_M that the tracking does not take for one of the resistance, as a share of motor.psi_M",
+                |p| &mut p.flux,
+            )
+            .at_least(0.0)
+            .at_most(1.0)
             .tunable(),
         ]
     },

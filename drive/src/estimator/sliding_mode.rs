@@ -15,7 +15,7 @@
 //! Limits: those of the extended EMF. It holds rated load down to 0.020 of the rated speed, 0.020 with a compensated dead
 //! time. K below |E| loses the angle.
 
-use crate::control::tables::{ALL_PARAMETERS, ControllerParameters};
+use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::emf::{self, Direction, pole};
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Sample};
@@ -88,7 +88,7 @@ impl Estimating for SlidingMode {
         let bandwidth = par.estimators.sliding_mode.bandwidth;
         if bandwidth * par.T_s > 1.0 {
             let allowed = format!("at most 1 / T_s = {} rad/s, or the sampled observer chatters", 1.0 / par.T_s);
-            return Err(ALL_PARAMETERS.fault(par, |p| &mut p.estimators.sliding_mode.bandwidth, allowed));
+            return Err(PARAMETERS.fault(par, |p| &mut p.estimators.sliding_mode.bandwidth, allowed));
         }
         emf::validate(par)
     }

@@ -7,9 +7,9 @@
 //! [`modulation`](crate::modulation) computes the voltages. The dead-time model is the field's usual mean-value model;
 //! neither paper contains it. u in V, i in A, times in s.
 
-use crate::plant::losses::conduction::Devices;
+use crate::plant::losses::conduction::{DEVICES, Devices};
 use fmu_core::unit::{AMPERE, SECOND};
-use fmu_core::{Row, Table};
+use fmu_core::{Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters; zero dead time gives the ideal average inverter.
@@ -54,6 +54,7 @@ pub const INVERTER: &Table<Inverter> = &Table::new(
                 &mut p.i_zero
             })
             .above(0.0),
+            P::part("", &Part { table: DEVICES, lens: |p| &mut p.devices }),
         ]
     },
 );

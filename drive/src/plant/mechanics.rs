@@ -9,7 +9,7 @@
 //! N.m.s/rad, torques in N.m, speeds in rad/s (mechanical).
 
 use crate::math::{abs, reciprocal, tanh, tanh_beside};
-use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, SPEED};
+use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, NM_S2_PER_RAD2, SPEED};
 use fmu_core::{Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
 
@@ -153,6 +153,10 @@ pub const MECHANICS: &Table<Mechanics> = &Table::new(
             P::parameter("tau_coulomb", &NEWTON_METER, "Coulomb friction torque", |m| &mut m.tau_coulomb).at_least(0.0),
             P::parameter("w_coulomb", &SPEED, "Speed over which the Coulomb torque changes sign", |m| &mut m.w_coulomb)
                 .above(0.0),
+            P::parameter("k_w", &NM_S2_PER_RAD2, "Windage: torque over the square of the speed; 0: none", |m| {
+                &mut m.k_w
+            })
+            .at_least(0.0),
             P::boolean_parameter(
                 "imposed",
                 "The drive train imposes speed_shaft and angle_shaft and takes tau_shaft; the inertia is its own. false: the \

@@ -14,9 +14,9 @@ use crate::plant::power::Energy;
 use crate::plant::power::Powers;
 use crate::plant::signals::{Measured, PlantInputs, PlantOutputs};
 use crate::plant::state::{Instant, State};
-use crate::plant::tables::{PlantParameters, TABLE};
+use crate::plant::tables::{PARAMETERS, PlantParameters, TABLE};
 use crate::plant::thermal::warm::Warm;
-use crate::plant::thermal::{Temperatures, ThermalMode};
+use crate::plant::thermal::{self, Temperatures, ThermalMode};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
 
@@ -184,7 +184,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 10;
+    const STATE_VERSION: u16 = 11;
 
     fn derive(&mut self) {
         (self.sw, self.coulomb) = (switching::Last::default(), Coulomb::default());
@@ -196,9 +196,9 @@ impl Model for PmsmPlant {
         let fastest = self.fastest();
         if initial.speed.abs() > fastest && !self.parameters.mechanics.imposed {
             let allowed = format!("at most {fastest} rad/s in magnitude, the speed of any machine with this motor.n_p");
-            return Err(Fault::value("initial.speed", format!("{} rad/s", initial.speed), allowed));
+            return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.initial.speed, allowed));
         }
-        self.parameters.thermal.validate()?;
+        thermal::validate(&self.parameters)?;
         self.judge_temperatures(&self.inputs)
     }
 

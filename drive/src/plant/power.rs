@@ -28,10 +28,10 @@
 
 use crate::frame::Phases;
 use crate::plant::legs::Legs;
-use crate::plant::losses::Losses;
+use crate::plant::losses::{LOSSES, Losses};
 use crate::plant::signals::PlantInputs;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
-use fmu_core::{Row, Scalar, Table};
+use fmu_core::{Part, Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
 
 /// Powers; motor sign, from the DC link to the load.
@@ -165,6 +165,7 @@ pub const POWERS: &Table<Powers> = &Table::new(
                 |p| &mut p.p_loss,
             )
             .mean(),
+            P::part("", &Part { table: LOSSES, lens: |p| &mut p.losses }),
         ]
     },
 );

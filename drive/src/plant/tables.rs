@@ -3,15 +3,13 @@
 use crate::motor::{MOTOR, Motor};
 use crate::plant::inverter::{INVERTER, Inverter};
 use crate::plant::iron::{IRON, Iron};
-use crate::plant::losses::LOSSES;
-use crate::plant::losses::conduction::DEVICES;
 use crate::plant::mechanics::{MECHANICS, Mechanics};
 use crate::plant::model::PmsmPlant;
 use crate::plant::power::{ENERGY, POWERS};
 use crate::plant::saturation::{SATURATION, Saturation};
 use crate::plant::signals::PlantOutputs;
 use crate::plant::thermal::{THERMAL, THERMAL_INPUTS, THERMAL_OUTPUTS, Thermal};
-use fmu_core::unit::{AMPERE, NEWTON_METER, NM_S2_PER_RAD2, ONE, RADIAN, S2_PER_RAD2, SPEED, VOLT, WEBER};
+use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, PER_KELVIN, RADIAN, S2_PER_RAD2, SPEED, VOLT, WEBER};
 use fmu_core::{Block, Part, Row, Table};
 use serde::{Deserialize, Serialize};
 
@@ -22,12 +20,12 @@ pub struct PlantParameters {
     pub motor: Motor,
     /// Its saturation.
     pub saturation: Saturation,
-    /// The inverter.
-    pub inverter: Inverter,
     /// Inertia and friction.
     pub mechanics: Mechanics,
     /// State at the start.
     pub initial: Initial,
+    /// The inverter.
+    pub inverter: Inverter,
     /// Iron loss of the machine.
     pub iron: Iron,
     /// The winding beyond its resistance.
@@ -58,9 +56,6 @@ type O = Row<PlantOutputs>;
 pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
     const {
         &[
-            O::output("i_a", &AMPERE, "Stator current of phase a, positive into the machine", |o| &mut o.i.a),
-            O::output("i_b", &AMPERE, "Stator current of phase b", |o| &mut o.i.b),
-            O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
             O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed).nominal(100.0),
             O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle)
                 .unbounded()
@@ -69,9 +64,6 @@ pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
                 &mut o.theta_e
             }),
             O::output("tau_e", &NEWTON_METER, "Electromagnetic torque at the instant", |o| &mut o.tau_e),
-            O::output("i_d", &AMPERE, "d-axis stator current", |o| &mut o.i_d),
-            O::output("i_q", &AMPERE, "q-axis stator current", |o| &mut o.i_q),
-            O::part("", &Part { table: POWERS, lens: |o| &mut o.powers }),
             O::output(
                 "tau_shaft",
                 &NEWTON_METER,
@@ -80,7 +72,21 @@ pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
                 |o| &mut o.powers.tau_shaft,
             )
             .mean(),
+            O::output("i_a", &AMPERE, "Stator current of phase a, positive into the machine", |o| &mut o.i.a),
+            O::output("i_b", &AMPERE, "Stator current of phase b", |o| &mut o.i.b),
+            O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
+            O::output("i_d", &AMPERE, "d-axis stator current", |o| &mut o.i_d),
+            O::output("i_q", &AMPERE, "q-axis stator current", |o| &mut o.i_q),
+            O::part("", &Part { table: POWERS, lens: |o| &mut o.powers }),
+            O::output(
+                "efficiency",
+                &ONE,
+                "p_mech / p_in of a motor, p_in / p_mech of a generator, else 0; of the means (Model Exchange: at the instant)",
+                |o| &mut o.efficiency,
+            )
+            .mean(),
             O::part("energy_", &Part { table: ENERGY, lens: |o| &mut o.energy }),
+            O::part("", &Part { table: THERMAL_OUTPUTS, lens: |o| o }),
         ]
     },
 );
@@ -93,43 +99,16 @@ pub const PARAMETERS: &Table<PlantParameters> = &Table::new(
         &[
             P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
             P::part("saturation.", &Part { table: SATURATION, lens: |p| &mut p.saturation }),
-            P::part("inverter.", &Part { table: INVERTER, lens: |p| &mut p.inverter }),
             P::part("mechanics.", &Part { table: MECHANICS, lens: |p| &mut p.mechanics }),
             P::parameter("initial.theta_e", &RADIAN, "Electrical rotor angle at the start", |p| &mut p.initial.theta_e),
             P::parameter("initial.speed", &SPEED, "Mechanical rotor speed at the start", |p| &mut p.initial.speed),
-        ]
-    },
-);
-
-/// The outputs of the losses, which follow the older variables: a value reference never moves.
-pub const LOSS_OUTPUTS: &Table<PlantOutputs> = &Table::new(
-    const {
-        &[
-            O::part("", &Part { table: LOSSES, lens: |o| &mut o.powers.losses }),
-            O::output(
-                "efficiency",
-                &ONE,
-                "p_mech / p_in of a motor, p_in / p_mech of a generator, else 0; of the means (Model Exchange: at the instant)",
-                |o| &mut o.efficiency,
-            )
-            .mean(),
-        ]
-    },
-);
-
-/// The parameters of losses and temperatures, which follow the older variables.
-pub const LOSS_PARAMETERS: &Table<PlantParameters> = &Table::new(
-    const {
-        &[
+            P::part("inverter.", &Part { table: INVERTER, lens: |p| &mut p.inverter }),
             P::part("iron.", &Part { table: IRON, lens: |p| &mut p.iron }),
-            P::part("inverter.", &Part { table: DEVICES, lens: |p| &mut p.inverter.devices }),
-            P::parameter(
-                "mechanics.k_w",
-                &NM_S2_PER_RAD2,
-                "Windage: torque over the square of the speed; 0: none",
-                |p| &mut p.mechanics.k_w,
-            )
-            .at_least(0.0),
+            P::parameter("iron.rotor_share", &ONE, "Share of the iron loss that heats the rotor", |p| {
+                &mut p.thermal.rotor_share
+            })
+            .at_least(0.0)
+            .at_most(1.0),
             P::parameter(
                 "winding.k_ac",
                 &S2_PER_RAD2,
@@ -137,14 +116,29 @@ pub const LOSS_PARAMETERS: &Table<PlantParameters> = &Table::new(
                 |p| &mut p.winding.k_ac,
             )
             .at_least(0.0),
-            P::part("", &Part { table: THERMAL, lens: |p| &mut p.thermal }),
+            P::parameter(
+                "winding.alpha",
+                &PER_KELVIN,
+                "Temperature coefficient of the resistance, R_s (1 + alpha (T_winding - T_ref)); copper 3.93e-3; 0: none",
+                |p| &mut p.thermal.alpha_R,
+            )
+            .at_least(0.0)
+            .nominal(4e-3),
+            P::parameter(
+                "magnet.alpha",
+                &PER_KELVIN,
+                "Temperature coefficient of the permanent-magnet flux linkage; NdFeB -1.1e-3; 0: none",
+                |p| &mut p.thermal.alpha_psi,
+            )
+            .nominal(1e-3),
+            P::part("thermal.", &Part { table: THERMAL, lens: |p| &mut p.thermal }),
         ]
     },
 );
 
 type S = Row<PmsmPlant>;
 
-/// States that are no outputs; of the plant and of `PmsmDrive`.
+/// The states that are not outputs, of the plant and of `PmsmDrive`.
 pub const STATES: &Table<PmsmPlant> = &Table::new(
     const {
         &[
@@ -166,6 +160,10 @@ pub const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             V::input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
             V::input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
             V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+            V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
+                &mut m.model.inputs.enable
+            })
+            .optional(),
             V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
                 &mut m.model.inputs.tau_load
             }),
@@ -174,17 +172,10 @@ pub const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
             V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
                 .unbounded()
                 .read_with("mechanics.imposed", "true"),
-            V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
-                &mut m.model.inputs.enable
-            })
-            .optional(),
-            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-            V::part("", &Part { table: STATES, lens: |m| &mut m.model }),
-            V::part("", &Part { table: LOSS_OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.parameters }),
             V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
-            V::part("", &Part { table: THERMAL_OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: STATES, lens: |m| &mut m.model }),
+            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
         ]
     },
 );

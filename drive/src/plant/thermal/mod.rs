@@ -25,7 +25,8 @@ pub mod warm;
 use crate::motor::Motor;
 use crate::plant::losses::Losses;
 use crate::plant::signals::PlantOutputs;
-use fmu_core::unit::{KELVIN, ONE, PER_KELVIN, WATT};
+use crate::plant::tables::{PARAMETERS, PlantParameters};
+use fmu_core::unit::{KELVIN, WATT};
 use fmu_core::{Fault, Field, Part, Row, Scalar, Table, enumeration};
 use network::{NETWORK, Network};
 use serde::{Deserialize, Serialize};
@@ -183,97 +184,72 @@ impl Thermal {
         let [iron, inverter] = [losses.iron - magnet + losses.friction, losses.cond + losses.sw];
         Heat { winding: losses.cu, iron, magnet, inverter, coolant: losses.sum() }
     }
+}
 
-    /// Refuses a network without heat capacities.
-    ///
-    /// # Errors
-    /// Names the parameter and what to do.
-    pub fn validate(&self) -> Result<(), Fault> {
-        if self.mode != ThermalMode::Network {
-            return Ok(());
-        }
-        let capacities: [fn(&mut Self) -> &mut f64; 4] = [
-            |p| &mut p.network.C_winding,
-            |p| &mut p.network.C_stator,
-            |p| &mut p.network.C_rotor,
-            |p| &mut p.network.C_inverter,
-        ];
-        for get in capacities {
-            if *get(&mut self.clone()) <= 0.0 {
-                let mode = THERMAL.tell(self, |p| &mut p.mode);
-                let allowed =
-                    format!("greater than 0 with {mode}; set the heat capacity, or thermal.mode = 1 (Constant)");
-                return Err(THERMAL.fault(self, get, allowed));
-            }
-        }
-        Ok(())
+/// Rejects a network without heat capacities.
+///
+/// # Errors
+/// Names the parameter and what to do.
+pub fn validate(par: &PlantParameters) -> Result<(), Fault> {
+    if par.thermal.mode != ThermalMode::Network {
+        return Ok(());
     }
+    let capacities: [Get; 4] = [
+        |p| &mut p.thermal.network.C_winding,
+        |p| &mut p.thermal.network.C_stator,
+        |p| &mut p.thermal.network.C_rotor,
+        |p| &mut p.thermal.network.C_inverter,
+    ];
+    for get in capacities {
+        if *get(&mut par.clone()) <= 0.0 {
+            let mode = PARAMETERS.tell(par, |p| &mut p.thermal.mode);
+            let allowed = format!("greater than 0 with {mode}; set the heat capacity, or thermal.mode = 1 (Constant)");
+            return Err(PARAMETERS.fault(par, get, allowed));
+        }
+    }
+    Ok(())
+}
 
-    /// Refuses temperatures that leave the `motor` no resistance or no magnet; `names` are those of the temperatures of
-    /// winding and magnets.
-    ///
-    /// # Errors
-    /// Names the temperature, its effect and what to do.
-    #[inline]
-    pub fn check(&self, motor: &Motor, at: &Temperatures, names: [&str; 2], remedy: &str) -> Result<(), Fault> {
-        let Motor { R_s, psi_M, .. } = self.motor(motor, at);
-        let works = |x: f64| x > 0.0 && x.is_finite();
-        if !works(R_s) {
-            return Err(self.refused(
-                names[0],
-                at.winding,
-                |p| &mut p.alpha_R,
-                &format!("resistance {R_s} Ohm"),
-                remedy,
-            ));
-        }
-        if !works(psi_M) {
-            let effect = format!("permanent-magnet flux linkage {psi_M} Wb");
-            return Err(self.refused(names[1], at.magnet, |p| &mut p.alpha_psi, &effect, remedy));
-        }
-        Ok(())
+/// Rejects temperatures at which the machine has no resistance or no magnet; `names` are those of the temperatures of
+/// winding and magnets.
+///
+/// # Errors
+/// Names the temperature, its effect and what to do.
+#[inline]
+pub fn check(par: &PlantParameters, at: &Temperatures, names: [&str; 2], remedy: &str) -> Result<(), Fault> {
+    let Motor { R_s, psi_M, .. } = par.thermal.motor(&par.motor, at);
+    let works = |x: f64| x > 0.0 && x.is_finite();
+    if !works(R_s) {
+        let effect = format!("resistance {R_s} Ohm");
+        return Err(refused(par, (names[0], at.winding), |p| &mut p.thermal.alpha_R, &effect, remedy));
     }
+    if !works(psi_M) {
+        let effect = format!("permanent-magnet flux linkage {psi_M} Wb");
+        return Err(refused(par, (names[1], at.magnet), |p| &mut p.thermal.alpha_psi, &effect, remedy));
+    }
+    Ok(())
+}
 
-    #[cold]
-    fn refused(&self, name: &str, T: f64, alpha: fn(&mut Self) -> &mut f64, effect: &str, remedy: &str) -> Fault {
-        let [alpha, T_ref] = [THERMAL.tell(self, alpha), THERMAL.tell(self, |p| &mut p.T_ref)];
-        Fault::new(format!(
-            "{name} = {T} K with {alpha} and {T_ref} makes the {effect}, which must be greater than 0: {remedy}"
-        ))
-    }
+type Get = fn(&mut PlantParameters) -> &mut f64;
+
+#[cold]
+fn refused(par: &PlantParameters, (name, T): (&str, f64), alpha: Get, effect: &str, remedy: &str) -> Fault {
+    let [alpha, T_ref] = [PARAMETERS.tell(par, alpha), PARAMETERS.tell(par, |p| &mut p.thermal.T_ref)];
+    Fault::new(format!(
+        "{name} = {T} K with {alpha} and {T_ref} makes the {effect}, which must be greater than 0: {remedy}"
+    ))
 }
 
 type P = Row<Thermal>;
 
-/// The parameters of temperatures and heat.
+/// Variables of the temperatures; their owner supplies the prefix `thermal.`.
 pub const THERMAL: &Table<Thermal> = &Table::new(
     const {
         &[
-            P::parameter(
-                "winding.alpha",
-                &PER_KELVIN,
-                "Temperature coefficient of the resistance, R_s (1 + alpha (T_winding - T_ref)); copper 3.93e-3; 0: none",
-                |p| &mut p.alpha_R,
-            )
-            .at_least(0.0)
-            .nominal(4e-3),
-            P::parameter(
-                "magnet.alpha",
-                &PER_KELVIN,
-                "Temperature coefficient of the permanent-magnet flux linkage; NdFeB -1.1e-3; 0: none",
-                |p| &mut p.alpha_psi,
-            )
-            .nominal(1e-3),
-            P::parameter("iron.rotor_share", &ONE, "Share of the iron loss that heats the rotor", |p| {
-                &mut p.rotor_share
-            })
-            .at_least(0.0)
-            .at_most(1.0),
-            P::enumeration_parameter("thermal.mode", "Where the temperatures come from", &Field(|p| &mut p.mode)),
-            P::part("thermal.", &Part { table: NETWORK, lens: |p| &mut p.network }),
-            P::parameter("thermal.T_ref", &KELVIN, "Temperature of motor.R_s and motor.psi_M", |p| &mut p.T_ref)
-                .above(0.0),
-            P::parameter("thermal.T_start", &KELVIN, "All temperatures at the start", |p| &mut p.T_start).above(0.0),
+            P::enumeration_parameter("mode", "Where the temperatures come from", &Field(|p| &mut p.mode)),
+            P::parameter("T_ref", &KELVIN, "Temperature of motor.R_s and motor.psi_M", |p| &mut p.T_ref).above(0.0),
+            P::parameter("T_start", &KELVIN, "All temperatures at the start", |p| &mut p.T_start).above(0.0),
+            P::part("", &Part { table: NETWORK, lens: |p| &mut p.network }),
         ]
     },
 );

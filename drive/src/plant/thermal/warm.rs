@@ -10,6 +10,7 @@ use crate::plant::losses::Losses;
 use crate::plant::machine::{Inverse, Machine};
 use crate::plant::model::PmsmPlant;
 use crate::plant::signals::PlantInputs;
+use crate::plant::tables::PARAMETERS;
 use fmu_core::{Fault, Interface, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -112,7 +113,7 @@ impl PmsmPlant {
         let thermal = &self.parameters.thermal;
         let heat = thermal.heat(&self.powers.losses);
         let at = thermal.network.step(&self.warm.at, &heat, self.inputs.thermal.coolant, h);
-        thermal.check(&self.parameters.motor, &at, ["T_winding", "T_magnet"], RUNAWAY)?;
+        super::check(&self.parameters, &at, ["T_winding", "T_magnet"], RUNAWAY)?;
         self.change(at);
         Ok(())
     }
@@ -130,18 +131,17 @@ impl PmsmPlant {
     pub(in crate::plant) fn judge_temperatures(&self, inputs: &PlantInputs) -> Result<(), Fault> {
         let (at, names) = self.given(inputs);
         let remedy = "temperatures are in K (20 degC are 293.15 K); correct the temperature or the coefficient";
-        self.parameters.thermal.check(&self.parameters.motor, &at, names, remedy)
+        super::check(&self.parameters, &at, names, remedy)
     }
 
     /// Refuses the network in Model Exchange.
     pub(in crate::plant) fn validate_network(&self, interface: Interface) -> Result<(), Fault> {
-        let thermal = &self.parameters.thermal;
-        if interface != Interface::ModelExchange || thermal.mode != ThermalMode::Network {
+        if interface != Interface::ModelExchange || self.parameters.thermal.mode != ThermalMode::Network {
             return Ok(());
         }
         let allowed = "1 (Constant) or 3 (Imposed) in Model Exchange: the network advances with the steps of \
                        Co-Simulation; use Co-Simulation, or connect a thermal model to the inputs T_winding_imposed ... \
                        with thermal.mode = 3";
-        Err(super::THERMAL.fault(thermal, |p| &mut p.mode, allowed))
+        Err(PARAMETERS.fault(&self.parameters, |p| &mut p.thermal.mode, allowed))
     }
 }
