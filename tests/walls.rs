@@ -137,6 +137,21 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
     }
 }
 
+/// An estimator checks a small view of the controller, so the controller knows the estimators and they do not know it.
+#[test]
+fn an_estimator_does_not_know_the_controller() {
+    let mut files = Vec::new();
+    sources(&root().join("drive/src/estimator"), &mut files);
+    assert!(files.len() > 25, "{files:?}");
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        for path in text.split("crate::").skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_')) {
+            let module = path.into_iter().next().unwrap();
+            assert!(module != "control", "{} knows the controller", file.display());
+        }
+    }
+}
+
 /// A file of the checker names the module that a type lives in; types at the root would tie all files into one circle.
 #[test]
 fn no_module_of_the_checker_depends_on_its_root() {

@@ -1,8 +1,8 @@
 //! Each parameter has exactly one variable, in the one table of its part: so every refusal can name what it refuses.
 #![allow(missing_docs)]
 
-use drive::control::tables::{self as control, ControllerParameters};
-use drive::plant::tables::{self as plant, PlantParameters};
+use drive::control::tables as control;
+use drive::plant::tables as plant;
 use fmu_core::{Kind, Slot, Table};
 use serde::Serialize;
 use serde_json::Value;

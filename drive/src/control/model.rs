@@ -11,7 +11,7 @@ use crate::control::state::{Gains, InUse, State, context};
 use crate::control::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::control::weakening::{self, WeakeningGains};
 use crate::control::zero_speed::{self, ZeroSpeed};
-use crate::estimator::{Class, Estimator, Sample};
+use crate::estimator::{Class, Estimator, Sample, Setup};
 use crate::motor::Motor;
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
@@ -120,7 +120,19 @@ impl SensorlessController {
     pub(crate) fn validate_on(&self, u_dc: f64) -> Result<(), Fault> {
         let par = &self.parameters;
         let ControllerParameters { limit, zero_speed, estimator, start, .. } = par;
-        estimator.validate(par)?;
+        let tell = |name: &str| PARAMETERS.tell_name(par, name).unwrap_or_else(|| name.to_owned());
+        estimator.validate(&Setup {
+            kind: *estimator,
+            par: &par.estimators,
+            motor: &par.motor,
+            J: par.J,
+            T_s: par.T_s,
+            reference_feed_forward: par.current.reference_feed_forward,
+            active_resistance: par.current.active_resistance,
+            starts_by_injection: start.mode == StartMode::Injection,
+            weakens: par.weakening.used,
+            tell: &tell,
+        })?;
         current::validate(par)?;
         if start.mode == StartMode::CurrentFrequency && start.i > limit.i {
             return Err(above_limit(par, |p| &mut p.start.i));

@@ -11,8 +11,7 @@
 //! here.
 //! w_h in rad/s, T_s in s.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
-use crate::estimator::Context;
+use crate::estimator::{Context, Setup};
 use crate::frame::Vector;
 use crate::math::sin_cos;
 use fmu_core::unit::{ONE, RAD_PER_S, VOLT};
@@ -137,16 +136,16 @@ impl PeriodMean {
 ///
 /// # Errors
 /// The period is not a whole number of samples, or it has too few or too many samples.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let (frequency, T_s) = (par.estimators.carrier.frequency, par.T_s);
+pub fn validate(setup: &Setup) -> Result<(), Fault> {
+    let (frequency, T_s) = (setup.par.carrier.frequency, setup.T_s);
     if samples(frequency, T_s).is_some() {
         return Ok(());
     }
     Err(Fault::new(format!(
         "{} and {}: a period of the carrier is {} samples; it must be a whole number from {MIN_SAMPLES} to \
          {MAX_SAMPLES}",
-        PARAMETERS.tell(par, |p| &mut p.estimators.carrier.frequency),
-        PARAMETERS.tell(par, |p| &mut p.T_s),
+        setup.tell("carrier.frequency"),
+        setup.tell("T_s"),
         TAU / (frequency * T_s)
     )))
 }

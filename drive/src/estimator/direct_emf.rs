@@ -9,11 +9,10 @@
 //! holds rated load down to 0.020 of the rated speed, 0.020 with a compensated dead time. A reversal at light load is
 //! ambiguous by half a turn, unless `emf.hold_reversal` holds it.
 
-use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
 use crate::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
@@ -49,8 +48,8 @@ impl Estimating for DirectEmf {
         emf::follow(&mut self.tracker, &mut self.direction, context, self.e, sample)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        emf::validate(par)
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        emf::validate(setup)
     }
 }
 

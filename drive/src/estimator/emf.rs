@@ -25,10 +25,9 @@
 //! The angle's gain fades with the EMF, and the speed goes on through zero with e_q, so that theta^ is its integral: the
 //! error grows with the time spent there, by (R - R^) i / psi_M in rad/s. It is for passing zero, not for staying.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Sample};
+use crate::estimator::{Context, Estimate, Sample, Setup};
 use crate::frame::DqHat;
 use crate::math::{atan2, exp};
 use fmu_core::unit::RAD_PER_S;
@@ -154,12 +153,12 @@ impl AxisObserver {
 ///
 /// # Errors
 /// States by how much the tracker is too fast.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let (rho, w_o) = (par.estimators.tracker.bandwidth, par.estimators.emf.bandwidth);
+pub fn validate(setup: &Setup) -> Result<(), Fault> {
+    let (rho, w_o) = (setup.par.tracker.bandwidth, setup.par.emf.bandwidth);
     if rho > w_o / 3.0 * (1.0 + 1e-9) {
-        let observer = PARAMETERS.tell(par, |p| &mut p.estimators.emf.bandwidth);
+        let observer = setup.tell("emf.bandwidth");
         let allowed = format!("at most a third of {observer}, or the tracker rings on the EMF's lag");
-        return Err(PARAMETERS.fault(par, |p| &mut p.estimators.tracker.bandwidth, allowed));
+        return Err(setup.fault("tracker.bandwidth", allowed));
     }
     Ok(())
 }

@@ -10,11 +10,10 @@
 //! Limits: those of the extended EMF; for large angle errors, the neglected saliency slows convergence. It holds rated
 //! load down to 0.020 of the rated speed, 0.020 with a compensated dead time.
 
-use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
 use crate::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
@@ -55,8 +54,8 @@ impl Estimating for EmfObserver {
         emf::follow(&mut self.tracker, &mut self.direction, context, DqHat::new(e_d, e_q), sample)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        emf::validate(par)
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        emf::validate(setup)
     }
 }
 

@@ -10,11 +10,10 @@
 //! time. A reversal at light load is ambiguous by half a turn, unless `emf.hold_reversal` holds it. L_q + 20 % at rated
 //! load shifts the angle by 5.8 deg. The speed that `emf.hold_reversal` takes from the EMF is e_q / (psi_M + (L_d - L_q) i_d).
 
-use crate::control::tables::ControllerParameters;
 use crate::estimator::emf::{self, AxisObserver, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
 use crate::frame::DqHat;
 use crate::math::at_least;
 use fmu_core::Fault;
@@ -94,8 +93,8 @@ impl Estimating for ExtendedEmf {
         emf::follow(tracker, &mut observer.direction, context, e, sample)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        emf::validate(par)
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        emf::validate(setup)
     }
 }
 

@@ -9,12 +9,11 @@
 //! Transition speeds: 0.1 and 0.2 of the rated speed; above them the injection lacks voltage, below them the EMF is too
 //! small. Limits: those of the active method; a machine without saliency needs another low-speed method.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::extended_emf::ExtendedEmfObserver;
 use crate::estimator::interval::Interval;
 use crate::estimator::square_wave::{SquareWave, SquareWaveInjection};
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use crate::frame::{Axis, DqHat, Estimated};
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Fault, Row, Table};
@@ -91,13 +90,13 @@ impl Estimating for Hybrid {
         self.estimate(context, sample, i)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        let HybridParameters { w_low, w_high, .. } = par.estimators.hybrid;
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        let HybridParameters { w_low, w_high, .. } = setup.par.hybrid;
         if w_low >= w_high {
-            let allowed = format!("above {}", PARAMETERS.tell(par, |p| &mut p.estimators.hybrid.w_low));
-            return Err(PARAMETERS.fault(par, |p| &mut p.estimators.hybrid.w_high, allowed));
+            let allowed = format!("above {}", setup.tell("hybrid.w_low"));
+            return Err(setup.fault("hybrid.w_high", allowed));
         }
-        SquareWaveInjection::validate(par)
+        SquareWaveInjection::validate(setup)
     }
 }
 

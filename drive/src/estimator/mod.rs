@@ -30,6 +30,7 @@ pub mod resistance;
 pub mod rotating;
 pub mod saliency;
 pub mod sensored;
+mod setup;
 pub mod sliding_mode;
 pub mod square_wave;
 pub mod tables;
@@ -39,11 +40,11 @@ pub mod tracker;
 pub mod voltage_feedback;
 pub mod voltage_model;
 
-use crate::control::tables::ControllerParameters;
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use crate::motor::Motor;
 use fmu_core::{Fault, enumeration};
 use serde::{Deserialize, Serialize};
+pub use setup::Setup;
 pub use tables::EstimatorParameters;
 
 /// The controller's inputs to an estimator at sample k.
@@ -176,12 +177,12 @@ pub trait Estimating: Sized {
         motor.R_s
     }
 
-    /// Checks that the controller's parameters suit this estimator.
+    /// Checks that this estimator can work in the controller.
     ///
     /// # Errors
     /// States which parameters are unsuitable, and why.
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        let _ = par;
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        let _ = setup;
         Ok(())
     }
 }
@@ -234,16 +235,16 @@ macro_rules! estimators {
                 }
             }
 
-            /// Checks that the controller's parameters suit this estimator.
+            /// Checks that this estimator can work in the controller.
             ///
             /// # Errors
-            /// As for [`Estimating::validate`], or an option is not the estimator's, or the tracker cannot work.
-            pub fn validate(self, par: &ControllerParameters) -> Result<(), Fault> {
-                tracker::validate(par)?;
-                options::validate(par)?;
-                resistance::validate(par)?;
+            /// Those of [`Estimating::validate`]; an option that the estimator does not have; a tracker that cannot work.
+            pub fn validate(self, setup: &Setup) -> Result<(), Fault> {
+                tracker::validate(setup)?;
+                options::validate(setup)?;
+                resistance::validate(setup)?;
                 match self {
-                    $(Self::$name => <$state>::validate(par),)*
+                    $(Self::$name => <$state>::validate(setup),)*
                 }
             }
         }

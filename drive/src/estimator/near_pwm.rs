@@ -12,10 +12,9 @@
 //! Limits: above about 0.2 of the rated speed, the injection takes voltage that the drive needs; the controlled current
 //! has one sample of delay.
 
-use crate::control::tables::ControllerParameters;
 use crate::estimator::saliency::{self, Admittance, CLIP, response};
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use crate::math::atan2;
 use fmu_core::unit::VOLT;
@@ -96,8 +95,8 @@ impl Estimating for NearPwmInjection {
         self.estimate(context, sample, free)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        saliency::validate(par)
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        saliency::validate(setup)
     }
 }
 

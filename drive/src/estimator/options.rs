@@ -3,18 +3,16 @@
 //! An option is a variable that is off at its start value. Values of a method (bandwidths, voltages, noise densities) are no
 //! options: each estimator reads its own, and a set of values may hold those of several.
 
-use crate::control::start::StartMode;
-use crate::control::tables::{ControllerParameters as Par, PARAMETERS};
 use crate::estimator::pulsating::Demodulation;
 use crate::estimator::tracker::TrackerKind;
-use crate::estimator::{Class, Kind};
+use crate::estimator::{Class, Kind, Setup};
 use fmu_core::Fault;
 
 struct Choice {
+    /// Name of its variable.
+    name: &'static str,
     /// Whether it is on.
-    asked: fn(&Par) -> bool,
-    /// Its name and value.
-    tell: fn(&Par) -> String,
+    asked: fn(&Setup) -> bool,
     /// Whether an estimator has it.
     has: fn(Kind) -> bool,
     /// What the others do not do.
@@ -25,22 +23,22 @@ struct Choice {
 
 const CHOICES: &[Choice] = &[
     Choice {
-        asked: |p| p.start.mode == StartMode::Injection,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.start.mode),
+        name: "start.mode",
+        asked: |s| s.starts_by_injection,
         has: |kind| kind.class().injects(),
         why: "the start by injection needs an estimator that injects",
         off: "set start.mode = CurrentFrequency or Direct",
     },
     Choice {
-        asked: |p| p.weakening.used,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.weakening.used),
+        name: "weakening.use",
+        asked: |s| s.weakens,
         has: |kind| kind.class() != Class::Injection,
         why: "injection leaves no voltage for field weakening",
         off: "set it to false",
     },
     Choice {
-        asked: |p| p.estimators.tracker.kind != TrackerKind::Pll,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.tracker.kind),
+        name: "tracker.kind",
+        asked: |s| s.par.tracker.kind != TrackerKind::Pll,
         has: |kind| {
             use Kind::{CurrentModel, KalmanFilter, Rasmussen, Sensored, VoltageModel};
             !matches!(kind, Rasmussen | VoltageModel | CurrentModel | Sensored | KalmanFilter)
@@ -49,36 +47,36 @@ const CHOICES: &[Choice] = &[
         off: "set it to Pll",
     },
     Choice {
-        asked: |p| p.estimators.adaptation.resistance,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.resistance),
+        name: "adaptation.resistance",
+        asked: |s| s.par.adaptation.resistance,
         has: |kind| matches!(kind, Kind::Rasmussen | Kind::FluxObserver),
         why: "it does not adapt the resistance",
         off: "set it to false",
     },
     Choice {
-        asked: |p| p.estimators.adaptation.tracking > 0.0,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.tracking),
+        name: "adaptation.tracking",
+        asked: |s| s.par.adaptation.tracking > 0.0,
         has: |kind| kind == Kind::Rasmussen,
         why: "only Rasmussen needs it; FluxObserver adapts the resistance at every speed",
         off: "set adaptation.tracking = 0",
     },
     Choice {
-        asked: |p| p.estimators.adaptation.k_a > 0.0,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.adaptation.k_a),
+        name: "adaptation.k_a",
+        asked: |s| s.par.adaptation.k_a > 0.0,
         has: |kind| kind == Kind::Rasmussen,
         why: "it does not turn the frame at rest",
         off: "set adaptation.k_a = 0",
     },
     Choice {
-        asked: |p| p.estimators.flux_observer.magnet > 0.0,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.flux_observer.magnet),
+        name: "flux_observer.magnet",
+        asked: |s| s.par.flux_observer.magnet > 0.0,
         has: |kind| kind == Kind::FluxObserver,
         why: "it does not adapt psi_M",
         off: "set it to 0",
     },
     Choice {
-        asked: |p| p.estimators.emf.hold_reversal,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.emf.hold_reversal),
+        name: "emf.hold_reversal",
+        asked: |s| s.par.emf.hold_reversal,
         has: |kind| {
             use Kind::{DirectEmf, EmfObserver, ExtendedEmf, SlidingMode, VoltageFeedback};
             matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | SlidingMode)
@@ -87,8 +85,8 @@ const CHOICES: &[Choice] = &[
         off: "set it to false",
     },
     Choice {
-        asked: |p| !p.estimators.emf.frame_term,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.emf.frame_term),
+        name: "emf.frame_term",
+        asked: |s| !s.par.emf.frame_term,
         has: |kind| {
             use Kind::{CurrentModel, DirectEmf, EmfObserver, ExtendedEmf, Hybrid, VoltageFeedback, VoltageModel};
             let by_emf = matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | Hybrid);
@@ -98,22 +96,22 @@ const CHOICES: &[Choice] = &[
         off: "set it to true",
     },
     Choice {
-        asked: |p| !p.estimators.matsui.integral,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.matsui.integral),
+        name: "matsui.integral",
+        asked: |s| !s.par.matsui.integral,
         has: |kind| matches!(kind, Kind::VoltageModel | Kind::CurrentModel),
         why: "it has no such integral",
         off: "set it to true",
     },
     Choice {
-        asked: |p| p.estimators.pulsating.demodulation != Demodulation::Heterodyne,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.pulsating.demodulation),
+        name: "pulsating.demodulation",
+        asked: |s| s.par.pulsating.demodulation != Demodulation::Heterodyne,
         has: |kind| kind == Kind::PulsatingInjection,
         why: "it has no pulsating carrier",
         off: "set it to Heterodyne",
     },
     Choice {
-        asked: |p| p.estimators.gradient.clamped,
-        tell: |p| PARAMETERS.tell(p, |p| &mut p.estimators.gradient.clamped),
+        name: "gradient.clamped",
+        asked: |s| s.par.gradient.clamped,
         has: |kind| kind == Kind::GradientObserver,
         why: "it has no such clamp",
         off: "set it to false",
@@ -124,8 +122,8 @@ const CHOICES: &[Choice] = &[
 ///
 /// # Errors
 /// It does not have one of them.
-pub fn validate(par: &Par) -> Result<(), Fault> {
-    let Some(choice) = CHOICES.iter().find(|choice| (choice.asked)(par) && !(choice.has)(par.estimator)) else {
+pub fn validate(setup: &Setup) -> Result<(), Fault> {
+    let Some(choice) = CHOICES.iter().find(|choice| (choice.asked)(setup) && !(choice.has)(setup.kind)) else {
         return Ok(());
     };
     let names: Vec<&str> = Kind::ALL.iter().filter(|&&kind| (choice.has)(kind)).map(|kind| kind.name()).collect();
@@ -135,8 +133,8 @@ pub fn validate(par: &Par) -> Result<(), Fault> {
     };
     Err(Fault::new(format!(
         "{} is not allowed with {}: {}; {}, or set estimator = {names}",
-        (choice.tell)(par),
-        PARAMETERS.tell(par, |p| &mut p.estimator),
+        setup.tell(choice.name),
+        setup.tell("estimator"),
         choice.why,
         choice.off
     )))

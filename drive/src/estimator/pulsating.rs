@@ -11,11 +11,10 @@
 //! (45) is low by a factor of 2. Limits: the filters add delay; e has zeros at 0, 90 and 180 deg, of which 90 deg is
 //! unstable.
 
-use crate::control::tables::ControllerParameters;
 use crate::estimator::carrier::{self, BandPass, Carrier, PeriodMean};
 use crate::estimator::saliency::{self, Admittance, CLIP, response};
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use fmu_core::{Fault, Field, Row, Table, enumeration};
 use serde::{Deserialize, Serialize};
@@ -94,9 +93,9 @@ impl Estimating for PulsatingInjection {
         self.estimate(&carrier, free)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        carrier::validate(par)?;
-        saliency::validate(par)
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        carrier::validate(setup)?;
+        saliency::validate(setup)
     }
 }
 

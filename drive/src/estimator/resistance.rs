@@ -45,8 +45,7 @@
 //! Not observable: R^ without current or while a speed is asked for; theta~ at rest; psi_M^ at rest. In torque mode
 //! nothing tells when the rotor may stand: R^ stays `motor.R_s`.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
-use crate::estimator::{Context, Sample};
+use crate::estimator::{Context, Sample, Setup};
 use crate::frame::DqHat;
 use crate::motor::Motor;
 use fmu_core::unit::{AMPERE, ONE, PER_SECOND};
@@ -193,28 +192,22 @@ impl Resistance {
 ///
 /// # Errors
 /// States which parameter is unsuitable, and what to do.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let adaptation = &par.estimators.adaptation;
-    if !adaptation.resistance {
+pub fn validate(setup: &Setup) -> Result<(), Fault> {
+    let ResistanceParameters { resistance, start, min, max, .. } = &setup.par.adaptation;
+    if !resistance {
         return Ok(());
     }
-    if adaptation.min > 1.0 {
-        return Err(PARAMETERS.fault(
-            par,
-            |p| &mut p.estimators.adaptation.min,
-            "at most 1, so that motor.R_s lies between the clamps; lower it, or correct motor.R_s",
-        ));
+    if *min > 1.0 {
+        let allowed = "at most 1, so that motor.R_s lies between the clamps; lower it, or correct motor.R_s";
+        return Err(setup.fault("adaptation.min", allowed));
     }
-    if adaptation.max < 1.0 {
-        return Err(PARAMETERS.fault(
-            par,
-            |p| &mut p.estimators.adaptation.max,
-            "at least 1, so that motor.R_s lies between the clamps; raise it, or correct motor.R_s",
-        ));
+    if *max < 1.0 {
+        let allowed = "at least 1, so that motor.R_s lies between the clamps; raise it, or correct motor.R_s";
+        return Err(setup.fault("adaptation.max", allowed));
     }
-    if !(adaptation.min..=adaptation.max).contains(&adaptation.start) {
-        let allowed = format!("{} to {}, the clamps adaptation.min and adaptation.max", adaptation.min, adaptation.max);
-        return Err(PARAMETERS.fault(par, |p| &mut p.estimators.adaptation.start, allowed));
+    if !(min..=max).contains(&start) {
+        let allowed = format!("{min} to {max}, the clamps adaptation.min and adaptation.max");
+        return Err(setup.fault("adaptation.start", allowed));
     }
     Ok(())
 }

@@ -11,11 +11,10 @@
 //!
 //! Limits: the filters add delay; both axes carry carrier current.
 
-use crate::control::tables::ControllerParameters;
 use crate::estimator::carrier::{self, BandPass, Carrier, PeriodMean};
 use crate::estimator::saliency::{self, Admittance, CLIP, response};
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use crate::frame::{AlphaBeta, Axis, Estimated, Stator};
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
@@ -64,9 +63,9 @@ impl Estimating for RotatingInjection {
         self.estimate(&carrier, free)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        carrier::validate(par)?;
-        saliency::validate(par)
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        carrier::validate(setup)?;
+        saliency::validate(setup)
     }
 }
 

@@ -2,14 +2,13 @@
 //!
 //! In stator axes, with u and i as complex numbers, di/dt = S u + D e^{j 2 theta} conj(u), where S = (1/L_d + 1/L_q) /
 //! 2 and D = (1/L_d - 1/L_q) / 2. Only the D term contains the angle, and it contains 2 theta. Injection therefore
-//! cannot identify the magnet polarity; [`polarity`](crate::control::polarity) does. Limits of all injection methods:
+//! cannot identify the magnet polarity; the start by injection of the controller does. Limits of all injection methods:
 //! the machine must be salient, and cross-saturation shifts the axis of the inductances itself, by -9 to -21 deg at
 //! rated load.
 //!
 //! Kim & Sul 2011, eq (33) to (37), inverted: the paper gives the voltage as a function of the current. S and D in 1/H.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
-use crate::estimator::Sample;
+use crate::estimator::{Sample, Setup};
 use crate::frame::{Axis, DqHat, Estimated};
 use crate::motor::Motor;
 use fmu_core::Fault;
@@ -55,14 +54,14 @@ pub fn response(motor: &Motor, middle: Axis<Estimated>, sample: &Sample, T_s: f6
 ///
 /// # Errors
 /// The two inductances are too close to each other.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let Motor { L_d, L_q, .. } = par.motor;
+pub fn validate(setup: &Setup) -> Result<(), Fault> {
+    let Motor { L_d, L_q, .. } = setup.motor;
     if (L_q - L_d).abs() < MIN_SALIENCY * (L_q + L_d) {
         return Err(Fault::new(format!(
             "{} and {}: an estimator by injection needs inductances that differ by more than {} % of their sum, since \
              it finds the angle by their difference",
-            PARAMETERS.tell(par, |p| &mut p.motor.L_d),
-            PARAMETERS.tell(par, |p| &mut p.motor.L_q),
+            setup.tell("motor.L_d"),
+            setup.tell("motor.L_q"),
             100.0 * MIN_SALIENCY
         )));
     }

@@ -15,10 +15,9 @@
 //! Limits: those of the extended EMF. It holds rated load down to 0.020 of the rated speed, 0.020 with a compensated dead
 //! time. K below |E| loses the angle.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::emf::{self, Direction, pole};
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
 use crate::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use crate::math::{atan2, sin_cos};
 use fmu_core::unit::{RAD_PER_S, VOLT};
@@ -84,13 +83,13 @@ impl Estimating for SlidingMode {
         emf::follow(&mut self.tracker, &mut self.direction, context, self.e, sample)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        let bandwidth = par.estimators.sliding_mode.bandwidth;
-        if bandwidth * par.T_s > 1.0 {
-            let allowed = format!("at most 1 / T_s = {} rad/s, or the sampled observer chatters", 1.0 / par.T_s);
-            return Err(PARAMETERS.fault(par, |p| &mut p.estimators.sliding_mode.bandwidth, allowed));
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        let bandwidth = setup.par.sliding_mode.bandwidth;
+        if bandwidth * setup.T_s > 1.0 {
+            let allowed = format!("at most 1 / T_s = {} rad/s, or the sampled observer chatters", 1.0 / setup.T_s);
+            return Err(setup.fault("sliding_mode.bandwidth", allowed));
         }
-        emf::validate(par)
+        emf::validate(setup)
     }
 }
 

@@ -12,10 +12,9 @@
 //! Limits: above about 0.2 of the rated speed, the injection takes voltage that the drive needs; e has zeros at 0, 90
 //! and 180 deg, of which 90 deg is unstable.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::saliency::{self, Admittance, CLIP, response};
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use crate::frame::{Axis, DqHat, Estimated};
 use fmu_core::unit::VOLT;
 use fmu_core::{Fault, Row, Table};
@@ -115,12 +114,12 @@ impl Estimating for SquareWaveInjection {
         self.estimate(context, sample, i)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        let samples = par.estimators.square_wave.samples;
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        let samples = setup.par.square_wave.samples;
         if samples != 2 && samples != 4 {
-            return Err(PARAMETERS.fault(par, |p| &mut p.estimators.square_wave.samples, "2 or 4"));
+            return Err(setup.fault("square_wave.samples", "2 or 4"));
         }
-        saliency::validate(par)
+        saliency::validate(setup)
     }
 }
 

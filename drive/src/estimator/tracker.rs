@@ -8,8 +8,7 @@
 //! and, if J is correct, every change of its own torque, so its speed does not lag. Limits: after a filter or observer
 //! of bandwidth w_o, rho <= w_o / 3; below 2 pi 15 rad/s, a 50 % load step loses synchronism.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
-use crate::estimator::{Context, Estimate, Sample};
+use crate::estimator::{Context, Estimate, Sample, Setup};
 use crate::math::at_least;
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Fault, Field, Row, Table, enumeration};
@@ -89,13 +88,13 @@ impl Tracker {
 ///
 /// # Errors
 /// The mechanical observer has no inertia value.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let observes_load = par.estimators.tracker.kind == TrackerKind::MechanicalObserver;
-    if observes_load && par.J.partial_cmp(&0.0) != Some(Ordering::Greater) {
+pub fn validate(setup: &Setup) -> Result<(), Fault> {
+    let observes_load = setup.par.tracker.kind == TrackerKind::MechanicalObserver;
+    if observes_load && setup.J.partial_cmp(&0.0) != Some(Ordering::Greater) {
         return Err(Fault::new(format!(
             "{} and {}: that observer divides torque by inertia, which must be above 0",
-            PARAMETERS.tell(par, |p| &mut p.J),
-            PARAMETERS.tell(par, |p| &mut p.estimators.tracker.kind)
+            setup.tell("mechanics.J"),
+            setup.tell("tracker.kind")
         )));
     }
     Ok(())

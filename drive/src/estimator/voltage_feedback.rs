@@ -11,11 +11,10 @@
 //! as printed, without the frame term, to 0.120. A reversal at light load is ambiguous by half a turn, unless
 //! `emf.hold_reversal` holds it.
 
-use crate::control::tables::{ControllerParameters, PARAMETERS};
 use crate::estimator::emf::{self, Direction, pole};
 use crate::estimator::interval::Interval;
 use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
 use crate::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
@@ -59,16 +58,16 @@ impl Estimating for VoltageFeedback {
         self.tracker.follow(context, fade * e, sample)
     }
 
-    fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-        if !par.current.reference_feed_forward || par.current.active_resistance {
+    fn validate(setup: &Setup) -> Result<(), Fault> {
+        if !setup.reference_feed_forward || setup.active_resistance {
             return Err(Fault::new(format!(
                 "{} and {}: {} reads the angle error from the output of the current controller's integrators; set the \
                  first to true and the second to false, so that nothing else appears there",
-                PARAMETERS.tell(par, |p| &mut p.current.reference_feed_forward),
-                PARAMETERS.tell(par, |p| &mut p.current.active_resistance),
-                PARAMETERS.tell(par, |p| &mut p.estimator)
+                setup.tell("current.reference_feed_forward"),
+                setup.tell("current.active_resistance"),
+                setup.tell("estimator")
             )));
         }
-        emf::validate(par)
+        emf::validate(setup)
     }
 }
