@@ -58,7 +58,7 @@ impl Pair {
     #[inline]
     pub(crate) fn exchange(&mut self) {
         let Self { plant, controller, .. } = self;
-        plant.model.inputs.apply(&controller.out);
+        plant.model.inputs.apply(controller.out.commanded());
         controller.model.inputs.measure(plant.out.measured());
     }
 
@@ -66,7 +66,7 @@ impl Pair {
     #[inline]
     pub(crate) fn exchange_present(&mut self) {
         let Self { plant, controller, .. } = self;
-        plant.model.inputs.apply(controller.model.shown());
+        plant.model.inputs.apply(controller.model.shown().commanded());
         controller.model.inputs.measure(plant.model.measured());
     }
 

@@ -14,8 +14,6 @@ mod period;
 
 pub use period::Means;
 
-use crate::control::signals::ControllerOutputs;
-use crate::control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::{PlantInputs, PlantOutputs};
@@ -23,6 +21,8 @@ use crate::plant::tables as plant;
 use crate::plant::thermal::{THERMAL_INPUTS, ThermalInputs};
 #[cfg(doc)]
 use crate::{PmsmPlant, SensorlessController};
+use drive_control::signals::ControllerOutputs;
+use drive_control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
@@ -147,7 +147,7 @@ impl Model for PmsmDrive {
         description: "Sensorless drive: permanent-magnet synchronous machine, inverter and controller in one",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-3 },
         documentation: crate::documentation::DRIVE,
-        ..crate::PROJECT
+        ..drive_base::PROJECT
     };
 
     const TABLE: &'static Table<Block<Self>> = TABLE;

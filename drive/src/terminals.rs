@@ -1,10 +1,10 @@
 //! Connections between the models: their terminals and icons.
 //!
-//! `phases` and `sensor` exist twice, on the plant and mirrored on the controller: members with the same name connect.
-//! The inverter is inside the plant, so the phases carry references and measured values, and a connection makes them
-//! equal (signals). At the shaft and the DC link, where power leaves the model, torque and current are flows: they sum
-//! to zero with those of the connected component. Heat is positive out of the model.
+//! At the shaft and the DC link, where power leaves the model, torque and current are flows: they sum
+//! to zero with those of the connected component. Heat is positive out of the model. The terminals that the controller
+//! mirrors are in [`connection`](drive_base::connection).
 
+use drive_base::connection::{PHASES, SENSOR, phases};
 use fmu_core::{Member, Terminal};
 
 /// Terminals of `PmsmPlant`.
@@ -14,13 +14,13 @@ pub(crate) const PLANT: &[Terminal] = &[
         "Voltage references and enable from the controller, measured currents to it",
         &phases(Member::signal("enable")),
     )
-    .drawn(&icon::PHASES, -100.0, 40.0),
+    .drawn(&PHASES, -100.0, 40.0),
     Terminal::plug(
         "sensor",
         "What a shaft sensor measures: mechanical speed and electrical angle",
         &[Member::signal("speed"), Member::signal("theta_e")],
     )
-    .drawn(&icon::SENSOR, -100.0, -40.0),
+    .drawn(&SENSOR, -100.0, -40.0),
     SHAFT,
     SHAFT_IMPOSED,
     DC_LINK,
@@ -29,22 +29,6 @@ pub(crate) const PLANT: &[Terminal] = &[
     HEAT_IRON,
     HEAT_MAGNET,
     HEAT_INVERTER,
-];
-
-/// Terminals of `SensorlessController`.
-pub(crate) const CONTROLLER: &[Terminal] = &[
-    Terminal::plug(
-        "phases",
-        "Voltage references and enable to the plant, measured currents from it",
-        &phases(Member::signal("enable").of("enabled")),
-    )
-    .drawn(&icon::PHASES, 100.0, 40.0),
-    Terminal::plug(
-        "sensor",
-        "A shaft sensor, read by the sensored estimator only: mechanical speed and electrical angle",
-        &[Member::signal("speed").of("speed_meas"), Member::signal("theta_e").of("theta_meas")],
-    )
-    .drawn(&icon::SENSOR, 100.0, -40.0),
 ];
 
 /// Terminals of `PmsmDrive`.
@@ -64,19 +48,6 @@ pub(crate) const DRIVE: &[Terminal] = &[
     HEAT_MAGNET,
     HEAT_INVERTER,
 ];
-
-/// Signals between controller and inverter.
-const fn phases(enable: Member) -> [Member; 7] {
-    [
-        Member::signal("u_a"),
-        Member::signal("u_b"),
-        Member::signal("u_c"),
-        enable,
-        Member::signal("i_a"),
-        Member::signal("i_b"),
-        Member::signal("i_c"),
-    ]
-}
 
 /// The shaft end: the load receives speed and angle and returns its torque.
 const SHAFT: Terminal = Terminal::plug(
@@ -145,10 +116,6 @@ const HEAT_INVERTER: Terminal = Terminal::plug(
 mod icon {
     use fmu_core::Icon;
 
-    pub(super) const PHASES: Icon =
-        Icon { name: "phases", svg: include_str!("../icons/phases.svg"), color: [217, 72, 15] };
-    pub(super) const SENSOR: Icon =
-        Icon { name: "sensor", svg: include_str!("../icons/sensor.svg"), color: [43, 138, 62] };
     pub(super) const SHAFT: Icon = Icon { name: "shaft", svg: include_str!("../icons/shaft.svg"), color: [73, 80, 87] };
     pub(super) const DC_LINK: Icon =
         Icon { name: "dc_link", svg: include_str!("../icons/dc_link.svg"), color: [24, 100, 171] };

@@ -1,9 +1,10 @@
 //! Each parameter has exactly one variable, in the one table of its part: so every refusal can name what it refuses.
 #![allow(missing_docs)]
 
+use drive::PmsmDrive;
 use drive::control::tables as control;
 use drive::plant::tables as plant;
-use fmu_core::{Kind, Slot, Table};
+use fmu_core::{Kind, Model, Slot, Table};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -66,4 +67,17 @@ fn of_the_plant() {
 #[test]
 fn of_the_controller() {
     each_field_has_a_variable(control::PARAMETERS);
+}
+
+#[test]
+fn pole_pairs_that_differ_within_a_drive() {
+    let mut drive = PmsmDrive::default();
+    drive.validate().unwrap();
+    drive.pair.controller.model.parameters.motor.n_p = 4;
+    let message = drive.validate().expect_err("must be refused").message().to_owned();
+    for part in ["plant.motor.n_p = 3", "controller.motor.n_p = 4", "the same number"] {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    drive.pair.plant.model.parameters.motor.n_p = 4;
+    drive.validate().unwrap();
 }

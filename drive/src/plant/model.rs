@@ -12,11 +12,12 @@ use crate::plant::losses::{Losses, efficiency, switching};
 use crate::plant::machine::{self, Machine};
 use crate::plant::power::Energy;
 use crate::plant::power::Powers;
-use crate::plant::signals::{Measured, PlantInputs, PlantOutputs};
+use crate::plant::signals::{PlantInputs, PlantOutputs};
 use crate::plant::state::{Instant, State};
 use crate::plant::tables::{PARAMETERS, PlantParameters, TABLE};
 use crate::plant::thermal::warm::Warm;
 use crate::plant::thermal::{self, Temperatures, ThermalMode};
+use drive_base::connection::Measured;
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal};
 use serde::{Deserialize, Serialize};
 
@@ -175,7 +176,7 @@ impl Model for PmsmPlant {
         description: "Permanent-magnet synchronous machine with average inverter and mechanics",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
         documentation: crate::documentation::PLANT,
-        ..crate::PROJECT
+        ..drive_base::PROJECT
     };
 
     const TABLE: &'static Table<Block<Self>> = TABLE;

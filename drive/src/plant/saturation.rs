@@ -11,20 +11,9 @@
 //! and s_dq in A/Wb2, s_3 in A/Wb3.
 
 use crate::frame::{Dq, Rotor, Vector};
-use crate::motor::Motor;
-use fmu_core::unit::{Exponents, Quantity, Unit};
+use crate::motor::{A_PER_WB2, A_PER_WB3, Motor};
 use fmu_core::{Row, Scalar, Table};
 use serde::{Deserialize, Serialize};
-
-/// Second-order coefficient in A/Wb2.
-pub(crate) const A_PER_WB2: Quantity = Quantity::new("SaturationOfSecondOrder", Unit::si("A/Wb2", per_weber(2)));
-/// Third-order coefficient in A/Wb3.
-const A_PER_WB3: Quantity = Quantity::new("SaturationOfThirdOrder", Unit::si("A/Wb3", per_weber(3)));
-
-/// Exponents of an ampere per weber to the power of `n`: 1 Wb = 1 kg.m2.s-2.A-1.
-const fn per_weber(n: i8) -> Exponents {
-    Exponents::mechanical(-n, -2 * n, 2 * n, 1 + n)
-}
 
 /// Parameters; all zero gives the linear machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

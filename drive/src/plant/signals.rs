@@ -1,10 +1,10 @@
 //! Inputs and outputs of the plant.
 
-use crate::control::signals::ControllerOutputs;
 use crate::frame::Phases;
 use crate::plant::losses::efficiency;
 use crate::plant::power::{Energy, Powers};
 use crate::plant::thermal::{Heat, Temperatures, ThermalInputs};
+use drive_base::connection::{Commanded, Measured};
 use fmu_core::Dual;
 use serde::{Deserialize, Serialize};
 
@@ -35,10 +35,10 @@ impl Default for PlantInputs {
 }
 
 impl PlantInputs {
-    /// The voltages and the gates that the controller asks for.
+    /// Takes the voltages and the gates that a controller commands.
     #[inline]
-    pub fn apply(&mut self, controller: &ControllerOutputs) {
-        (self.u, self.enable) = (controller.u, controller.enabled);
+    pub fn apply(&mut self, Commanded { u, enable }: Commanded) {
+        (self.u, self.enable) = (u, enable);
     }
 
     /// These inputs with the change `along` of the continuous ones.
@@ -93,17 +93,6 @@ pub struct PlantOutputs<S = f64> {
     pub temperatures: Temperatures<S>,
     /// Heat in W, of the powers.
     pub heat: Heat<S>,
-}
-
-/// What the sensors of a controller measure.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
-    /// Stator currents in A.
-    pub i: Phases,
-    /// Electrical angle in rad, in (-pi, pi].
-    pub theta_e: f64,
-    /// Mechanical speed in rad/s.
-    pub speed: f64,
 }
 
 impl PlantOutputs {

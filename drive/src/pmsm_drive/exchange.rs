@@ -2,10 +2,10 @@
 
 use super::{DriveOutputs, Means, PmsmDrive};
 use crate::PmsmPlant;
-use crate::control::signals::ControllerOutputs;
 use crate::frame::Phases;
 use crate::pair::Pair;
 use crate::plant::signals::PlantInputs;
+use drive_control::signals::ControllerOutputs;
 use fmu_core::events::{bounded, grid};
 use fmu_core::{
     CompletedSteps, ContinuousTime, Differentiable, Elapsed, Events, Fault, Indicator, Model, Next, Outcome, Sampled,
@@ -18,7 +18,7 @@ impl PmsmDrive {
         let Pair { plant, controller, .. } = &mut self.pair;
         controller.model.show();
         controller.model.output(now, &mut controller.out);
-        plant.model.inputs.apply(&controller.out);
+        plant.model.inputs.apply(controller.out.commanded());
     }
 }
 
