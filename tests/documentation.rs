@@ -205,7 +205,7 @@ fn pages_stand_alone() {
     let drawn =
         |svg: &str, name: &str| svg.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(|word| word == name);
     for (name, svg) in [
-        ("PmsmPlant", include_str!("../drive/docs/pmsm_plant.svg")),
+        ("PmsmPlant", include_str!("../drive/plant/docs/pmsm_plant.svg")),
         ("SensorlessController", include_str!("../drive/control/docs/sensorless_controller.svg")),
         ("PmsmDrive", include_str!("../drive/docs/pmsm_drive.svg")),
     ] {

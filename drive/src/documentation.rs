@@ -2,15 +2,9 @@
 
 use drive_base::joined;
 pub use drive_control::documentation::CONTROLLER;
-use drive_control::documentation::{DIAGRAM, ENVELOPE, EQUATIONS, LIMITS_AND_TUNING, REFERENCE};
-
-/// Documentation of [`PmsmPlant`](crate::PmsmPlant).
-pub const PLANT: &str = joined!(
-    include_str!("../docs/pmsm_plant.svg"),
-    include_str!("../docs/pmsm_plant_intro.html"),
-    include_str!("../docs/pmsm_plant.html"),
-    include_str!("../docs/pmsm_plant_pair.html"),
-);
+use drive_control::documentation::{self as control, ENVELOPE, LIMITS_AND_TUNING, REFERENCE};
+use drive_plant::documentation as plant;
+pub use drive_plant::documentation::PLANT;
 
 /// Documentation of [`PmsmDrive`](crate::PmsmDrive).
 pub const DRIVE: &str = joined!(
@@ -21,10 +15,10 @@ pub const DRIVE: &str = joined!(
     include_str!("../docs/losses.html"),
     include_str!("../docs/losses.svg"),
     include_str!("../docs/pmsm_drive_plant.html"),
-    include_str!("../docs/pmsm_plant.svg"),
-    include_str!("../docs/pmsm_plant.html"),
+    plant::DIAGRAM,
+    plant::EQUATIONS,
     include_str!("../docs/pmsm_drive_controller.html"),
-    DIAGRAM,
-    EQUATIONS,
+    control::DIAGRAM,
+    control::EQUATIONS,
     LIMITS_AND_TUNING,
 );

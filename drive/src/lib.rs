@@ -3,8 +3,9 @@
 //! | crate | folder | holds |
 //! |---|---|---|
 //! | `drive-base` | `drive/base/` | frames, elementary functions, the data of a machine, modulation; the conventions |
-//! | `drive-control` | `drive/control/` | the controller [`SensorlessController`], and every [`estimator`] |
-//! | `drive` | `drive/src/` | the plant [`PmsmPlant`]; [`PmsmDrive`] and the [`Pair`] of plant and controller |
+//! | `drive-plant` | `drive/plant/` | [`PmsmPlant`]: machine, inverter, losses, temperatures, mechanics |
+//! | `drive-control` | `drive/control/` | [`SensorlessController`], and every [`estimator`] |
+//! | `drive` | `drive/src/` | [`PmsmDrive`], and the [`Pair`] of plant and controller |
 
 #![forbid(unsafe_code)]
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
@@ -12,13 +13,12 @@
 
 pub mod documentation;
 pub mod pair;
-pub mod plant;
 pub mod pmsm_drive;
 mod terminals;
 
 pub use drive_base::{frame, integrate, math, modulation, motor};
 pub use drive_control::model::SensorlessController;
 pub use drive_control::{self as control, estimator};
+pub use drive_plant::{self as plant, PmsmPlant};
 pub use pair::Pair;
-pub use plant::model::PmsmPlant;
 pub use pmsm_drive::PmsmDrive;

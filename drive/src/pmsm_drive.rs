@@ -14,15 +14,15 @@ mod period;
 
 pub use period::Means;
 
-use crate::frame::Phases;
 use crate::pair::Pair;
-use crate::plant::signals::{PlantInputs, PlantOutputs};
-use crate::plant::tables as plant;
-use crate::plant::thermal::{THERMAL_INPUTS, ThermalInputs};
 #[cfg(doc)]
 use crate::{PmsmPlant, SensorlessController};
+use drive_base::frame::Phases;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
+use drive_plant::signals::{PlantInputs, PlantOutputs};
+use drive_plant::tables as plant;
+use drive_plant::thermal::{THERMAL_INPUTS, ThermalInputs};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{

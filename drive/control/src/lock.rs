@@ -234,8 +234,8 @@ pub const LOCK: &Table<LockParameters> = &Table::new(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drive::plant::machine::flux;
     use drive_base::frame::{Dq, Rotor};
+    use drive_plant::machine::flux;
 
     const T_S: f64 = 1e-4;
     /// Of the reference drive.

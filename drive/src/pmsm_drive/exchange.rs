@@ -1,11 +1,11 @@
 //! `PmsmDrive` for Model Exchange: the equations of the plant, and the events of the controller.
 
 use super::{DriveOutputs, Means, PmsmDrive};
-use crate::PmsmPlant;
-use crate::frame::Phases;
 use crate::pair::Pair;
-use crate::plant::signals::PlantInputs;
+use drive_base::frame::Phases;
 use drive_control::signals::ControllerOutputs;
+use drive_plant::PmsmPlant;
+use drive_plant::signals::PlantInputs;
 use fmu_core::events::{bounded, grid};
 use fmu_core::{
     CompletedSteps, ContinuousTime, Differentiable, Elapsed, Events, Fault, Indicator, Model, Next, Outcome, Sampled,

@@ -243,10 +243,10 @@ mod tests {
     use super::*;
     use crate::estimator::EstimatorParameters;
     use crate::estimator::testing::{comes_to_the_rotor, salient, with_L_q};
-    use drive::plant::machine;
-    use drive::plant::saturation::Saturation;
     use drive_base::frame::{Dq, Rotor};
     use drive_base::integrate::rk4;
+    use drive_plant::machine;
+    use drive_plant::saturation::Saturation;
 
     const T_S: f64 = 1e-4;
 

@@ -1,10 +1,10 @@
 //! Runs an estimator next to a machine at constant speed, for the estimators' unit tests: no control, no noise.
 
 use crate::estimator::{Context, Estimating, EstimatorParameters, Injection, Sample};
-use drive::plant::machine::flux;
 use drive_base::frame::{AlphaBeta, Axis, Dq, Estimated, Rotor};
 use drive_base::math::wrap;
 use drive_base::motor::Motor;
+use drive_plant::machine::flux;
 
 /// The salient machine used in the tests.
 pub(crate) fn salient() -> Motor {
