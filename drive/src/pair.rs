@@ -27,7 +27,7 @@ impl Pair {
         self.controller.model.validate()
     }
 
-    /// State and outputs of both at the start.
+    /// Sets state and outputs of both to those at the start.
     pub fn initialize(&mut self) {
         self.now = Elapsed::ZERO;
         self.plant.initialize();
@@ -62,7 +62,7 @@ impl Pair {
         controller.model.inputs.measure(plant.out.measured());
     }
 
-    /// The same where the outputs are those of an earlier step.
+    /// Passes the present outputs on, where the blocks still hold those of an earlier step.
     #[inline]
     pub(crate) fn exchange_present(&mut self) {
         let Self { plant, controller, .. } = self;
@@ -83,7 +83,7 @@ impl Pair {
         Ok(())
     }
 
-    /// The outputs of both.
+    /// Computes the outputs of both.
     #[inline]
     pub(crate) fn output(&mut self) {
         let Self { plant, controller, now } = self;

@@ -1,7 +1,7 @@
 //! The bounds of the tracker's bandwidth in field weakening ([`tracking`](drive::control::tracking)) in the running drive.
 #![allow(missing_docs, non_snake_case)]
 
-use drive::control::envelope::{Envelope, Warm};
+use drive::control::envelope::{Envelope, WarmStart};
 use drive::control::reference::max_torque_per_ampere;
 use drive::estimator::Kind;
 use drive::estimator::tracker::TrackerKind;
@@ -57,7 +57,7 @@ impl Point<'_> {
         let Machine { motor, i, u_dc, J, .. } = self.machine;
         let (envelope, w) = (Envelope::new(motor, *i), f64::from(motor.n_p) * self.rpm * PI / 30.0);
         let (U, mtpa) = (0.95 * u_dc / 3.0_f64.sqrt(), max_torque_per_ampere(motor, self.tau));
-        assert!(envelope.limit(w, 1.0, U, &mut Warm::default()).tau > 1.1 * self.tau, "{}", self.rpm);
+        assert!(envelope.limit(w, 1.0, U, &mut WarmStart::default()).tau > 1.1 * self.tau, "{}", self.rpm);
         let i_d = envelope.i_d(self.tau, w, U, mtpa.d(), 20).unwrap();
         let i = DqHat::new(i_d, envelope.i_q(self.tau, i_d));
         f64::from(motor.n_p) * envelope.slope(i) / (J * self.rho)

@@ -7,7 +7,7 @@
 
 use drive::Pair;
 use drive::control::current::CurrentLoop;
-use drive::control::envelope::{Envelope, Limit, Warm};
+use drive::control::envelope::{Envelope, Limit, WarmStart};
 use drive::control::reference::max_torque_per_ampere;
 use drive::control::tables::{ControllerParameters, Limits};
 use drive::control::weakening::{Weakening, WeakeningGains, WeakeningParameters};
@@ -58,7 +58,7 @@ impl Machine {
 
     /// The limit at `rpm` of the sign `s`: cold, and after six more samples.
     fn limit(&self, rpm: f64, s: f64) -> [Limit; 2] {
-        let mut warm = Warm::default();
+        let mut warm = WarmStart::default();
         let mut step = || self.envelope().limit(self.w(rpm), s, self.U(0.95), &mut warm);
         let first = step();
         [first, (0..6).map(|_| step()).last().unwrap()]
@@ -228,7 +228,7 @@ fn an_injected_voltage_is_taken_off() {
     let both =
         (0..9).map(|n| state.limits(&gains, &par.weakening, (w, machine.u_dc, injected), 1e3, n)).last().unwrap();
     for (i, s) in [(both.1, 1.0), (both.0, -1.0)] {
-        let mut warm = Warm::default();
+        let mut warm = WarmStart::default();
         let mut limit = || machine.envelope().limit(w, s, machine.U(0.95) - injected, &mut warm).tau;
         let figure = (0..9).map(|_| limit()).last().unwrap();
         assert!(
@@ -432,7 +432,7 @@ fn a_wrong_l_d_settles_at_the_mtpv_of_the_estimates() {
     let (rpm, truth) = (2.5 * 999.14, a());
     let wrong = Envelope::new(&Motor { L_d: 1.2 * truth.motor.L_d, ..truth.motor.clone() }, truth.i);
     let at = |U: f64| {
-        let mut warm = Warm::default();
+        let mut warm = WarmStart::default();
         (0..6).map(|_| wrong.limit(truth.w(rpm), 1.0, U, &mut warm).i).last().unwrap()
     };
     let excess = |U: f64| truth.envelope().excess(at(U), truth.w(rpm), truth.U(0.98));

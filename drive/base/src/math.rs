@@ -148,7 +148,7 @@ pub fn sin_cos_small(d: f64) -> (f64, f64) {
     (d + d * z * s, (1.0 - 0.5 * z) + z_2 * c)
 }
 
-/// The same with short series for a tiny angle `d`.
+/// Sine and cosine of a tiny angle `d` (rad), by shorter series; of a larger one, [`sin_cos`].
 ///
 /// For |d| <= 0.004, the first term left out is below 6e-18.
 #[inline]
@@ -167,7 +167,7 @@ fn large(d: f64) -> (f64, f64) {
     sin_cos(d)
 }
 
-/// Of an angle beyond a million, or of no number.
+/// Sine and cosine of an angle beyond the range of [`sin_cos`], or of NaN.
 #[cold]
 #[inline(never)]
 fn far(x: f64) -> (f64, f64) {
@@ -186,13 +186,13 @@ pub fn tanh_beside(t: f64, d: f64) -> f64 {
     (t * below + above) / (below + t * above)
 }
 
-/// The smaller of two numbers: one instruction, unlike [`f64::min`], which also orders NaN. Of a NaN, `x` stays.
+/// The smaller of two numbers: one instruction, unlike [`f64::min`], which also orders NaN. If either is NaN, the result is `x`.
 #[inline]
 pub fn at_most(x: f64, most: f64) -> f64 {
     if most < x { most } else { x }
 }
 
-/// The greater of two numbers, as quick as [`at_most`]. Of a NaN, `x` stays.
+/// The greater of two numbers, as quick as [`at_most`]. If either is NaN, the result is `x`.
 #[inline]
 pub fn at_least(x: f64, least: f64) -> f64 {
     if least > x { least } else { x }
@@ -204,13 +204,13 @@ pub fn within(x: f64, limit: f64) -> f64 {
     at_least(at_most(x, limit), -limit)
 }
 
-/// 1/x for x > 0; finite, so that a product with 0 is 0 for a subnormal `x` too.
+/// 1/x for x > 0; finite even for a subnormal `x`, so that a product with 0 is 0.
 #[inline]
 pub fn reciprocal(x: f64) -> f64 {
     (1.0 / x).min(f64::MAX)
 }
 
-/// Whether all values are numbers.
+/// Whether all values are finite.
 #[inline]
 pub fn all_finite<const N: usize>(values: [f64; N]) -> bool {
     // Then their sum is one, too, unless it overflows.

@@ -1,6 +1,6 @@
 //! The average output of three inverter legs over a PWM period for a voltage command: the hexagon of the DC link and
-//! the dead-time voltage. The plant models its inverter with these functions, and the controller takes its limits and
-//! its dead time into account with the same ones.
+//! the dead-time voltage. The plant models its inverter with these functions; the controller accounts for the limits and
+//! the dead time with them, too.
 //!
 //! The hexagon is derived here from three legs between the rails. Dead time: a leg loses u_dead sign(i), or u_dead i /
 //! i_zero below i_zero. This is the field's usual mean-value model; neither paper contains it. u in V, i in A.
@@ -23,7 +23,7 @@ pub fn limit_span<S: Scalar>(u: Vector<Stator, S>, span: S, u_dc: S) -> Vector<S
     if span.value() > u_dc.value() { u.scaled(positive(u_dc) / span) } else { u }
 }
 
-/// `x`, or 0 for a negative one.
+/// `x`, or 0 if it is negative.
 #[inline]
 fn positive<S: Scalar>(x: S) -> S {
     x.chain(x.value().max(0.0), f64::from(u8::from(x.value() >= 0.0)))

@@ -14,7 +14,7 @@ const fn per_weber(n: i8) -> Exponents {
     Exponents::mechanical(-n, -2 * n, 2 * n, 1 + n)
 }
 
-/// A permanent-magnet synchronous machine, salient in general; what a temperature changes is an `S`.
+/// A permanent-magnet synchronous machine, salient in general; `S` is the type of the values that depend on temperature.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motor<S = f64> {
     /// Number of pole pairs (Z_p in Rasmussen).

@@ -46,8 +46,8 @@ impl SensorlessController {
         self.state.computed = self.cycle(false);
     }
 
-    /// [`control`](Self::control), once for any sample and once more, without calls, for the `steady` state of the default:
-    /// on its estimator, after the start, with nothing tuned.
+    /// One sample, compiled twice: for any state of the controller, and without calls for the `steady` state of the default
+    /// (its estimator supplies the angle, the start is over, nothing has been tuned).
     #[inline(always)]
     fn cycle(&mut self, steady: bool) -> ControllerOutputs {
         let first = !steady && self.state.k == 0;
@@ -90,7 +90,7 @@ impl SensorlessController {
         self.state.i_last = self.currents().to_stator();
     }
 
-    /// Measured currents in A, without the offsets that were found.
+    /// Measured currents in A, less the offsets measured at rest.
     #[inline(always)]
     fn currents(&self) -> Phases {
         let Phases { a, b, c } = self.parameters.sensor.measure(self.inputs.i, self.state.samples);
@@ -133,7 +133,7 @@ impl SensorlessController {
         }
     }
 
-    /// The estimated frame and the action of the loops in it. Parameters that were `tuned` then act on the estimator.
+    /// The estimated frame and the action of the loops in it. Parameters that were `tuned` act on the estimator after that.
     #[inline(always)]
     fn estimate(&mut self, sample: &Sample, tuned: bool, steady: bool) -> (Frame, Mode) {
         let Self { inputs, parameters: par, gains, in_use, state, .. } = self;
@@ -153,7 +153,7 @@ impl SensorlessController {
         (Frame { axis, theta, w, half, i: axis.from_stator(i), injection }, mode)
     }
 
-    /// The references at the estimated mechanical `speed` (rad/s) beside an `injection`.
+    /// The references at the estimated mechanical `speed` (rad/s) in addition to an `injection`.
     #[inline(always)]
     fn reference(&mut self, mode: Mode, speed: f64, injection: Injection, tuned: bool) -> References {
         let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;

@@ -44,9 +44,9 @@ pub struct Limit {
     pub tau: f64,
 }
 
-/// Where the iterations of one sign ended at the last sample; zeros: nowhere, they begin anew.
+/// Where the iterations for one sign ended at the last sample and the next ones begin; zeros: they begin anew.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Warm {
+pub struct WarmStart {
     x: f64,
     /// Direction of the voltage at MTPV.
     u: [f64; 2],
@@ -97,12 +97,12 @@ impl Envelope {
 
     /// The limit of the sign `s` at |w| = `w` (rad/s) under the voltage `U` (V).
     #[inline]
-    pub fn limit(&self, w: f64, s: f64, U: f64, warm: &mut Warm) -> Limit {
+    pub fn limit(&self, w: f64, s: f64, U: f64, warm: &mut WarmStart) -> Limit {
         let p = self.quartic(w, s, U);
         let on_circle = |x: f64| self.on_circle(x, s);
         let mut left = 0.0;
         if value(&p, self.x_mtpa) <= 0.0 {
-            *warm = Warm::default();
+            *warm = WarmStart::default();
             return self.at(on_circle(self.x_mtpa));
         }
         if self.psi_M < self.L_d * self.I {
@@ -117,7 +117,7 @@ impl Envelope {
             }
         }
         if value(&p, left) > 0.0 {
-            *warm = Warm::default();
+            *warm = WarmStart::default();
             return Limit { i: DqHat::new(-self.I.min(self.psi_M / self.L_d), 0.0), tau: 0.0 };
         }
         warm.x = root(&p, left, self.x_mtpa, warm.x);
@@ -204,7 +204,7 @@ impl Envelope {
         self.slope(i) > 0.0
     }
 
-    /// i_q (A) for the torque `tau` (N.m) beside `i_d` (A).
+    /// i_q (A) for the torque `tau` (N.m) with `i_d` (A).
     #[inline]
     pub fn i_q(&self, tau: f64, i_d: f64) -> f64 {
         tau / (self.k * (self.psi_M - self.dL * i_d))

@@ -8,7 +8,7 @@
 //! the two back EMFs. epsilon is transformed to the estimated frame and smoothed at 50 Hz. A resistance that is wrong
 //! by up to 30 % explains part of it; what remains is divided by lock.u + 2 sin(lock.angle / 2) psi_M |w^|.
 //!
-//! Near standstill the EMF is smaller than (R - R^) i and says nothing. There the speed tells:
+//! Near standstill the EMF is smaller than (R - R^) i and shows nothing. There the speed shows it:
 //!
 //! # Speed
 //! A rotor that turns with the estimated frame but not at the reference is lost: the estimate itself shows it. The
@@ -30,11 +30,11 @@
 //! `lock.u` covers the errors that remain with a good estimate: what (R - R^) i leaves, and for the dead time 4/3 of a
 //! leg's voltage. A smaller value detects more if the machine values are accurate.
 //!
-//! Limits: a rotor that is blocked, or loaded beyond the torque, near standstill is told as lost: the current is at
+//! Limits: a rotor that is blocked, or loaded beyond the torque, near standstill is reported as lost: the current is at
 //! its limit and the speed is not reached in both cases. At |w| psi_M < lock.u / 2, a rotor at a wrong angle that
 //! still turns at the reference is not seen; at standstill without a change of current, nothing shows it.
 //!
-//! The voltage is derived here from Kim & Sul 2011, eq (1), the speed from the PI speed loop; for all estimators alike.
+//! The voltage is derived here from Kim & Sul 2011, eq (1), the speed from the PI speed loop; for every estimator.
 //! u in V, psi in Wb, theta in rad, w in rad/s (electrical).
 
 use crate::estimator::Sample;
@@ -238,7 +238,7 @@ mod tests {
     use drive_plant::machine::flux;
 
     const T_S: f64 = 1e-4;
-    /// Of the reference drive.
+    /// Reach of the reference drive.
     const REACH: Reach = Reach { integral: 5.0, acceleration: 8000.0 };
 
     /// `lock_lost` for an estimate `theta_tilde` (rad) off a loaded rotor turning at `w` (rad/s), estimated as `w_hat`.

@@ -32,7 +32,7 @@ pub struct SensorlessController {
     /// Parameters; a step never changes them.
     pub parameters: ControllerParameters,
     pub(super) gains: Gains,
-    /// Those of the last sample.
+    /// Gains of the last sample.
     pub(super) last_gains: Gains,
     /// A parameter has been set since the last sample.
     pub(super) tuned: bool,
@@ -41,7 +41,7 @@ pub struct SensorlessController {
 }
 
 impl SensorlessController {
-    /// The outputs, the results of the last sample but one.
+    /// The outputs that are visible now: the results of the last sample but one.
     #[inline]
     pub fn shown(&self) -> &ControllerOutputs {
         &self.state.shown
@@ -64,7 +64,7 @@ impl SensorlessController {
         }
     }
 
-    /// Refuses inputs that are no numbers.
+    /// Rejects inputs that are not finite.
     #[inline]
     fn finite(&self) -> Result<(), Fault> {
         if self.inputs.is_finite() {
@@ -142,7 +142,7 @@ impl SensorlessController {
         }
         // A running drive has to live with its DC link.
         weakening::validate(par, if self.state.samples == 0 { u_dc } else { 0.0 })?;
-        // The start value holds no estimator back that does not read it.
+        // The start value is accepted with an estimator that does not read it.
         let reads = estimator.class() == Class::FluxObserver;
         if zero_speed.i_0 > limit.i && (reads || zero_speed.i_0 > ZeroSpeed::default().i_0) {
             return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
@@ -281,7 +281,7 @@ impl Warns for SensorlessController {
         if *out == restarted {
             log.warn("restarted", || {
                 format!(
-                    "the estimate left the finite numbers or turned by more than {MAX_TURN} rad in a sample: the controller \
+                    "the estimate was not finite or turned by more than {MAX_TURN} rad in a sample: the controller \
                      starts again at rest, theta_est = {} rad",
                     out.theta_est
                 )
@@ -289,7 +289,7 @@ impl Warns for SensorlessController {
             return;
         }
         let Motor { n_p, R_s, L_d, L_q, psi_M } = self.parameters.motor;
-        // A wrong resistance moves the voltage by no more than R_s i: nothing beside a back EMF of twice that.
+        // A wrong resistance changes the voltage by at most R_s i, which a back EMF of twice that outweighs.
         let emf = psi_M * (f64::from(n_p) * out.speed_est).abs();
         let tells = emf <= 2.0 * R_s * par.limit.i;
         log.warn("lock_lost", || {

@@ -25,13 +25,13 @@ pub struct ControllerInputs {
 }
 
 impl ControllerInputs {
-    /// What the sensors at the plant measure.
+    /// Takes what the sensors at the plant measure.
     #[inline]
     pub fn measure(&mut self, plant: Measured) {
         (self.i, self.theta_meas, self.speed_meas) = (plant.i, plant.theta_e, plant.speed);
     }
 
-    /// Whether all values are numbers.
+    /// Whether all values are finite.
     pub fn is_finite(&self) -> bool {
         let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _ } = self;
         all_finite([i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref])
@@ -93,7 +93,7 @@ impl ControllerOutputs {
         Commanded { u: self.u, enable: self.enabled }
     }
 
-    /// Whether all values are numbers.
+    /// Whether all values are finite.
     pub fn is_finite(&self) -> bool {
         // The limits of the torque are bounded, and the share of the voltage is finite with u.
         let Self { u, speed_est, theta_est, i, i_ref, lock_lost, .. } = self;

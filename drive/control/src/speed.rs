@@ -93,7 +93,7 @@ impl SpeedController {
     }
 }
 
-/// Out of line: as a branch, it lets the current loop begin before the limits are known.
+/// A branch out of line, so that the current loop begins before the limits are known.
 #[cold]
 #[inline(never)]
 fn limited(wanted: f64, low: f64, high: f64) -> f64 {

@@ -43,7 +43,8 @@ pub(super) struct Gains {
 }
 
 impl Gains {
-    /// What a flux observer's low-speed law leaves at the estimated mechanical `speed` (rad/s); the others have none.
+    /// The low-speed law of a flux observer at the estimated mechanical `speed` (rad/s), and the torque that remains; other
+    /// estimators have no such law.
     #[inline]
     fn law(&self, par: &ControllerParameters, speed: f64) -> Law {
         if !self.observes_flux {
@@ -57,7 +58,7 @@ impl Gains {
         Law { share, i_d, limit: at_least(at_most(most, self.i_tau), f64::MIN_POSITIVE) }
     }
 
-    /// Whether the torque counts the reluctance, beside i_d of the low-speed law too.
+    /// Whether the torque includes the reluctance torque, also with the i_d of the low-speed law.
     #[inline]
     fn exact(par: &ControllerParameters) -> bool {
         par.current.mtpa || par.speed_loop.torque_mode
@@ -88,7 +89,7 @@ impl Gains {
 struct Law {
     /// Share of `zero_speed.i_0`.
     share: f64,
-    /// i_d in A that it asks for.
+    /// i_d in A that it requests.
     i_d: f64,
     /// Greatest torque in N.m that remains, divided by the torque constant.
     limit: f64,
@@ -191,7 +192,7 @@ pub(super) struct State {
     pub(super) limited_for: f64,
     /// Outputs of the last sample.
     pub(super) computed: ControllerOutputs,
-    /// They wait for the next instant.
+    /// The outputs of the last sample wait for the next sample instant.
     pub(super) hidden: bool,
     /// Outputs visible now.
     pub(super) shown: ControllerOutputs,
@@ -295,7 +296,7 @@ impl State {
         }
     }
 
-    /// The references at the estimated mechanical `speed` (rad/s) beside an `injection`; `old` are the gains of a speed loop
+    /// The references at the estimated mechanical `speed` (rad/s) in addition to an `injection`; `old` are the gains of a speed loop
     /// that is retuned at this sample.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
@@ -354,8 +355,8 @@ impl State {
         let limited = requested > high || requested < -low;
         self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
         let tau = gains.k * i_q_ref;
-        let today = || gains.currents(par, law, i_q_ref);
-        let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, par.current.mtpa, today);
+        let plain = || gains.currents(par, law, i_q_ref);
+        let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, par.current.mtpa, plain);
         References { i, limited, tau: (gains.k * low, gains.k * high), weakens: self.weakening.weakens }
     }
 

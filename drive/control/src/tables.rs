@@ -30,14 +30,14 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Maximum |i_q| in A that remains beside `i_d` (A), which has priority.
+    /// Maximum |i_q| in A that `i_d` (A), which has priority, leaves.
     #[inline]
     pub fn i_q_beside(&self, i_d: f64) -> f64 {
         at_most(at_least(self.i * self.i - i_d * i_d, 0.0).sqrt(), self.i_q)
     }
 }
 
-/// Dead-time compensation, added to the command, and what the estimators are told of it. With u_loss(i) of
+/// Dead-time compensation, added to the command, and the voltage that the estimators receive. With u_loss(i) of
 /// [`modulation`](drive_base::modulation) (V, stator axes, at the currents i in A):
 ///
 /// ```text
@@ -260,9 +260,12 @@ pub const STATUS: &Table<ControllerOutputs> = &Table::new(
             O::discrete_output("tau_max", &NEWTON_METER, "Greatest torque that the references may ask for now", |o| {
                 &mut o.tau_max
             }),
-            O::discrete_output("tau_min", &NEWTON_METER, "The same in the negative direction, 0 or less", |o| {
-                &mut o.tau_min
-            }),
+            O::discrete_output(
+                "tau_min",
+                &NEWTON_METER,
+                "Least torque that the references may ask for now, 0 or less",
+                |o| &mut o.tau_min,
+            ),
             O::discrete_output(
                 "u_share",
                 &ONE,

@@ -9,8 +9,8 @@
 //! ```
 //!
 //! and for the mechanical observer, which knows its own torque, (s + rho)^3 = A s, stable for A < 8/3 rho^2. A filter of the EMF
-//! with three times rho or more changes the bounds by 2 %. While i_d is lowered, the tracker is at least as fast as they ask,
-//! with the margin m: rho / m >= w_s (1/2 + 2 / t_is) + A / rho. m is 1.5, or what the parameters leave where A = 0; rho is at
+//! with three times rho or more changes the bounds by 2 %. While i_d is lowered, the tracker is at least as fast as these bounds
+//! require, with the margin m: rho / m >= w_s (1/2 + 2 / t_is) + A / rho. m is 1.5, or less where the set bandwidth leaves less at A = 0; rho is at
 //! most a third of the EMF's bandwidth, and 0.05 / T_s.
 
 use crate::estimator::Kind;
@@ -32,7 +32,7 @@ pub struct LeastTracker {
 /// Margin m of the tracker's bandwidth.
 const MARGIN: f64 = 1.5;
 
-/// Greatest product of the tracker's bandwidth and T_s that field weakening asks for.
+/// Greatest product of the tracker's bandwidth and T_s that field weakening requires.
 const MOST_PER_SAMPLE: f64 = 0.05;
 
 impl LeastTracker {

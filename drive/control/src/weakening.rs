@@ -2,20 +2,20 @@
 //!
 //! The voltage that the references may use is U = k_u u_dc / sqrt 3 - y. From U, the estimated speed and the machine
 //! estimates, [`Envelope`] gives the limits of the torque and, for the torque within them, the least current. Where
-//! today's reference (maximum torque per ampere, i_d = 0 or the low-speed law) fits the voltage, nothing is changed.
+//! the plain reference (maximum torque per ampere, i_d = 0 or the low-speed law) fits the voltage, nothing is changed.
 //!
 //! The trim y corrects wrong estimates: dy/dt = w_t (|u| - k_t u_dc / sqrt 3), 0 <= y <= 0.3 u_dc / sqrt 3, with the voltage
 //! |u| that the current loop requests, before the hexagon. It changes U, never i_d, so that MTPV and the current limit
 //! stay right; it also moves while the current error is large, where wrong estimates would saturate the loop for good.
 //!
 //! The speed loop's limits are those of the torque. They fall as the speed rises, so while one acts, the integrator
-//! follows: dI/dt = w_s (limited - wanted), besides the hold of [`speed`](crate::speed).
+//! follows: dI/dt = w_s (limited - wanted), in addition to the hold of [`speed`](crate::speed).
 //!
 //! A limit is computed at every sample while it acts, else at every eighth one and when the voltage has changed by 1 %.
 //!
 //! The tracker's bandwidth while weakening: [`tracking`](crate::tracking).
 
-use crate::envelope::{Envelope, Limit, Warm};
+use crate::envelope::{Envelope, Limit, WarmStart};
 use crate::estimator::Kind;
 use crate::reference::{max_torque, max_torque_per_ampere};
 use crate::tables::{ControllerParameters, PARAMETERS};
@@ -68,7 +68,7 @@ impl Default for WeakeningParameters {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WeakeningGains {
     envelope: Envelope,
-    /// Currents (A) of the greatest positive torque of today's reference.
+    /// Currents (A) of the greatest positive torque of the plain reference.
     end: DqHat,
     /// Inverse of the torque constant in A/(N.m).
     per_torque: f64,
@@ -81,7 +81,7 @@ pub struct WeakeningGains {
 }
 
 impl WeakeningGains {
-    /// For a reference that may ask for `tau` (N.m), with maximum torque per ampere (`mtpa`) or i_d = 0.
+    /// For a reference of up to `tau` (N.m), with maximum torque per ampere (`mtpa`) or i_d = 0.
     pub fn new(par: &ControllerParameters, tau: f64, mtpa: bool) -> Self {
         let ControllerParameters { motor, limit, .. } = par;
         let end = if mtpa {
@@ -110,7 +110,7 @@ impl WeakeningGains {
         self.tracker.at(self.envelope.slope(i))
     }
 
-    /// Electrical speed in rad/s below which all of today's references fit the voltage `U` (V).
+    /// Electrical speed in rad/s below which all plain references fit the voltage `U` (V).
     pub fn onset(&self, U: f64) -> f64 {
         let [copper, cross, flux] = self.voltage;
         let free = U * U - copper;
@@ -128,18 +128,18 @@ pub struct Weakening {
     U: f64,
     /// Voltage in V at the last sample that had to compute both limits.
     U_then: f64,
-    /// Some of today's references does not fit the voltage.
+    /// Some plain reference does not fit the voltage.
     near: bool,
-    /// Motoring, generating.
+    /// Limits for motoring and for generating.
     limits: [Limit; 2],
-    warm: [Warm; 2],
+    warm: [WarmStart; 2],
     /// The drive generates: the second limit is the one in use.
     generates: bool,
     /// The limit in use acts.
     clipped: bool,
     /// i_d of the last sample in A, read while weakening.
     i_d: f64,
-    /// i_d is below today's reference.
+    /// i_d is below that of the plain reference.
     pub weakens: bool,
 }
 
@@ -171,7 +171,7 @@ impl Weakening {
         if w >= 0.0 { (generating, motoring) } else { (motoring, generating) }
     }
 
-    /// The limits (A), motoring and generating, where today's references may not fit; at most `i`.
+    /// The limits (A), motoring and generating, where the plain references may not fit; at most `i`.
     fn limits_near(&mut self, gains: &WeakeningGains, w: f64, i: f64, k: u64) -> [f64; 2] {
         let moved = (self.U - self.U_then).abs() > LEAST_CHANGE * self.U;
         if moved {
@@ -183,21 +183,21 @@ impl Weakening {
                 self.limits[side] = self.limit(gains, side, s, w);
             }
         }
-        // Not a number if the speed is none: no torque then.
+        // NaN if the speed is NaN: no torque then.
         self.limits.map(|limit| (limit.tau * gains.per_torque).max(0.0).min(i))
     }
 
     fn limit(&mut self, gains: &WeakeningGains, side: usize, s: f64, w: f64) -> Limit {
         let end = DqHat::new(gains.end.d(), s * gains.end.q());
         if gains.envelope.excess(end, w, self.U) <= 0.0 {
-            self.warm[side] = Warm::default();
+            self.warm[side] = WarmStart::default();
             return Limit { i: DqHat::new(gains.least, 0.0), tau: f64::INFINITY };
         }
         gains.envelope.limit(w, s, self.U, &mut self.warm[side])
     }
 
-    /// Currents (A) for the torque `tau` (N.m) at the electrical speed `w` (rad/s): `today`'s, of maximum torque per ampere
-    /// if `mtpa`, or on the voltage limit; |i_q| at most `i_q_max`.
+    /// Currents (A) for the torque `tau` (N.m) at the electrical speed `w` (rad/s): the `plain` ones, of maximum torque per
+    /// ampere if `mtpa`, or on the voltage limit; |i_q| at most `i_q_max`.
     #[inline]
     pub fn currents(
         &mut self,
@@ -206,10 +206,10 @@ impl Weakening {
         w: f64,
         i_q_max: f64,
         mtpa: bool,
-        today: impl Fn() -> DqHat,
+        plain: impl Fn() -> DqHat,
     ) -> DqHat {
         if !self.near {
-            return today();
+            return plain();
         }
         self.generates = tau * w < 0.0;
         let limit = self.limits[usize::from(self.generates)];
@@ -227,16 +227,16 @@ impl Weakening {
         } else if let Some(i) = if self.weakens && mtpa { warm() } else { None } {
             i
         } else {
-            let today = today();
-            if gains.envelope.excess(today, w, self.U) <= 0.0 {
+            let plain = plain();
+            if gains.envelope.excess(plain, w, self.U) <= 0.0 {
                 self.weakens = false;
-                return today;
+                return plain;
             }
             let warm = if self.weakens && !mtpa { solve(self.i_d, 2) } else { None };
-            let i = on_the_limit(warm.or_else(|| solve(today.d(), 8)).unwrap_or(limit.i.d()));
-            if i.d() >= today.d() {
+            let i = on_the_limit(warm.or_else(|| solve(plain.d(), 8)).unwrap_or(limit.i.d()));
+            if i.d() >= plain.d() {
                 self.weakens = false;
-                return today;
+                return plain;
             }
             i
         };

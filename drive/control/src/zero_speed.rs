@@ -2,8 +2,8 @@
 //!
 //! Rasmussen (25): i_sd,ref = i_0 exp(-|w_r^| / w_0), with the MECHANICAL speed.
 //!
-//! With maximum torque per ampere, the share 1 - exp(-|w_r^| / w_0) of its i_d is added, and i_q gives the torque beside
-//! both; the greatest torque is that of the current limit.
+//! With maximum torque per ampere, the share 1 - exp(-|w_r^| / w_0) of its i_d is added, and i_q gives the rest of the
+//! torque; the greatest torque is that of the current limit.
 
 use crate::estimator::Class;
 use crate::tables::{ControllerParameters, PARAMETERS};
@@ -42,10 +42,10 @@ impl ZeroSpeed {
     }
 }
 
-/// Checks that i_q gives torque beside the law's i_d, where the references depend on it.
+/// Checks that i_q gives torque in spite of the law's i_d, where the references depend on it.
 ///
 /// # Errors
-/// The reluctance torque takes most of the magnet's away.
+/// The reluctance torque cancels most of the magnet's torque.
 pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
     let ControllerParameters { current, weakening, speed_loop, motor, zero_speed, estimator, .. } = par;
     let by_torque = current.mtpa || weakening.used || speed_loop.torque_mode;

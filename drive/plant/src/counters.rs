@@ -48,6 +48,9 @@ pub(super) struct Point {
 
 impl PmsmPlant {
     /// [`CompletedSteps::complete`](fmu_core::CompletedSteps::complete) under these `inputs`.
+    ///
+    /// # Errors
+    /// The step cannot be integrated.
     pub fn complete_under(&mut self, inputs: &PlantInputs, now: Elapsed) -> Result<(), Fault> {
         let h = now.since(self.point.time);
         if h > 0.0 {

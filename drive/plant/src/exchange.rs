@@ -108,6 +108,9 @@ impl PmsmPlant {
     }
 
     /// [`ContinuousTime::derivatives`] under these `inputs`.
+    ///
+    /// # Errors
+    /// Those of [`ContinuousTime::derivatives`]: the shaft is too fast, or a derivative is not finite.
     pub fn derivatives_under(&self, inputs: &PlantInputs, dx: &mut [f64]) -> Result<(), Fault> {
         let at = self.present(inputs);
         if self.is_too_fast(at.speed) {

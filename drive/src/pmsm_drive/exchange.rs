@@ -13,7 +13,7 @@ use fmu_core::{
 };
 
 impl PmsmDrive {
-    /// The outputs of the controller's last sample become visible and act on the plant.
+    /// Makes the outputs of the controller's last sample visible and applies them to the plant.
     fn show(&mut self, now: Elapsed) {
         let Pair { plant, controller, .. } = &mut self.pair;
         controller.model.show();

@@ -14,10 +14,10 @@
 //! dz/dt = -j w z - (R - R^) i / psi_a - c Re z,        poles s^2 + c s + w^2
 //! ```
 //!
-//! whatever the tracker does, and r = Re z shows it.
+//! independently of the tracker, and r = Re z shows it.
 //!
 //! **Resistance.** What one ohm does to psi~ is known: h with dh/dt = -i - c rho psi_a, rho = Re(h / psi_a), integrated
-//! beside psi^. It gives r = (R - R^) rho, at rest (rho = -i_d / (c psi_M)), at speed (rho = -i_q / (w psi_M)) and in all
+//! along with psi^. It gives r = (R - R^) rho, at rest (rho = -i_d / (c psi_M)), at speed (rho = -i_q / (w psi_M)) and in all
 //! transients between, with the right sign, also where rho passes zero. Hence the adaptive observer (Zhang, IEEE Trans.
 //! Autom. Control 47 (3), 2002), with rho_0 = `adaptation.i` / (c_0 psi_M), c_0 = c at rest:
 //!
@@ -27,7 +27,7 @@
 //!
 //! The second equation removes what the old R^ left in psi^. Neither the gate by standstill nor the freezing of R^ that
 //! Rasmussen's observer needs ([`resistance`](crate::estimator::resistance)) is left: both replaced the missing dynamics
-//! of r. A small c makes the angle insensitive and rho large: while a speed is asked for, c <= k_c |w|, as there.
+//! of r. A small c makes the angle insensitive and rho large: while the reference is a speed, c <= k_c |w|, as there.
 //! `adaptation.k_a` is not read: at creep it fought R^ and lost cells.
 //!
 //! **Magnet.** r also contains (psi_M^ - psi_M) / psi_a: psi_M^ follows -r where R^ has no part in it,
@@ -143,7 +143,7 @@ impl Estimating for FluxObserver {
         if par.adaptation.resistance { self.R } else { motor.R_s }
     }
 
-    /// What was learned of the machine stays.
+    /// The adapted values of the machine stay.
     fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
         *self = Self { R: self.R, ..Self::start(context, sample, theta, w).0 };
     }
@@ -221,7 +221,7 @@ mod tests {
         }
     }
 
-    /// So does the magnet flux, beside the resistance.
+    /// The magnet flux adapts together with the resistance.
     #[test]
     fn the_magnet_flux_converges() {
         let hat = Motor { psi_M: 1.2 * salient().psi_M, ..salient() };

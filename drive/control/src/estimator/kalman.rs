@@ -36,7 +36,7 @@
 //! implies such a change, the filter restarts at its current angle.
 //!
 //! Limits: the angle requires an EMF. It holds rated load down to 0.010 of the rated speed, 0.010 with a compensated dead
-//! time. An error in L_q shifts the angle as it does in every back-EMF method.
+//! time. An error in L_q shifts the angle, as in every back-EMF method.
 
 use crate::estimator::{Context, Estimate, Estimating, Sample};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
@@ -65,13 +65,13 @@ const WANDERING_TIME: f64 = 0.05;
 /// Parameters: spectral densities.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KalmanParameters {
-    /// Of the estimated d-axis voltage in V2.s, > 0.
+    /// Density of the estimated d-axis voltage in V2.s, > 0.
     pub voltage_d: f64,
-    /// Of the estimated q-axis voltage in V2.s, > 0.
+    /// Density of the estimated q-axis voltage in V2.s, > 0.
     pub voltage_q: f64,
-    /// Of the electrical acceleration in rad2/s3, > 0.
+    /// Density of the electrical acceleration in rad2/s3, > 0.
     pub acceleration: f64,
-    /// Of the measured current in A2.s, > 0.
+    /// Density of the measured current in A2.s, > 0.
     pub current: f64,
 }
 

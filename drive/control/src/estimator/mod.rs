@@ -57,8 +57,9 @@ pub struct Sample {
     /// Stator current measured at sample k - 1, in A; the first sample repeats the current of sample 0.
     pub i_last: AlphaBeta,
     /// Stator voltage command that acted in [k - 1, k), in V: limited, with injection, without dead-time compensation
-    /// (with `compensation.observe`: with it, less what the legs lose at the measured currents), held in stator axes. It is the command of sample k - 1 - delay, and so is the injection in it: identify the
-    /// carrier from `u_injected`, not from the most recently requested sign.
+    /// (with `compensation.observe`: with it, less what the legs lose at the measured currents), held in stator axes. It
+    /// is the command of sample k - 1 - delay, and so is the injection in it: identify the carrier from `u_injected`, not
+    /// from the most recently requested sign.
     pub u: AlphaBeta,
     /// The injected part of `u`, in V, reduced in the same way as `u` if the voltage limit applied.
     pub u_injected: AlphaBeta,
@@ -68,7 +69,7 @@ pub struct Sample {
     pub i_ref: DqHat,
     /// Torque reference of sample k - 1, limited, in N.m.
     pub tau_ref: f64,
-    /// Least bandwidth of a tracker in rad/s that field weakening asks for; 0: none.
+    /// Least bandwidth of a tracker in rad/s that field weakening requires; 0: none.
     pub rho: f64,
     /// Electrical angle from a sensor in rad.
     pub theta_meas: f64,
@@ -76,11 +77,11 @@ pub struct Sample {
     pub w_meas: f64,
     /// DC-link voltage in V.
     pub u_dc: f64,
-    /// Mechanical speed asked for, in rad/s; none in torque mode.
+    /// Mechanical speed reference in rad/s; none in torque mode.
     pub speed_ref: Option<f64>,
 }
 
-/// An estimator's inputs besides the sample: parameters and the controller's estimates.
+/// An estimator's inputs in addition to the sample: parameters and the controller's estimates.
 #[derive(Clone, Copy, Debug)]
 pub struct Context<'a> {
     /// The estimators' parameters.
@@ -170,7 +171,7 @@ pub trait Estimating: Sized {
         let _ = (old, new);
     }
 
-    /// Stator resistance in Ohm that the estimator uses: the estimate `R_s` of the motor, unless it adapts it; asked only
+    /// Stator resistance in Ohm that the estimator uses: the estimate `R_s` of the motor, unless it adapts it; called only
     /// with `adaptation.resistance`.
     fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
         let _ = par;

@@ -5,7 +5,7 @@
 //! [`saliency`].
 //! - Heterodyne: band-pass, times 2 u, low-pass ([`carrier`]): eps = T_s D V^2 sin(2 theta~).
 //! - 45-degree measurement axes (Fig. 10): the magnitudes of (x_d + x_q) / sqrt 2 and (x_d - x_q) / sqrt 2 are equal where
-//!   theta~ = 0. Rectified, subtracted, low-pass: 2 sqrt 2 / pi T_s D V sin(2 theta~), whatever the phase of the carrier.
+//!   theta~ = 0. Rectified, subtracted, low-pass: 2 sqrt 2 / pi T_s D V sin(2 theta~), for any phase of the carrier.
 //!
 //! The error is e = eps / (2 T_s D V^2). Correction to the paper: (44) has cos^2 and sin^2 of theta~ and no 1/2, so
 //! (45) is low by a factor of 2. Limits: the filters add delay; e has zeros at 0, 90 and 180 deg, of which 90 deg is
@@ -45,9 +45,9 @@ impl Default for PulsatingParameters {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PulsatingInjection {
     tracker: Tracker,
-    /// For the current.
+    /// Filter of the current.
     notch: BandPass<Estimated>,
-    /// For the response to the injected voltage.
+    /// Filter of the response to the injected voltage.
     band_pass: BandPass<Estimated>,
     low_pass: PeriodMean,
 }

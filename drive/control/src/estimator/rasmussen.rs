@@ -62,7 +62,7 @@ pub struct Rasmussen {
     theta: f64,
     /// Estimated electrical speed in rad/s.
     w: f64,
-    /// The frame at the next sample: a sample does not begin with a wait for its sine and cosine.
+    /// The frame at the next sample, computed in advance: the next sample does not wait for its sine and cosine.
     next: Axis<Estimated>,
     /// Adaptation of the resistance.
     resistance: Resistance,
@@ -110,7 +110,7 @@ impl Estimating for Rasmussen {
         if par.adaptation.resistance { self.resistance.R } else { motor.R_s }
     }
 
-    /// What was learned of the resistance stays.
+    /// The adapted resistance stays.
     fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
         *self = Self { resistance: self.resistance, ..Self::start(context, sample, theta, w).0 };
     }

@@ -7,16 +7,16 @@
 //! dx/dt = -c_1 x + w y + R~ i_d        dy/dt = -w (x + d) + R~ i_q
 //! ```
 //!
-//! **At rest** (w = 0), x settles at R~ i_d / c_1, whatever psi_M^ and theta~ are. So R^ follows, at the `bandwidth` b:
+//! **At rest** (w = 0), x settles at R~ i_d / c_1 for any psi_M^ and theta~. So R^ follows, at the `bandwidth` b:
 //!
 //! ```text
 //! dR^/dt = b c_1 g x i_d / (i_d^2 + i_q^2 + i^2),   g = (1 - (w_f / (2 rad/s))^2)^4 at rest, otherwise 0
 //! ```
 //!
-//! w_f is the low-passed mechanical speed; beyond 2 rad/s, g is 0. R^ adapts only where standstill is asked for: at a creeping speed the same
-//! law gives s^3 + c_1 s^2 + (w^2 + k i_d) s + k w i_q, unstable for w i_q < 0. There, x = R~ i_q / w - d shows R~ only
-//! beside the error of psi_M^, and a fast k with i_q / w as regressor lost 3 to 7 of 56 creeping cells with a generating
-//! load. R^ therefore stays constant while a speed is asked for, unless it is tracked.
+//! w_f is the low-passed mechanical speed; beyond 2 rad/s, g is 0. R^ adapts only while the reference is standstill: at a
+//! creeping speed the same law gives s^3 + c_1 s^2 + (w^2 + k i_d) s + k w i_q, unstable for w i_q < 0. There, x = R~ i_q / w - d shows R~ only
+//! together with the error of psi_M^, and a fast k with i_q / w as regressor lost 3 to 7 of 56 creeping cells with a generating
+//! load. R^ therefore stays constant while the reference is a speed, unless it is tracked.
 //!
 //! **At creep**, the steady state is sin theta~ = -(c_1 d + R~ i_d) / (w psi_M) + c_1 R~ i_q / (w^2 psi_M). A constant
 //! c_1 lets both terms grow without limit towards w = 0: at 30 rpm, psi_M^ = 1.2 psi_M has no equilibrium. With
@@ -39,11 +39,11 @@
 //!
 //! **k_a** adds the voltage k_a R_nom g i_q on the q-axis, which acts like a lower R^ there: dy/dt = k_a R_nom i_q
 //! turns the frame until i_d carries the load, the safe side at rest, where theta~ is not observable: with an exact R^
-//! an offset of current or voltage makes it drift. It also acts where the asked-for speed and i_q have the same sign:
+//! an offset of current or voltage makes it drift. It also acts where the speed reference and i_q have the same sign:
 //! a start under load then leaves the false lock at the limit of i_q. For a generating load it would be unstable.
 //!
-//! Not observable: R^ without current or while a speed is asked for; theta~ at rest; psi_M^ at rest. In torque mode
-//! nothing tells when the rotor may stand: R^ stays `motor.R_s`.
+//! Not observable: R^ without current or while the reference is a speed; theta~ at rest; psi_M^ at rest. In torque mode
+//! nothing indicates whether the rotor is at standstill: R^ stays `motor.R_s`.
 
 use crate::estimator::{Context, Sample, Setup};
 use drive_base::frame::DqHat;
@@ -52,9 +52,9 @@ use fmu_core::unit::{AMPERE, ONE, PER_SECOND};
 use fmu_core::{Fault, Row, Table};
 use serde::{Deserialize, Serialize};
 
-/// Mechanical speed in rad/s below which a speed reference asks for standstill.
+/// Mechanical speed in rad/s below which a speed reference counts as standstill.
 pub(super) const STANDSTILL: f64 = 0.05;
-/// Mechanical speed in rad/s from which on nothing adapts.
+/// Mechanical speed in rad/s above which nothing adapts.
 const GATE: f64 = 2.0;
 /// Corner frequency in rad/s of the low-pass filter of the speed.
 pub(super) const FILTER: f64 = 100.0;
@@ -83,7 +83,7 @@ pub struct ResistanceParameters {
     pub k_c: f64,
     /// Rate at which R^ follows R at creep divided by the electrical speed, >= 0; 0: R^ stays constant there.
     pub tracking: f64,
-    /// Error of psi_M^ that is no sign of R, as a share of psi_M^, >= 0.
+    /// Error of psi_M^ that the tracking does not take for one of R, as a share of psi_M^, >= 0.
     pub flux: f64,
 }
 
@@ -105,7 +105,8 @@ impl Default for ResistanceParameters {
 }
 
 impl ResistanceParameters {
-    /// First estimate in Ohm: `motor.R_s` in torque mode, where nothing tells when the rotor may stand.
+    /// First estimate in Ohm: `motor.R_s` in torque mode, where nothing indicates
+    /// whether the rotor is at standstill.
     pub(super) fn first(&self, motor: &Motor, sample: &Sample) -> f64 {
         let share = if sample.speed_ref.is_some() { self.start } else { 1.0 };
         share * motor.R_s
@@ -220,7 +221,7 @@ pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
         &[
             P::boolean_parameter(
                 "resistance",
-                "Rasmussen (while standstill is asked for) and FluxObserver adapt the resistance, the others refuse it; false: motor.R_s",
+                "Rasmussen (while the reference is standstill) and FluxObserver adapt the resistance, the others refuse it; false: motor.R_s",
                 |p| &mut p.resistance,
             ),
             P::parameter(

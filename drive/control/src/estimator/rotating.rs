@@ -23,9 +23,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RotatingInjection {
     tracker: Tracker,
-    /// For the measured current.
+    /// Filter of the measured current.
     notch: BandPass<Stator>,
-    /// For the response to the injected voltage.
+    /// Filter of the response to the injected voltage.
     band_pass: BandPass<Stator>,
     low_pass: PeriodMean,
 }

@@ -68,7 +68,7 @@ impl Tracker {
     }
 
     /// Corrects the state with the angle error `e` (rad) and the bandwidth `rho` (rad/s): the angle from the next
-    /// sample on, the speed immediately. Field weakening may ask for a faster one.
+    /// sample on, the speed immediately. Field weakening may require a faster one.
     #[inline]
     pub fn correct(&mut self, context: &Context, rho: f64, e: f64, sample: &Sample) {
         let (T_s, rho) = (context.T_s, at_least(rho, sample.rho));
