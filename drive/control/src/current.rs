@@ -254,4 +254,68 @@ mod tests {
         // limitation = -K_p e: the integral part stays bounded at the limit instead of growing with K_i e t.
         assert!((c.integral.q() - limit).abs() < 1e-6, "{:?}", c.integral);
     }
+
+    /// Loops with every combination of the options.
+    fn loops() -> [CurrentLoop; 4] {
+        let with = |active_resistance, reference_feed_forward| CurrentLoop {
+            active_resistance,
+            reference_feed_forward,
+            ..CurrentLoop::default()
+        };
+        [with(false, false), with(true, false), with(false, true), with(true, true)]
+    }
+
+    /// On the currents of its references, the command is the voltage of the turning machine, u = R i + j w psi, once the
+    /// integrators hold what the decoupling leaves.
+    #[test]
+    fn the_command_is_the_voltage_of_the_turning_machine() {
+        let motor = Motor::IPMSM_2_2_KW;
+        for par in loops() {
+            for (i, w) in
+                [(DqHat::new(-2.0, 5.0), 300.0), (DqHat::new(1.0, -7.0), 300.0), (DqHat::new(-3.0, 4.0), -200.0)]
+            {
+                let psi = drive_plant::machine::flux(&motor, drive_base::frame::Dq::new(i.d(), i.q()));
+                let u = i * motor.R_s + DqHat::new(psi.d(), psi.q()).turned() * w;
+                let gains = CurrentGains::new(&par, &motor);
+                let by = |L: f64| par.bandwidth * L - motor.R_s;
+                let active = DqHat::new(by(motor.L_d) * i.d(), by(motor.L_q) * i.q());
+                let left = if par.reference_feed_forward { DqHat::ZERO } else { i * motor.R_s };
+                let integral = left + if par.active_resistance { active } else { DqHat::ZERO };
+                let command = CurrentController { integral }.command(&gains, &motor, i, i, w);
+                assert!((command - u).magnitude() < 1e-9, "{par:?} {i:?} {w}: {command:?}, not {u:?}");
+            }
+        }
+    }
+
+    /// An error adds K_p of its axis to the command, whatever else is in it, and this is what `output` shows too.
+    #[test]
+    fn an_error_acts_with_the_proportional_gain_of_its_axis() {
+        let motor = Motor::IPMSM_2_2_KW;
+        let gains = CurrentGains::new(&CurrentLoop::default(), &motor);
+        let c = CurrentController { integral: DqHat::new(3.0, -4.0) };
+        let (i, error) = (DqHat::new(-2.0, 5.0), DqHat::new(0.1, -0.2));
+        let w_c = CurrentLoop::default().bandwidth;
+        let expected = DqHat::new(w_c * motor.L_d * 0.1, w_c * motor.L_q * -0.2);
+        let added = c.command(&gains, &motor, i + error, i, 300.0) - c.command(&gains, &motor, i, i, 300.0);
+        assert!((added - expected).magnitude() < 1e-9, "{added:?}, not {expected:?}");
+        assert!((c.output(&gains, error) - c.integral - expected).magnitude() < 1e-9);
+    }
+
+    #[test]
+    fn tuning_does_not_change_the_command() {
+        let motor = Motor::IPMSM_2_2_KW;
+        let (i_ref, i) = (DqHat::new(-2.0, 5.0), DqHat::new(-1.7, 4.4));
+        for par in loops() {
+            let other = Motor { R_s: 1.3 * motor.R_s, ..motor.clone() };
+            let [old, new] = [
+                CurrentGains::new(&par, &motor),
+                CurrentGains::new(&CurrentLoop { bandwidth: 0.6 * par.bandwidth, ..par.clone() }, &other),
+            ];
+            let mut c = CurrentController { integral: DqHat::new(3.0, -4.0) };
+            let before = c.command(&old, &motor, i_ref, i, 300.0);
+            c.retune(&old, &new, i_ref, i);
+            let after = c.command(&new, &motor, i_ref, i, 300.0);
+            assert!((after - before).magnitude() < 1e-9, "{par:?}: {before:?} {after:?}");
+        }
+    }
 }

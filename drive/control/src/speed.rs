@@ -188,4 +188,41 @@ mod tests {
         held.update(&gains, -1.0, 0.0, (-6.0, 6.0), 1e-4);
         assert!(held.integral < 7.0, "the error drives it out: it moves");
     }
+
+    /// K_p (b w_ref - w) + I, and I grows with K_i (w_ref - w).
+    #[test]
+    fn the_output_is_that_of_a_weighted_set_point() {
+        let gains = SpeedGains::new(&SpeedLoop { b: 0.4, ..SpeedLoop::default() }, 1.5e-3, 0.675);
+        let mut c = SpeedController { integral: 0.7 };
+        let (i_q_ref, wanted) = c.update(&gains, 20.0, 11.0, (-6.0, 6.0), 1e-4);
+        assert!((i_q_ref - (gains.k_p * (0.4 * 20.0 - 11.0) + 0.7)).abs() < 1e-12 && (wanted - i_q_ref).abs() < 1e-15);
+        assert!((c.integral - 0.7 - 1e-4 * gains.k_i * 9.0).abs() < 1e-12);
+        let (low, _) = c.update(&gains, 0.0, 90.0, (-6.0, 6.0), 1e-4);
+        assert!((low + 6.0).abs() < 1e-15, "the lower limit: {low}");
+    }
+
+    #[test]
+    fn tuning_and_a_handover_do_not_change_the_output() {
+        let [old, new] = [80.0, 30.0].map(|bandwidth| {
+            SpeedGains::new(&SpeedLoop { bandwidth, b: 0.01 * bandwidth, ..SpeedLoop::default() }, 1.5e-3, 0.675)
+        });
+        let (w_ref, w, limits) = (20.0, 11.0, (-60.0, 60.0));
+        let mut c = SpeedController { integral: 0.7 };
+        let (before, _) = c.clone().update(&old, w_ref, w, limits, 1e-4);
+        c.retune(&old, &new, w_ref, w);
+        let (after, _) = c.update(&new, w_ref, w, limits, 1e-4);
+        assert!((after - before).abs() < 1e-12, "{before} {after}");
+        let (begins, _) = SpeedController::take_over(&new, w_ref, w, 2.5).update(&new, w_ref, w, limits, 1e-4);
+        assert!((begins - 2.5).abs() < 1e-12, "{begins}");
+    }
+
+    /// While a limit falls, the integral follows it: what is wanted comes to the limit at the given rate.
+    #[test]
+    fn the_integral_follows_a_limit() {
+        let mut c = SpeedController { integral: 5.0 };
+        for _ in 0..1000 {
+            c.follow(80.0, 2.0 - c.integral, 1e-4);
+        }
+        assert!((c.integral - 2.0 - 3.0 * (-8.0_f64).exp()).abs() < 1e-4, "{}", c.integral);
+    }
 }

@@ -210,3 +210,72 @@ pub const START: &Table<StartParameters> = &Table::new(
         ]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use drive_base::frame::{AlphaBeta, Axis, Estimated, Rotor};
+    use drive_base::math::wrap;
+    use drive_base::motor::Motor;
+    use drive_plant::machine::flux;
+
+    const T_S: f64 = 1e-4;
+
+    /// Runs the start next to a rotor at `rotor(frame, t)` (rad, for the frame's angle and the time in s) that has the currents
+    /// asked for, until it hands over or `seconds` are over; returns the last step and the rotor's angle.
+    fn beside(reference: f64, seconds: f64, rotor: impl Fn(f64, f64) -> f64) -> (StartStep, f64) {
+        let (motor, par, estimators) = (Motor::default(), StartParameters::default(), EstimatorParameters::default());
+        let context = Context { par: &estimators, motor: &motor, J: 1.5e-3, T_s: T_S };
+        let mut start = CurrentFrequencyStart::default();
+        let (mut i_last, mut psi_last, mut theta_last) = (AlphaBeta::ZERO, None, 0.0);
+        let (mut frame, mut i_ref, mut t) = (-FRAC_PI_2, DqHat::ZERO, 0.0);
+        loop {
+            let theta = rotor(frame, t);
+            let axis = Axis::<Rotor>::at(theta);
+            let i = Axis::<Estimated>::at(frame).to_stator(i_ref);
+            let psi = axis.to_stator(flux(&motor, axis.from_stator(i)));
+            let u = (psi - psi_last.unwrap_or(psi)) * (1.0 / T_S) + (i_last + i) * (0.5 * motor.R_s);
+            let sample = Sample { i, i_last, u, ..Sample::default() };
+            let step = start.update(&par, &context, 0.0, reference, &sample);
+            let StartStep::Current { theta: at, w, i_ref: next } = step else { return (step, theta) };
+            t += T_S;
+            if t >= seconds {
+                return (step, theta_last);
+            }
+            (i_last, psi_last, theta_last) = (i, Some(psi), theta);
+            (frame, i_ref) = (at + T_S * w, next);
+        }
+    }
+
+    /// The rotor lags behind its current vector or leads it: the estimator takes over at the rotor, in both directions.
+    #[test]
+    fn hands_over_at_the_rotor() {
+        for (reference, off) in [(50.0, -0.4), (50.0, 0.3), (-50.0, 0.4), (-50.0, -0.3)] {
+            let (step, rotor) = beside(reference, 60.0, |frame, _| frame + off);
+            let StartStep::HandOver { theta, w, .. } = step else { panic!("{reference} rad/s: {step:?}") };
+            let error = wrap(theta - rotor).to_degrees();
+            println!("{reference} rad/s, {off} rad: {error} deg off, {w} rad/s");
+            assert!(error.abs() < 0.01, "{reference} rad/s, {off} rad: {error} deg");
+            let speed = StartParameters::default().speed * 3.0;
+            assert!((w - speed.copysign(reference)).abs() < 1e-9, "{w} rad/s");
+        }
+    }
+
+    /// A rotor that turns through the aligned frame is braked: i_q = -2 zeta w_0 J / (n_p K) w.
+    #[test]
+    fn damps_the_rotor() {
+        let motor = Motor::default();
+        let (n_p, K, J) = (3.0, motor.torque_constant(), 1.5e-3);
+        let w_0 = (n_p * K * StartParameters::default().i / J).sqrt();
+        for w in [4.0, -4.0] {
+            let seconds = 0.9 * StartParameters::default().t_align;
+            // At the end, the rotor passes the frame.
+            let (step, _) = beside(50.0, seconds, |frame, t| frame + w * (t - seconds));
+            let StartStep::Current { i_ref, .. } = step else { panic!("{step:?}") };
+            let expected = -2.0 * ZETA * w_0 * J / (n_p * K) * w;
+            println!("{w} rad/s: {} A, {expected} A", i_ref.q());
+            assert!((i_ref.q() / expected - 1.0).abs() < 0.01, "{w} rad/s: {} A, not {expected} A", i_ref.q());
+        }
+    }
+}

@@ -409,4 +409,66 @@ mod tests {
         }
         assert!((offset.i.a - 0.02).abs() < 1e-5, "{}", offset.i.a);
     }
+
+    fn controller(set: impl FnOnce(&mut ControllerParameters)) -> (Gains, ControllerParameters) {
+        let mut controller = crate::SensorlessController::default();
+        set(&mut controller.parameters);
+        fmu_core::Model::derive(&mut controller);
+        (controller.gains, controller.parameters)
+    }
+
+    /// i_d of the low-speed law fades into that of maximum torque per ampere, and i_q gives the rest of the torque.
+    #[test]
+    fn the_currents_give_the_torque_at_every_speed() {
+        let (gains, par) = controller(|p| {
+            (p.motor, p.current.mtpa) = (Motor::IPMSM_2_2_KW, true);
+            (p.limit.i, p.limit.i_q, p.zero_speed.i_0) = (15.0, 15.0, 4.0);
+        });
+        for tau in [3.0, -9.0] {
+            for (speed, law_share) in [(0.0, 1.0), (-10.0 * std::f64::consts::LN_2, 0.5), (1e4, 0.0)] {
+                let law = gains.law(&par, speed);
+                let i = gains.currents(&par, &law, tau / gains.k);
+                let torque = par.motor.torque(i.d(), i.q());
+                assert!((torque - tau).abs() < 1e-9, "{tau} N.m at {speed} rad/s: {torque} N.m");
+                assert!((law.share - law_share).abs() < 1e-12 && (law.i_d - 4.0 * law_share).abs() < 1e-12);
+            }
+            let [still, fast] = [0.0, 1e4].map(|speed| gains.currents(&par, &gains.law(&par, speed), tau / gains.k));
+            assert!((still.d() - 4.0).abs() < 1e-12, "at rest the law alone: {still:?}");
+            let mtpa = max_torque_per_ampere(&par.motor, tau);
+            assert!((fast - mtpa).magnitude() < 1e-6, "at speed: {fast:?}, not {mtpa:?}");
+        }
+    }
+
+    /// The torque of the limit has exactly the limit's current.
+    #[test]
+    fn the_low_speed_law_leaves_the_rest_of_the_current_limit() {
+        let (gains, par) = controller(|p| (p.limit.i, p.limit.i_q, p.zero_speed.i_0) = (5.0, 5.0, 3.0));
+        let law = gains.law(&par, 0.0);
+        assert!((law.limit - 4.0).abs() < 1e-12, "{} A", law.limit);
+        let (others, par) = controller(|p| p.estimator = crate::estimator::Kind::ExtendedEmf);
+        let law = others.law(&par, 0.0);
+        assert!(law.i_d.abs() < 1e-15 && (law.limit - 6.0).abs() < 1e-12, "no law: {} A", law.limit);
+    }
+
+    /// The voltage in stator axes stays when the frame changes at the handover, and so does the torque.
+    #[test]
+    fn a_handover_keeps_voltage_and_torque() {
+        let (gains, par) = controller(|p| p.speed_loop.ramp = 100.0);
+        let mut state = State::default();
+        state.current.integrate(&gains.current, DqHat::new(30.0, -50.0), None, 1e-2);
+        let (theta, theta_frame, w) = (0.9, 1.3, 60.0);
+        let voltage = |state: &State, theta: f64| {
+            Axis::<Estimated>::at(theta).to_stator(state.current.output(&gains.current, DqHat::ZERO))
+        };
+        let before = voltage(&state, theta_frame);
+        let i = Axis::<Estimated>::at(theta).to_stator(DqHat::new(0.5, 2.0));
+        let sample = Sample { i, ..Sample::default() };
+        state.take_over(&gains, &par, 100.0, &sample, (theta, w, theta_frame));
+        assert!((voltage(&state, theta) - before).magnitude() < 1e-12 && before.magnitude() > 1.0);
+        let speed = w / f64::from(par.motor.n_p);
+        assert!((state.w_ref - speed).abs() < 1e-12, "the ramp begins at the rotor's speed: {}", state.w_ref);
+        let inputs = ControllerInputs { speed_ref: 100.0, ..ControllerInputs::default() };
+        let References { i, .. } = state.references(&gains, None, &par, &inputs, speed, Injection::None);
+        assert!((i.q() - 2.0).abs() < 1e-9, "the torque stays: {i:?}");
+    }
 }

@@ -60,3 +60,29 @@ impl LeastTracker {
         (self.half + (self.half * self.half + self.per_slope * slope.max(0.0)).sqrt()).min(self.most)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tables::ControllerParameters;
+
+    /// rho / m = part + A / rho for the PLL, A = 8/3 (rho / m)^2 for the mechanical observer, and no more than the bounds.
+    #[test]
+    fn the_least_bandwidth_fulfills_its_equation() {
+        let mut par = ControllerParameters { estimator: Kind::ExtendedEmf, ..ControllerParameters::default() };
+        par.estimators.emf.bandwidth = 1e4;
+        par.estimators.tracker.bandwidth = 200.0;
+        (par.speed_loop.bandwidth, par.speed_loop.t_is) = (40.0, 4.0);
+        let (part, inertia) = (40.0, par.J / f64::from(par.motor.n_p));
+        for slope in [0.0, 5.0, 40.0] {
+            let (A, rho) = (slope / inertia, LeastTracker::new(&par).at(slope));
+            assert!((rho / MARGIN - part - A / rho).abs() < 1e-9 || rho >= MOST_PER_SAMPLE / par.T_s, "{slope}: {rho}");
+        }
+        par.estimators.tracker.kind = TrackerKind::MechanicalObserver;
+        let (A, rho) = (5.0 / inertia, LeastTracker::new(&par).at(5.0));
+        assert!((rho * rho - 0.375 * MARGIN * A).abs() < 1e-6 * rho * rho, "{rho}");
+        par.estimators.emf.bandwidth = 90.0;
+        assert!((LeastTracker::new(&par).at(1e9) - 30.0).abs() < 1e-9, "a third of the EMF's bandwidth");
+        assert!(LeastTracker::new(&par).at(-5.0).abs() < 1e-12, "no torque by angle, no bound");
+    }
+}

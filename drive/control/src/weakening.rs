@@ -346,3 +346,47 @@ pub const WEAKENING: &Table<WeakeningParameters> = &Table::new(
         ]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use drive_base::motor::Motor;
+
+    /// A request above k_t lowers the voltage of the references at the rate `bandwidth`, one below it raises it again, within
+    /// its bounds.
+    #[test]
+    fn the_trim_lowers_the_voltage_while_too_much_is_requested() {
+        let (par, u_dc) = (WeakeningParameters { used: true, ..WeakeningParameters::default() }, 540.0);
+        let (highest, mut weakening) = (u_dc * INVERSE_SQRT_3, Weakening::default());
+        weakening.integrate(&par, (par.k_t + 0.02) * highest, u_dc, 1e-4);
+        let expected = 1e-4 * par.bandwidth * 0.02 * highest;
+        assert!((weakening.trim - expected).abs() < 1e-9, "{} V, not {expected} V", weakening.trim);
+        let gains = WeakeningGains::new(&ControllerParameters::default(), 3.0, false);
+        weakening.limits(&gains, &par, (1.0, u_dc, 10.0), 5.0, 0);
+        assert!((weakening.U - (par.k_u * highest - expected - 10.0)).abs() < 1e-9, "{} V", weakening.U);
+        for _ in 0..200_000 {
+            weakening.integrate(&par, 1.2 * highest, u_dc, 1e-4);
+        }
+        assert!((weakening.trim - GREATEST_TRIM * highest).abs() < 1e-9, "{} V", weakening.trim);
+        for _ in 0..200_000 {
+            weakening.integrate(&par, 0.5 * highest, u_dc, 1e-4);
+        }
+        assert!(weakening.trim.abs() < 1e-12, "{} V", weakening.trim);
+    }
+
+    /// Up to the onset, the voltage of the torque's currents fits, and it does not above.
+    #[test]
+    fn the_onset_is_where_the_voltage_is_used_up() {
+        let motor = Motor::IPMSM_2_2_KW;
+        let par = ControllerParameters { motor: motor.clone(), ..ControllerParameters::default() };
+        let gains = WeakeningGains::new(&par, 14.0, true);
+        let i = max_torque_per_ampere(&motor, 14.0);
+        let w = gains.onset(200.0);
+        let u = i * motor.R_s + DqHat::new(motor.psi_M + motor.L_d * i.d(), motor.L_q * i.q()).turned() * w;
+        assert!(
+            (u.magnitude() / 200.0 - 1.0).abs() < 0.01 && u.magnitude() < 200.0 + 1e-9,
+            "{} V at {w} rad/s",
+            u.magnitude()
+        );
+    }
+}

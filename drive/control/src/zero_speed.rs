@@ -106,4 +106,15 @@ mod tests {
         assert!((law.i_d_ref(0.0) - 5.0).abs() < 1e-15);
         assert!((law.i_d_ref(-10.0) - 5.0 / std::f64::consts::E).abs() < 1e-14);
     }
+
+    /// i_0 holds a load of up to K i_0: the share at a speed is the one of both directions, and w_0 its scale.
+    #[test]
+    fn the_share_follows_the_speed() {
+        let law = ZeroSpeed { i_0: 4.0, w_0: 20.0 };
+        for (speed, share) in
+            [(0.0, 1.0), (20.0_f64 * std::f64::consts::LN_2, 0.5), (-20.0 * std::f64::consts::LN_2, 0.5)]
+        {
+            assert!((law.share(speed) - share).abs() < 1e-12 && (law.i_d_ref(speed) - 4.0 * share).abs() < 1e-12);
+        }
+    }
 }
