@@ -7,16 +7,14 @@
 mod machines;
 
 use drive::Pair;
-use drive::control::envelope::{Envelope, Limit, WarmStart};
-use drive::control::reference::max_torque_per_ampere;
+use drive::control::envelope::{Envelope, WarmStart};
 use drive::control::tables::ControllerParameters;
-use drive::control::weakening::{WeakeningGains, WeakeningParameters};
 use drive::estimator::Kind;
-use drive::frame::DqHat;
 use drive::motor::Motor;
 use fmu_core::Warns;
 use fmu_core::log::Warnings;
-use machines::{Machine, RPM, a, b, c};
+use machines::{Machine, RPM, a, b, c, currents};
+use std::f64::consts::TAU;
 
 const T_S: f64 = 1e-4;
 

@@ -244,15 +244,15 @@ mod tests {
 
     #[test]
     fn back_calculation_settles_where_the_command_is_the_limit() {
-        let (motor, mut c) = (Motor::default(), CurrentController::default());
+        let (motor, mut c) = (Motor::IPMSM_2_2_KW, CurrentController::default());
         let gains = CurrentGains::new(&CurrentLoop::default(), &motor);
-        let (i_ref, i, limit) = (DqHat::new(0.0, 5.0), DqHat::ZERO, 20.0);
+        let (i_ref, i, limit) = (DqHat::new(-3.0, 5.0), DqHat::ZERO, DqHat::new(-12.0, motor.psi_M + 20.0));
         for _ in 0..100_000 {
-            let wanted = c.command(&gains, &motor, i_ref, i, 0.0).q();
-            c.integrate(&gains, i_ref - i, Some(DqHat::new(0.0, limit - wanted)), 1e-4);
+            let wanted = c.command(&gains, &motor, i_ref, i, 0.0);
+            c.integrate(&gains, i_ref - i, Some(limit - wanted), 1e-4);
         }
         // limitation = -K_p e: the integral part stays bounded at the limit instead of growing with K_i e t.
-        assert!((c.integral.q() - limit).abs() < 1e-6, "{:?}", c.integral);
+        assert!((c.integral - limit).magnitude() < 1e-6, "{:?}", c.integral);
     }
 
     /// Loops with every combination of the options.

@@ -330,4 +330,65 @@ mod tests {
         let u = u.to_stator();
         assert!((u.beta().atan2(u.alpha()) - 0.06).abs() < 1e-12, "{u:?}");
     }
+
+    /// A controller whose frame turns at `w` (rad/s).
+    fn turning(w: f64, set: impl FnOnce(&mut SensorlessController)) -> (SensorlessController, Frame) {
+        let mut controller = SensorlessController::default();
+        set(&mut controller);
+        controller.derive();
+        controller.initialize();
+        let half = Turn::new(0.5 * controller.parameters.T_s * w);
+        (controller, Frame { axis: Axis::at(0.7), theta: 0.7, w, half, i: DqHat::ZERO, injection: Injection::None })
+    }
+
+    /// The voltage beyond the hexagon drives the integrators back: the request settles K_p e beyond it instead of growing with the
+    /// error.
+    #[test]
+    fn what_the_hexagon_cuts_off_drives_the_integrators_back() {
+        let (mut controller, frame) = turning(200.0, |c| c.inputs.u_dc = 60.0);
+        let mut request =
+            |n: u32| (0..n).map(|_| controller.modulate(Mode::ClosedLoop, &frame, DqHat::new(-2.0, 4.0), false)).last();
+        let (_, limited, share) = request(20_000).unwrap();
+        let (.., later) = request(20_000).unwrap();
+        assert!(limited && share < 2.5 && (later - share).abs() < 1e-3, "{share} and later {later} of u_dc / sqrt 3");
+    }
+
+    /// What the dead time takes from the legs is added, in the direction of the current that is asked for.
+    #[test]
+    fn the_compensation_adds_the_loss_of_the_legs() {
+        let (mut controller, frame) = turning(0.0, |c| c.parameters.compensation.u_dead = 6.5);
+        let i_ref = DqHat::new(0.0, 4.0);
+        let at = |u: Phases| frame.axis.from_stator(u.to_stator());
+        let (with, ..) = controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, i_ref, false);
+        let command = frame.axis.from_stator(controller.state.commands[0].u);
+        assert!((command - DqHat::new(0.0, 20.0)).magnitude() < 1e-9, "the estimators see the command: {command:?}");
+        let more = (at(with) - command).q();
+        assert!(more > 6.5 && more < 6.5 * 4.0 / 3.0 + 1e-9, "{more} V");
+    }
+
+    /// The next sample reads what the PI gave, and the torque of the references.
+    #[test]
+    fn the_next_sample_reads_references_and_output() {
+        let (mut controller, frame) = turning(0.0, |_| ());
+        let (i_ref, i) = (DqHat::new(-1.0, 3.0), DqHat::new(-0.5, 2.0));
+        controller.keep(&Sample::default(), i_ref, i);
+        let (par, state) = (&controller.parameters, &controller.state);
+        let expected = (i_ref - i) * (par.current.bandwidth * par.motor.L_d);
+        assert!((state.u_pi - expected).magnitude() < 1e-9, "{:?}, not {expected:?}", state.u_pi);
+        assert!(
+            (state.tau_ref - par.motor.torque(-1.0, 3.0)).abs() < 1e-12 && (state.i_ref - i_ref).magnitude() < 1e-15
+        );
+        assert_eq!(frame.theta.to_bits(), 0.7_f64.to_bits());
+    }
+
+    /// The angle that is shown is that of the next sample, and the least torque is below 0.
+    #[test]
+    fn the_outputs_are_for_the_next_sample() {
+        let (mut controller, _) = turning(0.0, |c| c.parameters.estimator = crate::estimator::Kind::Sensored);
+        (controller.inputs.theta_meas, controller.inputs.speed_meas) = (0.4, 100.0);
+        let out = controller.cycle(false);
+        assert!((out.theta_est - 0.4 - 1e-4 * 300.0).abs() < 1e-12 && (out.speed_est - 100.0).abs() < 1e-12, "{out:?}");
+        let most = controller.gains.k * controller.parameters.limit.i_q;
+        assert!((out.tau_max - most).abs() < 1e-12 && (out.tau_min + most).abs() < 1e-12, "{out:?}");
+    }
 }

@@ -9,9 +9,8 @@ mod machines;
 use drive_base::frame::DqHat;
 use drive_base::motor::Motor;
 use drive_control::envelope::{Limit, WarmStart};
-use drive_control::reference::max_torque_per_ampere;
 use drive_control::weakening::{Weakening, WeakeningGains};
-use machines::{Machine, a, b, c};
+use machines::{Machine, a, b, c, currents};
 
 #[test]
 fn the_envelope() {
@@ -97,21 +96,6 @@ fn resistance_counts() {
         let share = without(&c(i)).limit(rpm, 1.0)[1].tau / c(i).limit(rpm, 1.0)[1].tau;
         assert!((share - figure).abs() < 6e-4, "{rpm} rpm: {share}");
     }
-}
-
-/// The currents that the controller asks for.
-fn currents(machine: &Machine, rpm: f64, tau: f64) -> (DqHat, Weakening) {
-    let par = machine.parameters();
-    let most = machine.limit(100.0, 1.0)[1].tau;
-    let gains = WeakeningGains::new(&par, most, true);
-    let (w, mut state) = (machine.w(rpm), Weakening::default());
-    let plain = max_torque_per_ampere(&par.motor, tau);
-    let mut i = DqHat::ZERO;
-    for k in 0..8 {
-        state.limits(&gains, &par.weakening, (w, machine.u_dc, 0.0), most / par.motor.torque_constant(), k);
-        i = state.currents(&gains, tau, w, machine.i, true, || plain);
-    }
-    (i, state)
 }
 
 #[test]

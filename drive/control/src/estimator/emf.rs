@@ -230,4 +230,23 @@ mod tests {
             assert!((direction.update(w, 5.0) - sign).abs() < 1e-15);
         }
     }
+
+    /// Near standstill, the correction of the angle fades and the speed follows e_q / psi_M; at speed, neither.
+    #[test]
+    fn a_reversal_is_held_near_standstill() {
+        let (mut par, motor) = (crate::estimator::EstimatorParameters::default(), drive_base::motor::Motor::default());
+        par.emf.hold_reversal = true;
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
+        let rho = par.tracker.bandwidth;
+        for (w, g) in [(par.emf.w_hold, 0.5), (3.0 * par.emf.w_hold, 0.1), (0.0, 1.0)] {
+            let (mut tracker, mut direction) = (Tracker::at(0.0, w, 1e-4), Direction::of(w));
+            let (angle, length) = (0.1, motor.psi_M * w);
+            let e = DqHat::new(-length * f64::sin(angle), length * f64::cos(angle));
+            follow(&mut tracker, &mut direction, &context, e, &Sample::default());
+            let slow = 1e-4 * g * par.emf.bandwidth / 3.0 * (e.q() / motor.psi_M - w);
+            let expected = if w > 0.0 { (1.0 - g) * angle } else { 0.0 };
+            assert!((tracker.w_frame - w - slow - 2.0 * rho * expected).abs() < 1e-9, "{w} rad/s: {tracker:?}");
+            assert!((tracker.w - w - slow - 1e-4 * rho * rho * expected).abs() < 1e-9, "{w} rad/s: {tracker:?}");
+        }
+    }
 }

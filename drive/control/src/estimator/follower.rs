@@ -104,3 +104,33 @@ pub const MATSUI: &Table<MatsuiParameters> = &Table::new(
         ]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use drive_base::motor::Motor;
+
+    /// Both poles of the angle are at -rho/2: next to a rotor whose speed is off by dw, the error follows dw t e^{-rho t / 2}.
+    #[test]
+    fn both_poles_are_at_half_the_gain() {
+        let (par, motor, w, off) = (EstimatorParameters::default(), Motor::default(), 300.0, 4.0);
+        let (rho, T_s) = (par.matsui.bandwidth, 1e-6);
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s };
+        for sign in [1.0, -1.0] {
+            let mut follower = Follower::at(0.0, sign * w, T_s);
+            let n = 2.0 / (rho * T_s);
+            let (mut theta, mut k) = (0.0, 0.0);
+            while k < n {
+                follower.advance(T_s);
+                theta += T_s * (sign * w + off);
+                follower.correct(&context, -sign * w * motor.psi_M * (theta - follower.theta));
+                k += 1.0;
+            }
+            let (t, error) = (k * T_s, theta - follower.theta);
+            let expected = off * t * (-0.5 * rho * t).exp();
+            assert!((error / expected - 1.0).abs() < 0.01, "{error} rad, not {expected} rad");
+            assert!((follower.speed() - follower.w - follower.x).abs() < 1e-12 && follower.x * off > 0.0);
+        }
+    }
+}

@@ -277,3 +277,83 @@ pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
         ]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+
+    const T_S: f64 = 1e-4;
+
+    /// The adaptation after `seconds` next to a machine of 2 Ohm, from an estimate of `R_hat` (Ohm), with the currents `i` (A) at
+    /// the speed `w` (rad/s) asked for; the flux error is the steady one of the observer, `x` (R~ in Ohm, c_1 in 1/s) in Wb.
+    fn adapted(
+        set: impl FnOnce(&mut EstimatorParameters),
+        (R_hat, i, w): (f64, DqHat, f64),
+        seconds: f64,
+        x: impl Fn(f64, f64) -> f64,
+    ) -> (Resistance, Adapted) {
+        let mut par = EstimatorParameters::default();
+        par.adaptation.resistance = true;
+        set(&mut par);
+        let motor = Motor::default();
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: T_S };
+        let sample = Sample { speed_ref: Some(w / f64::from(motor.n_p)), ..Sample::default() };
+        let mut resistance = Resistance { R: R_hat, ..Resistance::start(&context, &sample, w) };
+        let (mut adapted, mut t) = (Adapted { c_1: par.rasmussen.c_1, v_q: 0.0 }, 0.0);
+        while t < seconds {
+            adapted = resistance.update(&context, &sample, x(2.0 - resistance.R, adapted.c_1), i, w);
+            t += T_S;
+        }
+        (resistance, adapted)
+    }
+
+    /// At rest, x = R~ i_d / c_1: the estimate comes to the resistance from both sides, at the rate
+    /// b i_d^2 / (i_d^2 + i_q^2 + i^2).
+    #[test]
+    fn at_rest_the_estimate_comes_to_the_resistance() {
+        for (R_hat, i_d) in [(1.6, 5.0), (2.6, 5.0), (1.6, -5.0)] {
+            let i = DqHat::new(i_d, 1.0);
+            let (resistance, _) = adapted(|_| (), (R_hat, i, 0.0), 0.1, |error, c_1| error * i_d / c_1);
+            let par = ResistanceParameters::default();
+            let left = (R_hat - 2.0) * (-0.1 * par.bandwidth * 25.0 / (26.0 + par.i * par.i)).exp();
+            assert!((resistance.R - 2.0 - left).abs() < 1e-3, "from {R_hat} Ohm: {} Ohm", resistance.R);
+        }
+    }
+
+    /// At creep, x = R~ i_q / w beyond the uncertainty of the magnet: tracking comes to the resistance in both directions of
+    /// rotation, motoring and generating.
+    #[test]
+    fn tracking_comes_to_the_resistance() {
+        let track = |p: &mut EstimatorParameters| (p.adaptation.tracking, p.adaptation.flux) = (0.15, 0.0);
+        for (w, i_q) in [(10.0, 4.0), (10.0, -4.0), (-10.0, 4.0), (-10.0, -4.0)] {
+            for R_hat in [1.6, 2.6] {
+                let (resistance, _) =
+                    adapted(track, (R_hat, DqHat::new(0.0, i_q), w), 20.0, |error, _| error * i_q / w);
+                assert!((resistance.R - 2.0).abs() < 1e-3, "{w} rad/s, {i_q} A: {} Ohm", resistance.R);
+            }
+        }
+        let (held, _) = adapted(|_| (), (1.6, DqHat::new(0.0, 4.0), 10.0), 1.0, |error, _| error * 0.4);
+        assert!((held.R - 1.6).abs() < 1e-12, "without tracking, it stays: {} Ohm", held.R);
+    }
+
+    /// Once the resistance is known, c_1 falls to k_c |w|; before, it stays.
+    #[test]
+    fn a_known_resistance_lowers_the_gain() {
+        let ((_, unknown), (_, rest)) = (
+            adapted(|_| (), (1.6, DqHat::new(5.0, 1.0), 10.0), 0.1, |_, _| 0.0),
+            adapted(|_| (), (1.6, DqHat::new(5.0, 1.0), 0.0), 0.1, |_, _| 0.0),
+        );
+        assert!((unknown.c_1 - 50.0).abs() < 1e-9 && (rest.c_1 - 50.0).abs() < 1e-12, "{unknown:?} {rest:?}");
+        let par = EstimatorParameters::default();
+        let (motor, i) = (Motor::default(), DqHat::new(5.0, 1.0));
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: T_S };
+        let at = |speed: f64| Sample { speed_ref: Some(speed), ..Sample::default() };
+        let mut resistance = Resistance::start(&context, &at(0.0), 0.0);
+        for _ in 0..20_000 {
+            resistance.update(&context, &at(0.0), 0.0, i, 0.0);
+        }
+        let creep = resistance.update(&context, &at(10.0 / 3.0), 0.0, i, 10.0);
+        assert!((creep.c_1 - par.adaptation.k_c * 10.0).abs() < 1e-3, "{creep:?}");
+    }
+}

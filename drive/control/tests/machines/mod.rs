@@ -2,12 +2,14 @@
 //! default, which cites DOI 10.1109/TPEL.2020.3006779), with an assumed link of 400 V.
 #![allow(dead_code, reason = "each test program uses a part")]
 
+use drive_base::frame::DqHat;
 use drive_base::motor::Motor;
 use drive_control::current::CurrentLoop;
 use drive_control::envelope::{Envelope, Limit, WarmStart};
 use drive_control::estimator::Kind;
+use drive_control::reference::max_torque_per_ampere;
 use drive_control::tables::{ControllerParameters, Limits};
-use drive_control::weakening::WeakeningParameters;
+use drive_control::weakening::{Weakening, WeakeningGains, WeakeningParameters};
 use std::f64::consts::TAU;
 
 pub(crate) const RPM: f64 = std::f64::consts::PI / 30.0;
@@ -85,4 +87,19 @@ impl Machine {
             ..ControllerParameters::default()
         }
     }
+}
+
+/// The currents that the controller requests.
+pub(crate) fn currents(machine: &Machine, rpm: f64, tau: f64) -> (DqHat, Weakening) {
+    let par = machine.parameters();
+    let most = machine.limit(100.0, 1.0)[1].tau;
+    let gains = WeakeningGains::new(&par, most, true);
+    let (w, mut state) = (machine.w(rpm), Weakening::default());
+    let plain = max_torque_per_ampere(&par.motor, tau);
+    let mut i = DqHat::ZERO;
+    for k in 0..8 {
+        state.limits(&gains, &par.weakening, (w, machine.u_dc, 0.0), most / par.motor.torque_constant(), k);
+        i = state.currents(&gains, tau, w, machine.i, true, || plain);
+    }
+    (i, state)
 }
