@@ -67,3 +67,20 @@ pub const MOTOR: &Table<Motor> = &Table::new(
         ]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The torque is 1.5 n_p times the cross product of flux linkage and current.
+    #[test]
+    fn the_torque_is_that_of_flux_linkage_and_current() {
+        let motor = Motor::IPMSM_2_2_KW;
+        for (i_d, i_q) in [(0.0, 4.0), (-3.0, 5.0), (2.0, -6.0)] {
+            let [psi_d, psi_q] = [motor.psi_M + motor.L_d * i_d, motor.L_q * i_q];
+            let expected = 1.5 * 3.0 * (psi_d * i_q - psi_q * i_d);
+            assert!((motor.torque(i_d, i_q) - expected).abs() < 1e-12, "{i_d} A, {i_q} A");
+        }
+        assert!((motor.torque(0.0, 2.0) - 2.0 * motor.torque_constant()).abs() < 1e-12);
+    }
+}

@@ -123,6 +123,12 @@ impl LockGains {
             follows: 0.5 * reach.acceleration * T_s,
         }
     }
+
+    /// What depends on the speed loop's reach.
+    #[cfg(test)]
+    pub(crate) fn speed(&self) -> [f64; 3] {
+        [self.w_0, self.integrates, self.follows]
+    }
 }
 
 /// State at a sample.

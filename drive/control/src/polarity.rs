@@ -177,3 +177,39 @@ pub const POLARITY: &Table<PolarityParameters> = &Table::new(
         ]
     },
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use drive_base::motor::Motor;
+
+    /// At rest, along the d axis, with i = x / L_d + s_2 x^2 for the flux linkage x: more current along the magnet flux.
+    fn found(turned: bool) -> f64 {
+        let (par, motor, estimators) =
+            (PolarityParameters::default(), Motor::IPMSM_2_2_KW, EstimatorParameters::default());
+        let context = Context { par: &estimators, motor: &motor, J: 0.015, T_s: 1e-4 };
+        let (theta, s_2) = (0.4, 5.0);
+        let pole = if turned { -1.0 } else { 1.0 };
+        let (mut search, mut x) = (PolaritySearch::default(), 0.0_f64);
+        for _ in 0..100_000 {
+            let i_d = pole * (pole * x / motor.L_d + s_2 * x * x);
+            let i = Axis::<Estimated>::at(theta).to_stator(DqHat::new(i_d, 0.0));
+            match search.update(&par, &context, &Sample { i, ..Sample::default() }) {
+                SearchStep::Inject => search.sees(theta),
+                SearchStep::Pulse { theta: at, u } => {
+                    assert!((at - theta).abs() < 1e-15 && u.q().abs() < 1e-15, "along the axis");
+                    x += 1e-4 * (u.d() - motor.R_s * i_d);
+                }
+                SearchStep::Found(at) => return at,
+            }
+        }
+        panic!("nothing found")
+    }
+
+    #[test]
+    fn the_larger_current_marks_the_north_pole() {
+        assert!((found(false) - 0.4).abs() < 1e-12, "{}", found(false));
+        assert!((found(true) - 0.4 - PI).abs() < 1e-12, "{}", found(true));
+    }
+}

@@ -471,4 +471,42 @@ mod tests {
         let References { i, .. } = state.references(&gains, None, &par, &inputs, speed, Injection::None);
         assert!((i.q() - 2.0).abs() < 1e-9, "the torque stays: {i:?}");
     }
+
+    /// Beyond the base speed, the references give the limit's torque in the direction that is asked for, and the integral of the
+    /// speed loop follows the limit.
+    #[test]
+    fn the_limits_of_field_weakening_act_in_both_directions() {
+        let set = |p: &mut ControllerParameters| {
+            (p.motor, p.estimator) = (Motor::IPMSM_2_2_KW, crate::estimator::Kind::Sensored);
+            (p.weakening.used, p.current.mtpa, p.limit.i, p.limit.i_q) = (true, true, 15.0, 15.0);
+        };
+        let (gains, mut par) = controller(set);
+        let inputs =
+            |tau_ref| ControllerInputs { u_dc: 540.0, speed_ref: 400.0, tau_ref, ..ControllerInputs::default() };
+        for speed in [250.0, -250.0] {
+            par.speed_loop.torque_mode = true;
+            let at = |tau_ref: f64| {
+                let mut state = State::default();
+                (0..20)
+                    .map(|_| state.references(&gains, None, &par, &inputs(tau_ref), speed, Injection::None))
+                    .last()
+                    .unwrap()
+            };
+            for tau_ref in [100.0, -100.0] {
+                let References { i, tau: (low, high), limited, .. } = at(tau_ref);
+                let (tau, most) = (par.motor.torque(i.d(), i.q()), if tau_ref > 0.0 { high } else { -low });
+                assert!(limited && (tau / most - 1.0).abs() < 0.02, "{speed} rad/s: {tau} N.m, not {most} N.m");
+            }
+        }
+        par.speed_loop.torque_mode = false;
+        let mut state = State { w_ref: 400.0, ..State::default() };
+        state.speed = SpeedController::take_over(&gains.speed, 400.0, 250.0, 14.0);
+        let wanted = |state: &State| state.speed.clone().update(&gains.speed, 400.0, 250.0, (-99.0, 99.0), 1e-4).1;
+        let before = wanted(&state);
+        for _ in 0..500 {
+            state.references(&gains, None, &par, &inputs(0.0), 250.0, Injection::None);
+        }
+        let after = wanted(&state);
+        assert!(after < before - 1.0, "{before} A, later {after} A");
+    }
 }

@@ -304,4 +304,25 @@ mod tests {
         let most = errors.iter().map(|error| error.abs()).fold(0.0, f64::max);
         assert!(most < 1e-4, "{most} rad");
     }
+
+    /// Tuning the speed adaptation leaves the estimated speed: w^ = 2 zeta w_n / psi_M psi_rq^ + w_I.
+    #[test]
+    fn tuning_does_not_change_the_speed() {
+        let motor = Motor::default();
+        let [old, new] = [(1.0, 300.0), (0.6, 200.0)].map(|(zeta, w_n)| EstimatorParameters {
+            rasmussen: RasmussenParameters { zeta, w_n, ..RasmussenParameters::default() },
+            ..EstimatorParameters::default()
+        });
+        let first = Sample::default();
+        let (mut observer, _) = Rasmussen::start(&context(&old, &motor), &first, 0.0, 100.0);
+        let sample = Sample { u: AlphaBeta::new(3.0, 40.0), ..first };
+        for _ in 0..20 {
+            observer.update(&context(&old, &motor), &sample);
+        }
+        let psi_rq = observer.psi_r(&motor, Axis::at(observer.theta)).q();
+        assert!(psi_rq.abs() > 1e-3, "{psi_rq} Wb");
+        observer.retune(&context(&old, &motor), &context(&new, &motor));
+        let speed = 2.0 * 0.6 * 200.0 / motor.psi_M * psi_rq + observer.w_i;
+        assert!((speed - observer.w).abs() < 1e-9, "{speed} rad/s, not {} rad/s", observer.w);
+    }
 }

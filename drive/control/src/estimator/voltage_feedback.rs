@@ -71,3 +71,30 @@ impl Estimating for VoltageFeedback {
         emf::validate(setup)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use drive_base::motor::Motor;
+
+    /// The PI gives -w psi_M sin theta~ on the d axis: the estimate turns toward the rotor, in both directions of rotation.
+    #[test]
+    fn the_estimate_turns_toward_the_rotor() {
+        let (par, motor) = (EstimatorParameters::default(), Motor::default());
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
+        for w in [200.0, -200.0] {
+            for start in [0.3, -0.3] {
+                let (mut theta, first) = (start, Sample::default());
+                let (mut estimator, mut estimate) = VoltageFeedback::start(&context, &first, 0.0, w);
+                for _ in 0..5000 {
+                    let u_pi = DqHat::new(-w * motor.psi_M * (theta - estimate.theta).sin(), 0.0);
+                    theta += 1e-4 * w;
+                    estimate = estimator.update(&context, &Sample { u_pi, ..first });
+                }
+                let off = theta - estimate.theta;
+                assert!(off.abs() < 0.03, "{w} rad/s, {start} rad ahead: {off} rad");
+            }
+        }
+    }
+}
