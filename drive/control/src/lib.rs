@@ -13,6 +13,7 @@ mod cycle;
 pub mod documentation;
 pub mod envelope;
 pub mod estimator;
+mod gains;
 pub mod lock;
 pub mod model;
 pub mod polarity;

@@ -2,13 +2,14 @@
 
 use crate::current::{self, CurrentGains};
 use crate::estimator::{Class, Estimator, Sample, Setup};
+use crate::gains::Gains;
 use crate::lock::{LOST, Lock, LockGains, Reach};
 use crate::polarity;
 use crate::reference::{max_torque, max_torque_per_ampere};
 use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::speed::SpeedGains;
 use crate::start::StartMode;
-use crate::state::{Gains, InUse, State, context};
+use crate::state::{InUse, State, context};
 use crate::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::weakening::{self, WeakeningGains};
 use crate::zero_speed::{self, ZeroSpeed};

@@ -80,6 +80,28 @@ fn uniform(counter: u64) -> f64 {
     (f64::from(u32::from_le_bytes([a, b, c, d])) + 0.5) / 4_294_967_296.0
 }
 
+/// Running mean of the measured currents while the drive rests.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Offset {
+    /// Mean in A.
+    pub(crate) i: Phases,
+    /// Number of samples in it, at most those of `MEMORY`.
+    n: f64,
+}
+
+impl Offset {
+    /// Time in s over which the mean extends: currents that decay after the drive was switched off are forgotten.
+    const MEMORY: f64 = 0.02;
+
+    /// One more sample of currents (A) with the sample period `T_s` (s).
+    pub(crate) fn update(&mut self, measured: Phases, T_s: f64) {
+        self.n = (self.n + 1.0).min((Self::MEMORY / T_s).max(1.0));
+        let toward = |mean: f64, x: f64| mean + (x - mean) / self.n;
+        let Phases { a, b, c } = self.i;
+        self.i = Phases { a: toward(a, measured.a), b: toward(b, measured.b), c: toward(c, measured.c) };
+    }
+}
+
 type P = Row<Sensor>;
 
 /// Variables of the sensors; their owner supplies the prefix `sensor.`.
@@ -146,5 +168,21 @@ mod tests {
         let sensor = Sensor { resolution: 40.0 / 4096.0, ..Sensor::default() };
         let measured = sensor.measure(Phases { a: 1.0, b: 0.004, c: -0.006 }, 0);
         assert!((measured.a - 1.0).abs() <= 0.5 * 40.0 / 4096.0 && measured.b.abs() < 1e-12 && measured.c < -0.009);
+    }
+
+    /// The mean is exact at once, and forgets currents that were still flowing at first.
+    #[test]
+    fn offsets_are_a_running_mean() {
+        let mut offset = Offset::default();
+        let at = |a: f64| Phases { a, b: -a, c: 0.01 };
+        offset.update(at(0.02), 1e-4);
+        assert!((offset.i.a - 0.02).abs() < 1e-15 && (offset.i.c - 0.01).abs() < 1e-15);
+        offset.update(at(0.04), 1e-4);
+        assert!((offset.i.a - 0.03).abs() < 1e-15 && (offset.i.b + 0.03).abs() < 1e-15);
+        offset.update(at(5.0), 1e-4);
+        for _ in 0..3000 {
+            offset.update(at(0.02), 1e-4);
+        }
+        assert!((offset.i.a - 0.02).abs() < 1e-5, "{}", offset.i.a);
     }
 }

@@ -1,17 +1,18 @@
 //! The controller state from one sample to the next, and the source of the angle: a start sequence or the estimator.
 
-use crate::current::{CurrentController, CurrentGains};
+use crate::current::CurrentController;
 use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Sample};
-use crate::lock::{Lock, LockGains};
+use crate::gains::{Gains, Law};
+use crate::lock::Lock;
 use crate::polarity::{PolaritySearch, SearchStep};
-use crate::reference::max_torque_per_ampere;
+use crate::sensor::Offset;
 use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::speed::{SpeedController, SpeedGains};
 use crate::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::tables::ControllerParameters;
-use crate::weakening::{Weakening, WeakeningGains};
-use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases};
-use drive_base::math::{at_least, at_most, within, wrap};
+use crate::weakening::Weakening;
+use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
+use drive_base::math::{within, wrap};
 use drive_base::motor::Motor;
 use serde::{Deserialize, Serialize};
 
@@ -22,77 +23,6 @@ pub(super) fn context<'a>(
     motor: &'a Motor,
 ) -> Context<'a> {
     Context { par: estimators, motor, J: par.J, T_s: par.T_s }
-}
-
-/// Gains computed from the parameters.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Gains {
-    pub(super) current: CurrentGains,
-    pub(super) speed: SpeedGains,
-    /// Torque constant in N.m/A.
-    pub(super) k: f64,
-    /// Maximum torque in N.m divided by the torque constant: the limit of the speed loop in A.
-    pub(super) i_tau: f64,
-    /// i_d in A of the maximum torque, by maximum torque per ampere.
-    pub(super) i_d_end: f64,
-    /// The estimator is a flux observer: it needs the low-speed law at standstill, where the others would only have its
-    /// losses.
-    pub(super) observes_flux: bool,
-    pub(super) lock: LockGains,
-    pub(super) weakening: WeakeningGains,
-}
-
-impl Gains {
-    /// The low-speed law of a flux observer at the estimated mechanical `speed` (rad/s), and the torque that remains; other
-    /// estimators have no such law.
-    #[inline]
-    fn law(&self, par: &ControllerParameters, speed: f64) -> Law {
-        if !self.observes_flux {
-            return Law { limit: self.i_tau, ..Law::default() };
-        }
-        let share = par.zero_speed.share(speed);
-        let i_d = share * par.zero_speed.i_0;
-        let end = if par.current.mtpa { i_d + (1.0 - share) * self.i_d_end } else { i_d };
-        let i_q = par.limit.i_q_beside(end);
-        let most = if Self::exact(par) { par.motor.torque(end, i_q) / self.k } else { i_q };
-        Law { share, i_d, limit: at_least(at_most(most, self.i_tau), f64::MIN_POSITIVE) }
-    }
-
-    /// Whether the torque includes the reluctance torque, also with the i_d of the low-speed law.
-    #[inline]
-    fn exact(par: &ControllerParameters) -> bool {
-        par.current.mtpa || par.speed_loop.torque_mode
-    }
-
-    /// References of the currents (A) without field weakening for the torque of `i_q` (A): i_d of the `law`, and of maximum
-    /// torque per ampere as far as it is not active.
-    #[inline]
-    fn currents(&self, par: &ControllerParameters, law: &Law, i_q: f64) -> DqHat {
-        if par.current.mtpa && !self.observes_flux {
-            return max_torque_per_ampere(&par.motor, self.k * i_q);
-        }
-        if !(self.observes_flux && Self::exact(par)) {
-            return DqHat::new(law.i_d, i_q);
-        }
-        let mut i_d = law.i_d;
-        if par.current.mtpa {
-            // The limit is the end of the curve: no current exceeds its own limit before.
-            let most = max_torque_per_ampere(&par.motor, self.k * self.i_tau * (i_q / law.limit));
-            i_d += (1.0 - law.share) * most.d();
-        }
-        DqHat::new(i_d, self.k * i_q / par.motor.torque(i_d, 1.0))
-    }
-}
-
-/// The low-speed law at a sample.
-#[derive(Clone, Copy, Debug, Default)]
-struct Law {
-    /// Share of `zero_speed.i_0`.
-    share: f64,
-    /// i_d in A that it requests.
-    i_d: f64,
-    /// Greatest torque in N.m that remains, divided by the torque constant.
-    limit: f64,
 }
 
 /// Parameters the estimator uses: at the first sample after retuning, still the previous ones.
@@ -196,28 +126,6 @@ pub(super) struct State {
     pub(super) hidden: bool,
     /// Outputs visible now.
     pub(super) shown: ControllerOutputs,
-}
-
-/// Running mean of the measured currents while the drive rests.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Offset {
-    /// Mean in A.
-    pub(super) i: Phases,
-    /// Number of samples in it, at most those of `MEMORY`.
-    n: f64,
-}
-
-impl Offset {
-    /// Time in s over which the mean extends: currents that decay after the drive was switched off are forgotten.
-    const MEMORY: f64 = 0.02;
-
-    /// One more sample of currents (A) with the sample period `T_s` (s).
-    pub(super) fn update(&mut self, measured: Phases, T_s: f64) {
-        self.n = (self.n + 1.0).min((Self::MEMORY / T_s).max(1.0));
-        let toward = |mean: f64, x: f64| mean + (x - mean) / self.n;
-        let Phases { a, b, c } = self.i;
-        self.i = Phases { a: toward(a, measured.a), b: toward(b, measured.b), c: toward(c, measured.c) };
-    }
 }
 
 impl State {
@@ -393,62 +301,7 @@ mod fixed_size {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The mean is exact at once, and forgets currents that were still flowing at first.
-    #[test]
-    fn offsets_are_a_running_mean() {
-        let mut offset = Offset::default();
-        let at = |a: f64| Phases { a, b: -a, c: 0.01 };
-        offset.update(at(0.02), 1e-4);
-        assert!((offset.i.a - 0.02).abs() < 1e-15 && (offset.i.c - 0.01).abs() < 1e-15);
-        offset.update(at(0.04), 1e-4);
-        assert!((offset.i.a - 0.03).abs() < 1e-15 && (offset.i.b + 0.03).abs() < 1e-15);
-        offset.update(at(5.0), 1e-4);
-        for _ in 0..3000 {
-            offset.update(at(0.02), 1e-4);
-        }
-        assert!((offset.i.a - 0.02).abs() < 1e-5, "{}", offset.i.a);
-    }
-
-    fn controller(set: impl FnOnce(&mut ControllerParameters)) -> (Gains, ControllerParameters) {
-        let mut controller = crate::SensorlessController::default();
-        set(&mut controller.parameters);
-        fmu_core::Model::derive(&mut controller);
-        (controller.gains, controller.parameters)
-    }
-
-    /// i_d of the low-speed law fades into that of maximum torque per ampere, and i_q gives the rest of the torque.
-    #[test]
-    fn the_currents_give_the_torque_at_every_speed() {
-        let (gains, par) = controller(|p| {
-            (p.motor, p.current.mtpa) = (Motor::IPMSM_2_2_KW, true);
-            (p.limit.i, p.limit.i_q, p.zero_speed.i_0) = (15.0, 15.0, 4.0);
-        });
-        for tau in [3.0, -9.0] {
-            for (speed, law_share) in [(0.0, 1.0), (-10.0 * std::f64::consts::LN_2, 0.5), (1e4, 0.0)] {
-                let law = gains.law(&par, speed);
-                let i = gains.currents(&par, &law, tau / gains.k);
-                let torque = par.motor.torque(i.d(), i.q());
-                assert!((torque - tau).abs() < 1e-9, "{tau} N.m at {speed} rad/s: {torque} N.m");
-                assert!((law.share - law_share).abs() < 1e-12 && (law.i_d - 4.0 * law_share).abs() < 1e-12);
-            }
-            let [still, fast] = [0.0, 1e4].map(|speed| gains.currents(&par, &gains.law(&par, speed), tau / gains.k));
-            assert!((still.d() - 4.0).abs() < 1e-12, "at rest the law alone: {still:?}");
-            let mtpa = max_torque_per_ampere(&par.motor, tau);
-            assert!((fast - mtpa).magnitude() < 1e-6, "at speed: {fast:?}, not {mtpa:?}");
-        }
-    }
-
-    /// The torque of the limit has exactly the limit's current.
-    #[test]
-    fn the_low_speed_law_leaves_the_rest_of_the_current_limit() {
-        let (gains, par) = controller(|p| (p.limit.i, p.limit.i_q, p.zero_speed.i_0) = (5.0, 5.0, 3.0));
-        let law = gains.law(&par, 0.0);
-        assert!((law.limit - 4.0).abs() < 1e-12, "{} A", law.limit);
-        let (others, par) = controller(|p| p.estimator = crate::estimator::Kind::ExtendedEmf);
-        let law = others.law(&par, 0.0);
-        assert!(law.i_d.abs() < 1e-15 && (law.limit - 6.0).abs() < 1e-12, "no law: {} A", law.limit);
-    }
+    use crate::gains::tests::controller;
 
     /// The voltage in stator axes stays when the frame changes at the handover, and so does the torque.
     #[test]

@@ -310,7 +310,7 @@ mod tests {
     fn tuning_does_not_change_the_speed() {
         let motor = Motor::default();
         let [old, new] = [(1.0, 300.0), (0.6, 200.0)].map(|(zeta, w_n)| EstimatorParameters {
-            rasmussen: RasmussenParameters { zeta, w_n, ..RasmussenParameters::default() },
+            rasmussen: RasmussenParameters { w_n, zeta, ..RasmussenParameters::default() },
             ..EstimatorParameters::default()
         });
         let first = Sample::default();
