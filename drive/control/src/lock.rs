@@ -123,12 +123,6 @@ impl LockGains {
             follows: 0.5 * reach.acceleration * T_s,
         }
     }
-
-    /// What depends on the speed loop's reach.
-    #[cfg(test)]
-    pub(crate) fn speed(&self) -> [f64; 3] {
-        [self.w_0, self.integrates, self.follows]
-    }
 }
 
 /// State at a sample.
@@ -341,6 +335,20 @@ mod tests {
         for k in 0..400 {
             let w = if k % 2 == 0 { 20.0 } else { -20.0 };
             assert!(followed(&mut watch, w, 0.0, 5e-3, false) < 0.1, "{}", watch.S);
+        }
+    }
+
+    /// The speed loop goes from no torque to i_q = 6 A over 6 A / K_i = 1.6875 rad, and 0.675 N.m/A times 6 A accelerate
+    /// 1.5e-3 kg.m2; both count pole pairs.
+    #[test]
+    fn the_gains_know_the_reach_of_the_speed_loop() {
+        let mut controller = crate::SensorlessController::default();
+        fmu_core::Model::derive(&mut controller);
+        let reach = Reach { integral: 3.0 * 1.6875, acceleration: 3.0 * 0.675 * 6.0 / 1.5e-3 };
+        let expected = LockGains::new(&LockParameters::default(), &controller.parameters.motor, T_S, reach);
+        let of = |gains: &LockGains| [gains.w_0, gains.integrates, gains.follows];
+        for (gain, expected) in of(&controller.gains.lock).into_iter().zip(of(&expected)) {
+            assert!((gain / expected - 1.0).abs() < 1e-9, "{gain}, not {expected}");
         }
     }
 }

@@ -332,22 +332,3 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
         ]
     },
 );
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lock::LockParameters;
-
-    /// The speed loop goes from no torque to i_q = 6 A over 6 A / K_i = 1.6875 rad, and 0.675 N.m/A times 6 A accelerate
-    /// 1.5e-3 kg.m2; both count pole pairs.
-    #[test]
-    fn the_lock_knows_the_reach_of_the_speed_loop() {
-        let mut controller = SensorlessController::default();
-        controller.derive();
-        let reach = Reach { integral: 3.0 * 1.6875, acceleration: 3.0 * 0.675 * 6.0 / 1.5e-3 };
-        let expected = LockGains::new(&LockParameters::default(), &controller.parameters.motor, 1e-4, reach);
-        let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
-        let [a, b] = [controller.gains.lock.speed(), expected.speed()];
-        assert!(a.iter().zip(&b).all(|(&a, &b)| close(a, b)), "{a:?}, not {b:?}");
-    }
-}
