@@ -79,7 +79,7 @@ fn every_figure_is_inside_its_tolerance() {
 #[test]
 fn the_limits_of_the_estimators_are_those_of_the_grid() {
     const FULL: [&str; 3] = ["lowest", "lowest-dead", "arriving"];
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("drive/docs/limits.html");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("drive/control/docs/limits.html");
     let page = std::fs::read_to_string(&path).unwrap();
     let entries: Vec<Entry> =
         Entry::all().into_iter().filter(|e| !["Rasmussen", "Sensored"].contains(&e.name)).collect();
@@ -122,7 +122,10 @@ fn the_limits_of_the_estimators_are_those_of_the_grid() {
         std::fs::write(&path, format!("{before}full at 0</th></tr>\n{rows}</table>{after}")).unwrap();
         return;
     }
-    assert_eq!(kept, rows, "drive/docs/limits.html is old: UPDATE_GOLDEN=1 cargo test --test compare writes it");
+    assert_eq!(
+        kept, rows,
+        "drive/control/docs/limits.html is old: UPDATE_GOLDEN=1 cargo test --test compare writes it"
+    );
     let both_ways = shown("Hybrid", "reversal", &["peak angle error"]);
     assert!(page.contains(&format!("under 0.8 of the load: error {both_ways}")), "{both_ways}");
 }

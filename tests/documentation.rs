@@ -22,7 +22,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The plots in `drive/docs`, shown by the README and by the pages, are those that a run gives today.
+/// The plots in the models' `docs`, shown by the README and by the pages, are those that a run gives today.
 /// `UPDATE_GOLDEN=1 cargo test --test documentation` accepts others.
 #[test]
 fn the_plots_are_those_of_a_run() {
@@ -37,7 +37,7 @@ fn the_plots_are_those_of_a_run() {
 #[test]
 fn the_envelope_is_that_of_the_running_drive() {
     let plane = plane::envelope(&[1000.0, 2000.0, 3000.0, 3500.0, 4000.0, 4500.0, 5000.0, 5300.0]).unwrap();
-    let text = include_str!("../drive/docs/envelope.html");
+    let text = include_str!("../drive/control/docs/envelope.html");
     let [motoring, generating] = &plane.panel.curves[..] else { panic!() };
     for (k, &(rpm, torque)) in plane.panel.dots.iter().enumerate() {
         let points: Vec<_> = if k % 2 == 0 { motoring.points().collect() } else { generating.points().collect() };
@@ -50,7 +50,7 @@ fn the_envelope_is_that_of_the_running_drive() {
         let row =
             format!("<tr><td>{} rpm</td><td>{:.2} N.m</td><td>{:.2} N.m</td></tr>", pair[0].0, pair[0].1, pair[1].1);
         let row = row.replace('-', "−");
-        assert!(text.contains(&row), "drive/docs/envelope.html has another row than\n{row}");
+        assert!(text.contains(&row), "drive/control/docs/envelope.html has another row than\n{row}");
     }
     for part in [format!("base speed, {:.0} rpm", plane.base), format!("above {:.0} rpm", plane.end)] {
         assert!(text.contains(&part), "{part}");
@@ -99,23 +99,23 @@ fn the_losses_are_those_of_the_running_drive() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    keep_in(&[fragments::DRIVE], "losses.svg", &plot::svg(&plane::figure(motoring.panels.into())).unwrap());
+    keep_in(&[fragments::DRIVE], "drive/docs/losses.svg", &plot::svg(&plane::figure(motoring.panels.into())).unwrap());
 }
 
-/// The plot `drawn` is the one that `drive/docs` keeps, and in the pages of controller and drive.
+/// The plot `drawn` is the one that the controller's `docs` keep, and in the pages of controller and drive.
 fn keep(name: &str, drawn: &str) {
-    keep_in(&[fragments::CONTROLLER, fragments::DRIVE], name, drawn);
+    keep_in(&[fragments::CONTROLLER, fragments::DRIVE], &format!("drive/control/docs/{name}"), drawn);
 }
 
-/// The plot `drawn` is the one that `drive/docs` keeps, and in these pages.
+/// The plot `drawn` is the one in the file `name`, and in these pages.
 fn keep_in(pages: &[&str], name: &str, drawn: &str) {
-    let path = root().join("drive/docs").join(name);
+    let path = root().join(name);
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         return std::fs::write(&path, drawn).unwrap();
     }
     let kept = std::fs::read_to_string(&path).unwrap();
     let line = kept.lines().zip(drawn.lines()).position(|(a, b)| a != b).map(|k| k + 1);
-    assert!(kept == drawn, "drive/docs/{name} differs from line {line:?} on; UPDATE_GOLDEN=1 accepts");
+    assert!(kept == drawn, "{name} differs from line {line:?} on; UPDATE_GOLDEN=1 accepts");
     assert!(pages.iter().all(|page| page.contains(drawn)), "{name} is in its pages");
 }
 
@@ -159,11 +159,11 @@ fn one_floor_of_glibc() {
 fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
     let read = |path: &str| std::fs::read_to_string(root().join(path)).unwrap();
     let head = |file: &str| -> String {
-        let text = read(&format!("drive/src/estimator/{file}.rs"));
+        let text = read(&format!("drive/control/src/estimator/{file}.rs"));
         let lines = text.lines().filter_map(|line| line.strip_prefix("//!"));
         lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
     };
-    let (list, limits) = (read("drive/src/estimator/mod.rs"), read("drive/docs/limits.html"));
+    let (list, limits) = (read("drive/control/src/estimator/mod.rs"), read("drive/control/docs/limits.html"));
     let row = |kind: &str| -> Option<Vec<String>> {
         let row = limits.split_once(&format!("<tr><td>{kind}</td><td>"))?.1.split_once("</td></tr>")?.0;
         Some(row.split("</td><td>").map(Into::into).collect())
@@ -180,7 +180,7 @@ fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
         });
         assert_eq!(claims, usize::from(expected.is_some()), "{kind}: {head}");
         let expected = expected.unwrap_or_default();
-        assert!(head.contains(&expected), "drive/src/estimator: the head of {kind} must say: {expected}");
+        assert!(head.contains(&expected), "drive/control/src/estimator: the head of {kind} must say: {expected}");
         if let Some(cells) = held.filter(|cells| cells[2] != "–") {
             without.push((kind, cells[2].clone()));
         }
@@ -205,8 +205,8 @@ fn pages_stand_alone() {
     let drawn =
         |svg: &str, name: &str| svg.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(|word| word == name);
     for (name, svg) in [
-        ("PmsmPlant", include_str!("../drive/docs/pmsm_plant.svg")),
-        ("SensorlessController", include_str!("../drive/docs/sensorless_controller.svg")),
+        ("PmsmPlant", include_str!("../drive/plant/docs/pmsm_plant.svg")),
+        ("SensorlessController", include_str!("../drive/control/docs/sensorless_controller.svg")),
         ("PmsmDrive", include_str!("../drive/docs/pmsm_drive.svg")),
     ] {
         for standard in ["fmi2", "fmi3"] {

@@ -13,7 +13,10 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-import", &["fmu-core", "model-description"]),
     ("fmu-sweep", &["fmu-import", "model-description"]),
     ("fmu-check", &["fmu-import", "model-description"]),
-    ("drive", &["fmu-core"]),
+    ("drive-base", &["fmu-core"]),
+    ("drive-control", &["drive-base", "fmu-core"]),
+    ("drive-plant", &["drive-base", "fmu-core"]),
+    ("drive", &["drive-base", "drive-control", "drive-plant", "fmu-core"]),
     ("drive-study", &["drive", "fmu-core", "fmu-import"]),
     ("pmsm-plant", &["drive", "fmu-export"]),
     ("sensorless-controller", &["drive", "fmu-export"]),
@@ -133,6 +136,21 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
             for text in [&lib, &main].into_iter().filter(|text| !text.is_empty()) {
                 assert!(text.contains("#![forbid(unsafe_code)]"), "{name} does not forbid unsafe code");
             }
+        }
+    }
+}
+
+/// An estimator checks a small view of the controller, so the controller knows the estimators and they do not know it.
+#[test]
+fn an_estimator_does_not_know_the_controller() {
+    let mut files = Vec::new();
+    sources(&root().join("drive/control/src/estimator"), &mut files);
+    assert!(files.len() > 25, "{files:?}");
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        for path in text.split("crate::").skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_')) {
+            let module = path.into_iter().next().unwrap();
+            assert!(module == "estimator", "{} knows the controller by crate::{module}", file.display());
         }
     }
 }

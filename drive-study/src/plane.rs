@@ -20,7 +20,7 @@ use crate::ink::{CURVES, Ink};
 use crate::runner;
 use anyhow::{Result, anyhow};
 use drive::Pair;
-use drive::control::envelope::{Envelope, Limit, Warm};
+use drive::control::envelope::{Envelope, Limit, WarmStart};
 use drive::estimator::Kind;
 use drive::frame::{Dq, DqHat};
 use drive::plant::losses::{Losses, efficiency, switching};
@@ -97,7 +97,7 @@ impl Reference {
 
     /// The limit of the sign `s`.
     fn limit(&self, rpm: f64, s: f64) -> Limit {
-        let mut warm = Warm::default();
+        let mut warm = WarmStart::default();
         let limits = (0..8).map(|_| self.envelope.limit(self.electrical(rpm), s, self.U, &mut warm));
         limits.last().unwrap_or_default()
     }

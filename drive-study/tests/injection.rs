@@ -180,7 +180,7 @@ fn cross_saturation_turns_all_alike() {
         let turned = -0.5 * (2.0 * S_DQ * psi_q).atan2(1.0 / 36e-3 - 1.0 / 51e-3 - S_DQ * x).to_degrees();
         method.near("error by cross-saturation", error.mean(), turned, 0.3);
         let sentence = format!("by −{:.0}° at rated load (<code>saturation.s_dq</code> = {S_DQ} A/Wb²)", -turned);
-        assert!(include_str!("../../drive/docs/limits.html").contains(&sentence), "{sentence}");
+        assert!(include_str!("../../drive/control/docs/limits.html").contains(&sentence), "{sentence}");
     }
 }
 

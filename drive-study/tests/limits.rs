@@ -1,4 +1,4 @@
-//! The numbers of `drive/docs/limits.html`, the limits that every documentation page tells: each row is that of a run.
+//! The numbers of `drive/control/docs/limits.html`, the limits that every documentation page tells: each row is that of a run.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;
@@ -7,7 +7,7 @@ use drive::math::wrap;
 use drive_study::runner;
 use std::f64::consts::PI;
 
-const PAGE: &str = include_str!("../../drive/docs/limits.html");
+const PAGE: &str = include_str!("../../drive/control/docs/limits.html");
 const RPM: f64 = PI / 30.0;
 const T_S: f64 = 1e-4;
 /// Resistance of the reference motor in Ohm.
@@ -16,7 +16,7 @@ const R: f64 = 2.0;
 /// The page must have this row.
 fn holds(cells: &[String]) {
     let row = format!("<tr><td>{}</td></tr>", cells.join("</td><td>"));
-    assert!(PAGE.contains(&row), "drive/docs/limits.html has another row than\n{row}");
+    assert!(PAGE.contains(&row), "drive/control/docs/limits.html has another row than\n{row}");
 }
 
 /// A number as the page has it.

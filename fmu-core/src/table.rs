@@ -181,23 +181,38 @@ impl<W: 'static> Table<W> {
     {
         let mut whole = whole.clone();
         let wanted = ptr::from_mut(get(&mut whole)).addr();
-        let found = (0..self.len).find_map(|index| {
-            let (meta, slot) = self.entry(&mut whole, index)?;
-            let address = match &slot {
-                Slot::Real(x) => ptr::from_ref(&**x).addr(),
-                Slot::Float32(x) => ptr::from_ref(&**x).addr(),
-                Slot::Integer(x) => ptr::from_ref(&**x).addr(),
-                Slot::Boolean(x) => ptr::from_ref(&**x).addr(),
-                Slot::Enumeration(x) => ptr::from_ref(&**x).addr(),
-                Slot::Text(x) => ptr::from_ref(&**x).addr(),
-                Slot::Said(_) => return None,
-            };
-            let value = if let Slot::Enumeration(x) = &slot { item(meta, x.get()) } else { slot.to_string() };
-            let unit = if let Kind::Real(of) | Kind::Float32(of) = meta.kind { of.unit.name } else { "" };
-            let space = if unit.is_empty() { "" } else { " " };
-            (address == wanted).then(|| Some(format!("{} = {value}{space}{unit}", self.locate(index)?.0))).flatten()
+        let found = (0..self.len).find(|&index| {
+            let address = self.entry(&mut whole, index).and_then(|(_, slot)| match slot {
+                Slot::Real(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Float32(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Integer(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Boolean(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Enumeration(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Text(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Said(_) => None,
+            });
+            address == Some(wanted)
         });
-        found.unwrap_or_else(|| "a value without a variable".into())
+        found
+            .and_then(|index| self.tell_index(&mut whole, index))
+            .unwrap_or_else(|| "a value without a variable".into())
+    }
+
+    /// Name, value and unit of the variable `name` in `whole`: for messages.
+    pub fn tell_name(&self, whole: &W, name: &str) -> Option<String>
+    where
+        W: Clone,
+    {
+        let index = (0..self.len).find(|&index| self.locate(index).is_some_and(|(found, ..)| found == name))?;
+        self.tell_index(&mut whole.clone(), index)
+    }
+
+    fn tell_index(&self, whole: &mut W, index: usize) -> Option<String> {
+        let (meta, slot) = self.entry(whole, index)?;
+        let value = if let Slot::Enumeration(x) = &slot { item(meta, x.get()) } else { slot.to_string() };
+        let unit = if let Kind::Real(of) | Kind::Float32(of) = meta.kind { of.unit.name } else { "" };
+        let space = if unit.is_empty() { "" } else { " " };
+        Some(format!("{} = {value}{space}{unit}", self.locate(index)?.0))
     }
 
     fn locate_into(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {

@@ -7,7 +7,7 @@ use super::Outcome;
 use super::candidate::Candidate;
 use super::measure::{Follow, Measure};
 use crate::runner::{self, RATED_SPEED, Statistics, line};
-use drive::control::envelope::{Envelope, Warm};
+use drive::control::envelope::{Envelope, WarmStart};
 use drive::estimator::Kind;
 use fmu_core::Fault;
 
@@ -51,7 +51,7 @@ impl Truth {
 
     /// Greatest torque (N.m) at `speed` (pu).
     fn torque(&self, speed: f64) -> f64 {
-        let mut warm = Warm::default();
+        let mut warm = WarmStart::default();
         let mut limit = || self.envelope.limit(speed * RATED_SPEED * self.n_p, 1.0, self.U, &mut warm).tau;
         (0..8).map(|_| limit()).last().unwrap_or_default()
     }

@@ -6,7 +6,7 @@
 use super::motor::{Data, MotorFile};
 use super::rules::{Setting, Value, electrical, set};
 use anyhow::{Result, bail};
-use drive::control::envelope::{Envelope, Warm};
+use drive::control::envelope::{Envelope, WarmStart};
 use drive::control::reference::max_torque_per_ampere;
 use drive::control::weakening::WeakeningParameters;
 use drive::frame::DqHat;
@@ -50,7 +50,7 @@ pub fn of(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Result<V
         );
     }
     let most = |speed: f64| {
-        let mut warm = Warm::default();
+        let mut warm = WarmStart::default();
         (0..8).map(|_| envelope.limit(n_p * speed, 1.0, U, &mut warm).tau).last().unwrap_or_default()
     };
     let fits = |torque: f64, speed: f64| envelope.excess(currents(torque), n_p * speed, U) <= 0.0;
