@@ -9,7 +9,8 @@ use drive_study::compare::measure::Measure;
 use drive_study::compare::plots::{self, Plot};
 use drive_study::compare::scenario::{Effort, SCENARIOS};
 use drive_study::compare::{self, Cell, Selection, html, table};
-use drive_study::{ink, plot};
+use drive_study::ink;
+use fmu_plot::svg;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -155,7 +156,7 @@ fn a_lost_run_is_cut_where_it_is_lost() {
         let end = lost.x[lost.y.len() - 1];
         assert!((0.9..1.1).contains(&end) && lost.y.iter().all(|y| y.abs() <= 90.0), "{end} s");
     }
-    let svg = plot::svg(figure).unwrap();
+    let svg = svg::draw(figure).unwrap();
     assert!(svg.contains("DirectEmf ✕ lost") && svg.matches("l10 10m0-10l-10 10").count() == 2, "{svg}");
 }
 

@@ -7,7 +7,6 @@ use common::Native;
 use drive::plant::losses::Losses;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController, documentation as fragments};
 use drive_study::plane::{self, Point};
-use drive_study::plot;
 use drive_study::reproduce::plots;
 use drive_study::reproduce::scenario::{
     ClosedLoop, LOAD_0, LOAD_1000, START, STEP_20, STEP_500, STEP_1000, STEP_1500, Scenario, Trace,
@@ -15,6 +14,7 @@ use drive_study::reproduce::scenario::{
 use fmu::documentation;
 use fmu_core::{Description, Model};
 use fmu_import::elf::FLOOR;
+use fmu_plot::svg;
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 
@@ -29,8 +29,8 @@ fn the_plots_are_those_of_a_run() {
     let run = |s: &Scenario| -> Trace { Native.run(s, 1e-4).unwrap() };
     let figure_4 = plots::figure_4(&run(&START), [&STEP_20, &STEP_500, &STEP_1000, &STEP_1500].map(run).each_ref());
     let figure_5 = plots::figure_5(&run(&LOAD_0), &run(&LOAD_1000));
-    keep("figure-4.svg", &plot::svg(&figure_4).unwrap());
-    keep("figure-5.svg", &plot::svg(&figure_5).unwrap());
+    keep("figure-4.svg", &svg::draw(&figure_4).unwrap());
+    keep("figure-5.svg", &svg::draw(&figure_5).unwrap());
 }
 
 /// Torque over speed on the pages: every number and every dot is that of a run, and on the curves.
@@ -55,7 +55,7 @@ fn the_envelope_is_that_of_the_running_drive() {
     for part in [format!("base speed, {:.0} rpm", plane.base), format!("above {:.0} rpm", plane.end)] {
         assert!(text.contains(&part), "{part}");
     }
-    keep("envelope.svg", &plot::svg(&plane::figure(vec![plane.panel])).unwrap());
+    keep("envelope.svg", &svg::draw(&plane::figure(vec![plane.panel])).unwrap());
 }
 
 /// Losses over speed on the page of the drive: every row and every dot is that of a run, and on the curves within 0.3 % of
@@ -99,7 +99,7 @@ fn the_losses_are_those_of_the_running_drive() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    keep_in(&[fragments::DRIVE], "losses.svg", &plot::svg(&plane::figure(motoring.panels.into())).unwrap());
+    keep_in(&[fragments::DRIVE], "losses.svg", &svg::draw(&plane::figure(motoring.panels.into())).unwrap());
 }
 
 /// The plot `drawn` is the one that `drive/docs` keeps, and in the pages of controller and drive.

@@ -15,8 +15,6 @@
 //!
 //! u_on, r_on of transistor and diode alike, so the duty cycle has no influence; k is the switching loss per ampere.
 
-use crate::figure::{Curve, Figure, Panel};
-use crate::ink::{CURVES, Ink};
 use crate::runner;
 use anyhow::{Result, anyhow};
 use drive::Pair;
@@ -25,6 +23,8 @@ use drive::estimator::Kind;
 use drive::frame::{Dq, DqHat};
 use drive::plant::losses::{Losses, efficiency, switching};
 use drive::plant::machine;
+use fmu_plot::figure::{Curve, Figure, Panel};
+use fmu_plot::ink::{CURVES, Ink};
 use std::f64::consts::PI;
 
 const RPM: f64 = PI / 30.0;

@@ -1,12 +1,13 @@
 //! `fmu simulate`: co-simulates FMUs, or integrates those for Model Exchange.
 
+mod curves;
 mod output;
+mod overview;
 mod worker;
 
 use crate::Failed;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use drive_study::overview;
 use fmu_check::message;
 use fmu_import::cosimulation::{Integration, Method, Point, Schedule, Settings, Solver, System};
 use fmu_import::guard::Allowance;

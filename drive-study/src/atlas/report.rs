@@ -5,7 +5,7 @@ use super::cell::{Cell, Scenario};
 use super::map::{self, percent};
 use super::run::{Approach, Class, Verdict};
 use crate::ink;
-use crate::page::{self, escape};
+use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
 
 /// A row per run.

@@ -5,8 +5,8 @@ use super::plots::Plot;
 use super::table::{Block, mark, number};
 use super::{Cell, Outcome, table};
 use crate::ink;
-use crate::page::{self, escape};
 use anyhow::Result;
+use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
 
 /// The page with its plots.

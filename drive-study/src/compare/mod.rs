@@ -18,7 +18,6 @@ mod signal;
 pub mod table;
 mod weakening;
 
-use crate::plot;
 use anyhow::{Context, Result};
 use candidate::{Candidate, Entry};
 use measure::{Measure, Trace};
@@ -126,7 +125,7 @@ pub fn write(cells: &[Cell], out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
     let plots = plots::all(cells);
     for Plot { name, figure } in &plots {
-        file(&format!("{name}.svg"), &plot::svg(figure)?)?;
+        file(&format!("{name}.svg"), &fmu_plot::svg::draw(figure)?)?;
     }
     file("compare.csv", &table::csv(cells))?;
     file("compare.txt", &table::text(cells))?;

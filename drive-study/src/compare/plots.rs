@@ -2,8 +2,9 @@
 //! injects a voltage, the carrier current and the angle found in it (Fig. 8 and 11 of the review).
 
 use super::Cell;
-use crate::figure::{Curve, Figure, Panel};
-use crate::ink::{self, CURVES, REFERENCE};
+use crate::ink;
+use fmu_plot::figure::{Curve, Figure, Panel};
+use fmu_plot::ink::{CURVES, REFERENCE};
 use std::rc::Rc;
 
 /// A picture.

@@ -6,7 +6,6 @@ pub mod plots;
 mod report;
 pub mod scenario;
 
-use crate::plot;
 use anyhow::{Context, Result};
 use packed::Packed;
 use report::Table;
@@ -56,7 +55,7 @@ pub fn run(folder: &Path, out: &Path) -> Result<(String, bool)> {
         ("figure-5.svg", plots::figure_5(load_0, load_1000)),
     ];
     for (name, figure) in &plots {
-        write(name, &plot::svg(figure)?)?;
+        write(name, &fmu_plot::svg::draw(figure)?)?;
     }
     write("report.html", &report::html(&table, identical, &plots, &ALL)?)?;
     write("table.md", &table.text())?;

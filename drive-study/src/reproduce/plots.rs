@@ -1,8 +1,8 @@
 //! The paper's Fig. 4 and Fig. 5 in its own layout.
 
 use super::scenario::Trace;
-use crate::figure::{Curve, Figure, Panel};
-use crate::ink::{CURVES, Ink, REFERENCE};
+use fmu_plot::figure::{Curve, Figure, Panel};
+use fmu_plot::ink::{CURVES, Ink, REFERENCE};
 
 const TRUE: Ink = CURVES[1];
 const ESTIMATED: Ink = CURVES[0];

@@ -2,9 +2,9 @@
 
 use super::figures::Figure;
 use super::scenario::{Scenario, Trace};
-use crate::figure::Figure as FigureOfPaper;
-use crate::page::{self, escape};
 use anyhow::Result;
+use fmu_plot::figure::Figure as FigureOfPaper;
+use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
 
 /// The figures of both standards side by side.
@@ -155,10 +155,10 @@ pub(super) fn html(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::{Curve, Panel};
-    use crate::ink::REFERENCE;
     use crate::reproduce::figures::Expected;
     use crate::reproduce::scenario::REST;
+    use fmu_plot::figure::{Curve, Panel};
+    use fmu_plot::ink::REFERENCE;
 
     #[test]
     fn numbers_have_four_digits() {
