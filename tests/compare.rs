@@ -8,7 +8,7 @@ use drive_study::compare::candidate::{Class, Entry};
 use drive_study::compare::measure::Measure;
 use drive_study::compare::plots::{self, Plot};
 use drive_study::compare::scenario::{Effort, SCENARIOS};
-use drive_study::compare::{self, Cell, Selection, html, table};
+use drive_study::compare::{self, Run, Selection, html, table};
 use drive_study::ink;
 use fmu_plot::svg;
 use std::collections::BTreeMap;
@@ -17,14 +17,14 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 /// The reduced grid, run once a test program.
-fn grid() -> &'static [Cell] {
-    static GRID: OnceLock<Vec<Cell>> = OnceLock::new();
+fn grid() -> &'static [Run] {
+    static GRID: OnceLock<Vec<Run>> = OnceLock::new();
     GRID.get_or_init(|| compare::run(&Selection::all(Effort::Reduced), || ()))
 }
 
 /// The cells of these estimators in these scenarios.
-fn of(cells: &[Cell], estimators: &[&str], scenarios: &[&str]) -> Vec<Cell> {
-    let wanted = |c: &&Cell| estimators.contains(&c.entry.name) && scenarios.contains(&c.scenario.id);
+fn of(cells: &[Run], estimators: &[&str], scenarios: &[&str]) -> Vec<Run> {
+    let wanted = |c: &&Run| estimators.contains(&c.entry.name) && scenarios.contains(&c.scenario.id);
     cells.iter().filter(wanted).cloned().collect()
 }
 
@@ -73,7 +73,7 @@ fn the_grid_is_that_of_the_golden_copy() {
 fn every_figure_is_inside_its_tolerance() {
     let outside: Vec<_> = grid().iter().filter(|cell| !cell.holds()).collect();
     assert!(outside.is_empty(), "{}", table::verdict(grid()));
-    assert!(grid().iter().flat_map(Cell::measures).filter(|m| m.expected.is_some()).count() > 100);
+    assert!(grid().iter().flat_map(Run::measures).filter(|m| m.expected.is_some()).count() > 100);
 }
 
 /// The table of estimators in the documentation has the numbers that `fmu compare` prints, at full effort.
@@ -162,7 +162,7 @@ fn a_lost_run_is_cut_where_it_is_lost() {
 
 #[test]
 fn what_is_outside_is_marked() {
-    let mut cells: Vec<Cell> = grid().iter().filter(|c| c.entry.name == "DirectEmf").cloned().collect();
+    let mut cells: Vec<Run> = grid().iter().filter(|c| c.entry.name == "DirectEmf").cloned().collect();
     let cell = cells.iter_mut().find(|c| c.scenario.id == "load-0.5").unwrap();
     let compare::Outcome::Measured(measures, _) = &mut cell.outcome else { panic!() };
     measures.iter_mut().find(|m| m.name == "dip").unwrap().value = 0.2;

@@ -6,11 +6,11 @@ mod common;
 use common::Native;
 use drive::plant::losses::Losses;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController, documentation as fragments};
-use drive_study::plane::{self, Point};
-use drive_study::reproduce::plots;
-use drive_study::reproduce::scenario::{
-    ClosedLoop, LOAD_0, LOAD_1000, START, STEP_20, STEP_500, STEP_1000, STEP_1500, Scenario, Trace,
+use drive_study::plane::{self, OperatingPoint};
+use drive_study::reproduce::experiment::{
+    ClosedLoop, Experiment, LOAD_0, LOAD_1000, Record, START, STEP_20, STEP_500, STEP_1000, STEP_1500,
 };
+use drive_study::reproduce::plots;
 use fmu::documentation;
 use fmu_core::{Description, Model};
 use fmu_import::elf::FLOOR;
@@ -26,7 +26,7 @@ fn root() -> &'static Path {
 /// `UPDATE_GOLDEN=1 cargo test --test documentation` accepts others.
 #[test]
 fn the_plots_are_those_of_a_run() {
-    let run = |s: &Scenario| -> Trace { Native.run(s, 1e-4).unwrap() };
+    let run = |s: &Experiment| -> Record { Native.run(s, 1e-4).unwrap() };
     let figure_4 = plots::figure_4(&run(&START), [&STEP_20, &STEP_500, &STEP_1000, &STEP_1500].map(run).each_ref());
     let figure_5 = plots::figure_5(&run(&LOAD_0), &run(&LOAD_1000));
     keep("figure-4.svg", &svg::draw(&figure_4).unwrap());
@@ -64,10 +64,10 @@ fn the_envelope_is_that_of_the_running_drive() {
 #[test]
 fn the_losses_are_those_of_the_running_drive() {
     let text = include_str!("../drive/docs/losses.html");
-    let row = |p: &Point| {
+    let row = |p: &OperatingPoint| {
         let Losses { cu, iron, cond, sw, friction } = p.losses;
         let powers = [cu, iron, cond, sw, friction].map(|x| format!("<td>{x:.1} W</td>")).concat();
-        let Point { rpm, tau, tau_shaft, efficiency, .. } = p;
+        let OperatingPoint { rpm, tau, tau_shaft, efficiency, .. } = p;
         format!(
             "<tr><td>{rpm} rpm</td><td>{tau:.3} N.m</td><td>{tau_shaft:.2} N.m</td>{powers}<td>{:.1} %</td></tr>",
             100.0 * efficiency
@@ -79,7 +79,7 @@ fn the_losses_are_those_of_the_running_drive() {
     let generating = plane::losses(-2.5, 5000.0, &[3000.0]).unwrap();
     let mut wrong = Vec::new();
     for [figure, run] in motoring.points.iter().chain(&generating.points) {
-        let parts = |p: &Point| {
+        let parts = |p: &OperatingPoint| {
             let Losses { cu, iron, cond, sw, friction } = p.losses;
             [cu, iron, cond, sw, friction, p.tau_shaft, p.efficiency]
         };
@@ -268,7 +268,7 @@ fn pages_in_a_browser() {
             &["--html", &path("run.html"), "--csv", &path("run.csv")],
         ]
         .concat(),
-        vec!["compare", "--scenario", "ramp,reversal,load-0,signal,signal-trace", "--out", &path("compare")],
+        vec!["compare", "--experiment", "ramp,reversal,load-0,signal,signal-trace", "--out", &path("compare")],
         vec!["reproduce", "--out", &path("reproduce")],
         vec!["atlas", "--every", "20", "--out", &path("atlas")],
     ]

@@ -12,8 +12,11 @@
 
 pub mod atlas;
 pub mod compare;
+pub mod expected;
 pub mod ink;
+mod output;
 pub mod plane;
+pub mod queue;
 pub mod reproduce;
 pub mod runner;
 pub mod tune;

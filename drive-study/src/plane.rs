@@ -18,7 +18,7 @@
 use crate::runner;
 use anyhow::{Result, anyhow};
 use drive::Pair;
-use drive::control::envelope::{Envelope, Limit, Warm};
+use drive::control::envelope::{Envelope, Limit};
 use drive::estimator::Kind;
 use drive::frame::{Dq, DqHat};
 use drive::plant::losses::{Losses, efficiency, switching};
@@ -41,7 +41,7 @@ fn area(name: &str, ink: Ink, fill: f64, points: impl Iterator<Item = (f64, f64)
 
 /// The drive in steady state.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Point {
+pub struct OperatingPoint {
     /// Speed in rpm.
     pub rpm: f64,
     /// Torque that the controller is asked for, in N.m.
@@ -97,9 +97,7 @@ impl Reference {
 
     /// The limit of the sign `s`.
     fn limit(&self, rpm: f64, s: f64) -> Limit {
-        let mut warm = Warm::default();
-        let limits = (0..8).map(|_| self.envelope.limit(self.electrical(rpm), s, self.U, &mut warm));
-        limits.last().unwrap_or_default()
+        runner::settled_limit(&self.envelope, self.electrical(rpm), s, self.U)
     }
 
     /// The current (A) for `tau` (N.m): i_d = 0 where the voltage suffices, because L_d = L_q.
@@ -118,7 +116,7 @@ impl Reference {
     }
 
     /// The steady state by the equations, for the torque `tau` (N.m) of the controller.
-    fn steady(&self, rpm: f64, tau: f64) -> Point {
+    fn steady(&self, rpm: f64, tau: f64) -> OperatingPoint {
         let plant = &self.pair.plant.model;
         let (par, motor) = (&plant.parameters, &plant.parameters.motor);
         let (sampled, w) = (self.current(rpm, tau), self.electrical(rpm));
@@ -143,17 +141,17 @@ impl Reference {
             friction: friction * rpm * RPM,
         };
         let (tau_shaft, p_mech) = (tau_e - friction, (tau_e - friction) * rpm * RPM);
-        Point { rpm, tau, tau_e, tau_shaft, losses, efficiency: efficiency(p_mech + losses.sum(), p_mech) }
+        OperatingPoint { rpm, tau, tau_e, tau_shaft, losses, efficiency: efficiency(p_mech + losses.sum(), p_mech) }
     }
 
     /// The steady state with the torque `wanted` (N.m) at the shaft, or else with the greatest one of this sign.
-    fn at_shaft(&self, rpm: f64, wanted: f64) -> Point {
+    fn at_shaft(&self, rpm: f64, wanted: f64) -> OperatingPoint {
         let end = |s: f64| s * self.limit(rpm, s).tau;
         self.steady(rpm, bisect(end(-1.0), end(1.0), |tau| self.steady(rpm, tau).tau_shaft < wanted))
     }
 
     /// The steady state of the running drive: means of the last tenth of 0.5 s.
-    fn run(&self, rpm: f64, tau: f64) -> Result<Point> {
+    fn run(&self, rpm: f64, tau: f64) -> Result<OperatingPoint> {
         let (mut pair, mut n, mut torque, mut p_in, mut p_mech) = (self.pair.clone(), 0.0, 0.0, 0.0, 0.0);
         let mut losses = Losses::none();
         let survived = runner::run_in_steps(&mut pair, 1e-4, 0.5, |t, pair| {
@@ -172,7 +170,7 @@ impl Reference {
             return Err(anyhow!("a step failed at {rpm} rpm"));
         }
         let (tau_shaft, efficiency) = (p_mech / n / (rpm * RPM), efficiency(p_in, p_mech));
-        Ok(Point { rpm, tau, tau_e: torque / n, tau_shaft, losses: losses.map(|sum| sum / n), efficiency })
+        Ok(OperatingPoint { rpm, tau, tau_e: torque / n, tau_shaft, losses: losses.map(|sum| sum / n), efficiency })
     }
 }
 
@@ -236,7 +234,7 @@ pub struct Split {
     /// Losses, stacked, and efficiency.
     pub panels: [Panel; 2],
     /// By the equations and of the running drive, at each speed that was measured.
-    pub points: Vec<[Point; 2]>,
+    pub points: Vec<[OperatingPoint; 2]>,
 }
 
 /// The losses of the reference drive with `torque` (N.m) at the shaft, or the greatest torque where this is less, up to
@@ -257,9 +255,9 @@ pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
         let tau = (at(rpm).tau * 1e3).round() / 1e3;
         points.push([at(rpm), drive.run(rpm, tau)?]);
     }
-    let curves: Vec<Point> = (0..=200).map(|k| at(highest * f64::from(k) / 200.0)).collect();
+    let curves: Vec<OperatingPoint> = (0..=200).map(|k| at(highest * f64::from(k) / 200.0)).collect();
     // From the axis up.
-    let sums = |p: &Point| {
+    let sums = |p: &OperatingPoint| {
         let Losses { cu, iron, cond, sw, .. } = p.losses;
         [cu, cu + iron, cu + iron + cond, cu + iron + cond + sw, p.losses.sum()]
     };
@@ -275,7 +273,7 @@ pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
         dots: points.iter().flat_map(|[_, run]| sums(run).map(|sum| (run.rpm, sum))).collect(),
         marks: vec![(onset, "field weakening".into()), (end, format!("{limit} A"))],
     };
-    let percent = |p: &Point| (p.rpm, 100.0 * p.efficiency);
+    let percent = |p: &OperatingPoint| (p.rpm, 100.0 * p.efficiency);
     let efficiency = Panel {
         title: title("efficiency"),
         unit: "efficiency in %".into(),

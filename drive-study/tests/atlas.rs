@@ -2,7 +2,7 @@
 #![allow(missing_docs)]
 
 use drive::estimator::Kind;
-use drive_study::atlas::cell::{Grid, Scenario};
+use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
 use drive_study::atlas::{self, Atlas, map, report};
 use drive_study::compare::candidate::Entry;
@@ -33,7 +33,7 @@ fn the_reference_drive_loses_two_cells_of_five_and_lock_lost_tells() {
 #[test]
 fn every_scenario_and_any_number_of_threads() {
     let grid = Grid {
-        scenarios: Scenario::ALL.to_vec(),
+        scenarios: Course::ALL.to_vec(),
         R: vec![0.8],
         psi: vec![1.0],
         load: vec![1.0],

@@ -1,10 +1,14 @@
 //! The numbers of `drive/docs/limits.html`, the limits that every documentation page tells: each row is that of a run.
 #![allow(missing_docs, non_snake_case)]
 
+#[path = "common/rated.rs"]
+mod rated;
+
 use drive::Pair;
 use drive::estimator::Kind;
 use drive::math::wrap;
 use drive_study::runner;
+use rated::steady;
 use std::f64::consts::PI;
 
 const PAGE: &str = include_str!("../../drive/docs/limits.html");
@@ -162,7 +166,7 @@ fn torque_at_zero_speed() {
 fn injection_at_speed() {
     let up_to = |kind: Kind| {
         let speeds = (1..=10).map(|k| 0.1 * f64::from(k));
-        let held = speeds.take_while(|&speed| runner::steady(runner::drive(kind), speed, 1.0).holds());
+        let held = speeds.take_while(|&speed| steady(runner::drive(kind), speed, 1.0).holds());
         held.last().map_or("0".into(), |speed| format!("{speed:.1}"))
     };
     let held = |kind: Kind| (kind.name(), up_to(kind));

@@ -4,7 +4,7 @@ use crate::workspace::output_folder;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use drive::estimator::Kind;
-use drive_study::atlas::cell::{Grid, Scenario};
+use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
 use drive_study::atlas::{self, report};
 use drive_study::compare::candidate::Entry;
@@ -115,8 +115,8 @@ fn grid(args: &Atlas) -> Result<Grid> {
     }
     if let Some(names) = &args.scenario {
         let find = |name: &String| {
-            let known = || Scenario::ALL.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ");
-            let found = Scenario::ALL.iter().find(|s| s.name() == name);
+            let known = || Course::ALL.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ");
+            let found = Course::ALL.iter().find(|s| s.name() == name);
             found.copied().ok_or_else(|| anyhow!("--scenario {name}: is not a scenario; there are {}", known()))
         };
         grid.scenarios = names.iter().filter(|name| !name.is_empty()).map(find).collect::<Result<_>>()?;

@@ -5,7 +5,7 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use drive_study::compare::candidate::Entry;
 use drive_study::compare::scenario::{self, Effort, SCENARIOS};
-use drive_study::compare::{self, Cell, Selection, table};
+use drive_study::compare::{self, Run, Selection, table};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
@@ -58,7 +58,7 @@ pub fn run(args: &Compare) -> Result<bool> {
     compare::write(&cells, &out)?;
     println!("{}", table::text(&cells));
     println!("{}", out.join("compare.html").display());
-    Ok(cells.iter().all(Cell::holds))
+    Ok(cells.iter().all(Run::holds))
 }
 
 fn names<'a>(all: impl Iterator<Item = &'a str>) -> String {

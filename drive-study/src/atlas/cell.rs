@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 
 /// The course of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scenario {
+pub enum Course {
     /// The load arrives at the speed.
     Load,
     /// The speed is asked for under load.
@@ -17,7 +17,7 @@ pub enum Scenario {
     Inverter,
 }
 
-impl Scenario {
+impl Course {
     /// All scenarios.
     pub const ALL: &'static [Self] = &[Self::Load, Self::Speed, Self::Heating, Self::Noise, Self::Inverter];
 
@@ -49,7 +49,7 @@ impl Scenario {
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Cell {
     /// The course.
-    pub scenario: Scenario,
+    pub scenario: Course,
     /// R^/R: the controller's resistance as a share of the (cold) machine's.
     pub R: f64,
     /// psi^/psi: the controller's magnet flux as a share of the machine's.
@@ -67,7 +67,7 @@ pub struct Cell {
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Grid {
     /// The courses.
-    pub scenarios: Vec<Scenario>,
+    pub scenarios: Vec<Course>,
     /// R^/R, > 0.
     pub R: Vec<f64>,
     /// psi^/psi, > 0.
@@ -85,7 +85,7 @@ impl Default for Grid {
     /// the same result, so speeds of one sign are enough.
     fn default() -> Self {
         Self {
-            scenarios: vec![Scenario::Load],
+            scenarios: vec![Course::Load],
             R: vec![0.5, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.5],
             psi: vec![0.8, 0.9, 1.0, 1.1, 1.2],
             load: vec![0.0, 0.5, -0.5, 1.0, -1.0],
@@ -99,7 +99,7 @@ impl Grid {
     /// All scenarios, speeds of both signs, a magnet flux known to 5 %, and three start angles.
     pub fn full() -> Self {
         Self {
-            scenarios: Scenario::ALL.to_vec(),
+            scenarios: Course::ALL.to_vec(),
             psi: vec![0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2],
             speed: vec![-0.05, -0.02, -0.01, 0.0, 0.01, 0.02, 0.05],
             theta: vec![-120.0, 0.0, 120.0],

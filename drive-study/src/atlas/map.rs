@@ -2,7 +2,7 @@
 //! the drive is lost, a dot where `lock_lost` does not tell the truth. A legend says so.
 
 use super::Atlas;
-use super::cell::{Cell, Scenario};
+use super::cell::{Cell, Course};
 use std::fmt::Write as _;
 
 /// Side of a cell in pixels.
@@ -93,8 +93,8 @@ pub fn svg(atlas: &Atlas) -> String {
     let axis = |of: fn(&Cell) -> f64| sorted(atlas.runs.iter().map(|(cell, _)| of(cell)));
     let [R, psi, loads, speeds, angles] =
         [axis(|c| c.R), axis(|c| c.psi), axis(|c| c.load), axis(|c| c.speed), axis(|c| c.theta)];
-    let has = |s: &&Scenario| atlas.runs.iter().any(|(cell, _)| cell.scenario == **s);
-    let scenarios: Vec<Scenario> = Scenario::ALL.iter().filter(has).copied().collect();
+    let has = |s: &&Course| atlas.runs.iter().any(|(cell, _)| cell.scenario == **s);
+    let scenarios: Vec<Course> = Course::ALL.iter().filter(has).copied().collect();
     // A title must not reach into the next panel.
     let title = if angles.len() > 1 { TITLE } else { SHORT_TITLE };
     let (panel_width, panel_height) = (LEFT + (SIDE * count(&R)).max(title), TOP + SIDE * count(&psi) + BELOW);

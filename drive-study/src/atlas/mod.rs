@@ -10,8 +10,9 @@ pub mod map;
 pub mod report;
 pub mod run;
 
-use crate::compare::queue;
-use anyhow::{Context, Result, anyhow};
+use crate::output::Folder;
+use crate::queue;
+use anyhow::{Result, anyhow};
 use cell::Cell;
 use drive::Drive;
 use run::Verdict;
@@ -63,15 +64,11 @@ pub fn run(drives: &[Drive], cells: &[Cell], threads: usize, done: impl Fn() + S
 /// # Errors
 /// A file cannot be written.
 pub fn write(atlases: &[Atlas], out: &Path) -> Result<()> {
-    let file = |name: &str, text: &str| {
-        let path = out.join(name);
-        std::fs::write(&path, text).with_context(|| format!("writing {}", path.display()))
-    };
-    std::fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
+    let out = Folder::create(out)?;
     for atlas in atlases {
-        file(&format!("atlas-{}.svg", atlas.drive.name), &map::svg(atlas))?;
+        out.write(&format!("atlas-{}.svg", atlas.drive.name), &map::svg(atlas))?;
     }
-    file("atlas.csv", &report::csv(atlases))?;
-    file("atlas.md", &report::markdown(atlases))?;
-    file("atlas.html", &report::page(atlases))
+    out.write("atlas.csv", &report::csv(atlases))?;
+    out.write("atlas.md", &report::markdown(atlases))?;
+    out.write("atlas.html", &report::page(atlases))
 }

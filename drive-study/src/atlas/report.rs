@@ -1,9 +1,9 @@
 //! The atlas as CSV, as Markdown and as one self-contained page.
 
 use super::Atlas;
-use super::cell::{Cell, Scenario};
+use super::cell::{Cell, Course};
 use super::map::{self, percent};
-use super::run::{Approach, Class, Verdict};
+use super::run::{Approach, Loss, Verdict};
 use crate::ink;
 use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
@@ -86,7 +86,7 @@ fn lost<'a>(runs: impl Iterator<Item = &'a (Cell, Verdict)>) -> [String; 2] {
 fn by_scenario(atlases: &[Atlas]) -> Table {
     let mut table = Table::new(["Estimator", "Machine", "Scenario", "Lost", "R^ within 20 %, psi^ within 5 %"]);
     for Atlas { drive, runs } in atlases {
-        for &scenario in Scenario::ALL {
+        for &scenario in Course::ALL {
             let of = || runs.iter().filter(|(cell, _)| cell.scenario == scenario);
             if of().next().is_some() {
                 let [all, near] = lost(of());
@@ -144,12 +144,12 @@ fn by_class(atlases: &[Atlas]) -> Table {
         let mut row = |class: &str, runs: &[&Verdict], seen: usize| {
             table.rows.push(vec![atlas.drive.name.clone(), class.into(), runs.len().to_string(), seen.to_string()]);
         };
-        let of = |class: Option<Class>| -> Vec<&Verdict> {
+        let of = |class: Option<Loss>| -> Vec<&Verdict> {
             let is = |v: &&Verdict| v.lost.is_some_and(|(of, _)| class.is_none_or(|class| class == of));
             atlas.runs.iter().map(|(_, verdict)| verdict).filter(is).collect()
         };
         let seen = |runs: &[&Verdict]| runs.iter().filter(|v| v.lock_lost >= 1.0).count();
-        for &class in Class::ALL {
+        for &class in Loss::ALL {
             let runs = of(Some(class));
             if !runs.is_empty() {
                 row(&format!("{}: {}", class.name(), class.title()), &runs, seen(&runs));
@@ -212,7 +212,7 @@ pub fn page(atlases: &[Atlas]) -> String {
     }
     for atlas in atlases {
         let drive = &atlas.drive;
-        let swatch = page::swatch(ink::of(drive.pair.controller.model.parameters.estimator));
+        let swatch = page::swatch(ink::of(drive.bench.pair.controller.model.parameters.estimator));
         let (name, machine) = (escape(&drive.name), escape(&drive.machine));
         let _ = write!(
             html,

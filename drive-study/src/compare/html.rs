@@ -3,7 +3,7 @@
 use super::candidate::Entry;
 use super::plots::Plot;
 use super::table::{Block, mark, number};
-use super::{Cell, Outcome, table};
+use super::{Outcome, Run, table};
 use crate::ink;
 use anyhow::Result;
 use fmu_plot::page::{self, escape};
@@ -13,8 +13,8 @@ use std::fmt::Write as _;
 ///
 /// # Errors
 /// Those of [`page::figure`].
-pub fn page(cells: &[Cell], plots: &[Plot]) -> Result<String> {
-    let class = if cells.iter().all(Cell::holds) { "" } else { " off" };
+pub fn page(cells: &[Run], plots: &[Plot]) -> Result<String> {
+    let class = if cells.iter().all(Run::holds) { "" } else { " off" };
     let mut html = format!(
         "<p class=\"verdict{class}\">{}</p>\n\
          <p>S.-K. Sul and S. Kim's review, ICEMS 2011, every estimator in closed loop. {}</p>\n<p>{}</p>\n\

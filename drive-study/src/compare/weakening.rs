@@ -5,9 +5,10 @@
 
 use super::Outcome;
 use super::candidate::Candidate;
-use super::measure::{Follow, Measure};
-use crate::runner::{self, RATED_SPEED, Statistics, line};
-use drive::control::envelope::{Envelope, Warm};
+use super::measure::Measure;
+use crate::runner::{self, RATED_SPEED, Statistics, line, settled_limit};
+use drive::Pair;
+use drive::control::envelope::Envelope;
 use drive::estimator::Kind;
 use fmu_core::Fault;
 
@@ -36,7 +37,7 @@ struct Truth {
 
 impl Truth {
     fn new(candidate: &Candidate) -> Self {
-        let (plant, par) = (&candidate.pair.plant.model, &candidate.pair.controller.model.parameters);
+        let (plant, par) = (&candidate.bench.pair.plant.model, &candidate.bench.pair.controller.model.parameters);
         Self {
             envelope: Envelope::new(&plant.parameters.motor, par.limit.i),
             U: par.weakening.k_u * plant.inputs.u_dc / 3.0_f64.sqrt(),
@@ -51,9 +52,7 @@ impl Truth {
 
     /// Greatest torque (N.m) at `speed` (pu).
     fn torque(&self, speed: f64) -> f64 {
-        let mut warm = Warm::default();
-        let mut limit = || self.envelope.limit(speed * RATED_SPEED * self.n_p, 1.0, self.U, &mut warm).tau;
-        (0..8).map(|_| limit()).last().unwrap_or_default()
+        settled_limit(&self.envelope, speed * RATED_SPEED * self.n_p, 1.0, self.U).tau
     }
 }
 
@@ -69,16 +68,9 @@ pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
     let base = Truth::new(candidate).base_speed();
     let (candidate, target) = (weakening(candidate).turning(FROM), times * base);
     let truth = Truth::new(&candidate);
-    let load = 1.1 * truth.torque(target) / candidate.torque;
-    let mut follow = Follow::default();
+    let load = 1.1 * truth.torque(target) / candidate.bench.torque;
     let [mut fast, mut slow, mut torque] = [Statistics::default(); 3];
-    let survived = candidate.run(3.5, |t, p| {
-        let reference = line(t, 0.5, FROM, 1.0, target);
-        candidate.set(p, reference, line(t, 1.5, 0.0, 1.8, load));
-        follow.trace(t, reference, p);
-        if t > 0.5 {
-            follow.add(t, reference, p);
-        }
+    let course = |t, p: &mut Pair| {
         let speed = runner::speed(p);
         if t <= 1.5 {
             fast.peak = fast.peak.max(speed);
@@ -90,7 +82,9 @@ pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
             slow.add(speed);
             torque.add(p.plant.out.tau_e);
         }
-    })?;
+        (line(t, 0.5, FROM, 1.0, target), line(t, 1.5, 0.0, 1.8, load))
+    };
+    let (follow, survived) = candidate.follow(3.5, 0.5, course)?;
     let lost = !survived || follow.lost();
     let or_lost = |x: f64| if lost { f64::INFINITY } else { x };
     let measures = vec![

@@ -12,9 +12,10 @@
 //! - Current: 2 pi 250 rad/s (Rasmussen); 2 pi 200 rad/s with the I-f start, and 2/3 of the stable limit at most.
 
 use super::extended_emf::{EMF_PER_TRACKER, GREATEST_GAIN, GREATEST_TORQUE, gain_per_bandwidth};
-use super::flux_observer::least_observer;
 use super::motor::{Data, Number};
+use super::rasmussen::least_observer;
 use super::rules::{Setting, Value};
+use drive::estimator::Kind;
 use std::f64::consts::{E, TAU};
 
 /// Samples per electrical period at the highest speed that the rules take.
@@ -67,12 +68,13 @@ pub struct Bandwidths {
 }
 
 impl Bandwidths {
-    /// As given, or by the rules for the estimator.
-    pub fn of(data: &Data, flux_observer: bool) -> Self {
+    /// The given ones, or those of the rules for this estimator, Rasmussen's or the extended EMF.
+    pub fn of(data: &Data, estimator: Kind) -> Self {
+        let rasmussen = estimator == Kind::Rasmussen;
         let (given, machine) = (&data.bandwidth, &data.machine);
         let n_p = f64::from(*machine.n_p.get_ref());
         let needed = DIP_OF_A_STEP * acceleration(data) / (DIP * data.rating.speed.get_ref());
-        let wanted = needed.max(if flux_observer { 40.0 } else { TAU * 5.0 });
+        let wanted = needed.max(if rasmussen { 40.0 } else { TAU * 5.0 });
         let tracker = || {
             Chosen::new(given.observer.as_ref(), "follows the greatest torque, at least 2 pi 20 rad/s", || {
                 let least = 1.1 * (n_p * GREATEST_TORQUE * acceleration(data) / 0.35).sqrt();
@@ -81,7 +83,7 @@ impl Bandwidths {
                 least.max(TAU * 20.0).max((3.0 * wanted).min(TAU * 40.0).min(calm))
             })
         };
-        let tracker = (!flux_observer).then(tracker);
+        let tracker = (!rasmussen).then(tracker);
         let fastest = tracker.as_ref().map_or(0.0, |rho| EMF_PER_TRACKER * rho.value).max(n_p * data.rating.top());
         let rule = "12 samples or more per electrical period and per period of the EMF observer";
         let T_s = Chosen::new(data.control.T_s.as_ref(), rule, || {
@@ -92,10 +94,10 @@ impl Bandwidths {
                 (1.05 * least_observer(data)).max(300.0).max((3.0 * wanted).min(600.0 * PERIODS[0] / T_s.value))
             })
         });
-        let calm = if flux_observer { f64::INFINITY } else { CALM / gain_per_bandwidth(data, observer.value) };
+        let calm = if rasmussen { f64::INFINITY } else { CALM / gain_per_bandwidth(data, observer.value) };
         let rule = "dips by 0.05 pu under a step of the rated torque; at most a third of the observer";
         let speed = Chosen::new(given.speed.as_ref(), rule, || wanted.min(observer.value / 3.0).min(calm));
-        let current = if flux_observer {
+        let current = if rasmussen {
             Chosen::new(given.current.as_ref(), "250 Hz", || TAU * 250.0)
         } else {
             Chosen::new(given.current.as_ref(), "200 Hz, 2/3 of the stable limit at most", || {

@@ -14,13 +14,13 @@
 
 use super::bandwidth::DIP_OF_A_STEP;
 use super::extended_emf::{GREATEST_GAIN, gain_per_bandwidth};
-use super::flux_observer::{LEAST_MARGIN, resistance_margin};
 use super::motor::{Data, MotorFile, Number};
+use super::rasmussen::{LEAST_MARGIN, resistance_margin};
 use super::remedy::{self, Cure};
 use super::rules::{Tuned, torque_constant};
 use super::trial::Trial;
 use drive::control::tables::ControllerParameters;
-use drive::estimator::Class;
+use drive::estimator::Kind;
 use std::fmt;
 
 /// What a limit is about.
@@ -121,7 +121,7 @@ fn of_load(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
         );
     }
     let by_speed = format!("{} takes 2/e T / (J w_s) = {dip:.3} of the {speed:.3} rad/s", step(trial));
-    if par.estimator.class() != Class::FluxObserver {
+    if par.estimator != Kind::Rasmussen {
         return by_speed;
     }
     let (psi_M, w) = (data.machine.psi_M.get_ref(), f64::from(par.motor.n_p) * speed);
@@ -135,7 +135,7 @@ fn of_load(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
 
 fn of_start(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
     let from = format!("from {} of {} angles, ", trial.angles - trial.started, trial.angles);
-    if par.estimator.class() == Class::FluxObserver {
+    if par.estimator == Kind::Rasmussen {
         let margin = resistance_margin(data);
         if margin < LEAST_MARGIN {
             return format!(

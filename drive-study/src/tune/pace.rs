@@ -12,7 +12,7 @@ use super::bandwidth::DIP_OF_A_STEP;
 use super::rules::Tuned;
 use drive::Pair;
 use drive::control::start::StartMode;
-use drive::estimator::Class;
+use drive::estimator::Kind;
 
 /// Least share of a load that the greatest torque is taken to leave.
 const LEAST_SPARE: f64 = 0.02;
@@ -34,7 +34,7 @@ impl Pace {
         let par = &pair.controller.model.parameters;
         let (speed_loop, estimators) = (&par.speed_loop, &par.estimators);
         let w = f64::from(par.motor.n_p) * level * tuned.speed;
-        let observer = if par.estimator.class() == Class::FluxObserver {
+        let observer = if par.estimator == Kind::Rasmussen {
             let rasmussen = &estimators.rasmussen;
             slowest(rasmussen.c_1, w * w).max(1.0 / rasmussen.w_n)
         } else {

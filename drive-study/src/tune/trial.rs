@@ -7,11 +7,10 @@
 
 use super::pace::{Pace, begin};
 use super::rules::Tuned;
+use crate::queue;
 use drive::Pair;
 use drive::math::wrap;
 use std::f64::consts::TAU;
-use std::num::NonZero;
-use std::thread;
 
 /// The levels of speed in pu that every drive is tried at; besides, its highest speed.
 pub const LEVELS: [f64; 3] = [0.1, 0.5, 1.0];
@@ -247,13 +246,8 @@ pub fn all(tuned: &Tuned, angles: u32) -> Vec<Trial> {
 
 /// Tries a task from `angles` start angles, evenly spaced, on all processors.
 pub fn at(tuned: &Tuned, task: &Task, angles: u32) -> Trial {
-    let run = |k: u32| one(tuned, task, f64::from(k) * TAU / f64::from(angles));
-    let threads = u32::try_from(thread::available_parallelism().map_or(1, NonZero::get)).unwrap_or(1).min(angles);
-    let runs: Vec<Run> = thread::scope(|scope| {
-        let of = |first| (first..angles).step_by(threads.max(1) as usize).map(run).collect::<Vec<_>>();
-        let all: Vec<_> = (0..threads).map(|first| scope.spawn(move || of(first))).collect();
-        all.into_iter().flat_map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
-    });
+    let starts: Vec<f64> = (0..angles).map(|k| f64::from(k) * TAU / f64::from(angles)).collect();
+    let runs = queue::map(&starts, |theta| one(tuned, task, *theta));
     let mut trial =
         Trial { task: *task, angles, started: 0, held: 0, least: f64::INFINITY, error: 0.0, most: f64::INFINITY };
     for Run { started, held, least, error, most } in runs {

@@ -1,7 +1,7 @@
 //! The expected figures of the cells. Those of the Kim & Sul review are derived again for the 2.2 kW machine; those of
 //! Rasmussen's observer hold for its own reference motor. The default tolerance is 10 %, and 0.3 deg for angles.
 
-use crate::reproduce::figures::Expected;
+use crate::expected::Expected;
 use Expected::{AtLeast, AtMost, Near};
 
 /// Estimators that share a figure.
