@@ -62,7 +62,7 @@ fn icon(svg: &str) -> String {
     format!("<div class=\"icon\" aria-hidden=\"true\">{}</div>\n", svg.trim())
 }
 
-/// Drawings and tables in boxes of their own, in which a narrow page scrolls them.
+/// Puts drawings and tables into boxes that scroll on a narrow page.
 fn scrolling(html: &str) -> String {
     let boxed = |html: String, open: &str, close: &str| {
         let mut parts = html.split(open);
@@ -138,13 +138,13 @@ fn parameters(d: &Description) -> String {
     out
 }
 
-/// What is connected together.
+/// The terminals.
 fn terminals(d: &Description) -> String {
     if d.terminals.is_empty() {
         return String::new();
     }
     let mut out = String::from(
-        "<h2>Terminals</h2>\n<p>Variables that are connected together; those of one member name belong to each other.</p>\n\
+        "<h2>Terminals</h2>\n<p>Variables that are connected together: two terminals connect the members of the same name.</p>\n\
          <div class=\"scroll\">\n<table class=\"variables\">\n<tr><th>Terminal</th><th class=\"wide\">Description</th>\
          <th>Members</th></tr>\n",
     );

@@ -3,9 +3,9 @@
 //!
 //! To stack quantities, a [`Panel`] fills their sums down to zero, the greatest first.
 //!
-//! Steady state of a drive whose controller gets the torque `tau` and knows the machine but no losses: i is the current for
-//! `tau` under the voltage of field weakening at the samples. The voltage is held over T_s while the rotor turns, so that the
-//! mean current is i_s. With g = G w
+//! Steady state of a drive whose controller gets the torque `tau` and knows the machine but not the losses: at the samples, i is
+//! the current for `tau` under the voltage of field weakening. The voltage is held over T_s while the rotor turns; the mean
+//! current is i_s. With g = G w
 //!
 //! ```text
 //! i_s = i + j w u T_s^2 / (12 L)
@@ -44,7 +44,7 @@ fn area(name: &str, ink: Ink, fill: f64, points: impl Iterator<Item = (f64, f64)
 pub struct OperatingPoint {
     /// Speed in rpm.
     pub rpm: f64,
-    /// Torque that the controller is asked for, in N.m.
+    /// Torque reference of the controller in N.m.
     pub tau: f64,
     /// Electromagnetic torque in N.m.
     pub tau_e: f64,
@@ -79,7 +79,7 @@ impl Reference {
         Self { pair, envelope, U }
     }
 
-    /// The same with losses of iron and inverter; the values are assumed.
+    /// The drive with assumed losses of iron and inverter.
     fn lossy() -> Self {
         let mut drive = Self::new();
         let plant = &mut drive.pair.plant.model.parameters;
@@ -95,7 +95,7 @@ impl Reference {
         f64::from(self.pair.plant.model.parameters.motor.n_p) * rpm * RPM
     }
 
-    /// The limit of the sign `s`.
+    /// The greatest torque of the sign `s`.
     fn limit(&self, rpm: f64, s: f64) -> Limit {
         runner::settled_limit(&self.envelope, self.electrical(rpm), s, self.U)
     }
@@ -174,7 +174,7 @@ impl Reference {
     }
 }
 
-/// Where `holds` ends to be true, between `low` and `high`.
+/// The greatest value between `low` and `high` up to which `holds` is true.
 fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..60 {
         let mid = 0.5 * (low + high);
@@ -227,7 +227,7 @@ pub fn envelope(measured: &[f64]) -> Result<Plane> {
 /// The losses of the reference drive at one torque over the speed.
 #[derive(Clone, Debug)]
 pub struct Split {
-    /// Speed in rpm above which the voltage takes field weakening at this torque.
+    /// Speed in rpm above which this torque needs field weakening.
     pub onset: f64,
     /// Speed in rpm above which the drive has less than this torque.
     pub end: f64,
@@ -251,12 +251,12 @@ pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
     let onset = bisect(0.0, highest, |rpm| drive.current(rpm, at(rpm).tau).d() == 0.0);
     let mut points = Vec::new();
     for &rpm in measured {
-        // The reference as the page writes it.
+        // The page shows the reference with three decimals.
         let tau = (at(rpm).tau * 1e3).round() / 1e3;
         points.push([at(rpm), drive.run(rpm, tau)?]);
     }
     let curves: Vec<OperatingPoint> = (0..=200).map(|k| at(highest * f64::from(k) / 200.0)).collect();
-    // From the axis up.
+    // Stacked from the axis upward.
     let sums = |p: &OperatingPoint| {
         let Losses { cu, iron, cond, sw, .. } = p.losses;
         [cu, cu + iron, cu + iron + cond, cu + iron + cond + sw, p.losses.sum()]

@@ -17,11 +17,11 @@ use std::thread;
 /// Runs drives with wrong estimates of resistance and magnet flux at low speed under load, and maps where they are lost.
 ///
 /// Without MOTOR.toml, an estimator runs on the drive of `fmu compare`: flux observers on the reference motor (rated 3000 rpm
-/// and 2 N.m), all others on the 2.2 kW machine. With it, on the drive that `fmu tune` gives for the machine. Every value of
-/// an axis meets every value of the others; shares are of the true or the rated value.
+/// and 2 N.m), all others on the 2.2 kW machine. With it, they run on the drive that `fmu tune` gives for the machine. The cells
+/// are all combinations of the values on the axes; shares are of the true or the rated value.
 ///
-/// Writes a map per estimator (atlas-NAME.svg, red where lost), atlas.csv, atlas.md and atlas.html, which needs no network.
-/// The files have the same bytes for any number of jobs.
+/// Writes a map per estimator (atlas-NAME.svg, red where the drive is lost), atlas.csv, atlas.md and atlas.html, which needs no
+/// network. The files have the same bytes for any number of jobs.
 ///
 ///   fmu atlas --estimator Rasmussen --out target/atlas
 ///   fmu atlas --set adaptation.resistance=true --set adaptation.k_a=0.02

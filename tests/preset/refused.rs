@@ -34,7 +34,7 @@ fn files_that_are_no_fmus_of_this_program() {
         ("none.fmu", "none.fmu: "),
         ("text.fmu", "not a ZIP archive"),
         ("elsewhere.fmu", "for this platform"),
-        ("edited.fmu", "modelDescription.xml and binary are of different builds: build the FMU anew"),
+        ("edited.fmu", "modelDescription.xml and binary are of different builds: build the FMU again"),
     ] {
         let said = preset(&path(file), &path("new.fmu"), &["motor.R_s=3"]).unwrap_err();
         assert!(said.contains(why) && said.starts_with("Some(2) ") && !path("new.fmu").exists(), "{said}");

@@ -2,18 +2,18 @@
 
 use anyhow::{Result, bail};
 
-/// The course of a run.
+/// What happens in a run; the scenario of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Course {
     /// The load arrives at the speed.
     Load,
-    /// The speed is asked for under load.
+    /// The speed reference comes under load.
     Speed,
-    /// As `Load`; then the resistance rises by 40 % within 10 s.
+    /// `Load`; then the resistance rises by 40 % within 10 s.
     Heating,
-    /// As `Load`, with noise of the current sensors.
+    /// `Load` with noise of the current sensors.
     Noise,
-    /// As `Noise`, with offsets of the current sensors and a compensated dead time.
+    /// `Noise` with offsets of the current sensors and a compensated dead time.
     Inverter,
 }
 
@@ -32,11 +32,11 @@ impl Course {
         }
     }
 
-    /// What happens in it.
+    /// One sentence about it.
     pub fn title(self) -> &'static str {
         match self {
             Self::Load => "the load arrives at the speed",
-            Self::Speed => "the speed is asked for under load",
+            Self::Speed => "the speed reference comes under load",
             Self::Heating => "the load arrives, then R rises by 40 % in 10 s",
             Self::Noise => "the load arrives, noisy currents",
             Self::Inverter => "the load arrives, noise, offsets and a compensated dead time",
@@ -48,7 +48,7 @@ impl Course {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Cell {
-    /// The course.
+    /// The scenario.
     pub scenario: Course,
     /// R^/R: the controller's resistance as a share of the (cold) machine's.
     pub R: f64,
@@ -66,7 +66,7 @@ pub struct Cell {
 #[derive(Clone, Debug, PartialEq)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Grid {
-    /// The courses.
+    /// The scenarios.
     pub scenarios: Vec<Course>,
     /// R^/R, > 0.
     pub R: Vec<f64>,
@@ -81,7 +81,7 @@ pub struct Grid {
 }
 
 impl Default for Grid {
-    /// The 1100 cells of the load that arrives. Without noise, a cell and its mirror image (speed and load negated) have
+    /// The 1100 cells of the scenario `Load`. Without noise, a cell and its mirror image (speed and load negated) have
     /// the same result, so speeds of one sign are enough.
     fn default() -> Self {
         Self {
@@ -107,7 +107,7 @@ impl Grid {
         }
     }
 
-    /// The axes, with their option and what a value must be.
+    /// The axes with their options and ranges.
     fn axes(&self) -> [(&'static str, &[f64], f64, f64); 5] {
         [
             ("--resistance", &self.R, 0.1, 10.0),

@@ -1,4 +1,4 @@
-//! A drive of the atlas: the one that `fmu compare` runs, or one tuned for a machine's file, with settings of the user.
+//! A drive of the atlas: a drive of `fmu compare`, or one tuned for a machine's file, with settings of the user.
 
 use super::run::Approach;
 use crate::compare::candidate::{Candidate, Class, Entry};
@@ -43,7 +43,7 @@ impl Drive {
         }
     }
 
-    /// The machine of a file with this estimator, tuned as `fmu tune` does: a flux observer by the rules for Rasmussen's, any
+    /// The machine of a file with this estimator, tuned by the rules of `fmu tune`: a flux observer by those for Rasmussen's, any
     /// other by those for the extended EMF.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Drive {
         let par = &mut pair.controller.model.parameters;
         par.estimator = kind;
         par.start.mode = StartMode::Direct;
-        // Other methods refuse it.
+        // The other estimators refuse this option.
         par.estimators.emf.hold_reversal &= kind == Kind::ExtendedEmf;
         Ok(Self {
             name: kind.name().into(),

@@ -1,7 +1,7 @@
 //! The atlas: where a drive with wrong estimates of resistance and magnet flux holds low speeds under load, and whether
-//! `lock_lost` tells when it does not.
+//! `lock_lost` reports the cells that it does not hold.
 //!
-//! - [`cell`]: the grid; [`mod@run`]: a run, what counts as lost; [`drive`]: the drives;
+//! - [`cell`]: the grid; [`mod@run`]: a run and what counts as lost; [`drive`]: the drives;
 //! - [`map`]: the map of a drive; [`report`]: tables, CSV and page.
 
 pub mod cell;
@@ -23,7 +23,7 @@ use std::path::Path;
 pub struct Atlas {
     /// The drive.
     pub drive: Drive,
-    /// Cells and what they gave, in the order of the grid.
+    /// Cells and verdicts, in the order of the grid.
     pub runs: Vec<(Cell, Verdict)>,
 }
 

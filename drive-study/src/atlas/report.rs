@@ -66,7 +66,7 @@ impl Table {
     }
 }
 
-/// How many of these runs there are, how many are lost, and the same with R^ within 20 % of R and psi^ within 5 %.
+/// How many of these runs are lost: of all, and of those with R^ within 20 % of R and psi^ within 5 % of psi.
 fn lost<'a>(runs: impl Iterator<Item = &'a (Cell, Verdict)>) -> [String; 2] {
     let (mut all, mut near) = ([0_u32; 2], [0_u32; 2]);
     for (cell, verdict) in runs {
@@ -137,7 +137,7 @@ fn by_axis(atlases: &[Atlas]) -> Table {
     table
 }
 
-/// What `lock_lost` says, by class.
+/// The values of `lock_lost`, by class.
 fn by_class(atlases: &[Atlas]) -> Table {
     let mut table = Table::new(["Estimator", "Class", "Cells", "lock_lost >= 1 within 1 s"]);
     for atlas in atlases {
@@ -164,7 +164,7 @@ fn by_class(atlases: &[Atlas]) -> Table {
     table
 }
 
-/// What the drives do before they are judged, and what counts as lost.
+/// The course of the runs, and what counts as lost.
 fn definitions(atlases: &[Atlas]) -> Vec<&'static str> {
     let has = |approach| atlases.iter().any(|a| a.drive.approach == approach);
     let mut all = Vec::new();
@@ -216,7 +216,7 @@ pub fn page(atlases: &[Atlas]) -> String {
         let (name, machine) = (escape(&drive.name), escape(&drive.machine));
         let _ = write!(
             html,
-            "<h2>{swatch}{name} ({machine})</h2>\n<p>Red: lost. A white dot: lost, and lock_lost does not tell it within 1 s. A \
+            "<h2>{swatch}{name} ({machine})</h2>\n<p>Red: lost. A white dot: lost, and lock_lost does not report it within 1 s. A \
              red dot on a held cell: a false alarm. Speed n and load are shares of the rated values.</p>\n<div class=\"scroll\" tabindex=\"0\">{}</div>\n",
             map::svg(atlas)
         );

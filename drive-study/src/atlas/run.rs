@@ -1,6 +1,6 @@
-//! One run: the course of speed and load, what counts as lost, and what `lock_lost` says about it.
+//! One run: the course of speed and load, what counts as lost, and whether `lock_lost` reports it.
 //!
-//! Every course has an approach, then a load, and it is judged at its end. Shares are of rated speed and torque:
+//! Every run has an approach, then a load, and it is judged at its end. Shares are of rated speed and torque:
 //!
 //! | | [`Approach::Rest`] | [`Approach::Turning`] |
 //! |---|---|---|
@@ -12,7 +12,7 @@
 //! | lost: speed off by more than | 1/600 + 5 % of the reference | 0.02 |
 //! | lost: angle off by more than | 180 deg, which is never: at rest the d-axis current carries load at 36 deg | 30 deg |
 //!
-//! `noise` is that of sensors with 10 mA per 7.5 A of `limit.i`, `inverter` adds offsets of +20 and -20 mA per 7.5 A and a
+//! In `noise`, the current sensors have 10 mA of noise per 7.5 A of `limit.i`; `inverter` adds offsets of +20 and -20 mA per 7.5 A and a
 //! dead time of 2 % of T_s, compensated. A drive with `compensation.calibrate` is off for the
 //! first 0.05 s, and the course begins after that.
 
@@ -24,7 +24,7 @@ use drive::math::wrap;
 use fmu_core::{Fault, Model};
 use std::f64::consts::TAU;
 
-/// How the drive comes to its speed; with it goes what counts as lost.
+/// How the drive comes to its speed; it also decides what counts as lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Approach {
     /// From rest, in steps.
@@ -74,7 +74,7 @@ impl Loss {
         }
     }
 
-    /// What it means.
+    /// One sentence about it.
     pub fn title(self) -> &'static str {
         match self {
             Self::Slips => "the rotor slips against the estimate",
@@ -86,7 +86,7 @@ impl Loss {
     }
 }
 
-/// What a run gave.
+/// The result of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
     /// How and when (s) the drive was lost: the first time out of its tolerance while it is judged.
@@ -102,8 +102,8 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Whether `lock_lost` told the truth: 1 or more within 1 s of a loss, below 1 while the drive holds. A cell that is
-    /// held in the end may have been lost before: `heating` brings R to R^ > R.
+    /// Whether `lock_lost` was right: 1 or more within 1 s of a loss, below 1 while the drive holds. A cell that is
+    /// held in the end may have been lost before: in `heating`, R rises to an R^ that was greater.
     pub fn told(&self) -> bool {
         if self.lost.is_some() { self.lock_lost >= 1.0 } else { self.while_held < 1.0 }
     }
@@ -178,7 +178,7 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
     let course = |t: f64, p: &mut Pair| {
         let on = t >= off - 1e-9;
         (p.controller.model.inputs.enable, p.plant.model.inputs.enable) = (on, on);
-        // A percent at a time.
+        // In steps of one percent.
         let share = if heats { ((t - 2.0) / 10.0).clamp(0.0, 1.0) * 40.0 } else { 0.0 };
         if share >= f64::from(hot + 1) {
             hot += 1;

@@ -62,7 +62,7 @@ impl Entry {
         }
     }
 
-    /// Its name in a table, with the machine if it differs from that of the others.
+    /// Its name in a table, with the machine if the others have a different one.
     pub fn label(&self) -> String {
         match self.kind {
             Kind::Rasmussen => format!("{} ({})", self.name, self.machine()),
@@ -142,7 +142,7 @@ impl Candidate {
         self.with(|p| *p = runner::turning(p.clone(), speed))
     }
 
-    /// The start from an unknown angle: by I-f, by polarity pulses (which need saturation), or by the estimator itself.
+    /// Starting from an unknown angle: by I-f, by polarity pulses (which need saturation), or by the estimator itself.
     pub fn starting(&self) -> Self {
         self.with(|p| {
             let mode = &mut p.controller.model.parameters.start.mode;

@@ -1,10 +1,10 @@
-//! The expected figures of the cells. Those of the Kim & Sul review are derived again for the 2.2 kW machine; those of
+//! The expected figures. Those of the Kim & Sul review are derived again for the 2.2 kW machine; those of
 //! Rasmussen's observer hold for its own reference motor. The default tolerance is 10 %, and 0.3 deg for angles.
 
 use crate::expected::Expected;
 use Expected::{AtLeast, AtMost, Near};
 
-/// Estimators that share a figure.
+/// Groups of estimators that share a figure.
 const DIRECT: &[&str] = &["DirectEmf"];
 const OBSERVERS: &[&str] = &["EmfObserver", "ExtendedEmf"];
 const KALMAN: &[&str] = &["KalmanFilter"];
@@ -96,7 +96,7 @@ const FIGURES: &[Row] = &[
     (DIRECT, "load-0.5", PEAK, deg(3.9)),
     (OBSERVERS, "load-0.5", "dip", tenth(0.092)),
     (OBSERVERS, "load-0.5", PEAK, deg(3.8)),
-    // Judged by the figures of the observers, although it performs better.
+    // The figures of the observers, which the Kalman filter exceeds.
     (KALMAN, "load-0.5", "dip", AtMost(0.1012)),
     (KALMAN, "load-0.5", PEAK, AtMost(4.1)),
     (MODELS, "load-0.5", "dip", tenth(0.070)),
@@ -130,7 +130,7 @@ const FIGURES: &[Row] = &[
     (PULSATING, "bandwidth-fast", BANDWIDTH, tenth(52.0)),
     (BOTH_SQUARES, "bandwidth-fast", BANDWIDTH, Near(49.85, 8.45)),
     (NEAR_PWM, "bandwidth-fast", BANDWIDTH, tenth(39.0)),
-    // Injection: error at 0 and ±0.1 pu (must not exceed the noise of the list), cost of the signal, full load step at
+    // Injection: error at 0 and ±0.1 pu (at most the noise of the list), cost of the signal, full load step at
     // standstill.
     (ROTATING, "rated-0", MEAN, Near(0.0, 0.4)),
     (ROTATING, "rated-0.1", MEAN, Near(0.0, 0.4)),
@@ -165,7 +165,7 @@ const FIGURES: &[Row] = &[
     (INJECTION, "load-0", PEAK, AtMost(30.0)),
     (HYBRID, "reversal", PEAK, tenth(7.6)),
     (HYBRID, "reversal-dead", PEAK, AtMost(13.0)),
-    // The methods that practice compares with, derived for this machine.
+    // Methods from practice; the figures are derived for this machine.
     (FLUX_OBSERVER, "reversal", PEAK, AtMost(1.0)),
     (FLUX_OBSERVER, "lowest", LOWEST, AtMost(0.0)),
     (FLUX_OBSERVER, "lowest-dead", LOWEST, AtMost(0.0)),

@@ -1,4 +1,4 @@
-//! The grid as one self-contained page.
+//! The comparison as one self-contained page.
 
 use super::candidate::Entry;
 use super::plots::Plot;
@@ -52,7 +52,7 @@ pub fn page(cells: &[Run], plots: &[Plot]) -> Result<String> {
 
 /// A table with a column for each quantity of each scenario.
 fn grid(block: &Block<'_>) -> String {
-    // Whoever has no mouse scrolls it with the arrow keys.
+    // The focus lets the arrow keys scroll it.
     let mut html = format!(
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\"><table>\n\
          <thead><tr><th class=\"name\" rowspan=\"2\">estimator</th>",

@@ -3,14 +3,14 @@
 use crate::expected::Expected;
 use crate::runner::{Moment, Statistics};
 
-/// A number of a cell. It is infinite if the value was never reached or the rotor was lost.
+/// A number measured in a run. It is infinite if the value was never reached or the rotor was lost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measure {
     /// Name of the quantity.
     pub name: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// The value, infinite where the drive was lost.
+    /// The value.
     pub value: f64,
     /// The expected value, if there is a figure.
     pub expected: Option<Expected>,

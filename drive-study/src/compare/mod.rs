@@ -1,4 +1,4 @@
-//! The grid: runs every estimator through every scenario on all cores, with the native models, then measures, checks
+//! The comparison: runs every estimator through every scenario on all cores, with the native models, then measures, checks
 //! and plots the results.
 //!
 //! - [`candidate`]: an estimator with the drive it is compared on; [`scenario`]: the test it runs through;
@@ -37,7 +37,7 @@ pub enum Outcome {
     Refused(String),
 }
 
-/// One cell of the grid.
+/// One estimator in one scenario, with the result.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// The row.
@@ -70,13 +70,13 @@ impl Run {
         self.measures().iter().filter(|m| m.expected.is_some_and(|e| !e.holds(m.value)))
     }
 
-    /// Whether every number of this cell is as expected.
+    /// Whether every number is as expected.
     pub fn holds(&self) -> bool {
         !matches!(self.outcome, Outcome::Refused(_)) && self.outside().next().is_none()
     }
 }
 
-/// Which cells, and how thoroughly.
+/// Which estimators run through which scenarios, and how thoroughly.
 #[derive(Clone, Debug)]
 pub struct Selection {
     /// The estimators, the rows.
@@ -88,13 +88,13 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// All cells.
+    /// Every estimator in every scenario.
     pub fn all(effort: Effort) -> Self {
         Self { entries: Entry::all(), scenarios: SCENARIOS.iter().collect(), effort }
     }
 }
 
-/// Runs the cells on all cores and calls `done` after each finished cell.
+/// Runs the selection on all cores and calls `done` after each run.
 pub fn run(selection: &Selection, done: impl Fn() + Sync) -> Vec<Run> {
     let Selection { entries, scenarios, effort } = selection;
     let jobs: Vec<_> = entries.iter().flat_map(|&entry| scenarios.iter().map(move |&s| (entry, s))).collect();

@@ -1,4 +1,4 @@
-//! Plots over time: speed and angle error of all estimators in one picture per scenario and, for each estimator that
+//! Plots over time: speed and angle error of all estimators in one plot per scenario and, for each estimator that
 //! injects a voltage, the carrier current and the angle found in it (Fig. 8 and 11 of the review).
 
 use super::Run;
@@ -7,7 +7,7 @@ use fmu_plot::figure::{Curve, Figure, Panel};
 use fmu_plot::ink::{CURVES, REFERENCE};
 use std::rc::Rc;
 
-/// A picture.
+/// A plot and its name.
 #[derive(Debug)]
 pub struct Plot {
     /// File name without extension.
@@ -16,7 +16,7 @@ pub struct Plot {
     pub figure: Figure,
 }
 
-/// All pictures of the cells.
+/// All plots of the runs.
 pub fn all(cells: &[Run]) -> Vec<Plot> {
     let mut plots = Vec::new();
     for id in ["ramp", "reversal", "load-0", "load-0.1", "load-0.5", "load-1", "weakening"] {

@@ -1,4 +1,4 @@
-//! The grid as text, Markdown and CSV: estimators as rows, scenarios as columns, one table per group of scenarios.
+//! The comparison as text, Markdown and CSV: estimators as rows, scenarios as columns, one table per group of scenarios.
 
 use super::candidate::Entry;
 use super::measure::Measure;
@@ -7,14 +7,14 @@ use crate::compare::candidate::Class;
 use crate::output::{self, aligned};
 use std::fmt::Write as _;
 
-/// A group of scenarios with its cells.
+/// A group of scenarios with its runs.
 #[derive(Debug)]
 pub struct Block<'a> {
     /// What the scenarios have in common.
     pub title: &'static str,
     /// The scenarios, each with its quantities; their values are those of one estimator.
     pub headings: Vec<(&'static str, &'a [Measure])>,
-    /// The estimators with their cells, one for each scenario.
+    /// The estimators with their runs, one for each scenario.
     pub rows: Vec<(&'a Entry, Vec<Option<&'a Run>>)>,
     /// Notes under the table.
     pub notes: Vec<String>,
@@ -35,7 +35,7 @@ impl Block<'_> {
     }
 }
 
-/// A number in a resolution that suits its unit.
+/// A number with as many digits as its unit deserves.
 pub fn number(m: &Measure) -> String {
     if m.value.is_infinite() {
         return if m.name == "settling time" { "never" } else { "lost" }.into();
@@ -74,7 +74,7 @@ pub(super) fn mark(m: &Measure, expected: bool) -> &'static str {
     }
 }
 
-/// The tables of the cells.
+/// The tables of the runs.
 pub fn blocks(cells: &[Run]) -> Vec<Block<'_>> {
     let mut groups: Vec<&'static str> = Vec::new();
     for cell in cells {
@@ -173,7 +173,7 @@ pub const MACHINES: &str = "All on the 2.2 kW machine with interior magnets (R 3
      on its own reference motor (assumed; 1 pu = 1500 rpm and 2 N.m) with R^ = 0.9 R and without noise. \
      Angle errors are theta - theta^: positive where the rotor is ahead of the estimate.";
 
-/// How the estimators of the cells start, in words.
+/// How the estimators start, in words.
 pub fn starts(cells: &[Run]) -> String {
     let mut ways: Vec<(&str, Vec<&str>)> = Vec::new();
     for cell in cells {

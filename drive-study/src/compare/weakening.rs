@@ -1,7 +1,7 @@
 //! Field weakening: to a multiple of the base speed, and there more load than the machine can carry.
 //!
-//! Base speed n_b: of the true machine at its greatest current and 0.95 u_dc / sqrt 3. Envelope: of the true machine too, under
-//! the limits of each estimator.
+//! The base speed n_b is that of the true machine at its greatest current and 0.95 u_dc / sqrt 3; the envelope too is that of the
+//! true machine, under the limits of each estimator.
 
 use super::Outcome;
 use super::candidate::Candidate;
@@ -18,9 +18,9 @@ fn weakening(candidate: &Candidate) -> Candidate {
         let par = &mut p.controller.model.parameters;
         par.weakening.used = true;
         match par.estimator {
-            // Its gain has no bound near the current -psi_M / L_d.
+            // The gain of this estimator has no bound near the current -psi_M / L_d.
             Kind::VoltageModel => par.limit.i = 0.7 * par.motor.psi_M / par.motor.L_d,
-            // A saturated hexagon is an angle error to it.
+            // This estimator takes a saturated hexagon for an angle error.
             Kind::VoltageFeedback => (par.weakening.k_u, par.weakening.k_t) = (0.9, 0.9),
             _ => {}
         }
@@ -56,8 +56,8 @@ impl Truth {
     }
 }
 
-/// A ramp of the reference to a multiple of the base speed, then a tenth more load than the envelope has there: the drive slows
-/// down along the envelope to where it carries the load.
+/// A ramp of the reference to a multiple of the base speed, then 1.1 times the torque of the envelope as load: the drive slows
+/// down along the envelope to the speed at which it carries the load.
 pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
     const FROM: f64 = 0.5;
     if let Some(why) = candidate.no_speed(1.0) {

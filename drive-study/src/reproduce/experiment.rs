@@ -8,10 +8,10 @@ pub const RPM: f64 = PI / 30.0;
 /// Values of one input over time: each holds from its time (s) to the next.
 pub type Schedule = &'static [(f64, f64)];
 
-/// One experiment with plant and controller.
+/// An experiment with plant and controller.
 #[derive(Clone, Copy, Debug)]
 pub struct Experiment {
-    /// Short name, used for files.
+    /// Short name, also of files.
     pub id: &'static str,
     /// Figure of the paper.
     pub figure: &'static str,
@@ -107,7 +107,7 @@ pub fn at(schedule: Schedule, t: f64) -> f64 {
     schedule.iter().rev().find(|(from, _)| t >= from - 1e-9).map_or(0.0, |(_, value)| *value)
 }
 
-/// The record of every communication point.
+/// The recorded communication points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Record {
     /// Time in s.

@@ -83,7 +83,7 @@ impl<'a> Window<'a> {
         (self.max(column) - target).max(target - self.min(column))
     }
 
-    /// What the greatest value exceeds `target` by, in percent.
+    /// Overshoot of the greatest value over `target` in percent.
     fn overshoot(&self, column: Column, target: f64) -> f64 {
         (self.max(column) / target - 1.0) * 100.0
     }
@@ -119,7 +119,7 @@ fn first(record: &Record) -> Window<'_> {
     window(record, 0.2, 1.2)
 }
 
-/// Its second start, at 2.2 s.
+/// The second start of `start-180`, at 2.2 s.
 fn second(record: &Record) -> Window<'_> {
     window(record, 2.2, 3.2)
 }

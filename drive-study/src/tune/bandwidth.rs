@@ -1,13 +1,13 @@
 //! The sample period and the bandwidths of the loops: as given in the machine's file, or by these rules.
 //!
 //! - T_s: the longest of 100, 50, 25 and 12.5 us that gives at least 12 samples per electrical period at the highest speed. A
-//!   voltage that is held for a sample turns by 30 deg there against the rotor, so that 1.1 % of it is lost, and the command,
-//!   which acts 1.5 samples later on the average, is turned ahead by 45 deg. The poles of the EMF observer get as many.
+//!   voltage that is held for a sample turns by 30 deg there against the rotor, which loses 1.1 % of it, and the command,
+//!   which acts 1.5 samples later on average, is turned ahead by 45 deg. The poles of the EMF observer get as many samples.
 //! - Observer: the acceleration alpha (electrical) that it must follow leaves an angle error of alpha / w_n^2 = 0.35 rad at
 //!   most. Rasmussen's observer: that of the maximum current, and 300 rad/s at least; the tracker of the extended EMF: that
 //!   of 1.6 times the rated torque, the limit, and 2 pi 20 rad/s at least.
-//! - Speed: a step of the torque T makes the loop dip by 2/e T / (J w_s), a double pole at w_s / 2. It is to be at most 0.05
-//!   pu; at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up to a limit;
+//! - Speed: a step of the torque T makes the loop dip by 2/e T / (J w_s), a double pole at w_s / 2. The dip should be at most
+//!   0.05 pu; w_s is at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up to a limit;
 //!   with the extended EMF, less where the gain through the change of i_q would be high ([`limits`](super::limits)).
 //! - Current: 2 pi 250 rad/s (Rasmussen); 2 pi 200 rad/s with the I-f start, and 2/3 of the stable limit at most.
 
@@ -18,22 +18,22 @@ use super::rules::{Setting, Value};
 use drive::estimator::Kind;
 use std::f64::consts::{E, TAU};
 
-/// Samples per electrical period at the highest speed that the rules take.
+/// Least number of samples per electrical period at the highest speed.
 const SAMPLES: f64 = 12.0;
 
 /// Sample periods in s to choose from.
 const PERIODS: [f64; 4] = [1e-4, 5e-5, 2.5e-5, 1.25e-5];
 
-/// Dip of the speed in pu under a step of the rated torque that the rules aim at.
+/// Target of the rules: dip of the speed in pu under a step of the rated torque.
 const DIP: f64 = 0.05;
 
-/// Gain of the speed loop through the EMF that a change of i_q makes, see [`limits`](super::limits): what the rules take.
+/// Gain of the speed loop through the EMF that a change of i_q makes, see [`limits`](super::limits): the limit of the rules.
 const CALM: f64 = 0.6 * GREATEST_GAIN;
 
-/// A value and where it comes from.
+/// A value and its origin.
 #[derive(Clone, Debug)]
 pub struct Chosen {
-    /// In rad/s or s.
+    /// The value in rad/s or s.
     pub value: f64,
     rule: String,
     /// Offset in the machine's file, where given.
@@ -48,7 +48,7 @@ impl Chosen {
         )
     }
 
-    /// As the value of a variable.
+    /// The setting of the variable `name`.
     pub fn setting(&self, name: &'static str) -> Setting {
         Setting { name, value: Value::Real(self.value), rule: self.rule.clone(), origin: self.origin }
     }
@@ -78,7 +78,7 @@ impl Bandwidths {
         let tracker = || {
             Chosen::new(given.observer.as_ref(), "follows the greatest torque, at least 2 pi 20 rad/s", || {
                 let least = 1.1 * (n_p * GREATEST_TORQUE * acceleration(data) / 0.35).sqrt();
-                // With a third of rho as w_s, the gain has this at most.
+                // With w_s = rho / 3, this bounds the gain.
                 let calm = (3.0 * CALM / gain_per_bandwidth(data, 1.0)).cbrt();
                 least.max(TAU * 20.0).max((3.0 * wanted).min(TAU * 40.0).min(calm))
             })

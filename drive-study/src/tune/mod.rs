@@ -48,7 +48,7 @@ pub fn needed(tuned: &Tuned, integers: bool) -> Result<(Vec<Setting>, Vec<Settin
     Ok((of_model::<PmsmPlant>(&tuned.plant, integers)?, of_model::<SensorlessController>(&tuned.controller, integers)?))
 }
 
-/// The settings of `PmsmDrive`, as [`needed`] for the two: the parameters of plant and controller with the prefixes `plant.` and
+/// The settings of `PmsmDrive`: those that [`needed`] gives for plant and controller, with the prefixes `plant.` and
 /// `controller.`, and `u_dc` once.
 ///
 /// # Errors

@@ -27,13 +27,13 @@ use std::f64::consts::TAU;
 /// A value for a variable.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Of a real variable.
+    /// Value of a real variable.
     Real(f64),
-    /// Of an integer.
+    /// Value of an integer.
     Integer(i32),
-    /// Of a Boolean.
+    /// Value of a Boolean.
     Boolean(bool),
-    /// Of an enumeration: the name of an item.
+    /// Value of an enumeration: the name of an item.
     Item(String),
 }
 
@@ -115,7 +115,7 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     controller.extend(settings);
     cap_current_loop(data, &bandwidths, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
-    // Five periods of the swing that the observer damps, over 2 pi.
+    // 5 / w_0: five periods of the swing, which the observer damps, over 2 pi.
     let rest = if rasmussen { (5.0 / swing(data, rasmussen::zero_speed_current(data))).max(REST) } else { 0.0 };
     if rest > REST {
         notes.push(format!(
@@ -180,7 +180,7 @@ fn plant(data: &Data) -> Vec<Setting> {
     all
 }
 
-/// Values that every estimator needs.
+/// Values for every estimator.
 fn common(data: &Data, bandwidths: &Bandwidths, estimator: Kind) -> Vec<Setting> {
     let Data { machine, mechanics, .. } = data;
     let mut all =
@@ -235,7 +235,7 @@ pub fn torque_constant(data: &Data) -> f64 {
     1.5 * f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref()
 }
 
-/// The ratings are positive.
+/// Checks that the ratings are positive.
 fn ratings(motor: &MotorFile) -> Result<()> {
     let rating = &motor.data.rating;
     for (name, x) in [("speed", &rating.speed), ("torque", &rating.torque), ("current", &rating.current)] {
@@ -249,7 +249,7 @@ fn ratings(motor: &MotorFile) -> Result<()> {
 /// Least number of samples per electrical period.
 const LEAST_SAMPLES: f64 = 10.0;
 
-/// Rules for every estimator.
+/// Checks bandwidths and sample period, for every estimator.
 fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<()> {
     let Data { machine, rating, .. } = &motor.data;
     let (w_s, w_o) = (bandwidths.speed.value, bandwidths.observer.value);

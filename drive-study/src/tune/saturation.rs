@@ -13,7 +13,7 @@ use drive::plant::machine;
 use drive::plant::saturation::Saturation;
 use std::f64::consts::TAU;
 
-/// Directions of the current that are looked at.
+/// Number of directions of the current.
 const DIRECTIONS: u32 = 72;
 
 fn of(data: &Data) -> Saturation {

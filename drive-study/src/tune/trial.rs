@@ -12,16 +12,16 @@ use drive::Pair;
 use drive::math::wrap;
 use std::f64::consts::TAU;
 
-/// The levels of speed in pu that every drive is tried at; besides, its highest speed.
+/// Speeds in pu at which every drive is tried, in addition to its highest speed.
 pub const LEVELS: [f64; 3] = [0.1, 0.5, 1.0];
 
 /// End of a run in units of the slowest time constant.
 const HORIZON: f64 = 20.0;
 
-/// What has to be settled, in units of the time constant of the slower loop.
+/// Time over which a run must be settled, in units of the time constant of the slower loop.
 const WINDOW: f64 = 4.0;
 
-/// Parts of the window; the oldest one is left as a new one begins.
+/// Parts of the window; a new part replaces the oldest.
 const PARTS: usize = 4;
 
 /// Tolerances of the end: speed in pu, angle in deg.
@@ -33,10 +33,10 @@ const CALM: (f64, f64) = (0.005, 25.0);
 /// Greatest movement in the window of a run that has clearly settled: speed in pu, angle in deg.
 const STILL: (f64, f64) = (0.002, 1.0);
 
-/// Distance from the reference in pu, besides its own size, from which no drive returns.
+/// Distance from the reference in pu, in addition to its magnitude, from which no drive returns.
 const AWAY: f64 = 4.0;
 
-/// What is asked of the drive.
+/// A task of the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Task {
     /// Speed in pu of the rated speed.
@@ -57,10 +57,10 @@ impl Tuned {
     }
 }
 
-/// What a number of start angles gave.
+/// The result of a task from a number of start angles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
-    /// What was asked.
+    /// The task.
     pub task: Task,
     /// Start angles.
     pub angles: u32,
@@ -88,8 +88,8 @@ impl Trial {
     }
 }
 
-/// How a run went: whether it started, whether it held the load, least speed in pu and greatest angle error in deg after it, and
-/// the greatest torque in N.m.
+/// The result of a run: whether the drive started, whether it held the load, least speed in pu and greatest angle error in deg
+/// after the load, and the greatest torque in N.m.
 #[derive(Clone, Copy)]
 struct Run {
     started: bool,
@@ -99,7 +99,7 @@ struct Run {
     most: f64,
 }
 
-/// What is seen of the speed and the angle error in a part of the window.
+/// Speed and angle error in a part of the window.
 #[derive(Clone, Copy)]
 struct Part {
     /// Distance of the speed from the reference in pu, greatest magnitude.
@@ -161,8 +161,8 @@ impl Bench<'_> {
         f64::from(self.k) * self.T_s
     }
 
-    /// One sample at the speed reference `level` (pu) with the load `torque` (N.m): speed in pu and angle error in deg; none if
-    /// the models give up.
+    /// One sample at the speed reference `level` (pu) with the load `torque` (N.m): speed in pu and angle error in deg; `None` if a
+    /// step fails.
     fn step(&mut self, level: f64, torque: f64) -> Option<(f64, f64)> {
         self.pair.set_inputs(level * self.tuned.speed, torque, self.u_dc);
         self.pair.step(self.T_s).ok()?;

@@ -12,10 +12,10 @@ use drive::control::reference::max_torque_per_ampere;
 use drive::control::weakening::WeakeningParameters;
 use drive::frame::DqHat;
 
-/// Share of the greatest torque at the highest speed that a load may take: the rest is for the speed loop.
+/// Greatest load at the highest speed as a share of the greatest torque: the rest is for the speed loop.
 const TOP_SHARE: f64 = 0.8;
 
-/// What the voltage allows.
+/// Field weakening and load at the highest speed.
 pub struct Voltage {
     /// The setting of field weakening, where it is needed.
     pub settings: Vec<Setting>,

@@ -69,7 +69,7 @@ pub(super) fn write(
     Ok(told.join("\n"))
 }
 
-/// How to see a page: with the command of this system, and in any browser.
+/// How to open a page: with the command of this system, and in any browser.
 fn how_to_open(page: &Path) -> String {
     let path = page.display().to_string();
     let command = if cfg!(windows) {
