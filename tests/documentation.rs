@@ -4,6 +4,8 @@
 mod common;
 
 use common::Native;
+use common::shows::{differs, shows};
+use drive::estimator::Kind;
 use drive::plant::losses::Losses;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController, documentation as fragments};
 use drive_study::plane::{self, OperatingPoint};
@@ -50,10 +52,10 @@ fn the_envelope_is_that_of_the_running_drive() {
         let row =
             format!("<tr><td>{} rpm</td><td>{:.2} N.m</td><td>{:.2} N.m</td></tr>", pair[0].0, pair[0].1, pair[1].1);
         let row = row.replace('-', "−");
-        assert!(text.contains(&row), "drive/docs/envelope.html has another row than\n{row}");
+        shows("drive/docs/envelope.html", text, &row);
     }
     for part in [format!("base speed, {:.0} rpm", plane.base), format!("above {:.0} rpm", plane.end)] {
-        assert!(text.contains(&part), "{part}");
+        shows("drive/docs/envelope.html", text, &part);
     }
     keep("envelope.svg", &svg::draw(&plane::figure(vec![plane.panel])).unwrap());
 }
@@ -90,12 +92,12 @@ fn the_losses_are_those_of_the_running_drive() {
         }
         let row = row(run);
         if [1000.0, 2000.0, 3000.0, 4000.0, 4500.0, 5000.0].contains(&run.rpm) && !text.contains(&row) {
-            wrong.push(format!("drive/docs/losses.html has another row than\n{row}"));
+            wrong.push(differs("drive/docs/losses.html", text, &row));
         }
     }
     for part in [format!("above {:.0} rpm", motoring.onset), format!("up to {:.0} rpm", motoring.end)] {
         if !text.contains(&part) {
-            wrong.push(part);
+            wrong.push(differs("drive/docs/losses.html", text, &part));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -115,8 +117,12 @@ fn keep_in(pages: &[&str], name: &str, drawn: &str) {
     }
     let kept = std::fs::read_to_string(&path).unwrap();
     let line = kept.lines().zip(drawn.lines()).position(|(a, b)| a != b).map(|k| k + 1);
-    assert!(kept == drawn, "drive/docs/{name} differs from line {line:?} on; UPDATE_GOLDEN=1 accepts");
-    assert!(pages.iter().all(|page| page.contains(drawn)), "{name} is in its pages");
+    assert!(
+        kept == drawn,
+        "drive/docs/{name} is not what a run draws now, from line {line:?} on. If you meant to change the drive, \
+         UPDATE_GOLDEN=1 cargo test --test documentation writes the new plot"
+    );
+    assert!(pages.iter().all(|page| page.contains(drawn)), "a page does not include drive/docs/{name}");
 }
 
 /// A page opens without a network: no address but those of the SVG name space and of the licenses beside it.
@@ -171,22 +177,29 @@ fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
     let (mut files, mut without) = (0, Vec::new());
     for line in list.split("estimators! {\n").nth(1).unwrap().lines().filter(|line| line.contains("standstill")) {
         let (kind, rest) = line.trim().split_once(' ').unwrap().1.split_once('(').unwrap();
-        let head = head(rest.split("::").next().unwrap());
+        let file = rest.split("::").next().unwrap();
+        let head = head(file);
         let claims = head.matches("rated load down to").count() + head.matches("rated load from").count();
         let held = row(kind).filter(|cells| cells[0] != "0.000");
         let expected = held.as_ref().map(|cells| {
             let [ideal, dead] = [&cells[0], &cells[1]];
             format!("holds rated load down to {ideal} of the rated speed, {dead} with a compensated dead time")
         });
-        assert_eq!(claims, usize::from(expected.is_some()), "{kind}: {head}");
+        let file = format!("drive/src/estimator/{file}.rs");
+        assert_eq!(
+            claims,
+            usize::from(expected.is_some()),
+            "{file}: its documentation must say once down to which speed {kind} holds rated load, if drive/docs/limits.html has \
+             that speed: {expected:?}"
+        );
         let expected = expected.unwrap_or_default();
-        assert!(head.contains(&expected), "drive/src/estimator: the head of {kind} must say: {expected}");
+        assert!(head.contains(&expected), "{file}: its documentation must say, by drive/docs/limits.html: {expected}");
         if let Some(cells) = held.filter(|cells| cells[2] != "–") {
             without.push((kind, cells[2].clone()));
         }
         files += 1;
     }
-    assert_eq!(files, 17);
+    assert_eq!(files, Kind::ALL.len(), "estimators whose row in the list this test has found");
     let of = |kind: &str| without.iter().find(|(name, _)| *name == kind).unwrap().1.clone();
     let feedback = format!("without the frame term, to {}", of("VoltageFeedback"));
     assert!(head("voltage_feedback").contains(&feedback), "{feedback}");

@@ -9,7 +9,7 @@ use drive_study::compare::candidate::Entry;
 use std::path::Path;
 
 fn of(name: &str) -> Drive {
-    Drive::compared(Entry::all().into_iter().find(|e| e.name == name).unwrap())
+    Drive::compared(Entry::find(name).unwrap())
 }
 
 /// Every 9th of the 1100 cells.

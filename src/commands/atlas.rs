@@ -1,5 +1,6 @@
 //! `fmu atlas`: where a drive with wrong estimates holds low speeds under load.
 
+use super::bar_of_cells;
 use crate::workspace::output_folder;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
@@ -8,8 +9,6 @@ use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
 use drive_study::atlas::{self, report};
 use drive_study::compare::candidate::Entry;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{IsTerminal, stderr};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::thread;
@@ -80,10 +79,7 @@ pub fn run(args: &Atlas) -> Result<()> {
     let out = args.out.clone().map_or_else(|| output_folder("atlas"), Ok)?;
     let jobs = args.jobs.map_or_else(|| thread::available_parallelism().map_or(1, NonZero::get), usize::from);
 
-    let count = u64::try_from(cells.len() * drives.len())?;
-    let bar = if stderr().is_terminal() { ProgressBar::new(count) } else { ProgressBar::hidden() };
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} cells  {eta} left");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = bar_of_cells(cells.len() * drives.len());
     let atlases = atlas::run(&drives, &cells, jobs, || bar.inc(1))?;
     bar.finish_and_clear();
 
@@ -130,8 +126,7 @@ fn drives(args: &Atlas) -> Result<Vec<Drive>> {
         let mut drive = if let Some(path) = &args.motor {
             tuned(path, name)?
         } else {
-            let found = Entry::all().into_iter().find(|e| e.name.eq_ignore_ascii_case(name));
-            Drive::compared(found.ok_or_else(|| unknown(name, Entry::all().iter().map(|e| e.name)))?)
+            Drive::compared(Entry::find(name).ok_or_else(|| unknown(name, Entry::all().iter().map(|e| e.name)))?)
         };
         args.set.iter().try_for_each(|text| drive.set(text))?;
         drives.push(drive);

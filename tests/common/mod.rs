@@ -5,6 +5,8 @@ pub mod estimators;
 pub mod importers;
 pub mod pages;
 pub mod python;
+#[path = "../../drive-study/tests/common/shows.rs"]
+pub mod shows;
 
 use drive::Pair;
 use drive_study::reproduce::experiment::{ClosedLoop, Experiment, Point, RPM, Record, at, samples_apart};

@@ -75,6 +75,11 @@ impl Entry {
         Self { kind, name: kind.name(), set: |_| () }
     }
 
+    /// The estimator or variant of this name, in capitals or not.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::all().into_iter().find(|entry| entry.name.eq_ignore_ascii_case(name))
+    }
+
     /// All estimators, each with its variants.
     pub fn all() -> Vec<Self> {
         let with_variants = |&kind: &Kind| {
