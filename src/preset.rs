@@ -30,8 +30,8 @@ pub struct Course {
     pub step: Option<f64>,
 }
 
-/// An FMU, and the start values that it is to have.
-pub struct Preset {
+/// An FMU, and the start values that it will have.
+pub struct PresetFmu {
     /// The archive, for messages.
     file: PathBuf,
     md: ModelDescription,
@@ -47,7 +47,7 @@ pub struct Preset {
     earlier: BTreeSet<u32>,
 }
 
-impl Preset {
+impl PresetFmu {
     /// Opens an FMU of this exporter, with the values that it already presets.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! What a measured number is expected to be.
+//! The expected value of a measured number.
 
 /// The expected value of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]

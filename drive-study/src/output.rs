@@ -1,4 +1,4 @@
-//! What the studies write: files in a folder, tables of text.
+//! The output of the studies: files in a folder, tables of text.
 
 use anyhow::{Context, Result};
 use std::fmt::Write as _;

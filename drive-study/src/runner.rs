@@ -45,7 +45,7 @@ pub fn drive(kind: Kind) -> Pair {
     (par.speed_loop.bandwidth, par.speed_loop.t_is, par.speed_loop.b) = (TAU * 5.0, 4.0, 1.0);
     (par.limit.i_q, par.limit.i, par.limit.tau) = (15.0, 15.0, 1.6 * RATED_TORQUE);
     (par.sensor.noise, par.sensor.resolution) = (0.01, 40.0 / 4096.0);
-    // The error left by an uncompensated dead time is no sign of a lost rotor.
+    // The error of an uncompensated dead time must not look like a lost rotor.
     par.lock.u = 15.0;
     (par.start.i, par.start.speed) = (8.0, 0.15 * RATED_SPEED);
     let w = 0.05 * 3.0 * RATED_SPEED;
@@ -120,7 +120,7 @@ pub struct Bench {
     pub torque: f64,
 }
 
-/// What a run shows at a sample.
+/// A run at one sample.
 #[derive(Clone, Copy)]
 pub struct Moment<'a> {
     /// Time in s.

@@ -23,7 +23,7 @@ fn the_reference_drive_loses_two_cells_of_five_and_lock_lost_tells() {
     let atlas = thinned();
     let lost: Vec<_> = atlas.that_are(true).collect();
     assert!(atlas.runs.len() == 123 && (45..=55).contains(&lost.len()), "{} lost", lost.len());
-    let silent: Vec<_> = lost.iter().filter(|(_, verdict)| !verdict.told()).collect();
+    let silent: Vec<_> = lost.iter().filter(|(_, verdict)| !verdict.lock_lost_is_right()).collect();
     assert!(20 * silent.len() <= lost.len(), "{silent:?}");
     let alarms: Vec<_> = atlas.that_are(false).filter(|(_, verdict)| verdict.lock_lost >= 1.0).collect();
     assert!(alarms.is_empty(), "{alarms:?}");
@@ -71,7 +71,7 @@ fn a_tuned_machine_runs() {
         let drive = Drive::tuned(&motors.join(file), kind).unwrap();
         let atlas = atlas::run(&[drive], &cells, 2, || ()).unwrap().remove(0);
         assert_eq!(atlas.that_are(true).count(), 0, "{file}: {:?}", atlas.runs);
-        assert!(atlas.runs.iter().all(|(_, verdict)| verdict.told()), "{file}: {:?}", atlas.runs);
+        assert!(atlas.runs.iter().all(|(_, verdict)| verdict.lock_lost_is_right()), "{file}: {:?}", atlas.runs);
     }
     let error = Drive::tuned(Path::new("none.toml"), Kind::Rasmussen).err().unwrap();
     assert!(format!("{error:#}").starts_with("reading none.toml: "), "{error:#}");

@@ -165,7 +165,7 @@ fn the_atlas() {
         let atlas = run(&cells, k_a);
         let lost: Vec<_> = atlas.that_are(true).collect();
         let near = lost.iter().filter(|(c, _)| (c.psi - 1.0).abs() < 1e-9 && (0.8..=1.2).contains(&c.R)).count();
-        let seen = lost.iter().filter(|(_, verdict)| verdict.told()).count();
+        let seen = lost.iter().filter(|(_, verdict)| verdict.lock_lost_is_right()).count();
         let alarms = atlas.that_are(false).filter(|(_, verdict)| verdict.lock_lost >= 1.0).count();
         println!(
             "k_a {k_a:?}: {} of {} lost, {near} with R^ 0.8..1.2 R and the exact flux; lock_lost sees {seen}, {alarms} false",

@@ -248,7 +248,7 @@ impl Batch {
         work: impl FnOnce(&mut Lane) -> Result<T, fmu_import::Error> + Send,
     ) -> PyResult<T> {
         if k >= self.n {
-            return Err(usage(&k.to_string(), &format!("is no instance; there are {}", self.n)));
+            return Err(usage(&k.to_string(), &format!("is not an instance; there are {}", self.n)));
         }
         py.detach(|| work(&mut self.lanes().all[k])).map_err(raise)
     }

@@ -77,7 +77,7 @@ def test_save_and_restore(standard):
     assert ahead == again
     with pytest.raises(FmuError):
         many.restore(0, (0, b"nothing"))
-    with pytest.raises(FmuError, match="is no instance"):
+    with pytest.raises(FmuError, match="is not an instance"):
         many.save(2)
 
 

@@ -85,8 +85,8 @@ fn head(md: &ModelDescription, files: &BTreeMap<String, Vec<u8>>, size: u64) -> 
     let folder = |(name, bytes): (&String, &Vec<u8>)| {
         let (folder, _) = name.strip_prefix("binaries/")?.split_once('/')?;
         let platforms: Vec<&str> = machine::platforms(bytes).into_iter().map(Platform::tuple).collect();
-        let told = platforms.is_empty() || platforms == [folder];
-        Some(if told { folder.to_owned() } else { format!("{folder} ({})", platforms.join(" and ")) })
+        let known = platforms.is_empty() || platforms == [folder];
+        Some(if known { folder.to_owned() } else { format!("{folder} ({})", platforms.join(" and ")) })
     };
     let platforms: BTreeSet<String> = files.iter().filter_map(folder).collect();
     let sources = files.keys().any(|name| name.starts_with("sources/")).then(|| "sources".to_owned());

@@ -2,7 +2,7 @@
 
 mod motor;
 
-use crate::preset::{Course, Preset as Made};
+use crate::preset::{Course, PresetFmu};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use drive_study::tune::{self, rules::Tuned};
@@ -69,7 +69,7 @@ pub fn run(args: &Preset) -> Result<String> {
     let out = out.context("--out NEW.fmu is missing")?;
     let tuned = args.motor.as_deref().map(tune::tune).transpose()?;
     let given = args.stimuli.as_deref().map(course).transpose()?;
-    let mut preset = Made::open(&args.file)?;
+    let mut preset = PresetFmu::open(&args.file)?;
     if let Some(path) = &args.ssv {
         let of = || path.display().to_string();
         let text = std::fs::read_to_string(path).with_context(of)?;
@@ -93,7 +93,7 @@ pub fn run(args: &Preset) -> Result<String> {
 /// # Errors
 /// Those of [`run`].
 pub fn of_machine(file: &Path, tuned: &Tuned, out: &Path) -> Result<()> {
-    let mut preset = Made::open(file)?;
+    let mut preset = PresetFmu::open(file)?;
     let course = motor::set(&mut preset, tuned)?;
     preset.write(None, Some(&course), out).map(drop)
 }

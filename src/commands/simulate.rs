@@ -48,15 +48,15 @@ use std::time::{Duration, Instant};
 ///
 /// Start the drive, turn it at 1000 rpm, and load it after 0.5 s:
 ///   fmu simulate target/fmu/fmi3/PmsmDrive.fmu --input speed_ref=0:0,0.1:1000rpm --input tau_load=0:0,0.5:2 --html run.html
-/// The same with controller and plant apart, without a load:
+/// The drive as controller and plant, without a load:
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
 ///     --input SensorlessController.speed_ref=0:0,0.1:1000rpm --stop 1 --plot run.svg
-/// The same from an SSP file of `fmu ssp` or any other tool; names without a dot refer to connectors of the system:
+/// An SSP file of `fmu ssp` or any other tool; names without a dot refer to connectors of the system:
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
-/// The same, connected by terminals:
+/// Controller and plant, connected by terminals:
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --terminal p.phases=c.phases --terminal p.sensor=c.sensor \
 ///     --input c.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
-/// The same, connected by hand, with another resistance, recording selected variables as CSV:
+/// Controller and plant, connected by hand, with another resistance; selected variables recorded as CSV:
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --connect c.u_a=p.u_a --connect c.u_b=p.u_b \
 ///     --connect c.u_c=p.u_c --connect p.i_a=c.i_a --connect p.i_b=c.i_b --connect p.i_c=c.i_c \
 ///     --set p.motor.R_s=3.3 --input c.speed_ref=0:0,0.1:104.7 --stop 1 --record p.speed,c.speed_est --csv -

@@ -111,7 +111,7 @@ fn report(report: &Report, sweep: &Definition, args: &Sweep) -> Result<bool> {
     Ok(failures.count == 0)
 }
 
-/// What would run.
+/// Prints the parts that would run.
 fn plan(sweep: &Definition, args: &Sweep) -> Result<bool> {
     let with_unit = |name: &str, unit: &str| if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") };
     let columns: Vec<String> = sweep.columns().iter().map(|c| with_unit(&c.name, &c.unit)).collect();

@@ -134,7 +134,7 @@ pub fn svg(atlas: &Atlas) -> String {
             let x = x + SIDE * index(&R, cell.R);
             let y = y + SIDE * (count(&psi) - 1.0 - index(&psi, cell.psi));
             let class = if verdict.lost.is_some() { "l" } else { "h" };
-            body += &square((x, y), class, !verdict.told());
+            body += &square((x, y), class, !verdict.lock_lost_is_right());
         }
         height += block + 10.0;
     }

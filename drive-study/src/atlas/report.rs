@@ -26,7 +26,7 @@ pub fn csv(atlases: &[Atlas]) -> String {
                 drive.machine,
                 scenario.name(),
                 verdict.lock_lost,
-                verdict.told(),
+                verdict.lock_lost_is_right(),
                 verdict.speed_error,
                 verdict.angle_error
             );
@@ -158,7 +158,7 @@ fn by_class(atlases: &[Atlas]) -> Table {
         row("all lost", &of(None), seen(&of(None)));
         let held: Vec<&Verdict> = atlas.that_are(false).map(|(_, verdict)| verdict).collect();
         row("held (1 or more at any time)", &held, seen(&held));
-        let alarms = held.iter().filter(|v| !v.told()).count();
+        let alarms = held.iter().filter(|v| !v.lock_lost_is_right()).count();
         row("held (1 or more while it has held for 1 s: a false alarm)", &held, alarms);
     }
     table

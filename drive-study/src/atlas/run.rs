@@ -104,7 +104,7 @@ pub struct Verdict {
 impl Verdict {
     /// Whether `lock_lost` was right: 1 or more within 1 s of a loss, below 1 while the drive holds. A cell that is
     /// held in the end may have been lost before: in `heating`, R rises to an R^ that was greater.
-    pub fn told(&self) -> bool {
+    pub fn lock_lost_is_right(&self) -> bool {
         if self.lost.is_some() { self.lock_lost >= 1.0 } else { self.while_held < 1.0 }
     }
 }

@@ -37,7 +37,7 @@ const ERROR: Column = |r| &r.error;
 const I_D: Column = |r| &r.i_d;
 const I_Q: Column = |r| &r.i_q;
 
-/// What happens between two times of a record.
+/// The part of a record between two times.
 struct Window<'a> {
     record: &'a Record,
     from: usize,

@@ -88,14 +88,14 @@ mod tests {
 
     #[test]
     fn points_that_say_nothing_are_refused() {
-        for (points, told) in [
+        for (points, message) in [
             ("[[100.0, 5.0]]", "give pairs at two speeds at least"),
             ("[[100.0, 5.0], [100.0, 5.1]]", "give pairs at two speeds at least"),
             ("[[100.0, -5.0], [200.0, 9.0]]", "[100, -5] must be a speed in rad/s greater than 0"),
             ("[[0.0, 0.0], [200.0, 9.0]]", "[0, 0] must be"),
         ] {
             let error = fitted(points).unwrap_err().to_string();
-            assert!(error.contains(told) && error.starts_with("m.toml:"), "{error}");
+            assert!(error.contains(message) && error.starts_with("m.toml:"), "{error}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The preset of a machine: the values of `fmu tune`, and the inputs of its reference result.
 
 use crate::commands::tune::place;
-use crate::preset::{Course, Preset};
+use crate::preset::{Course, PresetFmu};
 use anyhow::{Result, bail};
 use drive_study::tune::{
     joined,
@@ -15,7 +15,7 @@ use fmu_core::Description;
 ///
 /// # Errors
 /// The FMU is not one of the drive's.
-pub(super) fn set(preset: &mut Preset, tuned: &Tuned) -> Result<Course> {
+pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<Course> {
     let named = |settings: &[Setting]| settings.iter().map(|s| (s.name.to_owned(), s.value.clone())).collect();
     let values: Vec<(String, Value)> = match place(preset.own())? {
         Some(0) => joined(&tuned.plant, &tuned.controller),

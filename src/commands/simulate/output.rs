@@ -21,7 +21,7 @@ pub(super) fn write(
     let plotted = (args.plot.is_some() || args.html.is_some())
         .then(|| if first_plot { curves::figure(&overview::overview(&recording)) } else { curves::figure(&recording) });
     recording.columns.truncate(recording.columns.len() - for_plot);
-    let mut told = vec![match &plotted {
+    let mut lines = vec![match &plotted {
         Some(figure) if first_plot => overview::at_the_end(figure, alone),
         _ => recording.last_values(),
     }];
@@ -37,7 +37,7 @@ pub(super) fn write(
             let mut bytes = Vec::new();
             recording.write_csv(&mut bytes)?;
             pack::write(path, &bytes)?;
-            told.push(format!("recording: {}", path.display()));
+            lines.push(format!("recording: {}", path.display()));
         }
         None => {}
     }
@@ -49,7 +49,7 @@ pub(super) fn write(
         } else {
             pack::write(path, svg.as_bytes())?;
         }
-        told.push(format!("plot: {}", path.display()));
+        lines.push(format!("plot: {}", path.display()));
     }
     if let (Some(path), Some(plotted)) = (&args.html, &plotted) {
         let names: Vec<&str> = args.fmus.iter().map(|file| file.rsplit(['/', '\\']).next().unwrap_or(file)).collect();
@@ -61,12 +61,12 @@ pub(super) fn write(
             .map(|name| format!("<p>{} asked to end the simulation.</p>\n", page::escape(name)));
         let body = format!("{}{figure}", ended.unwrap_or_default());
         pack::write(path, page::page(&names.join(", "), &body).as_bytes())?;
-        told.push(format!("page: {}\n{}", path.display(), how_to_open(&std::path::absolute(path)?)));
+        lines.push(format!("page: {}\n{}", path.display(), how_to_open(&std::path::absolute(path)?)));
     }
     if let Some(name) = &recording.ended_by {
-        told.insert(0, format!("{name} asked to end the simulation"));
+        lines.insert(0, format!("{name} asked to end the simulation"));
     }
-    Ok(told.join("\n"))
+    Ok(lines.join("\n"))
 }
 
 /// How to open a page: with the command of this system, and in any browser.

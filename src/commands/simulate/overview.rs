@@ -1,4 +1,4 @@
-//! What the first plot of a run shows: speed, torque, currents, angle error and power of any drive with these names.
+//! The first plot of a run: speed, torque, currents, angle error and power of any drive with these names.
 
 use drive::math::wrap;
 use fmu_import::cosimulation::{Column, Recording};
