@@ -105,7 +105,7 @@ pub(super) fn csv(record: &Record) -> String {
 pub(super) fn verdict(holds: bool, identical: bool) -> String {
     let figures = if holds { "Every figure is inside its tolerance." } else { "Some figures are OFF." };
     let same = if identical { "are equal bit for bit" } else { "DIFFER" };
-    format!("{figures} The records of FMI 2.0 and FMI 3.0 {same}.")
+    format!("{figures} The traces of FMI 2.0 and FMI 3.0 {same}.")
 }
 
 /// The page: tables and plots, self-contained; `plots` come with the names of their SVG files.
