@@ -9,7 +9,7 @@
 mod common;
 
 use drive::Pair;
-use drive_study::reproduce::scenario::RPM;
+use drive_study::reproduce::experiment::RPM;
 use fmu_import::{Fmu, Instance};
 use libloading::{Library, Symbol};
 use std::path::Path;

@@ -79,7 +79,7 @@ pub fn main() -> ExitCode {
     }
     let command =
         Cli::from_arg_matches(&line().get_matches_from(arguments())).unwrap_or_else(|error| error.exit()).command;
-    // The process that started a worker tells its error.
+    // The process that started a worker prints its error.
     let is_worker = matches!(&command, Command::Simulate(args) if args.worker);
     let outcome = match command {
         Command::New(args) => new::run(&args).map(|text| {

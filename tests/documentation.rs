@@ -4,17 +4,19 @@
 mod common;
 
 use common::Native;
+use common::shows::{differs, shows};
+use drive::estimator::Kind;
 use drive::plant::losses::Losses;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController, documentation as fragments};
-use drive_study::plane::{self, Point};
-use drive_study::plot;
-use drive_study::reproduce::plots;
-use drive_study::reproduce::scenario::{
-    ClosedLoop, LOAD_0, LOAD_1000, START, STEP_20, STEP_500, STEP_1000, STEP_1500, Scenario, Trace,
+use drive_study::plane::{self, OperatingPoint};
+use drive_study::reproduce::experiment::{
+    ClosedLoop, Experiment, LOAD_0, LOAD_1000, Record, START, STEP_20, STEP_500, STEP_1000, STEP_1500,
 };
+use drive_study::reproduce::plots;
 use fmu::documentation;
 use fmu_core::{Description, Model};
 use fmu_import::elf::FLOOR;
+use fmu_plot::svg;
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 
@@ -26,11 +28,11 @@ fn root() -> &'static Path {
 /// `UPDATE_GOLDEN=1 cargo test --test documentation` accepts others.
 #[test]
 fn the_plots_are_those_of_a_run() {
-    let run = |s: &Scenario| -> Trace { Native.run(s, 1e-4).unwrap() };
+    let run = |s: &Experiment| -> Record { Native.run(s, 1e-4).unwrap() };
     let figure_4 = plots::figure_4(&run(&START), [&STEP_20, &STEP_500, &STEP_1000, &STEP_1500].map(run).each_ref());
     let figure_5 = plots::figure_5(&run(&LOAD_0), &run(&LOAD_1000));
-    keep("figure-4.svg", &plot::svg(&figure_4).unwrap());
-    keep("figure-5.svg", &plot::svg(&figure_5).unwrap());
+    keep("figure-4.svg", &svg::draw(&figure_4).unwrap());
+    keep("figure-5.svg", &svg::draw(&figure_5).unwrap());
 }
 
 /// Torque over speed on the pages: every number and every dot is that of a run, and on the curves.
@@ -50,12 +52,12 @@ fn the_envelope_is_that_of_the_running_drive() {
         let row =
             format!("<tr><td>{} rpm</td><td>{:.2} N.m</td><td>{:.2} N.m</td></tr>", pair[0].0, pair[0].1, pair[1].1);
         let row = row.replace('-', "−");
-        assert!(text.contains(&row), "drive/control/docs/envelope.html has another row than\n{row}");
+        shows("drive/control/docs/envelope.html", text, &row);
     }
     for part in [format!("base speed, {:.0} rpm", plane.base), format!("above {:.0} rpm", plane.end)] {
-        assert!(text.contains(&part), "{part}");
+        shows("drive/control/docs/envelope.html", text, &part);
     }
-    keep("envelope.svg", &plot::svg(&plane::figure(vec![plane.panel])).unwrap());
+    keep("envelope.svg", &svg::draw(&plane::figure(vec![plane.panel])).unwrap());
 }
 
 /// Losses over speed on the page of the drive: every row and every dot is that of a run, and on the curves within 0.3 % of
@@ -64,10 +66,10 @@ fn the_envelope_is_that_of_the_running_drive() {
 #[test]
 fn the_losses_are_those_of_the_running_drive() {
     let text = include_str!("../drive/docs/losses.html");
-    let row = |p: &Point| {
+    let row = |p: &OperatingPoint| {
         let Losses { cu, iron, cond, sw, friction } = p.losses;
         let powers = [cu, iron, cond, sw, friction].map(|x| format!("<td>{x:.1} W</td>")).concat();
-        let Point { rpm, tau, tau_shaft, efficiency, .. } = p;
+        let OperatingPoint { rpm, tau, tau_shaft, efficiency, .. } = p;
         format!(
             "<tr><td>{rpm} rpm</td><td>{tau:.3} N.m</td><td>{tau_shaft:.2} N.m</td>{powers}<td>{:.1} %</td></tr>",
             100.0 * efficiency
@@ -79,7 +81,7 @@ fn the_losses_are_those_of_the_running_drive() {
     let generating = plane::losses(-2.5, 5000.0, &[3000.0]).unwrap();
     let mut wrong = Vec::new();
     for [figure, run] in motoring.points.iter().chain(&generating.points) {
-        let parts = |p: &Point| {
+        let parts = |p: &OperatingPoint| {
             let Losses { cu, iron, cond, sw, friction } = p.losses;
             [cu, iron, cond, sw, friction, p.tau_shaft, p.efficiency]
         };
@@ -90,16 +92,16 @@ fn the_losses_are_those_of_the_running_drive() {
         }
         let row = row(run);
         if [1000.0, 2000.0, 3000.0, 4000.0, 4500.0, 5000.0].contains(&run.rpm) && !text.contains(&row) {
-            wrong.push(format!("drive/docs/losses.html has another row than\n{row}"));
+            wrong.push(differs("drive/docs/losses.html", text, &row));
         }
     }
     for part in [format!("above {:.0} rpm", motoring.onset), format!("up to {:.0} rpm", motoring.end)] {
         if !text.contains(&part) {
-            wrong.push(part);
+            wrong.push(differs("drive/docs/losses.html", text, &part));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    keep_in(&[fragments::DRIVE], "drive/docs/losses.svg", &plot::svg(&plane::figure(motoring.panels.into())).unwrap());
+    keep_in(&[fragments::DRIVE], "drive/docs/losses.svg", &svg::draw(&plane::figure(motoring.panels.into())).unwrap());
 }
 
 /// The plot `drawn` is the one that the controller's `docs` keep, and in the pages of controller and drive.
@@ -115,8 +117,12 @@ fn keep_in(pages: &[&str], name: &str, drawn: &str) {
     }
     let kept = std::fs::read_to_string(&path).unwrap();
     let line = kept.lines().zip(drawn.lines()).position(|(a, b)| a != b).map(|k| k + 1);
-    assert!(kept == drawn, "{name} differs from line {line:?} on; UPDATE_GOLDEN=1 accepts");
-    assert!(pages.iter().all(|page| page.contains(drawn)), "{name} is in its pages");
+    assert!(
+        kept == drawn,
+        "{name} is not what a run draws now, from line {line:?} on. If you meant to change the drive, \
+         UPDATE_GOLDEN=1 cargo test --test documentation writes the new plot"
+    );
+    assert!(pages.iter().all(|page| page.contains(drawn)), "a page does not include {name}");
 }
 
 /// A page opens without a network: no address but those of the SVG name space and of the licenses beside it.
@@ -171,22 +177,32 @@ fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
     let (mut files, mut without) = (0, Vec::new());
     for line in list.split("estimators! {\n").nth(1).unwrap().lines().filter(|line| line.contains("standstill")) {
         let (kind, rest) = line.trim().split_once(' ').unwrap().1.split_once('(').unwrap();
-        let head = head(rest.split("::").next().unwrap());
+        let file = rest.split("::").next().unwrap();
+        let head = head(file);
         let claims = head.matches("rated load down to").count() + head.matches("rated load from").count();
         let held = row(kind).filter(|cells| cells[0] != "0.000");
         let expected = held.as_ref().map(|cells| {
             let [ideal, dead] = [&cells[0], &cells[1]];
             format!("holds rated load down to {ideal} of the rated speed, {dead} with a compensated dead time")
         });
-        assert_eq!(claims, usize::from(expected.is_some()), "{kind}: {head}");
+        let file = format!("drive/control/src/estimator/{file}.rs");
+        assert_eq!(
+            claims,
+            usize::from(expected.is_some()),
+            "{file}: its documentation must say once down to which speed {kind} holds rated load, if drive/control/docs/limits.html has \
+             that speed: {expected:?}"
+        );
         let expected = expected.unwrap_or_default();
-        assert!(head.contains(&expected), "drive/control/src/estimator: the head of {kind} must say: {expected}");
+        assert!(
+            head.contains(&expected),
+            "{file}: its documentation must say, by drive/control/docs/limits.html: {expected}"
+        );
         if let Some(cells) = held.filter(|cells| cells[2] != "–") {
             without.push((kind, cells[2].clone()));
         }
         files += 1;
     }
-    assert_eq!(files, 17);
+    assert_eq!(files, Kind::ALL.len(), "estimators whose row in the list this test has found");
     let of = |kind: &str| without.iter().find(|(name, _)| *name == kind).unwrap().1.clone();
     let feedback = format!("without the frame term, to {}", of("VoltageFeedback"));
     assert!(head("voltage_feedback").contains(&feedback), "{feedback}");
@@ -268,7 +284,7 @@ fn pages_in_a_browser() {
             &["--html", &path("run.html"), "--csv", &path("run.csv")],
         ]
         .concat(),
-        vec!["compare", "--scenario", "ramp,reversal,load-0,signal,signal-trace", "--out", &path("compare")],
+        vec!["compare", "--experiment", "ramp,reversal,load-0,signal,signal-trace", "--out", &path("compare")],
         vec!["reproduce", "--out", &path("reproduce")],
         vec!["atlas", "--every", "20", "--out", &path("atlas")],
     ]

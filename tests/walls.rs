@@ -13,16 +13,20 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-import", &["fmu-core", "model-description"]),
     ("fmu-sweep", &["fmu-import", "model-description"]),
     ("fmu-check", &["fmu-import", "model-description"]),
+    ("fmu-plot", &[]),
     ("drive-base", &["fmu-core"]),
     ("drive-control", &["drive-base", "fmu-core"]),
     ("drive-plant", &["drive-base", "fmu-core"]),
     ("drive", &["drive-base", "drive-control", "drive-plant", "fmu-core"]),
-    ("drive-study", &["drive", "fmu-core", "fmu-import"]),
+    ("drive-study", &["drive", "fmu-core", "fmu-import", "fmu-plot"]),
     ("pmsm-plant", &["drive", "fmu-export"]),
     ("sensorless-controller", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
     ("fmurun", &["fmu-import", "fmu-sweep", "model-description"]),
-    ("fmu", &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "fmu-sweep", "model-description"]),
+    (
+        "fmu",
+        &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "fmu-plot", "fmu-sweep", "model-description"],
+    ),
 ];
 
 fn root() -> &'static Path {
@@ -77,7 +81,7 @@ fn known_to(name: &str) -> BTreeSet<String> {
 fn the_checker_knows_no_motor_and_no_plotter() {
     let known = known_to("fmu-check");
     assert!(known.contains("fmu-import") && known.contains("quick-xml"), "{known:?}");
-    for foreign in ["drive", "drive-study", "nalgebra", "resvg", "libm"] {
+    for foreign in ["drive", "drive-study", "fmu-plot", "nalgebra", "resvg", "libm"] {
         assert!(!known.contains(foreign), "fmu-check depends on {foreign}");
     }
 }
@@ -87,7 +91,7 @@ fn the_checker_knows_no_motor_and_no_plotter() {
 fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
     let known = known_to("fmu-sweep");
     assert!(known.contains("fmu-import") && known.contains("libm"), "{known:?}");
-    for foreign in ["drive", "drive-study", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
+    for foreign in ["drive", "drive-study", "fmu-plot", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
         assert!(!known.contains(foreign), "fmu-sweep depends on {foreign}");
     }
 }

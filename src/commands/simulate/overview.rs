@@ -1,11 +1,11 @@
-//! What a first plot of a run shows: speed, torque, currents, angle error and power, of any drive with these names.
+//! The first plot of a run: speed, torque, currents, angle error and power of any drive with these names.
 
-use crate::figure::{Curve, Figure};
 use drive::math::wrap;
 use fmu_import::cosimulation::{Column, Recording};
+use fmu_plot::figure::{Curve, Figure};
 use std::fmt::Write as _;
 
-/// Panels, each with the variables that belong into it, without the names of their instances.
+/// Panels, each with its variables, without the names of their instances.
 const PANELS: [&[&str]; 4] = [
     &["speed", "speed_ref", "speed_est"],
     &["tau_e", "tau_load", "tau_ref"],
@@ -13,14 +13,14 @@ const PANELS: [&[&str]; 4] = [
     &["p_in", "p_mech", "p_loss"],
 ];
 
-/// Inputs that belong to a first plot, if something feeds them.
-pub const INPUTS: [&str; 3] = ["speed_ref", "tau_load", "tau_ref"];
+/// Inputs that the first plot shows if something feeds them.
+pub(super) const INPUTS: [&str; 3] = ["speed_ref", "tau_load", "tau_ref"];
 
-/// Most panels, and curves in a panel, of a run that has none of these names.
+/// Greatest number of panels, and of curves in a panel, for a run with none of these names.
 const MOST: (usize, usize) = (5, 6);
 
-/// The columns that a first plot shows. With `theta_est` and `theta_e` the angle error is one of them.
-pub fn overview(recording: &Recording) -> Recording {
+/// The columns that the first plot shows, with the angle error if there are `theta_est` and `theta_e`.
+pub(super) fn overview(recording: &Recording) -> Recording {
     let named = |name: &&str| recording.columns.iter().find(|c| last(&c.name) == *name);
     let mut columns: Vec<Column> = PANELS.concat().iter().filter_map(named).cloned().collect();
     if let (Some(estimate), Some(rotor)) = (named(&"theta_est"), named(&"theta_e")) {
@@ -43,8 +43,8 @@ pub fn overview(recording: &Recording) -> Recording {
     Recording { columns, time: recording.time.clone(), ended_by: recording.ended_by.clone() }
 }
 
-/// Where the curves of a first plot end: a line per panel, in its unit. Names are without that of the instance `alone`.
-pub fn at_the_end(figure: &Figure, alone: Option<&str>) -> String {
+/// The last values of the first plot: a line per panel, in its unit. Names of variables omit the instance `alone`.
+pub(super) fn at_the_end(figure: &Figure, alone: Option<&str>) -> String {
     let time = figure.panels.first().map_or(f64::NAN, |panel| panel.window.1);
     let mut text = format!("at {} s:", four(time));
     for panel in &figure.panels {
@@ -67,13 +67,14 @@ fn four(x: f64) -> String {
     if plain { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
-/// The name without that of its instance.
-pub(crate) fn last(name: &str) -> &str {
+/// The name of a variable without the name of its instance.
+pub(super) fn last(name: &str) -> &str {
     name.rsplit('.').next().unwrap_or(name)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::curves;
     use super::*;
 
     fn recording(names: &[(&str, &str)]) -> Recording {
@@ -106,7 +107,7 @@ mod tests {
     fn the_end_is_a_line_per_panel() {
         let mut run = recording(&[("d.speed", "rad/s"), ("d.speed_est", "rad/s"), ("d.tau_e", "N.m")]);
         run.columns[1].values[1] = 2.999_96;
-        let figure = Figure::of(&overview(&run));
+        let figure = curves::figure(&overview(&run));
         assert_eq!(at_the_end(&figure, Some("d")), "at 1 s:\n  speed 3 rad/s, speed_est 3 rad/s\n  tau_e 3 N.m");
         assert!(at_the_end(&figure, None).contains("\n  d.tau_e 3 N.m"));
     }

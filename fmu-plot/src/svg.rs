@@ -1,4 +1,4 @@
-//! Draws a [`Figure`] as SVG, on light or dark paper as the reader prefers.
+//! Draws a [`Figure`] as SVG, on light or dark paper as the reader's system prefers.
 
 use crate::figure::{Curve, Figure, Panel, ticks};
 use crate::ink::REFERENCE;
@@ -25,9 +25,9 @@ const STYLE: &str = "<style>@media (prefers-color-scheme:dark){.plot text{fill:#
 ///
 /// # Errors
 /// There is nothing to draw.
-pub fn svg(figure: &Figure) -> Result<String> {
+pub fn draw(figure: &Figure) -> Result<String> {
     if figure.is_empty() {
-        bail!("nothing was recorded, so there is nothing to plot");
+        bail!("{}", crate::EMPTY);
     }
     let (width, height) = SIZE[usize::from(figure.columns > 1)];
     let beside = figure.columns == 1;
@@ -247,11 +247,11 @@ mod tests {
         (curve.lost, curve.dashed) = (true, true);
         let panel = Panel { unit: "A".into(), window: (0.0, 4.0), curves: vec![curve], ..Panel::default() };
         let figure = |panels| Figure { title: "x".into(), x: "time in s", columns: 1, panels };
-        let text = svg(&figure(vec![panel])).unwrap();
+        let text = draw(&figure(vec![panel])).unwrap();
         assert_eq!(text.matches("fill=\"none\"").count(), 2, "{text}");
         assert!(text.contains("a &amp; b ✕ lost") && text.contains("stroke-dasharray") && !text.contains("NaN"));
         assert!(text.contains("l10 10m0-10l-10 10"), "{text}");
-        assert!(svg(&figure(Vec::new())).is_err());
+        assert!(draw(&figure(Vec::new())).is_err());
     }
 
     #[test]
@@ -259,7 +259,7 @@ mod tests {
         let curve = |k: usize| Curve::through(format!("x{k}"), CURVES[0], [(0.0, 1.0), (1.0, 2.0)].into_iter());
         let panel = |n: usize| Panel { window: (0.0, 1.0), curves: (0..n).map(curve).collect(), ..Panel::default() };
         let figure = Figure { x: "time in s", columns: 1, panels: vec![panel(20), panel(2)], ..Figure::default() };
-        let text = svg(&figure).unwrap();
+        let text = draw(&figure).unwrap();
         // 20 names of 17 pixels and 20 around them, then a panel of the usual height.
         assert!(text.contains("height=\"600\"") && text.matches(">x19</text>").count() == 1, "{text}");
         let places = text.match_indices("text-anchor=\"start\">x").map(|(at, _)| {

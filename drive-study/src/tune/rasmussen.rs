@@ -5,7 +5,7 @@
 //! electrical acceleration alpha = n_p K i_q / J.
 //!
 //! R^ = 0.9 R: the safe side at standstill, where R^ > R runs away. At rest on i_0 the estimate then drifts by (R - R^) i_0 /
-//! psi_M, and the rotor swings about it with w_0 = sqrt(n_p K i_0 / J). Another R^ is taken
+//! psi_M, and the rotor swings about it with w_0 = sqrt(n_p K i_0 / J). The rules choose R^
 //!
 //! - closer to R where the drift would exceed w_0: the rotor is too heavy to follow the estimate;
 //! - closer to R where (R - R^) i with the rated torque would exceed 0.15 of the EMF at 0.1 pu: the estimate turns away by c_1
@@ -23,23 +23,23 @@ use super::trial::LEVELS;
 use anyhow::{Result, bail};
 use drive::control::tables::ControllerParameters;
 
-/// Share of the EMF at 0.1 pu that (R - R^) i may take with the rated torque.
+/// Greatest share of the EMF at 0.1 pu for (R - R^) i at the rated torque.
 const LOST_EMF: f64 = 0.15;
 
-/// Least drift of the estimate at rest as a share of the rotor's swing, and the greatest share of R that may be missing for it.
+/// Least drift of the estimate at rest as a share of the rotor's swing, and the greatest share of R that the rules give up for it.
 const LEAST_DRIFT: (f64, f64) = (0.025, 0.5);
 
-/// Least share by which R^ can be kept below R: nobody knows R better.
+/// Least share by which R^ can be kept below R: less than this is below the uncertainty of R.
 pub const LEAST_MARGIN: f64 = 0.02;
 
-/// Share of R by which R^ is to be below it.
+/// Share of R by which R^ should be below R.
 pub fn resistance_margin(data: &Data) -> f64 {
     let (followed, held) = bounds(data);
     let (share, most) = LEAST_DRIFT;
     0.1_f64.max((share * followed).min(most)).min(followed).min(held)
 }
 
-/// Greatest share of R by which R^ may be below it: what the rotor follows at rest, and what leaves the EMF at 0.1 pu.
+/// Greatest shares of R by which R^ may be below R: so that the rotor follows at rest, and so that the EMF at 0.1 pu stays larger.
 fn bounds(data: &Data) -> (f64, f64) {
     let (R_s, psi_M) = (*data.machine.R_s.get_ref(), *data.machine.psi_M.get_ref());
     let (i_0, i) = (zero_speed_current(data), data.rating.torque.get_ref() / torque_constant(data));

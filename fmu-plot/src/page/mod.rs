@@ -1,4 +1,4 @@
-//! Pages without a network: one style for all, and [`Figure`]s with zoom, legend switches and readings at the cursor.
+//! Pages that need no network: one style for all, and [`Figure`]s with zoom, legend switches and readings at the cursor.
 
 use crate::figure::{Curve, Figure, Panel};
 use crate::ink::Ink;
@@ -11,39 +11,46 @@ use serde_json::{Value, json};
 use std::io::Write as _;
 use std::rc::Rc;
 
+/// The style of every document: colors on light and dark paper, the font, boxes that scroll.
+const BASE: &str = include_str!("base.css");
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("plot.js");
 
-/// Text for HTML.
+/// Escapes text for HTML.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// A dash in a color, before a name.
+/// A dash in a color, to stand before a name.
 pub fn swatch(ink: Ink) -> String {
     format!("<span class=\"swatch\" style=\"background:{ink}\"></span>")
 }
 
-/// A whole page: its title, which is also its heading, and what stands below it.
-pub fn page(title: &str, body: &str) -> String {
+/// A document with the common style and a `style` of its own; `body` is the content of the element of this name.
+pub fn document(title: &str, style: &str, body: &str) -> String {
     let title = escape(title);
-    // The script draws figures; a page without one has none.
-    let script =
-        if body.contains("class=\"figure\"") { format!("<script>\n{SCRIPT}</script>\n") } else { String::new() };
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-         <main>\n<h1>{title}</h1>\n{body}</main>\n{script}</body>\n</html>\n"
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<style>\n{BASE}{style}</style>\n</head>\n\
+         <body>\n{body}</body>\n</html>\n"
     )
 }
 
-/// A figure with its data; `instead` is HTML for browsers without JavaScript.
+/// A page of results: its title, which is also its heading, and its body below.
+pub fn page(title: &str, body: &str) -> String {
+    // Only figures need the script.
+    let script =
+        if body.contains("class=\"figure\"") { format!("<script>\n{SCRIPT}</script>\n") } else { String::new() };
+    document(title, STYLE, &format!("<main>\n<h1>{}</h1>\n{body}</main>\n{script}", escape(title)))
+}
+
+/// A figure with its data, for a [`page`]; `instead` is HTML for browsers without JavaScript.
 ///
 /// # Errors
 /// There is nothing to draw.
 pub fn figure(figure: &Figure, instead: &str) -> Result<String> {
     if figure.is_empty() {
-        bail!("nothing was recorded, so there is nothing to plot");
+        bail!("{}", crate::EMPTY);
     }
     let mut data = Data::default();
     let panels: Vec<Value> = figure.panels.iter().map(|panel| data.panel(panel)).collect();
@@ -57,19 +64,19 @@ pub fn figure(figure: &Figure, instead: &str) -> Result<String> {
         "lengths": data.lengths,
         "values": STANDARD.encode(deflated.finish()?),
     });
-    // No text in it can end the element.
+    // Without '<', no text can end the element.
     let json = json.to_string().replace('<', "\\u003c");
     Ok(format!(
         "<div class=\"figure\">\n<script type=\"application/json\">{json}</script>\n<noscript><p>{instead}</p></noscript>\n</div>\n"
     ))
 }
 
-/// The numbers of a figure.
+/// The numbers of a figure, coded.
 #[derive(Default)]
 struct Data {
     bytes: Vec<u8>,
     lengths: Vec<usize>,
-    /// Horizontal coordinates with the numbers of their arrays, whose sum they are.
+    /// Horizontal coordinates, each the sum of two arrays, with the numbers of these arrays.
     axes: Vec<(Rc<[f64]>, [usize; 2])>,
 }
 
@@ -92,8 +99,8 @@ impl Data {
         json!({ "name": name, "ink": ink, "opacity": opacity, "dashed": dashed, "lost": lost, "x": x, "y": y })
     }
 
-    /// Appends numbers and returns the number of their array: the differences of their bits, small ones of either sign as small
-    /// numbers (zigzag), all lowest bytes first.
+    /// Appends an array and returns its number. Coded are the differences of successive bit patterns, with the sign in the last
+    /// bit (zigzag), then all lowest bytes, all second bytes and so on: this order deflates best.
     fn array(&mut self, values: impl Iterator<Item = f32>) -> usize {
         let mut last = 0_i32;
         let coded: Vec<[u8; 4]> = values
@@ -109,14 +116,14 @@ impl Data {
     }
 }
 
-/// A value rounded by at most 1e-6 of itself, which takes a sixth less space. The vertical axis never spans less than 2e-3 of its
-/// values, so that this is less than a pixel at any zoom.
+/// A value rounded by at most 1e-6 of itself, which saves a sixth of the space. The vertical axis never spans less than 2e-3 of
+/// its values, so the error is less than a pixel at any zoom.
 fn seen(y: f64) -> f32 {
     let bits = single(y).to_bits();
     f32::from_bits(bits.saturating_add(8) & !15)
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "the part that is missing is kept beside it, or not seen")]
+#[expect(clippy::cast_possible_truncation, reason = "the rest is a second array, or too small to be seen")]
 fn single(x: f64) -> f32 {
     x as f32
 }
@@ -128,7 +135,7 @@ mod tests {
     use flate2::read::ZlibDecoder;
     use std::io::Read as _;
 
-    /// As `unpack` of `plot.js` does it.
+    /// Decodes like `unpack` in `plot.js`.
     fn unpack(json: &Value) -> Vec<Vec<f32>> {
         let packed = STANDARD.decode(json["values"].as_str().unwrap()).unwrap();
         let mut bytes = Vec::new();

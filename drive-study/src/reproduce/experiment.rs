@@ -8,10 +8,10 @@ pub const RPM: f64 = PI / 30.0;
 /// Values of one input over time: each holds from its time (s) to the next.
 pub type Schedule = &'static [(f64, f64)];
 
-/// One experiment with plant and controller.
+/// An experiment with plant and controller.
 #[derive(Clone, Copy, Debug)]
-pub struct Scenario {
-    /// Short name, used for files.
+pub struct Experiment {
+    /// Short name, also of files.
     pub id: &'static str,
     /// Figure of the paper.
     pub figure: &'static str,
@@ -30,11 +30,11 @@ pub struct Scenario {
 }
 
 /// An experiment without settings and events.
-pub const REST: Scenario =
-    Scenario { id: "", figure: "", title: "", plant: &[], controller: &[], speed_ref: &[], load: &[], duration: 1.0 };
+pub const REST: Experiment =
+    Experiment { id: "", figure: "", title: "", plant: &[], controller: &[], speed_ref: &[], load: &[], duration: 1.0 };
 
 /// Start from the worst angle, stop, second start.
-pub const START: Scenario = Scenario {
+pub const START: Experiment = Experiment {
     id: "start-180",
     figure: "4a, 4b",
     title: "first start with the rotor opposite to its estimate, stop, second start",
@@ -44,7 +44,7 @@ pub const START: Scenario = Scenario {
     ..REST
 };
 /// Speed step to 20 rpm.
-pub const STEP_20: Scenario = Scenario {
+pub const STEP_20: Experiment = Experiment {
     id: "step-20",
     figure: "4c",
     title: "speed step 0 - 20 rpm",
@@ -53,7 +53,7 @@ pub const STEP_20: Scenario = Scenario {
     ..REST
 };
 /// Speed step to 500 rpm.
-pub const STEP_500: Scenario = Scenario {
+pub const STEP_500: Experiment = Experiment {
     id: "step-500",
     figure: "4d",
     title: "speed step 0 - 500 rpm",
@@ -62,7 +62,7 @@ pub const STEP_500: Scenario = Scenario {
     ..REST
 };
 /// Speed step to 1000 rpm.
-pub const STEP_1000: Scenario = Scenario {
+pub const STEP_1000: Experiment = Experiment {
     id: "step-1000",
     figure: "4e",
     title: "speed step 0 - 1000 rpm",
@@ -71,7 +71,7 @@ pub const STEP_1000: Scenario = Scenario {
     ..REST
 };
 /// Speed step to 1500 rpm.
-pub const STEP_1500: Scenario = Scenario {
+pub const STEP_1500: Experiment = Experiment {
     id: "step-1500",
     figure: "4f",
     title: "speed step 0 - 1500 rpm",
@@ -80,7 +80,7 @@ pub const STEP_1500: Scenario = Scenario {
     ..REST
 };
 /// Load step at standstill.
-pub const LOAD_0: Scenario = Scenario {
+pub const LOAD_0: Experiment = Experiment {
     id: "load-0",
     figure: "5a, 5c, 5e",
     title: "load step 0 - 2 N.m at 0 rpm",
@@ -89,7 +89,7 @@ pub const LOAD_0: Scenario = Scenario {
     ..REST
 };
 /// Load step at 1000 rpm.
-pub const LOAD_1000: Scenario = Scenario {
+pub const LOAD_1000: Experiment = Experiment {
     id: "load-1000",
     figure: "5b, 5d, 5f",
     title: "load step 0 - 2 N.m at 1000 rpm",
@@ -100,16 +100,16 @@ pub const LOAD_1000: Scenario = Scenario {
 };
 
 /// All experiments that `reproduce` runs, in the paper's order.
-pub const ALL: [Scenario; 7] = [START, STEP_20, STEP_500, STEP_1000, STEP_1500, LOAD_0, LOAD_1000];
+pub const ALL: [Experiment; 7] = [START, STEP_20, STEP_500, STEP_1000, STEP_1500, LOAD_0, LOAD_1000];
 
 /// Value of a schedule at time `t` (s); 0 before its first entry.
 pub fn at(schedule: Schedule, t: f64) -> f64 {
     schedule.iter().rev().find(|(from, _)| t >= from - 1e-9).map_or(0.0, |(_, value)| *value)
 }
 
-/// The record of every communication point.
+/// The recorded communication points.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Trace {
+pub struct Record {
     /// Time in s.
     pub t: Vec<f64>,
     /// Speed reference in rpm.
@@ -147,11 +147,11 @@ pub struct Point {
     pub i_q: f64,
 }
 
-impl Trace {
-    /// Appends a communication point of `scenario` at time `t` (s).
-    pub fn push(&mut self, scenario: &Scenario, t: f64, point: &Point) {
+impl Record {
+    /// Appends a communication point of `experiment` at time `t` (s).
+    pub fn push(&mut self, experiment: &Experiment, t: f64, point: &Point) {
         self.t.push(t);
-        self.speed_ref.push(at(scenario.speed_ref, t));
+        self.speed_ref.push(at(experiment.speed_ref, t));
         self.speed.push(point.speed / RPM);
         self.speed_est.push(point.speed_est / RPM);
         self.theta_e.push(point.theta_e.to_degrees());
@@ -190,11 +190,11 @@ pub fn samples_apart(h: f64) -> u32 {
 
 /// A closed loop that can run an experiment: the packed FMUs, or the native models in the tests.
 pub trait ClosedLoop {
-    /// Runs `scenario` with communication steps of `h` (s) and records every [`samples_apart`]th point.
+    /// Runs `experiment` with communication steps of `h` (s) and records every [`samples_apart`]th point.
     ///
     /// # Errors
     /// A step or a set call fails.
-    fn run(&self, scenario: &Scenario, h: f64) -> anyhow::Result<Trace>;
+    fn run(&self, experiment: &Experiment, h: f64) -> anyhow::Result<Record>;
 }
 
 #[cfg(test)]
@@ -211,11 +211,11 @@ mod tests {
 
     #[test]
     fn errors_wrap_to_half_open_turn() {
-        let mut trace = Trace::default();
+        let mut record = Record::default();
         for (theta_est, theta_e) in [(PI, -PI / 2.0), (0.0, PI), (0.1, -0.1)] {
-            trace.push(&REST, 0.0, &Point { theta_e, theta_est, ..Point::default() });
+            record.push(&REST, 0.0, &Point { theta_e, theta_est, ..Point::default() });
         }
-        for (error, expected) in trace.error.iter().zip([-90.0, 180.0, 0.2_f64.to_degrees()]) {
+        for (error, expected) in record.error.iter().zip([-90.0, 180.0, 0.2_f64.to_degrees()]) {
             assert!((error - expected).abs() < 1e-9, "{error} {expected}");
         }
     }
