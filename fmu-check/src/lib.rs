@@ -15,7 +15,6 @@ mod exchange;
 mod fmu_file;
 mod formats;
 mod instance;
-pub mod message;
 pub mod probe;
 mod replay;
 pub mod report;

@@ -1,13 +1,13 @@
 //! What a machine presets: the values of `fmu tune`, and the inputs of its reference result.
 
 use crate::commands::tune::place;
+use crate::message;
 use crate::preset::{Course, Preset};
 use anyhow::{Result, bail};
 use drive_study::tune::{
     joined,
     rules::{Setting, Tuned, Value},
 };
-use fmu_check::message;
 use fmu_core::Description;
 
 /// Sets the values of the machine that the FMU has: also those that are the model's own, because the FMU may be a preset for
