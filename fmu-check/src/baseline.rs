@@ -46,7 +46,7 @@ impl Baseline {
     /// Reads a file.
     ///
     /// # Errors
-    /// It cannot be read or is no baseline.
+    /// The file cannot be read or is not a baseline.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))?;
         toml::from_str(&text).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))

@@ -163,7 +163,7 @@ impl Instance<'_> {
         self.step_with(t, h, false)
     }
 
-    /// The same with a value of noSetFMUStatePriorToCurrentPoint.
+    /// A step from any time, with a value of `noSetFMUStatePriorToCurrentPoint`.
     pub(super) fn step_with(&self, t: f64, h: f64, no_prior: bool) -> Result<Status, NotDetermined> {
         let mark = if no_prior { ", noSetFMUStatePriorToCurrentPoint=true" } else { "" };
         let call = if self.session.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?}{mark})") };

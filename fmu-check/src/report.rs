@@ -166,10 +166,10 @@ impl Report {
         out + end + "\n"
     }
 
-    /// As JSON.
+    /// The report as JSON.
     ///
     /// # Errors
-    /// None that is known.
+    /// The report cannot be written as JSON, which no report has shown.
     pub fn json(&self) -> serde_json::Result<String> {
         serde_json::to_string_pretty(self)
     }

@@ -163,14 +163,14 @@ pub(super) struct Runner {
     /// The binaries for co-simulation and for Model Exchange; mostly the same one.
     simulation: Option<PathBuf>,
     exchange: Option<PathBuf>,
-    /// Of one call.
+    /// Time limit of one call.
     timeout: Duration,
     allowance: Allowance,
     /// Processes that outlived a probe.
     left: Mutex<Vec<String>>,
-    /// Of a call with arguments that a real importer never passes: known after a minimal run.
+    /// Time limit of a call with arguments that a real importer never passes; a minimal run measures it.
     wild: OnceLock<Duration>,
-    /// Of the whole run.
+    /// End of the whole run.
     deadline: Option<Instant>,
 }
 
@@ -379,7 +379,7 @@ impl Runner {
         Ok(Outcome::End(report.end))
     }
 
-    /// How and in which call a process ended that has not finished its probe, or why its end is no finding.
+    /// How, and in which call, a process ended before its probe was complete; or why its end is not a finding.
     fn crash(&self, check: &Check, end: &Outcome, out: &Path) -> Result<(String, String), String> {
         let journal = fs::read_to_string(out.with_extension("call")).unwrap_or_default();
         let call = journal.lines().next().unwrap_or_default().trim();

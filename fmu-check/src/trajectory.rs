@@ -71,7 +71,7 @@ impl Session {
         self.compare_variables(&watched, what, a, b);
     }
 
-    /// The same for other variables.
+    /// Compares two runs in these variables.
     pub(super) fn compare_variables(
         &self,
         variables: &[&ModelVariable],
@@ -98,7 +98,7 @@ impl Session {
         self.deviates_at(None, largest, text);
     }
 
-    /// The same, of this level instead of that of the check.
+    /// Reports a deviation at this level, or at that of the check.
     pub(super) fn deviates_at(&self, lower: Option<Level>, largest: f64, text: &str) {
         let tolerance = self.tolerance();
         let (level, text) = if largest <= tolerance {

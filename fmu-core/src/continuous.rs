@@ -26,7 +26,7 @@ impl<M: 'static> State<M> {
         Self { name: of.name, rate: of.rate, reinit: of.reinit, at }
     }
 
-    /// The same for a state that an event may change.
+    /// Marks the state as one that an event may change.
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;
         self

@@ -98,7 +98,7 @@ pub struct Variable {
     pub shape: Vec<usize>,
     /// Start values (one, or one per element) of variables that the importer may set; `None` for calculated ones.
     pub start: Option<Vec<Value>>,
-    /// Value references that the initial value depends on; `None` for variables that are no initial unknown.
+    /// Value references that the initial value depends on; `None` for variables that are not initial unknowns.
     pub initial_dependencies: Option<Vec<u32>>,
     /// Value references that the value depends on between two events: of outputs and derivatives.
     pub dependencies: Option<Vec<u32>>,
@@ -150,13 +150,13 @@ pub enum VariableKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Value {
-    /// Of a real variable.
+    /// Start value of a real variable.
     Real(f64),
-    /// Of an integer or an enumeration.
+    /// Start value of an integer or an enumeration.
     Integer(i128),
-    /// Of a Boolean.
+    /// Start value of a Boolean.
     Boolean(bool),
-    /// Of a text.
+    /// Start value of a text.
     Text(String),
 }
 
@@ -178,7 +178,7 @@ impl Description {
         Self::instantiated::<E>(fresh()?)
     }
 
-    /// As [`exported`](Self::exported), with the start values and the resources that `block` has.
+    /// Describes an instance like [`exported`](Self::exported), with the start values and the resources that `block` has.
     ///
     /// # Errors
     /// As [`exported`](Self::exported).
@@ -415,7 +415,7 @@ fn kind(kind: &Kind) -> VariableKind {
     }
 }
 
-/// The same check as in a set call. A text must be one that XML can hold (XML 1.0, 2.2).
+/// Checks a start value by the rules of a set call. A text must be one that XML can hold (XML 1.0, 2.2).
 fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
     let text = match slot {
         Slot::Text(text) => text.as_str(),

@@ -125,7 +125,7 @@ pub fn bounded<M: Sampled>(model: &M, now: Elapsed) -> Result<(), Fault> {
     bounded_by(model, grid(model).past(model.samples(), now), now)
 }
 
-/// The same `past` (s) the next sample.
+/// Refuses a point `past` (s) after the next sample if more samples are due than anyone can wait for.
 #[inline]
 pub(crate) fn bounded_by<M: Sampled>(model: &M, past: f64, now: Elapsed) -> Result<(), Fault> {
     if past <= MAX_SAMPLES * model.period() { Ok(()) } else { Err(endless(model.period(), now)) }

@@ -41,7 +41,7 @@ pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, lon
     Ok(())
 }
 
-/// The same for a model with events, which happen where they are due: time events exactly, others where an indicator
+/// Integrates a model with events, which happen where they are due: time events exactly, others where an indicator
 /// changes its sign. Every step begins with an event, because inputs may have changed; one that is due at the end of the
 /// step belongs to the next one.
 ///

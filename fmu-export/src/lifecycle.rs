@@ -167,7 +167,7 @@ pub enum Call {
 /// The state that a successful call leads to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// As before.
+    /// Unchanged.
     Stay,
     /// This one.
     To(State),
@@ -292,7 +292,7 @@ impl Call {
 pub struct Allowed([States; 3]);
 
 impl Allowed {
-    /// Of `call`.
+    /// The states that allow `call`.
     pub const fn of(call: Call, standard: Standard) -> Self {
         Self([
             call.states(standard, Interface::CoSimulation),

@@ -76,7 +76,7 @@ impl<M: Model> Snapshot<M> {
         Self::of(interface, Block::default())
     }
 
-    /// As [`new`](Self::new), of a model that is not its `Default`.
+    /// Like [`new`](Self::new), for a model other than its `Default`.
     pub fn of(interface: Interface, block: Block<M>) -> Self {
         Self {
             life: Life::new(interface),

@@ -130,7 +130,7 @@ impl Archive {
             let file = self.zip.by_index(index).map_err(|e| wrong(&e))?;
             file.take(machine::HEAD).read_to_end(&mut head).map_err(|e| wrong(&e))?;
             let platforms = machine::platforms(&head);
-            // The loader tells what is wrong with a file that is no library.
+            // The loader says what is wrong with a file that is not a library.
             if platforms.is_empty() || platforms.contains(&host) {
                 return Ok((folder, name));
             }

@@ -45,7 +45,7 @@ impl Error {
         Self::Usage { instance: instance.into(), cause: one_line(&cause.to_string()) }
     }
 
-    /// The same error with what was tried when it happened.
+    /// Adds to the error what was tried when it happened.
     pub(crate) fn during(self, what: &str) -> Self {
         match self {
             Self::Call { instance, function, status, message } => {

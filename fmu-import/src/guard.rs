@@ -319,7 +319,7 @@ mod unix {
     fn guard(arguments: &[OsString], channel: &UnixStream) -> Result<Report, String> {
         let text = |index: usize| arguments.get(index).and_then(|a| a.to_str()).unwrap_or_default();
         let number =
-            |index: usize| text(index).parse().map_err(|_| format!("argument {index} of {GUARD} is no number"));
+            |index: usize| text(index).parse().map_err(|_| format!("argument {index} of {GUARD} is not a number"));
         let allowance = Allowance { memory: number(0)?, file: number(1)?, sandbox: text(2) == "sandbox" };
         // Fails only for a process that leads its group already, which then has a group of its own.
         let _ = setsid();

@@ -171,7 +171,7 @@ impl Instance {
         self.setup_with(start, stop, None)
     }
 
-    /// As [`setup`](Self::setup), with the relative tolerance of a solver inside the FMU.
+    /// Like [`setup`](Self::setup), with the relative tolerance of a solver inside the FMU.
     ///
     /// # Errors
     /// The FMU refuses.

@@ -131,8 +131,8 @@ impl Fmu {
         Self::load(&Arc::new(Mutex::new(Archive::from_bytes(path.as_ref(), bytes)?)))
     }
 
-    /// The same FMU with another copy of its binary, from the archive that this one was opened from, whatever its path leads to
-    /// by now. After the status Fatal no instance of a binary can be used (FMI 2.0.5, 2.1.3; FMI 3.0.2, 2.2.4).
+    /// Opens the FMU again with another copy of its binary, from the archive that this one was opened from, whatever its path
+    /// leads to by now. After the status Fatal no instance of a binary can be used (FMI 2.0.5, 2.1.3; FMI 3.0.2, 2.2.4).
     ///
     /// # Errors
     /// The archive cannot be read or unpacked.

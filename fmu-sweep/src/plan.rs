@@ -83,7 +83,7 @@ impl Plan {
     /// Opens the FMUs of a definition, connects them and sets what is the same in all runs. Relative paths begin in `folder`.
     ///
     /// # Errors
-    /// A file is no FMU that runs here, a name or a value is wrong, or a measure makes no sense.
+    /// A file is not an FMU that runs here, a name or a value is wrong, or a measure makes no sense.
     pub fn new(definition: &Definition, folder: &Path) -> Result<Self, Error> {
         if definition.fmus.is_empty() {
             return invalid("fmus: expected at least one FMU, or an SSP file");

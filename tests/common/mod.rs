@@ -5,6 +5,7 @@ pub mod estimators;
 pub mod importers;
 pub mod pages;
 pub mod python;
+pub mod words;
 
 use drive::Pair;
 use drive_study::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};

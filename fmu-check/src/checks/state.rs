@@ -118,7 +118,7 @@ fn report(
     }
 }
 
-/// As [`rerun`], for a check that takes F02a for granted: where a run from a restored state differs anyway, it cannot decide.
+/// Like [`rerun`], for a check that takes F02a for granted: where a run from a restored state differs anyway, it cannot decide.
 fn rerun_given_f02a(instance: &Instance<'_>, first: &[Vec<Vec<u64>>], what: &str) -> Result<(), NotDetermined> {
     let (session, h) = (instance.session, instance.session.h());
     let same = |second: &Result<Vec<Vec<Vec<u64>>>, NotDetermined>, first: &[Vec<Vec<u64>>]| {

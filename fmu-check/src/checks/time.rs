@@ -355,7 +355,7 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
         session.note("the FMU does not save states");
         return Ok(());
     }
-    // A state that does not lead back without the flag is no matter of the flag: F02a is about that.
+    // A state that does not lead back even without the flag is unrelated to the flag; F02a checks it.
     let (here, time) = (unrestricted.save()?, unrestricted.time.get());
     let first = unrestricted.run(10, session.h())?;
     unrestricted.restore(here, time)?;

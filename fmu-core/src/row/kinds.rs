@@ -25,7 +25,7 @@ impl<W: 'static> Row<W> {
         Self::boolean((Causality::Output, Variability::Discrete), name, description, get)
     }
 
-    /// A Boolean variable that is no output.
+    /// A Boolean variable other than an output.
     pub const fn boolean_local(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut bool) -> Self {
         Self::boolean((Causality::Local, Variability::Discrete), name, description, get)
     }
@@ -67,7 +67,7 @@ impl<W: 'static> Row<W> {
         Self::enumeration((Causality::Output, Variability::Discrete), name, description, field)
     }
 
-    /// An enumeration that is no output.
+    /// An enumeration other than an output.
     pub const fn enumeration_local<E: Enumerated>(
         name: &'static str,
         description: &'static str,
@@ -116,7 +116,7 @@ impl<W: 'static> Row<W> {
         Self::single((Causality::Output, Variability::Discrete), name, quantity, description, get)
     }
 
-    /// A real variable in single precision that is no output and changes at sample instants.
+    /// A real variable in single precision other than an output, which changes at sample instants.
     pub const fn float32_local(
         name: &'static str,
         quantity: &'static Quantity,
@@ -171,7 +171,7 @@ impl<W: 'static> Row<W> {
         Self::array((Causality::Output, Variability::Continuous), name, quantity, description, dimension, get)
     }
 
-    /// An array of continuous real variables that are no outputs; `dimension` elements.
+    /// An array of `dimension` continuous real variables other than outputs.
     pub const fn array_local(
         name: &'static str,
         quantity: &'static Quantity,

@@ -48,7 +48,7 @@ impl<E: Exported> Abi<E> {
         let json = catch_unwind(|| {
             let mut made = Made::<E::Model>::described(resources.as_deref())?;
             if changes_on_loading(&made, resources.as_deref())? {
-                return Err(Fault::new("load changes what a state saves: what it reads belongs into a Resource"));
+                return Err(Fault::new("load changes what a state saves: store what it reads in a Resource"));
             }
             made.block.model.load(resources.as_deref())?;
             let mut description = Description::instantiated::<E>(made.block)?;

@@ -214,8 +214,7 @@ impl Hybrid for Fmus<'_> {
     }
 }
 
-/// Simulates instances that are initialized and in event mode. As [`simulate`](super::run::simulate), which begins and ends the
-/// run.
+/// Simulates instances that are initialized and in event mode; [`simulate`](super::run::simulate) begins and ends the run.
 pub(super) fn run(
     instances: &mut [Instance],
     exchange: &mut Exchange,

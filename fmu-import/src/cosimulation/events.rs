@@ -156,7 +156,7 @@ impl Fmus<'_> {
     }
 }
 
-/// Simulates instances that are initialized. As [`simulate`](super::run::simulate), which begins and ends the run.
+/// Simulates instances that are initialized; [`simulate`](super::run::simulate) begins and ends the run.
 pub(super) fn run(
     instances: &mut [Instance],
     exchange: &mut Exchange,

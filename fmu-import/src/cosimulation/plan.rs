@@ -141,7 +141,7 @@ impl Plan {
         &self.columns
     }
 
-    /// The same system and times with other variables recorded, each a pair of `instance.variable` and the name of its column.
+    /// A plan for this system and these times that records other variables, each a pair of `instance.variable` and the name of its column.
     ///
     /// # Errors
     /// The variable does not exist or is not a number.
@@ -197,9 +197,9 @@ impl Plan {
 /// Runs a plan again and again.
 pub struct Worker {
     plan: Arc<Plan>,
-    /// None after an error.
+    /// Empty after an error.
     instances: Vec<Instance>,
-    /// Of the FMU of each instance.
+    /// Generation of the FMU of each instance.
     generations: Vec<u32>,
     exchange: Exchange,
     row: Vec<f64>,

@@ -47,7 +47,7 @@ impl Schedule {
         Ok(Self { points, linear, units: Vec::new() })
     }
 
-    /// The same with the values in the unit of the `variable`.
+    /// Converts the values to the unit of the `variable`.
     pub(super) fn in_unit_of(self, variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
         if self.units.is_empty() {
             return Ok(self);

@@ -101,7 +101,7 @@ impl Loaded {
         Self::open_files_with(files, folder, logging, |_| Method::default())
     }
 
-    /// As [`open_files`](Self::open_files), run by the method that suits the FMUs.
+    /// Like [`open_files`](Self::open_files), run by the method that suits the FMUs.
     ///
     /// # Errors
     /// As [`open_files`](Self::open_files), or an FMU does not have the interface that the method needs.
@@ -148,7 +148,7 @@ impl Loaded {
         Self::open_with(path, logging, |_| Method::default())
     }
 
-    /// As [`open`](Self::open), run by the method that suits the FMUs.
+    /// Like [`open`](Self::open), run by the method that suits the FMUs.
     fn open_with(path: &Path, logging: bool, method: impl FnOnce(&[(String, Fmu)]) -> Method) -> Result<Self> {
         let of = || path.display().to_string();
         let file = File::open(path).with_context(of)?;
@@ -172,7 +172,7 @@ impl Loaded {
         if let (Method::CoSimulation { .. }, Some(component)) =
             (&method, structure.components.iter().find(|component| component.model_exchange))
         {
-            let cause = "implementation=\"ModelExchange\" is no Co-Simulation: simulate it with --me";
+            let cause = "implementation=\"ModelExchange\" is not Co-Simulation: simulate it with --me";
             return Err(in_description(format!("line {}: {cause}", component.line)));
         }
         let mut loaded = Self { system: System::new(method), ..Self::default() };

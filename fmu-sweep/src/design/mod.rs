@@ -292,7 +292,7 @@ mod tests {
         assert!(stratified(6, 1.0 - 1e-16, 7) < 1.0);
     }
 
-    /// The same bits on every platform: only exact operations, and functions of the crate `libm`.
+    /// Designs have equal bits on every platform: they use exact operations and functions of the crate `libm` alone.
     #[test]
     fn rows_have_these_bits() {
         #[rustfmt::skip]
