@@ -5,24 +5,10 @@
 
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::State;
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Interface, Sensitivity, SensitivityArguments, Simple, Updated, Vector};
+use fmu_import::raw::{Sensitivity, SensitivityArguments, Simple, Updated, Vector};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown};
-
-/// States of the life cycle of Model Exchange.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mode {
-    Instantiated,
-    Initialization,
-    Event,
-    Continuous,
-    Terminated,
-}
-
-impl Mode {
-    pub(super) const ALL: [Self; 5] =
-        [Self::Instantiated, Self::Initialization, Self::Event, Self::Continuous, Self::Terminated];
-}
 
 /// Most updates of one event: a further one is needed only by an FMU that never comes to an end.
 const UPDATES: usize = 100;
@@ -66,18 +52,6 @@ impl Session {
     pub(super) fn integrator_step(&self) -> f64 {
         self.h() / 20.0
     }
-
-    /// An instance for Model Exchange in a state of its life cycle. In Event Mode no update was made yet.
-    pub(super) fn exchange(&self, mode: Mode) -> Result<Instance<'_>, NotDetermined> {
-        self.prepare(|| {
-            let arguments = Arguments { interface: Interface::ModelExchange, ..self.arguments("probe") };
-            let made = self.instantiate(&arguments)?;
-            let instance =
-                made.ok_or_else(|| NotDetermined("an instantiation for Model Exchange returned NULL".into()))?;
-            instance.bring_to(mode)?;
-            Ok(instance)
-        })
-    }
 }
 
 /// What an event did.
@@ -109,27 +83,6 @@ impl Event {
 }
 
 impl Instance<'_> {
-    /// Brings a new instance to a state.
-    pub(super) fn bring_to(&self, mode: Mode) -> Result<(), NotDetermined> {
-        if mode == Mode::Instantiated {
-            return Ok(());
-        }
-        self.enter()?;
-        if mode == Mode::Initialization {
-            return Ok(());
-        }
-        self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
-        if mode == Mode::Event {
-            return Ok(());
-        }
-        let _ = self.iterate()?;
-        self.must("EnterContinuousTimeMode", self.simple(Simple::EnterContinuousTimeMode)?)?;
-        if mode == Mode::Continuous {
-            return Ok(());
-        }
-        self.must("Terminate", self.simple(Simple::Terminate)?)
-    }
-
     /// One update of the discrete states.
     pub(super) fn update(&self) -> Result<(Status, Updated), NotDetermined> {
         let name = if self.session.description.version == FmiVersion::V2 {
@@ -285,10 +238,10 @@ impl Session {
     /// An instance in Event Mode whose inputs have been set; where the FMU does not take these values, with its start values.
     pub(super) fn excited(&self) -> Result<Instance<'_>, NotDetermined> {
         self.prepare(|| {
-            let instance = self.exchange(Mode::Event)?;
-            let trial = self.exchange(Mode::Event)?;
+            let instance = self.exchange(State::Event)?;
+            let trial = self.exchange(State::Event)?;
             let good = trial.excite()? && Importer::start(&trial).is_ok();
-            Ok(if good && instance.excite()? { instance } else { self.exchange(Mode::Event)? })
+            Ok(if good && instance.excite()? { instance } else { self.exchange(State::Event)? })
         })
     }
 }

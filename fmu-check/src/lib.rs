@@ -20,6 +20,7 @@ mod replay;
 pub mod report;
 mod runner;
 mod session;
+mod states;
 mod trajectory;
 mod watch;
 mod zip_headers;

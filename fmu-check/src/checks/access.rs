@@ -3,10 +3,12 @@
 use super::values::{booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, tunable};
 use crate::check::{Check, Level, Levels, Run};
 use crate::encoding::{bits, same, show};
+use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::Buffer;
 use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability, parse_number};
+use std::slice;
 
 const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.7.2";
 
@@ -114,20 +116,31 @@ fn plain_types(version: FmiVersion) -> Vec<BaseType> {
     if version == FmiVersion::V2 { v2.to_vec() } else { all() }
 }
 
+const WAYS: [&str; 2] = ["Get", "Set"];
+
+/// Gets or sets, as `way` says, with arrays that may be NULL, each with its count.
+fn pass(
+    instance: &Instance<'_>,
+    way: &str,
+    call: &str,
+    base: BaseType,
+    (list, n): (Option<&[u32]>, usize),
+    (values, n_values): (Option<&mut Buffer>, usize),
+) -> Result<Status, NotDetermined> {
+    instance.call(call, |raw| match way {
+        "Set" => raw.set(instance.handle, base, list, n, values, n_values),
+        _ => raw.get(instance.handle, base, list, n, values, n_values),
+    })
+}
+
 fn zero_variables(session: &Session) -> Result<(), NotDetermined> {
     for base in plain_types(session.description.version) {
         session.case(|| {
             let instance = session.stepping()?;
-            for set in [false, true] {
-                let (kind, none) = (if set { "Set" } else { "Get" }, Option::<&mut Buffer>::None);
-                let status = instance.call(&format!("{kind}({base}, NULL, 0, NULL, 0)"), |raw| {
-                    if set {
-                        raw.set(instance.handle, base, None, 0, none, 0)
-                    } else {
-                        raw.get(instance.handle, base, None, 0, none, 0)
-                    }
-                })?;
-                session.require(status.is_ok(), || format!("{kind}{base} of zero variables returned {status}"));
+            for way in WAYS {
+                let call = format!("{way}({base}, NULL, 0, NULL, 0)");
+                let status = pass(&instance, way, &call, base, (None, 0), (None, 0))?;
+                session.require(status.is_ok(), || format!("{way}{base} of zero variables returned {status}"));
             }
             Ok(())
         });
@@ -137,31 +150,15 @@ fn zero_variables(session: &Session) -> Result<(), NotDetermined> {
 
 fn null_arrays(session: &Session) -> Result<(), NotDetermined> {
     for (references, values) in [(false, true), (true, false)] {
-        for set in [false, true] {
+        for way in WAYS {
             session.case(|| {
                 let instance = session.stepping()?;
-                let wanted = if set { Causality::Input } else { Causality::Output };
-                let Some(v) = session.numeric().find(|v| v.causality == wanted && v.base.is_float() && !v.is_array())
-                else {
-                    return Ok(());
-                };
+                let Some(v) = subject(session, way) else { return Ok(()) };
                 let mut buffer = Buffer::of(v.base, session.description.version, &[bits(v.base, 0.0)]);
-                let list = [v.value_reference];
-                let (list, place) = (references.then_some(&list[..]), values.then_some(&mut buffer));
-                let call = format!(
-                    "{}({}, {}, 1, {}, 1)",
-                    if set { "Set" } else { "Get" },
-                    v.base,
-                    if references { "vr" } else { "NULL" },
-                    if values { "values" } else { "NULL" }
-                );
-                let status = instance.call(&call, |raw| {
-                    if set {
-                        raw.set(instance.handle, v.base, list, 1, place, 1)
-                    } else {
-                        raw.get(instance.handle, v.base, list, 1, place, 1)
-                    }
-                })?;
+                let (list, place) = (references.then_some(v.value_reference), values.then_some(&mut buffer));
+                let names = [if references { "vr" } else { "NULL" }, if values { "values" } else { "NULL" }];
+                let call = format!("{way}({}, {}, 1, {}, 1)", v.base, names[0], names[1]);
+                let status = pass(&instance, way, &call, v.base, (list.as_ref().map(slice::from_ref), 1), (place, 1))?;
                 session.require(status == Status::ERROR, || format!("{call} returned {status}"));
                 Ok(())
             });
@@ -171,33 +168,27 @@ fn null_arrays(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn wrong_counts(session: &Session) -> Result<(), NotDetermined> {
-    for (n, set) in [(0, false), (2, false), (0, true), (2, true)] {
+    for (n, way) in [(0, "Get"), (2, "Get"), (0, "Set"), (2, "Set")] {
         session.case(|| {
             let instance = session.stepping()?;
-            let wanted = if set { Causality::Input } else { Causality::Output };
-            let Some(v) = session
-                .numeric()
-                .find(|v| v.causality == wanted && v.base.is_float() && !v.is_array() && v.clocks.is_empty())
-            else {
-                return Ok(());
-            };
+            let Some(v) = subject(session, way) else { return Ok(()) };
             let mut buffer = Buffer::of(v.base, session.description.version, &vec![bits(v.base, 0.0); n]);
-            let list = [v.value_reference];
-            let call = format!("{}({}, nValueReferences=1, nValues={n})", if set { "Set" } else { "Get" }, v.name);
-            let status = instance.call(&call, |raw| {
-                let place = Some(&mut buffer);
-                if set {
-                    raw.set(instance.handle, v.base, Some(&list), 1, place, n)
-                } else {
-                    raw.get(instance.handle, v.base, Some(&list), 1, place, n)
-                }
-            })?;
+            let call = format!("{way}({}, nValueReferences=1, nValues={n})", v.name);
+            let list = (Some(&[v.value_reference][..]), 1);
+            let status = pass(&instance, way, &call, v.base, list, (Some(&mut buffer), n))?;
             session.require(status == Status::ERROR, || format!("{call} returned {status}"));
             session.require(buffer.intact(), || format!("{call} wrote past the {n} values"));
             Ok(())
         });
     }
     Ok(())
+}
+
+/// A scalar to get, an output, or to set, an input.
+fn subject<'b>(session: &'b Session, way: &str) -> Option<&'b ModelVariable> {
+    let wanted = if way == "Set" { Causality::Input } else { Causality::Output };
+    let fits = |v: &&ModelVariable| v.causality == wanted && v.base.is_float() && !v.is_array() && v.clocks.is_empty();
+    session.numeric().find(fits)
 }
 
 /// A reference that no variable has.
@@ -213,8 +204,8 @@ fn unknown_reference(session: &Session) -> Result<(), NotDetermined> {
             continue;
         }
         for base in plain_types(session.description.version) {
-            for set in [false, true] {
-                session.case(|| must_be_refused(session, base, reference, set, "a reference that does not exist"));
+            for way in WAYS {
+                session.case(|| must_be_refused(session, way, base, reference, "a reference that does not exist"));
             }
         }
     }
@@ -224,22 +215,15 @@ fn unknown_reference(session: &Session) -> Result<(), NotDetermined> {
 /// A getter or setter that must return Error.
 fn must_be_refused(
     session: &Session,
+    way: &str,
     base: BaseType,
     reference: u32,
-    set: bool,
     what: &str,
 ) -> Result<(), NotDetermined> {
     let instance = session.stepping()?;
     let mut buffer = Buffer::of(base, session.description.version, &[bits(base, 0.0)]);
-    let call = format!("{}({base}, reference={reference})", if set { "Set" } else { "Get" });
-    let status = instance.call(&call, |raw| {
-        let place = Some(&mut buffer);
-        if set {
-            raw.set(instance.handle, base, Some(&[reference]), 1, place, 1)
-        } else {
-            raw.get(instance.handle, base, Some(&[reference]), 1, place, 1)
-        }
-    })?;
+    let call = format!("{way}({base}, reference={reference})");
+    let status = pass(&instance, way, &call, base, (Some(&[reference]), 1), (Some(&mut buffer), 1))?;
     let text = format!("{call}, {what}, returned {status}");
     if status == Status::FATAL {
         // Refused, but with more than is wrong: it gives up all instances.
@@ -263,10 +247,9 @@ fn wrong_type(session: &Session) -> Result<(), NotDetermined> {
             .iter()
             .find(|v| carries(v.base) != carries(base) && !v.is_array() && !taken(v.value_reference));
         let Some(v) = other else { continue };
-        for set in [false, true] {
-            session.case(|| {
-                must_be_refused(session, base, v.value_reference, set, &format!("{} of the type {}", v.name, v.base))
-            });
+        let what = format!("{} of the type {}", v.name, v.base);
+        for way in WAYS {
+            session.case(|| must_be_refused(session, way, base, v.value_reference, &what));
         }
     }
     Ok(())
@@ -329,9 +312,8 @@ fn all_or_nothing(session: &Session) -> Result<(), NotDetermined> {
     let before = instance.get(v)?.1;
     let mut buffer = Buffer::of(v.base, session.description.version, &[values[0], 0]);
     let list = [v.value_reference, free_reference(session)];
-    let status = instance.call(&format!("Set({}, and a reference that does not exist)", v.name), |raw| {
-        raw.set(instance.handle, v.base, Some(&list), 2, Some(&mut buffer), 2)
-    })?;
+    let call = format!("Set({}, and a reference that does not exist)", v.name);
+    let status = pass(&instance, "Set", &call, v.base, (Some(&list), 2), (Some(&mut buffer), 2))?;
     if status.is_ok() {
         return Err(NotDetermined("the FMU does not refuse a reference that does not exist".into()));
     }

@@ -1,9 +1,11 @@
 //! Event mode and early return of co-simulation (FMI 3.0.2, 4.2.1).
 
+use super::calls::attempt;
 use crate::check::{Check, Level, Levels, Run};
 use crate::exchange::deviation;
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::Life;
 use fmu_import::Status;
 use fmu_import::raw::{Arguments, Simple, Stepped};
 use model_description::BaseType;
@@ -38,8 +40,8 @@ macro_rules! needs_event_mode {
 
 const COMBINATIONS: [(bool, bool); 4] = [(false, false), (false, true), (true, false), (true, true)];
 
-/// An importer that uses event mode and early return as it said.
-struct Importer<'b> {
+/// Steps an instance that uses event mode and early return as its instantiation said.
+struct Stepper<'b> {
     instance: Instance<'b>,
     event_mode: bool,
     early: bool,
@@ -48,20 +50,19 @@ struct Importer<'b> {
     over: bool,
 }
 
-impl<'b> Importer<'b> {
+impl<'b> Stepper<'b> {
     /// An instance in Step Mode.
     fn start(session: &'b Session, (event_mode, early): (bool, bool)) -> Result<Self, NotDetermined> {
         session.prepare(|| {
             let arguments = Arguments { event_mode, early_return: early, ..session.arguments("probe") };
-            let made = session.instantiate(&arguments)?;
-            let instance = made.ok_or_else(|| NotDetermined(format!("{} returned NULL", session.instantiation())))?;
+            let instance = session.made(&arguments)?;
             instance.enter()?;
             instance.must("ExitInitializationMode", instance.simple(Simple::ExitInitializationMode)?)?;
-            let mut importer = Self { instance, event_mode, early, next: None, over: false };
+            let mut stepper = Self { instance, event_mode, early, next: None, over: false };
             if event_mode {
-                importer.leave_event_mode()?;
+                stepper.leave_event_mode()?;
             }
-            Ok(importer)
+            Ok(stepper)
         })
     }
 
@@ -114,7 +115,7 @@ impl<'b> Importer<'b> {
 }
 
 /// What is wrong with a step, from its status, its results, and its two ends as the importer asked for them.
-type Rule<'a> = &'a dyn Fn(&Importer<'_>, Status, Stepped, [f64; 2]) -> Option<String>;
+type Rule<'a> = &'a dyn Fn(&Stepper<'_>, Status, Stepped, [f64; 2]) -> Option<String>;
 
 /// Steps of one and of five communication steps, within the default experiment, for each combination of the two flags.
 fn each_step(session: &Session, rule: Rule<'_>) -> Result<(), NotDetermined> {
@@ -126,14 +127,14 @@ fn each_step(session: &Session, rule: Rule<'_>) -> Result<(), NotDetermined> {
         for multiple in if variable { &[1.0, 5.0][..] } else { &[1.0] } {
             session.case(|| {
                 let h = multiple * session.h();
-                let mut importer = Importer::start(session, flags)?;
+                let mut stepper = Stepper::start(session, flags)?;
                 for _ in 0..200 {
-                    let t = importer.instance.time.get();
-                    if importer.over || t + h > stop * (1.0 + 1e-9) || session.half_time_used() {
+                    let t = stepper.instance.time.get();
+                    if stepper.over || t + h > stop * (1.0 + 1e-9) || session.half_time_used() {
                         break;
                     }
-                    let (status, stepped, end) = importer.step(h)?;
-                    if let Some(text) = rule(&importer, status, stepped, [t, end]) {
+                    let (status, stepped, end) = stepper.step(h)?;
+                    if let Some(text) = rule(&stepper, status, stepped, [t, end]) {
                         session.violated(format!(
                             "eventModeUsed={}, earlyReturnAllowed={}: DoStep(t={t:?}, h={:?}) {text}",
                             flags.0,
@@ -158,15 +159,15 @@ fn combinations(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn permitted(session: &Session) -> Result<(), NotDetermined> {
-    each_step(session, &|importer, status, stepped, _| {
+    each_step(session, &|stepper, status, stepped, _| {
         let flags = [stepped.event, stepped.terminate, stepped.early];
         if !status.is_ok() {
             None
         } else if flags.iter().any(|f| *f > 1) {
             Some(format!("gave {stepped:?}: a Boolean is not 0 or 1, or was not written"))
-        } else if stepped.early == 1 && !importer.early {
+        } else if stepped.early == 1 && !stepper.early {
             Some("returned early, which was not allowed".into())
-        } else if stepped.event == 1 && !importer.event_mode {
+        } else if stepped.event == 1 && !stepper.event_mode {
             Some("asked for event handling, but event mode is not used".into())
         } else {
             None
@@ -202,44 +203,22 @@ fn truly_early(session: &Session) -> Result<(), NotDetermined> {
 
 fn without_event_mode(session: &Session) -> Result<(), NotDetermined> {
     needs_event_mode!(session);
-    let importer = Importer::start(session, (false, false))?;
-    let status = importer.instance.simple(Simple::EnterEventMode)?;
+    let stepper = Stepper::start(session, (false, false))?;
+    let status = stepper.instance.simple(Simple::EnterEventMode)?;
     session.require(status == Status::ERROR, || format!("EnterEventMode returned {status}"));
     Ok(())
 }
 
 fn wrong_mode(session: &Session) -> Result<(), NotDetermined> {
     needs_event_mode!(session);
-    let check = |call: &str, status: Status| {
-        session.require(status == Status::ERROR, || format!("{call} returned {status}"));
-    };
-    session.case(|| {
-        let importer = Importer::start(session, (true, false))?;
-        importer.instance.must("EnterEventMode", importer.instance.simple(Simple::EnterEventMode)?)?;
-        let (t, h) = (importer.instance.time.get(), session.h());
-        let status = importer.instance.call("DoStep in Event Mode", |raw| {
-            raw.do_step(importer.instance.handle, t, h, false, [true; 4]).map(|(status, _)| status)
-        })?;
-        check("DoStep in Event Mode", status);
-        Ok(())
-    });
-    session.case(|| {
-        let importer = Importer::start(session, (true, false))?;
-        check("UpdateDiscreteStates in Step Mode", importer.instance.update()?.0);
-        Ok(())
-    });
-    session.case(|| {
-        let importer = Importer::start(session, (true, false))?;
-        check("EnterStepMode in Step Mode", importer.instance.simple(Simple::EnterStepMode)?);
-        Ok(())
-    });
+    attempt(session, Life::EventMode, '-');
     Ok(())
 }
 
 fn next_event_time(session: &Session) -> Result<(), NotDetermined> {
-    each_step(session, &|importer, _, _, _| {
-        let t = importer.instance.time.get();
-        let bad = importer.next.filter(|next| importer.event_mode && !importer.over && *next <= t - 1e-9 * t.abs());
+    each_step(session, &|stepper, _, _, _| {
+        let t = stepper.instance.time.get();
+        let bad = stepper.next.filter(|next| stepper.event_mode && !stepper.over && *next <= t - 1e-9 * t.abs());
         bad.map(|next| format!("reached {t:?}, and the next event time is {next:?}"))
     })
 }
@@ -248,19 +227,19 @@ fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     needs_event_mode!(session);
     let outputs: Vec<_> = session.watched().into_iter().filter(|v| v.base == BaseType::Float64).collect();
     let run = |visits: bool| -> Result<Vec<Vec<f64>>, NotDetermined> {
-        let mut importer = Importer::start(session, (true, false))?;
+        let mut stepper = Stepper::start(session, (true, false))?;
         let mut rows = Vec::new();
         for _ in 0..30 {
-            if importer.over {
+            if stepper.over {
                 break;
             }
-            let (status, stepped, _) = importer.step(session.h())?;
-            importer.instance.must("DoStep", status)?;
-            let due = importer.next.is_some_and(|next| next <= stepped.last + 1e-6 * session.h());
-            if visits && stepped.event == 0 && !due && !importer.over {
-                importer.event()?;
+            let (status, stepped, _) = stepper.step(session.h())?;
+            stepper.instance.must("DoStep", status)?;
+            let due = stepper.next.is_some_and(|next| next <= stepped.last + 1e-6 * session.h());
+            if visits && stepped.event == 0 && !due && !stepper.over {
+                stepper.event()?;
             }
-            let values = importer.instance.snapshot(&outputs)?;
+            let values = stepper.instance.snapshot(&outputs)?;
             rows.push(values.into_iter().flatten().map(f64::from_bits).collect());
         }
         Ok(rows)

@@ -1,11 +1,12 @@
 //! Model Exchange: life cycle, states and their derivatives (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2).
 
+use super::calls::attempt;
 use super::dependencies::exchange_dependencies;
-use super::exchange_table::{allowed, allowed_early, minimal_run, refused};
 use crate::check::{Check, Level, Levels, Run};
-use crate::exchange::{Importer, Mode, deviation, differ};
+use crate::exchange::{Importer, deviation, differ};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::{Life, State};
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
@@ -34,8 +35,35 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "E14", requirement: "A state of a Model Exchange instance does no harm to an instance for co-simulation, nor the reverse.", clause: "hardening", levels: Levels::HARD, tried: "Sets a state of one kind of instance into the other.", fix: "Store the kind, and return Error.", run: Run::Exchange(foreign_states) },
 ];
 
+fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
+    let instance = session.exchange(State::Event)?;
+    let mut importer = Importer::start(&instance)?;
+    importer.run(10, &mut |_| Ok(()))?;
+    let _ = instance.snapshot(&session.watched())?;
+    if !importer.over {
+        let status = instance.simple(Simple::Terminate)?;
+        session.require(status.is_ok(), || format!("{} returned {status}", session.raw.name("Terminate")));
+    }
+    Ok(())
+}
+
+fn allowed(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::ModelExchange, '+');
+    Ok(())
+}
+
+fn allowed_early(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::ModelExchange, 's');
+    Ok(())
+}
+
+fn refused(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::ModelExchange, '-');
+    Ok(())
+}
+
 fn counts(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.exchange(Mode::Event)?;
+    let instance = session.exchange(State::Event)?;
     let (states, indicators) = (session.states(), session.indicators());
     if session.description.version == FmiVersion::V3 {
         let counts = [(Count::GetNumberOfContinuousStates, states), (Count::GetNumberOfEventIndicators, indicators)];
@@ -81,7 +109,7 @@ macro_rules! needs_states {
 }
 
 fn nominals(session: &Session) -> Result<Vec<f64>, NotDetermined> {
-    let instance = session.exchange(Mode::Continuous)?;
+    let instance = session.exchange(State::Continuous)?;
     let (status, values, _) = instance.vector(Vector::GetNominalsOfContinuousStates, session.states())?;
     instance.must("GetNominalsOfContinuousStates", status)?;
     Ok(values)
@@ -116,7 +144,7 @@ fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
 
 fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     needs_states!(session);
-    let instance = session.exchange(Mode::Continuous)?;
+    let instance = session.exchange(State::Continuous)?;
     let x = moved(session, &instance.states()?, usize::MAX);
     let status = instance.set_states(&x)?;
     if !status.is_ok() {
@@ -213,7 +241,7 @@ fn same_bits(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn completed_step(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.exchange(Mode::Continuous)?;
+    let instance = session.exchange(State::Continuous)?;
     for k in 0..5 {
         instance.must("SetTime", instance.set_time(instance.time.get() + 1e-3 * session.integrator_step())?)?;
         let before = [instance.states()?, instance.derivatives()?];
@@ -238,7 +266,7 @@ fn independent(session: &Session) -> Result<(), NotDetermined> {
     let Some(time) = session.description.variables.iter().find(fits) else {
         return session.not_applicable("there is no independent variable of type Float64");
     };
-    let instance = session.exchange(Mode::Continuous)?;
+    let instance = session.exchange(State::Continuous)?;
     for _ in 0..3 {
         let t = instance.time.get() + 0.1 * session.integrator_step();
         instance.must("SetTime", instance.set_time(t)?)?;
@@ -255,7 +283,7 @@ fn wild_states(session: &Session) -> Result<(), NotDetermined> {
     needs_states!(session);
     for wild in [f64::NAN, f64::INFINITY, 1e300] {
         session.case(|| {
-            let instance = session.exchange(Mode::Continuous)?;
+            let instance = session.exchange(State::Continuous)?;
             let (x, f) = (instance.states()?, instance.derivatives()?);
             let set = instance.set_states(&vec![wild; x.len()])?;
             let mut told = vec![("SetContinuousStates", set)];
@@ -294,7 +322,7 @@ fn wrong_length(session: &Session) -> Result<(), NotDetermined> {
         (Vector::GetEventIndicators, session.indicators() + 1),
     ] {
         session.case(|| {
-            let instance = session.exchange(Mode::Continuous)?;
+            let instance = session.exchange(State::Continuous)?;
             let mut room = vec![0.0; n + 8];
             let call = format!("{}(n={n})", name.as_str());
             let status = instance.call(&call, |raw| raw.vector(name, instance.handle, Some(&mut room), n))?;
@@ -307,23 +335,24 @@ fn wrong_length(session: &Session) -> Result<(), NotDetermined> {
 
 fn reset(session: &Session) -> Result<(), NotDetermined> {
     let run = |instance: &Instance<'_>| Importer::start(instance)?.trajectory(100);
-    let first = run(&session.exchange(Mode::Event)?)?;
-    for mode in Mode::ALL {
+    let first = run(&session.exchange(State::Event)?)?;
+    for &state in Life::ModelExchange.states() {
         session.case(|| {
-            let running = mode == Mode::Continuous;
-            let instance = session.exchange(if running { Mode::Event } else { mode })?;
+            let running = state == State::Continuous;
+            let instance = session.exchange(if running { State::Event } else { state })?;
             if running {
                 Importer::start(&instance)?.run(20, &mut |_| Ok(()))?;
             }
             let status = instance.simple(Simple::Reset)?;
             if !status.is_ok() {
-                session.violated(format!("Reset after {mode:?} returned {status}"));
+                session.violated(format!("Reset after {state:?} returned {status}"));
                 return Ok(());
             }
             instance.experiment(session.start(), None);
-            instance.bring_to(Mode::Event)?;
+            instance.bring_to(State::Event)?;
             if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
-                let text = format!("Reset after {mode:?}: the run differs from that of a new instance after {k} steps");
+                let text =
+                    format!("Reset after {state:?}: the run differs from that of a new instance after {k} steps");
                 session.deviates(largest, &text);
             }
             Ok(())
@@ -393,7 +422,7 @@ fn foreign_states(session: &Session) -> Result<(), NotDetermined> {
     }
     for to_simulation in [true, false] {
         session.case(|| {
-            let (exchange, simulation) = (session.exchange(Mode::Continuous)?, session.stepping()?);
+            let (exchange, simulation) = (session.exchange(State::Continuous)?, session.stepping()?);
             let (from, to) = if to_simulation { (&exchange, &simulation) } else { (&simulation, &exchange) };
             let saved = from.save()?;
             let status = to.call("SetFMUState of the other interface", |raw| raw.set_state(to.handle, saved))?;

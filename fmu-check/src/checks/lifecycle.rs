@@ -1,12 +1,12 @@
 //! The life cycle: allowed calls succeed, others are refused, and none crashes the process
 //! (FMI 2.0.5, 2.1.5 and 4.2.4; FMI 3.0.2, 2.2.4, 2.3 and 4.2).
 
-use super::lifecycle_states::State::{Error, Initialization, Instantiated, Step, Terminated};
-use super::lifecycle_states::in_state;
-use super::state_table::{allowed, configuration, null_instance, refused, unsupported};
+use super::by_name::{configuration, null_instance, unsupported};
+use super::calls::attempt;
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
+use crate::states::{Life, State::Error, State::Step};
 use fmu_import::raw::{Handle, Interface, Simple};
 use model_description::{Causality, FmiVersion};
 use std::ffi::CString;
@@ -48,6 +48,16 @@ fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
     let _ = instance.snapshot(&session.watched())?;
     let status = instance.simple(Simple::Terminate)?;
     session.require(status.is_ok(), || format!("{} returned {status}", session.raw.name("Terminate")));
+    Ok(())
+}
+
+fn allowed(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::CoSimulation, '+');
+    Ok(())
+}
+
+fn refused(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::CoSimulation, '-');
     Ok(())
 }
 
@@ -186,8 +196,8 @@ fn free(session: &Session) -> Result<(), NotDetermined> {
         session.record_call(&format!("{}(NULL)", session.raw.name("FreeInstance")));
         session.raw.free(Handle::NULL).ok_or_else(|| NotDetermined("FreeInstance is missing".into()))
     });
-    for state in [Instantiated, Initialization, Step, Terminated, Error] {
-        session.case(|| match in_state(session, state) {
+    for &state in Life::CoSimulation.states().iter().chain([&Error]) {
+        session.case(|| match session.simulation(state) {
             Ok(instance) => instance.free(),
             // Some FMUs return no Error; another check reports that.
             Err(NotDetermined(why)) => {
@@ -206,9 +216,9 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
         instance.run(20, session.h())
     };
     let first = run(&session.fresh()?)?;
-    for state in [Instantiated, Initialization, Step, Terminated, Error] {
+    for &state in Life::CoSimulation.states().iter().chain([&Error]) {
         session.case(|| {
-            let Ok(instance) = in_state(session, state) else { return Ok(()) };
+            let Ok(instance) = session.simulation(state) else { return Ok(()) };
             // Reset must discard what was set.
             if matches!(state, Step) {
                 instance.change_inputs(1)?;
@@ -244,7 +254,7 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn after_error(session: &Session) -> Result<(), NotDetermined> {
-    let instance = in_state(session, Step)?;
+    let instance = session.simulation(Step)?;
     let how = instance.provoke()?;
     let status = instance.step_at(instance.time.get(), session.h())?;
     session.require(!status.is_ok(), || format!("after {how} had returned Error, DoStep returned {status}"));
@@ -252,7 +262,7 @@ fn after_error(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn recovery(session: &Session) -> Result<(), NotDetermined> {
-    let instance = in_state(session, Step)?;
+    let instance = session.simulation(Step)?;
     let how = instance.provoke()?;
     let status = instance.simple(Simple::Reset)?;
     if !status.is_ok() {
@@ -267,7 +277,7 @@ fn recovery(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn terminated(session: &Session) -> Result<(), NotDetermined> {
-    let instance = in_state(session, Step)?;
+    let instance = session.simulation(Step)?;
     let watched = session.watched();
     let before = instance.snapshot(&watched)?;
     let status = instance.simple(Simple::Terminate)?;

@@ -1,9 +1,9 @@
 //! Saved states (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
 
-use super::lifecycle_states::{State, in_state};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::State;
 use crate::trajectory::difference;
 use fmu_import::Status;
 use fmu_import::raw::SavedState;
@@ -43,7 +43,7 @@ fn in_every_state(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     for state in [State::Instantiated, State::Initialization, State::Step, State::Terminated] {
         session.case(|| {
-            let instance = in_state(session, state)?;
+            let instance = session.simulation(state)?;
             let mut saved = SavedState::NULL;
             let got = instance.call("GetFMUState", |raw| raw.get_state(instance.handle, Some(&mut saved)))?;
             session.require(got.is_ok() && saved != SavedState::NULL, || {
