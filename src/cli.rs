@@ -26,7 +26,7 @@ enum Command {
     Info(info::Info),
     Simulate(simulate::Simulate),
     Sweep(sweep::Sweep),
-    Check(check::Check),
+    Check(check::CheckArguments),
     Reproduce(reproduce::Reproduce),
     Compare(compare::Compare),
     Atlas(atlas::Atlas),

@@ -61,7 +61,7 @@ impl Baseline {
         }
     }
 
-    /// Known findings that have gone: the baseline can do without them.
+    /// Known findings that no longer occur.
     pub fn mended(&self, report: &Report) -> Vec<String> {
         let found: Vec<_> = report.violated().map(|f| f.id).collect();
         let ran = |id: &str| report.finding(id).is_some();

@@ -7,10 +7,10 @@ use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use crate::states::State;
 use fmu_import::Status;
-use fmu_import::raw::{Sensitivity, SensitivityArguments, Simple, Updated, Vector};
+use fmu_import::raw::{Sensitivity, SensitivityArguments, Simple, UpdateResults, Vector};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown};
 
-/// Most updates of one event: a further one is needed only by an FMU that never comes to an end.
+/// Largest number of updates of one event; an FMU that needs more never ends the event.
 const UPDATES: usize = 100;
 
 impl Session {
@@ -57,7 +57,7 @@ impl Session {
 /// What an event did.
 pub(super) struct Event {
     /// The results of each update, and whether it changed a state.
-    pub(super) updates: Vec<(Updated, bool)>,
+    pub(super) updates: Vec<(UpdateResults, bool)>,
 }
 
 impl Event {
@@ -84,7 +84,7 @@ impl Event {
 
 impl Instance<'_> {
     /// One update of the discrete states.
-    pub(super) fn update(&self) -> Result<(Status, Updated), NotDetermined> {
+    pub(super) fn update(&self) -> Result<(Status, UpdateResults), NotDetermined> {
         let name = if self.session.description.version == FmiVersion::V2 {
             "NewDiscreteStates"
         } else {
@@ -254,8 +254,8 @@ impl<'a, 'b> Importer<'a, 'b> {
         Ok(importer)
     }
 
-    /// Begins as [`start`](Self::start), runs, and shows every event, and the importer after every step and whether there was
-    /// an event at its end.
+    /// Begins like [`start`](Self::start), runs, and passes every event to `see`, and the importer after every step to `look`,
+    /// with whether there was an event at its end.
     pub(super) fn survey(
         instance: &'a Instance<'b>,
         steps: usize,

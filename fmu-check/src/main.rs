@@ -11,7 +11,7 @@ use std::process::ExitCode;
 #[command(name = "fmu-check", version, subcommand_negates_reqs = true, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(flatten)]
-    check: command::Check,
+    check: command::CheckArguments,
     #[command(subcommand)]
     probe: Option<Hidden>,
 }

@@ -232,7 +232,8 @@ pub fn html(reports: &[Report]) -> String {
     reports.iter().map(Report::section).fold(head, |page, section| page + &section) + "</body></html>\n"
 }
 
-/// Text for several files: what several have in common once, with the files; then what only one has; then a line for each.
+/// Text for several files: first the findings that several share, with the files; then those of a single file; then a line for
+/// each.
 pub fn texts(reports: &[Report], verbose: bool) -> String {
     if let [report] = reports {
         return report.text(verbose);

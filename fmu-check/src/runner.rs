@@ -8,7 +8,7 @@ use crate::check::{Check, Judgement, Level, Options, Run, Verdict};
 use crate::checks::GROUPS;
 use crate::fmu_file::FmuFile;
 use crate::session::{FOUND, Line};
-use crate::watch::{State, Watch};
+use crate::watch::{Pace, Watch};
 use fmu_import::guard::{self, Allowance, End, Guarded};
 use model_description::{Interface, limits};
 use std::collections::VecDeque;
@@ -349,20 +349,20 @@ impl Runner {
 
     /// Runs a command of [`Self::command`] to its end.
     fn guarded(&self, check: &Check, command: Command, out: &Path) -> io::Result<Outcome> {
-        let (mut watch, mut state, mut late) = (None, State::Runs, false);
+        let (mut watch, mut state, mut late) = (None, Pace::Runs, false);
         let new = |id| Watch::new(id, out.with_extension("call"), self.limit(check.id));
         let report = Guarded::start(command)?.wait(|id| {
             late = self.deadline.is_some_and(|end| Instant::now() > end);
             if let Some(id) = id {
                 state = watch.get_or_insert_with(|| new(id)).look();
             }
-            late || state != State::Runs
+            late || state != Pace::Runs
         })?;
         match report.end {
             End::Refused(why) => return Err(io::Error::other(why)),
             End::Stopped if late => return Ok(Outcome::OutOfTime),
-            End::Stopped if state == State::Slow => return Ok(Outcome::Slow),
-            End::Stopped if state == State::Stopped => {
+            End::Stopped if state == Pace::Slow => return Ok(Outcome::Slow),
+            End::Stopped if state == Pace::Stopped => {
                 return Ok(Outcome::Hang("stopped the process (as by SIGSTOP), which was not continued"));
             }
             End::Stopped => return Ok(Outcome::Hang("did not return")),

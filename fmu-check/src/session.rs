@@ -231,7 +231,7 @@ impl Session {
         self.note_call(&format!("\n{FOUND}\n"));
     }
 
-    /// Reports a call that should have succeeded, as a violation; an end that the FMU asked for is none.
+    /// Reports a call that should have succeeded, as a violation; an end that the FMU asked for is not a violation.
     pub(super) fn failed(&self, what: &str, NotDetermined(why): NotDetermined) {
         if why.starts_with(ENDED) {
             self.write(&Line::NotDetermined(why));

@@ -241,7 +241,7 @@ pub trait Exported: Sized + 'static {
     const TOKEN: crate::Token = Self::CAN.hash().guid();
 }
 
-/// A model without capabilities: as `export!(M)` exports it.
+/// A model without capabilities, which `export!(M)` exports.
 pub struct Plain<M>(PhantomData<M>);
 
 impl<M: Model> Exported for Plain<M> {

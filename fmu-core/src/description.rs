@@ -2,7 +2,7 @@
 
 mod terminals;
 
-pub use terminals::{Member, Terminal, TerminalPicture};
+pub use terminals::{MemberDescription, TerminalDescription, TerminalPicture};
 
 use crate::Fault;
 use crate::capability::{Capabilities, Exported};
@@ -23,7 +23,7 @@ pub const TIME: u32 = 0;
 pub struct Description {
     /// Model identifier, and the name that users see unless there is a title.
     pub name: String,
-    /// Name of this FMU for its users, as a preset may have one of its own.
+    /// Name that users see, for example that of a preset.
     pub title: Option<String>,
     /// One sentence.
     pub description: String,
@@ -44,7 +44,7 @@ pub struct Description {
     /// The variables in the order of their value references, without `time`.
     pub variables: Vec<Variable>,
     /// Groups of variables that are connected together.
-    pub terminals: Vec<Terminal>,
+    pub terminals: Vec<TerminalDescription>,
     /// Icon: an SVG document.
     pub icon: Option<String>,
     /// What the model can do beyond co-simulation without events, if anything.
@@ -62,7 +62,7 @@ pub struct ModelExchange {
     pub indicators: Vec<u32>,
     /// Co-simulation with Event Mode and early return (FMI 3.0).
     pub event_mode: bool,
-    /// The importer is to tell completed integrator steps.
+    /// The importer must call `CompletedIntegratorStep`.
     pub completed_steps: bool,
 }
 
@@ -367,7 +367,7 @@ fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, 
         _ => false,
     };
     if !has {
-        return Err(Fault::new(format!("{input} is read with {} = {value}, which it never is", found.name)));
+        return Err(Fault::new(format!("{input} is read with {} = {value}, a value that it never has", found.name)));
     }
     Ok(Need::With { parameter: &found.name, value }.to_string())
 }

@@ -4,7 +4,7 @@ use crate::{Elapsed, Fault, Hash, Step, Table, Terminal};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::path::Path;
 
-/// General information about a model, besides its variables.
+/// General information about a model; the table has its variables.
 #[derive(Clone, Copy, Debug)]
 pub struct Info {
     /// Name and model identifier: a C identifier.
@@ -141,7 +141,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
         Ok(())
     }
 
-    /// Rules that hold beside [`validate`](Model::validate) if the model is used through this interface.
+    /// Rules in addition to [`validate`](Model::validate) for a model that is used through this interface.
     ///
     /// # Errors
     /// Names the parameter, its value and the reason.

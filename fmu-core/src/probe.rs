@@ -94,7 +94,7 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
     found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output))
 }
 
-/// The start values first; then about half of the inputs and parameters have others.
+/// The start values first; then other values for about half of the inputs and parameters.
 fn operating_point<M: Model>(fresh: &Block<M>, point: u32, settable: &[usize], draw: &mut Draw) -> Block<M> {
     let mut block = fresh.clone();
     for &i in settable {

@@ -12,7 +12,7 @@ use crate::message;
 use crate::snapshot::ramps;
 use fmu_core::{Block, Causality, Elapsed, Exported, Fault, Kind, Model, Slot, Step, Variability};
 
-/// Parts into which a step with changing inputs is divided: each has the inputs of its middle.
+/// Parts into which a step with changing inputs is divided: each uses the inputs at its middle.
 const PARTS: u32 = 32;
 
 /// Memory for the derivatives.
@@ -448,7 +448,7 @@ fn check_sizes(seed: &[f64], needed: usize, (room, results): (usize, usize)) -> 
     }
 }
 
-/// Refuses what a model without states lacks.
+/// Refuses a call that a model without states does not support.
 fn supported<E: Exported>(lacks: &str) -> Result<(), Fault> {
     if E::CAN.continuous.is_some() { Ok(()) } else { Err(Fault::new(format!("not supported: {lacks}"))) }
 }

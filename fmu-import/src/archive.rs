@@ -28,7 +28,7 @@ pub(super) struct Archive {
     pub(super) description: Arc<ModelDescription>,
 }
 
-/// What was extracted of an archive.
+/// What was extracted from an archive.
 pub(super) struct Extracted {
     pub(super) folder: Folder,
     /// Path of the binary for Co-Simulation, if there is that interface.

@@ -113,7 +113,7 @@ impl Guarded {
     /// the guard has started it.
     ///
     /// # Errors
-    /// The system does not tell.
+    /// The system does not report the end of the process.
     #[cfg(unix)]
     pub fn wait(&mut self, mut over: impl FnMut(Option<u32>) -> bool) -> io::Result<Report> {
         use std::io::Read;
@@ -152,7 +152,7 @@ impl Guarded {
     /// Waits until the process has ended, or `over` says that its time is over. `over` gets the number of the process.
     ///
     /// # Errors
-    /// The system does not tell.
+    /// The system does not report the end of the process.
     #[cfg(not(unix))]
     pub fn wait(&mut self, mut over: impl FnMut(Option<u32>) -> bool) -> io::Result<Report> {
         loop {

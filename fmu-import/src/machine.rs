@@ -61,7 +61,7 @@ pub fn images(library: &[u8]) -> Result<Vec<&[u8]>, String> {
 /// A universal library with these images, which dyld and dlopen of macOS choose from.
 ///
 /// # Errors
-/// An image is not one of macOS for a processor of its own, or all together exceed 4 GiB.
+/// An image is not for macOS, two are for one processor, or all together exceed 4 GiB.
 pub fn universal(images: &[&[u8]]) -> Result<Vec<u8>, String> {
     let (mut header, mut body) = (Vec::new(), Vec::new());
     let mut put = |x: u32| header.extend(x.to_be_bytes());

@@ -40,7 +40,10 @@ fn blocks<'a>(lines: impl Iterator<Item = Option<&'a str>>) -> Vec<(usize, Strin
     let (mut found, mut open): (Vec<(usize, String)>, bool) = (Vec::new(), false);
     for (number, line) in lines.enumerate() {
         match (line, found.last_mut()) {
-            (Some(line), Some((_, block))) if open => *block += &format!(" {line}"),
+            (Some(line), Some((_, block))) if open => {
+                block.push(' ');
+                block.push_str(line);
+            }
             (Some(line), _) => found.push((number + 1, line.to_owned())),
             (None, _) => {}
         }
@@ -73,12 +76,13 @@ fn rust(text: &str) -> Vec<(usize, String)> {
             let lines: Vec<&str> = literal[..end].split("\\\n").map(str::trim_start).collect();
             found.push((line, lines.concat()));
             1 + end + close.len()
-        } else if begins.starts_with('\'') {
+        } else if let Some(rest) = begins.strip_prefix('\'') {
             // A character, or a lifetime.
-            let mut after = begins[1..].chars();
+            let mut after = rest.chars();
             match (after.next(), after.next()) {
                 (Some('\\'), Some(escaped)) => {
-                    2 + escaped.len_utf8() + begins[2 + escaped.len_utf8()..].find('\'').unwrap_or(0) + 1
+                    let at = 1 + escaped.len_utf8();
+                    2 + at + rest[at..].find('\'').unwrap_or(0)
                 }
                 (Some(c), Some('\'')) => 2 + c.len_utf8(),
                 _ => 1,

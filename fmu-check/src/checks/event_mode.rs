@@ -7,7 +7,7 @@ use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use crate::states::Life;
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Simple, Stepped};
+use fmu_import::raw::{Arguments, Simple, StepResults};
 use model_description::BaseType;
 
 const STEP: &str = "3.0.2, 4.2.1";
@@ -16,14 +16,31 @@ const SHOULD: Levels = Levels(None, Some(Level::Should));
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "N01", requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed, the next from lastSuccessfulTime.", clause: STEP, levels: MUST, tried: "Runs with each combination of the two flags, with steps of 1 and 5 communication steps.", fix: "Start a step from lastSuccessfulTime, whatever was asked for before.", run: Run::Probe(combinations) },
-    Check { id: "N02", requirement: "A step returns early only if that is allowed, and asks for event handling only if event mode is used; Booleans are 0 or 1.", clause: STEP, levels: MUST, tried: "Looks at the results of the same runs.", fix: "Return early and ask for events only if the instantiation allowed it.", run: Run::Probe(permitted) },
-    Check { id: "N03", requirement: "After an early return lastSuccessfulTime lies between the communication point and the end of the step (should: time goes on).", clause: STEP, levels: MUST, tried: "Looks at the times of the same runs.", fix: "Write the time that was reached, between t and t + h.", run: Run::Probe(reached) },
-    Check { id: "N03e", requirement: "earlyReturn is true only if the step ended before its end.", clause: STEP, levels: SHOULD, tried: "Looks at earlyReturn of the same runs.", fix: "Set earlyReturn only if lastSuccessfulTime is before t + h.", run: Run::Probe(truly_early) },
-    Check { id: "N04", requirement: "Without eventModeUsed, EnterEventMode returns Error.", clause: "3.0.2, 2.2.4", levels: SHOULD, tried: "Calls EnterEventMode of an instance without event mode.", fix: "Return Error.", run: Run::Probe(without_event_mode) },
-    Check { id: "N05", requirement: "DoStep in Event Mode, and UpdateDiscreteStates and EnterStepMode in Step Mode, return Error.", clause: "3.0.2, 2.2.4", levels: SHOULD, tried: "Makes calls of the other mode.", fix: "Check the mode at the beginning of every function.", run: Run::Probe(wrong_mode) },
-    Check { id: "N06", requirement: "The next event time of an update is after now, if it is defined.", clause: "3.0.2, 2.3.5", levels: SHOULD, tried: "Looks at nextEventTime of the updates.", fix: "Return an absolute time after now.", run: Run::Probe(next_event_time) },
-    Check { id: "N07", requirement: "Entering and leaving Event Mode where there is no event changes no result.", clause: "hardening", levels: Levels(None, Some(Level::Hard)), tried: "Enters and leaves Event Mode between steps and compares.", fix: "Change nothing where there is no event.", run: Run::Probe(round_trip) },
+    Check { id: "N01", clause: STEP, levels: MUST, run: Run::Probe(combinations),
+        requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed, the next from lastSuccessfulTime.",
+        tried: "Runs with each combination of the two flags, with steps of 1 and 5 communication steps.",
+        fix: "Start a step from lastSuccessfulTime, whatever was asked for before." },
+    Check { id: "N02", clause: STEP, levels: MUST, run: Run::Probe(permitted),
+        requirement: "A step returns early only if that is allowed, and asks for event handling only if event mode is used; Booleans are 0 or 1.",
+        tried: "Looks at the results of the same runs.", fix: "Return early and ask for events only if the instantiation allowed it." },
+    Check { id: "N03", clause: STEP, levels: MUST, run: Run::Probe(reached),
+        requirement: "After an early return lastSuccessfulTime lies between the communication point and the end of the step (should: time goes on).",
+        tried: "Looks at the times of the same runs.", fix: "Write the time that was reached, between t and t + h." },
+    Check { id: "N03e", clause: STEP, levels: SHOULD, run: Run::Probe(truly_early),
+        requirement: "earlyReturn is true only if the step ended before its end.",
+        tried: "Looks at earlyReturn of the same runs.", fix: "Set earlyReturn only if lastSuccessfulTime is before t + h." },
+    Check { id: "N04", clause: "3.0.2, 2.2.4", levels: SHOULD, run: Run::Probe(without_event_mode),
+        requirement: "Without eventModeUsed, EnterEventMode returns Error.",
+        tried: "Calls EnterEventMode of an instance without event mode.", fix: "Return Error." },
+    Check { id: "N05", clause: "3.0.2, 2.2.4", levels: SHOULD, run: Run::Probe(wrong_mode),
+        requirement: "DoStep in Event Mode, and UpdateDiscreteStates and EnterStepMode in Step Mode, return Error.",
+        tried: "Makes calls of the other mode.", fix: "Check the mode at the beginning of every function." },
+    Check { id: "N06", clause: "3.0.2, 2.3.5", levels: SHOULD, run: Run::Probe(next_event_time),
+        requirement: "The next event time of an update is after now, if it is defined.",
+        tried: "Looks at nextEventTime of the updates.", fix: "Return an absolute time after now." },
+    Check { id: "N07", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(round_trip),
+        requirement: "Entering and leaving Event Mode where there is no event changes no result.",
+        tried: "Enters and leaves Event Mode between steps and compares.", fix: "Change nothing where there is no event." },
 ];
 
 /// Ends a probe of an FMU without event mode.
@@ -88,14 +105,14 @@ impl<'b> Stepper<'b> {
     }
 
     /// A step of `h`, at most to the next event, and the event that it ends in: what it returned, and what was asked for.
-    fn step(&mut self, whole: f64) -> Result<(Status, Stepped, f64), NotDetermined> {
+    fn step(&mut self, whole: f64) -> Result<(Status, StepResults, f64), NotDetermined> {
         let t = self.instance.time.get();
         let variable = self.instance.session.flag("canHandleVariableCommunicationStepSize");
         // A step that ends where the event is: the importer must not go beyond. Closer than this it is reached.
         let near = 1e-9 * whole + 4.0 * f64::EPSILON * t.abs();
         let inside = |next: &f64| variable && *next > t + near && *next < t + whole;
         let h = self.next.filter(inside).map_or(whole, |next| next - t);
-        let mut stepped = Stepped { event: 0, terminate: 0, early: 0, last: t };
+        let mut stepped = StepResults { event: 0, terminate: 0, early: 0, last: t };
         let status = self.instance.call(&format!("DoStep(t={t:?}, h={h:?})"), |raw| {
             let (status, found) = raw.do_step(self.instance.handle, t, h, false, [true; 4])?;
             stepped = found;
@@ -115,7 +132,7 @@ impl<'b> Stepper<'b> {
 }
 
 /// What is wrong with a step, from its status, its results, and its two ends as the importer asked for them.
-type Rule<'a> = &'a dyn Fn(&Stepper<'_>, Status, Stepped, [f64; 2]) -> Option<String>;
+type Rule<'a> = &'a dyn Fn(&Stepper<'_>, Status, StepResults, [f64; 2]) -> Option<String>;
 
 /// Steps of one and of five communication steps, within the default experiment, for each combination of the two flags.
 fn each_step(session: &Session, rule: Rule<'_>) -> Result<(), NotDetermined> {

@@ -193,12 +193,12 @@ impl<W: 'static> Row<W> {
         Self::array((Causality::Parameter, Variability::Fixed), name, quantity, description, dimension, get)
     }
 
-    /// A text parameter, fixed after initialization: a file name, a mode that has no list.
+    /// A text parameter, fixed after initialization: a file name, a mode that is not an enumeration.
     pub const fn text_parameter(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut String) -> Self {
         Self::new(name, description, Causality::Parameter, Variability::Fixed, Kind::Text, Access::Text(get))
     }
 
-    /// A text output. The model keeps it or chooses among constants: to say it allocates nothing in a step.
+    /// A text output. The model keeps it or chooses among constants: reading it in a step does not allocate.
     pub const fn text_output(name: &'static str, description: &'static str, say: fn(&W) -> &str) -> Self {
         Self::new(name, description, Causality::Output, Variability::Discrete, Kind::Text, Access::Said(say))
     }

@@ -19,7 +19,7 @@ pub(crate) fn enter() -> Result<(), String> {
     Ok(())
 }
 
-/// Other systems have no such thing for a process without privileges.
+/// Other systems offer nothing like it to a process without privileges.
 #[cfg(all(unix, not(target_os = "linux")))]
 pub(crate) fn enter() -> Result<(), String> {
     Err("it needs the namespaces of Linux".into())

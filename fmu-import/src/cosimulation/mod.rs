@@ -238,7 +238,7 @@ impl System {
     /// Records all outputs of all instances.
     ///
     /// # Errors
-    /// None that is known.
+    /// The variables come from the descriptions, so no error is known.
     pub fn record_outputs(&mut self) -> Result<(), Error> {
         self.outputs().iter().try_for_each(|port| self.record(port))
     }
