@@ -394,3 +394,20 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
         (largest > 1e-9).then_some((k + 1, largest))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_no_deviation() {
+        let rows = |last: f64| [vec![1.0, 0.0], vec![2.0, last]];
+        assert_eq!(deviation(&rows(5.0), &rows(5.0)), None);
+        assert_eq!(deviation(&rows(5.0), &rows(5.0 + 4e-9)), None, "below 1e-9 of the largest value");
+        let (step, largest) = deviation(&rows(5.0), &rows(5.0 + 1e-8)).unwrap();
+        assert!(step == 2 && (largest - 2e-9).abs() < 1e-12, "{step} {largest}");
+        assert_eq!(deviation(&rows(5.0), &rows(f64::NAN)), Some((2, f64::INFINITY)));
+        assert_eq!(deviation(&rows(f64::NAN), &rows(f64::NAN)), None);
+        assert_eq!(deviation(&rows(5.0), &rows(5.0)[..1]), Some((2, f64::INFINITY)));
+    }
+}

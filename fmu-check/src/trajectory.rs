@@ -114,3 +114,29 @@ impl Session {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_is_relative_to_the_largest_value_of_its_variable() {
+        let xml = br#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t"><ModelVariables>
+            <Float64 name="x" valueReference="1" causality="output"/><Int32 name="n" valueReference="2" causality="output"/>
+            </ModelVariables><ModelStructure/></fmiModelDescription>"#;
+        let description = model_description::read(xml).unwrap();
+        let variables: Vec<_> = description.variables.iter().collect();
+        let row = |x: f64, n: u64| vec![vec![x.to_bits()], vec![n]];
+        let first = [row(1.0, 3), row(-4.0, 3), row(2.0, 3)];
+        assert!(difference(&variables, &first, &first).is_none());
+        let found = difference(&variables, &first, &[row(1.0, 3), row(-4.0, 3), row(2.5, 3)]).unwrap();
+        assert_eq!((found.step, found.variable, found.largest.to_bits()), (2, 0, 0.125_f64.to_bits()));
+        let found = difference(&variables, &first, &[row(1.0, 3), row(-4.0, 4), row(2.0, 3)]).unwrap();
+        assert_eq!((found.step, found.variable, found.largest), (1, 1, f64::INFINITY));
+        let found = difference(&variables, &first, &first[..2]).unwrap();
+        assert_eq!((found.step, found.largest), (2, f64::INFINITY));
+        let nan = [row(f64::NAN, 3)];
+        assert!(difference(&variables, &nan, &nan).is_none());
+        assert_eq!(difference(&variables, &nan, &[row(0.0, 3)]).unwrap().largest, f64::INFINITY);
+    }
+}
