@@ -15,7 +15,7 @@
 
 enum { U = 1, X, DER_X, I, Y, T, LEVEL, COUNT, FAULT, N };
 enum { OK, WARNING, DISCARD, ERROR };
-enum { RESTLESS = 1, NAN_DERIVATIVE, DISCARDS, ZERO_NOMINAL, SAME_EVENT, FAILS, STEP_EVENTS, TERMINATES, FLIPS, NAN_STATE };
+enum { RESTLESS = 1, NAN_DERIVATIVE, DISCARDS, ZERO_NOMINAL, SAME_EVENT, FAILS, STEP_EVENTS, TERMINATES, FLIPS, NAN_STATE, NEW_NOMINAL };
 
 typedef void (*Log3)(void *, int, const char *, const char *);
 typedef struct {
@@ -26,7 +26,7 @@ typedef struct {
     Log3 log;
 } M;
 
-typedef struct { bool again, terminate, states, defined; double next; } Update;
+typedef struct { bool again, terminate, nominals, states, defined; double next; } Update;
 
 static M *make(bool exchange, bool events, bool early, void *environment, Log3 log) {
     M *m = calloc(1, sizeof(M));
@@ -73,6 +73,7 @@ static int update(M *m, Update *u) {
     if (fault(m, SAME_EVENT)) u->defined = true, u->next = m->t;
     if (fault(m, TERMINATES)) u->terminate = m->t >= 0.5;
     if (fault(m, NAN_STATE) && m->v[COUNT] > 0) m->v[X] = NAN, u->states = true;
+    if (fault(m, NEW_NOMINAL) && m->v[COUNT] > 0) u->nominals = true;
     return OK;
 }
 
@@ -133,7 +134,10 @@ static int step(M *m, double t, double h, bool *event, bool *early, double *last
 }
 
 static int states(M *m, double *x) { return x[0] = m->v[X], OK; }
-static int nominals(M *m, double *x) { return x[0] = fault(m, ZERO_NOMINAL) ? 0 : 1, OK; }
+static int nominals(M *m, double *x) {
+    bool bad = fault(m, ZERO_NOMINAL) || (fault(m, NEW_NOMINAL) && m->v[COUNT] > 0);
+    return x[0] = bad ? 0 : 1, OK;
+}
 static int indicators(M *m, double *z) { return z[0] = m->v[X] - m->v[LEVEL], OK; }
 
 /* FMI 2.0 */
@@ -166,7 +170,7 @@ int fmi2EnterEventMode(M *m) { return begin(m); }
 int fmi2NewDiscreteStates(M *m, EventInfo *info) {
     Update u;
     int status = update(m, &u);
-    *info = (EventInfo){u.again, u.terminate, 0, u.states, u.defined, u.next};
+    *info = (EventInfo){u.again, u.terminate, u.nominals, u.states, u.defined, u.next};
     return status;
 }
 int fmi2EnterContinuousTimeMode(M *m) { return leave(m); }
@@ -212,7 +216,7 @@ int fmi3EnterStepMode(M *m) { return leave(m); }
 int fmi3UpdateDiscreteStates(M *m, bool *again, bool *terminate, bool *nominal, bool *state, bool *defined, double *next) {
     Update u;
     int status = update(m, &u);
-    *again = u.again, *terminate = u.terminate, *nominal = false, *state = u.states, *defined = u.defined, *next = u.next;
+    *again = u.again, *terminate = u.terminate, *nominal = u.nominals, *state = u.states, *defined = u.defined, *next = u.next;
     return status;
 }
 int fmi3EnterContinuousTimeMode(M *m) { return leave(m); }
