@@ -66,3 +66,16 @@ fn calls_of_model_exchange_and_event_mode() {
     each(EXCHANGE, "exchange.c", 2, "exchange2.xml", faults);
     each(EXCHANGE, "exchange.c", 3, "exchange3.xml", &[("NONE", &[]), ("N04", &["N04"]), ("N05", &["N05"])]);
 }
+
+/// Step Mode is reached with two steps: an FMU that fails after its first step is not taken for one that passes.
+#[test]
+fn step_mode_is_that_after_two_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = Some(env!("CARGO_BIN_EXE_fmu-check").into());
+    let options = Options { only: vec!["L09a".into()], program, ..Options::default() };
+    let report = run(&fmu(folder.path(), "fmu.c", 2, "L09a", "fmu.xml"), &options).unwrap_or_else(|e| panic!("{e}"));
+    let calls = &report.finding("L09a").unwrap().calls;
+    let steps: Vec<_> = calls.iter().filter(|call| call.starts_with("fmi2DoStep")).collect();
+    let [first, second, wrong, after] = &steps[..] else { panic!("{calls:?}") };
+    assert!(first.ends_with("OK") && second.ends_with("OK") && wrong.ends_with("Error") && after.ends_with("OK"));
+}
