@@ -5,7 +5,7 @@ mod preset;
 pub use preset::preset;
 
 use fmu_core::IntegerType;
-use fmu_core::description::{Description, Member, Value, Variable, VariableKind};
+use fmu_core::description::{Description, MemberDescription, Value, Variable, VariableKind};
 use fmu_core::terminal::MemberKind;
 use fmu_core::variable::{Causality, Variability};
 use fmu_plot::page::{document, escape};
@@ -149,7 +149,7 @@ fn terminals(d: &Description) -> String {
          <th>Members</th></tr>\n",
     );
     for t in &d.terminals {
-        let member = |m: &Member| {
+        let member = |m: &MemberDescription| {
             let kind = match m.kind {
                 MemberKind::Signal => "",
                 MemberKind::Inflow => " <small>flows in</small>",

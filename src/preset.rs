@@ -2,10 +2,10 @@
 //! resources, and a description that says so.
 
 use crate::documentation;
+use crate::message;
 use crate::pack::{self, Entry, Moment, TOOL};
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use fmu_check::message;
 use fmu_core::Description;
 use fmu_core::description::{Value, Variable, VariableKind};
 use fmu_core::preset::{self, FILE};

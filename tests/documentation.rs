@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::Native;
 use common::shows::{differs, shows};
+use common::{Native, words};
 use drive::estimator::Kind;
 use drive::plant::losses::Losses;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController, documentation as fragments};
@@ -328,4 +328,49 @@ fn links_lead_somewhere() {
         }
     }
     assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+/// Where sentences are still to be rewritten: paths from the root, as prefixes.
+const STILL_TO_REWRITE: [&str; 8] =
+    ["drive", "drive-study", "src", "python", "docs", "ARCHITECTURE.md", "README.md", "CHANGELOG.md"];
+
+/// Doc comments, messages and pages are written in plain sentences: what each pattern stands for has a better word.
+#[test]
+fn sentences_have_no_pattern_of_the_list() {
+    let mut wrong = Vec::new();
+    for path in words::sources(root()) {
+        let name = path.strip_prefix(root()).unwrap();
+        if !STILL_TO_REWRITE.iter().any(|prefix| name.starts_with(prefix)) {
+            let texts = words::texts(&path);
+            let found = texts.iter().filter_map(|(line, text)| Some((line, words::pattern(text)?)));
+            wrong.extend(found.map(|(line, why)| format!("{}:{line}: {why}", name.display())));
+        }
+    }
+    assert!(wrong.is_empty(), "rewrite these sentences:\n{}", wrong.join("\n"));
+}
+
+/// The patterns are found where they stumble, and not where they are plain English.
+#[test]
+fn patterns_are_found() {
+    for wrong in [
+        "The same with more children.",
+        "Reads a file. The same for a folder.",
+        "As [`printable`], for several lines.",
+        "Of one call.",
+        "a value that is no number",
+        "The energies are no states.",
+        "what it reads belongs into a field",
+        "a step is told as lost",
+    ] {
+        assert!(words::pattern(wrong).is_some(), "{wrong}");
+    }
+    for plain in [
+        "there is no such check",
+        "It is no longer needed.",
+        "Compares runs of the same FMU.",
+        "A limit as large as the value.",
+        "a size is no more than the limit",
+    ] {
+        assert_eq!(words::pattern(plain), None, "{plain}");
+    }
 }

@@ -178,3 +178,44 @@ fn no_module_of_the_checker_depends_on_its_root() {
         );
     }
 }
+
+/// Crates whose names and lines are still to be put in order.
+const STILL_TO_NAME: [&str; 4] = ["drive", "drive-study", "fmu", "fmurun"];
+
+/// What a crate makes public has one name: a word means one thing.
+#[test]
+fn no_two_public_types_of_a_crate_share_a_name() {
+    for (name, (folder, _)) in crates().iter().filter(|(name, _)| !STILL_TO_NAME.contains(&name.as_str())) {
+        let (mut files, mut found) = (Vec::new(), BTreeMap::new());
+        if folder.join("src").is_dir() {
+            sources(&folder.join("src"), &mut files);
+        }
+        for file in files {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+            for line in code.lines().filter_map(|line| line.trim().strip_prefix("pub ")) {
+                let kinds = ["struct ", "enum ", "trait ", "type ", "union "];
+                let Some(rest) = kinds.iter().find_map(|kind| line.strip_prefix(kind)) else { continue };
+                let of = rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap().to_owned();
+                let other = found.insert(of.clone(), file.clone());
+                assert!(other.is_none(), "{name}: {of} is in {} and in {}", file.display(), other.unwrap().display());
+            }
+        }
+    }
+}
+
+/// A line of source fits a screen; the rows of a long table are several lines each.
+#[test]
+fn no_line_is_longer_than_160_characters() {
+    for (_, (folder, _)) in crates().iter().filter(|(name, _)| !STILL_TO_NAME.contains(&name.as_str())) {
+        let mut files = Vec::new();
+        for part in ["src", "tests", "benches"].map(|part| folder.join(part)).iter().filter(|part| part.is_dir()) {
+            sources(part, &mut files);
+        }
+        for file in files {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let long = text.lines().position(|line| line.chars().count() > 160).map(|at| at + 1);
+            assert!(long.is_none(), "{}:{}", file.display(), long.unwrap());
+        }
+    }
+}

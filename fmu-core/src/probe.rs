@@ -13,7 +13,7 @@ const POINTS: u32 = 64;
 /// The index that stands for `time`.
 pub(crate) const NOW: usize = usize::MAX;
 
-/// For each variable, the indices that it depends on; derivatives follow the table. `None` if it is no unknown.
+/// For each variable, the indices that it depends on; derivatives follow the table. `None` for a variable that is not an unknown.
 type Dependencies = Vec<Option<Vec<usize>>>;
 
 /// What initial values depend on: outputs, calculated parameters, states and derivatives on inputs and parameters.
@@ -66,7 +66,7 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
         let mut now = Elapsed::ZERO.plus(draw.between(0.0, 1.0));
         if let Some(events) = &can.events {
             (events.begin)(&mut base.model, now);
-            // A point that the model refuses is no operating point.
+            // A point that the model refuses is not an operating point.
             if (events.event)(&mut base.model, now).is_err() {
                 continue;
             }
@@ -94,7 +94,7 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
     found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output))
 }
 
-/// The start values first; then about half of the inputs and parameters have others.
+/// The start values first; then other values for about half of the inputs and parameters.
 fn operating_point<M: Model>(fresh: &Block<M>, point: u32, settable: &[usize], draw: &mut Draw) -> Block<M> {
     let mut block = fresh.clone();
     for &i in settable {
@@ -141,7 +141,7 @@ fn causalities<M: Model>(fresh: &Block<M>) -> Vec<(Causality, Variability)> {
     (0..M::TABLE.len()).map_while(one).collect()
 }
 
-/// The same after the outputs at `now` were computed.
+/// Bits of all values after the outputs at `now` were computed.
 fn observed<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) -> Vec<u64> {
     let observe = can.continuous.as_ref().map_or(M::output as fn(&M, _, &mut _), |continuous| continuous.observe);
     observe(&block.model, now, &mut block.out);

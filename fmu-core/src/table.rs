@@ -62,7 +62,7 @@ fn item(meta: &Meta, value: i32) -> String {
 
 /// Where an index leads: a row, and the index inside it.
 #[derive(Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct RowPlace {
     pub(crate) row: u16,
     pub(crate) inner: u16,
 }
@@ -70,7 +70,7 @@ pub(crate) struct Place {
 /// All variables of `W`.
 pub struct Table<W: 'static> {
     pub(crate) rows: &'static [Row<W>],
-    pub(crate) places: [Place; CAPACITY],
+    pub(crate) places: [RowPlace; CAPACITY],
     len: usize,
     hash: Hash,
 }
@@ -84,7 +84,7 @@ impl<W: 'static> Table<W> {
     pub const fn new(rows: &'static [Row<W>]) -> Self {
         assert!(CAPACITY <= u16::MAX as usize);
         // No row past the end.
-        let mut places = [Place { row: u16::MAX, inner: 0 }; CAPACITY];
+        let mut places = [RowPlace { row: u16::MAX, inner: 0 }; CAPACITY];
         let (mut len, mut row, mut hash) = (0, 0, Hash::START);
         while row < rows.len() {
             let meta = &rows[row].meta;
@@ -102,7 +102,7 @@ impl<W: 'static> Table<W> {
             let mut inner = 0;
             while inner < count {
                 assert!(len < CAPACITY, "the table holds more variables than CAPACITY");
-                places[len] = Place { row: row as u16, inner: inner as u16 };
+                places[len] = RowPlace { row: row as u16, inner: inner as u16 };
                 len += 1;
                 inner += 1;
             }

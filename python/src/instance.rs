@@ -2,7 +2,7 @@
 
 use crate::cache::{self, Opened};
 use crate::error::{gate, raise, usage};
-use fmu_import::{Error, State, Values};
+use fmu_import::{Error, Values};
 use model_description::BaseType;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -24,7 +24,7 @@ pub(crate) struct Instance {
 /// A saved state of one instance.
 #[pyclass(frozen, name = "FmuState", module = "fmurun._core")]
 pub(crate) struct FmuState {
-    state: State,
+    state: fmu_import::FmuState,
     owner: u64,
 }
 
@@ -83,7 +83,7 @@ impl Instance {
         &self.opened
     }
 
-    fn state<'a>(&self, state: &'a FmuState) -> PyResult<&'a State> {
+    fn state<'a>(&self, state: &'a FmuState) -> PyResult<&'a fmu_import::FmuState> {
         let own = state.owner == self.id;
         own.then_some(&state.state).ok_or_else(|| usage(&self.name, "the state belongs to another instance"))
     }

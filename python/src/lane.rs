@@ -1,7 +1,7 @@
 //! One instance of a batch: inputs in, a number of steps, outputs out.
 
 use crate::cache::{self, Opened};
-use fmu_import::{Error, Instance, State, Values};
+use fmu_import::{Error, FmuState, Instance, Values};
 use model_description::BaseType;
 use std::sync::Arc;
 
@@ -77,7 +77,7 @@ pub(crate) struct Lane {
     name: String,
     instance: Option<Instance>,
     /// State after the last initialization.
-    initial: Option<State>,
+    initial: Option<FmuState>,
     /// Steps since the start; time is never summed up.
     steps: u32,
     /// The error that stops the lane until it is reset.

@@ -1,11 +1,11 @@
 //! `fmu prove`: the folders of examples that the FMI tools page asks for, and the importers that replayed them.
 
 use super::build::{self, Build};
+use crate::message;
 use crate::pack::{self, TOOL};
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
-use fmu_check::message;
 use fmu_core::Experiment;
 use fmu_import::cosimulation::Schedule;
 use fmu_import::platform::Platform;

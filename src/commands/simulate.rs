@@ -6,9 +6,9 @@ mod overview;
 mod worker;
 
 use crate::Failed;
+use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use fmu_check::message;
 use fmu_import::cosimulation::{Integration, Method, Point, Schedule, Settings, Solver, System};
 use fmu_import::guard::Allowance;
 use fmu_import::ssp::load::Loaded;

@@ -159,7 +159,7 @@ struct Shown {
 
 impl Watch for Shown {
     fn note(&self, text: &str) {
-        fmu_check::message::note(text);
+        crate::message::note(text);
     }
 
     fn progress(&self, done: u64, failed: u64, all: u64) {

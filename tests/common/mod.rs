@@ -7,6 +7,7 @@ pub mod pages;
 pub mod python;
 #[path = "../../drive-study/tests/common/shows.rs"]
 pub mod shows;
+pub mod words;
 
 use drive::Pair;
 use drive_study::reproduce::experiment::{ClosedLoop, Experiment, Point, RPM, Record, at, samples_apart};

@@ -1,13 +1,13 @@
 //! The preset of a machine: the values of `fmu tune`, and the inputs of its reference result.
 
 use crate::commands::tune::place;
+use crate::message;
 use crate::preset::{Course, PresetFmu};
 use anyhow::{Result, bail};
 use drive_study::tune::{
     joined,
     rules::{Setting, Tuned, Value},
 };
-use fmu_check::message;
 use fmu_core::Description;
 
 /// Sets the values of the machine, also those that equal the model's own, because the FMU may be a preset for another machine. A

@@ -43,7 +43,7 @@ pub(super) fn guarded(args: &Simulate) -> Result<()> {
         !timeout.is_zero() && since.elapsed() > timeout
     })?;
     if !report.left.is_empty() {
-        fmu_check::message::warning(&format!(
+        crate::message::warning(&format!(
             "the FMUs left processes behind, which are ended now: {}",
             report.left.join(", ")
         ));
