@@ -18,6 +18,7 @@ mod instances;
 mod layered;
 mod lifecycle;
 mod logging;
+mod names;
 mod schema;
 mod schema_rules;
 mod sensitivity;
