@@ -69,9 +69,9 @@ impl Mechanics {
     pub fn shorter(&self, h: f64, from: f64, to: f64) -> Option<f64> {
         let (edge, small) = (RESOLVED * self.w_coulomb, LARGEST_CHANGE * self.w_coulomb);
         let (beyond, change) = (from.min(to) > edge || from.max(to) < -edge, (to - from).abs());
-        // A greater change is that of a coupling that diverges.
-        let resolved = change <= 1.01 * small || !(change < 1e5 * small.max(1.0));
-        if beyond || resolved || self.tau_coulomb == 0.0 || self.imposed {
+        // A greater change, or none that is a number, is that of a coupling that diverges.
+        let diverges = change.is_nan() || change >= 1e5 * small.max(1.0);
+        if beyond || diverges || change <= 1.01 * small || self.tau_coulomb == 0.0 || self.imposed {
             return None;
         }
         Some((h * (from.abs() - edge).max(small) / change).min(0.5 * h))

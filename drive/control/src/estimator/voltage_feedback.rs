@@ -7,7 +7,7 @@
 //!
 //! The method needs a specific current loop: feed-forward from the references and no active resistance, preferably with
 //! `current.integral` = 0.2.
-//! Limits: L p i is neglected. It holds rated load down to 0.020 of the rated speed, 0.030 with a compensated dead time;
+//! Limits: L p i is neglected. It holds rated load down to 0.020 of the rated speed, 0.020 with a compensated dead time;
 //! as printed, without the frame term, to 0.120. A reversal at light load is ambiguous by half a turn, unless
 //! `emf.hold_reversal` holds it.
 
