@@ -98,7 +98,7 @@ fn files(name: &str) -> Result<BTreeMap<String, String>> {
     Ok(files)
 }
 
-/// As long as the command is not published, the CI of a project must know where to get it.
+/// Until the command is published, the CI of a project must know where to get it.
 const CONDITION: &str = "        # The variable of the repository that names the Git repository of the command fmu
         if: vars.FMU_GIT != ''
 ";

@@ -25,7 +25,7 @@ const SHORTEST_SUBSTEP: f64 = 1e-6;
 pub struct Legs<S = f64> {
     /// The maximum voltage drop as a fraction of the DC-link voltage.
     share: f64,
-    /// The same in V.
+    /// The maximum voltage drop in V.
     u: S,
     /// Current in A below which the drop falls linearly.
     i_zone: S,

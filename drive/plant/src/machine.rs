@@ -38,7 +38,7 @@ pub struct Inverse {
 }
 
 impl Inverse {
-    /// Of this machine.
+    /// Computes them for a machine.
     #[inline]
     pub fn of<S>(motor: &Motor<S>) -> Self {
         Self { d: reciprocal(motor.L_d), q: reciprocal(motor.L_q) }

@@ -73,7 +73,7 @@ impl PmsmPlant {
         Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable }
     }
 
-    /// The same with iron loss, and the current (A) at the terminals.
+    /// [`reached`](Self::reached) with iron loss, and the current (A) at the terminals.
     fn reached_with_iron(&self) -> (Instant, Dq) {
         let at = self.reached();
         let at = if at.idle { Instant { i: self.idle_current(&self.warm.motor, at.speed), ..at } } else { at };

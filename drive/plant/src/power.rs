@@ -94,7 +94,7 @@ pub fn dc_current<S: Scalar>(p_in: S, inputs: &PlantInputs<S>, legs: &Legs<S>, i
     if inputs.u_dc.value() > 0.0 { p_in / inputs.u_dc } else { link_current(inputs, legs, i()) }
 }
 
-/// The same at an instant without a link voltage.
+/// [`dc_current`] without a link voltage.
 fn link_current<S: Scalar>(inputs: &PlantInputs<S>, legs: &Legs<S>, i: Phases<S>) -> S {
     let (u, span, zero) = (&inputs.u, inputs.u.span(), S::from(0.0));
     let full = if inputs.u_dc.value() > span.value() { inputs.u_dc } else { span };
@@ -154,14 +154,16 @@ pub const POWERS: &Table<Powers> = &Table::new(
             P::output(
                 "p_mech",
                 &WATT,
-                "Power delivered to the load at the shaft, tau_shaft speed, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
+                "Power delivered to the load at the shaft, tau_shaft speed, mean over the last step (PmsmDrive: over the last \
+                 T_s; Model Exchange: at the instant)",
                 |p| &mut p.p_mech,
             )
             .mean(),
             P::output(
                 "p_loss",
                 &WATT,
-                "All losses, p_cu + p_iron + p_cond + p_sw + p_friction, mean over the last step (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
+                "All losses, p_cu + p_iron + p_cond + p_sw + p_friction, mean over the last step (PmsmDrive: over the last T_s; \
+                 Model Exchange: at the instant)",
                 |p| &mut p.p_loss,
             )
             .mean(),

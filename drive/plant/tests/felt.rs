@@ -30,7 +30,9 @@ const MOVED: &[(&str, f64)] = &[
 
 /// Parameters of the network, which Model Exchange refuses and `temperature.rs` tests, and switches.
 fn is_elsewhere(name: &str) -> bool {
-    name.starts_with("thermal.") && !matches!(name, "thermal.T_ref") || name == "mechanics.imposed" || name == "motor.n_p"
+    name.starts_with("thermal.") && !matches!(name, "thermal.T_ref")
+        || name == "mechanics.imposed"
+        || name == "motor.n_p"
 }
 
 /// A parameter that acts only where this one has its moved value.

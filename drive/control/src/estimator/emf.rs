@@ -192,7 +192,8 @@ pub const EMF: &Table<EmfParameters> = &Table::new(
             ),
             P::boolean_parameter(
                 "hold_reversal",
-                "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; estimators other than the EMF methods refuse it",
+                "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; estimators \
+                 other than the EMF methods refuse it",
                 |p| &mut p.hold_reversal,
             ),
             P::parameter(

@@ -260,7 +260,8 @@ pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
             P::parameter(
                 "tracking",
                 &ONE,
-                "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed, others refuse it; 0: it stays constant there",
+                "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed, \
+                 others refuse it; 0: it stays constant there",
                 |p| &mut p.tracking,
             )
             .at_least(0.0)

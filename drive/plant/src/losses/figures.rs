@@ -64,7 +64,7 @@ fn c() -> Drive {
     drive(traction(), (3e-3, 5.0), [2e-4, 0.3, 2e-7], devices, 400.0)
 }
 
-/// The same with silicon carbide.
+/// Machine c with a silicon-carbide inverter.
 fn c_sic() -> Drive {
     let mut drive = c();
     drive.par.inverter.devices = devices((0.0, 3.5e-3), (0.0, 3.5e-3), (6e-3, 300.0, 400.0));

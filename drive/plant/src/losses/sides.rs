@@ -23,7 +23,7 @@ impl Sides {
     /// How far beyond its edge, as a share of the zone, a current may be at the end of a step.
     const TOLERANCE: f64 = 0.02;
 
-    /// Of the currents `i` (A) with the zone +-`zone` (A).
+    /// The sides of the currents `i` (A) with the zone +-`zone` (A).
     #[inline]
     pub fn of(i: [AlphaBeta; 2], zone: f64) -> Self {
         let side = |i: f64| f64::from(i8::from(i > zone) - i8::from(i < -zone));

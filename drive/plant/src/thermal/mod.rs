@@ -91,7 +91,7 @@ pub struct Temperatures<S = f64> {
 }
 
 impl Temperatures {
-    /// The same `T` (K) everywhere.
+    /// One temperature `T` (K) for all parts.
     pub fn all(T: f64) -> Self {
         Self { winding: T, stator: T, magnet: T, inverter: T }
     }
@@ -118,13 +118,13 @@ impl<S: Scalar> Temperatures<S> {
 /// Heat in W, positive out of the part that makes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Heat<S = f64> {
-    /// Of the winding.
+    /// From the winding.
     pub winding: S,
-    /// Of the stator iron, with that of friction.
+    /// From the stator iron, with that of friction.
     pub iron: S,
-    /// Of the rotor with its magnets.
+    /// From the rotor with its magnets.
     pub magnet: S,
-    /// Of the inverter.
+    /// From the inverter.
     pub inverter: S,
     /// To the coolant.
     pub coolant: S,

@@ -8,7 +8,7 @@
 //! Q = G_sc (T_s - T_c) + G_i (T_i - T_c)                    heat to the coolant
 //! ```
 //!
-//! The time constants are seconds to hours, so the network is no part of the machine's integration: it advances once per
+//! The time constants are seconds to hours, so the network is not integrated with the machine: it advances once per
 //! step of the plant with the step's mean losses, by the trapezoidal rule, which is stable at any step. The copper loss
 //! grows with the winding's temperature; with the current held, alpha_R p (1/G_ws + 1/G_sc) >= 1, p the loss at T_ref,
 //! has no steady state: the winding runs away.
