@@ -270,4 +270,32 @@ mod tests {
         assert!((tau_shaft - 1.0 + imposed.friction(2.0)).abs() < 1e-15);
         assert!(acceleration == 0.0);
     }
+
+    #[test]
+    fn the_series_is_the_hyperbolic_tangent() {
+        let m = Mechanics { tau_coulomb: 1.0, w_coulomb: 0.25, ..Mechanics::default() };
+        for start in [-4.0, -0.3, -0.05, 0.0, 0.02, 0.21, 0.8, 6.0] {
+            let near = Standstill::new(&m, start);
+            for x in [-1e-3, -4e-4, 1e-5, 7e-4, 1e-3, 2e-3, -0.7] {
+                let speed: f64 = start + 0.25 * 0.999 * x;
+                let (got, wanted): (f64, f64) = (near.coulomb(speed), (speed / 0.25).tanh());
+                assert!((got - wanted).abs() < 5e-16, "{start}, {x}: {got}, not {wanted}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_across_standstill_is_too_long() {
+        let m = Mechanics { w_coulomb: 0.5, ..Mechanics::default() };
+        // The zone ends at 2 rad/s; a step may change the speed by 0.125 rad/s there.
+        assert_eq!(m.shorter(1e-4, 30.0, 2.5), None);
+        assert_eq!(m.shorter(1e-4, -2.1, -9.0), None);
+        assert_eq!(m.shorter(1e-4, 1.0, 0.9), None);
+        let to_the_edge = m.shorter(1e-4, 3.0, -1.0).unwrap();
+        assert!((to_the_edge - 0.25e-4).abs() < 1e-12, "{to_the_edge} s");
+        let inside = m.shorter(1e-4, 1.0, -1.5).unwrap();
+        assert!((inside - 0.05e-4).abs() < 1e-12, "{inside} s");
+        assert_eq!(m.shorter(1e-4, 1.0, f64::NAN), None);
+        assert_eq!(Mechanics { tau_coulomb: 0.0, ..m }.shorter(1e-4, 1.0, -1.5), None);
+    }
 }

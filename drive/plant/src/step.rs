@@ -313,3 +313,30 @@ impl PmsmPlant {
         blocked.then(|| stored(state.psi) - stored(self.idle_flux(motor, state.speed)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::model::PmsmPlant;
+    use drive_base::frame::Phases;
+    use fmu_core::{Block, Elapsed, Step};
+
+    /// With the gates off, the current flows back through the diodes, then these block, and what is left is lost in the copper.
+    #[test]
+    fn every_loss_is_in_the_sum() {
+        let mut block = Block::<PmsmPlant>::default();
+        block.model.inputs.u = Phases { a: 20.0, b: -10.0, c: -10.0 };
+        block.initialize();
+        let (mut now, mut lost) = (Elapsed::ZERO, 0.0);
+        for k in 0..40 {
+            block.model.inputs.enable = k < 10;
+            let step = Step { start: now, h: 1e-4 };
+            block.step(&step).unwrap();
+            now = step.end();
+            let powers = &block.out.powers;
+            assert!((powers.losses.sum() - powers.p_loss).abs() < 1e-12 * (1.0 + powers.p_loss), "{k}: {powers:?}");
+            lost += powers.p_loss * 1e-4;
+            assert_eq!(block.out.i.a.abs() > 0.1, k < 10, "{k}: {:?}", block.out.i);
+        }
+        assert!((lost - block.out.energy.loss).abs() < 1e-12, "{lost} J");
+    }
+}

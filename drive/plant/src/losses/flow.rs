@@ -194,3 +194,27 @@ impl Path<&Switches> {
         [steady, dissipation.through(i, driving)]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use drive_base::frame::Vector;
+
+    #[test]
+    fn in_steady_state_the_dead_time_follows_the_terminals() {
+        let mut par = PlantParameters::default();
+        (par.iron.G_e, par.iron.G_h, par.winding.k_ac) = (2e-3, 0.3, 1e-7);
+        let (psi, i, w) = (AlphaBeta::new(0.12, -0.05), AlphaBeta::new(1.5, 3.0), 400.0);
+        let dissipation = Dissipation::at(&par, 2.0, w);
+        // The voltage with which the flux linkage turns with the rotor.
+        let steady = dissipation.steady(psi, i, w);
+        let u = psi.turned() * w + steady * dissipation.R;
+        let flow = Path { u, dissipation, drops: Ideal }.flow(psi, i, w);
+        assert!((flow.d_psi - psi.turned() * w).magnitude() < 1e-12, "{:?}", flow.d_psi);
+        assert!((flow.i - steady).magnitude() < 1e-13 && (steady - i).magnitude() > 0.1, "{:?}, {steady:?}", flow.i);
+        let none: Vector<_> = AlphaBeta::ZERO;
+        let switches = Switches::new(&par, true, 300.0, Legs::switching(&par.inverter, 300.0));
+        let path = Path { u: none, dissipation: Dissipation { R: 2.0, G: None }, drops: &switches };
+        assert_eq!(path.guides(psi, i, w), [i; 2], "without iron, both are the current of the flux linkage");
+    }
+}
