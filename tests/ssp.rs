@@ -172,7 +172,7 @@ fn omsimulator_runs_it_as_it_is() {
             "name=\"tau.load\" kind=\"input\"",
             "ComRef.cpp: tau.load is no identifier",
         ),
-        ("<ssc:Boolean/>", "", "Connector.cpp: enabled has no type"),
+        ("<ssc:Boolean/>", "", "Connector.cpp: voltage_limited has no type"),
         ("oms-ma", "oms-mav", "SystemWC.cpp: the master oms-mav"),
     ] {
         let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", old, new);

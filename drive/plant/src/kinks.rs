@@ -8,7 +8,7 @@ use crate::integration::LONGEST_STEP;
 use crate::legs::Legs;
 use crate::losses::flow::{Dissipation, Drops, Path, Switches};
 use crate::losses::sides::{OneSided, Sides};
-use crate::mechanics::{Coulomb, Shaft, Standstill, Whole};
+use crate::mechanics::{Coulomb, SHORTEST_STEP, Shaft, Standstill, Whole};
 use crate::model::PmsmPlant;
 use crate::state::State;
 use drive_base::frame::{AlphaBeta, Dq};
@@ -33,6 +33,9 @@ struct Step<'a> {
     /// The step is long beside the time constant of a current in the zone.
     damped: bool,
 }
+
+/// Most steps per second that are taken again to end at a kink: they bound the work of a step whatever the parameters are.
+const MOST_SEARCHES: f64 = 1e6;
 
 /// Longest step that follows a current in the zone in s, below which steps are damped: they take three times the time.
 const SHORTEST_RESOLVED: f64 = 10e-6;
@@ -66,6 +69,7 @@ impl PmsmPlant {
         let mut one_sided = switches.one_sided(u, &sides);
         // The time since the last kink, or since the voltage changed; and how long the next step may be.
         let (mut since, mut limit) = (0.0, f64::INFINITY);
+        let mut searches = 1000.0 + h * MOST_SEARCHES;
         loop {
             let apart = !kinks || sides.apart();
             let longest = if apart { LONGEST_STEP } else { Self::longest_after(since, resolved) };
@@ -92,14 +96,16 @@ impl PmsmPlant {
                 continue;
             }
             let end = guide(&next);
-            let shortest = SHORTEST_AT_KINK.min(resolved);
+            let shortest = SHORTEST_AT_KINK.min(resolved).max(SHORTEST_STEP);
             (limit, since) = (f64::INFINITY, since + h);
             let then = Sides::of(end, zone);
             if kinks && then != sides {
                 if h > shortest
+                    && searches > 0.0
                     && let Some(share) = sides.first_crossing(start, end, zone)
                 {
                     (limit, since) = ((h * share).max(shortest), since - h);
+                    searches -= 1.0;
                     continue;
                 }
                 (sides, since) = (then, 0.0);
@@ -128,7 +134,7 @@ impl PmsmPlant {
         } else {
             f64::INFINITY
         };
-        LONGEST_STEP_IN_ZONE.min(steps * resolved)
+        LONGEST_STEP_IN_ZONE.min((steps * resolved).max(SHORTEST_STEP))
     }
 
     /// The current (A) at the terminals less that of the flux linkage.

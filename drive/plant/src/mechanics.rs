@@ -59,6 +59,9 @@ impl Mechanics {
 /// Speed over w_coulomb up to which a step resolves the Coulomb torque: from here on, it is the whole one but for 1e-3.
 const RESOLVED: f64 = 4.0;
 
+/// Shortest step in s that is looked for, there and at the kinks of the inverter: it bounds the work whatever the parameters are.
+pub const SHORTEST_STEP: f64 = 1e-9;
+
 /// Greatest change of the speed in a step there, over w_coulomb.
 const LARGEST_CHANGE: f64 = 0.25;
 
@@ -71,10 +74,11 @@ impl Mechanics {
         let (beyond, change) = (from.min(to) > edge || from.max(to) < -edge, (to - from).abs());
         // A greater change, or none that is a number, is that of a coupling that diverges.
         let diverges = change.is_nan() || change >= 1e5 * small.max(1.0);
-        if beyond || diverges || change <= 1.01 * small || self.tau_coulomb == 0.0 || self.imposed {
+        if beyond || diverges || h <= SHORTEST_STEP || change <= 1.01 * small || self.tau_coulomb == 0.0 || self.imposed
+        {
             return None;
         }
-        Some((h * (from.abs() - edge).max(small) / change).min(0.5 * h))
+        Some((h * (from.abs() - edge).max(small) / change).min(0.5 * h).max(SHORTEST_STEP))
     }
 }
 

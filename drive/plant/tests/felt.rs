@@ -115,7 +115,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 /// The names of all parameters that this test moves.
 fn names() -> Vec<String> {
     let table: &Table<PlantParameters> = PARAMETERS;
-    let names = (0..table.len()).map(|k| table.locate(k).unwrap().0.to_string());
+    let names = (0..table.len()).map(|k| table.locate(k).unwrap().0.clone());
     names.filter(|name| !is_elsewhere(name)).collect()
 }
 
