@@ -7,7 +7,7 @@ mod timing;
 
 use drive::PmsmPlant;
 use fmu_core::Exported;
-use fmu_export::abi::types::{Fmi2Boolean, Instance, References, c_int};
+use fmu_export::abi::types::{Fmi2Boolean, InstancePointer, References, c_int};
 use std::ffi::CString;
 use std::hint::black_box;
 use std::ptr::null;
@@ -19,10 +19,12 @@ fn main() {
     let no = Fmi2Boolean(0);
     let token = CString::new(fmi::This::TOKEN.as_str()).unwrap_or_default();
     // An importer calls through pointers that the compiler does not know.
-    let set: unsafe extern "C" fn(Instance, References, usize, *const f64) -> c_int = black_box(fmi::fmi2SetReal);
-    let time_of: unsafe extern "C" fn(Instance, f64) -> c_int = black_box(fmi::fmi2SetTime);
-    let write: unsafe extern "C" fn(Instance, *const f64, usize) -> c_int = black_box(fmi::fmi2SetContinuousStates);
-    let read: unsafe extern "C" fn(Instance, *mut f64, usize) -> c_int = black_box(fmi::fmi2GetDerivatives);
+    let set: unsafe extern "C" fn(InstancePointer, References, usize, *const f64) -> c_int =
+        black_box(fmi::fmi2SetReal);
+    let time_of: unsafe extern "C" fn(InstancePointer, f64) -> c_int = black_box(fmi::fmi2SetTime);
+    let write: unsafe extern "C" fn(InstancePointer, *const f64, usize) -> c_int =
+        black_box(fmi::fmi2SetContinuousStates);
+    let read: unsafe extern "C" fn(InstancePointer, *mut f64, usize) -> c_int = black_box(fmi::fmi2GetDerivatives);
     // u_a, u_b, u_c.
     let (inputs, u, x, mut dx) = ([1, 2, 3], [20.0, -5.0, -15.0], [0.16, 0.02, 30.0, 0.4], [0.0; 4]);
     // SAFETY: used as the standard demands: one thread, arrays of the lengths given, freed once.

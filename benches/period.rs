@@ -2,14 +2,15 @@
 //! and 1 s of PmsmDrive; as a ratio to a loop that is written by hand in C (`c_period.c`), if a C compiler `cc` is there.
 //!
 //! The candidates take turns in one run, so that whatever else the computer does affects all of them; the figures are
-//! medians. `PERIOD_BASELINE=DIR` adds the FMUs of another build from `DIR/fmi2` and `DIR/fmi3`.
+//! medians. `PERIOD_BASELINE=DIR` adds the FMUs of another build from `DIR/fmi2` and `DIR/fmi3`. Then PmsmDrive with each effect of the
+//! plant, as a ratio to the default drive.
 #![allow(missing_docs)]
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
 use drive::Pair;
-use drive_study::reproduce::scenario::RPM;
+use drive_study::reproduce::experiment::RPM;
 use fmu_import::{Fmu, Instance};
 use libloading::{Library, Symbol};
 use std::path::Path;
@@ -90,9 +91,12 @@ fn native(point: Point) -> Candidate {
     })
 }
 
-fn start(folder: &Path, name: &str) -> Instance {
+fn start(folder: &Path, name: &str, settings: &[(&str, &str)]) -> Instance {
     let mut instance = Fmu::open(folder.join(name).with_extension("fmu")).unwrap().instantiate(name, false).unwrap();
     instance.setup(0.0, None).unwrap();
+    for &(name, value) in settings {
+        instance.set_text(name, value).unwrap();
+    }
     instance.enter_initialization().unwrap();
     instance.exit_initialization().unwrap();
     instance
@@ -103,7 +107,7 @@ fn references<const N: usize>(instance: &Instance, names: [&str; N]) -> [u32; N]
 }
 
 fn through_c(point: Point, folder: &Path, name: String) -> Candidate {
-    let (mut plant, mut controller) = (start(folder, "PmsmPlant"), start(folder, "SensorlessController"));
+    let (mut plant, mut controller) = (start(folder, "PmsmPlant", &[]), start(folder, "SensorlessController", &[]));
     let (i, u) = (["i_a", "i_b", "i_c"], ["u_a", "u_b", "u_c"]);
     let (plant_i, plant_u) = (references(&plant, i), references(&plant, u));
     let (controller_i, controller_u) = (references(&controller, i), references(&controller, u));
@@ -124,9 +128,9 @@ fn through_c(point: Point, folder: &Path, name: String) -> Candidate {
     })
 }
 
-/// PmsmDrive in steps of 1 ms.
-fn whole_drive(point: Point, folder: &Path, name: String) -> Candidate {
-    let mut drive = start(folder, "PmsmDrive");
+/// PmsmDrive in steps of 1 ms with these settings.
+fn whole_drive(point: Point, folder: &Path, name: String, settings: &[(&str, &str)]) -> Candidate {
+    let mut drive = start(folder, "PmsmDrive", settings);
     drive.set_reals(&references(&drive, ["speed_ref", "tau_load"]), &[point.speed, point.load]).unwrap();
     let mut k = 0_u32;
     Candidate::new(name, move || {
@@ -135,6 +139,42 @@ fn whole_drive(point: Point, folder: &Path, name: String) -> Candidate {
             k += 1;
         }
     })
+}
+
+const DEAD_TIME: [(&str, &str); 2] = [("plant.inverter.dead_time", "2e-6"), ("controller.compensation.u_dead", "6.5")];
+
+const LOSSES: [(&str, &str); 8] = [
+    ("plant.iron.G_e", "2.7e-4"),
+    ("plant.iron.G_h", "0.127"),
+    ("plant.winding.k_ac", "1e-7"),
+    ("plant.mechanics.k_w", "1e-6"),
+    ("plant.inverter.u_transistor", "0.9"),
+    ("plant.inverter.r_transistor", "0.06"),
+    ("plant.inverter.u_diode", "0.7"),
+    ("plant.inverter.E_sw", "1e-3"),
+];
+
+/// The effects of the plant.
+fn effects() -> Vec<(&'static str, Vec<(&'static str, &'static str)>)> {
+    let thermal = [
+        ("plant.thermal.mode", "2"),
+        ("plant.thermal.C_winding", "100"),
+        ("plant.thermal.C_stator", "1000"),
+        ("plant.thermal.C_rotor", "500"),
+        ("plant.thermal.C_inverter", "200"),
+        ("plant.thermal.G_ws", "5"),
+        ("plant.thermal.G_sc", "10"),
+    ];
+    vec![
+        ("default", vec![]),
+        ("saturation", vec![("plant.saturation.s_2", "2"), ("plant.saturation.s_dq", "1")]),
+        ("dead time", DEAD_TIME.to_vec()),
+        ("all losses", LOSSES.to_vec()),
+        ("losses and dead time", [DEAD_TIME.as_slice(), LOSSES.as_slice()].concat()),
+        ("temperatures", thermal.to_vec()),
+        ("imposed shaft", vec![("plant.mechanics.imposed", "true"), ("speed_shaft", "104.7")]),
+        ("field weakening", vec![("controller.weakening.use", "true")]),
+    ]
 }
 
 fn measure(candidates: &mut [Candidate]) {
@@ -166,7 +206,7 @@ fn main() {
             for standard in ["fmi2", "fmi3"] {
                 candidates.push(through_c(point, &folder.join(standard), format!("{build}pair, {standard}")));
             }
-            candidates.push(whole_drive(point, &folder.join("fmi3"), format!("{build}PmsmDrive at 1 ms")));
+            candidates.push(whole_drive(point, &folder.join("fmi3"), format!("{build}PmsmDrive at 1 ms"), &[]));
         }
         measure(&mut candidates);
         let to = candidates[0].median();
@@ -175,5 +215,18 @@ fn main() {
             let median = candidate.median();
             println!("{:<28}{median:>7.0}{:>7.2}", candidate.name, median / to);
         }
+    }
+    let (mut candidates, point) = (Vec::new(), POINTS[0]);
+    for (effect, settings) in effects() {
+        for (build, folder) in &builds {
+            candidates.push(whole_drive(point, &folder.join("fmi3"), format!("{build}{effect}"), &settings));
+        }
+    }
+    measure(&mut candidates);
+    let default = candidates[0].median();
+    println!("\nPmsmDrive at {}: ns per period of 0.1 ms, ratio to the default drive", point.name);
+    for candidate in &mut candidates {
+        let median = candidate.median();
+        println!("{:<32}{median:>7.0}{:>7.2}", candidate.name, median / default);
     }
 }

@@ -7,7 +7,7 @@ mod timing;
 
 use drive::SensorlessController;
 use fmu_core::Exported;
-use fmu_export::abi::types::{Fmi2Boolean, FmuState, Instance, c_int};
+use fmu_export::abi::types::{Fmi2Boolean, FmuState, InstancePointer, c_int};
 use fmu_export::snapshot::Snapshot;
 use std::ffi::CString;
 use std::hint::black_box;
@@ -20,9 +20,9 @@ fn main() {
     let (no, h) = (Fmi2Boolean(0), 1e-4);
     let token = CString::new(fmi::This::TOKEN.as_str()).unwrap_or_default();
     // An importer calls through pointers that the compiler does not know.
-    let save: unsafe extern "C" fn(Instance, *mut FmuState) -> c_int = black_box(fmi::fmi2GetFMUstate);
-    let restore: unsafe extern "C" fn(Instance, FmuState) -> c_int = black_box(fmi::fmi2SetFMUstate);
-    let step: unsafe extern "C" fn(Instance, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);
+    let save: unsafe extern "C" fn(InstancePointer, *mut FmuState) -> c_int = black_box(fmi::fmi2GetFMUstate);
+    let restore: unsafe extern "C" fn(InstancePointer, FmuState) -> c_int = black_box(fmi::fmi2SetFMUstate);
+    let step: unsafe extern "C" fn(InstancePointer, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);
     // SAFETY: used as the standard demands: one thread, freed once.
     unsafe {
         let it = fmi::fmi2Instantiate(c"bench".as_ptr(), 1, token.as_ptr(), null(), null(), no, no);

@@ -1,4 +1,4 @@
-"""Speed, torque, power and efficiency of PmsmDrive in FMPy: to 1000 rpm, a load of 2 N.m, then a load that drives.
+"""Speed, torque, power and efficiency of PmsmDrive in FMPy: to 1000 rpm, a load of 2 N.m, then a driving load.
 
     cargo run --release -- build
     pip install fmpy matplotlib

@@ -1,4 +1,4 @@
-"""Gymnasium: current control of the machine as an environment; voltages in d and q are what the agent chooses.
+"""Gymnasium: current control of the machine as an environment; the agent chooses the voltages in d and q.
 
     pip install gymnasium
     python examples/gym_drive.py target/fmu/fmi3

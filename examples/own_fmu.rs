@@ -86,7 +86,7 @@ impl Model for RcCircuit {
     }
 }
 
-// The physics. With it, the FMU has Model Exchange and derivatives besides.
+// The physics. With it, the FMU also has Model Exchange and derivatives.
 impl ContinuousTime for RcCircuit {
     const STATES: &'static [State<Self>] = &[State::new("u_c", &VOLT_PER_S, |m: &mut Self| &mut m.u_c)];
 
@@ -96,7 +96,7 @@ impl ContinuousTime for RcCircuit {
     }
 }
 
-// Reaches the importer's log, at most once a second, if it asked for warnings.
+// Goes to the importer's log, at most once a second, if the importer wants warnings.
 impl Warns for RcCircuit {
     fn warn(&self, log: &mut Warnings<'_>) {
         if self.u_c.abs() > self.u_rated {

@@ -1,4 +1,4 @@
-"""A sweep by joblib: processes of its own, chunks of rows; one dictionary of arrays at the end.
+"""A sweep by joblib: separate processes, chunks of rows; one dictionary of arrays at the end.
 
     python examples/sweep_joblib.py target/fmu/fmi3
 """

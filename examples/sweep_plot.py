@@ -1,4 +1,4 @@
-"""The share of lost starts of examples/sweep.toml, over what was varied: python examples/sweep_plot.py target/sweep lost.svg"""
+"""The share of lost starts of examples/sweep.toml, over the varied variables: python examples/sweep_plot.py target/sweep lost.svg"""
 import sys
 
 import matplotlib

@@ -1,4 +1,4 @@
-"""A sweep by Ray: chunks of rows as tasks that are tried again when a worker dies.
+"""A sweep by Ray: chunks of rows as tasks; Ray repeats them when a worker dies.
 
     pip install ray
     python examples/sweep_ray.py target/fmu/fmi3

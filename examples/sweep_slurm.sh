@@ -1,6 +1,6 @@
 #!/bin/bash
-# A sweep as a Slurm array on a shared folder: each task runs the parts that are its own, and whoever writes the last one joins
-# them to results.csv. Submit it again and it resumes.
+# A sweep as a Slurm array on a shared folder: each task runs its own parts, and the task that writes the last one joins
+# them to results.csv. Submit it again to resume.
 #
 #   sbatch --array=0-63 examples/sweep_slurm.sh sweep.toml results
 #SBATCH --job-name=sweep

@@ -1,8 +1,9 @@
 //! The command line: one variant for each command.
 
 use crate::commands::{atlas, build, compare, info, merge, new, preset, prove, reproduce, simulate, ssp, sweep, tune};
+use crate::message;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use fmu_check::{command as check, message, probe};
+use fmu_check::{command as check, probe};
 use fmu_import::printable_lines;
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -25,7 +26,7 @@ enum Command {
     Info(info::Info),
     Simulate(simulate::Simulate),
     Sweep(sweep::Sweep),
-    Check(check::Check),
+    Check(check::CheckArguments),
     Reproduce(reproduce::Reproduce),
     Compare(compare::Compare),
     Atlas(atlas::Atlas),
@@ -79,7 +80,7 @@ pub fn main() -> ExitCode {
     }
     let command =
         Cli::from_arg_matches(&line().get_matches_from(arguments())).unwrap_or_else(|error| error.exit()).command;
-    // The process that started a worker tells its error.
+    // The process that started a worker prints its error.
     let is_worker = matches!(&command, Command::Simulate(args) if args.worker);
     let outcome = match command {
         Command::New(args) => new::run(&args).map(|text| {

@@ -28,7 +28,7 @@ struct ArtifactTarget {
     crate_types: Vec<String>,
 }
 
-/// Compiles the cdylibs of these packages, optimized, in a target folder of its own (a `cargo` that waits for this program
+/// Compiles the cdylibs of these packages, optimized, in a separate target folder (a `cargo` that waits for this program
 /// holds the usual one). Paths of this machine stay out of the binaries, so that builds at two places agree byte for byte.
 ///
 /// # Errors
@@ -64,7 +64,7 @@ pub fn program(workspace: &Workspace, package: &str, name: &str, target: &Target
     if !status.with_context(|| format!("{program} cannot be run"))?.success() {
         return Err(crate::Failed(format!("building {name} failed")).into());
     }
-    // As `build` names the folder: below the target's name if one was given.
+    // `build` puts it below the target's name if one was given.
     let below = if target.linker == Linker::Zig { target.triple.as_str() } else { "" };
     let file = format!("{name}{}", env::consts::EXE_SUFFIX);
     Ok(workspace.target.join("fmu-build").join(below).join("release").join(file))
@@ -78,7 +78,7 @@ fn install_name(name: &str) -> [String; 2] {
     ["-C".into(), format!("link-arg=-Wl,-install_name,@rpath/lib{}.dylib", name.replace('-', "_"))]
 }
 
-/// The command, except for what follows `--`.
+/// The command, except for the arguments after `--`.
 fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target) -> Command {
     let mut build = match target.linker {
         Linker::Usual => cargo(),
@@ -166,8 +166,8 @@ fn flags(root: &Path, target: &Target) -> OsString {
         flag.push(format!("={to}"));
         flag
     };
-    // Pairs of numbers in one register save little arithmetic. But what was stored as a pair and is read singly, or the
-    // other way, is not forwarded from the store: a period of the drive takes a tenth longer.
+    // Pairs of numbers in one register save little arithmetic. But the processor does not forward a store of a pair to a
+    // load of a single number, or the reverse: a period of the drive takes a tenth longer.
     add(OsStr::new("-Cno-vectorize-slp"));
     add(&remap(root, "."));
     if let Some(home) = home {

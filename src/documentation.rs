@@ -5,9 +5,10 @@ mod preset;
 pub use preset::preset;
 
 use fmu_core::IntegerType;
-use fmu_core::description::{Description, Member, Value, Variable, VariableKind};
+use fmu_core::description::{Description, MemberDescription, Value, Variable, VariableKind};
 use fmu_core::terminal::MemberKind;
 use fmu_core::variable::{Causality, Variability};
+use fmu_plot::page::{document, escape};
 use model_description::FmiVersion;
 use std::fmt::Write;
 
@@ -22,10 +23,8 @@ const STYLE: &str = include_str!("documentation.css");
 pub fn page(d: &Description, version: FmiVersion) -> String {
     let name = escape(d.model_name());
     let exchange = if d.model_exchange.is_some() { " and Model Exchange" } else { "" };
-    let head = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-         <header>\n{}<h1>{name}</h1>\n<p class=\"summary\">{}</p>\n<p>Version {} · FMI {version} for Co-Simulation{exchange} · {}</p>\n\
+    let header = format!(
+        "<header>\n{}<h1>{name}</h1>\n<p class=\"summary\">{}</p>\n<p>Version {} · FMI {version} for Co-Simulation{exchange} · {}</p>\n\
          </header>\n",
         d.icon.as_deref().map(icon).unwrap_or_default(),
         escape(&d.description),
@@ -54,7 +53,7 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
         escape(&d.license),
     );
     let (contents, body) = with_contents(&out);
-    format!("{head}{contents}<main>\n{body}</main>\n</body>\n</html>\n")
+    document(d.model_name(), STYLE, &format!("{header}{contents}<main>\n{body}</main>\n"))
 }
 
 /// The icon of the FMU as part of the page: an SVG document without its declaration, which the name beside it describes.
@@ -63,7 +62,7 @@ fn icon(svg: &str) -> String {
     format!("<div class=\"icon\" aria-hidden=\"true\">{}</div>\n", svg.trim())
 }
 
-/// Drawings and tables in boxes of their own, in which a narrow page scrolls them.
+/// Puts drawings and tables into boxes that scroll on a narrow page.
 fn scrolling(html: &str) -> String {
     let boxed = |html: String, open: &str, close: &str| {
         let mut parts = html.split(open);
@@ -139,18 +138,18 @@ fn parameters(d: &Description) -> String {
     out
 }
 
-/// What is connected together.
+/// The terminals.
 fn terminals(d: &Description) -> String {
     if d.terminals.is_empty() {
         return String::new();
     }
     let mut out = String::from(
-        "<h2>Terminals</h2>\n<p>Variables that are connected together; those of one member name belong to each other.</p>\n\
+        "<h2>Terminals</h2>\n<p>Variables that are connected together: two terminals connect the members of the same name.</p>\n\
          <div class=\"scroll\">\n<table class=\"variables\">\n<tr><th>Terminal</th><th class=\"wide\">Description</th>\
          <th>Members</th></tr>\n",
     );
     for t in &d.terminals {
-        let member = |m: &Member| {
+        let member = |m: &MemberDescription| {
             let kind = match m.kind {
                 MemberKind::Signal => "",
                 MemberKind::Inflow => " <small>flows in</small>",
@@ -273,18 +272,6 @@ fn number(x: f64) -> String {
     let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
     let plain = rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs());
     if plain { format!("{rounded}") } else { format!("{rounded:e}") }.replace('-', "\u{2212}")
-}
-
-/// Text for HTML.
-fn escape(text: &str) -> String {
-    let entity = |c: char| match c {
-        '&' => "&amp;".into(),
-        '<' => "&lt;".into(),
-        '>' => "&gt;".into(),
-        '"' => "&quot;".into(),
-        c => c.to_string(),
-    };
-    text.chars().map(entity).collect()
 }
 
 #[cfg(test)]

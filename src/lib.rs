@@ -1,12 +1,14 @@
 //! The command-line tool `fmu`, as a library so that tests can use its parts.
 //!
 //! - [`cli`]: the command line; [`commands`]: one module for each command; [`vendor`]: the crates that `fmu new` writes.
-//! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`], [`mod@reference`], [`release`]: from Rust sources to `.fmu`
-//!   files.
+//! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`], [`mod@reference`],
+//!   [`release`]: from Rust sources to `.fmu` files.
 //! - [`preset`]: an FMU with other start values, from its archive.
+//! - [`message`]: errors, warnings and notes on standard error.
 //! - [`ssp`], [`ssv`]: write systems and parameter values.
 //!
-//! [`fmu_import`] runs FMUs, [`fmu_check`] checks them, and [`drive_study`] reproduces and compares drives.
+//! [`fmu_import`] runs FMUs, [`fmu_check`] checks them, [`drive_study`] reproduces, compares and tunes drives, and [`fmu_plot`]
+//! draws.
 
 #![forbid(unsafe_code)]
 
@@ -16,6 +18,7 @@ pub mod compile;
 pub mod documentation;
 pub mod icons;
 pub mod licenses;
+pub mod message;
 pub mod pack;
 pub mod picture;
 pub mod preset;

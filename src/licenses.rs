@@ -26,10 +26,10 @@ struct Crate {
 }
 
 impl Licenses {
-    /// Of what is linked into the library of a package.
+    /// The licenses of everything that is linked into the library of a package.
     pub fn of_package(workspace: &Workspace, package: &str) -> Self {
         let mut linked = workspace.linked(package);
-        // The FMU's own license stands in its description.
+        // The description has the FMU's own license.
         linked.retain(|p| p.name != package || p.license.is_some());
         let crates = linked.into_iter().map(|p| Crate::of(p, workspace.is_member(p))).collect();
         Self { own: texts_in(&workspace.root, ""), crates: Some(crates) }

@@ -33,7 +33,7 @@ impl Entry {
     }
 }
 
-/// When the FMU is made: `SOURCE_DATE_EPOCH`, or now.
+/// The time at which the FMU is made: `SOURCE_DATE_EPOCH`, or now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
     seconds: i64,
@@ -148,7 +148,7 @@ pub fn libraries_of(
 /// them.
 ///
 /// # Errors
-/// A file cannot be read, is neither file nor folder (a link is what it leads to), or has a name that not every system can write.
+/// A file cannot be read, is neither file nor folder (links are followed), or has a name that some system cannot write.
 pub fn resources(folder: &Path) -> Result<BTreeMap<String, Entry>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![(folder.to_owned(), "resources".to_owned(), 0)];
@@ -178,7 +178,7 @@ pub fn resources(folder: &Path) -> Result<BTreeMap<String, Entry>> {
 }
 
 /// The bytes of a ZIP archive as FMI requires it (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5): deflate, `/` in names, files only, no
-/// ZIP64, no data descriptors; and the same for the same files: sorted, one time, one compressor.
+/// ZIP64, no data descriptors. Equal files give equal bytes: sorted names, one time, one compressor.
 ///
 /// # Errors
 /// A file is larger than 4 GiB.

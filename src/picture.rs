@@ -1,4 +1,4 @@
-//! Pictures as PNG, from the SVG that is their only source.
+//! Renders pictures as PNG; their only source is SVG.
 
 use anyhow::{Result, anyhow, bail};
 use resvg::tiny_skia::{Pixmap, Transform};
@@ -7,8 +7,7 @@ use resvg::usvg::{Options, Tree};
 /// Widest and highest picture that is drawn, in pixels.
 const LARGEST: f32 = 8192.0;
 
-/// Draws an SVG document without text with a transparent ground, in the size that it gives itself; the same document gives the
-/// same bytes.
+/// Draws an SVG document without text on a transparent ground, in its own size; equal documents give equal bytes.
 ///
 /// # Errors
 /// It is not an SVG document, is too large, or contains text.
@@ -20,7 +19,7 @@ pub fn without_text(svg: &str) -> Result<Vec<u8>> {
     draw(svg, &Options::default(), 1.0)
 }
 
-/// Draws an SVG document at twice its size, its text with the fonts of this system.
+/// Draws an SVG document at twice its size, with the fonts of this system.
 ///
 /// # Errors
 /// It is not an SVG document, is too large, or the system has no font.
@@ -29,7 +28,7 @@ pub fn with_text(svg: &str) -> Result<Vec<u8>> {
     options.fontdb_mut().load_system_fonts();
     let family = options.fontdb.faces().find_map(|face| {
         let (name, _) = face.families.first()?;
-        // Any sans-serif will do, any font before none.
+        // Prefer a sans-serif, otherwise take any font.
         name.contains("Sans").then(|| name.clone())
     });
     let any = || options.fontdb.faces().find_map(|face| Some(face.families.first()?.0.clone()));

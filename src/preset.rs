@@ -2,10 +2,10 @@
 //! resources, and a description that says so.
 
 use crate::documentation;
+use crate::message;
 use crate::pack::{self, Entry, Moment, TOOL};
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use fmu_check::message;
 use fmu_core::Description;
 use fmu_core::description::{Value, Variable, VariableKind};
 use fmu_core::preset::{self, FILE};
@@ -20,7 +20,7 @@ const DESCRIPTION: &str = "modelDescription.xml";
 const PAGE: &str = "documentation/index.html";
 const BINARIES: &str = "binaries/";
 
-/// The default experiment of the new FMU: what feeds it, and its times in s.
+/// The default experiment of the new FMU: its inputs, and its times in s.
 pub struct Course {
     /// CSV with time first and a column for each input.
     pub stimuli: String,
@@ -30,8 +30,8 @@ pub struct Course {
     pub step: Option<f64>,
 }
 
-/// An FMU, and the start values that it is to have.
-pub struct Preset {
+/// An FMU, and the start values that it will have.
+pub struct PresetFmu {
     /// The archive, for messages.
     file: PathBuf,
     md: ModelDescription,
@@ -39,15 +39,15 @@ pub struct Preset {
     unpacked: Unpacked,
     /// The model as it is without a preset.
     own: Description,
-    /// The same as FMI 3.0 has it, with arrays, to read what users write.
+    /// The model as FMI 3.0 describes it, with arrays, to read what users write.
     reader: ModelDescription,
     /// Names and values by value reference, which is the order of the table.
     values: BTreeMap<u32, (String, String)>,
-    /// Which of them are of an earlier preset.
+    /// The value references that an earlier preset has set.
     earlier: BTreeSet<u32>,
 }
 
-impl Preset {
+impl PresetFmu {
     /// Opens an FMU of this exporter, with the values that it already presets.
     ///
     /// # Errors
@@ -64,8 +64,9 @@ impl Preset {
         let own = describe(&unpacked.library, Some(&unpacked.resources())).map_err(|e| {
             anyhow!("{name}: {}: a preset is for FMUs of this program (fmu build)", cause(&e.to_string(), &unpacked))
         })?;
-        let suffix = preset::suffix_of(&md.token, &own.token)
-            .with_context(|| format!("{name}: {DESCRIPTION} and binary are of different builds: build the FMU anew"))?;
+        let suffix = preset::suffix_of(&md.token, &own.token).with_context(|| {
+            format!("{name}: {DESCRIPTION} and binary are of different builds: build the FMU again")
+        })?;
         let reader = model_description::write(&own, FmiVersion::V3, &generation(Moment::fixed(0)));
         let reader = model_description::read(reader)?;
         let mut values = BTreeMap::new();
@@ -94,8 +95,8 @@ impl Preset {
         self.earlier.iter().filter_map(|place| self.values.get(place)).map(|(name, _)| name.as_str()).collect()
     }
 
-    /// Sets the start value of a variable, of an array with all of its elements, or of an element: what a user writes, in
-    /// `unit` if that is given.
+    /// Sets the start value of a variable, of a whole array, or of an element, from the text of a user, in `unit` if that is
+    /// given.
     ///
     /// # Errors
     /// Names the variable and the value, and what is expected.
@@ -170,7 +171,7 @@ impl Preset {
         preset::write(self.values.values().map(|(name, value)| (name.as_str(), value.as_str())))
     }
 
-    /// What the binary says of itself with the preset: it judges every name and value.
+    /// The description that the binary gives of itself with the preset: it judges every name and value.
     fn described(&self, title: Option<&str>) -> Result<Description> {
         let (name, text) = (self.file.display(), self.text());
         fs::write(self.unpacked.resources().join(FILE), &text)?;
@@ -179,7 +180,7 @@ impl Preset {
         let token = self.own.token.clone() + &preset::suffix(text.as_bytes());
         ensure!(
             description.token == token,
-            "{name}: its binary knows no presets, because an earlier version made it: build the FMU anew"
+            "{name}: its binary knows no presets, because an earlier version made it: build the FMU again"
         );
         let title = title.unwrap_or(&self.md.model_name);
         description.title = (title != description.name).then(|| title.to_owned());
@@ -204,7 +205,7 @@ impl Preset {
         Ok(())
     }
 
-    /// The reference files, run anew.
+    /// The reference files of a new run.
     fn reference(
         &self,
         archive: &Path,
@@ -242,7 +243,7 @@ fn entry(name: &str, bytes: Vec<u8>) -> Entry {
     Entry { bytes, executable: name.starts_with(BINARIES) }
 }
 
-/// Why a library cannot be described, without the place where it was unpacked and without the line of the preset.
+/// Why a library cannot be described, without the path where it was unpacked and without the line of the preset.
 fn cause(error: &str, unpacked: &Unpacked) -> String {
     let library = unpacked.library.display().to_string();
     let rest = error.strip_prefix(&library).map_or(error, |rest| rest.trim_start_matches([':', ' ']));
@@ -255,7 +256,7 @@ fn cause(error: &str, unpacked: &Unpacked) -> String {
     }
 }
 
-/// The variable of this name, or the array and which of its elements it is.
+/// The variable of this name, or the array and the index of the element.
 fn find<'a>(description: &'a Description, name: &str) -> Option<(&'a Variable, Option<usize>)> {
     if let Some(variable) = description.variable(name) {
         return Some((variable, None));

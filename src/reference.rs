@@ -1,8 +1,8 @@
-//! What an FMU gives when it is run as it recommends: reference files in its archive, as the layered standard FMI-LS-REF
+//! The result of an FMU's default experiment: reference files in its archive, as the layered standard FMI-LS-REF
 //! 1.0.0-beta.1 names them (<https://github.com/modelica/fmi-ls-ref>). The experiment has the format of its release 1.0.0-alpha.1,
 //! which <https://github.com/modelica/ma-hs-experiments> continues.
 //!
-//! The files of CSV keep to the rules for the examples that the FMI tools page lists: names in quotes, time first, at most ten
+//! The CSV files follow the rules for the examples that the FMI tools page lists: names in quotes, time first, at most ten
 //! variables (<https://github.com/modelica/fmi-standard.org>, CONTRIBUTING, "Compatibility information").
 
 use crate::pack::Entry;
@@ -20,21 +20,21 @@ use std::path::Path;
 /// Folder of the layered standard in an archive.
 pub const FOLDER: &str = "extra/org.fmi-standard.fmi-ls-ref/";
 
-/// File of a package with what its FMU is fed with: CSV with time first and a column per input, joined by lines.
+/// File of a package that feeds its FMU: CSV with time first and a column per input; lines join the points.
 pub const STIMULI: &str = "stimuli.csv";
 
-/// Variables and intervals at most.
+/// Greatest number of variables, and of intervals.
 const VARIABLES: usize = 10;
 const INTERVALS: f64 = 200.0;
 
-/// Communication steps at most: a build takes seconds.
+/// Greatest number of communication steps, so that a build takes seconds.
 const MOST_STEPS: f64 = 1e6;
 
 /// Runs a packed FMU through its default experiment, fed with the file `stimuli` if there is one; returns the files for its
 /// archive. `parameters` is a set of values, its name and the text of its SSV file.
 ///
 /// # Errors
-/// The FMU fails, or what feeds it does not fit.
+/// The FMU fails, or `stimuli` does not fit it.
 pub fn files(
     archive: &Path,
     description: &Description,
@@ -101,7 +101,7 @@ const ROOT: &str = "<fmiReferences xmlns:fmi-ls=\"http://fmi-standard.org/fmi-ls
 /// The experiment in Co-Simulation, every communication point recorded: the first outputs that are real numbers.
 ///
 /// # Errors
-/// As those of the FMU.
+/// Those of the FMU.
 pub fn run(archive: &Path, experiment: &Experiment, fed: Vec<(String, Schedule)>) -> Result<Recording> {
     let fmu = Fmu::open(archive)?;
     let mut system = System::default();
@@ -121,7 +121,7 @@ pub fn run(archive: &Path, experiment: &Experiment, fed: Vec<(String, Schedule)>
     system.run(&settings, |_| Ok(ControlFlow::Continue(()))).context("the default experiment")
 }
 
-/// Share of a step for a change of the inputs, and from there to the communication point.
+/// Share of a step that a change of the inputs takes, and the time from there to the communication point.
 const EDGE: f64 = 1e-3;
 
 /// Rows of the inputs as the run feeds them: held over its communication steps. A change is over just before its communication
@@ -168,7 +168,7 @@ pub fn every(experiment: &Experiment) -> usize {
     every
 }
 
-/// Every so many rows as CSV, and the last one.
+/// CSV with every `every`-th row, and the last one.
 fn thinned(recording: &Recording, every: usize) -> String {
     let names = std::iter::once("time").chain(recording.columns.iter().map(|c| c.name.as_str()));
     let mut csv = names.map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(",") + "\n";

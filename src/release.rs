@@ -1,4 +1,4 @@
-//! What a release holds beside its archives and programs: checksums, and a bill of materials.
+//! Checksums and bill of materials of a release.
 
 use crate::pack::{self, Moment, TOOL};
 use crate::workspace::{Package, Workspace};
@@ -47,7 +47,7 @@ pub fn finish(
     Ok([sums, materials])
 }
 
-/// The packages and what is linked into each, in the format CycloneDX 1.6 (<https://cyclonedx.org/docs/1.6/json/>).
+/// The packages and the crates linked into each, in the format CycloneDX 1.6 (<https://cyclonedx.org/docs/1.6/json/>).
 fn bill(workspace: &Workspace, packages: &[String], moment: Moment) -> Value {
     let reference = |p: &Package| format!("pkg:cargo/{}@{}", p.name, p.version);
     let mut components = BTreeMap::new();

@@ -35,7 +35,7 @@ const SIZE: f64 = 100.0;
 pub struct Values {
     /// Name of the component.
     pub component: String,
-    /// What to call the file in errors.
+    /// Name of the file for errors.
     pub file: String,
     /// The text of the SSV file.
     pub text: String,
@@ -63,8 +63,8 @@ struct Outside<'a> {
 /// The files of an SSP around the FMUs in `folder`.
 ///
 /// # Errors
-/// An FMU cannot be read, or values do not fit: file, line and what to do. The system is started once, so that what is written
-/// runs.
+/// An FMU cannot be read, or values do not fit; the error has file, line and remedy. The system is started once, so that the
+/// file runs.
 pub fn files(
     folder: &Path,
     parameters: &[Values],
@@ -116,7 +116,7 @@ pub fn files(
     Ok(files)
 }
 
-/// The values, each of the type that its variable has, whatever type the file gave it: OMSimulator converts none, and ignores
+/// The values, each in the type of its variable, whatever type the file gave it: OMSimulator converts none, and ignores
 /// a value of another type.
 fn typed(system: &System, component: &str, given: &[Parameter], names: bool) -> Result<Vec<(String, Value)>> {
     let Some(instance) = system.instances().iter().find(|i| i.name() == component) else { return Ok(Vec::new()) };
@@ -207,7 +207,7 @@ fn step(descriptions: &[(&str, ModelDescription)], given: &[(&str, Parameter)]) 
     given.or_else(start).and_then(parse_number).unwrap_or(1e-4)
 }
 
-/// For OMSimulator: its master of fixed step, Jacobi, which carries all outputs over before all inputs. The command line reads the
+/// For OMSimulator: its master with a fixed step (Jacobi), which reads all outputs before it sets any input. The command line reads the
 /// element inside (oms.xsd, SystemWC.cpp), the Python package the attributes under the name of its own choice (system.py).
 fn master(step: f64) -> Element {
     let master = Element::new("oms:FixedStepMaster")

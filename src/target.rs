@@ -12,7 +12,7 @@ pub const ZIG: &str = "pip install cargo-zigbuild ziglang";
 /// Makes Cargo build the standard library from source.
 pub(crate) const BUILD_STD: &str = "CARGO_UNSTABLE_BUILD_STD";
 
-/// A target that can be built for here.
+/// A target that can be built here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Target {
     /// Its rustc name.
@@ -21,11 +21,11 @@ pub struct Target {
     pub platform: Platform,
     /// Whether it is the build machine.
     pub is_host: bool,
-    /// What links it.
+    /// Its linker.
     pub linker: Linker,
 }
 
-/// What links a target's libraries.
+/// The linker of a target's libraries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Linker {
     /// The default linker of rustc, or the one that the user configured in Cargo.
@@ -61,8 +61,8 @@ impl Tools {
     /// A target by its name, with everything that its build needs.
     ///
     /// # Errors
-    /// rustc does not know it, FMI has no platform for it, its standard library or a linker is missing: what, and how to
-    /// get it.
+    /// rustc does not know it, FMI has no platform for it, or its standard library or a linker is missing; the error says how
+    /// to get it.
     pub fn target(&self, triple: &str) -> Result<Target> {
         let wrong = |cause: String| anyhow!("--target {triple}: {cause}");
         let mut rustc = rustc();
@@ -93,7 +93,7 @@ impl Tools {
         Ok(Target { triple: triple.into(), platform, is_host: triple == self.host, linker })
     }
 
-    /// What links a target, or what is missing.
+    /// The linker of a target, or what is missing.
     fn linker(&self, triple: &str, platform: Platform, environment: &str) -> Result<Linker, String> {
         let users = format!("CARGO_TARGET_{}_LINKER", triple.to_uppercase().replace(['-', '.'], "_"));
         if env::var_os(users).is_some() {
@@ -139,7 +139,7 @@ pub fn host_triple() -> Result<String> {
     let output = rustc().arg("-vV").output().context("rustc cannot be run")?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let Some(host) = text.lines().find_map(|line| line.strip_prefix("host: ")) else {
-        bail!("rustc -vV names no host")
+        bail!("rustc -vV does not name the host")
     };
     Ok(host.to_owned())
 }

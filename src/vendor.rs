@@ -4,13 +4,13 @@ use anyhow::{Context, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
-/// Files of the workspace by name: none if this program itself comes from a registry, which then has the crates too.
+/// Files of the workspace by name; empty if this program comes from a registry, which then has the crates too.
 const FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/vendored.rs"));
 
 /// The crates, each after those that it needs.
 pub const CRATES: [&str; 2] = ["fmu-core", "fmu-export"];
 
-/// Whether the crates are carried.
+/// Whether this program carries the crates.
 pub fn are_carried() -> bool {
     !FILES.is_empty()
 }
@@ -74,7 +74,7 @@ pub fn lock(package: &str, version: &str) -> Result<String> {
         }
         if let Some(dependencies) = found.get_mut("dependencies").and_then(Value::as_array_mut) {
             if CRATES.contains(&name) {
-                // Those of the crate's tests are not needed.
+                // The dependencies of the crate's tests are not needed.
                 let manifest: Table = file(&format!("{name}/Cargo.toml"))?.parse()?;
                 dependencies.retain(|d| d.as_str().is_some_and(|d| manifest["dependencies"].get(d).is_some()));
             }

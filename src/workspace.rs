@@ -74,8 +74,8 @@ struct DependencyKind {
     kind: Option<String>,
 }
 
-/// The folder for what a command writes if no option names another: `name` in Cargo's target folder or, where there is no package,
-/// in the current folder.
+/// The default folder for the files of a command: `name` in Cargo's target folder or, where there is no package, in the current
+/// folder.
 ///
 /// # Errors
 /// Cargo's target folder is unknown although there is a package.
@@ -105,7 +105,7 @@ impl Package {
             .any(|t| t.kind.iter().all(|k| k != "example") && t.crate_types.iter().any(|c| c == "cdylib"))
     }
 
-    /// A procedural macro runs in the compiler; nothing of it is in the binary.
+    /// Whether it is a procedural macro, which runs in the compiler and leaves nothing in the binary.
     fn is_linked(&self) -> bool {
         !self.targets.iter().any(|t| t.kind.iter().any(|k| k == "proc-macro"))
     }

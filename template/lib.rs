@@ -19,7 +19,7 @@ struct Body {
     temperature: f64,
 }
 
-/// The start values, written here alone.
+/// The start values, which are written only here.
 impl Default for Body {
     fn default() -> Self {
         Self { heat: 0.0, ambient: 293.15, capacity: 500.0, conductance: 2.0, initial: 293.15, temperature: 293.15 }

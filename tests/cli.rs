@@ -518,13 +518,13 @@ fn an_atlas_is_written_or_refused() {
     // A map says what its dots mean, on the page, by itself and in the documentation.
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let kept = std::fs::read_to_string(root.join("docs/atlas-Rasmussen.svg")).unwrap();
-    for part in ["white dot: lost, and lock_lost does not tell it", "red dot: held, and lock_lost"] {
+    for part in ["white dot: lost, and lock_lost does not report it", "red dot: held, and lock_lost"] {
         for drawn in [&text(&map), &text(&page), &kept] {
             assert!(drawn.contains(part), "{part}");
         }
     }
     let words = std::fs::read_to_string(root.join("docs/atlas.md")).unwrap();
-    assert!(words.contains("A white dot marks a lost cell that `lock_lost` does not tell"));
+    assert!(words.contains("A white dot marks a lost cell that `lock_lost` does not report"));
     assert!(run("1", "a") == run("2", "b"));
     for (arguments, parts) in [
         (&["--load="][..], &["--load has no value", "at least one", "leave the option out"][..]),

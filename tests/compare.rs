@@ -3,27 +3,29 @@
 
 mod common;
 
+use common::shows::shows;
 use drive::estimator::Kind;
 use drive_study::compare::candidate::{Class, Entry};
 use drive_study::compare::measure::Measure;
 use drive_study::compare::plots::{self, Plot};
 use drive_study::compare::scenario::{Effort, SCENARIOS};
-use drive_study::compare::{self, Cell, Selection, html, table};
-use drive_study::{ink, plot};
+use drive_study::compare::{self, Run, Selection, html, table};
+use drive_study::ink;
+use fmu_plot::svg;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 /// The reduced grid, run once a test program.
-fn grid() -> &'static [Cell] {
-    static GRID: OnceLock<Vec<Cell>> = OnceLock::new();
+fn grid() -> &'static [Run] {
+    static GRID: OnceLock<Vec<Run>> = OnceLock::new();
     GRID.get_or_init(|| compare::run(&Selection::all(Effort::Reduced), || ()))
 }
 
 /// The cells of these estimators in these scenarios.
-fn of(cells: &[Cell], estimators: &[&str], scenarios: &[&str]) -> Vec<Cell> {
-    let wanted = |c: &&Cell| estimators.contains(&c.entry.name) && scenarios.contains(&c.scenario.id);
+fn of(cells: &[Run], estimators: &[&str], scenarios: &[&str]) -> Vec<Run> {
+    let wanted = |c: &&Run| estimators.contains(&c.entry.name) && scenarios.contains(&c.scenario.id);
     cells.iter().filter(wanted).cloned().collect()
 }
 
@@ -65,21 +67,25 @@ fn the_grid_is_that_of_the_golden_copy() {
     }
     differences.extend(now.keys().filter(|key| !golden.contains_key(*key)).map(|key| format!("{key}: new")));
     let list = differences.join("\n");
-    assert!(differences.is_empty(), "{list}\nUPDATE_GOLDEN=1 cargo test --test compare accepts the changes");
+    assert!(
+        differences.is_empty(),
+        "tests/golden/compare.csv differs from what fmu compare gives now:\n{list}\nIf you meant to change the drive, UPDATE_GOLDEN=1 \
+         cargo test --test compare accepts the changes"
+    );
 }
 
 #[test]
 fn every_figure_is_inside_its_tolerance() {
     let outside: Vec<_> = grid().iter().filter(|cell| !cell.holds()).collect();
     assert!(outside.is_empty(), "{}", table::verdict(grid()));
-    assert!(grid().iter().flat_map(Cell::measures).filter(|m| m.expected.is_some()).count() > 100);
+    assert!(grid().iter().flat_map(Run::measures).filter(|m| m.expected.is_some()).count() > 100);
 }
 
 /// The table of estimators in the documentation has the numbers that `fmu compare` prints, at full effort.
 #[test]
 fn the_limits_of_the_estimators_are_those_of_the_grid() {
     const FULL: [&str; 3] = ["lowest", "lowest-dead", "arriving"];
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("drive/docs/limits.html");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("drive/control/docs/limits.html");
     let page = std::fs::read_to_string(&path).unwrap();
     let entries: Vec<Entry> =
         Entry::all().into_iter().filter(|e| !["Rasmussen", "Sensored"].contains(&e.name)).collect();
@@ -122,23 +128,40 @@ fn the_limits_of_the_estimators_are_those_of_the_grid() {
         std::fs::write(&path, format!("{before}full at 0</th></tr>\n{rows}</table>{after}")).unwrap();
         return;
     }
-    assert_eq!(kept, rows, "drive/docs/limits.html is old: UPDATE_GOLDEN=1 cargo test --test compare writes it");
+    let old = kept.lines().zip(rows.lines()).find(|(kept, row)| kept != row);
+    assert!(
+        kept == rows,
+        "the table in drive/control/docs/limits.html is not what fmu compare gives now; the first row that differs: {old:#?}\n\
+         UPDATE_GOLDEN=1 cargo test --test compare writes the table"
+    );
     let both_ways = shown("Hybrid", "reversal", &["peak angle error"]);
-    assert!(page.contains(&format!("under 0.8 of the load: error {both_ways}")), "{both_ways}");
+    shows("drive/control/docs/limits.html", &page, &format!("under 0.8 of the load: error {both_ways}"));
 }
 
-/// The results page shows what the command prints.
+/// The results page shows what the command prints; `UPDATE_GOLDEN=1` writes it.
 #[test]
 fn the_results_page_shows_what_is_printed() {
-    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results.md")).unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results.md");
+    let mut page = std::fs::read_to_string(&path).unwrap();
     let load_steps = ["Rasmussen", "ExtendedEmf", "VoltageModel", "SquareWaveInjection", "Sensored"];
     let beyond: Vec<_> = Entry::all().iter().filter(|e| e.kind.class() != Class::Injection).map(|e| e.name).collect();
     for (estimators, scenarios) in
         [(&load_steps[..], &["load-0", "load-0.1", "load-0.5", "load-1"][..]), (&beyond, &["weakening"])]
     {
         let text = table::text(&of(grid(), estimators, scenarios));
-        let (printed, _) = text.split_once(&format!("\n  {}: ", scenarios[0])).unwrap();
-        assert!(page.contains(printed), "docs/results.md shows another table than\n{printed}");
+        let end = format!("\n  {}: ", scenarios[0]);
+        let (printed, _) = text.split_once(&end).unwrap();
+        if std::env::var_os("UPDATE_GOLDEN").is_some() {
+            let begin = format!("```text\n{}\n", printed.lines().next().unwrap());
+            let (before, table) = page.split_once(&begin).expect("the title of the table");
+            let (_, after) = table.split_once(&end).expect("its quantities");
+            page = format!("{before}```text\n{printed}{end}{after}");
+        } else {
+            shows("docs/results.md", &page, printed);
+        }
+    }
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(&path, page).unwrap();
     }
 }
 
@@ -155,13 +178,13 @@ fn a_lost_run_is_cut_where_it_is_lost() {
         let end = lost.x[lost.y.len() - 1];
         assert!((0.9..1.1).contains(&end) && lost.y.iter().all(|y| y.abs() <= 90.0), "{end} s");
     }
-    let svg = plot::svg(figure).unwrap();
+    let svg = svg::draw(figure).unwrap();
     assert!(svg.contains("DirectEmf ✕ lost") && svg.matches("l10 10m0-10l-10 10").count() == 2, "{svg}");
 }
 
 #[test]
 fn what_is_outside_is_marked() {
-    let mut cells: Vec<Cell> = grid().iter().filter(|c| c.entry.name == "DirectEmf").cloned().collect();
+    let mut cells: Vec<Run> = grid().iter().filter(|c| c.entry.name == "DirectEmf").cloned().collect();
     let cell = cells.iter_mut().find(|c| c.scenario.id == "load-0.5").unwrap();
     let compare::Outcome::Measured(measures, _) = &mut cell.outcome else { panic!() };
     measures.iter_mut().find(|m| m.name == "dip").unwrap().value = 0.2;

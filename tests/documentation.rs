@@ -3,18 +3,20 @@
 
 mod common;
 
-use common::Native;
+use common::shows::{differs, shows};
+use common::{Native, words};
+use drive::estimator::Kind;
 use drive::plant::losses::Losses;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController, documentation as fragments};
-use drive_study::plane::{self, Point};
-use drive_study::plot;
-use drive_study::reproduce::plots;
-use drive_study::reproduce::scenario::{
-    ClosedLoop, LOAD_0, LOAD_1000, START, STEP_20, STEP_500, STEP_1000, STEP_1500, Scenario, Trace,
+use drive_study::plane::{self, OperatingPoint};
+use drive_study::reproduce::experiment::{
+    ClosedLoop, Experiment, LOAD_0, LOAD_1000, Record, START, STEP_20, STEP_500, STEP_1000, STEP_1500,
 };
+use drive_study::reproduce::plots;
 use fmu::documentation;
 use fmu_core::{Description, Model};
 use fmu_import::elf::FLOOR;
+use fmu_plot::svg;
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 
@@ -22,22 +24,22 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The plots in `drive/docs`, shown by the README and by the pages, are those that a run gives today.
+/// The plots in the models' `docs`, shown by the README and by the pages, are those that a run gives today.
 /// `UPDATE_GOLDEN=1 cargo test --test documentation` accepts others.
 #[test]
 fn the_plots_are_those_of_a_run() {
-    let run = |s: &Scenario| -> Trace { Native.run(s, 1e-4).unwrap() };
+    let run = |s: &Experiment| -> Record { Native.run(s, 1e-4).unwrap() };
     let figure_4 = plots::figure_4(&run(&START), [&STEP_20, &STEP_500, &STEP_1000, &STEP_1500].map(run).each_ref());
     let figure_5 = plots::figure_5(&run(&LOAD_0), &run(&LOAD_1000));
-    keep("figure-4.svg", &plot::svg(&figure_4).unwrap());
-    keep("figure-5.svg", &plot::svg(&figure_5).unwrap());
+    keep("figure-4.svg", &svg::draw(&figure_4).unwrap());
+    keep("figure-5.svg", &svg::draw(&figure_5).unwrap());
 }
 
 /// Torque over speed on the pages: every number and every dot is that of a run, and on the curves.
 #[test]
 fn the_envelope_is_that_of_the_running_drive() {
     let plane = plane::envelope(&[1000.0, 2000.0, 3000.0, 3500.0, 4000.0, 4500.0, 5000.0, 5300.0]).unwrap();
-    let text = include_str!("../drive/docs/envelope.html");
+    let text = include_str!("../drive/control/docs/envelope.html");
     let [motoring, generating] = &plane.panel.curves[..] else { panic!() };
     for (k, &(rpm, torque)) in plane.panel.dots.iter().enumerate() {
         let points: Vec<_> = if k % 2 == 0 { motoring.points().collect() } else { generating.points().collect() };
@@ -50,12 +52,12 @@ fn the_envelope_is_that_of_the_running_drive() {
         let row =
             format!("<tr><td>{} rpm</td><td>{:.2} N.m</td><td>{:.2} N.m</td></tr>", pair[0].0, pair[0].1, pair[1].1);
         let row = row.replace('-', "−");
-        assert!(text.contains(&row), "drive/docs/envelope.html has another row than\n{row}");
+        shows("drive/control/docs/envelope.html", text, &row);
     }
     for part in [format!("base speed, {:.0} rpm", plane.base), format!("above {:.0} rpm", plane.end)] {
-        assert!(text.contains(&part), "{part}");
+        shows("drive/control/docs/envelope.html", text, &part);
     }
-    keep("envelope.svg", &plot::svg(&plane::figure(vec![plane.panel])).unwrap());
+    keep("envelope.svg", &svg::draw(&plane::figure(vec![plane.panel])).unwrap());
 }
 
 /// Losses over speed on the page of the drive: every row and every dot is that of a run, and on the curves within 0.3 % of
@@ -64,10 +66,10 @@ fn the_envelope_is_that_of_the_running_drive() {
 #[test]
 fn the_losses_are_those_of_the_running_drive() {
     let text = include_str!("../drive/docs/losses.html");
-    let row = |p: &Point| {
+    let row = |p: &OperatingPoint| {
         let Losses { cu, iron, cond, sw, friction } = p.losses;
         let powers = [cu, iron, cond, sw, friction].map(|x| format!("<td>{x:.1} W</td>")).concat();
-        let Point { rpm, tau, tau_shaft, efficiency, .. } = p;
+        let OperatingPoint { rpm, tau, tau_shaft, efficiency, .. } = p;
         format!(
             "<tr><td>{rpm} rpm</td><td>{tau:.3} N.m</td><td>{tau_shaft:.2} N.m</td>{powers}<td>{:.1} %</td></tr>",
             100.0 * efficiency
@@ -79,7 +81,7 @@ fn the_losses_are_those_of_the_running_drive() {
     let generating = plane::losses(-2.5, 5000.0, &[3000.0]).unwrap();
     let mut wrong = Vec::new();
     for [figure, run] in motoring.points.iter().chain(&generating.points) {
-        let parts = |p: &Point| {
+        let parts = |p: &OperatingPoint| {
             let Losses { cu, iron, cond, sw, friction } = p.losses;
             [cu, iron, cond, sw, friction, p.tau_shaft, p.efficiency]
         };
@@ -90,33 +92,37 @@ fn the_losses_are_those_of_the_running_drive() {
         }
         let row = row(run);
         if [1000.0, 2000.0, 3000.0, 4000.0, 4500.0, 5000.0].contains(&run.rpm) && !text.contains(&row) {
-            wrong.push(format!("drive/docs/losses.html has another row than\n{row}"));
+            wrong.push(differs("drive/docs/losses.html", text, &row));
         }
     }
     for part in [format!("above {:.0} rpm", motoring.onset), format!("up to {:.0} rpm", motoring.end)] {
         if !text.contains(&part) {
-            wrong.push(part);
+            wrong.push(differs("drive/docs/losses.html", text, &part));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    keep_in(&[fragments::DRIVE], "losses.svg", &plot::svg(&plane::figure(motoring.panels.into())).unwrap());
+    keep_in(&[fragments::DRIVE], "drive/docs/losses.svg", &svg::draw(&plane::figure(motoring.panels.into())).unwrap());
 }
 
-/// The plot `drawn` is the one that `drive/docs` keeps, and in the pages of controller and drive.
+/// The plot `drawn` is the one that the controller's `docs` keep, and in the pages of controller and drive.
 fn keep(name: &str, drawn: &str) {
-    keep_in(&[fragments::CONTROLLER, fragments::DRIVE], name, drawn);
+    keep_in(&[fragments::CONTROLLER, fragments::DRIVE], &format!("drive/control/docs/{name}"), drawn);
 }
 
-/// The plot `drawn` is the one that `drive/docs` keeps, and in these pages.
+/// The plot `drawn` is the one in the file `name`, and in these pages.
 fn keep_in(pages: &[&str], name: &str, drawn: &str) {
-    let path = root().join("drive/docs").join(name);
+    let path = root().join(name);
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         return std::fs::write(&path, drawn).unwrap();
     }
     let kept = std::fs::read_to_string(&path).unwrap();
     let line = kept.lines().zip(drawn.lines()).position(|(a, b)| a != b).map(|k| k + 1);
-    assert!(kept == drawn, "drive/docs/{name} differs from line {line:?} on; UPDATE_GOLDEN=1 accepts");
-    assert!(pages.iter().all(|page| page.contains(drawn)), "{name} is in its pages");
+    assert!(
+        kept == drawn,
+        "{name} is not what a run draws now, from line {line:?} on. If you meant to change the drive, \
+         UPDATE_GOLDEN=1 cargo test --test documentation writes the new plot"
+    );
+    assert!(pages.iter().all(|page| page.contains(drawn)), "a page does not include {name}");
 }
 
 /// A page opens without a network: no address but those of the SVG name space and of the licenses beside it.
@@ -159,11 +165,11 @@ fn one_floor_of_glibc() {
 fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
     let read = |path: &str| std::fs::read_to_string(root().join(path)).unwrap();
     let head = |file: &str| -> String {
-        let text = read(&format!("drive/src/estimator/{file}.rs"));
+        let text = read(&format!("drive/control/src/estimator/{file}.rs"));
         let lines = text.lines().filter_map(|line| line.strip_prefix("//!"));
         lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
     };
-    let (list, limits) = (read("drive/src/estimator/mod.rs"), read("drive/docs/limits.html"));
+    let (list, limits) = (read("drive/control/src/estimator/mod.rs"), read("drive/control/docs/limits.html"));
     let row = |kind: &str| -> Option<Vec<String>> {
         let row = limits.split_once(&format!("<tr><td>{kind}</td><td>"))?.1.split_once("</td></tr>")?.0;
         Some(row.split("</td><td>").map(Into::into).collect())
@@ -171,22 +177,32 @@ fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
     let (mut files, mut without) = (0, Vec::new());
     for line in list.split("estimators! {\n").nth(1).unwrap().lines().filter(|line| line.contains("standstill")) {
         let (kind, rest) = line.trim().split_once(' ').unwrap().1.split_once('(').unwrap();
-        let head = head(rest.split("::").next().unwrap());
+        let file = rest.split("::").next().unwrap();
+        let head = head(file);
         let claims = head.matches("rated load down to").count() + head.matches("rated load from").count();
         let held = row(kind).filter(|cells| cells[0] != "0.000");
         let expected = held.as_ref().map(|cells| {
             let [ideal, dead] = [&cells[0], &cells[1]];
             format!("holds rated load down to {ideal} of the rated speed, {dead} with a compensated dead time")
         });
-        assert_eq!(claims, usize::from(expected.is_some()), "{kind}: {head}");
+        let file = format!("drive/control/src/estimator/{file}.rs");
+        assert_eq!(
+            claims,
+            usize::from(expected.is_some()),
+            "{file}: its documentation must say once down to which speed {kind} holds rated load, if drive/control/docs/limits.html has \
+             that speed: {expected:?}"
+        );
         let expected = expected.unwrap_or_default();
-        assert!(head.contains(&expected), "drive/src/estimator: the head of {kind} must say: {expected}");
+        assert!(
+            head.contains(&expected),
+            "{file}: its documentation must say, by drive/control/docs/limits.html: {expected}"
+        );
         if let Some(cells) = held.filter(|cells| cells[2] != "–") {
             without.push((kind, cells[2].clone()));
         }
         files += 1;
     }
-    assert_eq!(files, 17);
+    assert_eq!(files, Kind::ALL.len(), "estimators whose row in the list this test has found");
     let of = |kind: &str| without.iter().find(|(name, _)| *name == kind).unwrap().1.clone();
     let feedback = format!("without the frame term, to {}", of("VoltageFeedback"));
     assert!(head("voltage_feedback").contains(&feedback), "{feedback}");
@@ -205,8 +221,8 @@ fn pages_stand_alone() {
     let drawn =
         |svg: &str, name: &str| svg.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(|word| word == name);
     for (name, svg) in [
-        ("PmsmPlant", include_str!("../drive/docs/pmsm_plant.svg")),
-        ("SensorlessController", include_str!("../drive/docs/sensorless_controller.svg")),
+        ("PmsmPlant", include_str!("../drive/plant/docs/pmsm_plant.svg")),
+        ("SensorlessController", include_str!("../drive/control/docs/sensorless_controller.svg")),
         ("PmsmDrive", include_str!("../drive/docs/pmsm_drive.svg")),
     ] {
         for standard in ["fmi2", "fmi3"] {
@@ -268,7 +284,7 @@ fn pages_in_a_browser() {
             &["--html", &path("run.html"), "--csv", &path("run.csv")],
         ]
         .concat(),
-        vec!["compare", "--scenario", "ramp,reversal,load-0,signal,signal-trace", "--out", &path("compare")],
+        vec!["compare", "--experiment", "ramp,reversal,load-0,signal,signal-trace", "--out", &path("compare")],
         vec!["reproduce", "--out", &path("reproduce")],
         vec!["atlas", "--every", "20", "--out", &path("atlas")],
     ]
@@ -312,4 +328,43 @@ fn links_lead_somewhere() {
         }
     }
     assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+/// Doc comments, messages and pages are written in plain sentences: what each pattern stands for has a better word.
+#[test]
+fn sentences_have_no_pattern_of_the_list() {
+    let mut wrong = Vec::new();
+    for path in words::sources(root()) {
+        let name = path.strip_prefix(root()).unwrap();
+        let texts = words::texts(&path);
+        let found = texts.iter().filter_map(|(line, text)| Some((line, words::pattern(text)?)));
+        wrong.extend(found.map(|(line, why)| format!("{}:{line}: {why}", name.display())));
+    }
+    assert!(wrong.is_empty(), "rewrite these sentences:\n{}", wrong.join("\n"));
+}
+
+/// The patterns are found where they stumble, and not where they are plain English.
+#[test]
+fn patterns_are_found() {
+    for wrong in [
+        "The same with more children.",
+        "Reads a file. The same for a folder.",
+        "As [`printable`], for several lines.",
+        "Of one call.",
+        "a value that is no number",
+        "The energies are no states.",
+        "what it reads belongs into a field",
+        "a step is told as lost",
+    ] {
+        assert!(words::pattern(wrong).is_some(), "{wrong}");
+    }
+    for plain in [
+        "there is no such check",
+        "It is no longer needed.",
+        "Compares runs of the same FMU.",
+        "A limit as large as the value.",
+        "a size is no more than the limit",
+    ] {
+        assert_eq!(words::pattern(plain), None, "{plain}");
+    }
 }

@@ -7,15 +7,15 @@ mod common;
 
 use common::{Native, error, pair, run};
 use drive::Pair;
-use drive_study::reproduce::scenario::{ALL, ClosedLoop, RPM, Scenario};
-use drive_study::reproduce::{figures, scenario};
+use drive_study::reproduce::experiment::{ALL, ClosedLoop, Experiment, RPM};
+use drive_study::reproduce::{experiment, figures};
 
 /// Communication step: the controller's sample period.
 const T_S: f64 = 1e-4;
 
-fn check(scenario: &Scenario, h: f64) {
-    let trace = Native.run(scenario, h).unwrap();
-    let figures = figures::of(scenario.id, &trace);
+fn check(experiment: &Experiment, h: f64) {
+    let trace = Native.run(experiment, h).unwrap();
+    let figures = figures::of(experiment.id, &trace);
     assert!(!figures.is_empty());
     for f in figures {
         assert!(f.holds(), "Fig. {}, {}: {} {}, expected {}", f.figure, f.quantity, f.measured, f.unit, f.expected);
@@ -28,28 +28,28 @@ fn near(what: &str, measured: f64, expected: f64, tolerance: f64) {
 
 #[test]
 fn f01_start_from_180_degrees_and_second_start() {
-    check(&scenario::START, T_S);
+    check(&experiment::START, T_S);
 }
 
 #[test]
 fn f03_20_rpm() {
-    check(&scenario::STEP_20, T_S);
+    check(&experiment::STEP_20, T_S);
     // With the exact resistance the creep error is gone.
-    let exact = Scenario { controller: &[("motor.R_s", 2.0)], duration: 2.0, ..scenario::STEP_20 };
+    let exact = Experiment { controller: &[("motor.R_s", 2.0)], duration: 2.0, ..experiment::STEP_20 };
     let trace = Native.run(&exact, T_S).unwrap();
     near("angle error at 20 rpm, exact R", *trace.error.last().unwrap(), 0.0, 0.1);
 }
 
 #[test]
 fn f04_speed_steps_both_ways() {
-    for scenario in [scenario::STEP_500, scenario::STEP_1000, scenario::STEP_1500] {
-        check(&scenario, T_S);
-        let forward = Native.run(&scenario, T_S).unwrap();
+    for experiment in [experiment::STEP_500, experiment::STEP_1000, experiment::STEP_1500] {
+        check(&experiment, T_S);
+        let forward = Native.run(&experiment, T_S).unwrap();
         let mut backward = pair(&[], &[]);
         let mut worst = 0.0_f64;
         let mut k = 0;
-        run(&mut backward, T_S, scenario.duration, |t, p| {
-            p.controller.model.inputs.speed_ref = -scenario::at(scenario.speed_ref, t) * RPM;
+        run(&mut backward, T_S, experiment.duration, |t, p| {
+            p.controller.model.inputs.speed_ref = -experiment::at(experiment.speed_ref, t) * RPM;
             worst = worst.max((p.plant.out.speed / RPM + forward.speed[k]).abs());
             k += 1;
         });
@@ -59,7 +59,7 @@ fn f04_speed_steps_both_ways() {
 
 #[test]
 fn f05_load_at_standstill() {
-    check(&scenario::LOAD_0, T_S);
+    check(&experiment::LOAD_0, T_S);
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn f06_pull_out_torque_is_proportional_to_i_0() {
 
 #[test]
 fn f07_load_at_1000_rpm() {
-    check(&scenario::LOAD_1000, T_S);
+    check(&experiment::LOAD_1000, T_S);
 }
 
 #[test]
@@ -236,13 +236,13 @@ fn with_step(h: f64, speed: f64) -> (f64, f64, Pair) {
 #[test]
 fn communication_step_of_a_divisor_changes_nothing() {
     for divisor in [2.0, 3.0, 7.0] {
-        let reference = Native.run(&scenario::STEP_1000, T_S).unwrap();
-        let finer = Native.run(&scenario::STEP_1000, T_S / divisor).unwrap();
+        let reference = Native.run(&experiment::STEP_1000, T_S).unwrap();
+        let finer = Native.run(&experiment::STEP_1000, T_S / divisor).unwrap();
         let apart = reference.speed.iter().zip(&finer.speed).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(apart < 1e-5, "h = T_s/{divisor}: {apart} rpm apart");
     }
-    for scenario in &ALL {
-        check(scenario, T_S / 2.0);
+    for experiment in &ALL {
+        check(experiment, T_S / 2.0);
     }
 }
 
@@ -253,9 +253,9 @@ fn communication_step_of_three_samples() {
         near("steady angle error at 3 T_s", steady, expected, 0.2);
         assert!(peak < 11.0, "peak angle error {peak} deg at {speed} rpm");
     }
-    check(&scenario::LOAD_0, 3e-4);
-    let trace = Native.run(&scenario::START, 3e-4).unwrap();
-    let settled = figures::start(&trace).into_iter().find(|f| f.quantity.contains("below 5°")).unwrap();
+    check(&experiment::LOAD_0, 3e-4);
+    let trace = Native.run(&experiment::START, 3e-4).unwrap();
+    let settled = figures::of("start-180", &trace).into_iter().find(|f| f.quantity.contains("below 5°")).unwrap();
     near("start from 180 deg at 3 T_s", settled.measured, 0.18, 0.03);
 }
 

@@ -161,7 +161,7 @@ fn what_cannot_be_made_is_refused_in_one_line() {
         ("test", "is a name of Rust or Cargo: take another name, for example test-model"),
         ("serde", "is a package that the FMU itself needs: take another name, for example serde-model"),
         ("syn", "is a package that the FMU itself needs"),
-        ("there", "exists already: take another name, or remove it"),
+        ("there", "already exists: take another name, or remove it"),
         (&"x".repeat(65), "has 65 characters: 64 are allowed"),
     ] {
         refused(dir.path(), name, part);

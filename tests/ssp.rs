@@ -172,7 +172,7 @@ fn omsimulator_runs_it_as_it_is() {
             "name=\"tau.load\" kind=\"input\"",
             "ComRef.cpp: tau.load is no identifier",
         ),
-        ("<ssc:Boolean/>", "", "Connector.cpp: enabled has no type"),
+        ("<ssc:Boolean/>", "", "Connector.cpp: voltage_limited has no type"),
         ("oms-ma", "oms-mav", "SystemWC.cpp: the master oms-mav"),
     ] {
         let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", old, new);
@@ -372,7 +372,11 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "units are not converted"]);
     let (old, new) = ("implementation=\"CoSimulation\"", "implementation=\"ModelExchange\"");
     let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", old, new);
-    fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "is no Co-Simulation: simulate it with --me"]);
+    fails(
+        &["simulate", &path],
+        2,
+        &["x.ssp: SystemStructure.ssd: line", "is not Co-Simulation: simulate it with --me"],
+    );
     let plain = folder().join("plain.ssp");
     std::fs::write(&plain, "hello").unwrap();
     fails(&["simulate", plain.to_str().unwrap()], 2, &["plain.ssp: not a ZIP archive"]);

@@ -381,7 +381,12 @@ fn a_wrong_row_is_an_error_at_its_place() {
             "a: the product of the extents",
             5,
         ),
-        ("tuned", r#"V::text_parameter("t", "", |m| &mut m.t).tunable()"#, "t: only a parameter that is no text", 5),
+        (
+            "tuned",
+            r#"V::text_parameter("t", "", |m| &mut m.t).tunable()"#,
+            "t: only a parameter of a type other than text",
+            5,
+        ),
         ("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
         ("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
         // These two show in the table, whose start is in line 3.

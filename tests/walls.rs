@@ -13,13 +13,20 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-import", &["fmu-core", "model-description"]),
     ("fmu-sweep", &["fmu-import", "model-description"]),
     ("fmu-check", &["fmu-import", "model-description"]),
-    ("drive", &["fmu-core"]),
-    ("drive-study", &["drive", "fmu-core", "fmu-import"]),
+    ("fmu-plot", &[]),
+    ("drive-base", &["fmu-core"]),
+    ("drive-control", &["drive-base", "fmu-core"]),
+    ("drive-plant", &["drive-base", "fmu-core"]),
+    ("drive", &["drive-base", "drive-control", "drive-plant", "fmu-core"]),
+    ("drive-study", &["drive", "fmu-core", "fmu-import", "fmu-plot"]),
     ("pmsm-plant", &["drive", "fmu-export"]),
     ("sensorless-controller", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
     ("fmurun", &["fmu-import", "fmu-sweep", "model-description"]),
-    ("fmu", &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "fmu-sweep", "model-description"]),
+    (
+        "fmu",
+        &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "fmu-plot", "fmu-sweep", "model-description"],
+    ),
 ];
 
 fn root() -> &'static Path {
@@ -74,7 +81,7 @@ fn known_to(name: &str) -> BTreeSet<String> {
 fn the_checker_knows_no_motor_and_no_plotter() {
     let known = known_to("fmu-check");
     assert!(known.contains("fmu-import") && known.contains("quick-xml"), "{known:?}");
-    for foreign in ["drive", "drive-study", "nalgebra", "resvg", "libm"] {
+    for foreign in ["drive", "drive-study", "fmu-plot", "nalgebra", "resvg", "libm"] {
         assert!(!known.contains(foreign), "fmu-check depends on {foreign}");
     }
 }
@@ -84,7 +91,7 @@ fn the_checker_knows_no_motor_and_no_plotter() {
 fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
     let known = known_to("fmu-sweep");
     assert!(known.contains("fmu-import") && known.contains("libm"), "{known:?}");
-    for foreign in ["drive", "drive-study", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
+    for foreign in ["drive", "drive-study", "fmu-plot", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
         assert!(!known.contains(foreign), "fmu-sweep depends on {foreign}");
     }
 }
@@ -137,6 +144,21 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
     }
 }
 
+/// An estimator checks a small view of the controller, so the controller knows the estimators and they do not know it.
+#[test]
+fn an_estimator_does_not_know_the_controller() {
+    let mut files = Vec::new();
+    sources(&root().join("drive/control/src/estimator"), &mut files);
+    assert!(files.len() > 25, "{files:?}");
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        for path in text.split("crate::").skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_')) {
+            let module = path.into_iter().next().unwrap();
+            assert!(module == "estimator", "{} knows the controller by crate::{module}", file.display());
+        }
+    }
+}
+
 /// A file of the checker names the module that a type lives in; types at the root would tie all files into one circle.
 #[test]
 fn no_module_of_the_checker_depends_on_its_root() {
@@ -154,5 +176,43 @@ fn no_module_of_the_checker_depends_on_its_root() {
             file.display(),
             named.unwrap().lines().next().unwrap()
         );
+    }
+}
+
+/// What a crate makes public has one name: a word means one thing.
+#[test]
+fn no_two_public_types_of_a_crate_share_a_name() {
+    for (name, (folder, _)) in &crates() {
+        let (mut files, mut found) = (Vec::new(), BTreeMap::new());
+        if folder.join("src").is_dir() {
+            sources(&folder.join("src"), &mut files);
+        }
+        for file in files {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+            for line in code.lines().filter_map(|line| line.trim().strip_prefix("pub ")) {
+                let kinds = ["struct ", "enum ", "trait ", "type ", "union "];
+                let Some(rest) = kinds.iter().find_map(|kind| line.strip_prefix(kind)) else { continue };
+                let of = rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap().to_owned();
+                let other = found.insert(of.clone(), file.clone());
+                assert!(other.is_none(), "{name}: {of} is in {} and in {}", file.display(), other.unwrap().display());
+            }
+        }
+    }
+}
+
+/// A line of source fits a screen; the rows of a long table are several lines each.
+#[test]
+fn no_line_is_longer_than_160_characters() {
+    for (folder, _) in crates().values() {
+        let mut files = Vec::new();
+        for part in ["src", "tests", "benches"].map(|part| folder.join(part)).iter().filter(|part| part.is_dir()) {
+            sources(part, &mut files);
+        }
+        for file in files {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let long = text.lines().position(|line| line.chars().count() > 160).map(|at| at + 1);
+            assert!(long.is_none(), "{}:{}", file.display(), long.unwrap());
+        }
     }
 }

@@ -1,64 +1,56 @@
-//! The colors of all plots and pages, in one place.
+//! The colors of the estimators, in every figure and on every page: the class of an estimator chooses the tones, its place
+//! among the estimators of these tones chooses the color. A new estimator takes the first color that is not in use.
 
-use drive::estimator::Kind;
+use drive::estimator::{Class, Kind};
+use fmu_plot::ink::Ink;
 
-/// A color as `#rrggbb`.
-pub type Ink = &'static str;
+/// Light tones for the estimators that follow the back EMF.
+const LIGHT: &[Ink] = &[
+    "#dc5d63", "#d66919", "#0593e6", "#16a56e", "#c063ba", "#b08505", "#179fa5", "#847ae8", "#769c03", "#f00cf0",
+    "#f03ca8", "#b286a7",
+];
 
-/// Curves that have no color of their own: distinguishable with color blindness (Okabe and Ito; the blue lighter, for dark paper).
-pub const CURVES: [Ink; 7] = ["#0a80c4", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#808080"];
+/// Dark tones for the others.
+const DARK: &[Ink] =
+    &["#0775b9", "#ae520a", "#0d8557", "#a1469c", "#8d6a06", "#695dc8", "#bb3e48", "#a40cf0", "#0c58f0", "#735e7d"];
 
-/// References and what frames others.
-pub const REFERENCE: Ink = CURVES[6];
+/// Gray for the sensor, with which all others are compared.
+const SENSOR: &[Ink] = &["#7d8489"];
 
-/// The color of an estimator, in every plot and on every page, with a contrast of at least 3 to white and to the dark paper:
-/// light tones for those that follow the back EMF, dark ones for the others. A variant has the color of its estimator and a dashed line.
-pub fn of(kind: Kind) -> Ink {
-    match kind {
-        Kind::DirectEmf => "#dc5d63",
-        Kind::EmfObserver => "#d66919",
-        Kind::ExtendedEmf => "#0593e6",
-        Kind::VoltageModel => "#16a56e",
-        Kind::CurrentModel => "#c063ba",
-        Kind::VoltageFeedback => "#b08505",
-        Kind::KalmanFilter => "#179fa5",
-        Kind::GradientObserver => "#847ae8",
-        Kind::SlidingMode => "#769c03",
-        Kind::Rasmussen => "#0775b9",
-        Kind::FluxObserver => "#bb3e48",
-        Kind::RotatingInjection => "#ae520a",
-        Kind::PulsatingInjection => "#0d8557",
-        Kind::SquareWaveInjection => "#a1469c",
-        Kind::NearPwmInjection => "#8d6a06",
-        Kind::Hybrid => "#695dc8",
-        Kind::Sensored => "#7d8489",
+fn tones(kind: Kind) -> &'static [Ink] {
+    match kind.class() {
+        Class::BackEmf => LIGHT,
+        Class::Sensored => SENSOR,
+        Class::FluxObserver | Class::Injection | Class::Hybrid => DARK,
     }
+}
+
+/// The color of an estimator. A variant has the color of its estimator and a dashed line.
+pub fn of(kind: Kind) -> Ink {
+    let tones = tones(kind);
+    let before = Kind::ALL.iter().take_while(|other| **other != kind);
+    tones[before.filter(|other| self::tones(**other) == tones).count() % tones.len()]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fmu_plot::ink::{PAPERS, contrast};
 
-    /// Relative luminance and contrast of WCAG 2.2.
-    fn contrast(one: &str, other: &str) -> f64 {
-        let luminance = |ink: &str| {
-            let part = |at: usize| {
-                let x = f64::from(u8::from_str_radix(&ink[at..at + 2], 16).unwrap()) / 255.0;
-                if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
-            };
-            0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5) + 0.05
-        };
-        let (a, b) = (luminance(one), luminance(other));
-        a.max(b) / a.min(b)
+    #[test]
+    fn every_estimator_has_a_color_of_its_own() {
+        for (k, kind) in Kind::ALL.iter().enumerate() {
+            let twin = Kind::ALL[..k].iter().find(|other| of(**other) == of(*kind));
+            assert!(twin.is_none(), "{kind:?} has the color of {twin:?}: append a color to LIGHT or DARK");
+        }
+        assert_eq!((of(Kind::Rasmussen), of(Kind::SlidingMode)), ("#0775b9", "#769c03"));
     }
 
     #[test]
-    fn every_estimator_has_a_color_of_its_own_that_is_seen_on_both_papers() {
-        let inks: Vec<Ink> = Kind::ALL.iter().map(|kind| of(*kind)).collect();
-        for (k, ink) in inks.iter().enumerate() {
-            assert!(!inks[k + 1..].contains(ink), "{ink} twice");
-            for paper in ["#ffffff", "#15191c"] {
-                assert!(contrast(ink, paper) > 3.0, "{ink} on {paper}: {}", contrast(ink, paper));
+    fn every_color_is_seen_on_both_papers() {
+        for ink in [LIGHT, DARK, SENSOR].concat() {
+            for paper in PAPERS {
+                assert!(contrast(ink, paper) > 3.0, "{ink} on {paper}: {:.2}", contrast(ink, paper));
             }
         }
     }

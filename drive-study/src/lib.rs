@@ -1,7 +1,10 @@
-//! Studies of the drive: [`reproduce`], the paper's experiments with packed FMUs; [`compare`], the estimators side by
-//! side; [`atlas`], what wrong estimates lose at low speed; [`tune`], parameter values for a machine; [`runner`], the closed loop that they share; [`plane`], torque over speed.
+//! Studies of the drive. They share the closed loop of [`runner`] and the colors of [`ink`].
 //!
-//! [`figure`]: what a plot shows; [`plot`] draws it as SVG, [`page`] as a page with zoom; [`ink`]: the colors of both.
+//! - [`reproduce`]: the paper's experiments with packed FMUs.
+//! - [`compare`]: the estimators side by side.
+//! - [`atlas`]: what wrong estimates of resistance and magnet flux lose at low speed.
+//! - [`tune`]: parameter values for a machine.
+//! - [`plane`]: torque and losses over speed, drawn for the documentation.
 
 #![forbid(unsafe_code)]
 // The papers' symbols keep their case: J, T_s.
@@ -9,12 +12,11 @@
 
 pub mod atlas;
 pub mod compare;
-pub mod figure;
+pub mod expected;
 pub mod ink;
-pub mod overview;
-pub mod page;
+mod output;
 pub mod plane;
-pub mod plot;
+pub mod queue;
 pub mod reproduce;
 pub mod runner;
 pub mod tune;

@@ -3,9 +3,9 @@
 //!
 //! To stack quantities, a [`Panel`] fills their sums down to zero, the greatest first.
 //!
-//! Steady state of a drive whose controller gets the torque `tau` and knows the machine but no losses: i is the current for
-//! `tau` under the voltage of field weakening at the samples. The voltage is held over T_s while the rotor turns, so that the
-//! mean current is i_s. With g = G w
+//! Steady state of a drive whose controller gets the torque `tau` and knows the machine but not the losses: at the samples, i is
+//! the current for `tau` under the voltage of field weakening. The voltage is held over T_s while the rotor turns; the mean
+//! current is i_s. With g = G w
 //!
 //! ```text
 //! i_s = i + j w u T_s^2 / (12 L)
@@ -15,16 +15,16 @@
 //!
 //! u_on, r_on of transistor and diode alike, so the duty cycle has no influence; k is the switching loss per ampere.
 
-use crate::figure::{Curve, Figure, Panel};
-use crate::ink::{CURVES, Ink};
 use crate::runner;
 use anyhow::{Result, anyhow};
 use drive::Pair;
-use drive::control::envelope::{Envelope, Limit, Warm};
+use drive::control::envelope::{Envelope, Limit};
 use drive::estimator::Kind;
 use drive::frame::{Dq, DqHat};
 use drive::plant::losses::{Losses, efficiency, switching};
 use drive::plant::machine;
+use fmu_plot::figure::{Curve, Figure, Panel};
+use fmu_plot::ink::{CURVES, Ink};
 use std::f64::consts::PI;
 
 const RPM: f64 = PI / 30.0;
@@ -41,10 +41,10 @@ fn area(name: &str, ink: Ink, fill: f64, points: impl Iterator<Item = (f64, f64)
 
 /// The drive in steady state.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Point {
+pub struct OperatingPoint {
     /// Speed in rpm.
     pub rpm: f64,
-    /// Torque that the controller is asked for, in N.m.
+    /// Torque reference of the controller in N.m.
     pub tau: f64,
     /// Electromagnetic torque in N.m.
     pub tau_e: f64,
@@ -79,7 +79,7 @@ impl Reference {
         Self { pair, envelope, U }
     }
 
-    /// The same with losses of iron and inverter; the values are assumed.
+    /// The drive with assumed losses of iron and inverter.
     fn lossy() -> Self {
         let mut drive = Self::new();
         let plant = &mut drive.pair.plant.model.parameters;
@@ -95,11 +95,9 @@ impl Reference {
         f64::from(self.pair.plant.model.parameters.motor.n_p) * rpm * RPM
     }
 
-    /// The limit of the sign `s`.
+    /// The greatest torque of the sign `s`.
     fn limit(&self, rpm: f64, s: f64) -> Limit {
-        let mut warm = Warm::default();
-        let limits = (0..8).map(|_| self.envelope.limit(self.electrical(rpm), s, self.U, &mut warm));
-        limits.last().unwrap_or_default()
+        runner::settled_limit(&self.envelope, self.electrical(rpm), s, self.U)
     }
 
     /// The current (A) for `tau` (N.m): i_d = 0 where the voltage suffices, because L_d = L_q.
@@ -118,7 +116,7 @@ impl Reference {
     }
 
     /// The steady state by the equations, for the torque `tau` (N.m) of the controller.
-    fn steady(&self, rpm: f64, tau: f64) -> Point {
+    fn steady(&self, rpm: f64, tau: f64) -> OperatingPoint {
         let plant = &self.pair.plant.model;
         let (par, motor) = (&plant.parameters, &plant.parameters.motor);
         let (sampled, w) = (self.current(rpm, tau), self.electrical(rpm));
@@ -143,17 +141,17 @@ impl Reference {
             friction: friction * rpm * RPM,
         };
         let (tau_shaft, p_mech) = (tau_e - friction, (tau_e - friction) * rpm * RPM);
-        Point { rpm, tau, tau_e, tau_shaft, losses, efficiency: efficiency(p_mech + losses.sum(), p_mech) }
+        OperatingPoint { rpm, tau, tau_e, tau_shaft, losses, efficiency: efficiency(p_mech + losses.sum(), p_mech) }
     }
 
     /// The steady state with the torque `wanted` (N.m) at the shaft, or else with the greatest one of this sign.
-    fn at_shaft(&self, rpm: f64, wanted: f64) -> Point {
+    fn at_shaft(&self, rpm: f64, wanted: f64) -> OperatingPoint {
         let end = |s: f64| s * self.limit(rpm, s).tau;
         self.steady(rpm, bisect(end(-1.0), end(1.0), |tau| self.steady(rpm, tau).tau_shaft < wanted))
     }
 
     /// The steady state of the running drive: means of the last tenth of 0.5 s.
-    fn run(&self, rpm: f64, tau: f64) -> Result<Point> {
+    fn run(&self, rpm: f64, tau: f64) -> Result<OperatingPoint> {
         let (mut pair, mut n, mut torque, mut p_in, mut p_mech) = (self.pair.clone(), 0.0, 0.0, 0.0, 0.0);
         let mut losses = Losses::none();
         let survived = runner::run_in_steps(&mut pair, 1e-4, 0.5, |t, pair| {
@@ -172,11 +170,11 @@ impl Reference {
             return Err(anyhow!("a step failed at {rpm} rpm"));
         }
         let (tau_shaft, efficiency) = (p_mech / n / (rpm * RPM), efficiency(p_in, p_mech));
-        Ok(Point { rpm, tau, tau_e: torque / n, tau_shaft, losses: losses.map(|sum| sum / n), efficiency })
+        Ok(OperatingPoint { rpm, tau, tau_e: torque / n, tau_shaft, losses: losses.map(|sum| sum / n), efficiency })
     }
 }
 
-/// Where `holds` ends to be true, between `low` and `high`.
+/// The greatest value between `low` and `high` up to which `holds` is true.
 fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..60 {
         let mid = 0.5 * (low + high);
@@ -229,14 +227,14 @@ pub fn envelope(measured: &[f64]) -> Result<Plane> {
 /// The losses of the reference drive at one torque over the speed.
 #[derive(Clone, Debug)]
 pub struct Split {
-    /// Speed in rpm above which the voltage takes field weakening at this torque.
+    /// Speed in rpm above which this torque needs field weakening.
     pub onset: f64,
     /// Speed in rpm above which the drive has less than this torque.
     pub end: f64,
     /// Losses, stacked, and efficiency.
     pub panels: [Panel; 2],
     /// By the equations and of the running drive, at each speed that was measured.
-    pub points: Vec<[Point; 2]>,
+    pub points: Vec<[OperatingPoint; 2]>,
 }
 
 /// The losses of the reference drive with `torque` (N.m) at the shaft, or the greatest torque where this is less, up to
@@ -253,13 +251,13 @@ pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
     let onset = bisect(0.0, highest, |rpm| drive.current(rpm, at(rpm).tau).d() == 0.0);
     let mut points = Vec::new();
     for &rpm in measured {
-        // The reference as the page writes it.
+        // The page shows the reference with three decimals.
         let tau = (at(rpm).tau * 1e3).round() / 1e3;
         points.push([at(rpm), drive.run(rpm, tau)?]);
     }
-    let curves: Vec<Point> = (0..=200).map(|k| at(highest * f64::from(k) / 200.0)).collect();
-    // From the axis up.
-    let sums = |p: &Point| {
+    let curves: Vec<OperatingPoint> = (0..=200).map(|k| at(highest * f64::from(k) / 200.0)).collect();
+    // Stacked from the axis upward.
+    let sums = |p: &OperatingPoint| {
         let Losses { cu, iron, cond, sw, .. } = p.losses;
         [cu, cu + iron, cu + iron + cond, cu + iron + cond + sw, p.losses.sum()]
     };
@@ -275,7 +273,7 @@ pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
         dots: points.iter().flat_map(|[_, run]| sums(run).map(|sum| (run.rpm, sum))).collect(),
         marks: vec![(onset, "field weakening".into()), (end, format!("{limit} A"))],
     };
-    let percent = |p: &Point| (p.rpm, 100.0 * p.efficiency);
+    let percent = |p: &OperatingPoint| (p.rpm, 100.0 * p.efficiency);
     let efficiency = Panel {
         title: title("efficiency"),
         unit: "efficiency in %".into(),

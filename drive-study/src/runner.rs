@@ -1,8 +1,10 @@
-//! The test bench of the Kim & Sul figures: the 2.2 kW machine, a preset per estimator, and the measurements of a run.
+//! The closed loop on a test bench: a [`Bench`] follows a course of speed and load, and shows each [`Moment`] of its run.
+//! Presets of the 2.2 kW machine, one per estimator, with the gains behind the figures of the Kim & Sul review.
 //!
 //! Speeds are relative to rated speed, torques to rated torque (pu); angle errors are theta - theta^ in degrees, as in
 //! Kim & Sul.
 
+use drive::control::envelope::{Envelope, Limit, WarmStart};
 use drive::estimator::Kind;
 use drive::estimator::kalman::KalmanParameters;
 use drive::estimator::tracker::TrackerKind;
@@ -16,8 +18,6 @@ use std::f64::consts::TAU;
 pub const RATED_SPEED: f64 = TAU * 25.0;
 /// Rated torque in N.m.
 pub const RATED_TORQUE: f64 = 14.0;
-/// Voltage that an inverter leg loses to 2 us dead time, in V.
-const U_DEAD: f64 = 10.8;
 
 /// The 2.2 kW machine with interior magnets.
 pub fn machine() -> Motor {
@@ -40,12 +40,12 @@ pub fn drive(kind: Kind) -> Pair {
     (par.motor, par.J) = (machine(), 15e-3);
     par.current.bandwidth = TAU * 200.0;
     par.current.active_resistance = true;
-    // Its figures are those of the low-speed law alone.
+    // The figures of the flux observer are those of its low-speed law alone.
     par.current.mtpa = kind != Kind::FluxObserver;
     (par.speed_loop.bandwidth, par.speed_loop.t_is, par.speed_loop.b) = (TAU * 5.0, 4.0, 1.0);
     (par.limit.i_q, par.limit.i, par.limit.tau) = (15.0, 15.0, 1.6 * RATED_TORQUE);
     (par.sensor.noise, par.sensor.resolution) = (0.01, 40.0 / 4096.0);
-    // The error left by an uncompensated dead time is no sign of a lost rotor.
+    // The error of an uncompensated dead time must not look like a lost rotor.
     par.lock.u = 15.0;
     (par.start.i, par.start.speed) = (8.0, 0.15 * RATED_SPEED);
     let w = 0.05 * 3.0 * RATED_SPEED;
@@ -86,8 +86,10 @@ pub fn with_mechanical_observer(mut pair: Pair, bandwidth: f64) -> Pair {
 
 /// Dead time of 2 us in the inverter, compensated in the controller or not.
 pub fn with_dead_time(mut pair: Pair, compensated: bool) -> Pair {
-    pair.plant.model.parameters.inverter.dead_time = 2e-6;
-    pair.controller.model.parameters.compensation.u_dead = if compensated { U_DEAD } else { 0.0 };
+    let plant = &mut pair.plant.model;
+    plant.parameters.inverter.dead_time = 2e-6;
+    let u_dead = plant.parameters.inverter.u_dead(plant.inputs.u_dc);
+    pair.controller.model.parameters.compensation.u_dead = if compensated { u_dead } else { 0.0 };
     pair
 }
 
@@ -107,9 +109,77 @@ pub fn turning(mut pair: Pair, speed: f64) -> Pair {
     pair
 }
 
+/// A drive at rest, and what 1 pu of its speed and of its load is.
+#[derive(Clone)]
+pub struct Bench {
+    /// Plant and controller.
+    pub pair: Pair,
+    /// Rated mechanical speed in rad/s.
+    pub speed: f64,
+    /// Rated torque in N.m.
+    pub torque: f64,
+}
+
+/// A run at one sample.
+#[derive(Clone, Copy)]
+pub struct Moment<'a> {
+    /// Time in s.
+    pub t: f64,
+    /// Speed reference in pu.
+    pub reference: f64,
+    /// True speed in pu.
+    pub speed: f64,
+    /// Angle of the rotor ahead of the estimate: theta - theta^ in rad, wrapped.
+    pub theta_tilde: f64,
+    /// Plant and controller.
+    pub pair: &'a Pair,
+}
+
+impl Moment<'_> {
+    /// Angle error theta - theta^ in deg, wrapped.
+    pub fn error(&self) -> f64 {
+        self.theta_tilde.to_degrees()
+    }
+
+    /// Deviation of the speed from its reference in pu.
+    pub fn deviation(&self) -> f64 {
+        self.speed - self.reference
+    }
+}
+
+impl Bench {
+    /// Runs for `duration` (s) in steps of the sample period. Before every step and at the end, `course` gives speed reference and
+    /// load in pu, and `see` gets the moment. Returns false when a step fails, which means that the drive was lost.
+    ///
+    /// # Errors
+    /// The parameters are inconsistent.
+    pub fn run(
+        &self,
+        duration: f64,
+        mut course: impl FnMut(f64, &mut Pair) -> (f64, f64),
+        mut see: impl FnMut(&Moment<'_>),
+    ) -> Result<bool, Fault> {
+        let mut pair = self.pair.clone();
+        let T_s = pair.controller.model.parameters.T_s;
+        run_in_steps(&mut pair, T_s, duration, |t, pair| {
+            let (reference, load) = course(t, pair);
+            pair.controller.model.inputs.speed_ref = reference * self.speed;
+            pair.plant.model.inputs.tau_load = load * self.torque;
+            let (plant, controller) = (&pair.plant.out, &pair.controller.out);
+            let (speed, theta_tilde) = (plant.speed / self.speed, wrap(plant.theta_e - controller.theta_est));
+            see(&Moment { t, reference, speed, theta_tilde, pair });
+        })
+    }
+}
+
 /// Linear ramp from `a` at time `from` to `b` at time `to`, constant outside.
 pub fn line(t: f64, from: f64, a: f64, to: f64, b: f64) -> f64 {
     a + (b - a) * ((t - from) / (to - from)).clamp(0.0, 1.0)
+}
+
+/// 0 before the time `from`, 1 from then on. The exact instants of the samples are above or below by rounding.
+pub fn step(t: f64, from: f64) -> f64 {
+    if t >= from - 1e-9 { 1.0 } else { 0.0 }
 }
 
 /// Angle of the rotor ahead of the estimate: theta - theta^ in deg, wrapped.
@@ -117,7 +187,7 @@ pub fn rotor_ahead(pair: &Pair) -> f64 {
     wrap(pair.plant.out.theta_e - pair.controller.out.theta_est).to_degrees()
 }
 
-/// True speed in pu.
+/// True speed in pu of the 2.2 kW machine.
 pub fn speed(pair: &Pair) -> f64 {
     pair.plant.out.speed / RATED_SPEED
 }
@@ -146,7 +216,8 @@ pub fn run_in_steps(
     Ok(true)
 }
 
-/// The same, in steps of the sample period.
+/// Runs a pair for `duration` (s) in steps of the sample period; `each` gets the pair and the time before every step and at the
+/// end.
 ///
 /// # Panics
 /// If the parameters are inconsistent.
@@ -179,78 +250,20 @@ impl Statistics {
         self.sum / self.n
     }
 
+    /// Root mean square.
+    pub fn rms(&self) -> f64 {
+        (self.squares / self.n).sqrt()
+    }
+
+    /// Number of values.
+    pub fn count(&self) -> f64 {
+        self.n
+    }
+
     /// Standard deviation.
     pub fn std(&self) -> f64 {
         (self.squares / self.n - self.mean() * self.mean()).max(0.0).sqrt()
     }
-}
-
-/// A load that ramps to `load` (pu) between 0.1 and 0.4 s.
-fn ramp(load: f64, t: f64) -> f64 {
-    load * RATED_TORQUE * ((t - 0.1) / 0.3).clamp(0.0, 1.0)
-}
-
-/// The steady state at `speed` and `load` (pu).
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Steady {
-    /// Angle error in deg.
-    pub error: Statistics,
-    /// Deviation of the true speed from its reference in pu.
-    pub speed: Statistics,
-}
-
-impl Steady {
-    /// Whether the drive follows speed and rotor.
-    pub fn holds(&self) -> bool {
-        self.error.peak < 30.0 && self.speed.peak < 0.02
-    }
-}
-
-/// Runs at `speed`, takes `load` (both pu), settles until 2 s and measures for 0.5 s.
-pub fn steady(pair: Pair, speed: f64, load: f64) -> Steady {
-    let (mut pair, mut steady) = (turning(pair, speed), Steady::default());
-    run(&mut pair, 2.5, |t, p| {
-        p.plant.model.inputs.tau_load = ramp(load, t);
-        if t > 2.0 {
-            steady.error.add(rotor_ahead(p));
-            steady.speed.add(self::speed(p) - speed);
-        }
-    });
-    steady
-}
-
-/// Takes rated load at 0.5 pu, slows down to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and measures for 0.5 s.
-pub fn slowed_down(pair: Pair, speed: f64) -> Steady {
-    let (mut pair, mut steady) = (turning(pair, 0.5), Steady::default());
-    let arrival = 1.2 + (0.5 - speed) / 0.5;
-    run(&mut pair, arrival + 2.0, |t, p| {
-        p.plant.model.inputs.tau_load = ramp(1.0, t);
-        p.controller.model.inputs.speed_ref = RATED_SPEED * (0.5 - 0.5 * (t - 1.2)).clamp(speed, 0.5);
-        if t > arrival + 1.5 {
-            steady.error.add(rotor_ahead(p));
-            steady.speed.add(self::speed(p) - speed);
-        }
-    });
-    steady
-}
-
-/// Lowest of the `speeds` (pu, descending) down to which rated load is held.
-pub fn lowest_speed(pair: &Pair, speeds: &[f64]) -> Option<f64> {
-    speeds.iter().copied().take_while(|&speed| slowed_down(pair.clone(), speed).holds()).last()
-}
-
-/// A load step at `speed` (pu): dip of the true speed in pu, peak angle error in deg relative to its mean before the
-/// step.
-pub fn load_step(pair: Pair, speed: f64, load: f64) -> (f64, f64) {
-    let (mut pair, mut dip, mut peak) = (turning(pair, speed), 0.0_f64, 0.0_f64);
-    run(&mut pair, 2.0, |t, p| {
-        p.plant.model.inputs.tau_load = if t >= 0.5 - 1e-9 { load * RATED_TORQUE } else { 0.0 };
-        if t > 0.5 {
-            dip = dip.max(speed - self::speed(p));
-            peak = peak.max(rotor_ahead(p).abs());
-        }
-    });
-    (dip, peak)
 }
 
 /// Gain of the closed speed loop at `frequency` (Hz) around `speed` (pu), from the true speed.
@@ -272,8 +285,8 @@ fn speed_gain(pair: Pair, speed: f64, frequency: f64) -> f64 {
     2.0 * (sine * sine + cosine * cosine).sqrt() / (n * swing)
 }
 
-/// Bandwidth (-3 dB) of the closed speed loop in Hz around `speed` (pu), with ideal sensors: with noise, the result depends on
-/// the seed, 42 to 64 Hz for the heterodyne demodulation, because a run of half a second determines the gain only to 15 %.
+/// Bandwidth (-3 dB) of the closed speed loop in Hz around `speed` (pu), with ideal sensors. With noise, the result would depend on
+/// the seed (42 to 64 Hz for the heterodyne demodulation), because a run of half a second determines the gain only to 15 %.
 pub fn speed_bandwidth(pair: &Pair, speed: f64) -> f64 {
     const HALF_POWER: f64 = std::f64::consts::FRAC_1_SQRT_2;
     let mut pair = pair.clone();
@@ -321,4 +334,11 @@ pub fn injected_current(mut pair: Pair) -> f64 {
         }
     });
     d.std().hypot(q.std())
+}
+
+/// The greatest torque of the sign `s` and its currents at the electrical speed `w` (rad/s) with the voltage `U` (V), after the
+/// iterations of several samples.
+pub fn settled_limit(envelope: &Envelope, w: f64, s: f64, U: f64) -> Limit {
+    let mut iterate = WarmStart::default();
+    (0..8).map(|_| envelope.limit(w, s, U, &mut iterate)).last().unwrap_or_default()
 }

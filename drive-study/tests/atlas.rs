@@ -2,14 +2,14 @@
 #![allow(missing_docs)]
 
 use drive::estimator::Kind;
-use drive_study::atlas::cell::{Grid, Scenario};
+use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
 use drive_study::atlas::{self, Atlas, map, report};
 use drive_study::compare::candidate::Entry;
 use std::path::Path;
 
 fn of(name: &str) -> Drive {
-    Drive::compared(Entry::all().into_iter().find(|e| e.name == name).unwrap())
+    Drive::compared(Entry::find(name).unwrap())
 }
 
 /// Every 9th of the 1100 cells.
@@ -23,7 +23,7 @@ fn the_reference_drive_loses_two_cells_of_five_and_lock_lost_tells() {
     let atlas = thinned();
     let lost: Vec<_> = atlas.that_are(true).collect();
     assert!(atlas.runs.len() == 123 && (45..=55).contains(&lost.len()), "{} lost", lost.len());
-    let silent: Vec<_> = lost.iter().filter(|(_, verdict)| !verdict.told()).collect();
+    let silent: Vec<_> = lost.iter().filter(|(_, verdict)| !verdict.lock_lost_is_right()).collect();
     assert!(20 * silent.len() <= lost.len(), "{silent:?}");
     let alarms: Vec<_> = atlas.that_are(false).filter(|(_, verdict)| verdict.lock_lost >= 1.0).collect();
     assert!(alarms.is_empty(), "{alarms:?}");
@@ -33,7 +33,7 @@ fn the_reference_drive_loses_two_cells_of_five_and_lock_lost_tells() {
 #[test]
 fn every_scenario_and_any_number_of_threads() {
     let grid = Grid {
-        scenarios: Scenario::ALL.to_vec(),
+        scenarios: Course::ALL.to_vec(),
         R: vec![0.8],
         psi: vec![1.0],
         load: vec![1.0],
@@ -71,7 +71,7 @@ fn a_tuned_machine_runs() {
         let drive = Drive::tuned(&motors.join(file), kind).unwrap();
         let atlas = atlas::run(&[drive], &cells, 2, || ()).unwrap().remove(0);
         assert_eq!(atlas.that_are(true).count(), 0, "{file}: {:?}", atlas.runs);
-        assert!(atlas.runs.iter().all(|(_, verdict)| verdict.told()), "{file}: {:?}", atlas.runs);
+        assert!(atlas.runs.iter().all(|(_, verdict)| verdict.lock_lost_is_right()), "{file}: {:?}", atlas.runs);
     }
     let error = Drive::tuned(Path::new("none.toml"), Kind::Rasmussen).err().unwrap();
     assert!(format!("{error:#}").starts_with("reading none.toml: "), "{error:#}");

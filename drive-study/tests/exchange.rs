@@ -1,5 +1,5 @@
 //! In which order an importer exchanges the values of the pair, and how `timing.delay` shows: the numbers of
-//! `drive/docs/limits.html` and `docs/import.md`.
+//! `drive/control/docs/limits.html` and `docs/import.md`.
 //!
 //! The controller takes the currents at its sample k and shows the command of that sample, and theta^ for the instant one
 //! period later, at the end of the step. Jacobi: the currents are those of t_k, the command acts in [t_k + T_s, t_k + 2 T_s],
@@ -8,14 +8,18 @@
 //! one for t_k + 2 T_s: recorded at t_k + T_s it leads by w T_s with the right delay.
 #![allow(missing_docs, non_snake_case)]
 
+#[path = "common/shows.rs"]
+mod shows;
+
 use drive::Pair;
 use drive::estimator::{Class, Kind};
 use drive::math::wrap;
 use drive_study::runner;
 use fmu_core::Step;
+use shows::shows;
 use std::f64::consts::PI;
 
-const LIMITS: &str = include_str!("../../drive/docs/limits.html");
+const LIMITS: &str = include_str!("../../drive/control/docs/limits.html");
 const IMPORT: &str = include_str!("../../docs/import.md");
 const RPM: f64 = PI / 30.0;
 const T_S: f64 = 1e-4;
@@ -129,9 +133,9 @@ fn order_and_delay() {
             assert!((angle - 2.7 * (off + recorded)).abs() < 0.03, "{order:?}, delay {delay}: {angle} deg");
         }
         let html = format!("<tr><td>{}</td></tr>", cells.join("</td><td>"));
-        assert!(LIMITS.contains(&html), "drive/docs/limits.html has another row than\n{html}");
+        shows("drive/control/docs/limits.html", LIMITS, &html);
         let markdown = format!("| {} |", cells.join(" | "));
-        assert!(IMPORT.contains(&markdown), "docs/import.md has another row than\n{markdown}");
+        shows("docs/import.md", IMPORT, &markdown);
     }
 }
 

@@ -5,7 +5,7 @@
 use drive::Pair;
 use drive::estimator::Kind;
 use drive::math::tanh;
-use drive_study::compare::queue;
+use drive_study::queue;
 use drive_study::runner::{self, RATED_SPEED, RATED_TORQUE, line};
 
 /// Resistance estimate as a share of the true value, load in pu, speed in pu.

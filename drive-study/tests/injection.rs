@@ -1,12 +1,16 @@
 //! The figures of the estimators by injection in closed loop: tolerance 10 % or 0.3 deg where none is given.
 #![allow(missing_docs, non_snake_case)]
 
+#[path = "common/rated.rs"]
+mod rated;
+
 use drive::Pair;
 use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 use drive::estimator::pulsating::Demodulation;
 use drive_study::runner::{drive as preset, *};
+use rated::{load_step, steady};
 use std::f64::consts::TAU;
 
 /// One row of the table: what is set and what must come out.
@@ -70,10 +74,10 @@ fn error_at_standstill_and_low_speed() {
     for method in &METHODS {
         for speed in [0.0, 0.1, -0.1] {
             let steady = steady(method.pair(), speed, 1.0);
-            method.near("mean error", steady.error.mean(), 0.0, method.mean);
+            method.near("mean error", steady.angle.mean(), 0.0, method.mean);
             // The list's noise was greater (below): no worse than it.
-            assert!(steady.error.std() <= method.std + 0.3, "{}: {} deg", method.name, steady.error.std());
-            method.near("standard deviation", steady.error.std(), method.std_theory, 0.3);
+            assert!(steady.angle.std() <= method.std + 0.3, "{}: {} deg", method.name, steady.angle.std());
+            method.near("standard deviation", steady.angle.std(), method.std_theory, 0.3);
         }
     }
 }
@@ -150,8 +154,8 @@ fn load_with_the_mechanical_observer() {
     for method in &METHODS {
         let pair = with_mechanical_observer(method.pair(), TAU * method.observer.0);
         let steady = steady(pair.clone(), 0.0, 1.0);
-        assert!(steady.error.peak < 10.0 && steady.speed.peak < 0.03, "{}: {steady:?}", method.name);
-        method.near("mean error", steady.error.mean(), 0.0, 0.4);
+        assert!(steady.angle.peak < 10.0 && steady.speed.peak < 0.03, "{}: {steady:?}", method.name);
+        method.near("mean error", steady.angle.mean(), 0.0, 0.4);
     }
 }
 
@@ -180,7 +184,7 @@ fn cross_saturation_turns_all_alike() {
         let turned = -0.5 * (2.0 * S_DQ * psi_q).atan2(1.0 / 36e-3 - 1.0 / 51e-3 - S_DQ * x).to_degrees();
         method.near("error by cross-saturation", error.mean(), turned, 0.3);
         let sentence = format!("by −{:.0}° at rated load (<code>saturation.s_dq</code> = {S_DQ} A/Wb²)", -turned);
-        assert!(include_str!("../../drive/docs/limits.html").contains(&sentence), "{sentence}");
+        assert!(include_str!("../../drive/control/docs/limits.html").contains(&sentence), "{sentence}");
     }
 }
 
@@ -274,8 +278,8 @@ fn wrong_parameters_hardly_turn_the_estimate() {
             let mut pair = method.pair();
             change(&mut pair.controller.model.parameters);
             let steady = steady(pair, 0.05, 1.0);
-            method.near("mean error", steady.error.mean(), 0.0, 0.6);
-            assert!(steady.holds() && steady.error.std() < 2.5, "{}: {steady:?}", method.name);
+            method.near("mean error", steady.angle.mean(), 0.0, 0.6);
+            assert!(steady.holds() && steady.angle.std() < 2.5, "{}: {steady:?}", method.name);
         }
     }
 }
@@ -285,7 +289,7 @@ fn rated_load_is_held_with_dead_time() {
     for method in &METHODS {
         for compensated in [false, true] {
             let steady = steady(with_dead_time(method.pair(), compensated), 0.0, 1.0);
-            method.near("mean error", steady.error.mean(), 0.0, 0.3);
+            method.near("mean error", steady.angle.mean(), 0.0, 0.3);
             assert!(steady.holds(), "{}: {steady:?}", method.name);
         }
     }
@@ -295,7 +299,7 @@ fn rated_load_is_held_with_dead_time() {
 fn hybrid_holds_rated_load_at_every_speed() {
     for speed in [0.0, 0.02, -0.05, 0.1, 0.125, -0.15, 0.175, 0.2, 0.22, -0.5, 1.0] {
         let steady = steady(preset(Kind::Hybrid), speed, 1.0);
-        assert!(steady.holds() && steady.error.mean().abs() < 0.3, "{speed} pu: {steady:?}");
+        assert!(steady.holds() && steady.angle.mean().abs() < 0.3, "{speed} pu: {steady:?}");
     }
 }
 

@@ -1,11 +1,15 @@
 //! The figures of the Kim & Sul review in closed loop: tolerance 10 % or 0.3 deg where none is given.
 #![allow(missing_docs, non_snake_case)]
 
+#[path = "common/rated.rs"]
+mod rated;
+
 use drive::Pair;
 use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 use drive_study::runner::{drive as preset, *};
+use rated::{load_step, slowed_down, steady};
 use std::f64::consts::TAU;
 
 const ON_THE_EMF: [Kind; 3] = [Kind::DirectEmf, Kind::EmfObserver, Kind::ExtendedEmf];
@@ -27,8 +31,8 @@ fn with(kind: Kind, change: impl Fn(&mut ControllerParameters)) -> Pair {
 fn steady_error_at_rated_load() {
     for kind in ON_THE_EMF.into_iter().chain(MODELS).chain([Kind::VoltageFeedback, Kind::KalmanFilter]) {
         for steady in [slowed_down(preset(kind), 0.1), steady(preset(kind), 0.5, 1.0), steady(preset(kind), 1.0, 1.0)] {
-            near("steady error", kind, steady.error.mean(), 0.0, 0.1);
-            assert!(steady.holds() && steady.error.std() < 0.3, "{}: {steady:?}", kind.name());
+            near("steady error", kind, steady.angle.mean(), 0.0, 0.1);
+            assert!(steady.holds() && steady.angle.std() < 0.3, "{}: {steady:?}", kind.name());
         }
     }
 }
@@ -51,7 +55,7 @@ fn rated_load_is_held_down_to() {
 #[test]
 fn a_wrong_l_q_turns_the_estimate() {
     for kind in ON_THE_EMF.into_iter().chain(MODELS).chain([Kind::VoltageFeedback, Kind::KalmanFilter]) {
-        let error = |factor: f64| steady(with(kind, |p| p.motor.L_q *= factor), 0.5, 1.0).error.mean();
+        let error = |factor: f64| steady(with(kind, |p| p.motor.L_q *= factor), 0.5, 1.0).angle.mean();
         let expected = if MODELS.contains(&kind) { 5.5 } else { 5.8 };
         near("L_q + 20 %", kind, error(1.2), expected, 0.3);
         near("L_q - 20 %", kind, error(0.8), -5.9, 0.3);
@@ -61,7 +65,7 @@ fn a_wrong_l_q_turns_the_estimate() {
 #[test]
 fn a_wrong_r_turns_the_estimate_at_low_speed() {
     for kind in ON_THE_EMF.into_iter().chain([Kind::VoltageFeedback, Kind::KalmanFilter]) {
-        let error = |factor: f64| slowed_down(with(kind, |p| p.motor.R_s *= factor), 0.1).error.mean();
+        let error = |factor: f64| slowed_down(with(kind, |p| p.motor.R_s *= factor), 0.1).angle.mean();
         near("R + 20 %", kind, error(1.2), 1.3, 0.3);
         near("R - 20 %", kind, error(0.8), -1.3, 0.3);
     }
@@ -108,7 +112,7 @@ fn speed_bandwidths() {
 /// 0.5 s is itself uncertain by about std / sqrt(0.5 s w_0 / 2) = 0.015 deg.
 #[test]
 fn the_kalman_filter_makes_little_bias_of_noise() {
-    let at = |noise: f64| slowed_down(with(Kind::KalmanFilter, |p| p.sensor.noise = noise), 0.1).error.mean();
+    let at = |noise: f64| slowed_down(with(Kind::KalmanFilter, |p| p.sensor.noise = noise), 0.1).angle.mean();
     let (once, twice) = (at(0.01), at(0.02));
     assert!(once.abs() < 0.03 && twice.abs() < 0.1, "{once} {twice} deg");
 }
@@ -118,7 +122,7 @@ fn the_kalman_filter_makes_little_bias_of_noise() {
 fn the_kalman_filter_looks_for_the_angle_along_the_magnet() {
     for factor in [0.8, 1.2] {
         let pair = with(Kind::KalmanFilter, |p| p.motor.psi_M *= factor);
-        near("psi_M off by 20 %", Kind::KalmanFilter, steady(pair, 0.5, 1.0).error.mean(), 0.0, 0.15);
+        near("psi_M off by 20 %", Kind::KalmanFilter, steady(pair, 0.5, 1.0).angle.mean(), 0.0, 0.15);
     }
 }
 
@@ -128,7 +132,8 @@ fn the_frame_term_is_needed() {
     for kind in ON_THE_EMF {
         let printed = with(kind, |p| p.estimators.emf.frame_term = false);
         let speeds: [f64; 12] = std::array::from_fn(|k| 0.01 * f64::from(30 - u32::try_from(k).unwrap()));
-        let lowest = lowest_speed(&printed, &speeds).unwrap();
+        let held = speeds.into_iter().take_while(|speed| slowed_down(printed.clone(), *speed).holds());
+        let lowest = held.last().unwrap();
         let range = 0.9 * 0.21..=1.1 * 0.25;
         assert!(range.contains(&lowest), "{}: {lowest}, expected {range:?}", kind.name());
     }
@@ -153,7 +158,7 @@ fn the_integral_is_needed() {
 fn sensored_yardstick() {
     for speed in [0.0, 0.5, 1.0] {
         let steady = steady(preset(Kind::Sensored), speed, 1.0);
-        assert!(steady.holds() && steady.error.peak < 1e-2, "{steady:?}");
+        assert!(steady.holds() && steady.angle.peak < 1e-2, "{steady:?}");
     }
 }
 

@@ -1,13 +1,20 @@
-//! The numbers of `drive/docs/limits.html`, the limits that every documentation page tells: each row is that of a run.
+//! The numbers of `drive/control/docs/limits.html`, the limits that every documentation page tells: each row is that of a run.
 #![allow(missing_docs, non_snake_case)]
+
+#[path = "common/rated.rs"]
+mod rated;
+#[path = "common/shows.rs"]
+mod shows;
 
 use drive::Pair;
 use drive::estimator::Kind;
 use drive::math::wrap;
 use drive_study::runner;
+use rated::steady;
+use shows::shows;
 use std::f64::consts::PI;
 
-const PAGE: &str = include_str!("../../drive/docs/limits.html");
+const PAGE: &str = include_str!("../../drive/control/docs/limits.html");
 const RPM: f64 = PI / 30.0;
 const T_S: f64 = 1e-4;
 /// Resistance of the reference motor in Ohm.
@@ -16,7 +23,7 @@ const R: f64 = 2.0;
 /// The page must have this row.
 fn holds(cells: &[String]) {
     let row = format!("<tr><td>{}</td></tr>", cells.join("</td><td>"));
-    assert!(PAGE.contains(&row), "drive/docs/limits.html has another row than\n{row}");
+    shows("drive/control/docs/limits.html", PAGE, &row);
 }
 
 /// A number as the page has it.
@@ -162,7 +169,7 @@ fn torque_at_zero_speed() {
 fn injection_at_speed() {
     let up_to = |kind: Kind| {
         let speeds = (1..=10).map(|k| 0.1 * f64::from(k));
-        let held = speeds.take_while(|&speed| runner::steady(runner::drive(kind), speed, 1.0).holds());
+        let held = speeds.take_while(|&speed| steady(runner::drive(kind), speed, 1.0).holds());
         held.last().map_or("0".into(), |speed| format!("{speed:.1}"))
     };
     let held = |kind: Kind| (kind.name(), up_to(kind));
@@ -174,7 +181,7 @@ fn injection_at_speed() {
         "is held up to {} with {}, {} and {}, up to {} with\n{}.",
         square.1, rotating.0, pulsating.0, square.0, near.1, near.0
     );
-    assert!(PAGE.contains(&sentence), "{sentence}");
+    shows("drive/control/docs/limits.html", PAGE, &sentence);
 }
 
 #[test]
@@ -242,7 +249,7 @@ fn dead_time() {
     let (u, motor) = (plant.parameters.inverter.u_dead(325.0), &plant.parameters.motor);
     let speed = u / (f64::from(motor.n_p) * motor.psi_M) / RPM;
     let sentence = format!("cost a leg {u:.1} V, the EMF of {speed:.0} rpm");
-    assert!(PAGE.contains(&sentence), "{sentence}");
+    shows("drive/control/docs/limits.html", PAGE, &sentence);
     for (name, dead, compensated, real_sensors) in [
         ("no dead time", false, 0.0, false),
         ("no dead time, real sensors", false, 0.0, true),

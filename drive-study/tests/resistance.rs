@@ -3,7 +3,7 @@
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;
-use drive_study::atlas::cell::{Cell, Grid, Scenario};
+use drive_study::atlas::cell::{Cell, Course, Grid};
 use drive_study::atlas::drive::Drive;
 use drive_study::atlas::{self, Atlas};
 use drive_study::compare::candidate::Entry;
@@ -14,14 +14,14 @@ const T_S: f64 = 1e-4;
 /// The reference drive; `k_a` of the adaptation, or none.
 fn drive(k_a: Option<f64>) -> Drive {
     let mut drive = Drive::compared(Entry::all()[0]);
-    let adaptation = &mut drive.pair.controller.model.parameters.estimators.adaptation;
+    let adaptation = &mut drive.bench.pair.controller.model.parameters.estimators.adaptation;
     (adaptation.resistance, adaptation.k_a) = (k_a.is_some(), k_a.unwrap_or(0.0));
     drive
 }
 
 /// The pair of that drive with this estimate of the resistance, a share of the true one.
 fn pair(R_hat: f64, k_a: Option<f64>) -> Pair {
-    let mut pair = drive(k_a).pair;
+    let mut pair = drive(k_a).bench.pair;
     pair.controller.model.parameters.motor.R_s = R_hat * pair.plant.model.parameters.motor.R_s;
     pair
 }
@@ -37,7 +37,7 @@ fn lost(cells: &[Cell], k_a: Option<f64>) -> Vec<Cell> {
 
 /// R^/R, psi^/psi, load in rated torques of 2 N.m, speed in rpm.
 fn cell(R: f64, psi: f64, load: f64, rpm: f64) -> Cell {
-    Cell { scenario: Scenario::Load, R, psi, load, speed: rpm / 3000.0, theta: 0.0 }
+    Cell { scenario: Course::Load, R, psi, load, speed: rpm / 3000.0, theta: 0.0 }
 }
 
 /// A few cells of the atlas: lost and held without adaptation, all held with it; `lock_lost` is true of each.
@@ -66,7 +66,7 @@ fn adaptation_holds_what_the_wrong_resistance_loses() {
 #[test]
 fn leaves_a_loaded_rest() {
     for (R_hat, load, rpm) in [(0.8, -1.0, 10.0), (1.2, 1.0, 20.0)] {
-        let cell = Cell { scenario: Scenario::Speed, ..cell(R_hat, 1.0, load, rpm) };
+        let cell = Cell { scenario: Course::Speed, ..cell(R_hat, 1.0, load, rpm) };
         assert_eq!(lost(&[cell], Some(0.05)), []);
         let mut pair = pair(R_hat, Some(0.05));
         runner::run_in_steps(&mut pair, T_S, 1.5, |t, p| {
@@ -81,7 +81,7 @@ fn leaves_a_loaded_rest() {
 /// The drive with everything for a real inverter: tracking at creep, the dead time observed, the offsets measured.
 fn robust() -> Drive {
     let mut drive = drive(Some(0.02));
-    let par = &mut drive.pair.controller.model.parameters;
+    let par = &mut drive.bench.pair.controller.model.parameters;
     par.estimators.adaptation.tracking = 0.15;
     (par.compensation.observe, par.compensation.calibrate) = (true, true);
     drive
@@ -97,7 +97,7 @@ fn lost_by(cells: &[Cell], drive: Drive) -> Vec<Cell> {
 #[test]
 fn a_real_inverter_near_standstill() {
     let grid = Grid {
-        scenarios: vec![Scenario::Inverter],
+        scenarios: vec![Course::Inverter],
         R: vec![0.8, 1.2],
         psi: vec![1.0],
         speed: vec![0.0, 0.005, 0.01],
@@ -107,7 +107,7 @@ fn a_real_inverter_near_standstill() {
     assert_eq!(lost_by(&cells, robust()), []);
     let without = |set: fn(&mut drive::control::tables::Compensation)| {
         let mut drive = robust();
-        set(&mut drive.pair.controller.model.parameters.compensation);
+        set(&mut drive.bench.pair.controller.model.parameters.compensation);
         lost_by(&cells, drive).len()
     };
     let (blind, uncalibrated) = (without(|c| c.observe = false), without(|c| c.calibrate = false));
@@ -117,7 +117,7 @@ fn a_real_inverter_near_standstill() {
 /// R rises by 40 % at 30 rpm without a load and at 60 rpm generating; and a start from 120 deg off that leaves R^ wrong.
 #[test]
 fn tracks_the_resistance_at_creep() {
-    let heating = |load| Cell { scenario: Scenario::Heating, ..cell(1.0, 1.0, load, 60.0) };
+    let heating = |load| Cell { scenario: Course::Heating, ..cell(1.0, 1.0, load, 60.0) };
     let cells =
         [Cell { speed: 0.01, ..heating(0.0) }, heating(-1.0), Cell { theta: 120.0, ..cell(0.8, 1.0, -1.0, 30.0) }];
     assert_eq!(lost(&cells, Some(0.02)), cells);
@@ -165,7 +165,7 @@ fn the_atlas() {
         let atlas = run(&cells, k_a);
         let lost: Vec<_> = atlas.that_are(true).collect();
         let near = lost.iter().filter(|(c, _)| (c.psi - 1.0).abs() < 1e-9 && (0.8..=1.2).contains(&c.R)).count();
-        let seen = lost.iter().filter(|(_, verdict)| verdict.told()).count();
+        let seen = lost.iter().filter(|(_, verdict)| verdict.lock_lost_is_right()).count();
         let alarms = atlas.that_are(false).filter(|(_, verdict)| verdict.lock_lost >= 1.0).count();
         println!(
             "k_a {k_a:?}: {} of {} lost, {near} with R^ 0.8..1.2 R and the exact flux; lock_lost sees {seen}, {alarms} false",
@@ -183,7 +183,7 @@ fn the_atlas() {
 fn creeping_speed_asked_for_under_load() {
     let speeds = [0.0, 3.0, 6.0, 10.0, 20.0, 30.0, 60.0].map(|rpm| rpm / 3000.0);
     let grid = Grid {
-        scenarios: vec![Scenario::Speed],
+        scenarios: vec![Course::Speed],
         R: vec![0.8, 1.2],
         psi: vec![1.0],
         load: vec![0.5, -0.5, 1.0, -1.0],

@@ -1,7 +1,7 @@
 //! Parameters tuned on a running drive: no bump at the next sample, the new gains after it, a bad combination refused.
 #![allow(missing_docs, non_snake_case)]
 
-use drive::control::envelope::{Envelope, Warm};
+use drive::control::envelope::{Envelope, WarmStart};
 use drive::control::signals::ControllerOutputs;
 use drive::control::start::StartMode;
 use drive::estimator::Kind::{
@@ -332,7 +332,7 @@ fn the_traction_drive_reaches_two_and_a_half_times_its_base_speed() {
         let (motor, U) = (&pair.plant.model.parameters.motor, 0.95 * u_dc / 3.0_f64.sqrt());
         let (envelope, n_p) = (Envelope::new(motor, par.limit.i), f64::from(motor.n_p));
         let most = |speed: f64| {
-            let mut warm = Warm::default();
+            let mut warm = WarmStart::default();
             (0..8).map(|_| envelope.limit(n_p * speed, 1.0, U, &mut warm).tau).last().unwrap()
         };
         let top = 2.5 * envelope.base_speed(U) / n_p;

@@ -1,44 +1,24 @@
-//! Permanent-magnet synchronous machine drives: plant, control, estimators, and the models built from them.
+//! Permanent-magnet synchronous machine drives: the whole drive, built from its plant and its controller.
 //!
-//! Conventions throughout: SI units; motor sign (currents flow into the machine, torque is positive with positive
-//! speed); space vectors are peak-valued (amplitude-invariant Clarke transform), so torque and power carry a factor
-//! 3/2; angles are electrical unless the name says mechanical; the d-axis is the magnet axis. Each angle error states
-//! its sign: `theta~ = theta - theta^` (Kim & Sul: how far the rotor is ahead) in estimators, trackers and the
-//! comparison; `theta^ - theta` (Rasmussen: how far the estimate is ahead) in his observer and in the figures of his
-//! paper. A value with `_hat` belongs to an estimator; the controller never reads the plant's parameters.
-//!
-//! Papers: Rasmussen, *Sensorless speed control including zero speed of non salient PM synchronous drives*, Bull. Polish
-//! Acad. Sci. Tech. Sci. 54 (3), 2006, quoted as "Rasmussen (n)"; Kim & Sul, *Sensorless control of AC motor - where are
-//! we now?*, ICEMS 2011, quoted as "Kim & Sul (n)".
+//! | crate | folder | holds |
+//! |---|---|---|
+//! | `drive-base` | `drive/base/` | frames, elementary functions, the data of a machine, modulation; the conventions |
+//! | `drive-plant` | `drive/plant/` | [`PmsmPlant`]: machine, inverter, losses, temperatures, mechanics |
+//! | `drive-control` | `drive/control/` | [`SensorlessController`], and every [`estimator`] |
+//! | `drive` | `drive/src/` | [`PmsmDrive`], and the [`Pair`] of plant and controller |
 
 #![forbid(unsafe_code)]
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
 #![allow(non_snake_case)]
 
-pub mod control;
 pub mod documentation;
-pub mod estimator;
-pub mod frame;
-pub mod integrate;
-pub mod math;
-pub mod modulation;
-pub mod motor;
 pub mod pair;
-pub mod plant;
 pub mod pmsm_drive;
 mod terminals;
 
-pub use control::model::SensorlessController;
+pub use drive_base::{frame, integrate, math, modulation, motor};
+pub use drive_control::model::SensorlessController;
+pub use drive_control::{self as control, estimator};
+pub use drive_plant::{self as plant, PmsmPlant};
 pub use pair::Pair;
-pub use plant::model::PmsmPlant;
 pub use pmsm_drive::PmsmDrive;
-
-/// Information common to all models of this crate; each adds its own name, description and documentation.
-const PROJECT: fmu_core::Info = fmu_core::Info {
-    version: env!("CARGO_PKG_VERSION"),
-    author: "The sensorless-drive developers",
-    license: "MIT OR Apache-2.0",
-    copyright: "Copyright (c) 2026 The sensorless-drive developers",
-    experiment: fmu_core::Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
-    ..fmu_core::Info::DEFAULT
-};

@@ -27,7 +27,7 @@ impl Pair {
         self.controller.model.validate()
     }
 
-    /// State and outputs of both at the start.
+    /// Sets state and outputs of both to those at the start.
     pub fn initialize(&mut self) {
         self.now = Elapsed::ZERO;
         self.plant.initialize();
@@ -58,15 +58,15 @@ impl Pair {
     #[inline]
     pub(crate) fn exchange(&mut self) {
         let Self { plant, controller, .. } = self;
-        plant.model.inputs.apply(&controller.out);
+        plant.model.inputs.apply(controller.out.commanded());
         controller.model.inputs.measure(plant.out.measured());
     }
 
-    /// The same where the outputs are those of an earlier step.
+    /// Passes the present outputs on, where the blocks still hold those of an earlier step.
     #[inline]
     pub(crate) fn exchange_present(&mut self) {
         let Self { plant, controller, .. } = self;
-        plant.model.inputs.apply(controller.model.shown());
+        plant.model.inputs.apply(controller.model.shown().commanded());
         controller.model.inputs.measure(plant.model.measured());
     }
 
@@ -83,7 +83,7 @@ impl Pair {
         Ok(())
     }
 
-    /// The outputs of both.
+    /// Computes the outputs of both.
     #[inline]
     pub(crate) fn output(&mut self) {
         let Self { plant, controller, now } = self;

@@ -14,22 +14,17 @@ mod period;
 
 pub use period::Means;
 
-use crate::control::signals::ControllerOutputs;
-use crate::control::tables::{
-    self, ADAPTATION_OUTPUTS, ControllerParameters, ENABLED, LATER_OUTPUTS, LIMITED, LOCK_LOST,
-};
-use crate::control::weakening::WEAKENING;
-use crate::estimator::resistance::ADAPTATION;
-use crate::estimator::tables::{EstimatorParameters, LATER_ESTIMATOR_PARAMETERS};
-use crate::frame::Phases;
 use crate::pair::Pair;
-use crate::plant::signals::{PlantInputs, PlantOutputs};
-use crate::plant::thermal::{THERMAL_INPUTS, THERMAL_OUTPUTS, ThermalInputs};
-use crate::plant::{tables as plant, tables::PlantParameters};
 #[cfg(doc)]
 use crate::{PmsmPlant, SensorlessController};
+use drive_base::frame::Phases;
+use drive_control::signals::ControllerOutputs;
+use drive_control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
+use drive_plant::signals::{PlantInputs, PlantOutputs};
+use drive_plant::tables as plant;
+use drive_plant::thermal::{THERMAL_INPUTS, ThermalInputs};
 use fmu_core::log::Warnings;
-use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, RADIAN, SPEED, VOLT};
+use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
     Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, SampleGrid, Step, Table, Terminal, Warns,
 };
@@ -152,7 +147,7 @@ impl Model for PmsmDrive {
         description: "Sensorless drive: permanent-magnet synchronous machine, inverter and controller in one",
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-3 },
         documentation: crate::documentation::DRIVE,
-        ..crate::PROJECT
+        ..drive_base::PROJECT
     };
 
     const TABLE: &'static Table<Block<Self>> = TABLE;
@@ -161,7 +156,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 14;
+    const STATE_VERSION: u16 = 15;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -177,7 +172,7 @@ impl Model for PmsmDrive {
                 "plant.{} and controller.{}: the drive would run at another speed than its reference; set both to the same \
                  number of pole pairs",
                 plant::PARAMETERS.tell(plant, |p| &mut p.motor.n_p),
-                tables::PARAMETERS.tell(controller, |p| &mut p.motor.n_p)
+                control::PARAMETERS.tell(controller, |p| &mut p.motor.n_p)
             )));
         }
         Ok(())
@@ -296,16 +291,6 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
     const {
         &[
             V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
-            V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
-                &mut m.model.inputs.tau_load
-            }),
-            V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)
-                .at_least(0.0),
-            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
-                .read_with("mechanics.imposed", "true"),
-            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
-                .unbounded()
-                .read_with("mechanics.imposed", "true"),
             V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
                 .read_with("speed_loop.torque_mode", "true"),
             V::boolean_input(
@@ -314,52 +299,29 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 |m| &mut m.model.inputs.enable,
             )
             .optional(),
+            V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)
+                .at_least(0.0),
+            V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
+                &mut m.model.inputs.tau_load
+            }),
+            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
+                .read_with("mechanics.imposed", "true"),
+            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
+                .unbounded()
+                .read_with("mechanics.imposed", "true"),
+            V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
             V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),
+            V::part("", &Part { table: MEANS, lens: |m| &mut m.out.means }),
             V::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |m| &mut m.out.controller }),
+            V::part("", &Part { table: plant::STATES, lens: |m| &mut m.model.pair.plant.model }),
             V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
             V::part(
                 "controller.",
-                &Part { table: tables::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
+                &Part { table: control::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
             ),
-            V::part("", &Part { table: plant::STATES, lens: |m| &mut m.model.pair.plant.model }),
-            V::part(
-                "controller.weakening.",
-                &Part { table: WEAKENING, lens: |m| &mut m.model.pair.controller.model.parameters.weakening },
-            ),
-            V::part("", &Part { table: LATER_OUTPUTS, lens: |m| &mut m.out.controller }),
-            V::part("", &Part { table: plant::LOSS_OUTPUTS, lens: |m| &mut m.out.plant }),
-            V::part("", &Part { table: LOSS_PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
-            V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
-            V::part("", &Part { table: THERMAL_OUTPUTS, lens: |m| &mut m.out.plant }),
-            V::part(
-                "controller.adaptation.",
-                &Part {
-                    table: ADAPTATION,
-                    lens: |m| &mut m.model.pair.controller.model.parameters.estimators.adaptation,
-                },
-            ),
-            V::part("", &Part { table: ADAPTATION_OUTPUTS, lens: |m| &mut m.out.controller }),
-            V::part(
-                "",
-                &Part { table: ESTIMATORS, lens: |m| &mut m.model.pair.controller.model.parameters.estimators },
-            ),
-            V::part("", &Part { table: LATEST, lens: |m| &mut m.model.pair.controller.model.parameters }),
-            V::part("", &Part { table: MEANS, lens: |m| &mut m.out.means }),
         ]
     },
 );
-
-/// The plant's parameters of losses and temperatures.
-const LOSS_PARAMETERS: &Table<PlantParameters> =
-    &Table::new(const { &[Row::part("plant.", &Part { table: plant::LOSS_PARAMETERS, lens: |p| p })] });
-
-/// The estimators' parameters that joined later.
-const ESTIMATORS: &Table<EstimatorParameters> =
-    &Table::new(const { &[Row::part("controller.", &Part { table: LATER_ESTIMATOR_PARAMETERS, lens: |p| p })] });
-
-/// The controller's parameters that joined last.
-const LATEST: &Table<ControllerParameters> =
-    &Table::new(const { &[Row::part("controller.", &Part { table: tables::LATEST_PARAMETERS, lens: |p| p })] });
 
 type O = Row<ControllerOutputs>;
 
@@ -367,10 +329,7 @@ type O = Row<ControllerOutputs>;
 const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
     const {
         &[
-            O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
-            O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
-                &mut o.theta_est
-            }),
+            O::part("", &Part { table: ESTIMATES, lens: |o| o }),
             O::discrete_output("i_d_est", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| {
                 &mut o.i.d
             }),
@@ -379,14 +338,8 @@ const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
             }),
             O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
             O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
-            O::discrete_output("lock_lost", &ONE, LOCK_LOST, |o| &mut o.lock_lost),
-            O::boolean_output("enabled", ENABLED, |o| &mut o.enabled),
-            O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| {
-                &mut o.u.a
-            }),
-            O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
-            O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
-            O::part("", &Part { table: LIMITED, lens: |o| o }),
+            O::part("", &Part { table: VOLTAGES, lens: |o| o }),
+            O::part("", &Part { table: STATUS, lens: |o| o }),
         ]
     },
 );

@@ -1,51 +1,9 @@
-//! Connections between the models: their terminals and icons.
-//!
-//! `phases` and `sensor` exist twice, on the plant and mirrored on the controller: members with the same name connect.
-//! The inverter is inside the plant, so the phases carry references and measured values, and a connection makes them
-//! equal (signals). At the shaft and the DC link, where power leaves the model, torque and current are flows: they sum
-//! to zero with those of the connected component. Heat is positive out of the model.
+//! Terminals of the drive: those of the plant at shaft, DC link and cooling, and the torque request of a vehicle controller.
 
-use fmu_core::{Member, Terminal};
-
-/// Terminals of `PmsmPlant`.
-pub(crate) const PLANT: &[Terminal] = &[
-    Terminal::plug(
-        "phases",
-        "Voltage references and enable from the controller, measured currents to it",
-        &phases(Member::signal("enable")),
-    )
-    .drawn(&icon::PHASES, -100.0, 40.0),
-    Terminal::plug(
-        "sensor",
-        "What a shaft sensor measures: mechanical speed and electrical angle",
-        &[Member::signal("speed"), Member::signal("theta_e")],
-    )
-    .drawn(&icon::SENSOR, -100.0, -40.0),
-    SHAFT,
-    SHAFT_IMPOSED,
-    DC_LINK,
-    COOLANT,
-    HEAT_WINDING,
-    HEAT_IRON,
-    HEAT_MAGNET,
-    HEAT_INVERTER,
-];
-
-/// Terminals of `SensorlessController`.
-pub(crate) const CONTROLLER: &[Terminal] = &[
-    Terminal::plug(
-        "phases",
-        "Voltage references and enable to the plant, measured currents from it",
-        &phases(Member::signal("enable").of("enabled")),
-    )
-    .drawn(&icon::PHASES, 100.0, 40.0),
-    Terminal::plug(
-        "sensor",
-        "A shaft sensor, read by the sensored estimator only: mechanical speed and electrical angle",
-        &[Member::signal("speed").of("speed_meas"), Member::signal("theta_e").of("theta_meas")],
-    )
-    .drawn(&icon::SENSOR, 100.0, -40.0),
-];
+use drive_plant::terminals::{
+    COOLANT, DC_LINK, HEAT_INVERTER, HEAT_IRON, HEAT_MAGNET, HEAT_WINDING, SHAFT, SHAFT_IMPOSED,
+};
+use fmu_core::{Icon, Member, Terminal};
 
 /// Terminals of `PmsmDrive`.
 pub(crate) const DRIVE: &[Terminal] = &[
@@ -54,7 +12,7 @@ pub(crate) const DRIVE: &[Terminal] = &[
         "Torque reference of a vehicle controller (controller.speed_loop.torque_mode), and the torque limits to it",
         &[Member::signal("tau_ref"), Member::signal("tau_max"), Member::signal("tau_min")],
     )
-    .drawn(&icon::TORQUE_REQUEST, -100.0, 40.0),
+    .drawn(&TORQUE_REQUEST, -100.0, 40.0),
     SHAFT,
     SHAFT_IMPOSED,
     DC_LINK,
@@ -65,99 +23,9 @@ pub(crate) const DRIVE: &[Terminal] = &[
     HEAT_INVERTER,
 ];
 
-/// Signals between controller and inverter.
-const fn phases(enable: Member) -> [Member; 7] {
-    [
-        Member::signal("u_a"),
-        Member::signal("u_b"),
-        Member::signal("u_c"),
-        enable,
-        Member::signal("i_a"),
-        Member::signal("i_b"),
-        Member::signal("i_c"),
-    ]
-}
-
-/// The shaft end: the load receives speed and angle and returns its torque.
-const SHAFT: Terminal = Terminal::plug(
-    "shaft",
-    "The shaft's end, turning freely: speed and angle to the load, the torque that it takes",
-    &[Member::signal("speed"), Member::signal("angle"), Member::outflow("tau").of("tau_load")],
-)
-.drawn(&icon::SHAFT, 100.0, 40.0);
-
-/// The shaft end in the reverse direction, with `mechanics.imposed`.
-const SHAFT_IMPOSED: Terminal = Terminal::plug(
-    "shaft_imposed",
-    "The shaft's end with speed and angle imposed by the drive train (mechanics.imposed): the torque that it receives",
-    &[
-        Member::signal("speed").of("speed_shaft"),
-        Member::signal("angle").of("angle_shaft"),
-        Member::outflow("tau").of("tau_shaft"),
-    ],
-)
-.drawn(&icon::SHAFT, 100.0, -40.0);
-
-const DC_LINK: Terminal = Terminal::plug(
-    "dc_link",
-    "DC link of the inverter: its voltage, and the current drawn from it",
-    &[Member::signal("u_dc"), Member::inflow("i_dc")],
-)
-.drawn(&icon::DC_LINK, 0.0, 100.0);
-
-/// The coolant, with `thermal.mode` = Network; with Constant, all losses flow to it at once.
-const COOLANT: Terminal = Terminal::plug(
-    "coolant",
-    "Coolant of machine and inverter: its temperature, and the heat to it",
-    &[Member::signal("T").of("T_coolant"), Member::outflow("Q").of("Q_coolant")],
-)
-.drawn(&icon::COOLANT, 0.0, -100.0);
-
-const HEAT_WINDING: Terminal = Terminal::plug(
-    "heat_winding",
-    "The winding in a thermal model outside (thermal.mode = Imposed): its temperature, and the heat out of it",
-    &[Member::signal("T").of("T_winding_imposed"), Member::outflow("Q").of("Q_winding")],
-)
-.drawn(&icon::HEAT, -80.0, -100.0);
-
-const HEAT_IRON: Terminal = Terminal::plug(
-    "heat_iron",
-    "The stator iron in a thermal model outside (thermal.mode = Imposed): its temperature, and the heat out of it",
-    &[Member::signal("T").of("T_stator_imposed"), Member::outflow("Q").of("Q_iron")],
-)
-.drawn(&icon::HEAT, -40.0, -100.0);
-
-const HEAT_MAGNET: Terminal = Terminal::plug(
-    "heat_magnet",
-    "Rotor and magnets in a thermal model outside (thermal.mode = Imposed): their temperature, and the heat out of them",
-    &[Member::signal("T").of("T_magnet_imposed"), Member::outflow("Q").of("Q_magnet")],
-)
-.drawn(&icon::HEAT, 40.0, -100.0);
-
-const HEAT_INVERTER: Terminal = Terminal::plug(
-    "heat_inverter",
-    "The inverter in a thermal model outside (thermal.mode = Imposed): its temperature, and the heat out of it",
-    &[Member::signal("T").of("T_inverter_imposed"), Member::outflow("Q").of("Q_inverter")],
-)
-.drawn(&icon::HEAT, 80.0, -100.0);
-
-/// Icons of the terminals.
-mod icon {
-    use fmu_core::Icon;
-
-    pub(super) const PHASES: Icon =
-        Icon { name: "phases", svg: include_str!("../icons/phases.svg"), color: [217, 72, 15] };
-    pub(super) const SENSOR: Icon =
-        Icon { name: "sensor", svg: include_str!("../icons/sensor.svg"), color: [43, 138, 62] };
-    pub(super) const SHAFT: Icon = Icon { name: "shaft", svg: include_str!("../icons/shaft.svg"), color: [73, 80, 87] };
-    pub(super) const DC_LINK: Icon =
-        Icon { name: "dc_link", svg: include_str!("../icons/dc_link.svg"), color: [24, 100, 171] };
-    pub(super) const COOLANT: Icon =
-        Icon { name: "coolant", svg: include_str!("../icons/coolant.svg"), color: [11, 114, 133] };
-    pub(super) const HEAT: Icon = Icon { name: "heat", svg: include_str!("../icons/heat.svg"), color: [201, 42, 42] };
-    pub(super) const TORQUE_REQUEST: Icon =
-        Icon { name: "torque_request", svg: include_str!("../icons/torque_request.svg"), color: [95, 61, 196] };
-}
+/// Icon of the terminal `torque_request`.
+const TORQUE_REQUEST: Icon =
+    Icon { name: "torque_request", svg: include_str!("../icons/torque_request.svg"), color: [95, 61, 196] };
 
 #[cfg(test)]
 mod tests {

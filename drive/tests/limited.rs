@@ -1,5 +1,5 @@
 //! `voltage_limited` and `current_limited` say that the drive is at a limit, and only then.
-#![allow(missing_docs)]
+#![allow(missing_docs, non_snake_case)]
 
 use drive::{Pair, PmsmDrive};
 use fmu_core::log::Warnings;
@@ -97,4 +97,29 @@ fn a_load_far_above_the_torque_is_reported_once() {
     assert!(
         !warnings(100.0, |d| d.pair.plant.model.parameters.mechanics.imposed = true).iter().any(|w| w.0 == "tau_load")
     );
+}
+
+/// At the greatest bandwidth, the current stays near its limit; the drive that is refused leaves it by far.
+#[test]
+fn the_current_loop_holds_its_limit_at_the_bound() {
+    let greatest = |T_s: f64, active: bool| {
+        let mut pair = Pair::default();
+        let par = &mut pair.controller.model.parameters;
+        (par.T_s, par.current.active_resistance) = (T_s, active);
+        pair.set_inputs(0.0, 0.0, 325.0);
+        pair.initialize();
+        let (mut t, mut most) = (0.0, 0.0_f64);
+        while t < 1.0 {
+            pair.set_inputs(if t > 0.2 { 80.0 } else { 0.0 }, if t > 0.6 { 2.0 } else { 0.0 }, 325.0);
+            pair.step(T_s).unwrap();
+            t += T_s;
+            most = most.max(pair.plant.out.i_d.hypot(pair.plant.out.i_q));
+        }
+        most
+    };
+    for active in [false, true] {
+        let (bound, beyond) = (greatest(2.4e-4, active), greatest(1e-3, active));
+        println!("active resistance {active}: {bound} A at the bound, {beyond} A at 1 ms, limit 7.5 A");
+        assert!(bound < 1.15 * 7.5 && beyond > 3.0 * 7.5, "{bound} {beyond} A");
+    }
 }

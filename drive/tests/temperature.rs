@@ -7,7 +7,7 @@
 #![allow(missing_docs, non_snake_case)]
 
 use drive::control::current::CurrentLoop;
-use drive::control::envelope::{Envelope, Limit, Warm};
+use drive::control::envelope::{Envelope, Limit, WarmStart};
 use drive::control::tables::Limits;
 use drive::estimator::Kind;
 use drive::frame::{AlphaBeta, Phases};
@@ -41,7 +41,7 @@ fn the_envelope_at_temperature() {
         for ((celsius, limit), end) in [120.0, -20.0].into_iter().zip(limits).zip(ends) {
             let motor = thermal().motor(&motor, &Temperatures::all(celsius + ZERO));
             let envelope = Envelope::new(&motor, i);
-            let mut warm = Warm::default();
+            let mut warm = WarmStart::default();
             let mut at = |rpm: f64| (0..8).map(|_| envelope.limit(3.0 * rpm * RPM, 1.0, U, &mut warm)).last().unwrap();
             let (Limit { tau, .. }, Limit { tau: mtpa, i: full }) = (at(rpm), at(100.0));
             println!("{celsius} degC, {rpm} rpm: {tau} of {limit} N.m; {mtpa} of {end} N.m");

@@ -46,7 +46,7 @@ impl Baseline {
     /// Reads a file.
     ///
     /// # Errors
-    /// It cannot be read or is no baseline.
+    /// The file cannot be read or is not a baseline.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))?;
         toml::from_str(&text).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))
@@ -61,7 +61,7 @@ impl Baseline {
         }
     }
 
-    /// Known findings that have gone: the baseline can do without them.
+    /// Known findings that no longer occur.
     pub fn mended(&self, report: &Report) -> Vec<String> {
         let found: Vec<_> = report.violated().map(|f| f.id).collect();
         let ran = |id: &str| report.finding(id).is_some();

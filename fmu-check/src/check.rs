@@ -73,11 +73,11 @@ pub(super) enum Run {
     File(fn(&FmuFile) -> Verdict),
     /// Calls the binary in its own process.
     Probe(fn(&Session) -> Result<(), NotDetermined>),
-    /// As `Probe`; any output to the console or the working directory is a violation.
+    /// Like `Probe`; any output to the console or the working directory is a violation.
     Silent(fn(&Session) -> Result<(), NotDetermined>),
-    /// As `Probe`, in two processes that must report the same.
+    /// Like `Probe`, in two processes that must report the same.
     Twice(fn(&Session) -> Result<(), NotDetermined>),
-    /// As `Probe`, with instances for Model Exchange.
+    /// Like `Probe`, with instances for Model Exchange.
     Exchange(fn(&Session) -> Result<(), NotDetermined>),
 }
 

@@ -30,7 +30,7 @@ use std::time::Duration;
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
 #[expect(clippy::struct_excessive_bools, reason = "options of a command")]
-pub struct Check {
+pub struct CheckArguments {
     /// FMUs to check
     #[arg(value_name = "FILE.fmu", required_unless_present_any = ["list", "explain"])]
     pub files: Vec<PathBuf>,
@@ -108,7 +108,7 @@ fn seconds(name: &str, s: Option<f64>) -> Result<Option<Duration>> {
 ///
 /// # Errors
 /// A file is not an FMU, or an id does not exist.
-pub fn run(args: &Check) -> Result<bool> {
+pub fn run(args: &CheckArguments) -> Result<bool> {
     if args.list {
         print!("{}", report::list());
         return Ok(true);
@@ -173,7 +173,7 @@ pub fn run(args: &Check) -> Result<bool> {
     Ok(reports.iter().all(holds))
 }
 
-/// What a baseline does not know, and what it need not know any more.
+/// Findings missing from the baseline, and baseline entries that no longer occur.
 fn news(baseline: Option<&Baseline>, reports: &[Report]) -> String {
     let mut out = String::new();
     for report in baseline.map_or(&[][..], |_| reports) {

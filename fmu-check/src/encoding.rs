@@ -34,3 +34,24 @@ pub(super) fn same(v: &ModelVariable, version: FmiVersion, a: &[u64], b: &[u64])
     let zero = |x: u64| v.base.is_float() && x << (64 - (64 - shift) + 1) == 0;
     a.len() == b.len() && a.iter().zip(b).all(|(x, y)| x << shift == y << shift || (zero(*x) && zero(*y)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_shown_and_compared_as_their_type() {
+        let xml = br#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t"><ModelVariables>
+            <Float32 name="f" valueReference="1"/><Int16 name="i" valueReference="2"/><UInt8 name="u" valueReference="3"/>
+            </ModelVariables><ModelStructure/></fmiModelDescription>"#;
+        let description = model_description::read(xml).unwrap();
+        let [f, i, u] = &description.variables[..] else { panic!() };
+        let v3 = FmiVersion::V3;
+        assert_eq!((bits(f.base, 1.5), bits(i.base, -2.0) & 0xffff, bits(u.base, 7.0)), (0x3fc0_0000, 0xfffe, 7));
+        assert_eq!((show(f, v3, &[0x3fc0_0000]), show(i, v3, &[0xfffe, 5])), ("1.5".into(), "-2 5".into()));
+        assert_eq!(show(u, v3, &[255]), "255");
+        assert!(same(i, v3, &[0xfffe], &[0xffff_fffe]) && !same(i, v3, &[0xfffe], &[0xfffd]), "the low bits count");
+        assert!(same(f, v3, &[0], &[0x8000_0000]), "zeros of both signs");
+        assert!(!same(i, v3, &[0], &[0x8000]) && !same(i, v3, &[0], &[0, 0]));
+    }
+}

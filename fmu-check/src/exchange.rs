@@ -5,26 +5,12 @@
 
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::State;
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Interface, Sensitivity, SensitivityArguments, Simple, Updated, Vector};
+use fmu_import::raw::{Sensitivity, SensitivityArguments, Simple, UpdateResults, Vector};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown};
 
-/// States of the life cycle of Model Exchange.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mode {
-    Instantiated,
-    Initialization,
-    Event,
-    Continuous,
-    Terminated,
-}
-
-impl Mode {
-    pub(super) const ALL: [Self; 5] =
-        [Self::Instantiated, Self::Initialization, Self::Event, Self::Continuous, Self::Terminated];
-}
-
-/// Most updates of one event: a further one is needed only by an FMU that never comes to an end.
+/// Largest number of updates of one event; an FMU that needs more never ends the event.
 const UPDATES: usize = 100;
 
 impl Session {
@@ -66,24 +52,12 @@ impl Session {
     pub(super) fn integrator_step(&self) -> f64 {
         self.h() / 20.0
     }
-
-    /// An instance for Model Exchange in a state of its life cycle. In Event Mode no update was made yet.
-    pub(super) fn exchange(&self, mode: Mode) -> Result<Instance<'_>, NotDetermined> {
-        self.prepare(|| {
-            let arguments = Arguments { interface: Interface::ModelExchange, ..self.arguments("probe") };
-            let made = self.instantiate(&arguments)?;
-            let instance =
-                made.ok_or_else(|| NotDetermined("an instantiation for Model Exchange returned NULL".into()))?;
-            instance.bring_to(mode)?;
-            Ok(instance)
-        })
-    }
 }
 
 /// What an event did.
 pub(super) struct Event {
     /// The results of each update, and whether it changed a state.
-    pub(super) updates: Vec<(Updated, bool)>,
+    pub(super) updates: Vec<(UpdateResults, bool)>,
 }
 
 impl Event {
@@ -109,29 +83,8 @@ impl Event {
 }
 
 impl Instance<'_> {
-    /// Brings a new instance to a state.
-    pub(super) fn bring_to(&self, mode: Mode) -> Result<(), NotDetermined> {
-        if mode == Mode::Instantiated {
-            return Ok(());
-        }
-        self.enter()?;
-        if mode == Mode::Initialization {
-            return Ok(());
-        }
-        self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
-        if mode == Mode::Event {
-            return Ok(());
-        }
-        let _ = self.iterate()?;
-        self.must("EnterContinuousTimeMode", self.simple(Simple::EnterContinuousTimeMode)?)?;
-        if mode == Mode::Continuous {
-            return Ok(());
-        }
-        self.must("Terminate", self.simple(Simple::Terminate)?)
-    }
-
     /// One update of the discrete states.
-    pub(super) fn update(&self) -> Result<(Status, Updated), NotDetermined> {
+    pub(super) fn update(&self) -> Result<(Status, UpdateResults), NotDetermined> {
         let name = if self.session.description.version == FmiVersion::V2 {
             "NewDiscreteStates"
         } else {
@@ -285,10 +238,10 @@ impl Session {
     /// An instance in Event Mode whose inputs have been set; where the FMU does not take these values, with its start values.
     pub(super) fn excited(&self) -> Result<Instance<'_>, NotDetermined> {
         self.prepare(|| {
-            let instance = self.exchange(Mode::Event)?;
-            let trial = self.exchange(Mode::Event)?;
+            let instance = self.exchange(State::Event)?;
+            let trial = self.exchange(State::Event)?;
             let good = trial.excite()? && Importer::start(&trial).is_ok();
-            Ok(if good && instance.excite()? { instance } else { self.exchange(Mode::Event)? })
+            Ok(if good && instance.excite()? { instance } else { self.exchange(State::Event)? })
         })
     }
 }
@@ -301,8 +254,8 @@ impl<'a, 'b> Importer<'a, 'b> {
         Ok(importer)
     }
 
-    /// Begins as [`start`](Self::start), runs, and shows every event, and the importer after every step and whether there was
-    /// an event at its end.
+    /// Begins like [`start`](Self::start), runs, and passes every event to `see`, and the importer after every step to `look`,
+    /// with whether there was an event at its end.
     pub(super) fn survey(
         instance: &'a Instance<'b>,
         steps: usize,
@@ -440,4 +393,21 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
         let largest = differences.fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
         (largest > 1e-9).then_some((k + 1, largest))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_no_deviation() {
+        let rows = |last: f64| [vec![1.0, 0.0], vec![2.0, last]];
+        assert_eq!(deviation(&rows(5.0), &rows(5.0)), None);
+        assert_eq!(deviation(&rows(5.0), &rows(5.0 + 4e-9)), None, "below 1e-9 of the largest value");
+        let (step, largest) = deviation(&rows(5.0), &rows(5.0 + 1e-8)).unwrap();
+        assert!(step == 2 && (largest - 2e-9).abs() < 1e-12, "{step} {largest}");
+        assert_eq!(deviation(&rows(5.0), &rows(f64::NAN)), Some((2, f64::INFINITY)));
+        assert_eq!(deviation(&rows(f64::NAN), &rows(f64::NAN)), None);
+        assert_eq!(deviation(&rows(5.0), &rows(5.0)[..1]), Some((2, f64::INFINITY)));
+    }
 }

@@ -71,7 +71,7 @@ impl FmuFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// It cannot be read, is no ZIP archive, or has no description of FMI 2.0 or 3.0.
+    /// The file cannot be read, is not a ZIP archive, or has no description of FMI 2.0 or 3.0.
     pub fn open(path: &Path) -> Result<Self, Unusable> {
         let unusable = |cause: String| Unusable { path: path.into(), cause };
         let size = fs::metadata(path).map_err(|e| unusable(e.to_string()))?;

@@ -23,11 +23,8 @@ pub(super) struct Instance<'b> {
 impl Session {
     /// Instantiates; `None` for NULL.
     pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<Instance<'_>>, NotDetermined> {
-        let made = match (self.description.version, arguments.interface) {
-            (FmiVersion::V3, Interface::ModelExchange) => "fmi3InstantiateModelExchange",
-            _ => self.instantiation(),
-        };
-        self.record_call(&format!("{made}({:?})", arguments.name.as_deref().unwrap_or_default()));
+        let function = self.function_for(arguments.interface);
+        self.record_call(&format!("{function}({:?})", arguments.name.as_deref().unwrap_or_default()));
         let handle = self.raw.instantiate(arguments).map_err(NotDetermined)?;
         self.record_result(&if handle.is_some() { "an instance" } else { "NULL" });
         Ok(handle.map(|handle| Instance::new(self, handle, arguments.event_mode)))
@@ -43,10 +40,21 @@ impl Session {
 
     /// A new instance; NULL ends the probe.
     pub(super) fn fresh(&self) -> Result<Instance<'_>, NotDetermined> {
-        self.prepare(|| {
-            let made = self.instantiate(&self.arguments("probe"))?;
-            made.ok_or_else(|| NotDetermined(format!("{} returned NULL", self.instantiation())))
-        })
+        self.prepare(|| self.made(&self.arguments("probe")))
+    }
+
+    /// Instantiates; NULL ends the probe.
+    pub(super) fn made(&self, arguments: &Arguments) -> Result<Instance<'_>, NotDetermined> {
+        let made = self.instantiate(arguments)?;
+        made.ok_or_else(|| NotDetermined(format!("{} returned NULL", self.function_for(arguments.interface))))
+    }
+
+    /// Name of the function that makes instances for this interface.
+    fn function_for(&self, interface: Interface) -> &'static str {
+        match (self.description.version, interface) {
+            (FmiVersion::V3, Interface::ModelExchange) => "fmi3InstantiateModelExchange",
+            _ => self.instantiation(),
+        }
     }
 
     /// A new instance in initialization mode.
@@ -163,7 +171,7 @@ impl Instance<'_> {
         self.step_with(t, h, false)
     }
 
-    /// The same with a value of noSetFMUStatePriorToCurrentPoint.
+    /// A step from any time, with a value of `noSetFMUStatePriorToCurrentPoint`.
     pub(super) fn step_with(&self, t: f64, h: f64, no_prior: bool) -> Result<Status, NotDetermined> {
         let mark = if no_prior { ", noSetFMUStatePriorToCurrentPoint=true" } else { "" };
         let call = if self.session.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?}{mark})") };

@@ -1,16 +1,17 @@
-//! The command `fmu-check`: [`fmu_check`] by itself, the same as `fmu check`.
+//! The command `fmu-check`: the checker as a program of its own; it does what `fmu check` does.
 
 #![forbid(unsafe_code)]
 
-use clap::{Parser, Subcommand};
-use fmu_check::{command, message, probe};
+use clap::error::ErrorKind;
+use clap::{Error, Parser, Subcommand};
+use fmu_check::{command, probe};
 use std::process::ExitCode;
 
 #[derive(Debug, Parser)]
-#[command(name = "fmu-check", version, styles = message::HELP, subcommand_negates_reqs = true, args_conflicts_with_subcommands = true)]
+#[command(name = "fmu-check", version, subcommand_negates_reqs = true, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(flatten)]
-    check: command::Check,
+    check: command::CheckArguments,
     #[command(subcommand)]
     probe: Option<Hidden>,
 }
@@ -31,7 +32,8 @@ fn main() -> ExitCode {
         None => command::run(&check).map(|holds| ExitCode::from(u8::from(!holds))),
     };
     outcome.unwrap_or_else(|error| {
-        message::error(&fmu_import::printable_lines(&format!("{error:#}")));
+        let text = format!("{error:#}\n");
+        let _ = Error::raw(ErrorKind::Io, fmu_import::printable_lines(&text)).print();
         ExitCode::from(2)
     })
 }

@@ -166,10 +166,10 @@ impl Report {
         out + end + "\n"
     }
 
-    /// As JSON.
+    /// The report as JSON.
     ///
     /// # Errors
-    /// None that is known.
+    /// The report cannot be written as JSON, which no report has shown.
     pub fn json(&self) -> serde_json::Result<String> {
         serde_json::to_string_pretty(self)
     }
@@ -232,7 +232,8 @@ pub fn html(reports: &[Report]) -> String {
     reports.iter().map(Report::section).fold(head, |page, section| page + &section) + "</body></html>\n"
 }
 
-/// Text for several files: what several have in common once, with the files; then what only one has; then a line for each.
+/// Text for several files: first the findings that several share, with the files; then those of a single file; then a line for
+/// each.
 pub fn texts(reports: &[Report], verbose: bool) -> String {
     if let [report] = reports {
         return report.text(verbose);

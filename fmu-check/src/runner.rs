@@ -8,7 +8,7 @@ use crate::check::{Check, Judgement, Level, Options, Run, Verdict};
 use crate::checks::GROUPS;
 use crate::fmu_file::FmuFile;
 use crate::session::{FOUND, Line};
-use crate::watch::{State, Watch};
+use crate::watch::{Pace, Watch};
 use fmu_import::guard::{self, Allowance, End, Guarded};
 use model_description::{Interface, limits};
 use std::collections::VecDeque;
@@ -163,14 +163,14 @@ pub(super) struct Runner {
     /// The binaries for co-simulation and for Model Exchange; mostly the same one.
     simulation: Option<PathBuf>,
     exchange: Option<PathBuf>,
-    /// Of one call.
+    /// Time limit of one call.
     timeout: Duration,
     allowance: Allowance,
     /// Processes that outlived a probe.
     left: Mutex<Vec<String>>,
-    /// Of a call with arguments that a real importer never passes: known after a minimal run.
+    /// Time limit of a call with arguments that a real importer never passes; a minimal run measures it.
     wild: OnceLock<Duration>,
-    /// Of the whole run.
+    /// End of the whole run.
     deadline: Option<Instant>,
 }
 
@@ -349,20 +349,20 @@ impl Runner {
 
     /// Runs a command of [`Self::command`] to its end.
     fn guarded(&self, check: &Check, command: Command, out: &Path) -> io::Result<Outcome> {
-        let (mut watch, mut state, mut late) = (None, State::Runs, false);
+        let (mut watch, mut state, mut late) = (None, Pace::Runs, false);
         let new = |id| Watch::new(id, out.with_extension("call"), self.limit(check.id));
         let report = Guarded::start(command)?.wait(|id| {
             late = self.deadline.is_some_and(|end| Instant::now() > end);
             if let Some(id) = id {
                 state = watch.get_or_insert_with(|| new(id)).look();
             }
-            late || state != State::Runs
+            late || state != Pace::Runs
         })?;
         match report.end {
             End::Refused(why) => return Err(io::Error::other(why)),
             End::Stopped if late => return Ok(Outcome::OutOfTime),
-            End::Stopped if state == State::Slow => return Ok(Outcome::Slow),
-            End::Stopped if state == State::Stopped => {
+            End::Stopped if state == Pace::Slow => return Ok(Outcome::Slow),
+            End::Stopped if state == Pace::Stopped => {
                 return Ok(Outcome::Hang("stopped the process (as by SIGSTOP), which was not continued"));
             }
             End::Stopped => return Ok(Outcome::Hang("did not return")),
@@ -379,7 +379,7 @@ impl Runner {
         Ok(Outcome::End(report.end))
     }
 
-    /// How and in which call a process ended that has not finished its probe, or why its end is no finding.
+    /// How, and in which call, a process ended before its probe was complete; or why its end is not a finding.
     fn crash(&self, check: &Check, end: &Outcome, out: &Path) -> Result<(String, String), String> {
         let journal = fs::read_to_string(out.with_extension("call")).unwrap_or_default();
         let call = journal.lines().next().unwrap_or_default().trim();

@@ -25,7 +25,7 @@ pub(super) struct NotDetermined(pub(super) String);
 
 /// Why a probe has no session.
 pub(super) enum NotOpened {
-    /// Something failed on this computer, which is no fault of the FMU.
+    /// Something failed on this computer; the FMU is not at fault.
     Here(String),
     /// The binary does not load.
     Load(String),
@@ -158,18 +158,18 @@ impl Session {
         })
     }
 
-    /// The same FMU once more, for another thread.
+    /// Loads the FMU once more, for another thread.
     pub(super) fn duplicate(&self, number: usize) -> Result<Self, NotDetermined> {
         let raw = Raw::open(&self.binary, self.description.version).map_err(NotDetermined)?;
         self.duplicate_with(raw, number)
     }
 
-    /// The same FMU with another loaded binary; its findings and calls are discarded.
+    /// A session with another loaded binary of the FMU; its findings and calls are discarded.
     pub(super) fn duplicate_with(&self, raw: Raw, number: usize) -> Result<Self, NotDetermined> {
         self.duplicate_at(&self.dir, raw, number)
     }
 
-    /// The same, unpacked to another folder.
+    /// A session with another loaded binary and another unpacked folder; its findings and calls are discarded.
     pub(super) fn duplicate_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, NotDetermined> {
         let lost = |e: std::io::Error| NotDetermined(e.to_string());
         // It writes nothing but progress there.
@@ -231,7 +231,7 @@ impl Session {
         self.note_call(&format!("\n{FOUND}\n"));
     }
 
-    /// Reports a call that should have succeeded, as a violation; an end that the FMU asked for is none.
+    /// Reports a call that should have succeeded, as a violation; an end that the FMU asked for is not a violation.
     pub(super) fn failed(&self, what: &str, NotDetermined(why): NotDetermined) {
         if why.starts_with(ENDED) {
             self.write(&Line::NotDetermined(why));

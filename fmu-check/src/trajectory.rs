@@ -71,7 +71,7 @@ impl Session {
         self.compare_variables(&watched, what, a, b);
     }
 
-    /// The same for other variables.
+    /// Compares two runs in these variables.
     pub(super) fn compare_variables(
         &self,
         variables: &[&ModelVariable],
@@ -98,7 +98,7 @@ impl Session {
         self.deviates_at(None, largest, text);
     }
 
-    /// The same, of this level instead of that of the check.
+    /// Reports a deviation at this level, or at that of the check.
     pub(super) fn deviates_at(&self, lower: Option<Level>, largest: f64, text: &str) {
         let tolerance = self.tolerance();
         let (level, text) = if largest <= tolerance {
@@ -112,5 +112,31 @@ impl Session {
             Some(level) => self.lesser(level, text),
             None => self.violated(text),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_is_relative_to_the_largest_value_of_its_variable() {
+        let xml = br#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t"><ModelVariables>
+            <Float64 name="x" valueReference="1" causality="output"/><Int32 name="n" valueReference="2" causality="output"/>
+            </ModelVariables><ModelStructure/></fmiModelDescription>"#;
+        let description = model_description::read(xml).unwrap();
+        let variables: Vec<_> = description.variables.iter().collect();
+        let row = |x: f64, n: u64| vec![vec![x.to_bits()], vec![n]];
+        let first = [row(1.0, 3), row(-4.0, 3), row(2.0, 3)];
+        assert!(difference(&variables, &first, &first).is_none());
+        let found = difference(&variables, &first, &[row(1.0, 3), row(-4.0, 3), row(2.5, 3)]).unwrap();
+        assert_eq!((found.step, found.variable, found.largest.to_bits()), (2, 0, 0.125_f64.to_bits()));
+        let found = difference(&variables, &first, &[row(1.0, 3), row(-4.0, 4), row(2.0, 3)]).unwrap();
+        assert!((found.step, found.variable) == (1, 1) && found.largest.is_infinite());
+        let found = difference(&variables, &first, &first[..2]).unwrap();
+        assert!(found.step == 2 && found.largest.is_infinite());
+        let nan = [row(f64::NAN, 3)];
+        assert!(difference(&variables, &nan, &nan).is_none());
+        assert!(difference(&variables, &nan, &[row(0.0, 3)]).unwrap().largest.is_infinite());
     }
 }

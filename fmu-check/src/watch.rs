@@ -10,7 +10,7 @@ const PATIENCE: u32 = 6;
 
 /// What the parent knows about a probe that has not ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum State {
+pub(super) enum Pace {
     /// Go on waiting.
     Runs,
     /// One call has used the processor for the time limit, or has slept for it.
@@ -43,10 +43,10 @@ impl Watch {
     }
 
     /// Looks at the process; cheap enough to be called in a loop.
-    pub(super) fn look(&mut self) -> State {
+    pub(super) fn look(&mut self) -> Pace {
         let since = self.looked.elapsed();
         if since < self.limit / 100 {
-            return State::Runs;
+            return Pace::Runs;
         }
         self.looked = Instant::now();
         self.watched += since.min(self.limit / 10);
@@ -57,16 +57,16 @@ impl Watch {
         }
         let over = self.watched > self.limit.saturating_mul(PATIENCE);
         if self.watched.saturating_sub(self.call.1) <= self.limit {
-            return if over { State::Slow } else { State::Runs };
+            return if over { Pace::Slow } else { Pace::Runs };
         }
-        let Some((used, rests)) = used.zip(rests) else { return State::Hangs };
+        let Some((used, rests)) = used.zip(rests) else { return Pace::Hangs };
         let since = used.saturating_sub(self.call.2.unwrap_or_default());
         // Half of the limit: the processor's clock ticks in steps.
         match rests {
-            _ if since > self.limit / 2 => State::Hangs,
+            _ if since > self.limit / 2 => Pace::Hangs,
             Some(how) if since < self.limit / 20 => how,
-            _ if over => State::Slow,
-            _ => State::Runs,
+            _ if over => Pace::Slow,
+            _ => Pace::Runs,
         }
     }
 }
@@ -74,7 +74,7 @@ impl Watch {
 /// The processor time that a process has used, and how all its threads rest: they wait for something, or a signal has stopped
 /// them.
 #[cfg(target_os = "linux")]
-fn processor(pid: u32) -> Option<(Duration, Option<State>)> {
+fn processor(pid: u32) -> Option<(Duration, Option<Pace>)> {
     // The name of the program stands in parentheses and may contain anything.
     let fields =
         |text: String| Some(text.rsplit_once(')')?.1.split_whitespace().map(str::to_owned).collect::<Vec<_>>());
@@ -85,12 +85,12 @@ fn processor(pid: u32) -> Option<(Duration, Option<State>)> {
     let state = |task: fs::DirEntry| fields(fs::read_to_string(task.path().join("stat")).ok()?)?.into_iter().next();
     let states: Vec<String> = tasks.filter_map(state).collect();
     let all = |state: &str| states.iter().all(|s| s == state);
-    let rests = if all("S") { Some(State::Hangs) } else { all("T").then_some(State::Stopped) };
+    let rests = if all("S") { Some(Pace::Hangs) } else { all("T").then_some(Pace::Stopped) };
     Some((Duration::from_millis(10 * ticks), rests))
 }
 
 #[cfg(not(target_os = "linux"))]
-fn processor(_: u32) -> Option<(Duration, Option<State>)> {
+fn processor(_: u32) -> Option<(Duration, Option<Pace>)> {
     None
 }
 
@@ -100,12 +100,12 @@ mod tests {
     use std::process::{Child, Command};
 
     /// What the watch says in the end about a shell command, with its limit.
-    fn end(script: &str, limit: u64, journal: &std::path::Path) -> State {
+    fn end(script: &str, limit: u64, journal: &std::path::Path) -> Pace {
         let mut child: Child = Command::new("sh").args(["-c", script]).env("JOURNAL", journal).spawn().unwrap();
         let mut watch = Watch::new(child.id(), journal.into(), Duration::from_millis(limit));
         loop {
             let state = watch.look();
-            if state != State::Runs || child.try_wait().unwrap().is_some() {
+            if state != Pace::Runs || child.try_wait().unwrap().is_some() {
                 let _ = child.kill();
                 child.wait().unwrap();
                 return state;
@@ -119,15 +119,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let journal = folder.path().join("call");
         // One call that computes without end, one that waits without end.
-        assert_eq!(end("while :; do :; done", 400, &journal), State::Hangs);
-        assert_eq!(end("exec sleep 60", 400, &journal), State::Hangs);
+        assert_eq!(end("while :; do :; done", 400, &journal), Pace::Hangs);
+        assert_eq!(end("exec sleep 60", 400, &journal), Pace::Hangs);
         // Call after call: slow, however long it takes.
         let calls = "n=0; while :; do n=$((n + 1)); echo \"C call $n\" > \"$JOURNAL\"; done";
-        assert_eq!(end(calls, 400, &journal), State::Slow);
+        assert_eq!(end(calls, 400, &journal), Pace::Slow);
         // One call that stops the process.
-        assert_eq!(end("kill -STOP $$", 400, &journal), State::Stopped);
+        assert_eq!(end("kill -STOP $$", 400, &journal), Pace::Stopped);
         // One that ends is left to end.
-        assert_eq!(end("true", 400, &journal), State::Runs);
+        assert_eq!(end("true", 400, &journal), Pace::Runs);
     }
 
     /// The whole run may be stopped (a terminal, a debugger): the probe has not hung meanwhile.
@@ -142,6 +142,6 @@ mod tests {
         });
         let _ = child.kill();
         child.wait().unwrap();
-        assert_eq!(seen, [State::Runs; 3]);
+        assert_eq!(seen, [Pace::Runs; 3]);
     }
 }

@@ -68,17 +68,17 @@ pub type Complete<M> = fn(&mut M, Elapsed) -> Result<(), Fault>;
 /// The capabilities of the model `M`: `Capabilities::NONE.ContinuousTime().Events()`. A method exists only if the model
 /// implements the trait of its name.
 pub struct Capabilities<M: Model> {
-    /// Of a [`ContinuousTime`] model.
+    /// Functions of a [`ContinuousTime`] model.
     pub continuous: Option<Continuous<M>>,
-    /// Of a model with [`Events`].
+    /// Functions of a model with [`Events`].
     pub events: Option<Eventful<M>>,
-    /// Of a [`Sampled`] model.
+    /// Functions of a [`Sampled`] model.
     pub samples: Option<Samples<M>>,
-    /// Of a [`Differentiable`] model.
+    /// Functions of a [`Differentiable`] model.
     pub tangent: Option<Tangent<M>>,
-    /// Of a model that follows [`CompletedSteps`].
+    /// Function of a model that follows [`CompletedSteps`].
     pub complete: Option<Complete<M>>,
-    /// Of a model that [`Warns`].
+    /// Function of a model that [`Warns`].
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,
 }
 
@@ -241,7 +241,7 @@ pub trait Exported: Sized + 'static {
     const TOKEN: crate::Token = Self::CAN.hash().guid();
 }
 
-/// A model without capabilities: as `export!(M)` exports it.
+/// A model without capabilities, which `export!(M)` exports.
 pub struct Plain<M>(PhantomData<M>);
 
 impl<M: Model> Exported for Plain<M> {

@@ -26,7 +26,7 @@ impl<M: 'static> State<M> {
         Self { name: of.name, rate: of.rate, reinit: of.reinit, at }
     }
 
-    /// The same for a state that an event may change.
+    /// Marks the state as one that an event may change.
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;
         self
@@ -49,7 +49,7 @@ pub trait ContinuousTime: Model {
     /// The derivatives do not exist here: the solver tries a shorter step.
     fn derivatives(&self, now: Elapsed, dx: &mut [f64]) -> Result<(), Fault>;
 
-    /// The importer wrote states: recomputes what the model keeps beside them.
+    /// Called after the importer has set states; recomputes the values that the model derives from them.
     fn settle(&mut self) {}
 
     /// The outputs at an instant, in Model Exchange: a mean over a step becomes the instantaneous value.
@@ -57,12 +57,13 @@ pub trait ContinuousTime: Model {
         self.output(now, outputs);
     }
 
-    /// Writes the rates of outputs that grow at given states and inputs, like the energy since the start, in their own
-    /// places, and leaves the others alone: a part of the output derivatives of Co-Simulation.
+    /// Writes the rate of every output that accumulates, such as an energy counter, in the place of that output, and leaves the
+    /// other places alone. The rates are a part of the output derivatives of Co-Simulation.
     fn integrands(&self, _now: Elapsed, _outputs: &mut Self::Outputs) {}
 }
 
-/// A continuous model that follows the solution in Model Exchange, for example to count what passes between two of its points.
+/// A continuous model that is called at every accepted point of the solution in Model Exchange, for example to count what
+/// passes between two points.
 ///
 /// A solver also tries states that it gives up again; a model without this trait cannot tell them apart. In Co-Simulation,
 /// [`Model::advance`] knows the solution, and nothing here is called.

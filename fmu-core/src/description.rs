@@ -2,7 +2,7 @@
 
 mod terminals;
 
-pub use terminals::{Member, Terminal, TerminalPicture};
+pub use terminals::{MemberDescription, TerminalDescription, TerminalPicture};
 
 use crate::Fault;
 use crate::capability::{Capabilities, Exported};
@@ -23,7 +23,7 @@ pub const TIME: u32 = 0;
 pub struct Description {
     /// Model identifier, and the name that users see unless there is a title.
     pub name: String,
-    /// Name of this FMU for its users, as a preset may have one of its own.
+    /// Name that users see, for example that of a preset.
     pub title: Option<String>,
     /// One sentence.
     pub description: String,
@@ -44,7 +44,7 @@ pub struct Description {
     /// The variables in the order of their value references, without `time`.
     pub variables: Vec<Variable>,
     /// Groups of variables that are connected together.
-    pub terminals: Vec<Terminal>,
+    pub terminals: Vec<TerminalDescription>,
     /// Icon: an SVG document.
     pub icon: Option<String>,
     /// What the model can do beyond co-simulation without events, if anything.
@@ -62,7 +62,7 @@ pub struct ModelExchange {
     pub indicators: Vec<u32>,
     /// Co-simulation with Event Mode and early return (FMI 3.0).
     pub event_mode: bool,
-    /// The importer is to tell completed integrator steps.
+    /// The importer must call `CompletedIntegratorStep`.
     pub completed_steps: bool,
 }
 
@@ -98,7 +98,7 @@ pub struct Variable {
     pub shape: Vec<usize>,
     /// Start values (one, or one per element) of variables that the importer may set; `None` for calculated ones.
     pub start: Option<Vec<Value>>,
-    /// Value references that the initial value depends on; `None` for variables that are no initial unknown.
+    /// Value references that the initial value depends on; `None` for variables that are not initial unknowns.
     pub initial_dependencies: Option<Vec<u32>>,
     /// Value references that the value depends on between two events: of outputs and derivatives.
     pub dependencies: Option<Vec<u32>>,
@@ -150,13 +150,13 @@ pub enum VariableKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Value {
-    /// Of a real variable.
+    /// Start value of a real variable.
     Real(f64),
-    /// Of an integer or an enumeration.
+    /// Start value of an integer or an enumeration.
     Integer(i128),
-    /// Of a Boolean.
+    /// Start value of a Boolean.
     Boolean(bool),
-    /// Of a text.
+    /// Start value of a text.
     Text(String),
 }
 
@@ -178,7 +178,7 @@ impl Description {
         Self::instantiated::<E>(fresh()?)
     }
 
-    /// As [`exported`](Self::exported), with the start values and the resources that `block` has.
+    /// Describes an instance like [`exported`](Self::exported), with the start values and the resources that `block` has.
     ///
     /// # Errors
     /// As [`exported`](Self::exported).
@@ -367,7 +367,7 @@ fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, 
         _ => false,
     };
     if !has {
-        return Err(Fault::new(format!("{input} is read with {} = {value}, which it never is", found.name)));
+        return Err(Fault::new(format!("{input} is read with {} = {value}, a value that it never has", found.name)));
     }
     Ok(Need::With { parameter: &found.name, value }.to_string())
 }
@@ -415,7 +415,7 @@ fn kind(kind: &Kind) -> VariableKind {
     }
 }
 
-/// The same check as in a set call. A text must be one that XML can hold (XML 1.0, 2.2).
+/// Checks a start value by the rules of a set call. A text must be one that XML can hold (XML 1.0, 2.2).
 fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
     let text = match slot {
         Slot::Text(text) => text.as_str(),

@@ -22,8 +22,8 @@ pub enum Next {
 }
 
 impl Next {
-    /// Seconds from `now` to this event: 0 if it is due, also if `now` misses it by rounding. An importer may take a time
-    /// of its own for that of the event if both are the same to 1e-9 of the time.
+    /// Seconds from `now` to this event: 0 if it is due, or if rounding alone separates the two. An importer's time counts as
+    /// that of the event if both agree to 1e-9 of the time.
     pub fn left(self, now: Elapsed) -> Option<f64> {
         let left = match self {
             Self::Never => return None,
@@ -48,7 +48,7 @@ impl Next {
     }
 }
 
-/// What an event did, besides changing discrete variables.
+/// What an event did in addition to changing discrete variables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {
     /// Another call of [`Events::event`] follows before time goes on.
@@ -125,7 +125,7 @@ pub fn bounded<M: Sampled>(model: &M, now: Elapsed) -> Result<(), Fault> {
     bounded_by(model, grid(model).past(model.samples(), now), now)
 }
 
-/// The same `past` (s) the next sample.
+/// Refuses a point `past` (s) after the next sample if more samples are due than anyone can wait for.
 #[inline]
 pub(crate) fn bounded_by<M: Sampled>(model: &M, past: f64, now: Elapsed) -> Result<(), Fault> {
     if past <= MAX_SAMPLES * model.period() { Ok(()) } else { Err(endless(model.period(), now)) }

@@ -97,7 +97,7 @@ impl IntegerType {
     /// The smallest and the largest value of this type inside a range.
     pub fn within(self, range: &Range) -> (i128, i128) {
         let (min, max) = self.bounds();
-        // A bound that is no integer is rounded inwards; a strict one excludes itself. Conversion saturates.
+        // A bound that is not an integer is rounded inwards; a strict one excludes itself. Conversion saturates.
         #[expect(clippy::cast_possible_truncation, reason = "bounds are whole here, or infinite")]
         let (mut low, mut high) = (range.min.ceil() as i128, range.max.floor() as i128);
         low = low.saturating_add(i128::from(range.above && range.min.fract() == 0.0));

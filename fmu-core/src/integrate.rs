@@ -9,7 +9,7 @@ use crate::{ContinuousTime, Elapsed, Events, Fault, Sampled, Step};
 
 /// Maximum number of substeps in one communication step.
 const MAX_SUBSTEPS: f64 = 1e8;
-/// Maximum number of events located by indicators in one communication step, besides one in every substep.
+/// Maximum number of events located by indicators in one communication step, in addition to one in every substep.
 const MAX_LOCATED: f64 = 1e5;
 /// Maximum number of calls of [`Events::event`] at one instant.
 const MAX_ITERATIONS: usize = 100;
@@ -41,7 +41,7 @@ pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, lon
     Ok(())
 }
 
-/// The same for a model with events, which happen where they are due: time events exactly, others where an indicator
+/// Integrates a model with events, which happen where they are due: time events exactly, others where an indicator
 /// changes its sign. Every step begins with an event, because inputs may have changed; one that is due at the end of the
 /// step belongs to the next one.
 ///
@@ -108,7 +108,7 @@ pub fn sampled<M: Sampled>(model: &mut M, step: &Step) -> Result<(), Fault> {
     Ok(())
 }
 
-/// All of an event at `now`.
+/// Handles an event at `now` until it needs no further update.
 fn handle<M: Events>(model: &mut M, now: Elapsed) -> Result<(), Fault> {
     model.begin(now);
     for _ in 0..MAX_ITERATIONS {

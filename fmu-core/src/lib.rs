@@ -51,7 +51,7 @@
 //!     }
 //! }
 //!
-//! /// The physics. It gives Model Exchange and derivatives besides.
+//! /// The physics, for Model Exchange and derivatives too.
 //! impl ContinuousTime for Heater {
 //!     const STATES: &'static [State<Self>] = &[State::new("T", &KELVIN_PER_S, |m| &mut m.t)];
 //!
@@ -75,8 +75,8 @@
 //! ```
 //!
 //! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
-//! [`CompletedSteps`] and [`Warns`] are what a model can do besides; [`Model::load`] reads files that the FMU brings along, and
-//! a [`preset`] is one of them.
+//! [`CompletedSteps`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
+//! and a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`table`], [`terminal`], [`model`],
 //! [`continuous`], [`events`], [`capability`], [`description`]. No motor, no XML, no C, no `unsafe`.

@@ -27,12 +27,12 @@ pub const ALL: &str = "logAll";
 pub struct Warnings<'a>(&'a mut dyn FnMut(&'static str, &dyn Fn() -> String));
 
 impl<'a> Warnings<'a> {
-    /// Warnings that `sink` receives: a key that tells messages apart, and what makes the text.
+    /// Warnings that `sink` receives: a key that identifies the message, and a closure that formats it.
     pub fn to(sink: &'a mut dyn FnMut(&'static str, &dyn Fn() -> String)) -> Self {
         Self(sink)
     }
 
-    /// Warns with the text that `message` makes; warnings with one `key` appear at most once in a second.
+    /// Warns with the text that `message` formats; warnings with one `key` appear at most once in a second.
     pub fn warn(&mut self, key: &'static str, message: impl Fn() -> String) {
         (self.0)(key, &message);
     }

@@ -4,7 +4,7 @@ use crate::{Elapsed, Fault, Hash, Step, Table, Terminal};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::path::Path;
 
-/// General information about a model, besides its variables.
+/// General information about a model; the table has its variables.
 #[derive(Clone, Copy, Debug)]
 pub struct Info {
     /// Name and model identifier: a C identifier.
@@ -95,8 +95,8 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     const HASH: Hash = Hash::START.text(Self::INFO.name).text(Self::INFO.version).join(&Self::TABLE.hash());
 
     /// Reads data from the files of the FMU's folder `resources/`, once, at instantiation. `resources` is that folder; `None`
-    /// if the importer names none. What is read belongs into a [`Resource`](crate::Resource): it is no part of a saved state,
-    /// and is there again after a reset, and when a state is restored.
+    /// if the importer names none. Store what is read in a [`Resource`](crate::Resource): it is not part of a saved
+    /// state, and it is there again after a reset and when a state is restored.
     ///
     /// ```
     /// # use fmu_core::{Fault, Resource};
@@ -141,7 +141,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
         Ok(())
     }
 
-    /// Rules that hold beside [`validate`](Model::validate) if the model is used through this interface.
+    /// Rules in addition to [`validate`](Model::validate) for a model that is used through this interface.
     ///
     /// # Errors
     /// Names the parameter, its value and the reason.

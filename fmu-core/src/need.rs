@@ -8,7 +8,7 @@ use std::fmt;
 /// Whether an input must be fed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Need<'a> {
-    /// Its start value is no more than a beginning.
+    /// Its start value only serves the beginning of a run.
     #[default]
     Always,
     /// Its start value is what is usually wanted.
@@ -39,8 +39,7 @@ impl fmt::Display for Need<'_> {
 }
 
 impl<'a> Need<'a> {
-    /// Reads the end of a description. A description in other words, of another tool, that calls the input optional is taken
-    /// at its word.
+    /// Reads the end of a description. A description by another tool counts too if it calls the input optional.
     pub fn of(description: &'a str) -> Self {
         let condition = description.rsplit_once(OPTIONAL).and_then(|(_, end)| end.strip_prefix(ONLY_WITH));
         if let Some(condition) = condition {

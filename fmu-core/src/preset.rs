@@ -11,15 +11,15 @@
 //! weights[1,2]→0.5
 //! ```
 //!
-//! An enumeration has its integer, a Boolean `true` or `false`; `\n`, `\r`, `\t` and `\\` stand for what they stand for in
-//! Rust. The hash of the file follows the model's token after `+`: a token tells whether it has a preset, and which one.
+//! An enumeration has its integer, a Boolean `true` or `false`; `\n`, `\r`, `\t` and `\\` mean what they mean in Rust. The hash
+//! of the file follows the model's token after `+`: so the token shows whether there is a preset, and which one.
 
 use crate::{Fault, Hash};
 
 /// Name of the file in the folder `resources/`.
 pub const FILE: &str = "fmu-preset.txt";
 
-/// Bytes of the file at most.
+/// Largest size of the file in bytes.
 pub const MOST: u64 = 1 << 20;
 
 /// The first line.
@@ -64,7 +64,7 @@ pub fn write<'a>(values: impl IntoIterator<Item = (&'a str, &'a str)>) -> String
 /// Names the line and what is wrong: the size, the encoding, the format, the form of a line.
 pub fn read(bytes: &[u8]) -> Result<Vec<Entry>, Fault> {
     if bytes.len() as u64 > MOST {
-        return Err(Fault::new(format!("is larger than {MOST} bytes, and no preset is")));
+        return Err(Fault::new(format!("is larger than {MOST} bytes, the most that a preset may have")));
     }
     let text = std::str::from_utf8(bytes).map_err(|_| Fault::new("is not a preset: it is not UTF-8"))?;
     let mut lines = text.split('\n');

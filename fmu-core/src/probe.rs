@@ -1,5 +1,5 @@
 //! Finds dependencies by running the model itself: each known is changed alone, at several operating points; every
-//! unknown whose bits change depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
+//! unknown that changes by more than rounding depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
 
 use crate::Elapsed;
 use crate::capability::Capabilities;
@@ -13,7 +13,7 @@ const POINTS: u32 = 64;
 /// The index that stands for `time`.
 pub(crate) const NOW: usize = usize::MAX;
 
-/// For each variable, the indices that it depends on; derivatives follow the table. `None` if it is no unknown.
+/// For each variable, the indices that it depends on; derivatives follow the table. `None` for a variable that is not an unknown.
 type Dependencies = Vec<Option<Vec<usize>>>;
 
 /// What initial values depend on: outputs, calculated parameters, states and derivatives on inputs and parameters.
@@ -66,7 +66,7 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
         let mut now = Elapsed::ZERO.plus(draw.between(0.0, 1.0));
         if let Some(events) = &can.events {
             (events.begin)(&mut base.model, now);
-            // A point that the model refuses is no operating point.
+            // A point that the model refuses is not an operating point.
             if (events.event)(&mut base.model, now).is_err() {
                 continue;
             }
@@ -94,7 +94,7 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
     found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output))
 }
 
-/// The start values first; then about half of the inputs and parameters have others.
+/// The start values first; then other values for about half of the inputs and parameters.
 fn operating_point<M: Model>(fresh: &Block<M>, point: u32, settable: &[usize], draw: &mut Draw) -> Block<M> {
     let mut block = fresh.clone();
     for &i in settable {
@@ -103,6 +103,18 @@ fn operating_point<M: Model>(fresh: &Block<M>, point: u32, settable: &[usize], d
         }
     }
     block
+}
+
+/// Greatest relative change of a real number that is rounding: a torque, which is computed in stator axes, changes by some
+/// 1e-16 with the angle of the rotor.
+const ROUNDING: f64 = 1e-11;
+
+/// Whether two values differ by more than rounding. Integers, Booleans and hashes of texts, seen as the bits of a real number,
+/// differ by more.
+fn differ(before: u64, after: u64) -> bool {
+    let (a, b) = (f64::from_bits(before), f64::from_bits(after));
+    let rounded = (a - b).abs() <= ROUNDING * a.abs().max(b.abs()) && a.is_finite() && b.is_finite();
+    before != after && !rounded
 }
 
 /// Which unknown depends on which known.
@@ -115,7 +127,7 @@ impl Found {
 
     fn compare(&mut self, known: usize, before: &[u64], after: &[u64]) {
         for (list, (before, after)) in self.0.iter_mut().zip(before.iter().zip(after)) {
-            if before != after && !list.contains(&known) {
+            if differ(*before, *after) && !list.contains(&known) {
                 list.push(known);
             }
         }
@@ -141,7 +153,7 @@ fn causalities<M: Model>(fresh: &Block<M>) -> Vec<(Causality, Variability)> {
     (0..M::TABLE.len()).map_while(one).collect()
 }
 
-/// The same after the outputs at `now` were computed.
+/// Bits of all values after the outputs at `now` were computed.
 fn observed<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) -> Vec<u64> {
     let observe = can.continuous.as_ref().map_or(M::output as fn(&M, _, &mut _), |continuous| continuous.observe);
     observe(&block.model, now, &mut block.out);
@@ -229,5 +241,21 @@ impl Draw {
 
     fn below(&mut self, n: u32) -> usize {
         usize::try_from(self.next() % n).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_not_a_dependency() {
+        let bits = f64::to_bits;
+        assert!(!differ(bits(0.1 + 0.2), bits(0.3)) && !differ(bits(f64::NAN), bits(f64::NAN)));
+        assert!(
+            differ(bits(1.0), bits(1.0 + 1e-10)) && differ(bits(0.0), bits(1e-300)) && differ(bits(1.0), bits(-1.0))
+        );
+        assert!(differ(1, 2) && differ(0, 1) && differ(u64::from(u32::MAX), u64::from(u32::MAX) - 1));
+        assert!(differ(bits(f64::NAN), bits(1.0)) && differ(bits(f64::INFINITY), bits(1.0)));
     }
 }

@@ -1,4 +1,4 @@
-//! Data that a model reads from files at instantiation: shared, and no part of a saved state.
+//! Data that a model reads from files at instantiation: shared by clones, and not part of a saved state.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::any::Any;
@@ -69,7 +69,7 @@ impl<'de, T: Default + Send + Sync + 'static> Deserialize<'de> for Resource<T> {
 pub struct Shelf(Vec<Arc<dyn Any + Send + Sync>>);
 
 impl Shelf {
-    /// The resources of what is serialized meanwhile.
+    /// Collects the resources of what is serialized in the meantime.
     pub fn of(serialize: impl FnOnce()) -> Self {
         let _cleared = InUse::start(Vec::new(), true);
         serialize();
@@ -81,7 +81,7 @@ impl Shelf {
         self.0.is_empty()
     }
 
-    /// Puts the resources into what is deserialized meanwhile.
+    /// Puts the resources into what is deserialized in the meantime.
     pub fn attach<T>(&self, deserialize: impl FnOnce() -> T) -> T {
         if self.is_empty() {
             return deserialize();
@@ -91,9 +91,9 @@ impl Shelf {
     }
 }
 
-/// serde passes nothing along, so that the shelf in use is a variable of the thread.
+/// serde passes no context along, so the shelf in use is a variable of the thread.
 struct Used {
-    /// Empty but while a shelf is in use. A variable with a destructor would keep the binary from being unloaded.
+    /// Empty unless a shelf is in use. A variable with a destructor would keep the binary from being unloaded.
     data: ManuallyDrop<Vec<Arc<dyn Any + Send + Sync>>>,
     next: usize,
     collects: bool,

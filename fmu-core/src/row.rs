@@ -231,7 +231,7 @@ impl<W: 'static> Row<W> {
         Self::real((Causality::Output, Variability::Continuous), name, quantity, description, get)
     }
 
-    /// A continuous real variable that is no output: a state that importers may look at.
+    /// A continuous real variable other than an output: a state that importers may read.
     pub const fn state(
         name: &'static str,
         quantity: &'static Quantity,
@@ -251,7 +251,7 @@ impl<W: 'static> Row<W> {
         Self::real((Causality::Output, Variability::Discrete), name, quantity, description, get)
     }
 
-    /// A real variable that is no output and changes at sample instants.
+    /// A real variable other than an output, which changes at sample instants.
     pub const fn discrete_local(
         name: &'static str,
         quantity: &'static Quantity,

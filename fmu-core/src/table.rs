@@ -62,7 +62,7 @@ fn item(meta: &Meta, value: i32) -> String {
 
 /// Where an index leads: a row, and the index inside it.
 #[derive(Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct RowPlace {
     pub(crate) row: u16,
     pub(crate) inner: u16,
 }
@@ -70,7 +70,7 @@ pub(crate) struct Place {
 /// All variables of `W`.
 pub struct Table<W: 'static> {
     pub(crate) rows: &'static [Row<W>],
-    pub(crate) places: [Place; CAPACITY],
+    pub(crate) places: [RowPlace; CAPACITY],
     len: usize,
     hash: Hash,
 }
@@ -84,7 +84,7 @@ impl<W: 'static> Table<W> {
     pub const fn new(rows: &'static [Row<W>]) -> Self {
         assert!(CAPACITY <= u16::MAX as usize);
         // No row past the end.
-        let mut places = [Place { row: u16::MAX, inner: 0 }; CAPACITY];
+        let mut places = [RowPlace { row: u16::MAX, inner: 0 }; CAPACITY];
         let (mut len, mut row, mut hash) = (0, 0, Hash::START);
         while row < rows.len() {
             let meta = &rows[row].meta;
@@ -102,7 +102,7 @@ impl<W: 'static> Table<W> {
             let mut inner = 0;
             while inner < count {
                 assert!(len < CAPACITY, "the table holds more variables than CAPACITY");
-                places[len] = Place { row: row as u16, inner: inner as u16 };
+                places[len] = RowPlace { row: row as u16, inner: inner as u16 };
                 len += 1;
                 inner += 1;
             }
@@ -181,23 +181,38 @@ impl<W: 'static> Table<W> {
     {
         let mut whole = whole.clone();
         let wanted = ptr::from_mut(get(&mut whole)).addr();
-        let found = (0..self.len).find_map(|index| {
-            let (meta, slot) = self.entry(&mut whole, index)?;
-            let address = match &slot {
-                Slot::Real(x) => ptr::from_ref(&**x).addr(),
-                Slot::Float32(x) => ptr::from_ref(&**x).addr(),
-                Slot::Integer(x) => ptr::from_ref(&**x).addr(),
-                Slot::Boolean(x) => ptr::from_ref(&**x).addr(),
-                Slot::Enumeration(x) => ptr::from_ref(&**x).addr(),
-                Slot::Text(x) => ptr::from_ref(&**x).addr(),
-                Slot::Said(_) => return None,
-            };
-            let value = if let Slot::Enumeration(x) = &slot { item(meta, x.get()) } else { slot.to_string() };
-            let unit = if let Kind::Real(of) | Kind::Float32(of) = meta.kind { of.unit.name } else { "" };
-            let space = if unit.is_empty() { "" } else { " " };
-            (address == wanted).then(|| Some(format!("{} = {value}{space}{unit}", self.locate(index)?.0))).flatten()
+        let found = (0..self.len).find(|&index| {
+            let address = self.entry(&mut whole, index).and_then(|(_, slot)| match slot {
+                Slot::Real(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Float32(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Integer(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Boolean(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Enumeration(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Text(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Said(_) => None,
+            });
+            address == Some(wanted)
         });
-        found.unwrap_or_else(|| "a value without a variable".into())
+        found
+            .and_then(|index| self.tell_index(&mut whole, index))
+            .unwrap_or_else(|| "a value without a variable".into())
+    }
+
+    /// Name, value and unit of the variable `name` in `whole`: for messages.
+    pub fn tell_name(&self, whole: &W, name: &str) -> Option<String>
+    where
+        W: Clone,
+    {
+        let index = (0..self.len).find(|&index| self.locate(index).is_some_and(|(found, ..)| found == name))?;
+        self.tell_index(&mut whole.clone(), index)
+    }
+
+    fn tell_index(&self, whole: &mut W, index: usize) -> Option<String> {
+        let (meta, slot) = self.entry(whole, index)?;
+        let value = if let Slot::Enumeration(x) = &slot { item(meta, x.get()) } else { slot.to_string() };
+        let unit = if let Kind::Real(of) | Kind::Float32(of) = meta.kind { of.unit.name } else { "" };
+        let space = if unit.is_empty() { "" } else { " " };
+        Some(format!("{} = {value}{space}{unit}", self.locate(index)?.0))
     }
 
     fn locate_into(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {

@@ -117,7 +117,7 @@ impl Terminal {
         Self { name, description, rule, members, picture: None }
     }
 
-    /// The same, drawn with its center at (x, y).
+    /// Draws the terminal with its center at (x, y).
     pub const fn drawn(mut self, icon: &'static Icon, x: f64, y: f64) -> Self {
         self.picture = Some(Picture { icon, x, y });
         self
@@ -140,7 +140,7 @@ impl Member {
         Self { name, variable: name, kind: MemberKind::Outflow }
     }
 
-    /// The same for a variable of another name.
+    /// Names another variable for the member.
     pub const fn of(mut self, variable: &'static str) -> Self {
         self.variable = variable;
         self

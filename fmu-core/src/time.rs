@@ -128,8 +128,8 @@ impl SampleGrid {
         self.past(k, now) > self.width()
     }
 
-    /// Seconds from instant `k` to `now`: on the right side of +-[`width`](Self::width), but otherwise to the rounding of
-    /// `now`. One subtraction unless it leaves a doubt.
+    /// Seconds from instant `k` to `now`: exact enough to be on the right side of +-[`width`](Self::width), otherwise rounded
+    /// like `now`. One subtraction, unless its result is too close to call.
     #[inline]
     pub(crate) fn past(self, k: u64, now: Elapsed) -> f64 {
         let product = count(k) * self.period;

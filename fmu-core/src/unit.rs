@@ -38,12 +38,12 @@ impl Exponents {
         Self { kg, m, s, ampere, ..Self::NONE }
     }
 
-    /// The same with an exponent of the kelvin.
+    /// Sets the exponent of the kelvin.
     pub const fn with_kelvin(self, kelvin: i8) -> Self {
         Self { kelvin, ..self }
     }
 
-    /// The same with an exponent of the radian.
+    /// Sets the exponent of the radian.
     pub const fn with_rad(self, rad: i8) -> Self {
         Self { rad, ..self }
     }
@@ -98,7 +98,7 @@ impl Quantity {
         Self { name, unit, display: None, relative: false }
     }
 
-    /// The same, shown in another unit.
+    /// Shows values in another unit.
     pub const fn shown_in(self, display: DisplayUnit) -> Self {
         Self { display: Some(display), ..self }
     }

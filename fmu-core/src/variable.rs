@@ -107,7 +107,7 @@ impl Range {
         x.is_finite() && x >= self.min && x <= self.max && !on_the_edge
     }
 
-    /// The same in single precision: its bounds are rounded as every number of it is.
+    /// The variable in single precision; its bounds are rounded like its values.
     #[expect(clippy::cast_possible_truncation, reason = "rounds")]
     pub fn contains_single(&self, x: f32) -> bool {
         let single = |bound: f64| f64::from(bound as f32);

@@ -96,7 +96,7 @@ fn a_parameter_that_does_not_exist_is_a_fault() {
         [
             "T is read with thermal, of which there are 0",
             "T is read with u, of which there are 0",
-            "T is read with plant.thermal.mode = Imposed, which it never is"
+            "T is read with plant.thermal.mode = Imposed, a value that it never has"
         ]
     );
 }

@@ -6,7 +6,7 @@ mod timing;
 
 use fmu_core::unit::VOLT;
 use fmu_core::{Block, Elapsed, Experiment, Exported, Fault, Info, Model, Row, Step, Table};
-use fmu_export::abi::types::{Fmi2Boolean, Instance, References, c_int};
+use fmu_export::abi::types::{Fmi2Boolean, InstancePointer, References, c_int};
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;
 use std::hint::black_box;
@@ -64,9 +64,10 @@ fn main() {
     let no = Fmi2Boolean(0);
     let token = CString::new(fmi::This::TOKEN.as_str()).unwrap_or_default();
     // An importer calls through pointers that the compiler does not know.
-    let set: unsafe extern "C" fn(Instance, References, usize, *const f64) -> c_int = black_box(fmi::fmi2SetReal);
-    let step: unsafe extern "C" fn(Instance, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);
-    let get: unsafe extern "C" fn(Instance, References, usize, *mut f64) -> c_int = black_box(fmi::fmi2GetReal);
+    let set: unsafe extern "C" fn(InstancePointer, References, usize, *const f64) -> c_int =
+        black_box(fmi::fmi2SetReal);
+    let step: unsafe extern "C" fn(InstancePointer, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);
+    let get: unsafe extern "C" fn(InstancePointer, References, usize, *mut f64) -> c_int = black_box(fmi::fmi2GetReal);
     let (inputs, outputs, mut values) = ([1, 2, 3, 4, 5, 6], [7, 8, 9, 10, 11, 12], [1.0; 6]);
     let (mut t, h) = (0.0, 1e-4);
     // SAFETY: used as the standard demands: one thread, arrays of the lengths given, freed once.

@@ -8,7 +8,7 @@ use fmu_core::unit::{ONE, PER_SECOND};
 use fmu_core::{
     Block, ContinuousTime, Elapsed, Experiment, Exported, Fault, Info, Model, Row, State, Step, Table, integrate,
 };
-use fmu_export::abi::types::{Fmi2Boolean, Instance, References, c_int};
+use fmu_export::abi::types::{Fmi2Boolean, InstancePointer, References, c_int};
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;
 use std::hint::black_box;
@@ -72,15 +72,16 @@ impl ContinuousTime for Chain {
 
 fmu_export::export!(Chain: ContinuousTime);
 
-type Read = unsafe extern "C" fn(Instance, *mut f64, usize) -> c_int;
-type Write = unsafe extern "C" fn(Instance, *const f64, usize) -> c_int;
+type Read = unsafe extern "C" fn(InstancePointer, *mut f64, usize) -> c_int;
+type Write = unsafe extern "C" fn(InstancePointer, *const f64, usize) -> c_int;
 
 fn main() {
     let no = Fmi2Boolean(0);
     let token = CString::new(fmi::This::TOKEN.as_str()).unwrap_or_default();
     // An importer calls through pointers that the compiler does not know.
-    let set: unsafe extern "C" fn(Instance, References, usize, *const f64) -> c_int = black_box(fmi::fmi2SetReal);
-    let time_of: unsafe extern "C" fn(Instance, f64) -> c_int = black_box(fmi::fmi2SetTime);
+    let set: unsafe extern "C" fn(InstancePointer, References, usize, *const f64) -> c_int =
+        black_box(fmi::fmi2SetReal);
+    let time_of: unsafe extern "C" fn(InstancePointer, f64) -> c_int = black_box(fmi::fmi2SetTime);
     let (write, read): (Write, Read) = (black_box(fmi::fmi2SetContinuousStates), black_box(fmi::fmi2GetDerivatives));
     let (inputs, u, mut x, mut dx) = ([1, 2, 3, 4, 5, 6], [1.0; 6], [0.5; 4], [0.0; 4]);
     // SAFETY: used as the standard demands: one thread, arrays of the lengths given, freed once.

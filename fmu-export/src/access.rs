@@ -63,7 +63,7 @@ impl<E: Exported> Instance<E> {
         self.get_each(references, out)
     }
 
-    /// The same for any variables, whose number was checked.
+    /// Gets variables of any type; their number was checked.
     #[inline(never)]
     fn get_each<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         let (mut references, mut out) = (references, out);
@@ -240,7 +240,7 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// As many values as references, or in FMI 3.0 as many as the variables have elements (3.0.2, 2.2.7.2).
+    /// Checks the number of values: one for each reference or, in FMI 3.0, for each element of the variables (3.0.2, 2.2.7.2).
     pub(crate) fn check_count(&mut self, references: &[u32], given: usize) -> Result<(), Fault> {
         let mut needed = references.len();
         if self.arrays {

@@ -9,7 +9,7 @@ use fmu_core::{Elapsed, Exported, Fault, Model, Next, Outcome, SampleGrid};
 /// Maximum number of updates of one event that an instance does by itself.
 const MAX_ITERATIONS: usize = 100;
 
-/// What an update of the discrete states says.
+/// The result of an update of the discrete states.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Update {
     /// What the event did.
@@ -22,7 +22,7 @@ impl<E: Exported> Instance<E> {
     /// Event Mode begins.
     ///
     /// # Errors
-    /// What the model reports.
+    /// The model reports an error.
     pub fn enter_event(&mut self) -> Result<(), Fault> {
         self.complete()?;
         let current = &mut self.current;
@@ -92,7 +92,7 @@ impl<E: Exported> Instance<E> {
         Err(Fault::new(format!("the event at {} s does not settle", self.current.end)))
     }
 
-    /// The outputs are to be computed anew: in Model Exchange when they are read.
+    /// Marks the outputs as old; in Model Exchange, the next getter recomputes them.
     fn changed(&mut self) {
         if self.exchanges() {
             self.stale = true;
@@ -123,7 +123,7 @@ impl<E: Exported> Instance<E> {
     /// An integrator step is complete: no earlier time will be set.
     ///
     /// # Errors
-    /// What the model reports.
+    /// The model reports an error.
     pub fn completed_step(&mut self) -> Result<(), Fault> {
         self.complete()?;
         self.current.settled = self.current.settled.max(self.current.end);
@@ -134,7 +134,7 @@ impl<E: Exported> Instance<E> {
     /// Sets all states.
     ///
     /// # Errors
-    /// Another number than there are states (Error); a state that is out of its range or not finite (Discard): nothing
+    /// The array does not have one element for each state (Error); a state that is out of its range or not finite (Discard): nothing
     /// has changed.
     #[inline]
     pub fn set_states(&mut self, x: &[f64]) -> Result<(), Refusal> {
@@ -166,7 +166,7 @@ impl<E: Exported> Instance<E> {
     /// Reads all states.
     ///
     /// # Errors
-    /// Room for another number than there are states.
+    /// The array does not have one element for each state.
     pub fn get_states(&mut self, out: &mut [f64]) -> Result<(), Fault> {
         let states = E::CAN.states();
         count("nContinuousStates", out.len(), states.len())?;
@@ -180,7 +180,7 @@ impl<E: Exported> Instance<E> {
     /// Reads the derivatives of all states.
     ///
     /// # Errors
-    /// Room for another number than there are states (Error); derivatives that do not exist or are not finite (Discard).
+    /// The array does not have one element for each state (Error); derivatives that do not exist or are not finite (Discard).
     #[inline]
     pub fn derivatives(&mut self, dx: &mut [f64]) -> Result<(), Refusal> {
         let states = E::CAN.states();
@@ -205,7 +205,7 @@ impl<E: Exported> Instance<E> {
     /// Reads the event indicators.
     ///
     /// # Errors
-    /// Room for another number than there are (Error); indicators that are not a number (Discard).
+    /// The array does not have one element for each indicator (Error); indicators that are not a number (Discard).
     #[inline]
     pub fn indicators(&mut self, z: &mut [f64]) -> Result<(), Refusal> {
         let list = E::CAN.indicators();
@@ -223,7 +223,7 @@ impl<E: Exported> Instance<E> {
     /// Reads the nominal values of the states.
     ///
     /// # Errors
-    /// Room for another number than there are states.
+    /// The array does not have one element for each state.
     pub fn nominals(&mut self, out: &mut [f64]) -> Result<(), Fault> {
         count("nContinuousStates", out.len(), E::CAN.states().len())?;
         for (nominal, &row) in out.iter_mut().zip(&self.states) {

@@ -25,7 +25,7 @@ impl From<Fault> for Refusal {
     }
 }
 
-/// What a communication step says besides its status (FMI 3.0).
+/// The results of a communication step in addition to its status (FMI 3.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stepped {
     /// The importer is to enter Event Mode.
@@ -54,11 +54,11 @@ pub struct Instance<E: Exported> {
     pub(crate) ranges: Vec<Range>,
     /// Room for the derivatives and the indicators.
     pub(crate) values: Vec<f64>,
-    /// The outputs are of another instant; in Model Exchange only.
+    /// The outputs are old: they belong to another instant (Model Exchange only).
     pub(crate) stale: bool,
     /// Memory for derivatives of the equations.
     pub(crate) scratch: Option<Box<Scratch<E::Model>>>,
-    /// The texts that were got last.
+    /// The texts that the last getter returned.
     pub(crate) texts: Vec<CString>,
     /// The resources that the model loaded, for states from bytes.
     pub(crate) shelf: Shelf,

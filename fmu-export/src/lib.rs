@@ -50,7 +50,7 @@
 //!     }
 //! }
 //!
-//! /// The physics. It gives Model Exchange and derivatives besides.
+//! /// The physics, for Model Exchange and derivatives too.
 //! impl ContinuousTime for Heater {
 //!     const STATES: &'static [State<Self>] = &[State::new("T", &KELVIN_PER_S, |m| &mut m.t)];
 //!

@@ -79,12 +79,12 @@ impl States {
         Self(bits)
     }
 
-    /// Whether there is none.
+    /// Whether the set is empty.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Whether `state` is one of them.
+    /// Whether `state` is in the set.
     pub const fn contains(self, state: State) -> bool {
         self.0 & state as u8 != 0
     }
@@ -167,11 +167,11 @@ pub enum Call {
 /// The state that a successful call leads to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// As before.
+    /// Unchanged.
     Stay,
     /// This one.
     To(State),
-    /// That after initialization: Step Mode, or Event Mode where the importer handles events.
+    /// The state after initialization: Step Mode, or Event Mode where the importer handles events.
     Start,
 }
 
@@ -292,7 +292,7 @@ impl Call {
 pub struct Allowed([States; 3]);
 
 impl Allowed {
-    /// Of `call`.
+    /// The states that allow `call`.
     pub const fn of(call: Call, standard: Standard) -> Self {
         Self([
             call.states(standard, Interface::CoSimulation),
@@ -301,7 +301,7 @@ impl Allowed {
         ])
     }
 
-    /// Those of one interface.
+    /// The states of one interface.
     #[inline]
     pub const fn of_interface(&self, interface: Interface) -> States {
         self.0[interface as usize]

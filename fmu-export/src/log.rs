@@ -10,7 +10,7 @@ use fmu_core::log::{ALL, CATEGORIES, DISCARD, ERROR, EVENTS, WARNING};
 pub enum Status {
     /// The call succeeded.
     Ok = 0,
-    /// Of a message only: no call returns it.
+    /// Only messages have this status; no call returns it.
     Warning = 1,
     /// The call could not be fulfilled; nothing changed and the instance remains usable.
     Discard = 2,

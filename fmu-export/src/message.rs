@@ -42,7 +42,7 @@ fn kind(kind: &Kind) -> String {
     }
 }
 
-/// The value of an integer has no place in the Integer of FMI 2.0.
+/// The value of an integer does not fit the Integer of FMI 2.0.
 #[cold]
 pub(crate) fn narrow<M: Model>(index: usize, value: i128, of: IntegerType) -> Fault {
     let (name, of) = (name::<M>(index), of.name());
@@ -104,7 +104,8 @@ pub(crate) fn count(given: usize, needed: usize) -> Fault {
     Fault::value("nValues", given, format_args!("{needed} for these value references"))
 }
 
-/// How an instance starts: what differs from the start values, which are those of the model's `Default` unless it was `made` so.
+/// How an instance starts: what differs from the start values, which are those of the model's `Default` unless it was `made`
+/// with others.
 pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: Option<&Block<M>>) -> String {
     let mut fresh = made.cloned().unwrap_or_default();
     let mut changes = Vec::new();

@@ -89,7 +89,7 @@ fn of(path: &Path, why: impl Display) -> Fault {
     Fault::new(format!("{}: {why}", path.display()))
 }
 
-/// The bytes of the file, and one more than are allowed of a larger one.
+/// The bytes of the file; of a file that is too large, one byte more than is allowed.
 fn content(path: &Path) -> io::Result<Vec<u8>> {
     // Opening a pipe would wait for its writer.
     if !path.metadata()?.is_file() {
@@ -145,7 +145,7 @@ fn write(meta: &Meta, mut slot: Slot<'_>, text: &str) -> Result<(), String> {
             }
         }
         Slot::Text(x) => text.clone_into(x),
-        Slot::Said(_) => return Err("a text that only the model says".into()),
+        Slot::Said(_) => return Err("a text that the model computes".into()),
     }
     if slot.is_allowed(meta) { Ok(()) } else { Err(allowed()) }
 }

@@ -29,7 +29,7 @@ pub(crate) fn folder(location: Option<&CStr>) -> Option<PathBuf> {
     Some(path(if drive && cfg!(windows) { decoded[1..].to_vec() } else { decoded }))
 }
 
-/// Replaces percent codes by their bytes (RFC 3986, 2.1); what is none stays.
+/// Replaces percent codes by their bytes (RFC 3986, 2.1); anything else stays as it is.
 fn decode(text: &[u8]) -> Vec<u8> {
     let digit = |byte: Option<&u8>| char::from(*byte?).to_digit(16).and_then(|digit| u8::try_from(digit).ok());
     let (mut decoded, mut i) = (Vec::with_capacity(text.len()), 0);

@@ -12,7 +12,7 @@ use crate::message;
 use crate::snapshot::ramps;
 use fmu_core::{Block, Causality, Elapsed, Exported, Fault, Kind, Model, Slot, Step, Variability};
 
-/// Parts into which a step with changing inputs is divided: each has the inputs of its middle.
+/// Parts into which a step with changing inputs is divided: each uses the inputs at its middle.
 const PARTS: u32 = 32;
 
 /// Memory for the derivatives.
@@ -34,7 +34,7 @@ impl<E: Exported> Instance<E> {
     /// Directional derivative: the change of `unknowns` per unit of a change of `knowns` by `seed`.
     ///
     /// # Errors
-    /// A variable that is no known or unknown in this state, one named twice, a seed of another length (Error); derivatives
+    /// A variable that is not a known or unknown in this state, one named twice, a seed of another length (Error); derivatives
     /// that do not exist here (Discard). Nothing changes.
     pub fn directional(
         &mut self,
@@ -78,7 +78,7 @@ impl<E: Exported> Instance<E> {
     /// First derivatives of continuous outputs with respect to time, with the inputs held.
     ///
     /// # Errors
-    /// A variable that is no continuous output, or an order other than 1 (Error); derivatives that do not exist (Discard).
+    /// A variable other than a continuous output, or an order other than 1 (Error); derivatives that do not exist (Discard).
     pub fn output_derivatives(&mut self, unknowns: &[u32], orders: &[i32], out: &mut [f64]) -> Result<(), Refusal> {
         supported::<E>("maxOutputDerivativeOrder = 0")?;
         if let Some(order) = orders.iter().find(|&&order| order != 1) {
@@ -125,7 +125,7 @@ impl<E: Exported> Instance<E> {
     /// Sets first derivatives of continuous inputs; they hold for the next step (FMI 2.0.5, 4.2.1).
     ///
     /// # Errors
-    /// A variable that is no continuous real input, an order other than 1, a value that is not finite: nothing changes.
+    /// A variable other than a continuous real input, an order other than 1, a value that is not finite: nothing changes.
     pub fn input_derivatives(&mut self, knowns: &[u32], orders: &[i32], values: &[f64]) -> Result<(), Fault> {
         supported::<E>("canInterpolateInputs = false")?;
         for ((&known, order), value) in knowns.iter().zip(orders).zip(values) {
@@ -288,7 +288,7 @@ impl<E: Exported> Instance<E> {
         Self::finite(unknowns, out)
     }
 
-    /// The same by a central difference.
+    /// Approximates the derivative by a central difference.
     fn difference(
         &mut self,
         unknowns: &[u32],
@@ -348,7 +348,7 @@ impl<E: Exported> Instance<E> {
         Self::finite(unknowns, out)
     }
 
-    /// A derivative that is no finite number does not exist.
+    /// Refuses derivatives that are not finite: they do not exist.
     fn finite(unknowns: &[u32], out: &[f64]) -> Result<(), Refusal> {
         match out.iter().position(|x| !x.is_finite()) {
             None => Ok(()),
@@ -434,7 +434,7 @@ impl<E: Exported> Instance<E> {
     }
 }
 
-/// As many numbers in the seed as it needs, all finite, and room for as many as there are.
+/// Checks that the seed has as many numbers as it needs, all finite, and that there is room for the results.
 fn check_sizes(seed: &[f64], needed: usize, (room, results): (usize, usize)) -> Result<(), Fault> {
     if seed.len() != needed {
         return Err(Fault::value("nSeed", seed.len(), format_args!("{needed} for these value references")));
@@ -448,7 +448,7 @@ fn check_sizes(seed: &[f64], needed: usize, (room, results): (usize, usize)) -> 
     }
 }
 
-/// Refuses what a model without states lacks.
+/// Refuses a call that a model without states does not support.
 fn supported<E: Exported>(lacks: &str) -> Result<(), Fault> {
     if E::CAN.continuous.is_some() { Ok(()) } else { Err(Fault::new(format!("not supported: {lacks}"))) }
 }

@@ -76,7 +76,7 @@ impl<M: Model> Snapshot<M> {
         Self::of(interface, Block::default())
     }
 
-    /// As [`new`](Self::new), of a model that is not its `Default`.
+    /// Like [`new`](Self::new), for a model other than its `Default`.
     pub fn of(interface: Interface, block: Block<M>) -> Self {
         Self {
             life: Life::new(interface),
@@ -109,7 +109,7 @@ impl<M: Model> Clone for Snapshot<M> {
 }
 
 impl<M: Model> Snapshot<M> {
-    /// Every value that the importer sets is one that it could have set, and no other is NaN.
+    /// Checks that every value of a settable variable is one that the importer could have set, and that no other value is NaN.
     ///
     /// # Errors
     /// Names the first variable that is not, its value and what is allowed.

@@ -1,4 +1,4 @@
-//! Getting and setting texts. Those that were got are kept until the next are.
+//! Getting and setting texts. The texts of a getter are kept until the next getter of texts.
 
 use crate::access::{index, is_time, open};
 use crate::instance::{Instance, Refusal};

@@ -54,7 +54,7 @@ fn a_fault_of_the_model_is_its_message() {
 
 /// Where the logger below finds the instance that logs.
 struct Caller {
-    it: Instance,
+    it: InstancePointer,
     statuses: Vec<c_int>,
 }
 

@@ -79,7 +79,7 @@ fmu_export::export!(Sampler);
 use fmi::*;
 
 /// An instance of one of the standards after its initialization.
-struct Fmu(u8, Instance);
+struct Fmu(u8, InstancePointer);
 
 impl Fmu {
     fn started(version: u8, start: f64, period: f64) -> Self {

@@ -18,7 +18,7 @@ use fmu_export::abi::types::*;
 use std::ptr::{null, null_mut};
 
 /// Name, states that allow it, state afterwards, the call with arguments that are right otherwise.
-type Line = (&'static str, &'static str, char, fn(Instance) -> c_int);
+type Line = (&'static str, &'static str, char, fn(InstancePointer) -> c_int);
 
 fn check(version: u8, table: &[Line], unsupported: &[Unsupported]) {
     let unsupported = unsupported.iter().map(|&(name, call)| (name, "", '.', call));
@@ -175,7 +175,7 @@ fn experiment_first() {
 
 #[test]
 fn statuses_that_do_not_exist_are_discarded() {
-    let calls: [fn(Instance, c_int) -> c_int; 5] = [
+    let calls: [fn(InstancePointer, c_int) -> c_int; 5] = [
         |it, kind| unsafe { fmi2GetStatus(it, kind, &mut 0) },
         |it, kind| unsafe { fmi2GetIntegerStatus(it, kind, &mut Fmi2Integer(0)) },
         |it, kind| unsafe { fmi2GetStringStatus(it, kind, &mut null()) },

@@ -26,7 +26,7 @@ fn drain(journal: &Journal) -> Vec<Message> {
     journal.0.borrow_mut().drain(..).collect()
 }
 
-fn free(version: u8, it: Instance) {
+fn free(version: u8, it: InstancePointer) {
     assert!(!it.is_null());
     drop(Fmu { version, it, journal: Rc::default() });
 }

@@ -88,7 +88,7 @@ extern "C" fn log(_: *mut c_void, _: c_int, _: Text, message: Text) {
 }
 
 /// An instance of FMI 3.0 in Initialization Mode, or the reason why there is none.
-fn open(resources: Option<&CStr>) -> Result<Instance, String> {
+fn open(resources: Option<&CStr>) -> Result<InstancePointer, String> {
     let token = CString::new(This::TOKEN.as_str()).unwrap();
     let (no, resources) = (Fmi3Boolean(0), resources.map_or(null(), CStr::as_ptr));
     let name = c"it".as_ptr();
@@ -115,7 +115,7 @@ fn open(resources: Option<&CStr>) -> Result<Instance, String> {
     }
 }
 
-fn said(it: Instance, reference: u32) -> Result<CString, String> {
+fn said(it: InstancePointer, reference: u32) -> Result<CString, String> {
     let mut text = null();
     match unsafe { fmi3GetString(it, &reference, 1, &mut text, 1) } {
         0 => Ok(unsafe { CStr::from_ptr(text) }.to_owned()),
@@ -123,7 +123,7 @@ fn said(it: Instance, reference: u32) -> Result<CString, String> {
     }
 }
 
-fn size(it: Instance) -> u8 {
+fn size(it: InstancePointer) -> u8 {
     let mut size = 0;
     assert_eq!(unsafe { fmi3GetUInt8(it, &SIZE, 1, &mut size, 1) }, 0);
     size
@@ -248,7 +248,7 @@ fn a_load_that_changes_the_state_is_not_described() {
         (status, String::from_utf8(said).unwrap())
     };
     assert_eq!(describe(c"/where").0, 0);
-    let change = "load changes what a state saves: what it reads belongs into a Resource";
+    let change = "load changes what a state saves: store what it reads in a Resource";
     assert_eq!(describe(c"/change"), (1, change.into()));
     assert_eq!(describe(c"/none"), (1, "no file data.bin".into()));
     assert_eq!(describe(c"/panic"), (1, "a fault in the model's code (panic)".into()));

@@ -28,7 +28,7 @@ pub(super) struct Archive {
     pub(super) description: Arc<ModelDescription>,
 }
 
-/// What was extracted of an archive.
+/// What was extracted from an archive.
 pub(super) struct Extracted {
     pub(super) folder: Folder,
     /// Path of the binary for Co-Simulation, if there is that interface.
@@ -130,7 +130,7 @@ impl Archive {
             let file = self.zip.by_index(index).map_err(|e| wrong(&e))?;
             file.take(machine::HEAD).read_to_end(&mut head).map_err(|e| wrong(&e))?;
             let platforms = machine::platforms(&head);
-            // The loader tells what is wrong with a file that is no library.
+            // The loader says what is wrong with a file that is not a library.
             if platforms.is_empty() || platforms.contains(&host) {
                 return Ok((folder, name));
             }

@@ -97,7 +97,7 @@ pub fn strings(file: &ElfFile64<'_>, tag: i64) -> Result<Vec<String>, object::Er
 
 fn object_error() -> object::Error {
     // The crate has no public constructor; parsing nothing gives one.
-    object::File::parse(&[][..]).err().unwrap_or_else(|| unreachable!("nothing is no file"))
+    object::File::parse(&[][..]).err().unwrap_or_else(|| unreachable!("no bytes make an object file"))
 }
 
 /// The newest version of the GNU C library that a symbol requires.

@@ -45,7 +45,7 @@ impl Error {
         Self::Usage { instance: instance.into(), cause: one_line(&cause.to_string()) }
     }
 
-    /// The same error with what was tried when it happened.
+    /// Adds to the error what was tried when it happened.
     pub(crate) fn during(self, what: &str) -> Self {
         match self {
             Self::Call { instance, function, status, message } => {
@@ -70,7 +70,7 @@ impl Error {
         matches!(self, Self::Call { status, .. } if *status == Status::DISCARD.to_string())
     }
 
-    /// Whether the FMU itself refused, rather than its file or the user's wishes being wrong.
+    /// Whether the FMU itself refused, rather than a file or a setting being wrong.
     pub fn is_of_the_run(&self) -> bool {
         matches!(self, Self::Call { .. })
     }
@@ -80,7 +80,7 @@ fn said(message: Option<&str>) -> String {
     message.map(|m| format!(": {}", one_line(m))).unwrap_or_default()
 }
 
-/// Messages of others may have several lines; an error has one.
+/// Joins the lines of a message: an error has one line.
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

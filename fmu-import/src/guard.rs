@@ -113,7 +113,7 @@ impl Guarded {
     /// the guard has started it.
     ///
     /// # Errors
-    /// The system does not tell.
+    /// The system does not report the end of the process.
     #[cfg(unix)]
     pub fn wait(&mut self, mut over: impl FnMut(Option<u32>) -> bool) -> io::Result<Report> {
         use std::io::Read;
@@ -152,7 +152,7 @@ impl Guarded {
     /// Waits until the process has ended, or `over` says that its time is over. `over` gets the number of the process.
     ///
     /// # Errors
-    /// The system does not tell.
+    /// The system does not report the end of the process.
     #[cfg(not(unix))]
     pub fn wait(&mut self, mut over: impl FnMut(Option<u32>) -> bool) -> io::Result<Report> {
         loop {
@@ -319,7 +319,7 @@ mod unix {
     fn guard(arguments: &[OsString], channel: &UnixStream) -> Result<Report, String> {
         let text = |index: usize| arguments.get(index).and_then(|a| a.to_str()).unwrap_or_default();
         let number =
-            |index: usize| text(index).parse().map_err(|_| format!("argument {index} of {GUARD} is no number"));
+            |index: usize| text(index).parse().map_err(|_| format!("argument {index} of {GUARD} is not a number"));
         let allowance = Allowance { memory: number(0)?, file: number(1)?, sandbox: text(2) == "sandbox" };
         // Fails only for a process that leads its group already, which then has a group of its own.
         let _ = setsid();

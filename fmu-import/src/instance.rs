@@ -1,4 +1,4 @@
-//! One instance of an FMU, the same for both standards.
+//! One instance of an FMU of either standard.
 
 mod equations;
 
@@ -6,17 +6,17 @@ pub use equations::{CompletedStep, Stepped, Update};
 
 use super::standard::{Experiment, Kind, Outcome, Refusal};
 use super::{Error, Values, explain};
-use crate::abi::AnyInstance;
 use crate::abi::journal::{self, Call};
+use crate::abi::live::{Live, Pointer};
 use crate::abi::log::{Log, Message, Status};
-use crate::abi::shared::Handle;
+use crate::abi::raw::Simple;
 use model_description::{BaseType, Dimension, ModelDescription, ModelVariable};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// A saved state of an instance, as a number that only this instance understands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct State(usize);
+pub struct FmuState(usize);
 
 /// An instance of an FMU, which may go from thread to thread. Dropping it frees it.
 pub struct Instance {
@@ -24,9 +24,9 @@ pub struct Instance {
     /// Its number in the journal.
     id: u32,
     description: Arc<ModelDescription>,
-    standard: AnyInstance,
+    live: Live,
     kind: Kind,
-    states: Vec<Option<Handle>>,
+    states: Vec<Option<Pointer>>,
     dead: bool,
     // After the instance, which may log while it is freed.
     log: Arc<Log>,
@@ -37,11 +37,11 @@ impl Instance {
         name: &str,
         id: u32,
         description: Arc<ModelDescription>,
-        standard: AnyInstance,
+        live: Live,
         kind: Kind,
         log: Arc<Log>,
     ) -> Self {
-        Self { name: name.into(), id, description, standard, kind, states: Vec::new(), dead: false, log }
+        Self { name: name.into(), id, description, live, kind, states: Vec::new(), dead: false, log }
     }
 
     /// The name that the instance was given.
@@ -163,7 +163,7 @@ impl Instance {
         self.call(Call::Evaluation, |s| s.set_debug_logging(on))
     }
 
-    /// Says when the simulation starts and, if that is known, ends.
+    /// Sets the start time of the simulation and, if it is known, the stop time.
     ///
     /// # Errors
     /// The FMU refuses.
@@ -171,7 +171,7 @@ impl Instance {
         self.setup_with(start, stop, None)
     }
 
-    /// As [`setup`](Self::setup), with the relative tolerance of a solver inside the FMU.
+    /// Like [`setup`](Self::setup), with the relative tolerance of a solver inside the FMU.
     ///
     /// # Errors
     /// The FMU refuses.
@@ -184,7 +184,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_initialization(&mut self) -> Result<(), Error> {
-        self.call(Call::EnterInitialization, |s| s.enter_initialization())
+        self.call(Call::EnterInitialization, Live::enter_initialization)
     }
 
     /// Initialization ends.
@@ -192,7 +192,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses, for example parameters that do not fit together.
     pub fn exit_initialization(&mut self) -> Result<(), Error> {
-        self.call(Call::ExitInitialization, |s| s.shared().exit_initialization())
+        self.call(Call::ExitInitialization, |s| s.simple(Simple::ExitInitializationMode))
     }
 
     /// Steps from `t` to `t + h`; breaks when the FMU asks to end the simulation.
@@ -208,9 +208,9 @@ impl Instance {
     /// Time (s) that the last step reached; it differs from its end when the FMU asked to end the simulation.
     ///
     /// # Errors
-    /// The FMU refuses, or does not tell.
+    /// The FMU refuses, or does not report it.
     pub fn last_successful_time(&mut self) -> Result<f64, Error> {
-        self.call(Call::Evaluation, |s| s.last_successful_time())
+        self.call(Call::Evaluation, Live::last_successful_time)
     }
 
     /// Ends the simulation; variables can still be read.
@@ -218,7 +218,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn terminate(&mut self) -> Result<(), Error> {
-        self.call(Call::Terminate, |s| s.shared().terminate())
+        self.call(Call::Terminate, |s| s.simple(Simple::Terminate))
     }
 
     /// Restores the state after instantiation.
@@ -226,58 +226,58 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn reset(&mut self) -> Result<(), Error> {
-        self.call(Call::Reset, |s| s.shared().reset())
+        self.call(Call::Reset, |s| s.simple(Simple::Reset))
     }
 
     /// Saves the state.
     ///
     /// # Errors
     /// The FMU refuses, or cannot.
-    pub fn get_state(&mut self) -> Result<State, Error> {
-        let state = self.call(Call::State, |s| s.shared().get_state())?;
+    pub fn get_state(&mut self) -> Result<FmuState, Error> {
+        let state = self.call(Call::State, Live::get_state)?;
         self.states.push(Some(state));
-        Ok(State(self.states.len() - 1))
+        Ok(FmuState(self.states.len() - 1))
     }
 
     /// Goes back to a saved state.
     ///
     /// # Errors
     /// The FMU refuses, or the state was freed.
-    pub fn set_state(&mut self, state: State) -> Result<(), Error> {
+    pub fn set_state(&mut self, state: FmuState) -> Result<(), Error> {
         let state = self.state(state)?;
-        self.call(Call::State, |s| s.shared().set_state(state))
+        self.call(Call::State, |s| s.set_state(state))
     }
 
     /// Frees a saved state. Those that remain are freed with the instance.
     ///
     /// # Errors
     /// The FMU refuses, or the state was freed before.
-    pub fn free_state(&mut self, state: State) -> Result<(), Error> {
+    pub fn free_state(&mut self, state: FmuState) -> Result<(), Error> {
         let raw = self.state(state)?;
         self.states[state.0] = None;
-        self.call(Call::State, |s| s.shared().free_state(raw))
+        self.call(Call::State, |s| s.free_state(raw))
     }
 
     /// A saved state as bytes.
     ///
     /// # Errors
     /// The FMU refuses, or cannot, or the state was freed.
-    pub fn serialize_state(&mut self, state: State) -> Result<Vec<u8>, Error> {
+    pub fn serialize_state(&mut self, state: FmuState) -> Result<Vec<u8>, Error> {
         let state = self.state(state)?;
-        self.call(Call::State, |s| s.shared().serialize(state))
+        self.call(Call::State, |s| s.serialize(state))
     }
 
     /// A saved state from bytes; it is not yet set.
     ///
     /// # Errors
     /// The FMU refuses, or cannot.
-    pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<State, Error> {
-        let state = self.call(Call::State, |s| s.shared().deserialize(bytes))?;
+    pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<FmuState, Error> {
+        let state = self.call(Call::State, |s| s.deserialize(bytes))?;
         self.states.push(Some(state));
-        Ok(State(self.states.len() - 1))
+        Ok(FmuState(self.states.len() - 1))
     }
 
-    fn state(&self, state: State) -> Result<Handle, Error> {
+    fn state(&self, state: FmuState) -> Result<Pointer, Error> {
         let alive = self.states.get(state.0).copied().flatten();
         alive.ok_or_else(|| Error::usage(&self.name, "the state was freed, or is of another instance"))
     }
@@ -288,8 +288,8 @@ impl Instance {
         Ok((variable.base, variable.value_reference, self.elements(variable)?))
     }
 
-    /// Number of elements of a variable: the extents of an array as the file has them: sizes that structural parameters give are their start
-    /// values.
+    /// Number of elements of a variable: of an array, the product of its extents, where a structural parameter counts with its
+    /// start value.
     ///
     /// # Errors
     /// A size is not known.
@@ -312,18 +312,18 @@ impl Instance {
 
     /// Forgets the instance without freeing it: another one of its binary has returned the status Fatal.
     pub(super) fn abandon(&mut self) {
-        self.standard.shared().abandon();
+        self.live.abandon();
         self.dead = true;
     }
 
     /// The one way to the FMU.
     #[inline]
-    fn call<T>(&mut self, what: Call, call: impl FnOnce(&mut AnyInstance) -> Outcome<T>) -> Result<T, Error> {
+    fn call<T>(&mut self, what: Call, call: impl FnOnce(&mut Live) -> Outcome<T>) -> Result<T, Error> {
         if self.dead {
             return Err(self.buried());
         }
         journal::note(self.id, what);
-        call(&mut self.standard).map_err(|refusal| self.refused(refusal))
+        call(&mut self.live).map_err(|refusal| self.refused(refusal))
     }
 
     #[cold]
@@ -345,7 +345,7 @@ impl Drop for Instance {
         journal::note(self.id, Call::Free);
         for state in std::mem::take(&mut self.states).into_iter().flatten() {
             // Nobody is left to hear of a refusal.
-            let _ = self.call(Call::Free, |s| s.shared().free_state(state));
+            let _ = self.call(Call::Free, |s| s.free_state(state));
         }
     }
 }

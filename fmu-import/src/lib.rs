@@ -47,7 +47,7 @@ pub use abi::log::{Message, Status};
 pub use abi::raw;
 pub use error::Error;
 pub use folder::Folder;
-pub use instance::{CompletedStep, Instance, State, Stepped, Update};
+pub use instance::{CompletedStep, FmuState, Instance, Stepped, Update};
 pub use quantity::suggest;
 pub use standard::Kind;
 pub use text::{printable, printable_lines};
@@ -105,7 +105,8 @@ pub struct Fmu {
     path: PathBuf,
     description: Arc<ModelDescription>,
     terminals: Arc<Result<Option<TerminalsAndIcons>, Error>>,
-    /// Each interface of the description with its binary. A binary for Model Exchange alone may fail beside Co-Simulation.
+    /// Each interface of the description with its binary. A binary that serves Model Exchange alone may fail to load if there
+    /// is Co-Simulation.
     co_simulation: Option<Functions>,
     model_exchange: Option<Result<Functions, Error>>,
     archive: Arc<Mutex<Archive>>,
@@ -131,8 +132,8 @@ impl Fmu {
         Self::load(&Arc::new(Mutex::new(Archive::from_bytes(path.as_ref(), bytes)?)))
     }
 
-    /// The same FMU with another copy of its binary, from the archive that this one was opened from, whatever its path leads to
-    /// by now. After the status Fatal no instance of a binary can be used (FMI 2.0.5, 2.1.3; FMI 3.0.2, 2.2.4).
+    /// Opens the FMU again with another copy of its binary, from the archive that this one was opened from, whatever its path
+    /// leads to by now. After the status Fatal no instance of a binary can be used (FMI 2.0.5, 2.1.3; FMI 3.0.2, 2.2.4).
     ///
     /// # Errors
     /// The archive cannot be read or unpacked.
@@ -217,7 +218,7 @@ impl Fmu {
         let id = journal::name(name);
         journal::note(id, Call::Instantiate);
         match functions.instantiate(&c_name, &token, &resources, &log, logging, kind) {
-            Ok(standard) => Ok(Instance::new(name, id, self.description.clone(), standard, kind, log)),
+            Ok(live) => Ok(Instance::new(name, id, self.description.clone(), live, kind, log)),
             Err(refusal) => Err(explain(name, refusal, log.reason())),
         }
     }

@@ -6,7 +6,7 @@
 use crate::platform::Platform;
 use std::ops::Range;
 
-/// As much of a library as [`platforms`] needs.
+/// Number of bytes at the head of a library that [`platforms`] needs.
 pub const HEAD: u64 = 4096;
 
 /// Magic of a 64-bit Mach-O file, little-endian.
@@ -22,7 +22,7 @@ const MOST: u32 = 18;
 const PROCESSORS: [(u32, Platform, u32); 2] =
     [(0x0100_0007, Platform::X64Darwin, 12), (0x0100_000c, Platform::ArmDarwin, 14)];
 
-/// The platforms that a library is for; none if this is no library of a known platform. Its first [`HEAD`] bytes are enough.
+/// The platforms that a library is for; empty if this is not a library of a known platform. Its first [`HEAD`] bytes are enough.
 pub fn platforms(library: &[u8]) -> Vec<Platform> {
     if let Some(images) = table(library) {
         return images.iter().filter_map(|(cpu, _)| darwin(*cpu)).collect();
@@ -61,7 +61,7 @@ pub fn images(library: &[u8]) -> Result<Vec<&[u8]>, String> {
 /// A universal library with these images, which dyld and dlopen of macOS choose from.
 ///
 /// # Errors
-/// An image is not one of macOS for a processor of its own, or all together exceed 4 GiB.
+/// An image is not for macOS, two are for one processor, or all together exceed 4 GiB.
 pub fn universal(images: &[&[u8]]) -> Result<Vec<u8>, String> {
     let (mut header, mut body) = (Vec::new(), Vec::new());
     let mut put = |x: u32| header.extend(x.to_be_bytes());

@@ -23,17 +23,17 @@ pub enum Platform {
 }
 
 impl Platform {
-    /// All that are known.
+    /// All known platforms.
     pub const ALL: [Self; 6] =
         [Self::X64Linux, Self::ArmLinux, Self::X64Windows, Self::ArmWindows, Self::X64Darwin, Self::ArmDarwin];
 
-    /// The platform that this program runs on; another Unix passes for Linux.
+    /// The platform that this program runs on; another Unix counts as Linux.
     pub fn host() -> Self {
         let unix = || Self::of("linux", consts::ARCH);
         Self::of(consts::OS, consts::ARCH).or_else(unix).unwrap_or(Self::X64Linux)
     }
 
-    /// That of an operating system and a processor, as Rust calls them.
+    /// The platform of an operating system and a processor, as Rust calls them.
     pub fn of(os: &str, processor: &str) -> Option<Self> {
         match (os, processor) {
             ("linux", "x86_64") => Some(Self::X64Linux),
@@ -46,7 +46,8 @@ impl Platform {
         }
     }
 
-    /// That of a folder under `binaries/`, if it is one of these; x86_64 for the names of FMI 2.0 that do not say.
+    /// The platform of a folder under `binaries/`, if it is one of these; x86_64 for the names of FMI 2.0, which name no
+    /// processor.
     pub fn of_folder(folder: &str, version: FmiVersion) -> Option<Self> {
         let first = |p: &Self| p.folders(version)[0] == folder;
         let any = |p: &Self| p.folders(version).contains(&folder);

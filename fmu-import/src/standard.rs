@@ -1,9 +1,7 @@
-//! The interface that both standards implement for the facade.
+//! What calls take and how they end, in the words of the facade.
 
 use super::value::Values;
 use crate::abi::log::Status;
-use crate::abi::shared::SharedInstance;
-use crate::instance::{CompletedStep, Update};
 use model_description::BaseType;
 
 /// A call that did not succeed.
@@ -54,35 +52,9 @@ impl Default for Kind {
     }
 }
 
-/// One instance, seen through either standard. Dropping it frees the instance.
-pub(super) trait Standard: Equations {
-    /// The calls that both standards share: end of initialization, terminate, reset, saved states, modes, vectors.
-    fn shared(&mut self) -> &mut SharedInstance;
-    fn get(&mut self, base: BaseType, reference: u32, count: usize) -> Outcome<Values>;
-    fn set(&mut self, base: BaseType, reference: u32, values: &Values) -> Outcome;
-    fn set_debug_logging(&mut self, on: bool) -> Outcome;
-    fn setup(&mut self, experiment: Experiment) -> Outcome;
-    fn enter_initialization(&mut self) -> Outcome;
-    fn last_successful_time(&mut self) -> Outcome<f64>;
-}
-
-/// Events and derivatives, which the standards give different types: of Model Exchange, and of event mode and derivatives in
-/// Co-Simulation.
-pub(super) trait Equations {
-    /// `fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`.
-    fn update_discrete_states(&mut self) -> Outcome<Update>;
-    fn completed_integrator_step(&mut self) -> Outcome<CompletedStep>;
-    /// Numbers of continuous states and event indicators; `None` where only the description tells.
-    fn counts(&mut self) -> Outcome<Option<(usize, usize)>>;
-    fn directional_derivative(&mut self, s: Sensitivity<'_>, sensitivity: &mut [f64]) -> Outcome;
-    fn adjoint_derivative(&mut self, s: Sensitivity<'_>, sensitivity: &mut [f64]) -> Outcome;
-    fn output_derivatives(&mut self, references: &[u32], orders: &[i32], values: &mut [f64]) -> Outcome;
-    fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Outcome;
-}
-
 /// Which partial derivatives: value references and the seed.
 #[derive(Clone, Copy)]
-pub(super) struct Sensitivity<'a> {
+pub(super) struct Directions<'a> {
     pub(super) unknowns: &'a [u32],
     pub(super) knowns: &'a [u32],
     pub(super) seed: &'a [f64],
@@ -100,10 +72,4 @@ pub(super) fn same_length(what: &str, lengths: &[usize]) -> Outcome {
 /// A value that does not fit the type that crosses the interface.
 pub(super) fn misfit(base: BaseType, values: &Values) -> Refusal {
     Refusal::Impossible(format!("{values} is not a value of the type {base}"))
-}
-
-/// Integers of the width that crosses the interface.
-pub(super) fn narrow<T: TryFrom<i128>>(base: BaseType, values: &[i128]) -> Outcome<Vec<T>> {
-    let all: Result<Vec<T>, _> = values.iter().map(|&x| T::try_from(x)).collect();
-    all.map_err(|_| misfit(base, &Values::Integers(values.to_vec())))
 }

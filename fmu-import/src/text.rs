@@ -19,7 +19,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// As [`printable`], for a text of several lines.
+/// Like [`printable`], for a text of several lines.
 pub fn printable_lines(text: &str) -> Cow<'_, str> {
     if text.chars().any(|c| c != '\n' && commands(c)) {
         return Cow::Owned(text.split('\n').map(printable).collect::<Vec<_>>().join("\n"));

@@ -8,15 +8,15 @@ use std::fmt;
 /// The elements of a variable: one of a scalar, all in row-major order of an array.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// Of `Real`, `Float32`, `Float64`.
+    /// Values of `Real`, `Float32`, `Float64`.
     Reals(Vec<f64>),
-    /// Of every integer type and of enumerations; wide enough for each of them.
+    /// Values of every integer type and of enumerations; wide enough for each of them.
     Integers(Vec<i128>),
-    /// Of `Boolean` and `Clock`.
+    /// Values of `Boolean` and `Clock`.
     Booleans(Vec<bool>),
-    /// Of `String`.
+    /// Values of `String`.
     Strings(Vec<String>),
-    /// Of `Binary`.
+    /// Values of `Binary`.
     Binaries(Vec<Vec<u8>>),
 }
 
@@ -29,7 +29,7 @@ impl Values {
         Self::parse_with(text, variable, items, |e| Ok(e.parse::<f64>().ok()))
     }
 
-    /// As [`parse`](Self::parse), where `number` reads an element of a real variable.
+    /// Like [`parse`](Self::parse), where `number` reads an element of a real variable.
     fn parse_with(
         text: &str,
         variable: &ModelVariable,
@@ -75,7 +75,7 @@ impl Values {
         }
     }
 
-    /// As [`parse`](Self::parse), with the names that the description has for an enumeration, and with its units behind
+    /// Like [`parse`](Self::parse), with the names that the description has for an enumeration, and with its units behind
     /// numbers: `1000 rpm`.
     ///
     /// # Errors

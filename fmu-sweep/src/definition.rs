@@ -1,4 +1,4 @@
-//! The definition of a sweep: what a TOML file says, as it says it.
+//! The definition of a sweep: the contents of its TOML file.
 
 use crate::Error;
 use serde::de::{MapAccess, Visitor};
@@ -39,7 +39,7 @@ pub struct Definition {
     /// The varied variables; their order is that of the columns.
     pub vary: Ordered<Vary>,
     /// The measures of each run.
-    pub measure: Ordered<Measure>,
+    pub measure: Ordered<MeasureDefinition>,
     /// Which runs are recorded.
     pub trace: Option<Trace>,
 }
@@ -105,7 +105,7 @@ pub struct Vary {
 /// A number for each run.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct Measure {
+pub struct MeasureDefinition {
     /// A sum of variables, each optionally after a number and `*`.
     pub of: String,
     /// The function to compute from it.
@@ -253,7 +253,7 @@ impl Definition {
     /// Reads a file.
     ///
     /// # Errors
-    /// The file cannot be read, or says something else than a sweep: the line and what is wrong there.
+    /// The file cannot be read, or is not a definition of a sweep: names the line and what is wrong there.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         Self::parse(&text).map_err(|cause| Error::file(path, cause))

@@ -13,7 +13,7 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     write_with(path, |file| file.write_all(bytes))
 }
 
-/// The same, with contents that a function writes.
+/// Writes a file with contents that a function writes.
 pub(crate) fn write_with(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), Error> {
     let partial = partial(path);
     let whole = || {
@@ -32,7 +32,7 @@ pub(crate) fn write_with(path: &Path, content: impl FnOnce(&mut File) -> io::Res
     })
 }
 
-/// The same, unless the file exists; says whether it was written.
+/// Writes a file unless it exists; returns whether it was written.
 pub(crate) fn create(path: &Path, bytes: &[u8]) -> Result<bool, Error> {
     let partial = partial(path);
     let whole = || {

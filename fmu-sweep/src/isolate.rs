@@ -186,7 +186,7 @@ fn how(status: ExitStatus) -> String {
 /// The loop of a worker process, until its standard input ends.
 ///
 /// # Errors
-/// The input is none of a parent, or cannot be read.
+/// The input does not come from a parent, or cannot be read.
 pub fn serve() -> Result<(), Error> {
     guard::end_with_parent();
     let wrong = |e: io::Error| Error::Invalid(format!("standard input: {e}"));

@@ -2,7 +2,7 @@
 //!
 //! Sums are taken in the order of time, so a measure has the same bits on every thread and machine.
 
-use crate::definition::{Function, Measure as Definition};
+use crate::definition::{Function, MeasureDefinition};
 use crate::signal::Signal;
 use fmu_import::cosimulation::Settings;
 
@@ -35,7 +35,7 @@ enum Kind {
 
 /// The state of a measure during a run.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct State {
+pub(crate) struct Reading {
     /// Number of values.
     count: f64,
     /// Extremum, sum, or last value.
@@ -53,8 +53,8 @@ pub(crate) struct State {
 }
 
 impl Measure {
-    pub(crate) fn new(definition: &Definition, signal: Signal, settings: &Settings) -> Result<Self, String> {
-        let Definition { of, is, after, time, from, to, target, band, .. } = definition;
+    pub(crate) fn new(definition: &MeasureDefinition, signal: Signal, settings: &Settings) -> Result<Self, String> {
+        let MeasureDefinition { of, is, after, time, from, to, target, band, .. } = definition;
         let kind = match is {
             Function::Final => Kind::Final,
             Function::Min => Kind::Min,
@@ -119,12 +119,12 @@ impl Measure {
         }
     }
 
-    pub(crate) fn begin() -> State {
-        State { count: 0.0, x: f64::NAN, before: (0.0, 0.0), since: None, until: None, begun: 0.0, bad: None }
+    pub(crate) fn begin() -> Reading {
+        Reading { count: 0.0, x: f64::NAN, before: (0.0, 0.0), since: None, until: None, begun: 0.0, bad: None }
     }
 
     /// Takes the values of a communication point.
-    pub(crate) fn take(&self, s: &mut State, t: f64, values: &[f64]) {
+    pub(crate) fn take(&self, s: &mut Reading, t: f64, values: &[f64]) {
         if t < self.after - SAME || s.bad.is_some() {
             return;
         }
@@ -178,7 +178,7 @@ impl Measure {
     }
 
     /// The number; NaN if no communication point counted.
-    pub(crate) fn end(&self, s: &State) -> Result<f64, String> {
+    pub(crate) fn end(&self, s: &Reading) -> Result<f64, String> {
         if let Some((t, x)) = s.bad {
             return Err(format!("{} is {x} at {t} s", self.of));
         }

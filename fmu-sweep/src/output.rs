@@ -82,7 +82,7 @@ fn identity(sweep: &Sweep) -> Result<Value, Error> {
 }
 
 impl Output {
-    /// Opens the folder, or begins it with the cut that a function finds out.
+    /// Opens the folder, or begins it with the parts that a function determines.
     pub(crate) fn open(sweep: &Sweep, folder: &Path, cut: impl FnOnce() -> Result<Cut, Error>) -> Result<Self, Error> {
         let path = folder.join("sweep.json");
         let mine = identity(sweep)?;

@@ -1,9 +1,9 @@
 //! A system with its measures, ready for many runs.
 
 use crate::Error;
-use crate::definition::{Definition, Measure as Measured};
+use crate::definition::{Definition, MeasureDefinition};
 use crate::error::invalid;
-use crate::measure::{Measure, State};
+use crate::measure::{Measure, Reading};
 use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
 use fmu_import::cosimulation::{self, Recording, Schedule, Settings, Target, Worker, item};
@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The part that all runs share. A clone refers to the same data; any thread may use it.
+/// What all runs share. A clone refers to the same data; any thread may use it.
 #[derive(Clone)]
 pub struct Plan(Arc<Shared>);
 
@@ -83,7 +83,7 @@ impl Plan {
     /// Opens the FMUs of a definition, connects them and sets what is the same in all runs. Relative paths begin in `folder`.
     ///
     /// # Errors
-    /// A file is no FMU that runs here, a name or a value is wrong, or a measure makes no sense.
+    /// A file is not an FMU that runs here, a name or a value is wrong, or a measure makes no sense.
     pub fn new(definition: &Definition, folder: &Path) -> Result<Self, Error> {
         if definition.fmus.is_empty() {
             return invalid("fmus: expected at least one FMU, or an SSP file");
@@ -227,7 +227,7 @@ impl Plan {
         Ok(worker.record(values.iter().flat_map(|(v, x)| v.targets.iter().map(|target| (target, *x))))?)
     }
 
-    /// Someone who runs one row after another, for one thread.
+    /// Makes a runner of one row after another, for one thread.
     ///
     /// # Errors
     /// An FMU refuses to make an instance.
@@ -242,8 +242,8 @@ impl Plan {
         })
     }
 
-    /// Runs many rows: `columns` has the values of each variable. `progress` hears the number of rows done, on any of the
-    /// threads, and may break off.
+    /// Runs many rows: `columns` has the values of each variable. `progress` is called with the number of rows done, on any of
+    /// the threads, and may stop the run.
     ///
     /// # Errors
     /// The columns are not of one length, an FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run
@@ -339,7 +339,7 @@ fn place(names: &mut Vec<String>, name: &str) -> usize {
     })
 }
 
-fn of(measure: &Measured, settings: &Settings, recorded: &mut Vec<String>) -> Result<(Measure, Sum), String> {
+fn of(measure: &MeasureDefinition, settings: &Settings, recorded: &mut Vec<String>) -> Result<(Measure, Sum), String> {
     let sum = Sum::parse(&measure.of).map_err(|cause| format!("of = {cause}"))?;
     let wrap = measure.wrap.as_ref().map(period).transpose()?;
     let signal = Signal::new(&sum, wrap, |name| place(recorded, name));
@@ -351,7 +351,7 @@ pub struct Runner {
     plan: Plan,
     worker: Worker,
     variables: Vec<Variable>,
-    states: Vec<State>,
+    states: Vec<Reading>,
     reuse: bool,
     /// No run yet.
     fresh: bool,
@@ -384,7 +384,7 @@ impl Runner {
             })
         });
         let measured = |_| {
-            let of = |((measure, state), column): ((&Measure, &State), &Column)| {
+            let of = |((measure, state), column): ((&Measure, &Reading), &Column)| {
                 measure.end(state).map_err(|cause| format!("{}: {cause}", column.name))
             };
             measures.iter().zip(&*states).zip(&plan.0.columns).map(of).collect()

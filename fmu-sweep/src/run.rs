@@ -29,11 +29,11 @@ pub struct Options {
     pub isolate: Option<Isolation>,
 }
 
-/// Hears what happens, on any thread.
+/// Receives news of a run, on any thread.
 pub trait Watch: Sync {
-    /// Something to know, one line.
+    /// A note of one line.
     fn note(&self, text: &str);
-    /// So many of the rows to run are done, so many of them failed.
+    /// The number of rows that are done, of those to run, and how many of them failed.
     fn progress(&self, done: u64, failed: u64, all: u64);
 }
 
@@ -105,7 +105,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -
     };
     let log = Log::new(folder)?;
     log.write(&format!("{rows} rows in {} parts on {threads} jobs", jobs.len()))?;
-    let state = Mutex::new(State::default());
+    let state = Mutex::new(Progress::default());
     let work = Work { sweep, output: &output, jobs: &jobs, state: &state, watch, log: &log, rows };
     pool::run(
         blocks,
@@ -160,7 +160,7 @@ enum Executor<'a> {
 }
 
 #[derive(Default)]
-struct State {
+struct Progress {
     /// The completed lines of unfinished parts, by part number.
     parts: HashMap<u64, HashMap<u64, String>>,
     begun: HashMap<u64, Instant>,
@@ -172,7 +172,7 @@ struct Work<'a> {
     sweep: &'a Sweep,
     output: &'a Output,
     jobs: &'a [Job],
-    state: &'a Mutex<State>,
+    state: &'a Mutex<Progress>,
     watch: &'a dyn Watch,
     log: &'a Log,
     /// Rows of all jobs.
@@ -217,7 +217,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    fn state(&self) -> std::sync::MutexGuard<'_, State> {
+    fn state(&self) -> std::sync::MutexGuard<'_, Progress> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,4 +1,4 @@
-//! A sweep from its file: rows and what comes of them, as lines of CSV.
+//! A sweep from its file: its rows and their results, as lines of CSV.
 
 use crate::definition::{Runs, Trace, Which};
 use crate::error::invalid;
@@ -158,7 +158,7 @@ impl Sweep {
             .collect()
     }
 
-    /// Someone who runs rows and writes them down.
+    /// Runs rows and writes their lines.
     pub(crate) fn writer(&self, reuse: bool, traces: Option<PathBuf>) -> Result<Writer<'_>, Error> {
         let mut runner = self.plan.runner(&self.variables)?;
         runner.reuse(reuse);

@@ -1,6 +1,6 @@
 //! Every limit on what a file may ask for and on what a process that runs an FMU may use: one place, one message each.
 //!
-//! They hold for all commands alike, and are such that the static checks of a file take at most 512 MB and 20 s.
+//! They hold for all commands, and keep the static checks of a file below 512 MB and 20 s.
 
 use std::fmt::Display;
 
@@ -37,7 +37,7 @@ macro_rules! limits {
     ($(#[doc = $doc:literal] $name:ident = $before:literal, $most:expr, $after:literal;)*) => {
         $(#[doc = $doc] pub const $name: Limit = Limit::new($before, $most, $after);)*
 
-        /// Every limit on a file, with what it is on.
+        /// Every limit on a file, with its subject.
         pub const ALL: &[(&str, Limit)] = &[$(($doc, $name),)*];
     };
 }

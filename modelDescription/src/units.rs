@@ -52,7 +52,7 @@ pub struct DisplayUnit {
 }
 
 impl DisplayUnit {
-    /// The same for differences of values: its factor alone.
+    /// The conversion of differences of values: its factor alone.
     pub fn of_differences(&self) -> Self {
         Self { offset: 0.0, ..self.clone() }
     }

@@ -120,6 +120,11 @@ impl BaseType {
     pub fn is_float(self) -> bool {
         matches!(self, Self::Float32 | Self::Float64)
     }
+
+    /// Whether values are integers; those of an enumeration are.
+    pub fn is_integer(self) -> bool {
+        !self.is_float() && !matches!(self, Self::Boolean | Self::String | Self::Binary | Self::Clock)
+    }
 }
 
 /// One extent of an array (FMI 3.0 only).

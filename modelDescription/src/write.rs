@@ -22,7 +22,7 @@ pub struct Generation {
     pub date_and_time: String,
 }
 
-/// modelDescription.xml of an FMU; the same arguments give the same text.
+/// modelDescription.xml of an FMU; equal arguments give equal text.
 pub fn write(description: &Description, version: FmiVersion, generation: &Generation) -> String {
     let units = types::units(description, version);
     let definitions = types::definitions(description, version);

@@ -25,13 +25,13 @@ impl Element {
         Self { name: name.into(), ..Self::default() }
     }
 
-    /// The same with one more attribute.
+    /// Adds an attribute.
     pub fn with(mut self, name: &str, value: impl Into<String>) -> Self {
         self.attributes.push((name.into(), value.into()));
         self
     }
 
-    /// The same with one more attribute, unless there is no value for it.
+    /// Adds an attribute if there is a value for it.
     pub fn with_some(self, name: &str, value: Option<impl Into<String>>) -> Self {
         match value {
             Some(value) => self.with(name, value),
@@ -39,12 +39,12 @@ impl Element {
         }
     }
 
-    /// The same with one more attribute, unless the text is empty.
+    /// Adds an attribute unless the text is empty.
     pub fn with_text(self, name: &str, value: &str) -> Self {
         self.with_some(name, Some(value).filter(|text| !text.is_empty()))
     }
 
-    /// The same with more children.
+    /// Adds children.
     pub fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
         self.children.extend(children);
         self

@@ -46,7 +46,7 @@ class Batch(_core.Batch):
         return made
 
     def reset(self, mask=None, start_values=None):
-        """Return to the start; with a `mask` (n Booleans) these instances only. Returns the observations of all.
+        """Return to the start; with a `mask` (n Booleans) only these instances. Returns the observations of all.
 
         Without `start_values` an instance returns to its last initialization, which is a saved state where the FMU has
         states. With `start_values`, those of the constructor are replaced and the instances initialize again. An instance

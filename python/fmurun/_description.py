@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(eq=False)
 class DefaultExperiment:
-    """Times (s) as the file has them, texts; None where it says nothing."""
+    """Times (s) as texts of the file; None where the file gives none."""
 
     startTime: str | None = None
     stopTime: str | None = None
@@ -180,7 +180,7 @@ class ModelDescription:
 
 
 def _co_simulation(identifier, attributes):
-    """The capabilities of FMI 3.0 go by FMPy's names."""
+    """Capabilities of FMI 3.0 under FMPy's names."""
     # FMI 3.0 writes State where FMI 2.0 writes state.
     attributes = {name.replace("FMUState", "FMUstate"): text.strip() for name, text in attributes}
     step = attributes.pop("fixedInternalStepSize", None)

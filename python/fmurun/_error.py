@@ -2,7 +2,7 @@
 
 
 class FmuError(Exception):
-    """An FMU's file, its use or a call went wrong; the message is one line.
+    """An error of an FMU's file, of its use or of a call; the message is one line.
 
     It can be pickled, so that it comes back from worker processes whole.
 

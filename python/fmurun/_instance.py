@@ -14,7 +14,7 @@ from ._error import FmuError
 
 @lru_cache(maxsize=16)
 def _described(fmu):
-    """The description of an open FMU, shared: nobody writes it."""
+    """The description of an open FMU, shared and never written."""
     return _build(fmu.describe())
 
 
@@ -32,7 +32,7 @@ def _open(filename):
                 path = os.path.join(folder, name)
                 inside = os.path.relpath(path, filename).replace(os.sep, "/")
                 if inside.startswith(("modelDescription.xml", "binaries/", "resources/", "terminalsAndIcons/")):
-                    # One date for all: the same files are the same FMU.
+                    # One date for all: equal files give an equal archive.
                     file.writestr(zipfile.ZipInfo(inside), open(path, "rb").read())
     return _core.open(filename, archive.getvalue())
 
@@ -65,14 +65,14 @@ def extract(filename, unzipdir=None, include=None):
 
 
 def _refuse(**arguments):
-    """Refuse arguments that are set to something that this package does not do."""
+    """Refuse values of arguments that this package does not support."""
     for name, value in arguments.items():
         if value not in (None, False):
             raise NotImplementedError(f"{name} = {value!r}: fmurun does not do this; FMPy does")
 
 
 class _Slave(_core.Instance):
-    """What both standards share."""
+    """The methods that both standards share."""
 
     def __new__(cls, guid, unzipDirectory, modelIdentifier=None, instanceName=None, fmiCallLogger=None, requireFunctions=True,
                 libraryPath=None, *, loggingOn=False, fmu=None):  # fmt: skip
@@ -83,7 +83,7 @@ class _Slave(_core.Instance):
         return made
 
     def instantiate(self, visible=False, callbacks=None, loggingOn=False, **more):
-        """The instance is there already; switches logging on."""
+        """Switch logging on; the instance exists already."""
         _refuse(visible=visible, callbacks=callbacks, **more)
         if loggingOn:
             self._set_debug_logging(True)
@@ -94,7 +94,7 @@ class _Slave(_core.Instance):
         self._set_debug_logging(bool(loggingOn))
 
     def messages(self):
-        """Take the FMU's messages since the last time: (status, category, text)."""
+        """Take the FMU's messages since the last call: (status, category, text)."""
         return self._take_messages()
 
 

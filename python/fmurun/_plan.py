@@ -15,7 +15,7 @@ from ._error import FmuError
 from ._simulate import SimulationResult
 
 _LOCK = threading.Lock()
-# Plans of this process, by what they are made of: a task of Dask unpickles its plan, and finds it here.
+# Plans of this process by their arguments: a task of Dask unpickles its plan and finds it here.
 _MADE = OrderedDict()
 _KEPT = 16
 
@@ -106,7 +106,7 @@ class Plan:
     def _open(self):
         if not self._embed:
             return _core.Plan(json.dumps(self._definition), self._folder)
-        # The archives as files for as long as it takes to open them.
+        # The archives are files only until they are open.
         folder = tempfile.mkdtemp(prefix="fmurun-")
         try:
             paths, copies = _core.paths(json.dumps(self._definition)), []
@@ -134,7 +134,7 @@ class Plan:
         return self._prefix + name
 
     def simulate(self, start_values=None):
-        """Run once; `start_values` beside those of the plan. Returns a structured array with `time` (s) first.
+        """Run once; `start_values` in addition to those of the plan. Returns a structured array with `time` (s) first.
 
         >>> Plan(PLANT, stop_time=0.01, step_size=1e-3, output=["speed", "i_a"]).simulate().dtype.names
         ('time', 'speed', 'i_a')
@@ -203,7 +203,7 @@ class Plan:
         return list(self._definition["measure"])
 
     def meta(self, columns=None):
-        """What `run_many` returns for no rows: the columns and their types. `columns` are the varied, by default the design's."""
+        """The columns and types that `run_many` returns, without rows. `columns` are the varied ones, by default the design's."""
         columns = self._core.varied if columns is None else columns
         varied = self._named({name: np.empty(0) for name in columns})
         measures = {name: _named(items, np.empty(0)) for name, items in zip(self.measures, self._core.measure_items)}
@@ -330,7 +330,7 @@ def _values(name, column, core, full):
         raise ValueError(f"the column {name} has {array.ndim} dimensions; expected one")
     if array.dtype.kind in "OUS" and all(isinstance(x, str) for x in array.tolist()):
         return np.array([core.number(full, x) for x in array.tolist()])
-    # Of other kinds NumPy makes numbers, too: of None it makes NaN.
+    # NumPy also makes numbers from other kinds, for example NaN from None.
     bad = [] if array.dtype.kind in "biuf" else [x for x in array.tolist() if not isinstance(x, (int, float))]
     if bad:
         raise TypeError(f"the column {name} must have numbers, not {bad[0]!r}")

@@ -27,7 +27,7 @@ class SimulationResult(np.ndarray):
 
 
 class Recorder:
-    """What `step_finished(time, recorder)` sees: the instance `fmu`, `modelDescription`, and the rows so far."""
+    """The recorder of `step_finished(time, recorder)`: the instance `fmu`, `modelDescription`, and the rows so far."""
 
     def __init__(self, fmu, model_description, simulation, dtype):
         self.fmu, self.modelDescription, self._simulation, self._dtype = fmu, model_description, simulation, dtype
@@ -62,7 +62,7 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
                  logger=None, fmi_call_logger=None, step_finished=None, model_description=None, fmu_instance=None,
                  set_input_derivatives=False, remote_platform="auto", early_return_allowed=False, use_event_mode=False,
                  initialize=True, terminate=True, fmu_state=None, set_stop_time=True):  # fmt: skip
-    """Simulate an FMU by co-simulation, as FMPy 0.3.32 does: same arguments, same communication points, same bits.
+    """Simulate an FMU by co-simulation, like FMPy 0.3.32: same arguments, same communication points, same bits.
 
     FMUs stay open: another simulation of the same file reads it, compares its bytes and does not unpack it again.
 
@@ -84,8 +84,8 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
         fmu_state: state of `fmu_instance`, or bytes of a serialized one: begin there instead of with an initialization
         set_stop_time: tell the FMU the stop time
 
-    Where FMPy passes over a name that is no variable, this raises. `solver`, `step_size` and `record_events` belong to model exchange and have no effect, as in FMPy. The others are refused
-    with NotImplementedError, as is model exchange.
+    An unknown name raises an error; FMPy ignores it. `solver`, `step_size` and `record_events` belong to model exchange and have
+    no effect, as in FMPy. Model exchange and the other arguments of FMPy raise NotImplementedError.
 
     Returns:
         a structured array, one row per communication point, `time` (s) first, then the variables by type
@@ -222,7 +222,7 @@ def _start_values(variables, description, given, validate):
 
 
 def _value(v, description, value):
-    """A start value as a list of what the setter takes."""
+    """A start value as a list for the setter."""
     if type(value) is tuple:
         if len(value) != 2:
             raise ValueError(f"the start value of {v.name} must be a value or (value, unit), not {value!r}")
@@ -338,14 +338,14 @@ def _samples(description, variables, signals):
         if v.type == "Float32":
             table = table.astype(np.float32).astype(np.float64)
         elif v.type not in _FLOATS and not (np.isfinite(table).all() and (np.abs(table) <= 2.0**53).all()):
-            raise ValueError(f"input: {v.name} has the type {v.type}; a value is no number or beyond 2^53")
+            raise ValueError(f"input: {v.name} has the type {v.type}; a value is not a number or beyond 2^53")
         elif v.type not in _FLOATS:
             table = np.trunc(table)
         if v.variability in ("discrete", "tunable") and t.size > 1:
             events |= set(t[1:][np.diff(table) != 0])
         continuous = v.type in _FLOATS and v.variability not in ("discrete", "tunable")
         groups.setdefault((not continuous, _base(v, description)), []).append((v.valueReference, table))
-    # A stable order: continuous variables before discrete ones, types as they come.
+    # A stable order: continuous variables before discrete ones, types in the order of the description.
     ordered = sorted(groups.items(), key=lambda item: item[0][0])
     tables = [(base, not discrete, [r for r, _ in g], np.stack([x for _, x in g])) for (discrete, base), g in ordered]
     return t, np.array(sorted(events)), tables

@@ -1,4 +1,4 @@
-"""A sweep on a Dask cluster: parts as Parquet files, every row once, whatever dies.
+"""A sweep on a Dask cluster: parts as Parquet files, every row once, whichever worker dies.
 
     client = Client(LocalCluster(n_workers=2, threads_per_worker=1))      # or any other cluster
     sweep(Plan.from_toml("sweep.toml"), None, "results", client)
@@ -24,7 +24,7 @@ from ._plan import _columns
 
 __all__ = ["sweep"]
 
-# Work of a part (s): short beside a lost worker, long beside a task's 10 ms.
+# Work of a part (s): little is lost with a worker, and the 10 ms of a task are negligible.
 _WORK = 7.0
 
 
@@ -58,7 +58,7 @@ def sweep(plan, rows, out, client, chunk=None):
     if table is None and count > len(plan):
         raise ValueError(f"the design has {len(plan)} rows, not {count}")
     take = _rows_of(plan, table)
-    # What can be known wrong, before the first task: names, types, lengths.
+    # Errors that can be found before the first task: names, types, lengths.
     begin = time.perf_counter()
     plan.run_many(take(0, 1), threads=1)
     seconds = time.perf_counter() - begin
@@ -72,7 +72,7 @@ def sweep(plan, rows, out, client, chunk=None):
     firsts = [first for first in range(0, count, chunk) if _part(first) not in there]
     report = {"rows": count, "parts": -(-count // chunk), "skipped": -(-count // chunk) - len(firsts), "failed": 0, "isolated": 0}
     tables = {first: None if table is None else take(first, min(chunk, count - first)) for first in firsts}
-    # One key a call: what an earlier call left in the cluster is not taken for this one's.
+    # One key per call, so that results of an earlier call in the cluster are not mistaken for those of this call.
     keys = [f"fmurun-{uuid.uuid4().hex[:8]}-{first}" for first in firsts]
     futures = client.map(
         _work, firsts, [min(chunk, count - f) for f in firsts], [tables[f] for f in firsts], plan=plan, out=out, key=keys,
@@ -82,7 +82,7 @@ def sweep(plan, rows, out, client, chunk=None):
     for future in as_completed(futures, raise_errors=False):
         first = first_of[future.key]
         try:
-            # Not `status`: a worker that died since then took the number with it, and `result` waits for another one.
+            # Not `status`: a worker that has died since took the number with it, and `result` waits for another worker.
             report["failed"] += future.result()
             continue
         except KilledWorker:
@@ -130,7 +130,7 @@ def _cut(plan, table, count, chunk):
 
 
 def _agreed(fs, folder, cut):
-    """The cut that `out` has, or this one: a resumed sweep cuts alike."""
+    """The rows per part that `out` has, or these: a resumed sweep has parts of the same size."""
     path = f"{folder}/_sweep.json"
     if not fs.exists(path):
         _publish(fs, path, json.dumps(cut).encode())
@@ -144,7 +144,7 @@ def _agreed(fs, folder, cut):
 
 
 def _publish(fs, path, data):
-    """Write a file that has its name only when it is complete."""
+    """Write a file that gets its name when it is complete."""
     folder, name = path.rsplit("/", 1)
     partial = f"{folder}/.{name}-{uuid.uuid4().hex}"
     fs.pipe_file(partial, data)
@@ -158,10 +158,10 @@ def _write(fs, folder, first, results):
 
 
 def _work(first, count, table, plan, out):
-    """A part, on a worker; returns how many rows have an error. A number and not the rows: a dead worker holds nothing."""
+    """A part, on a worker; returns how many rows have an error. It returns no rows, so that none are lost with a worker."""
     fs, folder = fsspec.core.url_to_fs(out)
     if fs.exists(f"{folder}/{_part(first)}"):
-        # Written by this sweep and then asked for again, because the worker that held the number died.
+        # Written by this sweep and requested again, because the worker that held the number died.
         with fs.open(f"{folder}/{_part(first)}", "rb") as part:
             return sum(map(bool, pq.read_table(part).columns[-1].to_pylist()))
     results = plan.run_many(plan.rows(first, count) if table is None else table, threads=1, first_run=first)
@@ -170,7 +170,7 @@ def _work(first, count, table, plan, out):
 
 
 def _isolated(plan, table, first):
-    """Rows one by one in a child process, and another one when it dies."""
+    """Run rows one by one in a child process, and in a new one when it dies."""
     columns = {str(name): column for name, column in _columns(table).items() if name != "run"}
     context = multiprocessing.get_context("spawn")
     n, parts, child, pipe = len(next(iter(columns.values()))), [], None, None

@@ -25,7 +25,7 @@ struct Lanes {
 type Start = Vec<(String, Vec<f64>)>;
 
 impl Lanes {
-    /// Lanes in slices, each with its rows, on as many threads as there are slices.
+    /// Does `work` on every lane with its rows, in slices on several threads.
     fn each(&mut self, actions: &[f64], out: &mut [f64], work: impl Fn(&Common, &mut Lane, &[f64], &mut [f64]) + Sync) {
         let (a, o) = (self.common.actions.all.len(), self.common.observations.all.len());
         let common = &self.common;
@@ -39,12 +39,18 @@ impl Lanes {
             return one(&mut self.all, actions, out);
         }
         let size = self.all.len().div_ceil(self.threads);
+        let slices = Mutex::new(self.all.chunks_mut(size).zip(out.chunks_mut(size * o)).enumerate());
+        let work = || loop {
+            let next = slices.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let Some((k, (lanes, out))) = next else { return };
+            one(lanes, actions.get(k * size * a..).unwrap_or_default(), out);
+        };
         std::thread::scope(|scope| {
-            let slices = self.all.chunks_mut(size).zip(out.chunks_mut(size * o)).enumerate();
-            for (k, (lanes, out)) in slices {
-                let actions = actions.get(k * size * a..).unwrap_or_default();
-                scope.spawn(move || one(lanes, actions, out));
+            // This thread works too: a busy system may have no room for another.
+            for _ in 1..self.threads {
+                let _ = std::thread::Builder::new().spawn_scoped(scope, work);
             }
+            work();
         });
     }
 
@@ -206,7 +212,7 @@ impl Batch {
     /// The errors of the instances that failed, by their number.
     #[getter]
     fn failed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        // Not with the lanes locked: making an exception runs Python, which may run another thread.
+        // The lanes must not be locked here: making an exception runs Python, which may run another thread.
         let errors: Vec<_> = self.lanes().all.iter().map(|lane| lane.error.clone()).collect();
         let dict = PyDict::new(py);
         for (k, error) in errors.into_iter().enumerate().filter_map(|(k, e)| Some((k, e?))) {
@@ -223,7 +229,7 @@ impl Batch {
         })
     }
 
-    /// Let instance `k` go on from what `save` gave, of this or another instance of the FMU.
+    /// Let instance `k` continue from a state that `save` gave, of this or another instance of the FMU.
     #[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
     fn restore(&self, py: Python<'_>, k: usize, state: (u32, Vec<u8>)) -> PyResult<()> {
         gate(|| self.lane(k, py, |lane| lane.restore(state.0, &state.1)))
@@ -242,7 +248,7 @@ impl Batch {
         work: impl FnOnce(&mut Lane) -> Result<T, fmu_import::Error> + Send,
     ) -> PyResult<T> {
         if k >= self.n {
-            return Err(usage(&k.to_string(), &format!("is no instance; there are {}", self.n)));
+            return Err(usage(&k.to_string(), &format!("is not an instance; there are {}", self.n)));
         }
         py.detach(|| work(&mut self.lanes().all[k])).map_err(raise)
     }

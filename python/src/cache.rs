@@ -1,4 +1,4 @@
-//! FMUs that this process has opened: one with the same bytes is not opened again.
+//! FMUs that this process has opened; an archive with equal bytes is opened once.
 
 use crate::describe;
 use crate::error::{gate, plain, raise};
@@ -11,7 +11,7 @@ use std::collections::{HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Maximum number of FMUs that nobody uses and that stay open.
+/// Greatest number of unused FMUs that stay open.
 const KEPT: usize = 16;
 
 static OPENED: Mutex<VecDeque<Arc<Opened>>> = Mutex::new(VecDeque::new());
@@ -54,7 +54,7 @@ pub(crate) fn forget(opened: &Arc<Opened>) {
     OPENED.lock().unwrap_or_else(PoisonError::into_inner).retain(|o| !Arc::ptr_eq(o, opened));
 }
 
-/// The same FMU with a library that has had no fatal error.
+/// Opens the FMU again, with a library that has had no fatal error.
 pub(crate) fn renewed(opened: &Arc<Opened>) -> Result<Arc<Opened>, Error> {
     forget(opened);
     self::opened(opened.fmu.path(), opened.bytes.to_vec())
@@ -78,13 +78,13 @@ pub(crate) struct Fmu(pub(crate) Arc<Opened>);
 
 #[pymethods]
 impl Fmu {
-    /// Two are equal if they are one open library.
+    /// Whether both are the same open library.
     fn __eq__(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 
     fn __hash__(&self) -> u64 {
-        // As Python does it with objects: their address, alive as long as this.
+        // The address, like Python's hash of an object; it is valid as long as the FMU is open.
         Arc::as_ptr(&self.0) as u64 >> 4
     }
 
@@ -99,7 +99,7 @@ impl Fmu {
     }
 }
 
-/// Opens an FMU, from its file or from the bytes of one; errors name it `path`.
+/// Opens an FMU from its file, or from bytes; errors name it `path`.
 #[pyfunction]
 #[pyo3(signature = (path, bytes = None))]
 #[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]

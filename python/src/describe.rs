@@ -1,4 +1,4 @@
-//! A model description as plain Python values, of which `fmurun/fmpy.py` makes objects like FMPy's.
+//! A model description as plain Python values; `fmurun/fmpy.py` makes objects like FMPy's from them.
 
 use model_description::{
     BaseType, Dimension, Experiment, FmiVersion, Interface, ModelDescription, ModelVariable, Unknown, format_number,
@@ -15,7 +15,7 @@ pub(crate) fn type_name(version: FmiVersion, base: BaseType) -> &'static str {
     }
 }
 
-/// Extents of an array; those that structural parameters give are their start values, and 0 if they have none.
+/// Extents of an array; an extent that a structural parameter gives is its start value, or 0 without one.
 pub(crate) fn shape(description: &ModelDescription, variable: &ModelVariable) -> Vec<usize> {
     let start = |reference| {
         let size = description.variables.iter().find(|v| v.value_reference == reference)?;

@@ -15,7 +15,7 @@ pub(crate) struct Group {
     pub(crate) tables: Vec<Vec<f64>>,
 }
 
-/// Inputs of a simulation. Without samples there are none.
+/// Inputs of a simulation; empty without samples.
 #[derive(Default)]
 pub(crate) struct Input {
     pub(crate) times: Vec<f64>,
@@ -31,7 +31,7 @@ pub(crate) fn is_close(a: f64, b: f64) -> bool {
     same || (a.is_finite() && b.is_finite() && (a - b).abs() <= 1e-9 * a.abs().max(b.abs()))
 }
 
-/// Where the value at a time comes from.
+/// The samples that give the value at a time.
 enum At {
     Sample(usize),
     /// Between a sample and the next, with the weight of the first.

@@ -2,7 +2,7 @@
 
 use crate::cache::{self, Opened};
 use crate::error::{gate, raise, usage};
-use fmu_import::{Error, State, Values};
+use fmu_import::{Error, Values};
 use model_description::BaseType;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -17,14 +17,14 @@ pub(crate) struct Instance {
     name: String,
     id: u64,
     fmi2: bool,
-    /// `None` when it was freed.
+    /// `None` after it was freed.
     inner: Mutex<Option<fmu_import::Instance>>,
 }
 
 /// A saved state of one instance.
 #[pyclass(frozen, name = "FmuState", module = "fmurun._core")]
 pub(crate) struct FmuState {
-    state: State,
+    state: fmu_import::FmuState,
     owner: u64,
 }
 
@@ -36,7 +36,7 @@ impl Instance {
         Ok(Self { opened: opened.clone(), name: name.into(), id, fmi2, inner: Mutex::new(Some(inner)) })
     }
 
-    /// One call on the living instance, with Python's lock held: for calls of less than a microsecond.
+    /// One call on the instance, with Python's lock held: for calls of less than a microsecond.
     #[inline]
     fn call<T>(
         &self,
@@ -53,7 +53,7 @@ impl Instance {
         })
     }
 
-    /// One call on the living instance, for who has released Python's lock.
+    /// One call on the instance, without Python's lock.
     pub(crate) fn with<T>(&self, call: impl FnOnce(&mut fmu_import::Instance) -> Result<T, Error>) -> PyResult<T> {
         self.on(self.inner.lock().unwrap_or_else(PoisonError::into_inner).as_mut(), call)
     }
@@ -83,13 +83,13 @@ impl Instance {
         &self.opened
     }
 
-    fn state<'a>(&self, state: &'a FmuState) -> PyResult<&'a State> {
+    fn state<'a>(&self, state: &'a FmuState) -> PyResult<&'a fmu_import::FmuState> {
         let own = state.owner == self.id;
-        own.then_some(&state.state).ok_or_else(|| usage(&self.name, "the state is of another instance"))
+        own.then_some(&state.state).ok_or_else(|| usage(&self.name, "the state belongs to another instance"))
     }
 }
 
-/// Value references: a list in the fast way, else anything that can be iterated.
+/// Value references from a list, which is fast, or from anything that can be iterated.
 fn references(vr: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
     if let Ok(list) = vr.cast::<PyList>() {
         list.iter().map(|x| x.extract()).collect()
@@ -104,7 +104,7 @@ fn base(name: &str) -> PyResult<BaseType> {
         "Integer" => "Int32",
         other => other,
     };
-    BaseType::from_word(name).ok_or_else(|| PyValueError::new_err(format!("{name} is no type of FMI")))
+    BaseType::from_word(name).ok_or_else(|| PyValueError::new_err(format!("{name} is not a type of FMI")))
 }
 
 /// Values from Python, for a variable of this type.
@@ -134,7 +134,7 @@ impl Instance {
         &self.name
     }
 
-    /// Read double-precision numbers by their value references: all elements of arrays, whatever `nValues` says.
+    /// Read double-precision numbers by their value references: all elements of arrays, whatever `nValues` is.
     #[pyo3(name = "_get_reals", signature = (vr, nValues = None))]
     #[allow(non_snake_case, unused_variables, reason = "FMPy's name")]
     fn get_reals(&self, py: Python<'_>, vr: &Bound<'_, PyAny>, nValues: Option<usize>) -> PyResult<Vec<f64>> {
@@ -290,7 +290,7 @@ impl Instance {
         self.call(py, |i| i.set_debug_logging(on))
     }
 
-    /// Take the messages since the last time: (status, category, text).
+    /// Take the messages since the last call: (status, category, text).
     #[pyo3(name = "_take_messages")]
     fn take_messages(&self, py: Python<'_>) -> PyResult<Vec<(String, String, String)>> {
         let all = self.call(py, |i| Ok(i.take_messages()))?;

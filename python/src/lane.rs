@@ -1,7 +1,7 @@
 //! One instance of a batch: inputs in, a number of steps, outputs out.
 
 use crate::cache::{self, Opened};
-use fmu_import::{Error, Instance, State, Values};
+use fmu_import::{Error, FmuState, Instance, Values};
 use model_description::BaseType;
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub(crate) struct Port {
 pub(crate) struct Ports {
     pub(crate) all: Vec<Port>,
     references: Vec<u32>,
-    /// All are double-precision numbers.
+    /// Whether all are double-precision numbers.
     fast: bool,
 }
 
@@ -30,7 +30,7 @@ impl Ports {
         let port = |name: &String| {
             let v = description.variable(name).ok_or_else(|| usage(format!("has no variable {name}")))?;
             if v.is_array() || matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock) {
-                return Err(usage(format!("{name} is no scalar number")));
+                return Err(usage(format!("{name} is not a scalar number")));
             }
             Ok(Port { name: name.clone(), base: v.base, reference: v.value_reference })
         };
@@ -62,7 +62,7 @@ impl Ports {
     }
 }
 
-/// What all lanes share.
+/// The data that all lanes share.
 pub(crate) struct Common {
     pub(crate) actions: Ports,
     pub(crate) observations: Ports,
@@ -77,10 +77,10 @@ pub(crate) struct Lane {
     name: String,
     instance: Option<Instance>,
     /// State after the last initialization.
-    initial: Option<State>,
+    initial: Option<FmuState>,
     /// Steps since the start; time is never summed up.
     steps: u32,
-    /// Why the lane stands still until it is reset.
+    /// The error that stops the lane until it is reset.
     pub(crate) error: Option<Error>,
 }
 
@@ -89,7 +89,7 @@ impl Lane {
         Self { name, instance: None, initial: None, steps: 0, error: None }
     }
 
-    /// Begins anew with these start values; an instance that had an error is replaced.
+    /// Initializes with these start values; replaces an instance that had an error.
     pub(crate) fn initialize(
         &mut self,
         common: &Common,
@@ -137,7 +137,7 @@ impl Lane {
         Ok(true)
     }
 
-    /// Writes the actions, steps, reads; what goes wrong stays in `error`, and the observations become NaN.
+    /// Writes the actions, steps and reads. An error stays in `error`, and the observations become NaN.
     pub(crate) fn advance(&mut self, common: &Common, actions: &[f64], repeat: u32, observations: &mut [f64]) {
         let Self { instance: Some(instance), steps, error: None, .. } = self else {
             return observations.fill(f64::NAN);
@@ -159,7 +159,7 @@ impl Lane {
         }
     }
 
-    /// Reads without a step.
+    /// Reads the observations without a step.
     pub(crate) fn observe(&mut self, common: &Common, observations: &mut [f64]) {
         let Self { instance: Some(instance), error: None, .. } = self else { return observations.fill(f64::NAN) };
         if let Err(error) = common.observations.read(instance, observations) {
@@ -178,7 +178,7 @@ impl Lane {
         Ok((steps, bytes?))
     }
 
-    /// Goes back to what [`save`](Self::save) gave, here or in another lane.
+    /// Continues from a state of [`save`](Self::save), of this or another lane.
     pub(crate) fn restore(&mut self, steps: u32, bytes: &[u8]) -> Result<(), Error> {
         let instance = self.living()?;
         let state = instance.deserialize_state(bytes)?;
@@ -196,12 +196,12 @@ impl Lane {
         }
     }
 
-    /// Whether no instance of the library can be used.
+    /// Whether the library had a fatal error, so that none of its instances can be used.
     pub(crate) fn is_fatal(&self) -> bool {
         matches!(&self.error, Some(Error::Call { status, .. }) if status == "Fatal")
     }
 
-    /// Drops the instance; the next one is of another library.
+    /// Drops the instance; the next one comes from another library.
     pub(crate) fn leave(&mut self) {
         (self.instance, self.initial) = (None, None);
     }
@@ -211,7 +211,7 @@ fn usage(name: &str, cause: &str) -> Error {
     Error::Usage { instance: name.into(), cause: cause.into() }
 }
 
-/// The library again, when one of the lanes had a fatal error: every lane then begins with a new instance.
+/// Loads the library again if one of the lanes had a fatal error; every lane then gets a new instance.
 pub(crate) fn renew(opened: &mut Arc<Opened>, lanes: &mut [Lane]) -> Result<bool, Error> {
     if !lanes.iter().any(Lane::is_fatal) {
         return Ok(false);

@@ -1,6 +1,7 @@
 //! Many runs of one system: `fmurun.Plan` in `fmurun/_plan.py` has one of these.
 
 use crate::error::{gate, plain, raise};
+use fmu_import::guard::patiently;
 use fmu_sweep::{Definition, Outcomes, Sweep, Variable};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -12,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// How often Python's signals are looked at while runs go on.
+/// Time between two checks of Python's signals during runs.
 const SIGNALS: Duration = Duration::from_millis(100);
 
 fn failed(error: fmu_sweep::Error) -> PyErr {
@@ -150,7 +151,7 @@ impl Plan {
         gate(|| Ok(self.plan.bind([name]).map_err(failed)?.swap_remove(0).column.items))
     }
 
-    /// Those of each measure that is a value of an enumeration.
+    /// Numbers and names of the values of each measure; empty unless it is a value of an enumeration.
     #[getter]
     fn measure_items(&self) -> Vec<Vec<(i64, String)>> {
         self.plan.measures().iter().map(|column| column.items.clone()).collect()
@@ -172,19 +173,25 @@ impl Plan {
         self.sweep.as_ref().ok_or_else(none)
     }
 
-    /// Runs on other threads, while this one looks at Python's signals: Ctrl-C ends it.
+    /// Runs on other threads, while this one checks Python's signals: Ctrl-C ends the run.
     fn run(&self, variables: &[Variable], columns: &[Vec<f64>], threads: usize) -> PyResult<Outcomes> {
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let stop = AtomicBool::new(false);
         let go_on = |_| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         let (done, result) = channel();
         std::thread::scope(|scope| {
-            let (plan, columns) = (&self.plan, &columns);
-            let work = scope.spawn(move || {
-                let outcomes = plan.run_many(variables, columns, threads, &go_on);
-                // The receiver is there as long as this thread.
-                let _ = done.send(outcomes);
-            });
+            let (plan, columns, go_on) = (&self.plan, &columns, &go_on);
+            let start = || {
+                let done = done.clone();
+                let run = move || {
+                    let outcomes = plan.run_many(variables, columns, threads, go_on);
+                    // The receiver exists as long as this thread.
+                    let _ = done.send(outcomes);
+                };
+                std::thread::Builder::new().spawn_scoped(scope, run)
+            };
+            let work = patiently(start).map_err(|e| plain(&format!("no thread for the runs: {e}")))?;
+            drop(done);
             let mut signal = Ok(());
             loop {
                 match result.recv_timeout(SIGNALS) {

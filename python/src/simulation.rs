@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Steps between two looks at the clock and at Python's signals.
+/// Steps between two checks of the clock and of Python's signals.
 const CHUNK: u32 = 1024;
 
 struct Run {
@@ -26,7 +26,7 @@ struct Run {
     input: Input,
     record: Record,
     time: f64,
-    /// Regular points that were reached.
+    /// Regular points reached so far.
     reached: u32,
     ended: bool,
 }
@@ -76,7 +76,7 @@ type Columns = (String, Vec<u32>, Vec<usize>);
 type Samples<'py> = (String, bool, Vec<u32>, PyReadonlyArray2<'py, f64>);
 
 fn base(name: &str) -> PyResult<BaseType> {
-    BaseType::from_word(name).ok_or_else(|| PyValueError::new_err(format!("{name} is no type of FMI 3.0")))
+    BaseType::from_word(name).ok_or_else(|| PyValueError::new_err(format!("{name} is not a type of FMI 3.0")))
 }
 
 #[pymethods]

@@ -1,6 +1,9 @@
 """`Batch`: equal to single instances, resets, failures, threads."""
 
+import os
 import pickle
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -74,7 +77,7 @@ def test_save_and_restore(standard):
     assert ahead == again
     with pytest.raises(FmuError):
         many.restore(0, (0, b"nothing"))
-    with pytest.raises(FmuError, match="is no instance"):
+    with pytest.raises(FmuError, match="is not an instance"):
         many.save(2)
 
 
@@ -135,3 +138,23 @@ def test_in_another_thread(plant):
     thread.start()
     thread.join()
     assert np.array_equal(batch(plant, 2).step(voltages(2, 0)), seen[0])
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="another user has such a limit; root chooses one")
+def test_a_system_without_room_for_threads(plant):
+    """The thread that calls does what the others cannot."""
+    script = """
+import os, resource, sys
+import numpy as np
+from fmurun import Batch
+names = {"actions": ["u_a", "u_b", "u_c"], "observations": ["i_a", "speed"], "step_size": 1e-4}
+alone, many = (Batch(sys.argv[1], 5, threads=threads, **names) for threads in (1, 4))
+os.setuid(0x60000000 + os.getpid())
+resource.setrlimit(resource.RLIMIT_NPROC, (1, 1))
+actions = np.outer(np.arange(5.0), [10, -4, -6])
+for _ in range(3):
+    assert np.array_equal(alone.step(actions), many.step(actions))
+print("equal")
+"""
+    done = subprocess.run([sys.executable, "-c", script, plant], capture_output=True, text=True)
+    assert done.stdout == "equal\n", done.stderr

@@ -89,7 +89,7 @@ def test_types_and_states(standard):
     for k in range(10):
         instance.doStep(k * 1e-4, 1e-4)
     other, _ = initialized(standard / "SensorlessController.fmu")
-    with pytest.raises(FmuError, match="the state is of another instance"):
+    with pytest.raises(FmuError, match="the state belongs to another instance"):
         other.setFMUState(state)
     instance.setFMUState(instance.deserializeFMUState(stored))
     instance.doStep(0.0, 1e-4)

@@ -1,15 +1,14 @@
 //! `fmu atlas`: where a drive with wrong estimates holds low speeds under load.
 
+use super::bar_of_cells;
 use crate::workspace::output_folder;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use drive::estimator::Kind;
-use drive_study::atlas::cell::{Grid, Scenario};
+use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
 use drive_study::atlas::{self, report};
 use drive_study::compare::candidate::Entry;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{IsTerminal, stderr};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::thread;
@@ -17,11 +16,11 @@ use std::thread;
 /// Runs drives with wrong estimates of resistance and magnet flux at low speed under load, and maps where they are lost.
 ///
 /// Without MOTOR.toml, an estimator runs on the drive of `fmu compare`: flux observers on the reference motor (rated 3000 rpm
-/// and 2 N.m), all others on the 2.2 kW machine. With it, on the drive that `fmu tune` gives for the machine. Every value of
-/// an axis meets every value of the others; shares are of the true or the rated value.
+/// and 2 N.m), all others on the 2.2 kW machine. With it, they run on the drive that `fmu tune` gives for the machine. The cells
+/// are all combinations of the values on the axes; shares are of the true or the rated value.
 ///
-/// Writes a map per estimator (atlas-NAME.svg, red where lost), atlas.csv, atlas.md and atlas.html, which needs no network.
-/// The files have the same bytes for any number of jobs.
+/// Writes a map per estimator (atlas-NAME.svg, red where the drive is lost), atlas.csv, atlas.md and atlas.html, which needs no
+/// network. The files have the same bytes for any number of jobs.
 ///
 ///   fmu atlas --estimator Rasmussen --out target/atlas
 ///   fmu atlas --set adaptation.resistance=true --set adaptation.k_a=0.02
@@ -80,10 +79,7 @@ pub fn run(args: &Atlas) -> Result<()> {
     let out = args.out.clone().map_or_else(|| output_folder("atlas"), Ok)?;
     let jobs = args.jobs.map_or_else(|| thread::available_parallelism().map_or(1, NonZero::get), usize::from);
 
-    let count = u64::try_from(cells.len() * drives.len())?;
-    let bar = if stderr().is_terminal() { ProgressBar::new(count) } else { ProgressBar::hidden() };
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} cells  {eta} left");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = bar_of_cells(cells.len() * drives.len());
     let atlases = atlas::run(&drives, &cells, jobs, || bar.inc(1))?;
     bar.finish_and_clear();
 
@@ -115,8 +111,8 @@ fn grid(args: &Atlas) -> Result<Grid> {
     }
     if let Some(names) = &args.scenario {
         let find = |name: &String| {
-            let known = || Scenario::ALL.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ");
-            let found = Scenario::ALL.iter().find(|s| s.name() == name);
+            let known = || Course::ALL.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ");
+            let found = Course::ALL.iter().find(|s| s.name() == name);
             found.copied().ok_or_else(|| anyhow!("--scenario {name}: is not a scenario; there are {}", known()))
         };
         grid.scenarios = names.iter().filter(|name| !name.is_empty()).map(find).collect::<Result<_>>()?;
@@ -130,8 +126,7 @@ fn drives(args: &Atlas) -> Result<Vec<Drive>> {
         let mut drive = if let Some(path) = &args.motor {
             tuned(path, name)?
         } else {
-            let found = Entry::all().into_iter().find(|e| e.name.eq_ignore_ascii_case(name));
-            Drive::compared(found.ok_or_else(|| unknown(name, Entry::all().iter().map(|e| e.name)))?)
+            Drive::compared(Entry::find(name).ok_or_else(|| unknown(name, Entry::all().iter().map(|e| e.name)))?)
         };
         args.set.iter().try_for_each(|text| drive.set(text))?;
         drives.push(drive);

@@ -4,13 +4,13 @@ use super::tune;
 use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
+use crate::message;
 use crate::pack::{self, Entry, Moment};
 use crate::target::{Target, Tools, ZIG};
 use crate::workspace::{Package, Workspace, output_folder};
 use crate::{reference, release};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use fmu_check::message;
 use fmu_core::Description;
 use fmu_import::elf::{FLOOR, Needs};
 use fmu_import::platform::Platform;
@@ -32,8 +32,8 @@ use std::path::{Path, PathBuf};
 ///                                  fmu build --library target/release/libmy_fmu.so
 ///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
 ///
-/// The folder resources/ beside the package's Cargo.toml, or that of --resources, becomes the FMU's own: the model reads it in
-/// `load`. Hidden files stay out.
+/// The folder resources/ beside the package's Cargo.toml, or that of --resources, becomes the folder resources/ of the FMU; the
+/// model reads it in `load`. Hidden files stay out.
 ///
 /// For other platforms, name the Rust targets; the FMUs then contain a binary for each of them and no others:
 ///   fmu build --target x86_64-unknown-linux-gnu,aarch64-unknown-linux-gnu,x86_64-pc-windows-gnu
@@ -41,11 +41,11 @@ use std::path::{Path, PathBuf};
 /// ziglang for Linux and macOS. The command always builds for this computer too, because that library describes the model.
 ///
 /// With cargo-zigbuild in PATH, Linux binaries need glibc 2.17 (2012). Otherwise this computer's linker decides, and the command
-/// prints what they need. CARGO_TARGET_TRIPLE_LINKER, in Cargo's spelling, selects another linker.
+/// prints what they need. CARGO_TARGET_TRIPLE_LINKER (spelled as Cargo does) selects another linker.
 ///
-/// --release-dir DIR writes what a release holds: the archives, with a binary for each of Linux, Windows and macOS that can be
-/// built for here; SHA256SUMS; sbom.cdx.json, the crates in them and their licenses (CycloneDX); and in the workspace that has
-/// them, the programs fmu, cargo-fmu and fmu-check for this computer, which need no other library with cargo-zigbuild.
+/// --release-dir DIR writes all files of a release: the archives, with a binary for each of Linux, Windows and macOS that can be
+/// built here; SHA256SUMS; sbom.cdx.json with the crates in them and their licenses (CycloneDX); and, in the workspace that has
+/// them, the programs fmu, cargo-fmu and fmu-check for this computer, which need no other library if cargo-zigbuild builds them.
 ///   fmu build --release-dir release
 ///
 /// Archives of FMI 2.0 hold one universal library for both processors of macOS. Many importers look for Linux libraries of FMI 2.0
@@ -69,7 +69,7 @@ pub struct Build {
     /// Package of this workspace with a cdylib
     #[arg(long, value_name = "NAME", conflicts_with = "library")]
     pub package: Option<String>,
-    /// Library that is already built; with PLATFORM= if it is for another platform
+    /// Library that is already built; PLATFORM= names another platform than this computer's
     #[arg(long, value_name = "[PLATFORM=]FILE")]
     pub library: Vec<String>,
     /// Folder with the resources of the --library
@@ -81,7 +81,7 @@ pub struct Build {
     /// Processor of the library in the folder linux64 of FMI 2.0: x86_64 or aarch64 [default: x86_64]
     #[arg(long, value_name = "PROCESSOR")]
     pub linux64: Option<Linux64>,
-    /// Write everything of a release to this folder
+    /// Write all files of a release to this folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["package", "library", "out"])]
     pub release_dir: Option<PathBuf>,
 }
@@ -127,9 +127,9 @@ struct Model {
     own: Vec<(Platform, Vec<u8>)>,
     binaries: Vec<(Platform, Vec<u8>)>,
     licenses: Licenses,
-    /// Files of the model's own.
+    /// The model's own files.
     resources: BTreeMap<String, Entry>,
-    /// The file with what feeds the default experiment.
+    /// The file that feeds the default experiment.
     stimuli: PathBuf,
 }
 
@@ -181,7 +181,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     Ok(written)
 }
 
-/// The reference files for the model's archives. A model that does not run by itself has none: why is a note.
+/// The reference files for the model's archives. A model that does not run by itself has none; a note says why.
 fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTreeMap<String, Entry>> {
     let Model { description, stimuli, .. } = model;
     let dir = tempfile::tempdir()?;
@@ -198,7 +198,7 @@ fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTree
     })
 }
 
-/// Everything of a release, in a folder; returns its files.
+/// Writes all files of a release to a folder; returns them.
 fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
     let (workspace, tools, moment) = (Workspace::find()?, Tools::find()?, Moment::of_environment()?);
     let target = if args.target.is_empty() { available(&tools) } else { args.target.clone() };
@@ -228,7 +228,7 @@ fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(written.into_iter().chain(others).collect())
 }
 
-/// The targets of a release that can be built for here; what is missing for the others is a note.
+/// The targets of a release that can be built here; notes say what is missing for the others.
 fn available(tools: &Tools) -> Vec<String> {
     let can = |triple: &&str| match tools.target(triple) {
         Ok(_) => true,
@@ -271,7 +271,7 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
         None => compile(workspace, &names, &tools.host())?,
     };
     if describing.is_empty() {
-        bail!("nothing that was compiled is a cdylib: set crate-type = [\"cdylib\"]");
+        bail!("no compiled package is a cdylib: set crate-type = [\"cdylib\"]");
     }
     let model = |(package, own): &Library| {
         let folder = workspace.package(package).map_or(Path::new("."), Package::folder);
@@ -297,7 +297,7 @@ fn targets(tools: &Tools, triples: &[String]) -> Result<Vec<Target>> {
     Ok(targets)
 }
 
-/// `--linux64 aarch64` needs a library for it, and its price is a note.
+/// Checks that there is a library for `--linux64 aarch64`; a note says what the option costs.
 fn has_arm(models: &[Model]) -> Result<()> {
     let has = |model: &Model, platform| model.binaries.iter().any(|(p, _)| *p == platform);
     if let Some(model) = models.iter().find(|model| !has(model, Platform::ArmLinux)) {
@@ -313,7 +313,7 @@ fn has_arm(models: &[Model]) -> Result<()> {
     Ok(())
 }
 
-/// What the Linux binaries need of the importing system beyond glibc 2.17: one line for all binaries with the same needs.
+/// What the Linux binaries need beyond glibc 2.17 on the importing system: one line for all binaries with the same needs.
 fn notes(models: &[Model]) -> Vec<String> {
     let mut by_needs: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for Model { description, binaries, .. } in models {

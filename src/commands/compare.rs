@@ -1,13 +1,12 @@
 //! `fmu compare`: every estimator through every scenario.
 
+use super::bar_of_cells;
 use crate::workspace::output_folder;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use drive_study::compare::candidate::Entry;
 use drive_study::compare::scenario::{self, Effort, SCENARIOS};
-use drive_study::compare::{self, Cell, Selection, table};
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{IsTerminal, stderr};
+use drive_study::compare::{self, Run, Selection, table};
 use std::path::PathBuf;
 
 /// Runs every estimator through start-up, load steps, wrong parameters and more, and compares the figures.
@@ -48,17 +47,14 @@ pub fn run(args: &Compare) -> Result<bool> {
     let selection = selection(args)?;
     let out = args.out.clone().map_or_else(|| output_folder("compare"), Ok)?;
 
-    let count = u64::try_from(selection.entries.len() * selection.scenarios.len())?;
-    let bar = if stderr().is_terminal() { ProgressBar::new(count) } else { ProgressBar::hidden() };
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} cells  {eta} left");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = bar_of_cells(selection.entries.len() * selection.scenarios.len());
     let cells = compare::run(&selection, || bar.inc(1));
     bar.finish_and_clear();
 
     compare::write(&cells, &out)?;
     println!("{}", table::text(&cells));
     println!("{}", out.join("compare.html").display());
-    Ok(cells.iter().all(Cell::holds))
+    Ok(cells.iter().all(Run::holds))
 }
 
 fn names<'a>(all: impl Iterator<Item = &'a str>) -> String {
@@ -68,9 +64,8 @@ fn names<'a>(all: impl Iterator<Item = &'a str>) -> String {
 fn selection(args: &Compare) -> Result<Selection> {
     let mut selection = Selection::all(Effort::Full);
     let estimator = |name: &String| {
-        let found = Entry::all().into_iter().find(|e| e.name.eq_ignore_ascii_case(name));
         let known = || names(Entry::all().iter().map(|e| e.name));
-        found.ok_or_else(|| anyhow!("--only {name}: is not an estimator; there are {}", known()))
+        Entry::find(name).ok_or_else(|| anyhow!("--only {name}: is not an estimator; there are {}", known()))
     };
     let scenario = |id: &String| {
         let known = || names(SCENARIOS.iter().map(|s| s.id));

@@ -10,9 +10,9 @@ use model_description::{
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-/// Tells what an FMU is: standard, interfaces, platforms, size, terminals, and its variables by group.
+/// Describes an FMU: standard, interfaces, platforms, size, terminals, and its variables by group.
 ///
-/// It reads the archive and runs nothing of it.
+/// The command reads the archive and runs nothing in it.
 ///
 /// The inputs, outputs and parameters of the drive, with units and start values:
 ///   fmu info target/fmu/fmi3/PmsmDrive.fmu
@@ -81,12 +81,12 @@ fn head(md: &ModelDescription, files: &BTreeMap<String, Vec<u8>>, size: u64) -> 
     let interfaces = [interface("Co-Simulation", &md.co_simulation), interface("Model Exchange", &md.model_exchange)];
     let interfaces: Vec<String> = interfaces.into_iter().flatten().collect();
     line("standard", format!("FMI {}; {}", md.version, interfaces.join(" and ")));
-    // The names of FMI 2.0 do not tell the processor.
+    // The names of FMI 2.0 do not say which processor.
     let folder = |(name, bytes): (&String, &Vec<u8>)| {
         let (folder, _) = name.strip_prefix("binaries/")?.split_once('/')?;
         let platforms: Vec<&str> = machine::platforms(bytes).into_iter().map(Platform::tuple).collect();
-        let told = platforms.is_empty() || platforms == [folder];
-        Some(if told { folder.to_owned() } else { format!("{folder} ({})", platforms.join(" and ")) })
+        let known = platforms.is_empty() || platforms == [folder];
+        Some(if known { folder.to_owned() } else { format!("{folder} ({})", platforms.join(" and ")) })
     };
     let platforms: BTreeSet<String> = files.iter().filter_map(folder).collect();
     let sources = files.keys().any(|name| name.starts_with("sources/")).then(|| "sources".to_owned());

@@ -1,4 +1,4 @@
-//! `fmu merge`: one archive out of several of the same FMU, each with binaries for other platforms.
+//! `fmu merge`: one archive from several archives of one FMU, each with binaries for other platforms.
 
 use super::build::Linux64;
 use crate::pack::{self, Entry, Moment};
@@ -16,7 +16,7 @@ const BINARIES: &str = "binaries/";
 /// Merges builds of one FMU for different platforms into a single FMU.
 ///
 /// The FMUs must have the same FMI version, token (GUID) and files, except for binaries/ and the generation date; the latest date
-/// is kept. Otherwise the command writes nothing. The same FMUs give the same bytes in any order. In FMI 2.0, the libraries for both
+/// is kept. Otherwise the command writes nothing. The order of the FMUs does not change the bytes. In FMI 2.0, the libraries for both
 /// processors of macOS become one universal library.
 ///
 ///   fmu merge linux/PmsmPlant.fmu windows/PmsmPlant.fmu --out PmsmPlant.fmu
@@ -155,7 +155,8 @@ struct Library<'a> {
     bytes: &'a [u8],
 }
 
-/// The libraries of a part; a universal one is one for each processor. What a library does not tell, its folder does.
+/// The libraries of a part; a universal library counts once for each processor. The folder decides where a library does not say its
+/// platform.
 fn libraries(part: &Part) -> Result<Vec<Library<'_>>> {
     let md = &part.description;
     let interfaces = [&md.co_simulation, &md.model_exchange, &md.scheduled_execution].into_iter().flatten();
@@ -175,7 +176,7 @@ fn libraries(part: &Part) -> Result<Vec<Library<'_>>> {
     Ok(found)
 }
 
-/// Requires that both FMUs have the same of what both have below `binaries/`.
+/// Requires that files which both FMUs have below `binaries/` are equal.
 fn other_platforms(a: &Part, b: &Part) -> Result<()> {
     let (of_a, of_b) = (libraries(a)?, libraries(b)?);
     for theirs in &of_b {

@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Makes a folder with an FMU of your own: a small model, its test, a manifest, a file for CI.
 ///
-/// Replace the model in src/lib.rs by yours. The folder needs nothing but Rust: it contains the crates that the FMU links.
+/// Replace the model in src/lib.rs with yours. The folder needs nothing but Rust: it contains the crates that the FMU links.
 ///
 ///   fmu new my-model
 ///   cd my-model
@@ -25,7 +25,7 @@ pub struct New {
     pub name: String,
 }
 
-/// The files of a project, with places for names in braces.
+/// The files of a project; names in braces are filled in.
 const TEMPLATE: [(&str, &str); 6] = [
     ("Cargo.toml", include_str!("../../template/manifest.toml")),
     ("src/lib.rs", include_str!("../../template/lib.rs")),
@@ -46,7 +46,7 @@ pub fn run(args: &New) -> Result<String> {
     let name = args.name.as_str();
     judge(name)?;
     if fs::symlink_metadata(name).is_ok() {
-        bail!("{name}: exists already: take another name, or remove it");
+        bail!("{name}: already exists: take another name, or remove it");
     }
     let files = files(name)?;
     // Under another name until it is complete.
@@ -98,14 +98,14 @@ fn files(name: &str) -> Result<BTreeMap<String, String>> {
     Ok(files)
 }
 
-/// While the command is not published, CI has to know where it comes from.
+/// Until the command is published, the CI of a project must know where to get it.
 const CONDITION: &str = "        # The variable of the repository that names the Git repository of the command fmu
         if: vars.FMU_GIT != ''
 ";
 const VENDOR: &str = "`vendor/` contains the crates `fmu-core` and `fmu-export`. In CI, the native tests always run; the FMU is built and checked \
                       too\nif the repository's variable `FMU_GIT` names the Git repository that the command `fmu` is installed from.\n";
 
-/// Refuses what cannot be a package with a library and an FMU.
+/// Refuses names that cannot be a package with a library and an FMU.
 fn judge(name: &str) -> Result<()> {
     let remedy = "a name starts with a letter and has letters a to z, digits, - and _, as in my-model";
     if let Some((folder, last)) = name.rsplit_once(['/', '\\']) {
@@ -130,7 +130,7 @@ fn judge(name: &str) -> Result<()> {
     Ok(())
 }
 
-/// Rust's keywords in lower case, those of no crate name (reference, "Keywords", edition 2024).
+/// Rust's keywords in lower case, which no crate can be named after (reference, "Keywords", edition 2024).
 const KEYWORDS: [&str; 50] = [
     "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn", "else",
     "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop", "macro", "match", "mod",

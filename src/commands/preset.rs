@@ -2,7 +2,7 @@
 
 mod motor;
 
-use crate::preset::{Course, Preset as Made};
+use crate::preset::{Course, PresetFmu};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use drive_study::tune::{self, rules::Tuned};
@@ -16,13 +16,13 @@ use std::path::{Path, PathBuf};
 /// The new FMU starts with these values in every importer, also in those that read no parameter file: they are in its description
 /// and in its instances, and a reset returns to them. An importer may still set others. Binaries stay as they are: the values are
 /// a file of the archive's resources, without which the binary refuses to run. The result of the default experiment is computed
-/// anew, and documentation/index.html lists the new start values.
+/// again, and documentation/index.html lists the new start values.
 ///
 /// A value is written as for `fmu simulate --set`: a number, with one of the variable's units if needed (1000rpm), true or false, a
 /// name or a number of an enumeration, a text; the elements of an array with commas, or one element as `NAME[2]` or `NAME[1,2]`. The
-/// values of --ssv or --motor come before those of --set. In an FMU that is a preset already, its other values stay.
+/// values of --ssv or --motor are set before those of --set. An FMU that is already a preset keeps its other values.
 ///
-/// A wrong name, a value that is not allowed, or values that the FMU refuses together: nothing is written.
+/// The command writes nothing if a name is wrong, if a value is not allowed, or if the FMU refuses the values together.
 ///
 /// The drive with another machine, and then with another estimator:
 ///   fmu preset target/fmu/fmi2/PmsmDrive.fmu --motor motors/ipmsm-2.2kw.toml --name Pump --out Pump.fmu
@@ -69,7 +69,7 @@ pub fn run(args: &Preset) -> Result<String> {
     let out = out.context("--out NEW.fmu is missing")?;
     let tuned = args.motor.as_deref().map(tune::tune).transpose()?;
     let given = args.stimuli.as_deref().map(course).transpose()?;
-    let mut preset = Made::open(&args.file)?;
+    let mut preset = PresetFmu::open(&args.file)?;
     if let Some(path) = &args.ssv {
         let of = || path.display().to_string();
         let text = std::fs::read_to_string(path).with_context(of)?;
@@ -91,9 +91,9 @@ pub fn run(args: &Preset) -> Result<String> {
 /// The FMU with the values of a machine, for `fmu tune --fmu`.
 ///
 /// # Errors
-/// As [`run`].
+/// Those of [`run`].
 pub fn of_machine(file: &Path, tuned: &Tuned, out: &Path) -> Result<()> {
-    let mut preset = Made::open(file)?;
+    let mut preset = PresetFmu::open(file)?;
     let course = motor::set(&mut preset, tuned)?;
     preset.write(None, Some(&course), out).map(drop)
 }
@@ -109,7 +109,7 @@ fn course(path: &Path) -> Result<Course> {
     Ok(Course { stimuli, stop, step: None })
 }
 
-/// A name for users that is also one for files on every system, because the reference files have it.
+/// Checks that a name for users is also a file name on every system, because the reference files have it.
 fn judge(name: &str) -> Result<()> {
     let plain = |b: u8| (b' '..=b'~').contains(&b) && !br#"/\:*?"<>|"#.contains(&b);
     ensure!(

@@ -1,11 +1,11 @@
-//! `fmu prove`: the folders of examples that the FMI tools page asks for, with what replayed them.
+//! `fmu prove`: the folders of examples that the FMI tools page asks for, and the importers that replayed them.
 
 use super::build::{self, Build};
+use crate::message;
 use crate::pack::{self, TOOL};
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
-use fmu_check::message;
 use fmu_core::Experiment;
 use fmu_import::cosimulation::Schedule;
 use fmu_import::platform::Platform;
@@ -19,12 +19,12 @@ use std::process::Command;
 ///
 /// Each FMU gets a folder DIR/fmi2/NAME or DIR/fmi3/NAME with NAME.fmu, NAME_in.csv (where it is fed), NAME_ref.csv, NAME_ref.opt and
 /// Readme.txt. The contents come from the reference files that `fmu build` writes into every archive. The command then runs the
-/// archive again from these files, in this program and, if the Python has it, in FMPy, and validates it by `fmu check`; Readme.txt
-/// gives versions and deviations. Exit status 1 if an importer deviates by more than 1e-9 of a column's largest value.
+/// archive again from these files, in this program and, if the Python has it, in FMPy, and validates it with `fmu check`; Readme.txt
+/// lists versions and deviations. Exit status 1 if an importer deviates by more than 1e-9 of a column's largest value.
 ///
 /// All FMUs of the Cargo package or workspace around the current folder:
 ///   fmu prove examples-url
-/// Archives that are there already, in the FMPy of a virtual environment:
+/// Existing archives, with the FMPy of a virtual environment:
 ///   fmu prove examples-url target/fmu/fmi2/PmsmDrive.fmu target/fmu/fmi3/PmsmDrive.fmu --python venv/bin/python
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -32,7 +32,7 @@ pub struct Prove {
     /// Folder to write
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// FMUs that this command has built [default: they are built now]
+    /// FMUs that `fmu build` made [default: the command builds them]
     #[arg(value_name = "FILE.fmu")]
     pub files: Vec<PathBuf>,
     /// Python with FMPy
@@ -40,10 +40,10 @@ pub struct Prove {
     pub python: PathBuf,
 }
 
-/// Deviation that is rounding.
+/// Greatest deviation that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// What FMPy says.
+/// The result of FMPy.
 #[derive(Deserialize)]
 struct Replay {
     version: String,
@@ -87,7 +87,7 @@ fn example(archive: &Path, folder: &Path) -> Result<(Example, ModelDescription)>
     let wanted = format!("{FOLDER}{name}_ref.csv");
     if !files.contains_key(&wanted) {
         bail!(
-            "{}: has no {wanted}: build it with this command; fmu build tells if a model does not run by itself",
+            "{}: has no {wanted}: build it with this command; fmu build says whether a model runs by itself",
             archive.display()
         );
     }
@@ -112,7 +112,7 @@ fn example(archive: &Path, folder: &Path) -> Result<(Example, ModelDescription)>
     Ok((Example { folder, name, experiment }, md))
 }
 
-/// Replays the example from its files; returns Readme.txt, and whether everything gives the reference.
+/// Replays the example from its files; returns Readme.txt, and whether every importer gives the reference.
 fn proof(example: &Example, md: &ModelDescription, python: &Path) -> Result<(String, bool)> {
     let Example { name, experiment, .. } = example;
     let file = |ending: &str| example.folder.join(format!("{name}{ending}"));
@@ -167,7 +167,7 @@ fn proof(example: &Example, md: &ModelDescription, python: &Path) -> Result<(Str
     Ok((text, good))
 }
 
-/// What of FMI the FMU has.
+/// The capabilities of FMI that the FMU has.
 fn features(md: &ModelDescription) -> String {
     let cs = md.co_simulation.as_ref();
     let all = [
@@ -184,7 +184,7 @@ fn features(md: &ModelDescription) -> String {
     all.into_iter().filter(|(_, has)| *has).map(|(name, _)| name).collect::<Vec<_>>().join(", ")
 }
 
-/// The largest deviation of this program's importer.
+/// Largest deviation of the run in this program.
 fn own(example: &Example) -> Result<f64> {
     let Example { folder, name, experiment } = example;
     let csv = |ending: &str| Schedule::read_csv(&folder.join(format!("{name}{ending}"))).map_err(|e| anyhow!(e));
@@ -204,7 +204,7 @@ fn own(example: &Example) -> Result<f64> {
     Ok(largest)
 }
 
-/// The same in FMPy; `None` if the Python does not have it.
+/// Replays the example in FMPy; `None` if the Python does not have it.
 fn fmpy(example: &Example, python: &Path) -> Result<Option<Replay>> {
     let has_it = Command::new(python).args(["-c", "import fmpy"]).output();
     if !has_it.is_ok_and(|output| output.status.success()) {

@@ -1,13 +1,14 @@
 //! `fmu simulate`: co-simulates FMUs, or integrates those for Model Exchange.
 
+mod curves;
 mod output;
+mod overview;
 mod worker;
 
 use crate::Failed;
+use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use drive_study::overview;
-use fmu_check::message;
 use fmu_import::cosimulation::{Integration, Method, Point, Schedule, Settings, Solver, System};
 use fmu_import::guard::Allowance;
 use fmu_import::ssp::load::Loaded;
@@ -30,8 +31,8 @@ use std::time::{Duration, Instant};
 /// it.
 ///
 /// With --me, the command integrates FMUs for Model Exchange itself: it lands on time events, locates state events, and sets
-/// discrete inputs at events alone. --step is then the distance of the recorded points, and the step of --solver rk4. FMUs of
-/// which one has no Co-Simulation run so without --me. With --event-mode and --early-return, FMUs for Co-Simulation of FMI 3.0
+/// discrete inputs only at events. --step is then the distance of the recorded points, and the step of --solver rk4. If one of the
+/// FMUs has no Co-Simulation, the command does so without --me. With --event-mode and --early-return, FMUs for Co-Simulation of FMI 3.0
 /// handle their events at their time, whatever --step is.
 ///
 /// Ctrl-C ends the run at the next communication point and writes what was computed; a second Ctrl-C ends the command at once.
@@ -40,22 +41,22 @@ use std::time::{Duration, Instant};
 /// their descriptions call them optional, and a step that is longer than the DefaultExperiment of an FMU. The command ends with
 /// the last values: those of the curves if it draws a first plot, otherwise of all that is recorded. Then it names its files.
 ///
-/// The FMUs run in a process of their own, with limits on memory, open files and new processes. When they crash it, hang it or end it,
-/// the command names the FMU and the call, removes their temporary files and has exit status 2. What they print goes to standard
+/// The FMUs run in a separate process, with limits on memory, open files and new processes. If an FMU crashes, blocks or ends that
+/// process, the command names the FMU and the call, removes the temporary files and has exit status 2. What they print goes to standard
 /// error. --in-process runs them in the process of the command: it starts some milliseconds sooner, and an FMU that crashes
 /// takes the command with it.
 ///
 /// Start the drive, turn it at 1000 rpm, and load it after 0.5 s:
 ///   fmu simulate target/fmu/fmi3/PmsmDrive.fmu --input speed_ref=0:0,0.1:1000rpm --input tau_load=0:0,0.5:2 --html run.html
-/// The same with controller and plant apart, without a load:
+/// The drive as controller and plant, without a load:
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
 ///     --input SensorlessController.speed_ref=0:0,0.1:1000rpm --stop 1 --plot run.svg
-/// The same from an SSP file of `fmu ssp` or any other tool; names without a dot refer to connectors of the system:
+/// An SSP file of `fmu ssp` or any other tool; names without a dot refer to connectors of the system:
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
-/// The same, connected by terminals:
+/// Controller and plant, connected by terminals:
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --terminal p.phases=c.phases --terminal p.sensor=c.sensor \
 ///     --input c.speed_ref=0:0,0.1:104.7 --stop 1 --plot run.svg
-/// The same, connected by hand, with another resistance, recording selected variables as CSV:
+/// Controller and plant, connected by hand, with another resistance; selected variables recorded as CSV:
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --connect c.u_a=p.u_a --connect c.u_b=p.u_b \
 ///     --connect c.u_c=p.u_c --connect p.i_a=c.i_a --connect p.i_b=c.i_b --connect p.i_c=c.i_c \
 ///     --set p.motor.R_s=3.3 --input c.speed_ref=0:0,0.1:104.7 --stop 1 --record p.speed,c.speed_est --csv -
@@ -103,7 +104,7 @@ pub struct Simulate {
     /// Write the recording as CSV; - for standard output
     #[arg(long, value_name = "FILE|-")]
     pub csv: Option<PathBuf>,
-    /// Plot the recording; the ending tells the format. Without --record: speed, torque, dq currents, angle error and power of
+    /// Plot the recording; the ending selects the format. Without --record: speed, torque, dq currents, angle error and power of
     /// a drive, the first of each unit of other FMUs
     #[arg(long, value_name = "FILE.svg|FILE.png")]
     pub plot: Option<PathBuf>,
@@ -134,7 +135,7 @@ pub struct Simulate {
     /// Show all messages that the FMUs log
     #[arg(long)]
     pub logging: bool,
-    /// Longest time that loading, initialization or the way to the next communication point may take, in s; 0 for no limit
+    /// Longest time in s for loading, for initialization, and from one communication point to the next; 0 for no limit
     #[arg(long, value_name = "S", default_value_t = 300.0)]
     pub timeout: f64,
     /// Address space of the process of the FMUs, in GiB; 0 for no limit
@@ -146,7 +147,7 @@ pub struct Simulate {
     /// Run the FMUs in this process, without limits: for FMUs that you trust
     #[arg(long, conflicts_with = "sandbox")]
     pub in_process: bool,
-    /// This is the process of the FMUs
+    /// Run as the process of the FMUs
     #[arg(long, hide = true)]
     pub worker: bool,
 }
@@ -160,7 +161,7 @@ pub enum SolverName {
     Dopri,
 }
 
-/// How these FMUs are run.
+/// How to run these FMUs.
 fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
     let cannot_step = fmus.iter().find(|(_, fmu)| fmu.description().co_simulation.is_none());
     let all_exchange = fmus.iter().all(|(_, fmu)| fmu.description().model_exchange.is_some());
@@ -181,7 +182,7 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
     Method::ModelExchange(Integration { solver, ..Integration::default() })
 }
 
-/// Runs the command, which is the first argument of this process.
+/// Runs the command `fmu simulate` of this process.
 ///
 /// # Errors
 /// A file is not an FMU that runs here, a name is wrong, an FMU fails, or it ends its process.
@@ -252,7 +253,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     for text in warnings(&system, &settings) {
         message::warning(&printable(&text));
     }
-    // Last what the user is after.
+    // The results come last.
     let written = written?;
     let text = printable_lines(&written);
     if args.csv.as_deref() == Some(Path::new("-")) {
@@ -269,7 +270,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     }
 }
 
-/// Warnings about inputs that keep their start values and a step that is too long, which no FMU refuses.
+/// Warns of inputs that keep their start values and of a step that is too long: no FMU refuses either.
 fn warnings(system: &System, settings: &Settings) -> Vec<String> {
     let mut found = Vec::new();
     for (index, instance) in system.instances().iter().enumerate() {
@@ -298,7 +299,7 @@ fn warnings(system: &System, settings: &Settings) -> Vec<String> {
     found
 }
 
-/// Everything before the run; also how many of the last columns are for the plot alone.
+/// Prepares the run; also returns how many of the last columns are only for the plot.
 fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
     let Loaded { system, .. } = loaded;
     for text in &args.connect {
@@ -378,7 +379,7 @@ fn show(messages: &[(String, Message)]) {
     }
 }
 
-/// A bar on a terminal, once the run takes longer than a second.
+/// A progress bar on a terminal, if the run takes longer than a second.
 struct Progress {
     settings: Settings,
     begun: Instant,

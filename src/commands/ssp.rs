@@ -16,11 +16,11 @@ use std::path::{Path, PathBuf};
 ///
 ///   fmu ssp --motor motors/ipmsm-2.2kw.toml --out drive.ssp
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg
-/// With FMUs that are packed already:
+/// With existing FMUs:
 ///   fmu ssp --fmus target/fmu --fmi 3 --out drive.ssp
 ///
-/// SSP 1.0 is older than FMI 3.0, and many SSP importers accept only FMUs of FMI 2.0. OMSimulator, its command line and its Python
-/// package, runs the file as it is. With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
+/// SSP 1.0 is older than FMI 3.0, and many SSP importers accept only FMUs of FMI 2.0. OMSimulator runs the file as it is, with its
+/// command line and its Python package. With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
@@ -42,7 +42,7 @@ pub struct Ssp {
     /// (OMSimulator)
     #[arg(long)]
     pub names: bool,
-    /// The default; older scripts pass it
+    /// Write values of enumerations by number: the default; older scripts pass it
     #[arg(long, hide = true, conflicts_with = "names")]
     pub integers: bool,
     /// Connect `enabled` of the controller to `enable` of the plant, for a drive that can be switched off; some importers do

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// measures: docs/sweeps.md and examples/sweep.toml. Results are rows of CSV in parts, in DIR, and at the end DIR/results.csv.
 /// A row depends on the file, the seed and its number only, so results have the same bytes for any number of jobs.
 ///
-/// The command goes on where parts are missing, also after a kill. Several processes may work on one DIR, for example the tasks
+/// Started again, also after a kill, the command runs the parts that are missing. Several processes may work on one DIR, for example the tasks
 /// of an array job on a shared folder, each with its --part. A run that fails becomes a row with its error.
 ///
 /// Exit status: 0 if all rows are good, 1 if some failed, 2 for wrong usage or an unusable file.
@@ -37,13 +37,13 @@ pub struct Sweep {
     /// Run only the parts whose number leaves the remainder I when divided by N
     #[arg(long, value_name = "I/N", value_parser = part)]
     pub part: Option<(u64, u64)>,
-    /// Stop after N rows, rounded up to whole parts; the next call goes on
+    /// Stop after N rows, rounded up to whole parts; the next call continues
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub limit: Option<u64>,
     /// Remove the results in DIR and start again
     #[arg(long)]
     pub restart: bool,
-    /// Run rows in processes of their own: an FMU that crashes ends its row only
+    /// Run rows in separate processes: an FMU that crashes ends only its row
     #[arg(long)]
     pub isolate: bool,
     /// Check the file and list what is missing in DIR
@@ -96,7 +96,7 @@ fn report(report: &Report, sweep: &Definition, args: &Sweep) -> Result<bool> {
         Some(path) if path == Path::new("-") => {
             let mut file = File::open(results).with_context(|| results.display().to_string())?;
             match io::copy(&mut file, &mut io::stdout().lock()) {
-                // A reader like `head` has seen enough.
+                // A reader such as `head` closes the pipe early.
                 Err(e) if e.kind() == io::ErrorKind::BrokenPipe => {}
                 other => drop(other.context("standard output")?),
             }
@@ -111,7 +111,7 @@ fn report(report: &Report, sweep: &Definition, args: &Sweep) -> Result<bool> {
     Ok(failures.count == 0)
 }
 
-/// What would run.
+/// Prints the parts that would run.
 fn plan(sweep: &Definition, args: &Sweep) -> Result<bool> {
     let with_unit = |name: &str, unit: &str| if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") };
     let columns: Vec<String> = sweep.columns().iter().map(|c| with_unit(&c.name, &c.unit)).collect();
@@ -159,7 +159,7 @@ struct Shown {
 
 impl Watch for Shown {
     fn note(&self, text: &str) {
-        fmu_check::message::note(text);
+        crate::message::note(text);
     }
 
     fn progress(&self, done: u64, failed: u64, all: u64) {

@@ -15,13 +15,13 @@ use std::path::{Path, PathBuf};
 
 /// Computes parameter values of PmsmPlant, SensorlessController and PmsmDrive from motor data.
 ///
-/// `fmu tune --example` prints a motor file to start from. MOTOR.toml contains motor, mechanics, ratings and DC link, and may contain the bandwidths of current loop, speed loop and
-/// observer; see the examples in motors/. The command writes NAME.PmsmDrive.ssv, NAME.PmsmPlant.ssv and
+/// `fmu tune --example` prints a motor file to start from. MOTOR.toml contains motor, mechanics, ratings and DC link, and may
+/// contain the bandwidths of current loop, speed loop and observer; see the examples in motors/. The command writes NAME.PmsmDrive.ssv, NAME.PmsmPlant.ssv and
 /// NAME.SensorlessController.ssv (SSP 1.0) with the values that differ from the start values of the FMUs, for importers.
 ///
 /// The command tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu of the rated speed, and
-/// a load at rating.speed_max if that is given. What the drive does not hold it tells as notes, each with remedies that were
-/// tried too. --check prints the trial as a table.
+/// a load at rating.speed_max if that is given. A note names each load and each start that the drive does not hold, with remedies
+/// that the command has tried too; the exit status is still 0. --check prints the trial as a table.
 ///
 /// With --fmu it writes an FMU with these start values instead, which needs no parameter file: see `fmu preset`.
 ///
@@ -44,13 +44,13 @@ pub struct Tune {
     /// Output folder [default: tune in Cargo's target folder]; with --fmu the file to write
     #[arg(long, value_name = "DIR|NEW.fmu")]
     pub out: Option<PathBuf>,
-    /// Write this FMU, PmsmDrive, PmsmPlant or SensorlessController, with the values as its start values
+    /// FMU to write with the values as its start values: PmsmDrive, PmsmPlant or SensorlessController
     #[arg(long, value_name = "FILE.fmu", requires = "out", conflicts_with = "integers")]
     pub fmu: Option<PathBuf>,
     /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
-    /// Print what the trial showed: starts from 24 angles at each speed, loads held, least speed, greatest angle error
+    /// Print the trial: starts from 24 angles at each speed, loads held, least speed, greatest angle error
     #[arg(long)]
     pub check: bool,
 }
@@ -107,7 +107,7 @@ pub fn run(args: &Tune) -> Result<()> {
     Ok(())
 }
 
-/// Prints what the trial showed.
+/// Prints the trial.
 fn table(trials: &[Trial]) {
     println!("\nspeed   started    held load  least speed  angle error");
     for trial in trials {
@@ -123,8 +123,8 @@ fn table(trials: &[Trial]) {
     }
 }
 
-/// The values for one of the FMUs with the machine of --example: the name of the set and the SSV file. None for a model of any
-/// other interface.
+/// The values of the machine of --example for one of the FMUs: the name of the set and the SSV file. `None` for a model with
+/// another interface.
 ///
 /// # Errors
 /// A model cannot be described.
@@ -158,7 +158,7 @@ fn write(tuned: &Tuned, folder: &Path, integers: bool) -> Result<Vec<PathBuf>> {
     texts(tuned, integers)?.into_iter().map(write).collect()
 }
 
-/// The SSV files of the three FMUs, each with what [`tune::needed`] leaves.
+/// The SSV files of the three FMUs, each with the values that [`tune::needed`] returns.
 fn texts(tuned: &Tuned, integers: bool) -> Result<Vec<(&'static str, String)>> {
     let (plant, controller) = tune::needed(tuned, integers)?;
     let drive = tune::of_drive(tuned, integers)?;

@@ -1,4 +1,4 @@
-//! What the page of a preset says besides: which start values are its own.
+//! The part of a preset's page that lists its own start values.
 
 use super::{escape, start, unit};
 use fmu_core::Description;

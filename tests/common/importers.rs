@@ -6,7 +6,7 @@ pub use super::estimators::at;
 use super::estimators::Schedule;
 use drive::Pair;
 use drive::pmsm_drive::PmsmDrive;
-use drive_study::reproduce::scenario::RPM;
+use drive_study::reproduce::experiment::RPM;
 use fmu_core::{Block, Elapsed, Fault, Step};
 use serde_json::{Value, json};
 use std::f64::consts::PI;

@@ -5,9 +5,12 @@ pub mod estimators;
 pub mod importers;
 pub mod pages;
 pub mod python;
+#[path = "../../drive-study/tests/common/shows.rs"]
+pub mod shows;
+pub mod words;
 
 use drive::Pair;
-use drive_study::reproduce::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
+use drive_study::reproduce::experiment::{ClosedLoop, Experiment, Point, RPM, Record, at, samples_apart};
 use drive_study::runner::run_in_steps;
 use fmu_core::{Block, Model, Slot};
 use std::path::{Path, PathBuf};
@@ -55,12 +58,12 @@ pub fn pair(plant: &[(&str, f64)], controller: &[(&str, f64)]) -> Pair {
 pub struct Native;
 
 impl ClosedLoop for Native {
-    fn run(&self, scenario: &Scenario, h: f64) -> anyhow::Result<Trace> {
-        let mut trace = Trace::default();
+    fn run(&self, experiment: &Experiment, h: f64) -> anyhow::Result<Record> {
+        let mut record = Record::default();
         let (mut k, every) = (0, samples_apart(h));
-        run(&mut pair(scenario.plant, scenario.controller), h, scenario.duration, |t, p| {
-            p.controller.model.inputs.speed_ref = at(scenario.speed_ref, t) * RPM;
-            p.plant.model.inputs.tau_load = at(scenario.load, t);
+        run(&mut pair(experiment.plant, experiment.controller), h, experiment.duration, |t, p| {
+            p.controller.model.inputs.speed_ref = at(experiment.speed_ref, t) * RPM;
+            p.plant.model.inputs.tau_load = at(experiment.load, t);
             k += 1;
             if (k - 1) % every != 0 {
                 return;
@@ -74,9 +77,9 @@ impl ClosedLoop for Native {
                 i_d: controller.i.d,
                 i_q: controller.i.q,
             };
-            trace.push(scenario, t, &point);
+            record.push(experiment, t, &point);
         });
-        Ok(trace)
+        Ok(record)
     }
 }
 

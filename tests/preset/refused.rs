@@ -34,7 +34,7 @@ fn files_that_are_no_fmus_of_this_program() {
         ("none.fmu", "none.fmu: "),
         ("text.fmu", "not a ZIP archive"),
         ("elsewhere.fmu", "for this platform"),
-        ("edited.fmu", "modelDescription.xml and binary are of different builds: build the FMU anew"),
+        ("edited.fmu", "modelDescription.xml and binary are of different builds: build the FMU again"),
     ] {
         let said = preset(&path(file), &path("new.fmu"), &["motor.R_s=3"]).unwrap_err();
         assert!(said.contains(why) && said.starts_with("Some(2) ") && !path("new.fmu").exists(), "{said}");
@@ -55,7 +55,8 @@ fn files_that_are_no_fmus_of_this_program() {
     assert!(said.contains("--out"), "{said}");
     // The unit of a parameter file is that of the variable.
     let ssv = path("values.ssv");
-    fs::write(&ssv, "<ParameterSet><Parameters>\n<Parameter name=\"motor.L_d\"><Real value=\"6\" unit=\"mH\"/></Parameter></Parameters></ParameterSet>").unwrap();
+    let values = "<Parameter name=\"motor.L_d\"><Real value=\"6\" unit=\"mH\"/></Parameter>";
+    fs::write(&ssv, format!("<ParameterSet><Parameters>\n{values}</Parameters></ParameterSet>")).unwrap();
     let said = fmu(&["preset", text(&two), "--ssv", text(&ssv), "--out", text(&new)]).unwrap_err();
     assert!(
         said.contains("values.ssv: line 2: motor.L_d is given in mH, and PmsmPlant has it in H: convert the value"),

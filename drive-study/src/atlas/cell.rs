@@ -2,22 +2,22 @@
 
 use anyhow::{Result, bail};
 
-/// The course of a run.
+/// What happens in a run; the scenario of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scenario {
+pub enum Course {
     /// The load arrives at the speed.
     Load,
-    /// The speed is asked for under load.
+    /// The speed reference comes under load.
     Speed,
-    /// As `Load`; then the resistance rises by 40 % within 10 s.
+    /// `Load`; then the resistance rises by 40 % within 10 s.
     Heating,
-    /// As `Load`, with noise of the current sensors.
+    /// `Load` with noise of the current sensors.
     Noise,
-    /// As `Noise`, with offsets of the current sensors and a compensated dead time.
+    /// `Noise` with offsets of the current sensors and a compensated dead time.
     Inverter,
 }
 
-impl Scenario {
+impl Course {
     /// All scenarios.
     pub const ALL: &'static [Self] = &[Self::Load, Self::Speed, Self::Heating, Self::Noise, Self::Inverter];
 
@@ -32,11 +32,11 @@ impl Scenario {
         }
     }
 
-    /// What happens in it.
+    /// One sentence about it.
     pub fn title(self) -> &'static str {
         match self {
             Self::Load => "the load arrives at the speed",
-            Self::Speed => "the speed is asked for under load",
+            Self::Speed => "the speed reference comes under load",
             Self::Heating => "the load arrives, then R rises by 40 % in 10 s",
             Self::Noise => "the load arrives, noisy currents",
             Self::Inverter => "the load arrives, noise, offsets and a compensated dead time",
@@ -48,8 +48,8 @@ impl Scenario {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Cell {
-    /// The course.
-    pub scenario: Scenario,
+    /// The scenario.
+    pub scenario: Course,
     /// R^/R: the controller's resistance as a share of the (cold) machine's.
     pub R: f64,
     /// psi^/psi: the controller's magnet flux as a share of the machine's.
@@ -66,8 +66,8 @@ pub struct Cell {
 #[derive(Clone, Debug, PartialEq)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Grid {
-    /// The courses.
-    pub scenarios: Vec<Scenario>,
+    /// The scenarios.
+    pub scenarios: Vec<Course>,
     /// R^/R, > 0.
     pub R: Vec<f64>,
     /// psi^/psi, > 0.
@@ -81,11 +81,11 @@ pub struct Grid {
 }
 
 impl Default for Grid {
-    /// The 1100 cells of the load that arrives. Without noise, a cell and its mirror image (speed and load negated) have
+    /// The 1100 cells of the scenario `Load`. Without noise, a cell and its mirror image (speed and load negated) have
     /// the same result, so speeds of one sign are enough.
     fn default() -> Self {
         Self {
-            scenarios: vec![Scenario::Load],
+            scenarios: vec![Course::Load],
             R: vec![0.5, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.5],
             psi: vec![0.8, 0.9, 1.0, 1.1, 1.2],
             load: vec![0.0, 0.5, -0.5, 1.0, -1.0],
@@ -99,7 +99,7 @@ impl Grid {
     /// All scenarios, speeds of both signs, a magnet flux known to 5 %, and three start angles.
     pub fn full() -> Self {
         Self {
-            scenarios: Scenario::ALL.to_vec(),
+            scenarios: Course::ALL.to_vec(),
             psi: vec![0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2],
             speed: vec![-0.05, -0.02, -0.01, 0.0, 0.01, 0.02, 0.05],
             theta: vec![-120.0, 0.0, 120.0],
@@ -107,7 +107,7 @@ impl Grid {
         }
     }
 
-    /// The axes, with their option and what a value must be.
+    /// The axes with their options and ranges.
     fn axes(&self) -> [(&'static str, &[f64], f64, f64); 5] {
         [
             ("--resistance", &self.R, 0.1, 10.0),

@@ -1,14 +1,14 @@
-//! A drive of the atlas: the one that `fmu compare` runs, or one tuned for a machine's file, with settings of the user.
+//! A drive of the atlas: a drive of `fmu compare`, or one tuned for a machine's file, with settings of the user.
 
 use super::run::Approach;
 use crate::compare::candidate::{Candidate, Class, Entry};
-use crate::runner::RATED_SPEED;
+use crate::runner::Bench;
 use crate::tune::motor::MotorFile;
 use crate::tune::rules;
 use anyhow::{Context, Result, anyhow, bail};
+use drive::SensorlessController;
 use drive::control::start::StartMode;
 use drive::estimator::Kind;
-use drive::{Pair, SensorlessController};
 use fmu_core::description::VariableKind;
 use fmu_core::variable::Causality;
 use fmu_core::{Description, Model, Slot};
@@ -22,12 +22,8 @@ pub struct Drive {
     pub name: String,
     /// Its machine.
     pub machine: String,
-    /// Plant and controller.
-    pub pair: Pair,
-    /// Rated mechanical speed in rad/s.
-    pub speed: f64,
-    /// Rated torque in N.m.
-    pub torque: f64,
+    /// The drive at rest, with its rated speed and torque.
+    pub bench: Bench,
     /// How it comes to its speed.
     pub approach: Approach,
 }
@@ -36,19 +32,18 @@ impl Drive {
     /// The drive of `fmu compare`: rated are 3000 rpm and 2 N.m on the reference motor, 1500 rpm and 14 N.m on the 2.2 kW
     /// machine.
     pub fn compared(entry: Entry) -> Self {
-        let Candidate { class, pair, torque, .. } = Candidate::new(entry);
+        let Candidate { class, mut bench, .. } = Candidate::new(entry);
         let rest = class == Class::FluxObserver;
+        bench.speed *= if rest { 2.0 } else { 1.0 };
         Self {
             name: entry.name.into(),
             machine: entry.machine().into(),
-            pair,
-            speed: if rest { 2.0 } else { 1.0 } * RATED_SPEED,
-            torque,
+            bench,
             approach: if rest { Approach::Rest } else { Approach::Turning },
         }
     }
 
-    /// The machine of a file with this estimator, tuned as `fmu tune` does: a flux observer by the rules for Rasmussen's, any
+    /// The machine of a file with this estimator, tuned by the rules of `fmu tune`: a flux observer by those for Rasmussen's, any
     /// other by those for the extended EMF.
     ///
     /// # Errors
@@ -64,14 +59,12 @@ impl Drive {
         let par = &mut pair.controller.model.parameters;
         par.estimator = kind;
         par.start.mode = StartMode::Direct;
-        // Other methods refuse it.
+        // The other estimators refuse this option.
         par.estimators.emf.hold_reversal &= kind == Kind::ExtendedEmf;
         Ok(Self {
             name: kind.name().into(),
             machine: tuned.name,
-            pair,
-            speed: *file.data.rating.speed.get_ref(),
-            torque: *file.data.rating.torque.get_ref(),
+            bench: Bench { pair, speed: *file.data.rating.speed.get_ref(), torque: *file.data.rating.torque.get_ref() },
             approach: if rest { Approach::Rest } else { Approach::Turning },
         })
     }
@@ -94,7 +87,7 @@ impl Drive {
         let wrong = |expected: &str| anyhow!("--set {name}={value}: must be {expected}; correct the value");
         let table = <SensorlessController as Model>::TABLE;
         let index = (0..table.len()).find(|&i| table.locate(i).is_some_and(|(found, ..)| found == name));
-        let block = &mut self.pair.controller;
+        let block = &mut self.bench.pair.controller;
         let (_, slot) =
             index.and_then(|i| table.entry(block, i)).ok_or_else(|| anyhow!("--set {name}: has no place"))?;
         match (slot, &variable.kind) {
@@ -143,7 +136,7 @@ mod tests {
         }
         drive.set("adaptation.k_a=0.02").unwrap();
         drive.set("adaptation.resistance=true").unwrap();
-        let adaptation = &drive.pair.controller.model.parameters.estimators.adaptation;
+        let adaptation = &drive.bench.pair.controller.model.parameters.estimators.adaptation;
         assert!(adaptation.resistance && (adaptation.k_a - 0.02).abs() < 1e-12);
     }
 }

@@ -1,8 +1,8 @@
 //! The map of a drive: a panel per scenario, start angle, speed and load; R^/R to the right, psi^/psi upwards; red where
-//! the drive is lost, a dot where `lock_lost` does not tell the truth. A legend says so.
+//! the drive is lost, a dot where `lock_lost` is wrong. A legend explains this.
 
 use super::Atlas;
-use super::cell::{Cell, Scenario};
+use super::cell::{Cell, Course};
 use std::fmt::Write as _;
 
 /// Side of a cell in pixels.
@@ -22,11 +22,11 @@ const STYLE: &str = ".atlas text{fill:#1d2429;font:11px system-ui,sans-serif}.at
     @media (prefers-color-scheme:dark){.atlas text{fill:#e3e7ea}.atlas .paper{fill:#15191c}.atlas .h{fill:#2c4a3a}\
     .atlas .l{fill:#d84848}.atlas .h+.d{fill:#f07070}}";
 
-/// Class of a cell, whether it has a dot, and what that means.
+/// Class of a cell, whether it has a dot, and the meaning.
 const LEGEND: [(&str, bool, &str); 4] = [
     ("h", false, "held"),
-    ("l", false, "lost, and lock_lost tells it: it is 1 or more within 1 s"),
-    ("l", true, "white dot: lost, and lock_lost does not tell it within 1 s"),
+    ("l", false, "lost, and lock_lost reports it: it is 1 or more within 1 s"),
+    ("l", true, "white dot: lost, and lock_lost does not report it within 1 s"),
     ("h", true, "red dot: held, and lock_lost is 1 or more all the same, a false alarm"),
 ];
 /// Height of a line of the legend, and width of its longest.
@@ -44,7 +44,7 @@ fn square((x, y): (f64, f64), class: &str, dot: bool) -> String {
     text + "\n"
 }
 
-/// Different values in the order of their size.
+/// The different values in ascending order.
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut all: Vec<f64> = values.collect();
     all.sort_by(f64::total_cmp);
@@ -61,7 +61,7 @@ fn count(values: &[f64]) -> f64 {
     u32::try_from(values.len()).map_or(0.0, f64::from)
 }
 
-/// Percent with as many digits as it needs.
+/// A share in percent with one decimal, or none.
 pub(super) fn percent(share: f64) -> String {
     let text = format!("{:.1}", 100.0 * share);
     format!("{} %", text.strip_suffix(".0").unwrap_or(&text))
@@ -88,14 +88,14 @@ fn labels((x, y): (f64, f64), title: &str, R: &[f64], psi: &[f64]) -> String {
         + "\n"
 }
 
-/// Draws an SVG.
+/// Draws the map as SVG.
 pub fn svg(atlas: &Atlas) -> String {
     let axis = |of: fn(&Cell) -> f64| sorted(atlas.runs.iter().map(|(cell, _)| of(cell)));
     let [R, psi, loads, speeds, angles] =
         [axis(|c| c.R), axis(|c| c.psi), axis(|c| c.load), axis(|c| c.speed), axis(|c| c.theta)];
-    let has = |s: &&Scenario| atlas.runs.iter().any(|(cell, _)| cell.scenario == **s);
-    let scenarios: Vec<Scenario> = Scenario::ALL.iter().filter(has).copied().collect();
-    // A title must not reach into the next panel.
+    let has = |s: &&Course| atlas.runs.iter().any(|(cell, _)| cell.scenario == **s);
+    let scenarios: Vec<Course> = Course::ALL.iter().filter(has).copied().collect();
+    // No title may reach into the next panel.
     let title = if angles.len() > 1 { TITLE } else { SHORT_TITLE };
     let (panel_width, panel_height) = (LEFT + (SIDE * count(&R)).max(title), TOP + SIDE * count(&psi) + BELOW);
     let rows = count(&speeds) * count(&angles);
@@ -134,7 +134,7 @@ pub fn svg(atlas: &Atlas) -> String {
             let x = x + SIDE * index(&R, cell.R);
             let y = y + SIDE * (count(&psi) - 1.0 - index(&psi, cell.psi));
             let class = if verdict.lost.is_some() { "l" } else { "h" };
-            body += &square((x, y), class, !verdict.told());
+            body += &square((x, y), class, !verdict.lock_lost_is_right());
         }
         height += block + 10.0;
     }

@@ -1,7 +1,7 @@
 //! The atlas: where a drive with wrong estimates of resistance and magnet flux holds low speeds under load, and whether
-//! `lock_lost` tells when it does not.
+//! `lock_lost` reports the cells that it does not hold.
 //!
-//! - [`cell`]: the grid; [`mod@run`]: a run, what counts as lost; [`drive`]: the drives;
+//! - [`cell`]: the grid; [`mod@run`]: a run and what counts as lost; [`drive`]: the drives;
 //! - [`map`]: the map of a drive; [`report`]: tables, CSV and page.
 
 pub mod cell;
@@ -10,8 +10,9 @@ pub mod map;
 pub mod report;
 pub mod run;
 
-use crate::compare::queue;
-use anyhow::{Context, Result, anyhow};
+use crate::output::Folder;
+use crate::queue;
+use anyhow::{Result, anyhow};
 use cell::Cell;
 use drive::Drive;
 use run::Verdict;
@@ -22,7 +23,7 @@ use std::path::Path;
 pub struct Atlas {
     /// The drive.
     pub drive: Drive,
-    /// Cells and what they gave, in the order of the grid.
+    /// Cells and verdicts, in the order of the grid.
     pub runs: Vec<(Cell, Verdict)>,
 }
 
@@ -63,15 +64,11 @@ pub fn run(drives: &[Drive], cells: &[Cell], threads: usize, done: impl Fn() + S
 /// # Errors
 /// A file cannot be written.
 pub fn write(atlases: &[Atlas], out: &Path) -> Result<()> {
-    let file = |name: &str, text: &str| {
-        let path = out.join(name);
-        std::fs::write(&path, text).with_context(|| format!("writing {}", path.display()))
-    };
-    std::fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
+    let out = Folder::create(out)?;
     for atlas in atlases {
-        file(&format!("atlas-{}.svg", atlas.drive.name), &map::svg(atlas))?;
+        out.write(&format!("atlas-{}.svg", atlas.drive.name), &map::svg(atlas))?;
     }
-    file("atlas.csv", &report::csv(atlases))?;
-    file("atlas.md", &report::markdown(atlases))?;
-    file("atlas.html", &report::page(atlases))
+    out.write("atlas.csv", &report::csv(atlases))?;
+    out.write("atlas.md", &report::markdown(atlases))?;
+    out.write("atlas.html", &report::page(atlases))
 }

@@ -1,11 +1,11 @@
 //! The atlas as CSV, as Markdown and as one self-contained page.
 
 use super::Atlas;
-use super::cell::{Cell, Scenario};
+use super::cell::{Cell, Course};
 use super::map::{self, percent};
-use super::run::{Approach, Class, Verdict};
+use super::run::{Approach, Loss, Verdict};
 use crate::ink;
-use crate::page::{self, escape};
+use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
 
 /// A row per run.
@@ -26,7 +26,7 @@ pub fn csv(atlases: &[Atlas]) -> String {
                 drive.machine,
                 scenario.name(),
                 verdict.lock_lost,
-                verdict.told(),
+                verdict.lock_lost_is_right(),
                 verdict.speed_error,
                 verdict.angle_error
             );
@@ -66,7 +66,7 @@ impl Table {
     }
 }
 
-/// How many of these runs there are, how many are lost, and the same with R^ within 20 % of R and psi^ within 5 %.
+/// How many of these runs are lost: of all, and of those with R^ within 20 % of R and psi^ within 5 % of psi.
 fn lost<'a>(runs: impl Iterator<Item = &'a (Cell, Verdict)>) -> [String; 2] {
     let (mut all, mut near) = ([0_u32; 2], [0_u32; 2]);
     for (cell, verdict) in runs {
@@ -86,7 +86,7 @@ fn lost<'a>(runs: impl Iterator<Item = &'a (Cell, Verdict)>) -> [String; 2] {
 fn by_scenario(atlases: &[Atlas]) -> Table {
     let mut table = Table::new(["Estimator", "Machine", "Scenario", "Lost", "R^ within 20 %, psi^ within 5 %"]);
     for Atlas { drive, runs } in atlases {
-        for &scenario in Scenario::ALL {
+        for &scenario in Course::ALL {
             let of = || runs.iter().filter(|(cell, _)| cell.scenario == scenario);
             if of().next().is_some() {
                 let [all, near] = lost(of());
@@ -137,19 +137,19 @@ fn by_axis(atlases: &[Atlas]) -> Table {
     table
 }
 
-/// What `lock_lost` says, by class.
+/// The values of `lock_lost`, by class.
 fn by_class(atlases: &[Atlas]) -> Table {
     let mut table = Table::new(["Estimator", "Class", "Cells", "lock_lost >= 1 within 1 s"]);
     for atlas in atlases {
         let mut row = |class: &str, runs: &[&Verdict], seen: usize| {
             table.rows.push(vec![atlas.drive.name.clone(), class.into(), runs.len().to_string(), seen.to_string()]);
         };
-        let of = |class: Option<Class>| -> Vec<&Verdict> {
+        let of = |class: Option<Loss>| -> Vec<&Verdict> {
             let is = |v: &&Verdict| v.lost.is_some_and(|(of, _)| class.is_none_or(|class| class == of));
             atlas.runs.iter().map(|(_, verdict)| verdict).filter(is).collect()
         };
         let seen = |runs: &[&Verdict]| runs.iter().filter(|v| v.lock_lost >= 1.0).count();
-        for &class in Class::ALL {
+        for &class in Loss::ALL {
             let runs = of(Some(class));
             if !runs.is_empty() {
                 row(&format!("{}: {}", class.name(), class.title()), &runs, seen(&runs));
@@ -158,13 +158,13 @@ fn by_class(atlases: &[Atlas]) -> Table {
         row("all lost", &of(None), seen(&of(None)));
         let held: Vec<&Verdict> = atlas.that_are(false).map(|(_, verdict)| verdict).collect();
         row("held (1 or more at any time)", &held, seen(&held));
-        let alarms = held.iter().filter(|v| !v.told()).count();
+        let alarms = held.iter().filter(|v| !v.lock_lost_is_right()).count();
         row("held (1 or more while it has held for 1 s: a false alarm)", &held, alarms);
     }
     table
 }
 
-/// What the drives do before they are judged, and what counts as lost.
+/// The course of the runs, and what counts as lost.
 fn definitions(atlases: &[Atlas]) -> Vec<&'static str> {
     let has = |approach| atlases.iter().any(|a| a.drive.approach == approach);
     let mut all = Vec::new();
@@ -212,11 +212,11 @@ pub fn page(atlases: &[Atlas]) -> String {
     }
     for atlas in atlases {
         let drive = &atlas.drive;
-        let swatch = page::swatch(ink::of(drive.pair.controller.model.parameters.estimator));
+        let swatch = page::swatch(ink::of(drive.bench.pair.controller.model.parameters.estimator));
         let (name, machine) = (escape(&drive.name), escape(&drive.machine));
         let _ = write!(
             html,
-            "<h2>{swatch}{name} ({machine})</h2>\n<p>Red: lost. A white dot: lost, and lock_lost does not tell it within 1 s. A \
+            "<h2>{swatch}{name} ({machine})</h2>\n<p>Red: lost. A white dot: lost, and lock_lost does not report it within 1 s. A \
              red dot on a held cell: a false alarm. Speed n and load are shares of the rated values.</p>\n<div class=\"scroll\" tabindex=\"0\">{}</div>\n",
             map::svg(atlas)
         );

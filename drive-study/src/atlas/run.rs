@@ -1,6 +1,6 @@
-//! One run: the course of speed and load, what counts as lost, and what `lock_lost` says about it.
+//! One run: the course of speed and load, what counts as lost, and whether `lock_lost` reports it.
 //!
-//! Every course has an approach, then a load, and it is judged at its end. Shares are of rated speed and torque:
+//! Every run has an approach, then a load, and it is judged at its end. Shares are of rated speed and torque:
 //!
 //! | | [`Approach::Rest`] | [`Approach::Turning`] |
 //! |---|---|---|
@@ -12,19 +12,19 @@
 //! | lost: speed off by more than | 1/600 + 5 % of the reference | 0.02 |
 //! | lost: angle off by more than | 180 deg, which is never: at rest the d-axis current carries load at 36 deg | 30 deg |
 //!
-//! `noise` is that of sensors with 10 mA per 7.5 A of `limit.i`, `inverter` adds offsets of +20 and -20 mA per 7.5 A and a
+//! In `noise`, the current sensors have 10 mA of noise per 7.5 A of `limit.i`; `inverter` adds offsets of +20 and -20 mA per 7.5 A and a
 //! dead time of 2 % of T_s, compensated. A drive with `compensation.calibrate` is off for the
 //! first 0.05 s, and the course begins after that.
 
-use super::cell::{Cell, Scenario};
+use super::cell::{Cell, Course};
 use super::drive::Drive;
-use crate::runner;
+use crate::runner::{Bench, step};
 use drive::Pair;
 use drive::math::wrap;
 use fmu_core::{Fault, Model};
 use std::f64::consts::TAU;
 
-/// How the drive comes to its speed; with it goes what counts as lost.
+/// How the drive comes to its speed; it also decides what counts as lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Approach {
     /// From rest, in steps.
@@ -46,7 +46,7 @@ const DEAD_TIME: f64 = 0.02;
 
 /// How the rotor was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Class {
+pub enum Loss {
     /// The rotor slips against the estimated frame, by a turn or more in the last 2 s.
     Slips,
     /// Rotor and estimate turn together at a speed that is not the reference.
@@ -59,7 +59,7 @@ pub enum Class {
     Failed,
 }
 
-impl Class {
+impl Loss {
     /// All classes.
     pub const ALL: &'static [Self] = &[Self::Slips, Self::Creeps, Self::Swings, Self::Angle, Self::Failed];
 
@@ -74,7 +74,7 @@ impl Class {
         }
     }
 
-    /// What it means.
+    /// One sentence about it.
     pub fn title(self) -> &'static str {
         match self {
             Self::Slips => "the rotor slips against the estimate",
@@ -86,11 +86,11 @@ impl Class {
     }
 }
 
-/// What a run gave.
+/// The result of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
     /// How and when (s) the drive was lost: the first time out of its tolerance while it is judged.
-    pub lost: Option<(Class, f64)>,
+    pub lost: Option<(Loss, f64)>,
     /// Greatest `lock_lost` from the loss to 1 s later, or of the whole run if the cell is held.
     pub lock_lost: f64,
     /// Greatest `lock_lost` of a held cell while the drive has been within its tolerance for 1 s.
@@ -102,51 +102,51 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Whether `lock_lost` told the truth: 1 or more within 1 s of a loss, below 1 while the drive holds. A cell that is
-    /// held in the end may have been lost before: `heating` brings R to R^ > R.
-    pub fn told(&self) -> bool {
+    /// Whether `lock_lost` was right: 1 or more within 1 s of a loss, below 1 while the drive holds. A cell that is
+    /// held in the end may have been lost before: in `heating`, R rises to an R^ that was greater.
+    pub fn lock_lost_is_right(&self) -> bool {
         if self.lost.is_some() { self.lock_lost >= 1.0 } else { self.while_held < 1.0 }
     }
 }
 
 /// Speed reference and load at the time `t` (s), as shares.
 fn course(approach: Approach, cell: &Cell, t: f64) -> (f64, f64) {
-    // The exact instants of the samples are above or below by rounding.
-    let step = |from: f64| if t >= from - 1e-9 { 1.0 } else { 0.0 };
+    let step = |from| step(t, from);
     let ramp = |from: f64, to: f64| ((t - from) / (to - from)).clamp(0.0, 1.0);
     let first = 0.2_f64.copysign(cell.speed);
     let slow_down = |share: f64| first + share * (cell.speed - first);
     match (approach, cell.scenario) {
-        (Approach::Rest, Scenario::Speed) => (cell.speed * step(1.5), cell.load * step(0.5)),
+        (Approach::Rest, Course::Speed) => (cell.speed * step(1.5), cell.load * step(0.5)),
         (Approach::Rest, _) => (cell.speed * step(0.2), cell.load * step(1.0)),
-        (Approach::Turning, Scenario::Speed) => (slow_down(ramp(1.0, 1.8)), cell.load * ramp(0.2, 0.5)),
+        (Approach::Turning, Course::Speed) => (slow_down(ramp(1.0, 1.8)), cell.load * ramp(0.2, 0.5)),
         (Approach::Turning, _) => (slow_down(ramp(0.2, 1.0)), cell.load * ramp(1.5, 1.8)),
     }
 }
 
 /// The drive of a cell before its start.
-fn prepared(drive: &Drive, cell: &Cell) -> Pair {
-    let mut pair = drive.pair.clone();
+fn prepared(drive: &Drive, cell: &Cell) -> Bench {
+    let mut bench = drive.bench.clone();
+    let pair = &mut bench.pair;
     let (plant, controller) = (&mut pair.plant.model, &mut pair.controller.model);
     let (truth, par) = (&mut plant.parameters, &mut controller.parameters);
     par.motor.R_s = cell.R * truth.motor.R_s;
     par.motor.psi_M = cell.psi * truth.motor.psi_M;
     truth.initial.theta_e = par.theta_est + cell.theta.to_radians();
     if drive.approach == Approach::Turning {
-        let speed = 0.2_f64.copysign(cell.speed) * drive.speed;
+        let speed = 0.2_f64.copysign(cell.speed) * drive.bench.speed;
         (truth.initial.speed, par.speed_est) = (speed, speed);
     }
     // The presets of some drives have noise of their own.
     par.sensor.noise = 0.0;
-    if matches!(cell.scenario, Scenario::Noise | Scenario::Inverter) {
+    if matches!(cell.scenario, Course::Noise | Course::Inverter) {
         par.sensor.noise = NOISE * par.limit.i;
     }
-    if cell.scenario == Scenario::Inverter {
+    if cell.scenario == Course::Inverter {
         (par.sensor.offset.a, par.sensor.offset.b) = (OFFSET * par.limit.i, -OFFSET * par.limit.i);
         truth.inverter.dead_time = DEAD_TIME * par.T_s;
         par.compensation.u_dead = truth.inverter.u_dead(plant.inputs.u_dc);
     }
-    pair
+    bench
 }
 
 /// Runs a cell.
@@ -154,7 +154,8 @@ fn prepared(drive: &Drive, cell: &Cell) -> Pair {
 /// # Errors
 /// The parameters do not fit together.
 pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
-    let mut pair = prepared(drive, cell);
+    let mut bench = prepared(drive, cell);
+    let pair = &mut bench.pair;
     let off = if pair.controller.model.parameters.compensation.calibrate { OFF } else { 0.0 };
     if off > 0.0 {
         let coasting = &mut pair.plant.model;
@@ -162,8 +163,8 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
             f64::from(coasting.parameters.motor.n_p) * coasting.parameters.initial.speed * off;
         (coasting.inputs.enable, pair.controller.model.inputs.enable) = (false, false);
     }
-    let heats = cell.scenario == Scenario::Heating;
-    let (T_s, cold) = (pair.controller.model.parameters.T_s, pair.plant.model.parameters.motor.R_s);
+    let heats = cell.scenario == Course::Heating;
+    let cold = pair.plant.model.parameters.motor.R_s;
     let end = if heats { 14.0 } else { 6.0 };
     let (tolerance, angle) = match drive.approach {
         Approach::Rest => (1.0 / 600.0 + 0.05 * cell.speed.abs(), 180.0),
@@ -174,23 +175,22 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
     let (mut speed_error, mut angle_error, mut slip, mut theta_tilde) = (0.0_f64, 0.0_f64, 0.0, 0.0);
     let (mut mean, mut judged) = (0.0, 0.0);
     let mut hot = 0_u32;
-    let finished = runner::run_in_steps(&mut pair, T_s, end, |t, p| {
-        last = t;
-        let (speed, load) = course(drive.approach, cell, t - off);
-        p.controller.model.inputs.speed_ref = speed * drive.speed;
+    let course = |t: f64, p: &mut Pair| {
         let on = t >= off - 1e-9;
         (p.controller.model.inputs.enable, p.plant.model.inputs.enable) = (on, on);
-        p.plant.model.inputs.tau_load = load * drive.torque;
-        // A percent at a time.
+        // In steps of one percent.
         let share = if heats { ((t - 2.0) / 10.0).clamp(0.0, 1.0) * 40.0 } else { 0.0 };
         if share >= f64::from(hot + 1) {
             hot += 1;
             p.plant.model.parameters.motor.R_s = cold * (1.0 + HEATING * f64::from(hot) / 40.0);
             p.plant.model.derive();
         }
-        let out = &p.controller.out;
-        let error = wrap(p.plant.out.theta_e - out.theta_est);
-        let off = p.plant.out.speed / drive.speed - speed;
+        course(drive.approach, cell, t - off)
+    };
+    let finished = bench.run(end, course, |moment| {
+        let (t, error, out) = (moment.t, moment.theta_tilde, &moment.pair.controller.out);
+        last = t;
+        let off = moment.deviation();
         let is_off = off.abs() > tolerance || error.abs().to_degrees() > angle;
         if is_off {
             last_off = t;
@@ -217,15 +217,15 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
         lost_at = lost_at.or(Some(last));
     }
     let class = if !finished {
-        Class::Failed
+        Loss::Failed
     } else if slip.abs() >= TAU {
-        Class::Slips
+        Loss::Slips
     } else if (mean / judged).abs() > tolerance {
-        Class::Creeps
+        Loss::Creeps
     } else if speed_error > tolerance {
-        Class::Swings
+        Loss::Swings
     } else {
-        Class::Angle
+        Loss::Angle
     };
     Ok(Verdict {
         lost: lost_at.map(|at| (class, at)),

@@ -5,8 +5,8 @@
 //! its own gains (the start values of the FMUs, R^ = 0.9 R), where 1 pu of torque is the 2 N.m of the paper's load
 //! steps. 1 pu of speed is 1500 rpm on both machines.
 
-use crate::runner;
-use crate::runner::RATED_SPEED;
+use super::measure::Follow;
+use crate::runner::{self, Bench, RATED_SPEED};
 use drive::Pair;
 use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters;
@@ -62,7 +62,7 @@ impl Entry {
         }
     }
 
-    /// Its name in a table, with the machine if it differs from that of the others.
+    /// Its name in a table, with the machine if the others have a different one.
     pub fn label(&self) -> String {
         match self.kind {
             Kind::Rasmussen => format!("{} ({})", self.name, self.machine()),
@@ -70,12 +70,21 @@ impl Entry {
         }
     }
 
+    /// The row of an estimator.
+    pub fn of(kind: Kind) -> Self {
+        Self { kind, name: kind.name(), set: |_| () }
+    }
+
+    /// The estimator or variant of this name, in capitals or not.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::all().into_iter().find(|entry| entry.name.eq_ignore_ascii_case(name))
+    }
+
     /// All estimators, each with its variants.
     pub fn all() -> Vec<Self> {
-        let one = |&kind: &Kind| Self { kind, name: kind.name(), set: |_| () };
-        let with_variants = |kind: &Kind| {
-            let variants = VARIANTS.iter().copied().filter(|v| v.kind == *kind);
-            std::iter::once(one(kind)).chain(variants).collect::<Vec<_>>()
+        let with_variants = |&kind: &Kind| {
+            let variants = VARIANTS.iter().copied().filter(move |v| v.kind == kind);
+            std::iter::once(Self::of(kind)).chain(variants)
         };
         Kind::ALL.iter().flat_map(with_variants).collect()
     }
@@ -88,10 +97,8 @@ pub struct Candidate {
     pub entry: Entry,
     /// The signal from which it finds the rotor.
     pub class: Class,
-    /// The drive at rest.
-    pub pair: Pair,
-    /// 1 pu of torque in N.m.
-    pub torque: f64,
+    /// The drive at rest; 1 pu of speed is 1500 rpm.
+    pub bench: Bench,
 }
 
 impl Candidate {
@@ -104,7 +111,7 @@ impl Candidate {
         };
         pair.controller.model.parameters.estimator = entry.kind;
         (entry.set)(&mut pair.controller.model.parameters);
-        Self { entry, class, pair, torque }
+        Self { entry, class, bench: Bench { pair, speed: RATED_SPEED, torque } }
     }
 
     /// Why the estimator cannot be judged at standstill.
@@ -118,20 +125,21 @@ impl Candidate {
             .then_some("injection above 0.2 pu is limited by the voltage: Hybrid goes on from there")
     }
 
-    /// The same with other parameters.
+    /// The candidate of an estimator without a variant.
+    pub fn of(kind: Kind) -> Self {
+        Self::new(Entry::of(kind))
+    }
+
+    /// The candidate with other parameters.
     pub fn with(&self, change: impl FnOnce(&mut Pair)) -> Self {
         let mut other = self.clone();
-        change(&mut other.pair);
+        change(&mut other.bench.pair);
         other
     }
 
     /// With 2 us of dead time in the inverter, compensated or not.
     pub fn with_dead_time(&self, compensated: bool) -> Self {
-        self.with(|p| {
-            p.plant.model.parameters.inverter.dead_time = 2e-6;
-            let u_dead = p.plant.model.parameters.inverter.u_dead(p.plant.model.inputs.u_dc);
-            p.controller.model.parameters.compensation.u_dead = if compensated { u_dead } else { 0.0 };
-        })
+        self.with(|p| *p = runner::with_dead_time(p.clone(), compensated))
     }
 
     /// Running at `speed` (pu) with known angle and speed.
@@ -139,7 +147,7 @@ impl Candidate {
         self.with(|p| *p = runner::turning(p.clone(), speed))
     }
 
-    /// The start from an unknown angle: by I-f, by polarity pulses (which need saturation), or by the estimator itself.
+    /// Starting from an unknown angle: by I-f, by polarity pulses (which need saturation), or by the estimator itself.
     pub fn starting(&self) -> Self {
         self.with(|p| {
             let mode = &mut p.controller.model.parameters.start.mode;
@@ -155,25 +163,29 @@ impl Candidate {
         })
     }
 
-    /// Runs for `duration` (s). Before every step, `each` gets the drive and the time, sets inputs by
-    /// [`set`](Self::set) and reads outputs. Returns false when a step fails, which means that the drive was lost.
+    /// Runs a course of `duration` (s) and follows it: traces all of it, and measures it after the time `from` (s). A step that fails
+    /// means that the drive was lost; then the second value is false.
     ///
     /// # Errors
     /// The parameters are inconsistent.
-    pub fn run(&self, duration: f64, each: impl FnMut(f64, &mut Pair)) -> Result<bool, Fault> {
-        let mut pair = self.pair.clone();
-        let h = pair.controller.model.parameters.T_s;
-        runner::run_in_steps(&mut pair, h, duration, each)
+    pub fn follow(
+        &self,
+        duration: f64,
+        from: f64,
+        course: impl FnMut(f64, &mut Pair) -> (f64, f64),
+    ) -> Result<(Follow, bool), Fault> {
+        let mut follow = Follow::default();
+        let survived = self.bench.run(duration, course, |moment| {
+            follow.trace(moment);
+            if moment.t > from {
+                follow.add(moment);
+            }
+        })?;
+        Ok((follow, survived))
     }
+}
 
-    /// Sets speed reference and load, both in pu.
-    pub fn set(&self, pair: &mut Pair, speed: f64, load: f64) {
-        pair.controller.model.inputs.speed_ref = speed * RATED_SPEED;
-        pair.plant.model.inputs.tau_load = load * self.torque;
-    }
-
-    /// A load in pu that opposes the motion.
-    pub fn opposing(pair: &Pair, load: f64) -> f64 {
-        load * tanh(pair.plant.out.speed / 2.0)
-    }
+/// A load in pu that opposes the motion.
+pub fn opposing(pair: &Pair, load: f64) -> f64 {
+    load * tanh(pair.plant.out.speed / 2.0)
 }

@@ -1,20 +1,20 @@
-//! The grid as one self-contained page.
+//! The comparison as one self-contained page.
 
 use super::candidate::Entry;
 use super::plots::Plot;
 use super::table::{Block, mark, number};
-use super::{Cell, Outcome, table};
+use super::{Outcome, Run, table};
 use crate::ink;
-use crate::page::{self, escape};
 use anyhow::Result;
+use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
 
 /// The page with its plots.
 ///
 /// # Errors
 /// Those of [`page::figure`].
-pub fn page(cells: &[Cell], plots: &[Plot]) -> Result<String> {
-    let class = if cells.iter().all(Cell::holds) { "" } else { " off" };
+pub fn page(cells: &[Run], plots: &[Plot]) -> Result<String> {
+    let class = if cells.iter().all(Run::holds) { "" } else { " off" };
     let mut html = format!(
         "<p class=\"verdict{class}\">{}</p>\n\
          <p>S.-K. Sul and S. Kim's review, ICEMS 2011, every estimator in closed loop. {}</p>\n<p>{}</p>\n\
@@ -52,7 +52,7 @@ pub fn page(cells: &[Cell], plots: &[Plot]) -> Result<String> {
 
 /// A table with a column for each quantity of each scenario.
 fn grid(block: &Block<'_>) -> String {
-    // Whoever has no mouse scrolls it with the arrow keys.
+    // The focus lets the arrow keys scroll it.
     let mut html = format!(
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\"><table>\n\
          <thead><tr><th class=\"name\" rowspan=\"2\">estimator</th>",

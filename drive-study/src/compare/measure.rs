@@ -1,17 +1,16 @@
 //! The numbers measured in a run. Angle errors are theta - theta^ in deg, speeds are in pu.
 
-use crate::reproduce::figures::Expected;
-use crate::runner;
-use drive::Pair;
+use crate::expected::Expected;
+use crate::runner::{Moment, Statistics};
 
-/// A number of a cell. It is infinite if the value was never reached or the rotor was lost.
+/// A number measured in a run. It is infinite if the value was never reached or the rotor was lost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measure {
     /// Name of the quantity.
     pub name: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// The value, infinite where the drive was lost.
+    /// The value.
     pub value: f64,
     /// The expected value, if there is a figure.
     pub expected: Option<Expected>,
@@ -51,48 +50,61 @@ const BAND: f64 = 0.02;
 /// Follows a run against its reference.
 #[derive(Clone, Debug, Default)]
 pub struct Follow {
-    n: f64,
-    squares: f64,
-    last_outside: Option<f64>,
-    last: f64,
-    /// Angle error.
-    pub angle: runner::Statistics,
+    /// Deviation of the speed from its reference in pu.
+    pub speed: Statistics,
+    /// Angle error in deg.
+    pub angle: Statistics,
     /// Largest drop of the speed below its reference, in the direction of the reference, in pu.
     pub dip: f64,
+    last_outside: Option<f64>,
+    last: f64,
     trace: Trace,
 }
 
 impl Follow {
-    /// Measures the drive at time `t` (s), with the speed reference `reference` (pu).
-    pub fn add(&mut self, t: f64, reference: f64, pair: &Pair) {
-        let (speed, error) = (runner::speed(pair), runner::rotor_ahead(pair));
-        let off = speed - reference;
+    /// Measures a moment.
+    pub fn add(&mut self, moment: &Moment<'_>) {
+        let (t, error, off) = (moment.t, moment.error(), moment.deviation());
         if self.trace.lost.is_none() && (error.is_nan() || error.abs() > LOST) {
             self.trace.lost = Some(t);
         }
-        self.n += 1.0;
-        self.squares += off * off;
+        self.speed.add(off);
         self.angle.add(error);
-        self.dip = self.dip.max(if reference < 0.0 { off } else { -off });
+        self.dip = self.dip.max(if moment.reference < 0.0 { off } else { -off });
         if off.abs() >= BAND {
             self.last_outside = Some(t);
         }
         self.last = t;
     }
 
-    /// Records the state at time `t` (s) for the plot.
-    pub fn trace(&mut self, t: f64, reference: f64, pair: &Pair) {
-        if self.trace.t.last().is_none_or(|last| t - last > 1e-3 - 1e-9) {
-            self.trace.t.push(t);
-            self.trace.reference.push(reference);
-            self.trace.speed.push(runner::speed(pair));
-            self.trace.error.push(runner::rotor_ahead(pair));
+    /// Records a moment for the plot.
+    pub fn trace(&mut self, moment: &Moment<'_>) {
+        if self.trace.t.last().is_none_or(|last| moment.t - last > 1e-3 - 1e-9) {
+            self.trace.t.push(moment.t);
+            self.trace.reference.push(moment.reference);
+            self.trace.speed.push(moment.speed);
+            self.trace.error.push(moment.error());
+        }
+    }
+
+    /// Ends the plot at the time `end` (s).
+    pub fn show_until(&mut self, end: f64) {
+        let Trace { t, reference, speed, error, .. } = &mut self.trace;
+        let kept = t.partition_point(|t| *t <= end);
+        for values in [t, reference, speed, error] {
+            values.truncate(kept);
         }
     }
 
     /// Whether the rotor was lost, or nothing was measured at all.
     pub fn lost(&self) -> bool {
-        self.n == 0.0 || self.angle.peak.is_nan() || self.angle.peak > LOST || !self.squares.is_finite()
+        let angle = self.angle.peak;
+        self.speed.count() == 0.0 || angle.is_nan() || angle > LOST || !self.speed.rms().is_finite()
+    }
+
+    /// Whether the drive follows speed and rotor: within 30 deg, and 2 % of rated speed.
+    pub fn holds(&self) -> bool {
+        !self.lost() && self.angle.peak < 30.0 && self.last_outside.is_none()
     }
 
     fn or_lost(&self, x: f64) -> f64 {
@@ -101,7 +113,7 @@ impl Follow {
 
     /// Root mean square of the speed error.
     pub fn rms(&self) -> Measure {
-        Measure::new("rms speed error", "pu", self.or_lost((self.squares / self.n).sqrt()))
+        Measure::new("rms speed error", "pu", self.or_lost(self.speed.rms()))
     }
 
     /// Maximum angle error.
@@ -124,7 +136,7 @@ impl Follow {
         Measure::new("settling time", "s", self.or_lost(self.settling_time(from)))
     }
 
-    /// The same in s, whether or not the angle was lost: for a start, where the initial angle error does not count.
+    /// The settling time in s, whether or not the angle was lost: for a start, where the initial angle error does not count.
     pub fn settling_time(&self, from: f64) -> f64 {
         match self.last_outside {
             Some(t) if t >= self.last - 1e-9 => f64::INFINITY,
@@ -145,23 +157,22 @@ impl Follow {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drive::Pair;
 
-    fn at(speed: f64, error: f64) -> Pair {
-        let mut pair = Pair::default();
-        pair.plant.out.speed = speed * runner::RATED_SPEED;
-        pair.plant.out.theta_e = error.to_radians();
-        pair
+    /// At a reference of 0.5 pu, with an angle error in deg.
+    fn at(t: f64, speed: f64, error: f64, see: impl FnOnce(&Moment<'_>)) {
+        see(&Moment { t, reference: 0.5, speed, theta_tilde: error.to_radians(), pair: &Pair::default() });
     }
 
     #[test]
     fn settles_where_it_last_leaves_the_band() {
         let mut f = Follow::default();
         for (t, speed) in [(1.0, 0.5), (1.1, 0.4), (1.2, 0.47), (1.3, 0.49), (1.4, 0.5)] {
-            f.add(t, 0.5, &at(speed, 3.0));
+            at(t, speed, 3.0, |moment| f.add(moment));
         }
         assert!((f.settled(1.0).value - 0.2).abs() < 1e-12 && (f.dip - 0.1).abs() < 1e-12);
         assert!((f.peak().value - 3.0).abs() < 1e-9 && !f.lost());
-        f.add(1.5, 0.5, &at(0.0, 0.0));
+        at(1.5, 0.0, 0.0, |moment| f.add(moment));
         assert!(f.settled(1.0).value.is_infinite());
     }
 
@@ -169,12 +180,12 @@ mod tests {
     fn a_lost_rotor_has_no_numbers() {
         let mut f = Follow::default();
         assert!(f.lost());
-        f.add(0.0, 0.5, &at(0.5, 120.0));
+        at(0.0, 0.5, 120.0, |moment| f.add(moment));
         assert!(f.lost() && f.rms().value.is_infinite() && f.peak().value.is_infinite());
-        f.add(0.1, 0.5, &at(0.5, 3.0));
+        at(0.1, 0.5, 3.0, |moment| f.add(moment));
         assert_eq!(f.into_trace(true).lost, Some(0.0), "where it was lost first");
         let mut f = Follow::default();
-        f.trace(0.2, 0.5, &at(0.5, 3.0));
+        at(0.2, 0.5, 3.0, |moment| f.trace(moment));
         assert_eq!((f.clone().into_trace(true).lost, f.into_trace(false).lost), (None, Some(0.2)));
     }
 }

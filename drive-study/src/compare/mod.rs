@@ -1,25 +1,25 @@
-//! The grid: runs every estimator through every scenario on all cores, with the native models, then measures, checks
+//! The comparison: runs every estimator through every scenario on all cores, with the native models, then measures, checks
 //! and plots the results.
 //!
 //! - [`candidate`]: an estimator with the drive it is compared on; [`scenario`]: the test it runs through;
-//! - [`measure`]: the numbers measured in a run; [`expected`]: the figures expected by the review's list;
-//! - [`queue`]: the runs on all cores; [`table`], [`html`], [`plots`]: the output for an engineer.
+//! - [`running`]: the courses of a running drive; [`measure`]: the numbers measured in a run; [`figures`]: the figures that the review's list expects;
+//! - [`table`], [`html`], [`plots`]: the output for an engineer.
 
 pub mod candidate;
-pub mod expected;
+pub mod figures;
 pub mod html;
 pub mod measure;
 mod parameters;
 pub mod plots;
-pub mod queue;
-mod running;
+pub mod running;
 pub mod scenario;
 mod signal;
 pub mod table;
 mod weakening;
 
-use crate::plot;
-use anyhow::{Context, Result};
+use crate::output::Folder;
+use crate::queue;
+use anyhow::Result;
 use candidate::{Candidate, Entry};
 use measure::{Measure, Trace};
 use plots::Plot;
@@ -37,9 +37,9 @@ pub enum Outcome {
     Refused(String),
 }
 
-/// One cell of the grid.
+/// One estimator in one scenario, with the result.
 #[derive(Clone, Debug)]
-pub struct Cell {
+pub struct Run {
     /// The row.
     pub entry: Entry,
     /// The scenario.
@@ -48,7 +48,7 @@ pub struct Cell {
     pub outcome: Outcome,
 }
 
-impl Cell {
+impl Run {
     /// The numbers; none where the scenario does not apply.
     pub fn measures(&self) -> &[Measure] {
         match &self.outcome {
@@ -70,13 +70,13 @@ impl Cell {
         self.measures().iter().filter(|m| m.expected.is_some_and(|e| !e.holds(m.value)))
     }
 
-    /// Whether every number of this cell is as expected.
+    /// Whether every number is as expected.
     pub fn holds(&self) -> bool {
         !matches!(self.outcome, Outcome::Refused(_)) && self.outside().next().is_none()
     }
 }
 
-/// Which cells, and how thoroughly.
+/// Which estimators run through which scenarios, and how thoroughly.
 #[derive(Clone, Debug)]
 pub struct Selection {
     /// The estimators, the rows.
@@ -88,14 +88,14 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// All cells.
+    /// Every estimator in every scenario.
     pub fn all(effort: Effort) -> Self {
         Self { entries: Entry::all(), scenarios: SCENARIOS.iter().collect(), effort }
     }
 }
 
-/// Runs the cells on all cores and calls `done` after each finished cell.
-pub fn run(selection: &Selection, done: impl Fn() + Sync) -> Vec<Cell> {
+/// Runs the selection on all cores and calls `done` after each run.
+pub fn run(selection: &Selection, done: impl Fn() + Sync) -> Vec<Run> {
     let Selection { entries, scenarios, effort } = selection;
     let jobs: Vec<_> = entries.iter().flat_map(|&entry| scenarios.iter().map(move |&s| (entry, s))).collect();
     queue::map(&jobs, |&(entry, scenario)| {
@@ -106,11 +106,11 @@ pub fn run(selection: &Selection, done: impl Fn() + Sync) -> Vec<Cell> {
         };
         if let Outcome::Measured(measures, _) = &mut outcome {
             for m in measures {
-                m.expected = expected::of(entry.name, scenario.id, m.name);
+                m.expected = figures::of(entry.name, scenario.id, m.name);
             }
         }
         done();
-        Cell { entry, scenario, outcome }
+        Run { entry, scenario, outcome }
     })
 }
 
@@ -118,18 +118,14 @@ pub fn run(selection: &Selection, done: impl Fn() + Sync) -> Vec<Cell> {
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write(cells: &[Cell], out: &Path) -> Result<()> {
-    let file = |name: &str, text: &str| {
-        let path = out.join(name);
-        std::fs::write(&path, text).with_context(|| format!("writing {}", path.display()))
-    };
-    std::fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
+pub fn write(cells: &[Run], out: &Path) -> Result<()> {
+    let out = Folder::create(out)?;
     let plots = plots::all(cells);
     for Plot { name, figure } in &plots {
-        file(&format!("{name}.svg"), &plot::svg(figure)?)?;
+        out.write(&format!("{name}.svg"), &fmu_plot::svg::draw(figure)?)?;
     }
-    file("compare.csv", &table::csv(cells))?;
-    file("compare.txt", &table::text(cells))?;
-    file("compare.md", &table::markdown(cells))?;
-    file("compare.html", &html::page(cells, &plots)?)
+    out.write("compare.csv", &table::csv(cells))?;
+    out.write("compare.txt", &table::text(cells))?;
+    out.write("compare.md", &table::markdown(cells))?;
+    out.write("compare.html", &html::page(cells, &plots)?)
 }

@@ -1,12 +1,13 @@
-//! Plots over time: speed and angle error of all estimators in one picture per scenario and, for each estimator that
+//! Plots over time: speed and angle error of all estimators in one plot per scenario and, for each estimator that
 //! injects a voltage, the carrier current and the angle found in it (Fig. 8 and 11 of the review).
 
-use super::Cell;
-use crate::figure::{Curve, Figure, Panel};
-use crate::ink::{self, CURVES, REFERENCE};
+use super::Run;
+use crate::ink;
+use fmu_plot::figure::{Curve, Figure, Panel};
+use fmu_plot::ink::{CURVES, REFERENCE};
 use std::rc::Rc;
 
-/// A picture.
+/// A plot and its name.
 #[derive(Debug)]
 pub struct Plot {
     /// File name without extension.
@@ -15,11 +16,11 @@ pub struct Plot {
     pub figure: Figure,
 }
 
-/// All pictures of the cells.
-pub fn all(cells: &[Cell]) -> Vec<Plot> {
+/// All plots of the runs.
+pub fn all(cells: &[Run]) -> Vec<Plot> {
     let mut plots = Vec::new();
     for id in ["ramp", "reversal", "load-0", "load-0.1", "load-0.5", "load-1", "weakening"] {
-        let with_trace: Vec<&Cell> = cells.iter().filter(|c| c.scenario.id == id && c.trace().is_some()).collect();
+        let with_trace: Vec<&Run> = cells.iter().filter(|c| c.scenario.id == id && c.trace().is_some()).collect();
         if !with_trace.is_empty() {
             plots.push(together(id, &with_trace));
         }
@@ -34,7 +35,7 @@ fn panel(unit: &str, time: &[f64], curves: Vec<Curve>) -> Panel {
 }
 
 /// All estimators in a scenario, each until it loses the rotor.
-fn together(id: &str, cells: &[&Cell]) -> Plot {
+fn together(id: &str, cells: &[&Run]) -> Plot {
     let (mut time, mut speeds, mut errors): (Rc<[f64]>, _, _) = (Rc::from([]), Vec::new(), Vec::new());
     let traces = || cells.iter().filter_map(|cell| Some((&cell.entry, cell.trace()?)));
     for (_, trace) in traces().filter(|(_, trace)| !trace.t.is_empty()) {
@@ -60,7 +61,7 @@ fn together(id: &str, cells: &[&Cell]) -> Plot {
 }
 
 /// Fig. 8 and 11: the carrier current over six milliseconds, and the angle found in it.
-fn signal(cell: &Cell) -> Vec<Plot> {
+fn signal(cell: &Run) -> Vec<Plot> {
     let Some(trace) = cell.trace() else { return Vec::new() };
     let name = cell.entry.name;
     let review = match name {

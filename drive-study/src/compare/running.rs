@@ -1,10 +1,11 @@
 //! Scenarios of a running drive: start, ramp, reversal, load steps, rated load, lowest speed, bandwidth.
 
 use super::Outcome;
-use super::candidate::{Candidate, Class};
+use super::candidate::{Candidate, Class, opposing};
 use super::measure::{Follow, Measure};
 use super::scenario::Effort;
-use crate::runner::{self, line};
+use crate::runner::{self, Moment, line, step};
+use drive::Pair;
 use drive::estimator::tracker::TrackerKind;
 use fmu_core::Fault;
 use std::f64::consts::TAU;
@@ -22,16 +23,14 @@ pub(super) fn start(candidate: &Candidate, effort: Effort) -> Result<Outcome, Fa
         let target = if k % 4 < 2 { speed } else { -speed };
         let angle: f64 = every * f64::from(k);
         let at = starting.with(|p| p.plant.model.parameters.initial.theta_e = angle.to_radians());
-        let mut follow = Follow::default();
-        let mut after = Follow::default();
-        let survived = at.run(2.5, |t, p| {
-            let reference = if t > 0.6 { target } else { 0.0 };
-            at.set(p, reference, Candidate::opposing(p, load));
-            if t > 0.6 {
-                follow.add(t, target, p);
+        let (mut follow, mut after) = (Follow::default(), Follow::default());
+        let course = |t: f64, p: &mut Pair| (if t > 0.6 { target } else { 0.0 }, opposing(p, load));
+        let survived = at.bench.run(2.5, course, |moment| {
+            if moment.t > 0.6 {
+                follow.add(moment);
             }
-            if t > 1.5 {
-                after.add(t, target, p);
+            if moment.t > 1.5 {
+                after.add(moment);
             }
         })?;
         let settled = follow.settling_time(0.6);
@@ -54,16 +53,9 @@ pub(super) fn ramp(candidate: &Candidate, _effort: Effort) -> Result<Outcome, Fa
     if let Some(why) = candidate.no_speed(1.0) {
         return Ok(Outcome::NotApplicable(why));
     }
-    let (candidate, mut follow) = (candidate.starting(), Follow::default());
-    let survived = candidate.run(3.2, |t, p| {
-        let reference = if t < 0.5 { 0.0 } else { line(t, 1.4, 0.15, 2.4, 1.0) };
-        candidate.set(p, reference, Candidate::opposing(p, 0.3));
-        follow.trace(t, reference, p);
-        if t > 1.4 {
-            follow.add(t, reference, p);
-        }
-    })?;
-    Ok(dynamic(follow, survived, 2.4, false))
+    let reference = |t: f64| if t < 0.5 { 0.0 } else { line(t, 1.4, 0.15, 2.4, 1.0) };
+    let run = candidate.starting().follow(3.2, 1.4, |t, p| (reference(t), opposing(p, 0.3)))?;
+    Ok(dynamic(run, 2.4, false))
 }
 
 /// Speed reversal through standstill. The hybrid runs the profile that has a figure in the review's list.
@@ -72,16 +64,9 @@ pub(super) fn reversal(candidate: &Candidate) -> Result<Outcome, Fault> {
         return both_ways(candidate);
     }
     let top = if candidate.class == Class::Injection { 0.1 } else { 0.5 };
-    let (turning, mut follow) = (candidate.turning(top), Follow::default());
-    let survived = turning.run(2.5, |t, p| {
-        let reference = line(t, 0.7, top, 1.2, -top);
-        turning.set(p, reference, Candidate::opposing(p, 0.3));
-        follow.trace(t, reference, p);
-        if t > 0.5 {
-            follow.add(t, reference, p);
-        }
-    })?;
-    Ok(dynamic(follow, survived, 1.2, false))
+    let reference = |t| line(t, 0.7, top, 1.2, -top);
+    let run = candidate.turning(top).follow(2.5, 0.5, |t, p| (reference(t), opposing(p, 0.3)))?;
+    Ok(dynamic(run, 1.2, false))
 }
 
 /// 0 -> 0.95 -> -0.95 -> 0 pu under a constant 0.8 pu of load. The list does not give the slope of its ramps, which
@@ -89,15 +74,22 @@ pub(super) fn reversal(candidate: &Candidate) -> Result<Outcome, Fault> {
 fn both_ways(candidate: &Candidate) -> Result<Outcome, Fault> {
     let (top, ramp, stay, begin) = (0.95, 0.375, 0.5, 0.8);
     let (back, home) = (begin + ramp + stay, begin + 3.0 * ramp + 2.0 * stay);
-    let mut follow = Follow::default();
-    let survived = candidate.run(home + ramp + 0.5, |t, p| {
+    let reference = |t| {
         let up = line(t, begin, 0.0, begin + ramp, top);
-        let reference = up - line(t, back, 0.0, back + 2.0 * ramp, 2.0 * top) + line(t, home, 0.0, home + ramp, top);
-        candidate.set(p, reference, line(t, 0.1, 0.0, 0.4, 0.8));
-        follow.trace(t, reference, p);
-        follow.add(t, reference, p);
-    })?;
-    Ok(dynamic(follow, survived, home + ramp, false))
+        up - line(t, back, 0.0, back + 2.0 * ramp, 2.0 * top) + line(t, home, 0.0, home + ramp, top)
+    };
+    let load = |t| line(t, 0.1, 0.0, 0.4, 0.8);
+    let run = candidate.follow(home + ramp + 0.5, f64::NEG_INFINITY, |t, _| (reference(t), load(t)))?;
+    Ok(dynamic(run, home + ramp, false))
+}
+
+/// A step of the load at 0.5 s, at a constant speed, both in pu; false if a step failed.
+///
+/// # Errors
+/// The parameters are inconsistent.
+pub fn stepped(candidate: &Candidate, speed: f64, load: f64) -> Result<(Follow, bool), Fault> {
+    let duration = if speed == 0.0 { 4.0 } else { 2.0 };
+    candidate.turning(speed).follow(duration, 0.5, |t, _| (speed, load * step(t, 0.5)))
 }
 
 /// A load step at a constant speed.
@@ -106,20 +98,12 @@ pub(super) fn load_step(candidate: &Candidate, speed: f64, load: f64) -> Result<
     if let Some(why) = none.or(candidate.no_speed(speed)) {
         return Ok(Outcome::NotApplicable(why));
     }
-    let (turning, mut follow) = (candidate.turning(speed), Follow::default());
-    let survived = turning.run(if speed == 0.0 { 4.0 } else { 2.0 }, |t, p| {
-        turning.set(p, speed, if t >= 0.5 - 1e-9 { load } else { 0.0 });
-        if t <= 2.0 {
-            follow.trace(t, speed, p);
-        }
-        if t > 0.5 {
-            follow.add(t, speed, p);
-        }
-    })?;
-    Ok(dynamic(follow, survived, 0.5, true))
+    let mut run = stepped(candidate, speed, load)?;
+    run.0.show_until(2.0);
+    Ok(dynamic(run, 0.5, true))
 }
 
-fn dynamic(follow: Follow, survived: bool, from: f64, with_dip: bool) -> Outcome {
+fn dynamic((follow, survived): (Follow, bool), from: f64, with_dip: bool) -> Outcome {
     let dip = with_dip.then(|| Measure::new("dip", "pu", if follow.lost() { f64::INFINITY } else { follow.dip }));
     let mut measures = vec![follow.rms(), follow.peak(), follow.settled(from)];
     measures.extend(dip);
@@ -143,7 +127,10 @@ pub(super) fn rated(candidate: &Candidate, speed: f64) -> Result<Outcome, Fault>
 
 /// Takes rated load, then goes to `speed` (pu). It takes the load at 0.5 pu, so that the result is the lowest running
 /// speed and not the lowest starting speed.
-pub(super) fn slowed_down(candidate: &Candidate, speed: f64) -> Result<Follow, Fault> {
+///
+/// # Errors
+/// The parameters are inconsistent.
+pub fn slowed_down(candidate: &Candidate, speed: f64) -> Result<Follow, Fault> {
     let side = if speed < 0.0 { -1.0 } else { 1.0 };
     // Injection lacks the voltage for half the speed, so it takes the load at the target speed.
     let first = if candidate.class == Class::Injection { speed } else { side * speed.abs().max(0.5) };
@@ -152,29 +139,28 @@ pub(super) fn slowed_down(candidate: &Candidate, speed: f64) -> Result<Follow, F
 
 /// Takes `load` (pu) at speed `first` (pu) within 0.3 s, ramps to `speed` (pu) at 0.5 pu/s, settles for 1.5 s and
 /// measures for 0.5 s.
-fn loaded(candidate: &Candidate, first: f64, speed: f64, load: f64) -> Result<Follow, Fault> {
-    let (turning, mut follow) = (candidate.turning(first), Follow::default());
+///
+/// # Errors
+/// The parameters are inconsistent.
+pub fn loaded(candidate: &Candidate, first: f64, speed: f64, load: f64) -> Result<Follow, Fault> {
     let arrival = 1.2 + (first - speed).abs() / 0.5;
-    let survived = turning.run(arrival + 2.0, |t, p| {
-        let reference = line(t, 1.2, first, arrival.max(1.2 + 1e-9), speed);
-        turning.set(p, reference, line(t, 0.1, 0.0, 0.4, load));
-        if t > arrival + 1.5 {
-            follow.add(t, speed, p);
+    let reference = |t| line(t, 1.2, first, arrival.max(1.2 + 1e-9), speed);
+    let course = |t, _: &mut Pair| (reference(t), line(t, 0.1, 0.0, 0.4, load));
+    let mut follow = Follow::default();
+    let survived = candidate.turning(first).bench.run(arrival + 2.0, course, |moment| {
+        if moment.t > arrival + 1.5 {
+            // The end of the ramp is `speed` but for rounding.
+            follow.add(&Moment { reference: speed, ..*moment });
         }
     })?;
     Ok(if survived { follow } else { Follow::default() })
-}
-
-/// Whether the drive follows speed and rotor: within 30 deg and 2 % of rated speed.
-fn holds(follow: &Follow) -> bool {
-    !follow.lost() && follow.angle.peak < 30.0 && follow.settled(0.0).value == 0.0
 }
 
 /// Rated driving load, applied at `speed` (pu) within 0.3 s.
 pub(super) fn generating(candidate: &Candidate, speed: f64) -> Result<Outcome, Fault> {
     let follow = loaded(candidate, speed, speed, -1.0)?;
     let mut measures = vec![follow.mean("mean angle error"), follow.std(), follow.rms()];
-    if !holds(&follow) {
+    if !follow.holds() {
         for m in &mut measures {
             m.value = f64::INFINITY;
         }
@@ -192,7 +178,7 @@ fn lowest_of(
 ) -> Result<Outcome, Fault> {
     let mut lowest = f64::INFINITY;
     for speed in speeds {
-        if !holds(&approach(candidate, speed)?) {
+        if !approach(candidate, speed)?.holds() {
             break;
         }
         lowest = speed;
@@ -220,7 +206,7 @@ fn lowest_by(candidate: &Candidate, effort: Effort, approach: Approach) -> Resul
     lowest_of(candidate, approach, all.iter().copied().filter(|&speed| speed >= low))
 }
 
-/// The same without the term that the review omits, for estimators that have it.
+/// Lowest speed at which rated load is held without the term that the review omits, for estimators that have it.
 pub(super) fn as_printed(candidate: &Candidate) -> Result<Outcome, Fault> {
     if !["DirectEmf", "EmfObserver", "ExtendedEmf", "VoltageFeedback"].contains(&candidate.entry.kind.name()) {
         return Ok(Outcome::NotApplicable("has no frame-speed term to drop"));
@@ -234,13 +220,13 @@ pub(super) fn bandwidth(candidate: &Candidate, effort: Effort) -> Result<Outcome
     if effort == Effort::Reduced {
         return Ok(Outcome::NotApplicable("left out of the reduced grid"));
     }
-    candidate.pair.clone().start()?;
+    candidate.bench.pair.clone().start()?;
     let speed = if candidate.class == Class::Injection { 0.1 } else { 0.5 };
-    let bandwidth = runner::speed_bandwidth(&candidate.pair, speed);
+    let bandwidth = runner::speed_bandwidth(&candidate.bench.pair, speed);
     Ok(Outcome::Measured(vec![Measure::new("speed bandwidth", "Hz", bandwidth)], None))
 }
 
-/// The same with the speed loop (and the mechanical observer) of the review's faster figure.
+/// Bandwidth of the speed loop that the review's faster figure has, with the mechanical observer where the figure needs it.
 pub(super) fn bandwidth_fast(candidate: &Candidate, effort: Effort) -> Result<Outcome, Fault> {
     // Speed loop and tracker in Hz: the mechanical observer makes the fast speed loop possible.
     let (loop_hz, observer_hz) = match candidate.entry.kind.name() {

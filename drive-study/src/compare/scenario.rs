@@ -4,7 +4,7 @@ use super::candidate::Candidate;
 use super::{Outcome, parameters, running, signal, weakening};
 use fmu_core::Fault;
 
-/// Extent of the grid. The reduced grid is for a test that runs in seconds.
+/// Extent of the comparison. The reduced one is for a test that runs in seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
     /// 24 starts, all speeds.

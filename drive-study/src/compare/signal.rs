@@ -3,7 +3,7 @@
 use super::Outcome;
 use super::candidate::Candidate;
 use super::measure::{Measure, Trace};
-use crate::runner;
+use crate::runner::{self, Statistics};
 use fmu_core::Fault;
 
 const NOTHING: Outcome = Outcome::NotApplicable("injects nothing");
@@ -17,9 +17,9 @@ pub(super) fn cost(candidate: &Candidate) -> Result<Outcome, Fault> {
     if !injects(candidate) {
         return Ok(NOTHING);
     }
-    candidate.pair.clone().start()?;
-    let rms = runner::injected_current(candidate.pair.clone());
-    let r_s = candidate.pair.plant.model.parameters.motor.R_s;
+    candidate.bench.pair.clone().start()?;
+    let rms = runner::injected_current(candidate.bench.pair.clone());
+    let r_s = candidate.bench.pair.plant.model.parameters.motor.R_s;
     let measures = vec![Measure::new("i_hf rms", "A", rms), Measure::new("copper loss", "W", 1.5 * r_s * rms * rms)];
     Ok(Outcome::Measured(measures, None))
 }
@@ -29,17 +29,21 @@ pub(super) fn response(candidate: &Candidate) -> Result<Outcome, Fault> {
     if !injects(candidate) {
         return Ok(NOTHING);
     }
-    let (turning, mut trace, mut error) = (candidate.turning(0.05), Trace::default(), runner::Statistics::default());
-    turning.run(0.5, |t, p| {
-        turning.set(p, 0.05, 0.0);
-        if t > 0.2 {
-            error.add(runner::rotor_ahead(p));
-        }
-        let i = p.plant.out.i.to_stator();
-        trace.t.push(t);
-        trace.current.push([i.alpha(), i.beta()]);
-        trace.angles.push([p.plant.out.theta_e.to_degrees(), p.controller.out.theta_est.to_degrees()]);
-    })?;
+    let (mut trace, mut error) = (Trace::default(), Statistics::default());
+    candidate.turning(0.05).bench.run(
+        0.5,
+        |_, _| (0.05, 0.0),
+        |moment| {
+            if moment.t > 0.2 {
+                error.add(moment.error());
+            }
+            let (plant, controller) = (&moment.pair.plant.out, &moment.pair.controller.out);
+            let i = plant.i.to_stator();
+            trace.t.push(moment.t);
+            trace.current.push([i.alpha(), i.beta()]);
+            trace.angles.push([plant.theta_e.to_degrees(), controller.theta_est.to_degrees()]);
+        },
+    )?;
     let measures = vec![
         Measure::new("mean angle error", "deg", error.mean()),
         Measure::new("std of the angle error", "deg", error.std()),

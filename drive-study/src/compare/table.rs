@@ -1,20 +1,21 @@
-//! The grid as text, Markdown and CSV: estimators as rows, scenarios as columns, one table per group of scenarios.
+//! The comparison as text, Markdown and CSV: estimators as rows, scenarios as columns, one table per group of scenarios.
 
 use super::candidate::Entry;
 use super::measure::Measure;
-use super::{Cell, Outcome};
+use super::{Outcome, Run};
 use crate::compare::candidate::Class;
+use crate::output::{self, aligned};
 use std::fmt::Write as _;
 
-/// A group of scenarios with its cells.
+/// A group of scenarios with its runs.
 #[derive(Debug)]
 pub struct Block<'a> {
     /// What the scenarios have in common.
     pub title: &'static str,
     /// The scenarios, each with its quantities; their values are those of one estimator.
     pub headings: Vec<(&'static str, &'a [Measure])>,
-    /// The estimators with their cells, one for each scenario.
-    pub rows: Vec<(&'a Entry, Vec<Option<&'a Cell>>)>,
+    /// The estimators with their runs, one for each scenario.
+    pub rows: Vec<(&'a Entry, Vec<Option<&'a Run>>)>,
     /// Notes under the table.
     pub notes: Vec<String>,
 }
@@ -34,7 +35,7 @@ impl Block<'_> {
     }
 }
 
-/// A number in a resolution that suits its unit.
+/// A number with as many digits as its unit deserves.
 pub fn number(m: &Measure) -> String {
     if m.value.is_infinite() {
         return if m.name == "settling time" { "never" } else { "lost" }.into();
@@ -50,7 +51,7 @@ pub fn number(m: &Measure) -> String {
 }
 
 /// A cell: its numbers, with a mark at each that has an expected value.
-fn cell_text(cell: &Cell) -> String {
+fn cell_text(cell: &Run) -> String {
     match &cell.outcome {
         Outcome::NotApplicable(_) => "-".into(),
         Outcome::Refused(_) => "REFUSED".into(),
@@ -73,8 +74,8 @@ pub(super) fn mark(m: &Measure, expected: bool) -> &'static str {
     }
 }
 
-/// The tables of the cells.
-pub fn blocks(cells: &[Cell]) -> Vec<Block<'_>> {
+/// The tables of the runs.
+pub fn blocks(cells: &[Run]) -> Vec<Block<'_>> {
     let mut groups: Vec<&'static str> = Vec::new();
     for cell in cells {
         if !groups.contains(&cell.scenario.group) {
@@ -84,8 +85,8 @@ pub fn blocks(cells: &[Cell]) -> Vec<Block<'_>> {
     groups.into_iter().map(|group| block(group, cells)).collect()
 }
 
-fn block<'a>(group: &'static str, cells: &'a [Cell]) -> Block<'a> {
-    let inside: Vec<&'a Cell> = cells.iter().filter(|c| c.scenario.group == group).collect();
+fn block<'a>(group: &'static str, cells: &'a [Run]) -> Block<'a> {
+    let inside: Vec<&'a Run> = cells.iter().filter(|c| c.scenario.group == group).collect();
     let (mut scenarios, mut estimators, mut notes) = (Vec::new(), Vec::<&Entry>::new(), Vec::new());
     for cell in &inside {
         if !scenarios.contains(&cell.scenario.id) {
@@ -97,7 +98,7 @@ fn block<'a>(group: &'static str, cells: &'a [Cell]) -> Block<'a> {
         }
     }
     let of = |id: &'static str| inside.iter().copied().filter(move |c| c.scenario.id == id);
-    let heading = |id: &'static str| (id, of(id).map(Cell::measures).find(|m| !m.is_empty()).unwrap_or_default());
+    let heading = |id: &'static str| (id, of(id).map(Run::measures).find(|m| !m.is_empty()).unwrap_or_default());
     let row =
         |entry: &&'a Entry| (*entry, scenarios.iter().map(|id| of(id).find(|c| c.entry.name == entry.name)).collect());
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
@@ -123,32 +124,15 @@ fn block<'a>(group: &'static str, cells: &'a [Cell]) -> Block<'a> {
     }
 }
 
-/// Aligns rows of texts in columns; `rule` draws the line below the first row.
-fn aligned(rows: &[Vec<String>], left: &str, between: &str, right: &str, rule: impl Fn(&[usize]) -> String) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|x| x.chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let mut text = String::new();
-    for (k, row) in rows.iter().enumerate() {
-        let padded = |(x, w): (&String, &usize)| format!("{x}{}", " ".repeat(w - x.chars().count()));
-        let line: Vec<_> = row.iter().zip(&widths).map(padded).collect();
-        let _ = writeln!(text, "{}", format!("{left}{}{right}", line.join(between)).trim_end());
-        if k == 0 {
-            text.push_str(&rule(&widths));
-        }
-    }
-    text
-}
-
 /// The tables in plain text, with a list of the numbers outside their tolerances.
-pub fn text(cells: &[Cell]) -> String {
+pub fn text(cells: &[Run]) -> String {
     let mut text = String::new();
     for block in blocks(cells) {
         let heads = block.headings.iter().map(|h| h.0.into());
         let mut rows: Vec<Vec<String>> = vec![std::iter::once(String::new()).chain(heads).collect()];
         rows.extend(block.texts());
         let _ = writeln!(text, "{}", block.title);
-        text.push_str(&aligned(&rows, "  ", "   ", "", |_| String::new()));
+        text.push_str(&aligned(&rows, ["  ", "   ", ""], |_| String::new()));
         for (id, measures) in block.headings.iter().filter(|h| !h.1.is_empty()) {
             let _ = writeln!(text, "  {id}: {}", Block::quantities(measures));
         }
@@ -159,8 +143,8 @@ pub fn text(cells: &[Cell]) -> String {
 }
 
 /// The number of figures, and those that are not as expected.
-pub fn verdict(cells: &[Cell]) -> String {
-    let figures = cells.iter().flat_map(Cell::measures).filter(|m| m.expected.is_some()).count();
+pub fn verdict(cells: &[Run]) -> String {
+    let figures = cells.iter().flat_map(Run::measures).filter(|m| m.expected.is_some()).count();
     let outside: Vec<_> = cells.iter().flat_map(|c| c.outside().map(move |m| (c, m))).collect();
     let mut text = format!("{} of {figures} figures are inside their tolerance.\n", figures - outside.len());
     for (cell, m) in outside {
@@ -189,8 +173,8 @@ pub const MACHINES: &str = "All on the 2.2 kW machine with interior magnets (R 3
      on its own reference motor (assumed; 1 pu = 1500 rpm and 2 N.m) with R^ = 0.9 R and without noise. \
      Angle errors are theta - theta^: positive where the rotor is ahead of the estimate.";
 
-/// How the estimators of the cells start, in words.
-pub fn starts(cells: &[Cell]) -> String {
+/// How the estimators start, in words.
+pub fn starts(cells: &[Run]) -> String {
     let mut ways: Vec<(&str, Vec<&str>)> = Vec::new();
     for cell in cells {
         let way = match cell.entry.kind.class() {
@@ -211,7 +195,7 @@ pub fn starts(cells: &[Cell]) -> String {
 }
 
 /// The tables in Markdown.
-pub fn markdown(cells: &[Cell]) -> String {
+pub fn markdown(cells: &[Run]) -> String {
     let mut text = format!("# Estimators compared\n\n{MACHINES}\n\n{}\n\n", starts(cells));
     text.push_str("✓: inside the tolerance of its expected figure; ✗: outside; no mark: no expected figure.\n\n");
     for block in blocks(cells) {
@@ -223,11 +207,7 @@ pub fn markdown(cells: &[Cell]) -> String {
         let heads = block.headings.iter().map(heading);
         let mut rows: Vec<Vec<String>> = vec![std::iter::once("estimator".to_owned()).chain(heads).collect()];
         rows.extend(block.texts());
-        let rule = |widths: &[usize]| {
-            let lines: Vec<_> = widths.iter().map(|w| "-".repeat(w + 2)).collect();
-            format!("|{}|\n", lines.join("|"))
-        };
-        text.push_str(&aligned(&rows, "| ", " | ", " |", rule));
+        text.push_str(&output::markdown(&rows));
         text.push('\n');
         block.notes.iter().for_each(|note| {
             let _ = writeln!(text, "- {note}");
@@ -239,7 +219,7 @@ pub fn markdown(cells: &[Cell]) -> String {
 }
 
 /// Every number with its expected value, one per line.
-pub fn csv(cells: &[Cell]) -> String {
+pub fn csv(cells: &[Run]) -> String {
     let mut text = String::from("estimator,scenario,measure,unit,value,expected,verdict,machine\n");
     for cell in cells {
         let (name, id, machine) = (cell.entry.name, cell.scenario.id, cell.entry.machine());

@@ -1,13 +1,14 @@
 //! Field weakening: to a multiple of the base speed, and there more load than the machine can carry.
 //!
-//! Base speed n_b: of the true machine at its greatest current and 0.95 u_dc / sqrt 3. Envelope: of the true machine too, under
-//! the limits of each estimator.
+//! The base speed n_b is that of the true machine at its greatest current and 0.95 u_dc / sqrt 3; the envelope too is that of the
+//! true machine, under the limits of each estimator.
 
 use super::Outcome;
 use super::candidate::Candidate;
-use super::measure::{Follow, Measure};
-use crate::runner::{self, RATED_SPEED, Statistics, line};
-use drive::control::envelope::{Envelope, Warm};
+use super::measure::Measure;
+use crate::runner::{self, RATED_SPEED, Statistics, line, settled_limit};
+use drive::Pair;
+use drive::control::envelope::Envelope;
 use drive::estimator::Kind;
 use fmu_core::Fault;
 
@@ -17,9 +18,9 @@ fn weakening(candidate: &Candidate) -> Candidate {
         let par = &mut p.controller.model.parameters;
         par.weakening.used = true;
         match par.estimator {
-            // Its gain has no bound near the current -psi_M / L_d.
+            // The gain of this estimator has no bound near the current -psi_M / L_d.
             Kind::VoltageModel => par.limit.i = 0.7 * par.motor.psi_M / par.motor.L_d,
-            // A saturated hexagon is an angle error to it.
+            // This estimator takes a saturated hexagon for an angle error.
             Kind::VoltageFeedback => (par.weakening.k_u, par.weakening.k_t) = (0.9, 0.9),
             _ => {}
         }
@@ -36,7 +37,7 @@ struct Truth {
 
 impl Truth {
     fn new(candidate: &Candidate) -> Self {
-        let (plant, par) = (&candidate.pair.plant.model, &candidate.pair.controller.model.parameters);
+        let (plant, par) = (&candidate.bench.pair.plant.model, &candidate.bench.pair.controller.model.parameters);
         Self {
             envelope: Envelope::new(&plant.parameters.motor, par.limit.i),
             U: par.weakening.k_u * plant.inputs.u_dc / 3.0_f64.sqrt(),
@@ -51,14 +52,12 @@ impl Truth {
 
     /// Greatest torque (N.m) at `speed` (pu).
     fn torque(&self, speed: f64) -> f64 {
-        let mut warm = Warm::default();
-        let mut limit = || self.envelope.limit(speed * RATED_SPEED * self.n_p, 1.0, self.U, &mut warm).tau;
-        (0..8).map(|_| limit()).last().unwrap_or_default()
+        settled_limit(&self.envelope, speed * RATED_SPEED * self.n_p, 1.0, self.U).tau
     }
 }
 
-/// A ramp of the reference to a multiple of the base speed, then a tenth more load than the envelope has there: the drive slows
-/// down along the envelope to where it carries the load.
+/// A ramp of the reference to a multiple of the base speed, then 1.1 times the torque of the envelope as load: the drive slows
+/// down along the envelope to the speed at which it carries the load.
 pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
     const FROM: f64 = 0.5;
     if let Some(why) = candidate.no_speed(1.0) {
@@ -69,16 +68,9 @@ pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
     let base = Truth::new(candidate).base_speed();
     let (candidate, target) = (weakening(candidate).turning(FROM), times * base);
     let truth = Truth::new(&candidate);
-    let load = 1.1 * truth.torque(target) / candidate.torque;
-    let mut follow = Follow::default();
+    let load = 1.1 * truth.torque(target) / candidate.bench.torque;
     let [mut fast, mut slow, mut torque] = [Statistics::default(); 3];
-    let survived = candidate.run(3.5, |t, p| {
-        let reference = line(t, 0.5, FROM, 1.0, target);
-        candidate.set(p, reference, line(t, 1.5, 0.0, 1.8, load));
-        follow.trace(t, reference, p);
-        if t > 0.5 {
-            follow.add(t, reference, p);
-        }
+    let course = |t, p: &mut Pair| {
         let speed = runner::speed(p);
         if t <= 1.5 {
             fast.peak = fast.peak.max(speed);
@@ -90,7 +82,9 @@ pub(super) fn run(candidate: &Candidate) -> Result<Outcome, Fault> {
             slow.add(speed);
             torque.add(p.plant.out.tau_e);
         }
-    })?;
+        (line(t, 0.5, FROM, 1.0, target), line(t, 1.5, 0.0, 1.8, load))
+    };
+    let (follow, survived) = candidate.follow(3.5, 0.5, course)?;
     let lost = !survived || follow.lost();
     let or_lost = |x: f64| if lost { f64::INFINITY } else { x };
     let measures = vec![

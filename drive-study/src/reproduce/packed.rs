@@ -1,6 +1,6 @@
 //! The closed loop of the two packed FMUs, run by our own importer through the standard interface.
 
-use super::scenario::{ClosedLoop, Point, RPM, Scenario, Trace, at, samples_apart};
+use super::experiment::{ClosedLoop, Experiment, Point, RPM, Record, at, samples_apart};
 use anyhow::Result;
 use fmu_import::{Fmu, Instance};
 use std::path::Path;
@@ -44,17 +44,17 @@ fn references<const N: usize>(instance: &Instance, names: [&str; N]) -> Result<[
 }
 
 impl ClosedLoop for Packed {
-    fn run(&self, scenario: &Scenario, h: f64) -> Result<Trace> {
+    fn run(&self, experiment: &Experiment, h: f64) -> Result<Record> {
         // The last step may end up to half a step away from the duration.
-        let stop = scenario.duration + h;
-        let mut plant = start(&self.plant, "plant", scenario.plant, stop)?;
-        let mut controller = start(&self.controller, "controller", scenario.controller, stop)?;
+        let stop = experiment.duration + h;
+        let mut plant = start(&self.plant, "plant", experiment.plant, stop)?;
+        let mut controller = start(&self.controller, "controller", experiment.controller, stop)?;
         let plant_out = references(&plant, ["i_a", "i_b", "i_c", "speed", "theta_e"])?;
         let plant_in = references(&plant, ["u_a", "u_b", "u_c", "tau_load"])?;
         let controller_out = references(&controller, ["u_a", "u_b", "u_c", "speed_est", "theta_est", "i_d", "i_q"])?;
         let controller_in = references(&controller, ["i_a", "i_b", "i_c", "speed_ref"])?;
 
-        let (mut trace, mut k, every) = (Trace::default(), 0_u32, samples_apart(h));
+        let (mut record, mut k, every) = (Record::default(), 0_u32, samples_apart(h));
         let (mut from_plant, mut from_controller) = ([0.0; 5], [0.0; 7]);
         loop {
             let t = f64::from(k) * h;
@@ -63,19 +63,19 @@ impl ClosedLoop for Packed {
             let [i_a, i_b, i_c, speed, theta_e] = from_plant;
             let [u_a, u_b, u_c, speed_est, theta_est, i_d, i_q] = from_controller;
             if k % every == 0 {
-                trace.push(scenario, t, &Point { speed, theta_e, speed_est, theta_est, i_d, i_q });
+                record.push(experiment, t, &Point { speed, theta_e, speed_est, theta_est, i_d, i_q });
             }
-            if t >= scenario.duration - 0.5 * h {
+            if t >= experiment.duration - 0.5 * h {
                 break;
             }
-            plant.set_reals(&plant_in, &[u_a, u_b, u_c, at(scenario.load, t)])?;
-            controller.set_reals(&controller_in, &[i_a, i_b, i_c, at(scenario.speed_ref, t) * RPM])?;
+            plant.set_reals(&plant_in, &[u_a, u_b, u_c, at(experiment.load, t)])?;
+            controller.set_reals(&controller_in, &[i_a, i_b, i_c, at(experiment.speed_ref, t) * RPM])?;
             let _ = plant.do_step(t, h)?;
             let _ = controller.do_step(t, h)?;
             k += 1;
         }
         plant.terminate()?;
         controller.terminate()?;
-        Ok(trace)
+        Ok(record)
     }
 }

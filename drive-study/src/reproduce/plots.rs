@@ -1,8 +1,8 @@
 //! The paper's Fig. 4 and Fig. 5 in its own layout.
 
-use super::scenario::Trace;
-use crate::figure::{Curve, Figure, Panel};
-use crate::ink::{CURVES, Ink, REFERENCE};
+use super::experiment::Record;
+use fmu_plot::figure::{Curve, Figure, Panel};
+use fmu_plot::ink::{CURVES, Ink, REFERENCE};
 
 const TRUE: Ink = CURVES[1];
 const ESTIMATED: Ink = CURVES[0];
@@ -10,10 +10,10 @@ const ESTIMATED: Ink = CURVES[0];
 /// Name, color and values of a curve.
 type Row<'a> = (&'static str, Ink, &'a [f64]);
 
-fn panel<const N: usize>(title: &str, unit: &str, trace: &Trace, window: (f64, f64), rows: [Row<'_>; N]) -> Panel {
-    let from = trace.t.partition_point(|x| *x < window.0);
-    let to = trace.t.partition_point(|x| *x <= window.1);
-    let x = trace.t[from..to].into();
+fn panel<const N: usize>(title: &str, unit: &str, record: &Record, window: (f64, f64), rows: [Row<'_>; N]) -> Panel {
+    let from = record.t.partition_point(|x| *x < window.0);
+    let to = record.t.partition_point(|x| *x <= window.1);
+    let x = record.t[from..to].into();
     let curve = |(name, ink, values): Row<'_>| Curve {
         dashed: ink == REFERENCE,
         ..Curve::new(name, ink, &x, values[from..to].to_vec())
@@ -22,21 +22,21 @@ fn panel<const N: usize>(title: &str, unit: &str, trace: &Trace, window: (f64, f
     Panel { title: title.into(), unit: unit.into(), window, curves, ..Panel::default() }
 }
 
-fn speed(title: &str, trace: &Trace, window: (f64, f64)) -> Panel {
+fn speed(title: &str, record: &Record, window: (f64, f64)) -> Panel {
     let rows = [
-        ("reference", REFERENCE, &trace.speed_ref[..]),
-        ("true", TRUE, &trace.speed),
-        ("estimated", ESTIMATED, &trace.speed_est),
+        ("reference", REFERENCE, &record.speed_ref[..]),
+        ("true", TRUE, &record.speed),
+        ("estimated", ESTIMATED, &record.speed_est),
     ];
-    panel(title, "rpm", trace, window, rows)
+    panel(title, "rpm", record, window, rows)
 }
 
-fn currents(title: &str, trace: &Trace, window: (f64, f64)) -> Panel {
-    panel(title, "A", trace, window, [("i_sd", CURVES[0], &trace.i_d[..]), ("i_sq", CURVES[1], &trace.i_q)])
+fn currents(title: &str, record: &Record, window: (f64, f64)) -> Panel {
+    panel(title, "A", record, window, [("i_sd", CURVES[0], &record.i_d[..]), ("i_sq", CURVES[1], &record.i_q)])
 }
 
-fn error(title: &str, trace: &Trace, window: (f64, f64)) -> Panel {
-    panel(title, "deg", trace, window, [("error", CURVES[0], &trace.error[..])])
+fn error(title: &str, record: &Record, window: (f64, f64)) -> Panel {
+    panel(title, "deg", record, window, [("error", CURVES[0], &record.error[..])])
 }
 
 /// Panels in rows of two.
@@ -45,7 +45,7 @@ fn figure<const N: usize>(title: &str, panels: [Panel; N]) -> Figure {
 }
 
 /// Fig. 4: start from 180 deg (speed, angle) and the four speed steps.
-pub fn figure_4(start: &Trace, steps: [&Trace; 4]) -> Figure {
+pub fn figure_4(start: &Record, steps: [&Record; 4]) -> Figure {
     let angles = [("true", TRUE, &start.theta_e[..]), ("estimated", ESTIMATED, &start.theta_est)];
     figure(
         "Fig. 4: start-up and speed steps",
@@ -61,7 +61,7 @@ pub fn figure_4(start: &Trace, steps: [&Trace; 4]) -> Figure {
 }
 
 /// Section 3.2: the second start after a return to zero speed.
-pub(super) fn second_start(start: &Trace) -> Figure {
+pub(super) fn second_start(start: &Record) -> Figure {
     figure(
         "Section 3.2: the second start",
         [
@@ -72,7 +72,7 @@ pub(super) fn second_start(start: &Trace) -> Figure {
 }
 
 /// Fig. 5: load steps at 0 rpm (left) and 1000 rpm (right).
-pub fn figure_5(at_0: &Trace, at_1000: &Trace) -> Figure {
+pub fn figure_5(at_0: &Record, at_1000: &Record) -> Figure {
     let (left, right) = ((0.3, 2.5), (0.8, 2.0));
     figure(
         "Fig. 5: load steps",

@@ -1,18 +1,19 @@
 //! The output of `reproduce`: the table on the terminal, CSV, plots and `report.html`.
 
-use super::figures::Figure;
-use super::scenario::{Scenario, Trace};
-use crate::figure::Figure as FigureOfPaper;
-use crate::page::{self, escape};
+use super::experiment::{Experiment, Record};
+use super::figures::PaperFigure;
+use crate::output;
 use anyhow::Result;
+use fmu_plot::figure::Figure;
+use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
 
 /// The figures of both standards side by side.
 pub(super) struct Table {
     /// Measured through the FMI 2.0 archives, by experiment.
-    pub(super) fmi2: Vec<Vec<Figure>>,
+    pub(super) fmi2: Vec<Vec<PaperFigure>>,
     /// Measured through the FMI 3.0 archives, by experiment.
-    pub(super) fmi3: Vec<Vec<Figure>>,
+    pub(super) fmi3: Vec<Vec<PaperFigure>>,
 }
 
 const HEADINGS: [&str; 6] = ["Fig.", "quantity", "expected", "FMI 2.0", "FMI 3.0", "verdict"];
@@ -20,13 +21,13 @@ const HEADINGS: [&str; 6] = ["Fig.", "quantity", "expected", "FMI 2.0", "FMI 3.0
 impl Table {
     /// Whether every figure is as expected.
     pub(super) fn holds(&self) -> bool {
-        self.fmi2.iter().chain(&self.fmi3).flatten().all(Figure::holds)
+        self.fmi2.iter().chain(&self.fmi3).flatten().all(PaperFigure::holds)
     }
 
-    fn rows(&self) -> impl Iterator<Item = [String; 6]> {
+    fn rows(&self) -> impl Iterator<Item = Vec<String>> {
         self.fmi2.iter().flatten().zip(self.fmi3.iter().flatten()).map(|(a, b)| {
             let verdict = if a.holds() && b.holds() { "ok" } else { "OFF" };
-            [
+            vec![
                 a.figure.into(),
                 a.quantity.into(),
                 format!("{} {}", a.expected, a.unit),
@@ -39,43 +40,28 @@ impl Table {
 
     /// The table in plain text (Markdown).
     pub(super) fn text(&self) -> String {
-        let mut rows = vec![HEADINGS.map(String::from)];
-        rows.extend(self.rows());
-        let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
-        let widths: [usize; 6] = std::array::from_fn(width);
-        let mut text = String::new();
-        for (k, row) in rows.iter().enumerate() {
-            for (cell, width) in row.iter().zip(widths) {
-                let _ = write!(text, "| {cell}{} ", " ".repeat(width - cell.chars().count()));
-            }
-            text.push_str("|\n");
-            if k == 0 {
-                for width in widths {
-                    let _ = write!(text, "|{}", "-".repeat(width + 2));
-                }
-                text.push_str("|\n");
-            }
-        }
-        text
+        let heads = HEADINGS.map(String::from).to_vec();
+        output::markdown(&std::iter::once(heads).chain(self.rows()).collect::<Vec<_>>())
     }
 
     /// The figures of one experiment: a column for each quantity.
     fn html(&self, experiment: usize) -> String {
         let (fmi2, fmi3) = (&self.fmi2[experiment], &self.fmi3[experiment]);
-        let row = |tag: &str, head: &str, cell: &dyn Fn(&Figure) -> String, figures: &[Figure]| {
+        let row = |tag: &str, head: &str, cell: &dyn Fn(&PaperFigure) -> String, figures: &[PaperFigure]| {
             let cells: String = figures.iter().map(cell).collect();
             format!("<tr><{tag} class=\"name\">{head}</{tag}>{cells}</tr>\n")
         };
-        let heading = |f: &Figure| {
-            let Figure { figure, quantity, unit, .. } = f;
+        let heading = |f: &PaperFigure| {
+            let PaperFigure { figure, quantity, unit, .. } = f;
             format!(
                 "<th class=\"number\">{}<br><small>Fig. {figure}</small><br><small>{unit}</small></th>",
                 escape(quantity)
             )
         };
-        let expected =
-            |f: &Figure| format!("<td class=\"number\">{}</td>", escape(&f.expected.to_string()).replace('-', "−"));
-        let measured = |f: &Figure| {
+        let expected = |f: &PaperFigure| {
+            format!("<td class=\"number\">{}</td>", escape(&f.expected.to_string()).replace('-', "−"))
+        };
+        let measured = |f: &PaperFigure| {
             let (class, mark) = if f.holds() { ("in", "✓") } else { ("out", "✗") };
             format!("<td class=\"number {class}\">{} {mark}</td>", number(f.measured).replace('-', "−"))
         };
@@ -100,12 +86,12 @@ fn number(x: f64) -> String {
     format!("{x:.decimals$}")
 }
 
-/// A trace as CSV with a heading line; doubles in the shortest form that reads back exactly.
-pub(super) fn csv(trace: &Trace) -> String {
-    let columns = trace.columns();
+/// A record as CSV with a heading line; doubles in the shortest form that reads back exactly.
+pub(super) fn csv(record: &Record) -> String {
+    let columns = record.columns();
     let mut text = columns.map(|(name, _)| format!("\"{name}\"")).join(",");
     text.push('\n');
-    for k in 0..trace.t.len() {
+    for k in 0..record.t.len() {
         for (c, (_, values)) in columns.iter().enumerate() {
             let comma = if c == 0 { "" } else { "," };
             let _ = write!(text, "{comma}{}", values[k]);
@@ -126,8 +112,8 @@ pub(super) fn verdict(holds: bool, identical: bool) -> String {
 pub(super) fn html(
     table: &Table,
     identical: bool,
-    plots: &[(&str, FigureOfPaper)],
-    scenarios: &[Scenario],
+    plots: &[(&str, Figure)],
+    experiments: &[Experiment],
 ) -> Result<String> {
     let class = if table.holds() && identical { "" } else { " off" };
     let mut html = format!(
@@ -139,7 +125,7 @@ pub(super) fn html(
          <a href=\"table.md\">table.md</a>.</p>\n",
         verdict(table.holds(), identical)
     );
-    for (k, s) in scenarios.iter().enumerate() {
+    for (k, s) in experiments.iter().enumerate() {
         let csv = format!("<a href=\"{0}.csv\">{0}.csv</a>", s.id);
         let (figure, title, duration) = (s.figure, escape(s.title), s.duration);
         let _ = write!(html, "<h2>Fig. {figure}: {title}, {duration} s <small>{csv}</small></h2>\n{}", table.html(k));
@@ -155,10 +141,10 @@ pub(super) fn html(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::{Curve, Panel};
-    use crate::ink::REFERENCE;
-    use crate::reproduce::figures::Expected;
-    use crate::reproduce::scenario::REST;
+    use crate::expected::Expected;
+    use crate::reproduce::experiment::REST;
+    use fmu_plot::figure::{Curve, Panel};
+    use fmu_plot::ink::REFERENCE;
 
     #[test]
     fn numbers_have_four_digits() {
@@ -170,7 +156,7 @@ mod tests {
 
     #[test]
     fn one_figure_off_is_enough() {
-        let figure = |measured| Figure {
+        let figure = |measured| PaperFigure {
             figure: "5a",
             quantity: "dip",
             unit: "rpm",
@@ -181,8 +167,8 @@ mod tests {
         assert!(!table.holds() && table.text().contains("OFF"));
         let curve = Curve::through("speed", REFERENCE, [(0.0, 1.0), (1.0, 2.0)].into_iter());
         let panels = vec![Panel { window: (0.0, 1.0), curves: vec![curve], ..Panel::default() }];
-        let plot = FigureOfPaper { title: "Fig. 4".into(), x: "time in s", columns: 1, panels };
-        let page = html(&table, true, &[("f.svg", plot)], &[Scenario { id: "dip", ..REST }]).unwrap();
+        let plot = Figure { title: "Fig. 4".into(), x: "time in s", columns: 1, panels };
+        let page = html(&table, true, &[("f.svg", plot)], &[Experiment { id: "dip", ..REST }]).unwrap();
         let parts = [
             "in\">1.050 ✓</td>",
             "out\">1.200 ✗</td>",

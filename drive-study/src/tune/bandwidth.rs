@@ -1,38 +1,39 @@
 //! The sample period and the bandwidths of the loops: as given in the machine's file, or by these rules.
 //!
 //! - T_s: the longest of 100, 50, 25 and 12.5 us that gives at least 12 samples per electrical period at the highest speed. A
-//!   voltage that is held for a sample turns by 30 deg there against the rotor, so that 1.1 % of it is lost, and the command,
-//!   which acts 1.5 samples later on the average, is turned ahead by 45 deg. The poles of the EMF observer get as many.
+//!   voltage that is held for a sample turns by 30 deg there against the rotor, which loses 1.1 % of it, and the command,
+//!   which acts 1.5 samples later on average, is turned ahead by 45 deg. The poles of the EMF observer get as many samples.
 //! - Observer: the acceleration alpha (electrical) that it must follow leaves an angle error of alpha / w_n^2 = 0.35 rad at
 //!   most. Rasmussen's observer: that of the maximum current, and 300 rad/s at least; the tracker of the extended EMF: that
 //!   of 1.6 times the rated torque, the limit, and 2 pi 20 rad/s at least.
-//! - Speed: a step of the torque T makes the loop dip by 2/e T / (J w_s), a double pole at w_s / 2. It is to be at most 0.05
-//!   pu; at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up to a limit;
+//! - Speed: a step of the torque T makes the loop dip by 2/e T / (J w_s), a double pole at w_s / 2. The dip should be at most
+//!   0.05 pu; w_s is at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up to a limit;
 //!   with the extended EMF, less where the gain through the change of i_q would be high ([`limits`](super::limits)).
 //! - Current: 2 pi 250 rad/s (Rasmussen); 2 pi 200 rad/s with the I-f start, and 2/3 of the stable limit at most.
 
 use super::extended_emf::{EMF_PER_TRACKER, GREATEST_GAIN, GREATEST_TORQUE, gain_per_bandwidth};
-use super::flux_observer::least_observer;
 use super::motor::{Data, Number};
+use super::rasmussen::least_observer;
 use super::rules::{Setting, Value};
+use drive::estimator::Kind;
 use std::f64::consts::{E, TAU};
 
-/// Samples per electrical period at the highest speed that the rules take.
+/// Least number of samples per electrical period at the highest speed.
 const SAMPLES: f64 = 12.0;
 
 /// Sample periods in s to choose from.
 const PERIODS: [f64; 4] = [1e-4, 5e-5, 2.5e-5, 1.25e-5];
 
-/// Dip of the speed in pu under a step of the rated torque that the rules aim at.
+/// Target of the rules: dip of the speed in pu under a step of the rated torque.
 const DIP: f64 = 0.05;
 
-/// Gain of the speed loop through the EMF that a change of i_q makes, see [`limits`](super::limits): what the rules take.
+/// Gain of the speed loop through the EMF that a change of i_q makes, see [`limits`](super::limits): the limit of the rules.
 const CALM: f64 = 0.6 * GREATEST_GAIN;
 
-/// A value and where it comes from.
+/// A value and its origin.
 #[derive(Clone, Debug)]
 pub struct Chosen {
-    /// In rad/s or s.
+    /// The value in rad/s or s.
     pub value: f64,
     rule: String,
     /// Offset in the machine's file, where given.
@@ -47,7 +48,7 @@ impl Chosen {
         )
     }
 
-    /// As the value of a variable.
+    /// The setting of the variable `name`.
     pub fn setting(&self, name: &'static str) -> Setting {
         Setting { name, value: Value::Real(self.value), rule: self.rule.clone(), origin: self.origin }
     }
@@ -67,21 +68,22 @@ pub struct Bandwidths {
 }
 
 impl Bandwidths {
-    /// As given, or by the rules for the estimator.
-    pub fn of(data: &Data, flux_observer: bool) -> Self {
+    /// The given ones, or those of the rules for this estimator, Rasmussen's or the extended EMF.
+    pub fn of(data: &Data, estimator: Kind) -> Self {
+        let rasmussen = estimator == Kind::Rasmussen;
         let (given, machine) = (&data.bandwidth, &data.machine);
         let n_p = f64::from(*machine.n_p.get_ref());
         let needed = DIP_OF_A_STEP * acceleration(data) / (DIP * data.rating.speed.get_ref());
-        let wanted = needed.max(if flux_observer { 40.0 } else { TAU * 5.0 });
+        let wanted = needed.max(if rasmussen { 40.0 } else { TAU * 5.0 });
         let tracker = || {
             Chosen::new(given.observer.as_ref(), "follows the greatest torque, at least 2 pi 20 rad/s", || {
                 let least = 1.1 * (n_p * GREATEST_TORQUE * acceleration(data) / 0.35).sqrt();
-                // With a third of rho as w_s, the gain has this at most.
+                // With w_s = rho / 3, this bounds the gain.
                 let calm = (3.0 * CALM / gain_per_bandwidth(data, 1.0)).cbrt();
                 least.max(TAU * 20.0).max((3.0 * wanted).min(TAU * 40.0).min(calm))
             })
         };
-        let tracker = (!flux_observer).then(tracker);
+        let tracker = (!rasmussen).then(tracker);
         let fastest = tracker.as_ref().map_or(0.0, |rho| EMF_PER_TRACKER * rho.value).max(n_p * data.rating.top());
         let rule = "12 samples or more per electrical period and per period of the EMF observer";
         let T_s = Chosen::new(data.control.T_s.as_ref(), rule, || {
@@ -92,10 +94,10 @@ impl Bandwidths {
                 (1.05 * least_observer(data)).max(300.0).max((3.0 * wanted).min(600.0 * PERIODS[0] / T_s.value))
             })
         });
-        let calm = if flux_observer { f64::INFINITY } else { CALM / gain_per_bandwidth(data, observer.value) };
+        let calm = if rasmussen { f64::INFINITY } else { CALM / gain_per_bandwidth(data, observer.value) };
         let rule = "dips by 0.05 pu under a step of the rated torque; at most a third of the observer";
         let speed = Chosen::new(given.speed.as_ref(), rule, || wanted.min(observer.value / 3.0).min(calm));
-        let current = if flux_observer {
+        let current = if rasmussen {
             Chosen::new(given.current.as_ref(), "250 Hz", || TAU * 250.0)
         } else {
             Chosen::new(given.current.as_ref(), "200 Hz, 2/3 of the stable limit at most", || {

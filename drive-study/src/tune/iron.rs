@@ -1,9 +1,9 @@
-//! Iron loss from a drag test: the machine, without current, is driven at some speeds, and the power that this takes is
-//! measured; friction, measured with an unmagnetized rotor or estimated, is taken off.
+//! Iron loss from a drag test: a motor drives the machine, which has no current, at some speeds. The measured power less friction,
+//! which is measured with an unmagnetized rotor or estimated, is the iron loss.
 //!
 //! Without current, the flux linkage is psi_M, and the plant loses p = 1.5 psi_M^2 G(w) w^2 with G(w) = G_e + G_h /
-//! sqrt(w^2 + w_0^2). So p / (1.5 psi_M^2) is linear in G_e and G_h: linear least squares. A coefficient that would come
-//! out negative is 0, and the other one fits alone.
+//! sqrt(w^2 + w_0^2). So p / (1.5 psi_M^2) is linear in G_e and G_h: linear least squares. If a coefficient
+//! came out negative, it is 0, and the other one is fitted alone.
 
 use super::motor::MotorFile;
 use super::rules::{Setting, Value};
@@ -31,7 +31,7 @@ pub fn fit(motor: &MotorFile) -> Result<Vec<Setting>> {
     let fastest = points.iter().fold(0.0_f64, |most, [speed, _]| most.max(*speed));
     if fastest <= 1.05 * slowest {
         bail!(
-            "{place}: eddy currents and hysteresis are told apart by speed: give pairs at two speeds at least, best 1 to 3"
+            "{place}: eddy currents and hysteresis differ by their dependence on speed: give pairs at two speeds at least, best 1 to 3"
         );
     }
     let w_0 = Iron::default().w_0;
@@ -88,14 +88,14 @@ mod tests {
 
     #[test]
     fn points_that_say_nothing_are_refused() {
-        for (points, told) in [
+        for (points, message) in [
             ("[[100.0, 5.0]]", "give pairs at two speeds at least"),
             ("[[100.0, 5.0], [100.0, 5.1]]", "give pairs at two speeds at least"),
             ("[[100.0, -5.0], [200.0, 9.0]]", "[100, -5] must be a speed in rad/s greater than 0"),
             ("[[0.0, 0.0], [200.0, 9.0]]", "[0, 0] must be"),
         ] {
             let error = fitted(points).unwrap_err().to_string();
-            assert!(error.contains(told) && error.starts_with("m.toml:"), "{error}");
+            assert!(error.contains(message) && error.starts_with("m.toml:"), "{error}");
         }
     }
 }

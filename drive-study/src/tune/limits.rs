@@ -1,34 +1,33 @@
-//! What the tuned drive will not do, told beforehand: what its [`trial`](super::trial) showed, why, and what helps
-//! ([`remedy`]).
+//! Predicts what the tuned drive cannot do: what its [`trial`](super::trial) showed, why, and what helps ([`remedy`]).
 //!
-//! - **Load.** A step of the torque T makes the speed loop (double pole at w_s / 2) dip by 2/e T / (J w_s). An estimator that
-//!   lives on the EMF loses the rotor near zero speed; a flux observer may pass it. There, R^ below R turns the estimate by
+//! - **Load.** A step of the torque T makes the speed loop (double pole at w_s / 2) dip by 2/e T / (J w_s). An EMF-based
+//!   estimator loses the rotor near zero speed; a flux observer may pass it. There, R^ below R turns the estimate by
 //!   c_1 (R - R^) i / (w^2 psi_M), to first order.
 //! - **Start, flux observer.** At rest, R^ below R drives the estimate away at (R - R^) i_0 / psi_M, and the rotor follows with
-//!   w_0 = sqrt(n_p K i_0 / J): the former must be less than the latter. The rules choose R^ for that; below 2 % nobody knows
-//!   R. From the opposite angle, the speed loop turns i_q to its limit before the rotor has come round: at atan(i_q / i_d)
-//!   beside the rotor, that is no torque, and where R - R^ is small the estimate stays.
+//!   w_0 = sqrt(n_p K i_0 / J): the drift must be slower. The rules choose R^ for that; a margin below 2 % is less than the
+//!   uncertainty of R. From the opposite angle, the speed loop turns i_q to its limit before the rotor has come round: at atan(i_q / i_d)
+//!   beside the rotor, the currents give no torque, and where R - R^ is small the estimate stays.
 //! - **Start, extended EMF.** A change of i_q acts on the estimated speed through (L_q - L_d) p i_q against the EMF; closed by
-//!   the speed loop, the gain is J w_s (L_q - L_d) rho^2 / (K n_p w psi_M). Above 40 at 0.1 pu, the drive does not come to
-//!   rest there after the hand-over.
+//!   the speed loop, the gain is J w_s (L_q - L_d) rho^2 / (K n_p w psi_M). Above 40 at 0.1 pu, the speed does not
+//!   settle there after the hand-over.
 
 use super::bandwidth::DIP_OF_A_STEP;
 use super::extended_emf::{GREATEST_GAIN, gain_per_bandwidth};
-use super::flux_observer::{LEAST_MARGIN, resistance_margin};
 use super::motor::{Data, MotorFile, Number};
+use super::rasmussen::{LEAST_MARGIN, resistance_margin};
 use super::remedy::{self, Cure};
 use super::rules::{Tuned, torque_constant};
 use super::trial::Trial;
 use drive::control::tables::ControllerParameters;
-use drive::estimator::Class;
+use drive::estimator::Kind;
 use std::fmt;
 
-/// What a limit is about.
+/// What a drive does not hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
-    /// To start from any angle.
+    /// The start from any angle.
     Start,
-    /// To take the load as a step.
+    /// The load as a step.
     Load,
 }
 
@@ -41,16 +40,16 @@ impl fmt::Display for What {
     }
 }
 
-/// Something that the drive will not hold.
+/// A start or a load that the drive will not hold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limit {
-    /// What it will not hold.
+    /// What the drive will not hold.
     pub what: What,
     /// At which speed in pu.
     pub level: f64,
     /// Why.
     pub reason: String,
-    /// What helps: each was tried.
+    /// Remedies; each was tried.
     pub cures: Vec<Cure>,
 }
 
@@ -72,7 +71,7 @@ fn short(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }
 
-/// What the drive does not hold by its `trials`, and what it holds by a narrow margin.
+/// What the drive does not hold in its `trials`, and notes on what it holds by a narrow margin.
 pub fn of(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> (Vec<Limit>, Vec<String>) {
     let (mut limits, mut notes) = (Vec::new(), Vec::new());
     let pair = tuned.pair();
@@ -121,7 +120,7 @@ fn of_load(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
         );
     }
     let by_speed = format!("{} takes 2/e T / (J w_s) = {dip:.3} of the {speed:.3} rad/s", step(trial));
-    if par.estimator.class() != Class::FluxObserver {
+    if par.estimator != Kind::Rasmussen {
         return by_speed;
     }
     let (psi_M, w) = (data.machine.psi_M.get_ref(), f64::from(par.motor.n_p) * speed);
@@ -135,7 +134,7 @@ fn of_load(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
 
 fn of_start(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
     let from = format!("from {} of {} angles, ", trial.angles - trial.started, trial.angles);
-    if par.estimator.class() == Class::FluxObserver {
+    if par.estimator == Kind::Rasmussen {
         let margin = resistance_margin(data);
         if margin < LEAST_MARGIN {
             return format!(

@@ -1,22 +1,22 @@
 //! From a machine and bandwidths to parameter values of the FMUs.
 //!
-//! - [`motor`]: the TOML file of a machine; [`plausible`]: whether its values are those of a machine; [`rules`]: how values
-//!   follow from it; [`bandwidth`]: the loops; [`flux_observer`] and [`extended_emf`]: the estimators; [`iron`]: iron loss from a drag test; [`check`](mod@check): whether the models
-//!   have such variables; [`voltage`]: what the DC link allows; [`Tuned::pair`](rules::Tuned::pair): the drive with these values,
-//!   natively.
-//! - [`trial`]: the drive tried from many start angles, timed by its own time constants ([`pace`]); [`limits`]: what it will not
-//!   hold, and why; [`remedy`]: what helps.
+//! - [`motor`]: the TOML file of a machine. [`plausible`] checks its values, [`saturation`] its saturation.
+//! - [`rules`]: how values follow from the file: [`bandwidth`] for the loops, [`rasmussen`] and [`extended_emf`] for the
+//!   estimators, [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag test. [`check`](mod@check)
+//!   compares them with the variables of the models; [`Tuned::pair`](rules::Tuned::pair) is the native drive with these values.
+//! - [`trial`]: tries the drive from many start angles, timed by its own time constants ([`pace`]). [`limits`]: what it will not
+//!   hold, and why. [`remedy`]: what helps.
 
 pub mod bandwidth;
 pub mod check;
 pub mod extended_emf;
-pub mod flux_observer;
 pub mod iron;
 pub mod limits;
 pub mod motor;
 mod native;
 pub mod pace;
 pub mod plausible;
+pub mod rasmussen;
 pub mod remedy;
 pub mod rules;
 pub mod saturation;
@@ -48,7 +48,7 @@ pub fn needed(tuned: &Tuned, integers: bool) -> Result<(Vec<Setting>, Vec<Settin
     Ok((of_model::<PmsmPlant>(&tuned.plant, integers)?, of_model::<SensorlessController>(&tuned.controller, integers)?))
 }
 
-/// The settings of `PmsmDrive`, as [`needed`] for the two: the parameters of plant and controller with the prefixes `plant.` and
+/// The settings of `PmsmDrive`: those that [`needed`] gives for plant and controller, with the prefixes `plant.` and
 /// `controller.`, and `u_dc` once.
 ///
 /// # Errors

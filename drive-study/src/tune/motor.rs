@@ -11,7 +11,7 @@ pub type Number = Spanned<f64>;
 /// A machine's file, read.
 #[derive(Clone, Debug)]
 pub struct MotorFile {
-    /// Its content.
+    /// Content of the file.
     pub data: Data,
     path: PathBuf,
     text: String,
@@ -31,7 +31,7 @@ pub struct Data {
     pub mechanics: Mechanics,
     /// Ratings.
     pub rating: Rating,
-    /// What feeds the inverter.
+    /// Supply of the inverter.
     pub dc_link: DcLink,
     /// Bandwidths of the loops; by the rules where omitted.
     #[serde(default)]
@@ -98,7 +98,7 @@ impl Rating {
     }
 }
 
-/// What feeds the inverter.
+/// Supply of the inverter.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DcLink {

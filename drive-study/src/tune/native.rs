@@ -16,7 +16,7 @@ impl Tuned {
         pair
     }
 
-    /// A real value of the controller.
+    /// A real value of the controller, if it is set.
     pub fn real(&self, name: &str) -> Option<f64> {
         self.controller.iter().find(|setting| setting.name == name).and_then(|setting| match setting.value {
             Value::Real(x) => Some(x),
@@ -24,7 +24,7 @@ impl Tuned {
         })
     }
 
-    /// The drive with another value of the controller.
+    /// These values with another value of the controller.
     pub fn with(&self, name: &'static str, value: Value) -> Self {
         let mut other = self.clone();
         other.controller.retain(|setting| setting.name != name);

@@ -1,40 +1,40 @@
-//! How long the tuned drive takes: the time constants of its modes at a speed, by which a trial is timed.
+//! The time constants of the tuned drive at a speed. They time a trial.
 //!
 //! - **Speed loop.** s^2 + w_s s + w_s^2 / t_is = 0; with t_is = 4, a double pole at w_s / 2.
 //! - **Observer.** Rasmussen's flux poles at the electrical speed w: s^2 + c_1 s + w^2 = 0, so 2 / c_1 above w = c_1 / 2 and about
 //!   c_1 / w^2 below, where the back EMF says little; its speed adaptation: a double pole at w_n. The tracker of the extended
 //!   EMF: a double pole at rho.
-//! - **Mechanics.** J w / T, the time in which the rated torque brings the rotor to its speed. Under a load tau_L, which moves it
-//!   by the rated speed in either direction where the drive is lost, J w / T with the rated speed; and the dip 2/e tau_L / (J w_s)
-//!   is made good by what the load leaves of the greatest torque: in 2/e tau_L / (w_s (tau_max - tau_L)).
+//! - **Mechanics.** J w / T, the time in which the rated torque brings the rotor to its speed. A load tau_L moves the rotor of
+//!   a lost drive by the rated speed in either direction: J w / T with the rated speed. The torque that the load leaves makes up
+//!   for the dip 2/e tau_L / (J w_s) in 2/e tau_L / (w_s (tau_max - tau_L)).
 
 use super::bandwidth::DIP_OF_A_STEP;
 use super::rules::Tuned;
 use drive::Pair;
 use drive::control::start::StartMode;
-use drive::estimator::Class;
+use drive::estimator::Kind;
 
-/// Least share of a load that the greatest torque is taken to leave.
+/// Least torque that a load leaves, as a share of the load: an assumption where it leaves less.
 const LEAST_SPARE: f64 = 0.02;
 
 /// Time constants in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pace {
-    /// Of the mechanics.
+    /// Time constant of the mechanics.
     pub mechanics: f64,
-    /// Of the observer or tracker.
+    /// Time constant of the observer or tracker.
     pub observer: f64,
-    /// Of the speed loop.
+    /// Time constant of the speed loop.
     pub speed: f64,
 }
 
 impl Pace {
-    /// Of the tuned drive at `level` (pu of the rated speed), where `load` (N.m) comes.
+    /// The time constants at `level` (pu of the rated speed) under `load` (N.m).
     pub fn of(tuned: &Tuned, pair: &Pair, level: f64, load: f64) -> Self {
         let par = &pair.controller.model.parameters;
         let (speed_loop, estimators) = (&par.speed_loop, &par.estimators);
         let w = f64::from(par.motor.n_p) * level * tuned.speed;
-        let observer = if par.estimator.class() == Class::FluxObserver {
+        let observer = if par.estimator == Kind::Rasmussen {
             let rasmussen = &estimators.rasmussen;
             slowest(rasmussen.c_1, w * w).max(1.0 / rasmussen.w_n)
         } else {

@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn another_unit_is_named() {
-        for (from, to, told) in [
+        for (from, to, message) in [
             (
                 "L_d = 36e-3",
                 "L_d = 36.0",
@@ -178,7 +178,7 @@ mod tests {
             ),
         ] {
             let error = refused(from, to);
-            assert!(error.contains(told) && error.lines().count() == 1, "{error}");
+            assert!(error.contains(message) && error.lines().count() == 1, "{error}");
         }
     }
 }

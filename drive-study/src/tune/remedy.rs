@@ -1,4 +1,4 @@
-//! What helps a drive that does not start or does not hold its load: each remedy is tried before it is told.
+//! Remedies for a drive that does not start or does not hold its load. Each is tried before it is named.
 
 use super::limits::What;
 use super::motor::MotorFile;
@@ -8,28 +8,28 @@ use super::trial::{self, Task, Trial};
 use std::fmt;
 use toml::Spanned;
 
-/// Start angles that sort out what does not help.
+/// Number of start angles of the first try, which sorts out most remedies that do not help.
 const FEW: u32 = 4;
 
-/// A change that helps.
+/// A remedy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cure {
     /// The load rises in this time in s.
     Rise(f64),
     /// A load step of this torque in N.m instead.
     Torque(f64),
-    /// Bandwidths of speed loop and observer in rad/s.
+    /// Other bandwidths in rad/s.
     Bandwidths {
-        /// Of the speed loop.
+        /// Bandwidth of the speed loop.
         speed: f64,
-        /// Of observer or tracker.
+        /// Bandwidth of observer or tracker.
         observer: f64,
     },
-    /// Inertia in kg.m2: more with the load's, or less.
+    /// Another inertia.
     Inertia {
-        /// In kg.m2.
+        /// Inertia in kg.m2.
         J: f64,
-        /// It is more than in the file.
+        /// Whether it is more than in the file: with the inertia of the load.
         more: bool,
     },
     /// Greatest change of the speed reference in rad/s2.
@@ -84,8 +84,8 @@ impl Cure {
     }
 }
 
-/// Which remedies help where `trial` showed that the drive does not start or does not hold; the shortest rise, the least change
-/// of each kind. What the drive did in `trials` it still does with them.
+/// The remedies that help where `trial` showed that the drive does not start or does not hold: the shortest rise, the least change
+/// of each kind. With them, the drive still holds everything that it held in `trials`.
 pub fn found(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], trial: &Trial, what: What) -> Vec<Cure> {
     let speed = tuned.real("speed_loop.bandwidth").unwrap_or_default();
     let observer = tuned.real("rasmussen.w_n").or_else(|| tuned.real("tracker.bandwidth")).unwrap_or_default();
@@ -118,7 +118,7 @@ pub fn found(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], trial: &Trial, 
     cures
 }
 
-/// Whether the drive does `what` with the change, and still does what it did.
+/// Whether the drive holds `what` with the change, and still holds what it held.
 fn helps(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], (trial, what): (&Trial, What), cure: &Cure) -> bool {
     let Some((cured, task)) = cure.applied(motor, tuned, &trial.task) else { return false };
     let does = |angles| {

@@ -1,6 +1,6 @@
 //! The rules that derive parameter values from machine data and bandwidths.
 //!
-//! The rules choose Rasmussen's observer ([`flux_observer`]), which holds standstill, for a machine without saliency (L_q
+//! The rules choose Rasmussen's observer ([`rasmussen`]), which holds standstill, for a machine without saliency (L_q
 //! within a tenth of L_d), and the extended EMF with an I-f start ([`extended_emf`]) for a salient one. T_s and the bandwidths:
 //! [`bandwidth`](super::bandwidth); field weakening: [`voltage`].
 //!
@@ -17,22 +17,23 @@ use super::check::check;
 use super::iron;
 use super::motor::{Data, MotorFile, Number};
 use super::voltage::{self, Voltage};
-use super::{extended_emf, flux_observer, plausible, saturation};
+use super::{extended_emf, plausible, rasmussen, saturation};
 use anyhow::{Result, anyhow, bail};
 use drive::control::tables::ControllerParameters;
+use drive::estimator::Kind;
 use drive::motor::Motor;
 use std::f64::consts::TAU;
 
 /// A value for a variable.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Of a real variable.
+    /// Value of a real variable.
     Real(f64),
-    /// Of an integer.
+    /// Value of an integer.
     Integer(i32),
-    /// Of a Boolean.
+    /// Value of a Boolean.
     Boolean(bool),
-    /// Of an enumeration: the name of an item.
+    /// Value of an enumeration: the name of an item.
     Item(String),
 }
 
@@ -95,8 +96,8 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     let mut plant = plant(data);
     let estimator = estimator(motor)?;
     let mut notes = Vec::new();
-    let bandwidths = Bandwidths::of(data, estimator == "Rasmussen");
-    let mut controller = common(data, &bandwidths, &estimator);
+    let bandwidths = Bandwidths::of(data, estimator);
+    let mut controller = common(data, &bandwidths, estimator);
     // Check the given values before computing anything from them.
     check(&plant, &controller, motor)?;
     ratings(motor)?;
@@ -104,18 +105,18 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     saturation::check(motor)?;
     fits(motor, &bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
-    let observes_flux = estimator == "Rasmussen";
-    if observes_flux {
-        controller.extend(flux_observer::settings(motor, &bandwidths, &mut notes)?);
+    let rasmussen = estimator == Kind::Rasmussen;
+    if rasmussen {
+        controller.extend(rasmussen::settings(motor, &bandwidths, &mut notes)?);
     } else {
         controller.extend(extended_emf::settings(data, &bandwidths, &mut notes));
     }
-    let Voltage { settings, top_torque } = voltage::of(motor, !observes_flux, &mut notes)?;
+    let Voltage { settings, top_torque } = voltage::of(motor, !rasmussen, &mut notes)?;
     controller.extend(settings);
     cap_current_loop(data, &bandwidths, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
-    // Five periods of the swing that the observer damps, over 2 pi.
-    let rest = if observes_flux { (5.0 / swing(data, flux_observer::zero_speed_current(data))).max(REST) } else { 0.0 };
+    // 5 / w_0: five periods of the swing, which the observer damps, over 2 pi.
+    let rest = if rasmussen { (5.0 / swing(data, rasmussen::zero_speed_current(data))).max(REST) } else { 0.0 };
     if rest > REST {
         notes.push(format!(
             "keep speed_ref at 0 for the first {rest:.2} s: the rotor turns to the current that holds standstill"
@@ -141,20 +142,17 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
 /// Time in s at rest that every drive needs before the first speed reference.
 const REST: f64 = 0.2;
 
-fn estimator(motor: &MotorFile) -> Result<String> {
+fn estimator(motor: &MotorFile) -> Result<Kind> {
     let machine = &motor.data.machine;
     let salient = (machine.L_q.get_ref() / machine.L_d.get_ref() - 1.0).abs() > 0.1;
-    match &motor.data.control.estimator {
-        None => Ok(if salient { "ExtendedEmf" } else { "Rasmussen" }.into()),
-        Some(name) if ["ExtendedEmf", "Rasmussen"].contains(&name.get_ref().as_str()) => Ok(name.get_ref().clone()),
-        Some(name) => {
-            let what = name.get_ref();
-            bail!(
-                "{}: there are no rules for {what}: choose Rasmussen or ExtendedEmf, or leave it out",
-                motor.place(name)
-            )
-        }
-    }
+    let Some(given) = &motor.data.control.estimator else {
+        return Ok(if salient { Kind::ExtendedEmf } else { Kind::Rasmussen });
+    };
+    let known = [Kind::ExtendedEmf, Kind::Rasmussen].into_iter().find(|kind| kind.name() == given.get_ref());
+    known.ok_or_else(|| {
+        let (place, name) = (motor.place(given), given.get_ref());
+        anyhow!("{place}: there are no rules for {name}: choose Rasmussen or ExtendedEmf, or leave it out")
+    })
 }
 
 fn plant(data: &Data) -> Vec<Setting> {
@@ -182,15 +180,16 @@ fn plant(data: &Data) -> Vec<Setting> {
     all
 }
 
-/// Values that every estimator needs.
-fn common(data: &Data, bandwidths: &Bandwidths, estimator: &str) -> Vec<Setting> {
+/// Values for every estimator.
+fn common(data: &Data, bandwidths: &Bandwidths, estimator: Kind) -> Vec<Setting> {
     let Data { machine, mechanics, .. } = data;
-    let mut all = vec![set("estimator", Value::Item(estimator.into()), "by the saliency, or as given"), lock(data)];
+    let mut all =
+        vec![set("estimator", Value::Item(estimator.name().into()), "by the saliency, or as given"), lock(data)];
     all.push(bandwidths.T_s.setting("T_s"));
     all.extend([
         set("motor.n_p", Value::Integer(*machine.n_p.get_ref()), "as given"),
-        if estimator == "Rasmussen" {
-            flux_observer::resistance(data)
+        if estimator == Kind::Rasmussen {
+            rasmussen::resistance(data)
         } else {
             real("motor.R_s", 0.9 * machine.R_s.get_ref(), "0.9 R_s: the safe side at standstill")
         },
@@ -236,7 +235,7 @@ pub fn torque_constant(data: &Data) -> f64 {
     1.5 * f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref()
 }
 
-/// The ratings are positive.
+/// Checks that the ratings are positive.
 fn ratings(motor: &MotorFile) -> Result<()> {
     let rating = &motor.data.rating;
     for (name, x) in [("speed", &rating.speed), ("torque", &rating.torque), ("current", &rating.current)] {
@@ -250,7 +249,7 @@ fn ratings(motor: &MotorFile) -> Result<()> {
 /// Least number of samples per electrical period.
 const LEAST_SAMPLES: f64 = 10.0;
 
-/// Rules for every estimator.
+/// Checks bandwidths and sample period, for every estimator.
 fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<()> {
     let Data { machine, rating, .. } = &motor.data;
     let (w_s, w_o) = (bandwidths.speed.value, bandwidths.observer.value);

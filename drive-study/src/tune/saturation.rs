@@ -13,7 +13,7 @@ use drive::plant::machine;
 use drive::plant::saturation::Saturation;
 use std::f64::consts::TAU;
 
-/// Directions of the current that are looked at.
+/// Number of directions of the current.
 const DIRECTIONS: u32 = 72;
 
 fn of(data: &Data) -> Saturation {
@@ -102,12 +102,12 @@ mod tests {
     #[test]
     fn a_polynomial_that_is_no_machine_is_refused() {
         check(&ipmsm("s_3 = 40.0", "s_3 = 40.0\ns_dq = 10.0")).unwrap();
-        for (from, to, told) in [
+        for (from, to, message) in [
             ("s_3 = 40.0", "s_3 = 40.0\ns_dq = 40.0", "s_dq = 40, more flux takes less current"),
             ("s_2 = 40.0", "s_2 = 400.0", "s_2 = 400, s_3 = 40"),
         ] {
             let error = check(&ipmsm(from, to)).unwrap_err().to_string();
-            assert!(error.contains(told) && error.starts_with("m.toml:") && error.lines().count() == 1, "{error}");
+            assert!(error.contains(message) && error.starts_with("m.toml:") && error.lines().count() == 1, "{error}");
         }
     }
 }

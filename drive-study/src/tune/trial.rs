@@ -7,22 +7,21 @@
 
 use super::pace::{Pace, begin};
 use super::rules::Tuned;
+use crate::queue;
 use drive::Pair;
 use drive::math::wrap;
 use std::f64::consts::TAU;
-use std::num::NonZero;
-use std::thread;
 
-/// The levels of speed in pu that every drive is tried at; besides, its highest speed.
+/// Speeds in pu at which every drive is tried, in addition to its highest speed.
 pub const LEVELS: [f64; 3] = [0.1, 0.5, 1.0];
 
 /// End of a run in units of the slowest time constant.
 const HORIZON: f64 = 20.0;
 
-/// What has to be settled, in units of the time constant of the slower loop.
+/// Time over which a run must be settled, in units of the time constant of the slower loop.
 const WINDOW: f64 = 4.0;
 
-/// Parts of the window; the oldest one is left as a new one begins.
+/// Parts of the window; a new part replaces the oldest.
 const PARTS: usize = 4;
 
 /// Tolerances of the end: speed in pu, angle in deg.
@@ -34,10 +33,10 @@ const CALM: (f64, f64) = (0.005, 25.0);
 /// Greatest movement in the window of a run that has clearly settled: speed in pu, angle in deg.
 const STILL: (f64, f64) = (0.002, 1.0);
 
-/// Distance from the reference in pu, besides its own size, from which no drive returns.
+/// Distance from the reference in pu, in addition to its magnitude, from which no drive returns.
 const AWAY: f64 = 4.0;
 
-/// What is asked of the drive.
+/// A task of the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Task {
     /// Speed in pu of the rated speed.
@@ -58,10 +57,10 @@ impl Tuned {
     }
 }
 
-/// What a number of start angles gave.
+/// The result of a task from a number of start angles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
-    /// What was asked.
+    /// The task.
     pub task: Task,
     /// Start angles.
     pub angles: u32,
@@ -89,8 +88,8 @@ impl Trial {
     }
 }
 
-/// How a run went: whether it started, whether it held the load, least speed in pu and greatest angle error in deg after it, and
-/// the greatest torque in N.m.
+/// The result of a run: whether the drive started, whether it held the load, least speed in pu and greatest angle error in deg
+/// after the load, and the greatest torque in N.m.
 #[derive(Clone, Copy)]
 struct Run {
     started: bool,
@@ -100,7 +99,7 @@ struct Run {
     most: f64,
 }
 
-/// What is seen of the speed and the angle error in a part of the window.
+/// Speed and angle error in a part of the window.
 #[derive(Clone, Copy)]
 struct Part {
     /// Distance of the speed from the reference in pu, greatest magnitude.
@@ -162,8 +161,8 @@ impl Bench<'_> {
         f64::from(self.k) * self.T_s
     }
 
-    /// One sample at the speed reference `level` (pu) with the load `torque` (N.m): speed in pu and angle error in deg; none if
-    /// the models give up.
+    /// One sample at the speed reference `level` (pu) with the load `torque` (N.m): speed in pu and angle error in deg; `None` if a
+    /// step fails.
     fn step(&mut self, level: f64, torque: f64) -> Option<(f64, f64)> {
         self.pair.set_inputs(level * self.tuned.speed, torque, self.u_dc);
         self.pair.step(self.T_s).ok()?;
@@ -247,13 +246,8 @@ pub fn all(tuned: &Tuned, angles: u32) -> Vec<Trial> {
 
 /// Tries a task from `angles` start angles, evenly spaced, on all processors.
 pub fn at(tuned: &Tuned, task: &Task, angles: u32) -> Trial {
-    let run = |k: u32| one(tuned, task, f64::from(k) * TAU / f64::from(angles));
-    let threads = u32::try_from(thread::available_parallelism().map_or(1, NonZero::get)).unwrap_or(1).min(angles);
-    let runs: Vec<Run> = thread::scope(|scope| {
-        let of = |first| (first..angles).step_by(threads.max(1) as usize).map(run).collect::<Vec<_>>();
-        let all: Vec<_> = (0..threads).map(|first| scope.spawn(move || of(first))).collect();
-        all.into_iter().flat_map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
-    });
+    let starts: Vec<f64> = (0..angles).map(|k| f64::from(k) * TAU / f64::from(angles)).collect();
+    let runs = queue::map(&starts, |theta| one(tuned, task, *theta));
     let mut trial =
         Trial { task: *task, angles, started: 0, held: 0, least: f64::INFINITY, error: 0.0, most: f64::INFINITY };
     for Run { started, held, least, error, most } in runs {

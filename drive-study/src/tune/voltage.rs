@@ -1,20 +1,21 @@
-//! What the DC link allows: field weakening where the rated point or the highest speed needs it, and the torque there.
+//! The limits of the DC link: field weakening where the rated point or the highest speed needs it, and the torque there.
 //!
 //! The references may use U = k_u u_dc / sqrt 3. The rated torque at the rated speed must fit, with field weakening if need be;
 //! at the highest speed, that of the rated power.
 
 use super::motor::{Data, MotorFile};
 use super::rules::{Setting, Value, electrical, set};
+use crate::runner::settled_limit;
 use anyhow::{Result, bail};
-use drive::control::envelope::{Envelope, Warm};
+use drive::control::envelope::Envelope;
 use drive::control::reference::max_torque_per_ampere;
 use drive::control::weakening::WeakeningParameters;
 use drive::frame::DqHat;
 
-/// Share of the greatest torque at the highest speed that a load may take: the rest is for the speed loop.
+/// Greatest load at the highest speed as a share of the greatest torque: the rest is for the speed loop.
 const TOP_SHARE: f64 = 0.8;
 
-/// What the voltage allows.
+/// Field weakening and load at the highest speed.
 pub struct Voltage {
     /// The setting of field weakening, where it is needed.
     pub settings: Vec<Setting>,
@@ -49,10 +50,7 @@ pub fn of(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Result<V
             motor.place(&rating.current)
         );
     }
-    let most = |speed: f64| {
-        let mut warm = Warm::default();
-        (0..8).map(|_| envelope.limit(n_p * speed, 1.0, U, &mut warm).tau).last().unwrap_or_default()
-    };
+    let most = |speed: f64| settled_limit(&envelope, n_p * speed, 1.0, U).tau;
     let fits = |torque: f64, speed: f64| envelope.excess(currents(torque), n_p * speed, U) <= 0.0;
     let rated_fits = fits(torque, speed);
     if !rated_fits && most(speed) < torque {

@@ -1,11 +1,11 @@
 //! `PmsmDrive` for Model Exchange: the equations of the plant, and the events of the controller.
 
 use super::{DriveOutputs, Means, PmsmDrive};
-use crate::PmsmPlant;
-use crate::control::signals::ControllerOutputs;
-use crate::frame::Phases;
 use crate::pair::Pair;
-use crate::plant::signals::PlantInputs;
+use drive_base::frame::Phases;
+use drive_control::signals::ControllerOutputs;
+use drive_plant::PmsmPlant;
+use drive_plant::signals::PlantInputs;
 use fmu_core::events::{bounded, grid};
 use fmu_core::{
     CompletedSteps, ContinuousTime, Differentiable, Elapsed, Events, Fault, Indicator, Model, Next, Outcome, Sampled,
@@ -13,12 +13,12 @@ use fmu_core::{
 };
 
 impl PmsmDrive {
-    /// The outputs of the controller's last sample become visible and act on the plant.
+    /// Makes the outputs of the controller's last sample visible and applies them to the plant.
     fn show(&mut self, now: Elapsed) {
         let Pair { plant, controller, .. } = &mut self.pair;
         controller.model.show();
         controller.model.output(now, &mut controller.out);
-        plant.model.inputs.apply(&controller.out);
+        plant.model.inputs.apply(controller.out.commanded());
     }
 }
 

@@ -1,7 +1,7 @@
 //! Means over the sample periods of `PmsmDrive`, and their variables.
 
-use crate::plant::counters::Total;
-use crate::plant::power::Powers;
+use drive_plant::counters::Total;
+use drive_plant::power::Powers;
 use fmu_core::unit::{NEWTON_METER, WATT};
 use fmu_core::{Row, Table};
 use serde::{Deserialize, Serialize};

@@ -5,7 +5,7 @@ mod cases;
 
 use cases::CASES;
 use drive::Pair;
-use drive::control::tables::ALL_PARAMETERS;
+use drive::control::tables::PARAMETERS;
 use drive::estimator::kalman::KalmanParameters;
 use drive::estimator::{Class, Kind};
 use drive::frame::AlphaBeta;
@@ -129,15 +129,13 @@ fn every_option_acts_or_is_refused() {
 /// A new switch or choice needs a case above.
 #[test]
 fn no_option_is_forgotten() {
-    for (name, meta, _) in (0..ALL_PARAMETERS.len()).filter_map(|i| ALL_PARAMETERS.locate(i)) {
+    for (name, meta, _) in (0..PARAMETERS.len()).filter_map(|i| PARAMETERS.locate(i)) {
         if matches!(meta.kind, Type::Boolean | Type::Enumeration(_)) && name != "estimator" {
             assert!(CASES.iter().any(|case| case.option == name), "{name}");
         }
     }
     for case in CASES {
-        assert!(
-            (0..ALL_PARAMETERS.len()).any(|i| ALL_PARAMETERS.locate(i).is_some_and(|found| found.0 == case.option))
-        );
+        assert!((0..PARAMETERS.len()).any(|i| PARAMETERS.locate(i).is_some_and(|found| found.0 == case.option)));
     }
 }
 

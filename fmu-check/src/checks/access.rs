@@ -3,35 +3,73 @@
 use super::values::{booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, tunable};
 use crate::check::{Check, Level, Levels, Run};
 use crate::encoding::{bits, same, show};
+use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::Buffer;
 use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability, parse_number};
+use std::slice;
 
 const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.7.2";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "V07", requirement: "A start value in the description equals the value in the binary.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, tried: "Reads every variable with a start value from a new instance and compares.", fix: "Generate both from one table.", run: Run::Probe(start_values) },
-    Check { id: "V06b", requirement: "Integer and enumeration outputs always lie between min and max.", clause: "3.0.2, 2.2.7.3", levels: Levels(Some(Level::Should), Some(Level::Must)), tried: "Reads integer outputs with limits over 50 steps.", fix: "Saturate the output, or correct min and max.", run: Run::Probe(ranges) },
-    Check { id: "G01a", requirement: "Getting and setting zero variables succeeds, even with NULL pointers.", clause: GET, levels: Levels::HARD, tried: "Gets and sets no variables, with NULL arrays.", fix: "Return OK before looking at the arrays.", run: Run::Probe(zero_variables) },
-    Check { id: "G01b", requirement: "A NULL array gives Error.", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Gets and sets one variable with NULL arrays.", fix: "Check the pointers if the number is above 0.", run: Run::Probe(null_arrays) },
-    Check { id: "G01c", requirement: "A wrong number of values gives Error, and the FMU writes nothing past the values.", clause: "3.0.2, 2.2.4", levels: Levels(None, Some(Level::Should)), tried: "Passes too few and too many values.", fix: "Compare nValues with the sizes of the variables before copying.", run: Run::Probe(wrong_counts) },
-    Check { id: "G02", requirement: "A value reference that does not exist gives Error.", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, tried: "Gets and sets a reference that no variable has.", fix: "Return Error in the default branch, also of setters.", run: Run::Probe(unknown_reference) },
-    Check { id: "V12", requirement: "A getter or setter for another type than that of the variable gives Error.", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, tried: "Gets and sets variables with the functions of another type.", fix: "Look references up by type.", run: Run::Probe(wrong_type) },
-    Check { id: "G03a", requirement: "Setting a constant gives Error.", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, tried: "Sets a constant.", fix: "Return Error for variables with variability constant.", run: Run::Probe(constants) },
-    Check { id: "G03b", requirement: "Setting a variable that cannot be set (output, time, fixed parameter after initialization) gives Error and changes nothing.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, tried: "Sets an output, the time and a fixed parameter between steps, and reads back.", fix: "Compare causality, variability and state before assigning, and return Error.", run: Run::Probe(not_settable) },
-    Check { id: "G03c", requirement: "A set call for several variables that fails changes none of them.", clause: "hardening", levels: Levels::HARD, tried: "Sets an input together with a reference that does not exist.", fix: "Check all references before assigning any.", run: Run::Probe(all_or_nothing) },
-    Check { id: "G04", requirement: "A value that is set before the end of initialization reads back.", clause: GET, levels: Levels::MUST, tried: "Sets every settable number in Initialization Mode and reads it.", fix: "Store the value as it came.", run: Run::Probe(round_trip) },
-    Check { id: "G05", requirement: "The FMU copies strings that are set: the importer may overwrite its own.", clause: GET, levels: Levels::MUST, tried: "Sets strings, overwrites them, and reads back.", fix: "Copy the string.", run: Run::Probe(strings) },
-    Check { id: "G06", requirement: "A tunable parameter can be set between steps and keeps its value.", clause: "2.0.5, 4.2.4; 3.0.2, 4.2.1", levels: Levels::MUST, tried: "Sets each tunable parameter between steps, makes two, and reads it.", fix: "Accept variability tunable in step mode.", run: Run::Probe(tunable) },
-    Check { id: "L11", requirement: "Initialization can be iterated: values set and read in between leave no trace.", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.3", levels: Levels::MUST, tried: "Sets values once in one instance, twice with reading in between in another, and compares.", fix: "Compute outputs from values when they are read, without leaving anything in the state.", run: Run::Probe(iterated_initialization) },
-    Check { id: "G07a", requirement: "NaN, infinities and huge numbers in an input cause no hang, no crash and no disturbance of another instance.", clause: "hardening", levels: Levels::HARD, tried: "Sets NaN, infinities and huge numbers at each input and makes 3 steps.", fix: "Check inputs for finiteness, and bound every loop.", run: Run::Probe(not_a_number) },
-    Check { id: "G07b", requirement: "A parameter outside min and max is refused, at the latest at the end of initialization.", clause: "hardening", levels: Levels::HARD, tried: "Sets parameters outside min and max.", fix: "Compare with min and max, and refuse at the latest in ExitInitializationMode.", run: Run::Probe(out_of_range) },
-    Check { id: "G08", requirement: "A Boolean other than 0 and 1 does no harm.", clause: "hardening", levels: Levels::HARD, tried: "Sets Booleans of 2, 255 and all bits.", fix: "Compare with 0.", run: Run::Probe(booleans) },
+    Check { id: "V07", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::Probe(start_values),
+        requirement: "A start value in the description equals the value in the binary.",
+        tried: "Reads every variable with a start value from a new instance and compares.", fix: "Generate both from one table." },
+    Check { id: "V06b", clause: "3.0.2, 2.2.7.3", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(ranges),
+        requirement: "Integer and enumeration outputs always lie between min and max.",
+        tried: "Reads integer outputs with limits over 50 steps.", fix: "Saturate the output, or correct min and max." },
+    Check { id: "G01a", clause: GET, levels: Levels::HARD, run: Run::Probe(zero_variables),
+        requirement: "Getting and setting zero variables succeeds, even with NULL pointers.",
+        tried: "Gets and sets no variables, with NULL arrays.", fix: "Return OK before looking at the arrays." },
+    Check { id: "G01b", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(null_arrays),
+        requirement: "A NULL array gives Error.",
+        tried: "Gets and sets one variable with NULL arrays.", fix: "Check the pointers if the number is above 0." },
+    Check { id: "G01c", clause: "3.0.2, 2.2.4", levels: Levels(None, Some(Level::Should)), run: Run::Probe(wrong_counts),
+        requirement: "A wrong number of values gives Error, and the FMU writes nothing past the values.",
+        tried: "Passes too few and too many values.", fix: "Compare nValues with the sizes of the variables before copying." },
+    Check { id: "G02", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(unknown_reference),
+        requirement: "A value reference that does not exist gives Error.",
+        tried: "Gets and sets a reference that no variable has.", fix: "Return Error in the default branch, also of setters." },
+    Check { id: "V12", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(wrong_type),
+        requirement: "A getter or setter for another type than that of the variable gives Error.",
+        tried: "Gets and sets variables with the functions of another type.", fix: "Look references up by type." },
+    Check { id: "G03a", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(constants),
+        requirement: "Setting a constant gives Error.",
+        tried: "Sets a constant.", fix: "Return Error for variables with variability constant." },
+    Check { id: "G03b", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(not_settable),
+        requirement: "Setting a variable that cannot be set (output, time, fixed parameter after initialization) gives Error and changes nothing.",
+        tried: "Sets an output, the time and a fixed parameter between steps, and reads back.",
+        fix: "Compare causality, variability and state before assigning, and return Error." },
+    Check { id: "G03c", clause: "hardening", levels: Levels::HARD, run: Run::Probe(all_or_nothing),
+        requirement: "A set call for several variables that fails changes none of them.",
+        tried: "Sets an input together with a reference that does not exist.", fix: "Check all references before assigning any." },
+    Check { id: "G04", clause: GET, levels: Levels::MUST, run: Run::Probe(round_trip),
+        requirement: "A value that is set before the end of initialization reads back.",
+        tried: "Sets every settable number in Initialization Mode and reads it.", fix: "Store the value as it came." },
+    Check { id: "G05", clause: GET, levels: Levels::MUST, run: Run::Probe(strings),
+        requirement: "The FMU copies strings that are set: the importer may overwrite its own.",
+        tried: "Sets strings, overwrites them, and reads back.", fix: "Copy the string." },
+    Check { id: "G06", clause: "2.0.5, 4.2.4; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(tunable),
+        requirement: "A tunable parameter can be set between steps and keeps its value.",
+        tried: "Sets each tunable parameter between steps, makes two, and reads it.", fix: "Accept variability tunable in step mode." },
+    Check { id: "L11", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Probe(iterated_initialization),
+        requirement: "Initialization can be iterated: values set and read in between leave no trace.",
+        tried: "Sets values once in one instance, twice with reading in between in another, and compares.",
+        fix: "Compute outputs from values when they are read, without leaving anything in the state." },
+    Check { id: "G07a", clause: "hardening", levels: Levels::HARD, run: Run::Probe(not_a_number),
+        requirement: "NaN, infinities and huge numbers in an input cause no hang, no crash and no disturbance of another instance.",
+        tried: "Sets NaN, infinities and huge numbers at each input and makes 3 steps.", fix: "Check inputs for finiteness, and bound every loop." },
+    Check { id: "G07b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(out_of_range),
+        requirement: "A parameter outside min and max is refused, at the latest at the end of initialization.",
+        tried: "Sets parameters outside min and max.", fix: "Compare with min and max, and refuse at the latest in ExitInitializationMode." },
+    Check { id: "G08", clause: "hardening", levels: Levels::HARD, run: Run::Probe(booleans),
+        requirement: "A Boolean other than 0 and 1 does no harm.",
+        tried: "Sets Booleans of 2, 255 and all bits.", fix: "Compare with 0." },
 ];
 
-/// The start values of a variable as bits; `None` for a form that is none of the type.
+/// The start values of a variable as bits; `None` for text that is not of the type.
 fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
     let one = |word: &str| match v.base {
         BaseType::Boolean => Some(u64::from(matches!(word, "true" | "1"))),
@@ -114,20 +152,31 @@ fn plain_types(version: FmiVersion) -> Vec<BaseType> {
     if version == FmiVersion::V2 { v2.to_vec() } else { all() }
 }
 
+const WAYS: [&str; 2] = ["Get", "Set"];
+
+/// Gets or sets, as `way` says, with arrays that may be NULL, each with its count.
+fn pass(
+    instance: &Instance<'_>,
+    way: &str,
+    call: &str,
+    base: BaseType,
+    (list, n): (Option<&[u32]>, usize),
+    (values, n_values): (Option<&mut Buffer>, usize),
+) -> Result<Status, NotDetermined> {
+    instance.call(call, |raw| match way {
+        "Set" => raw.set(instance.handle, base, list, n, values, n_values),
+        _ => raw.get(instance.handle, base, list, n, values, n_values),
+    })
+}
+
 fn zero_variables(session: &Session) -> Result<(), NotDetermined> {
     for base in plain_types(session.description.version) {
         session.case(|| {
             let instance = session.stepping()?;
-            for set in [false, true] {
-                let (kind, none) = (if set { "Set" } else { "Get" }, Option::<&mut Buffer>::None);
-                let status = instance.call(&format!("{kind}({base}, NULL, 0, NULL, 0)"), |raw| {
-                    if set {
-                        raw.set(instance.handle, base, None, 0, none, 0)
-                    } else {
-                        raw.get(instance.handle, base, None, 0, none, 0)
-                    }
-                })?;
-                session.require(status.is_ok(), || format!("{kind}{base} of zero variables returned {status}"));
+            for way in WAYS {
+                let call = format!("{way}({base}, NULL, 0, NULL, 0)");
+                let status = pass(&instance, way, &call, base, (None, 0), (None, 0))?;
+                session.require(status.is_ok(), || format!("{way}{base} of zero variables returned {status}"));
             }
             Ok(())
         });
@@ -137,31 +186,15 @@ fn zero_variables(session: &Session) -> Result<(), NotDetermined> {
 
 fn null_arrays(session: &Session) -> Result<(), NotDetermined> {
     for (references, values) in [(false, true), (true, false)] {
-        for set in [false, true] {
+        for way in WAYS {
             session.case(|| {
                 let instance = session.stepping()?;
-                let wanted = if set { Causality::Input } else { Causality::Output };
-                let Some(v) = session.numeric().find(|v| v.causality == wanted && v.base.is_float() && !v.is_array())
-                else {
-                    return Ok(());
-                };
+                let Some(v) = subject(session, way) else { return Ok(()) };
                 let mut buffer = Buffer::of(v.base, session.description.version, &[bits(v.base, 0.0)]);
-                let list = [v.value_reference];
-                let (list, place) = (references.then_some(&list[..]), values.then_some(&mut buffer));
-                let call = format!(
-                    "{}({}, {}, 1, {}, 1)",
-                    if set { "Set" } else { "Get" },
-                    v.base,
-                    if references { "vr" } else { "NULL" },
-                    if values { "values" } else { "NULL" }
-                );
-                let status = instance.call(&call, |raw| {
-                    if set {
-                        raw.set(instance.handle, v.base, list, 1, place, 1)
-                    } else {
-                        raw.get(instance.handle, v.base, list, 1, place, 1)
-                    }
-                })?;
+                let (list, place) = (references.then_some(v.value_reference), values.then_some(&mut buffer));
+                let names = [if references { "vr" } else { "NULL" }, if values { "values" } else { "NULL" }];
+                let call = format!("{way}({}, {}, 1, {}, 1)", v.base, names[0], names[1]);
+                let status = pass(&instance, way, &call, v.base, (list.as_ref().map(slice::from_ref), 1), (place, 1))?;
                 session.require(status == Status::ERROR, || format!("{call} returned {status}"));
                 Ok(())
             });
@@ -171,33 +204,27 @@ fn null_arrays(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn wrong_counts(session: &Session) -> Result<(), NotDetermined> {
-    for (n, set) in [(0, false), (2, false), (0, true), (2, true)] {
+    for (n, way) in [(0, "Get"), (2, "Get"), (0, "Set"), (2, "Set")] {
         session.case(|| {
             let instance = session.stepping()?;
-            let wanted = if set { Causality::Input } else { Causality::Output };
-            let Some(v) = session
-                .numeric()
-                .find(|v| v.causality == wanted && v.base.is_float() && !v.is_array() && v.clocks.is_empty())
-            else {
-                return Ok(());
-            };
+            let Some(v) = subject(session, way) else { return Ok(()) };
             let mut buffer = Buffer::of(v.base, session.description.version, &vec![bits(v.base, 0.0); n]);
-            let list = [v.value_reference];
-            let call = format!("{}({}, nValueReferences=1, nValues={n})", if set { "Set" } else { "Get" }, v.name);
-            let status = instance.call(&call, |raw| {
-                let place = Some(&mut buffer);
-                if set {
-                    raw.set(instance.handle, v.base, Some(&list), 1, place, n)
-                } else {
-                    raw.get(instance.handle, v.base, Some(&list), 1, place, n)
-                }
-            })?;
+            let call = format!("{way}({}, nValueReferences=1, nValues={n})", v.name);
+            let list = (Some(&[v.value_reference][..]), 1);
+            let status = pass(&instance, way, &call, v.base, list, (Some(&mut buffer), n))?;
             session.require(status == Status::ERROR, || format!("{call} returned {status}"));
             session.require(buffer.intact(), || format!("{call} wrote past the {n} values"));
             Ok(())
         });
     }
     Ok(())
+}
+
+/// A scalar to get, an output, or to set, an input.
+fn subject<'b>(session: &'b Session, way: &str) -> Option<&'b ModelVariable> {
+    let wanted = if way == "Set" { Causality::Input } else { Causality::Output };
+    let fits = |v: &&ModelVariable| v.causality == wanted && v.base.is_float() && !v.is_array() && v.clocks.is_empty();
+    session.numeric().find(fits)
 }
 
 /// A reference that no variable has.
@@ -213,8 +240,8 @@ fn unknown_reference(session: &Session) -> Result<(), NotDetermined> {
             continue;
         }
         for base in plain_types(session.description.version) {
-            for set in [false, true] {
-                session.case(|| must_be_refused(session, base, reference, set, "a reference that does not exist"));
+            for way in WAYS {
+                session.case(|| must_be_refused(session, way, base, reference, "a reference that does not exist"));
             }
         }
     }
@@ -224,22 +251,15 @@ fn unknown_reference(session: &Session) -> Result<(), NotDetermined> {
 /// A getter or setter that must return Error.
 fn must_be_refused(
     session: &Session,
+    way: &str,
     base: BaseType,
     reference: u32,
-    set: bool,
     what: &str,
 ) -> Result<(), NotDetermined> {
     let instance = session.stepping()?;
     let mut buffer = Buffer::of(base, session.description.version, &[bits(base, 0.0)]);
-    let call = format!("{}({base}, reference={reference})", if set { "Set" } else { "Get" });
-    let status = instance.call(&call, |raw| {
-        let place = Some(&mut buffer);
-        if set {
-            raw.set(instance.handle, base, Some(&[reference]), 1, place, 1)
-        } else {
-            raw.get(instance.handle, base, Some(&[reference]), 1, place, 1)
-        }
-    })?;
+    let call = format!("{way}({base}, reference={reference})");
+    let status = pass(&instance, way, &call, base, (Some(&[reference]), 1), (Some(&mut buffer), 1))?;
     let text = format!("{call}, {what}, returned {status}");
     if status == Status::FATAL {
         // Refused, but with more than is wrong: it gives up all instances.
@@ -263,10 +283,9 @@ fn wrong_type(session: &Session) -> Result<(), NotDetermined> {
             .iter()
             .find(|v| carries(v.base) != carries(base) && !v.is_array() && !taken(v.value_reference));
         let Some(v) = other else { continue };
-        for set in [false, true] {
-            session.case(|| {
-                must_be_refused(session, base, v.value_reference, set, &format!("{} of the type {}", v.name, v.base))
-            });
+        let what = format!("{} of the type {}", v.name, v.base);
+        for way in WAYS {
+            session.case(|| must_be_refused(session, way, base, v.value_reference, &what));
         }
     }
     Ok(())
@@ -329,9 +348,8 @@ fn all_or_nothing(session: &Session) -> Result<(), NotDetermined> {
     let before = instance.get(v)?.1;
     let mut buffer = Buffer::of(v.base, session.description.version, &[values[0], 0]);
     let list = [v.value_reference, free_reference(session)];
-    let status = instance.call(&format!("Set({}, and a reference that does not exist)", v.name), |raw| {
-        raw.set(instance.handle, v.base, Some(&list), 2, Some(&mut buffer), 2)
-    })?;
+    let call = format!("Set({}, and a reference that does not exist)", v.name);
+    let status = pass(&instance, "Set", &call, v.base, (Some(&list), 2), (Some(&mut buffer), 2))?;
     if status.is_ok() {
         return Err(NotDetermined("the FMU does not refuse a reference that does not exist".into()));
     }

@@ -13,40 +13,92 @@ use object::{Architecture, BinaryFormat, Object, ObjectSection, ObjectSymbol};
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "B00", requirement: "The archive contains a binary for this platform, and it loads (should, if it lacks a shared library of this machine).", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, tried: "Loads the binary for this platform in a process of its own.", fix: "Link helpers statically or pack them beside the library, with the search path $ORIGIN; ldd shows what is missing.", run: Run::Probe(loads) },
-    Check { id: "B10", requirement: "Every binary is a shared library for the platform of its folder.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, tried: "Reads the format and the processor of every library.", fix: "Build each platform with its own compiler target, as a shared library.", run: Run::File(format) },
-    Check { id: "B01", requirement: "Every binary exports all functions of the standard; in FMI 2.0, those of its interface types.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, tried: "Compares the exported symbols with the functions of the interfaces.", fix: "Export every function of the standard; those that are not supported return Error.", run: Run::File(exports) },
-    Check { id: "B02a", requirement: "No other exported symbol begins with fmi3.", clause: "3.0.2, 2.5", levels: Levels(None, Some(Level::Should)), tried: "Looks for exported symbols that begin with fmi3 and are not in the standard.", fix: "Rename or hide helper functions.", run: Run::File(reserved) },
-    Check { id: "B02b", requirement: "A binary exports only functions of the standards and at most two symbols of the tool.", clause: "hardening", levels: Levels::HARD, tried: "Lists exported symbols.", fix: "Compile with -fvisibility=hidden and export the functions of the standard.", run: Run::File(only_standard_functions) },
-    Check { id: "B02c", requirement: "The binary can be unloaded: it has no unique symbols and no NODELETE flag.", clause: "hardening", levels: Levels::HARD, tried: "Reads the dynamic section and the unique symbols.", fix: "Link without -z nodelete, and compile C++ with -fno-gnu-unique.", run: Run::File(unloadable) },
-    Check { id: "B03", requirement: "A binary needs only C system libraries; the archive contains all others.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, tried: "Reads the libraries that the binary needs.", fix: "Link them statically (-static-libgcc -static-libstdc++, /MT), or pack them beside the binary.", run: Run::File(needed) },
-    Check { id: "B03r", requirement: "Every library search path is $ORIGIN or below.", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, tried: "Reads the search paths of the binary.", fix: "Set the search path to $ORIGIN, and strip those of the build machine.", run: Run::File(rpath) },
-    Check { id: "B04", requirement: "Linux binaries need at most version 2.17 (2012) of the GNU C library, so that they load on old systems.", clause: "hardening", levels: Levels::HARD, tried: "Reads the versions of symbols that the binary needs.", fix: "Build on an old system, or with `zig cc -target x86_64-linux-gnu.2.17`.", run: Run::File(c_library) },
-    Check { id: "B05", requirement: "Linux binaries have no text relocations and no executable stack.", clause: "hardening", levels: Levels::HARD, tried: "Reads the program headers.", fix: "Compile with -fPIC, and assembler files with .note.GNU-stack.", run: Run::File(no_dangerous_flags) },
-    Check { id: "B11", requirement: "A binary for x86_64 Linux requires no instruction set beyond x86-64-v1 (according to its note).", clause: "hardening", levels: Levels::HARD, tried: "Reads the note .note.gnu.property.", fix: "Build for x86-64, not with -march=native.", run: Run::File(processor) },
-    Check { id: "X02b", requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels(Some(Level::Should), Some(Level::Must)), tried: "Calls GetVersion, and in FMI 2.0 GetTypesPlatform.", fix: "Return the constants of the official headers.", run: Run::Probe(versions) },
-    Check { id: "B08", requirement: "A complete run writes nothing to the console and creates no file in the working directory.", clause: "hardening", levels: Levels::HARD, tried: "Runs 20 steps and watches console and working directory.", fix: "Send messages to the log callback, and write files only where a parameter says so.", run: Run::Silent(complete_run) },
+    Check { id: "B00", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::Probe(loads),
+        requirement: "The archive contains a binary for this platform, and it loads (should, if it lacks a shared library of this machine).",
+        tried: "Loads the binary for this platform in a process of its own.",
+        fix: "Link helpers statically or pack them beside the library, with the search path $ORIGIN; ldd shows what is missing." },
+    Check { id: "B10", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(format),
+        requirement: "Every binary is a shared library for the platform of its folder.",
+        tried: "Reads the format and the processor of every library.", fix: "Build each platform with its own compiler target, as a shared library." },
+    Check { id: "B01", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(exports),
+        requirement: "Every binary exports all functions of the standard; in FMI 2.0, those of its interface types.",
+        tried: "Compares the exported symbols with the functions of the interfaces.",
+        fix: "Export every function of the standard; those that are not supported return Error." },
+    Check { id: "B02a", clause: "3.0.2, 2.5", levels: Levels(None, Some(Level::Should)), run: Run::File(reserved),
+        requirement: "No other exported symbol begins with fmi3.",
+        tried: "Looks for exported symbols that begin with fmi3 and are not in the standard.", fix: "Rename or hide helper functions." },
+    Check { id: "B02b", clause: "hardening", levels: Levels::HARD, run: Run::File(only_standard_functions),
+        requirement: "A binary exports only functions of the standards and at most two symbols of the tool.",
+        tried: "Lists exported symbols.", fix: "Compile with -fvisibility=hidden and export the functions of the standard." },
+    Check { id: "B02c", clause: "hardening", levels: Levels::HARD, run: Run::File(unloadable),
+        requirement: "The binary can be unloaded: it has no unique symbols and no NODELETE flag.",
+        tried: "Reads the dynamic section and the unique symbols.", fix: "Link without -z nodelete, and compile C++ with -fno-gnu-unique." },
+    Check { id: "B03", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(needed),
+        requirement: "A binary needs only C system libraries; the archive contains all others.",
+        tried: "Reads the libraries that the binary needs.",
+        fix: "Link them statically (-static-libgcc -static-libstdc++, /MT), or pack them beside the binary." },
+    Check { id: "B03r", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(rpath),
+        requirement: "Every library search path is $ORIGIN or below.",
+        tried: "Reads the search paths of the binary.", fix: "Set the search path to $ORIGIN, and strip those of the build machine." },
+    Check { id: "B04", clause: "hardening", levels: Levels::HARD, run: Run::File(c_library),
+        requirement: "Linux binaries need at most version 2.17 (2012) of the GNU C library, so that they load on old systems.",
+        tried: "Reads the versions of symbols that the binary needs.", fix: "Build on an old system, or with `zig cc -target x86_64-linux-gnu.2.17`." },
+    Check { id: "B05", clause: "hardening", levels: Levels::HARD, run: Run::File(no_dangerous_flags),
+        requirement: "Linux binaries have no text relocations and no executable stack.",
+        tried: "Reads the program headers.", fix: "Compile with -fPIC, and assembler files with .note.GNU-stack." },
+    Check { id: "B11", clause: "hardening", levels: Levels::HARD, run: Run::File(processor),
+        requirement: "A binary for x86_64 Linux requires no instruction set beyond x86-64-v1 (according to its note).",
+        tried: "Reads the note .note.gnu.property.", fix: "Build for x86-64, not with -march=native." },
+    Check { id: "X02b", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(versions),
+        requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.",
+        tried: "Calls GetVersion, and in FMI 2.0 GetTypesPlatform.", fix: "Return the constants of the official headers." },
+    Check { id: "B08", clause: "hardening", levels: Levels::HARD, run: Run::Silent(complete_run),
+        requirement: "A complete run writes nothing to the console and creates no file in the working directory.",
+        tried: "Runs 20 steps and watches console and working directory.",
+        fix: "Send messages to the log callback, and write files only where a parameter says so." },
 ];
 
-const COMMON2: &str = "GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment EnterInitializationMode ExitInitializationMode Terminate Reset GetReal GetInteger GetBoolean GetString SetReal SetInteger SetBoolean SetString GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate GetDirectionalDerivative";
-const COSIMULATION2: &str = "SetRealInputDerivatives GetRealOutputDerivatives DoStep CancelStep GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus GetStringStatus";
-const EXCHANGE2: &str = "EnterEventMode NewDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime SetContinuousStates GetDerivatives GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates";
-const ALL3: &str = "GetVersion SetDebugLogging InstantiateModelExchange InstantiateCoSimulation InstantiateScheduledExecution FreeInstance EnterInitializationMode ExitInitializationMode EnterEventMode Terminate Reset GetFloat32 GetFloat64 GetInt8 GetUInt8 GetInt16 GetUInt16 GetInt32 GetUInt32 GetInt64 GetUInt64 GetBoolean GetString GetBinary GetClock SetFloat32 SetFloat64 SetInt8 SetUInt8 SetInt16 SetUInt16 SetInt32 SetUInt32 SetInt64 SetUInt64 SetBoolean SetString SetBinary SetClock GetNumberOfVariableDependencies GetVariableDependencies GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize SerializeFMUState DeserializeFMUState GetDirectionalDerivative GetAdjointDerivative EnterConfigurationMode ExitConfigurationMode GetIntervalDecimal GetIntervalFraction GetShiftDecimal GetShiftFraction SetIntervalDecimal SetIntervalFraction SetShiftDecimal SetShiftFraction EvaluateDiscreteStates UpdateDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime SetContinuousStates GetContinuousStateDerivatives GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates GetNumberOfEventIndicators GetNumberOfContinuousStates EnterStepMode GetOutputDerivatives DoStep ActivateModelPartition";
+/// Functions of FMI 2.0 for both interfaces.
+const COMMON2: &str = "\
+    GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance \
+    SetupExperiment EnterInitializationMode ExitInitializationMode Terminate Reset \
+    GetReal GetInteger GetBoolean GetString SetReal SetInteger SetBoolean SetString \
+    GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate \
+    GetDirectionalDerivative";
+const COSIMULATION2: &str = "\
+    SetRealInputDerivatives GetRealOutputDerivatives DoStep CancelStep \
+    GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus GetStringStatus";
+const EXCHANGE2: &str = "\
+    EnterEventMode NewDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime \
+    SetContinuousStates GetDerivatives GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates";
+/// Functions of FMI 3.0, which every FMU has.
+const ALL3: &str = "\
+    GetVersion SetDebugLogging \
+    InstantiateModelExchange InstantiateCoSimulation InstantiateScheduledExecution FreeInstance \
+    EnterInitializationMode ExitInitializationMode EnterEventMode Terminate Reset \
+    GetFloat32 GetFloat64 GetInt8 GetUInt8 GetInt16 GetUInt16 GetInt32 GetUInt32 GetInt64 GetUInt64 \
+    GetBoolean GetString GetBinary GetClock \
+    SetFloat32 SetFloat64 SetInt8 SetUInt8 SetInt16 SetUInt16 SetInt32 SetUInt32 SetInt64 SetUInt64 \
+    SetBoolean SetString SetBinary SetClock \
+    GetNumberOfVariableDependencies GetVariableDependencies \
+    GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize SerializeFMUState DeserializeFMUState \
+    GetDirectionalDerivative GetAdjointDerivative \
+    EnterConfigurationMode ExitConfigurationMode \
+    GetIntervalDecimal GetIntervalFraction GetShiftDecimal GetShiftFraction \
+    SetIntervalDecimal SetIntervalFraction SetShiftDecimal SetShiftFraction \
+    EvaluateDiscreteStates UpdateDiscreteStates \
+    EnterContinuousTimeMode CompletedIntegratorStep SetTime \
+    SetContinuousStates GetContinuousStateDerivatives GetEventIndicators GetContinuousStates \
+    GetNominalsOfContinuousStates GetNumberOfEventIndicators GetNumberOfContinuousStates \
+    EnterStepMode GetOutputDerivatives DoStep ActivateModelPartition";
 
 /// Every function of a standard, without prefix.
 pub(super) fn functions(version: FmiVersion) -> Vec<&'static str> {
-    let lists = match version {
-        FmiVersion::V2 => [COMMON2, COSIMULATION2, EXCHANGE2].join(" "),
-        FmiVersion::V3 => ALL3.into(),
+    let lists: &[&'static str] = match version {
+        FmiVersion::V2 => &[COMMON2, COSIMULATION2, EXCHANGE2],
+        FmiVersion::V3 => &[ALL3],
     };
-    let all = [COMMON2, COSIMULATION2, EXCHANGE2, ALL3].into_iter().flat_map(str::split_whitespace);
-    let mut found: Vec<&'static str> = Vec::new();
-    for name in all {
-        if lists.split_whitespace().any(|n| n == name) && !found.contains(&name) {
-            found.push(name);
-        }
-    }
-    found
+    lists.iter().flat_map(|list| list.split_whitespace()).collect()
 }
 
 /// The libraries named after a modelIdentifier; other libraries in their folders are helpers.

@@ -1,11 +1,13 @@
 //! Event mode and early return of co-simulation (FMI 3.0.2, 4.2.1).
 
+use super::calls::attempt;
 use crate::check::{Check, Level, Levels, Run};
 use crate::exchange::deviation;
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::Life;
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Simple, Stepped};
+use fmu_import::raw::{Arguments, Simple, StepResults};
 use model_description::BaseType;
 
 const STEP: &str = "3.0.2, 4.2.1";
@@ -14,14 +16,31 @@ const SHOULD: Levels = Levels(None, Some(Level::Should));
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "N01", requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed, the next from lastSuccessfulTime.", clause: STEP, levels: MUST, tried: "Runs with each combination of the two flags, with steps of 1 and 5 communication steps.", fix: "Start a step from lastSuccessfulTime, whatever was asked for before.", run: Run::Probe(combinations) },
-    Check { id: "N02", requirement: "A step returns early only if that is allowed, and asks for event handling only if event mode is used; Booleans are 0 or 1.", clause: STEP, levels: MUST, tried: "Looks at the results of the same runs.", fix: "Return early and ask for events only if the instantiation allowed it.", run: Run::Probe(permitted) },
-    Check { id: "N03", requirement: "After an early return lastSuccessfulTime lies between the communication point and the end of the step (should: time goes on).", clause: STEP, levels: MUST, tried: "Looks at the times of the same runs.", fix: "Write the time that was reached, between t and t + h.", run: Run::Probe(reached) },
-    Check { id: "N03e", requirement: "earlyReturn is true only if the step ended before its end.", clause: STEP, levels: SHOULD, tried: "Looks at earlyReturn of the same runs.", fix: "Set earlyReturn only if lastSuccessfulTime is before t + h.", run: Run::Probe(truly_early) },
-    Check { id: "N04", requirement: "Without eventModeUsed, EnterEventMode returns Error.", clause: "3.0.2, 2.2.4", levels: SHOULD, tried: "Calls EnterEventMode of an instance without event mode.", fix: "Return Error.", run: Run::Probe(without_event_mode) },
-    Check { id: "N05", requirement: "DoStep in Event Mode, and UpdateDiscreteStates and EnterStepMode in Step Mode, return Error.", clause: "3.0.2, 2.2.4", levels: SHOULD, tried: "Makes calls of the other mode.", fix: "Check the mode at the beginning of every function.", run: Run::Probe(wrong_mode) },
-    Check { id: "N06", requirement: "The next event time of an update is after now, if it is defined.", clause: "3.0.2, 2.3.5", levels: SHOULD, tried: "Looks at nextEventTime of the updates.", fix: "Return an absolute time after now.", run: Run::Probe(next_event_time) },
-    Check { id: "N07", requirement: "Entering and leaving Event Mode where there is no event changes no result.", clause: "hardening", levels: Levels(None, Some(Level::Hard)), tried: "Enters and leaves Event Mode between steps and compares.", fix: "Change nothing where there is no event.", run: Run::Probe(round_trip) },
+    Check { id: "N01", clause: STEP, levels: MUST, run: Run::Probe(combinations),
+        requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed, the next from lastSuccessfulTime.",
+        tried: "Runs with each combination of the two flags, with steps of 1 and 5 communication steps.",
+        fix: "Start a step from lastSuccessfulTime, whatever was asked for before." },
+    Check { id: "N02", clause: STEP, levels: MUST, run: Run::Probe(permitted),
+        requirement: "A step returns early only if that is allowed, and asks for event handling only if event mode is used; Booleans are 0 or 1.",
+        tried: "Looks at the results of the same runs.", fix: "Return early and ask for events only if the instantiation allowed it." },
+    Check { id: "N03", clause: STEP, levels: MUST, run: Run::Probe(reached),
+        requirement: "After an early return lastSuccessfulTime lies between the communication point and the end of the step (should: time goes on).",
+        tried: "Looks at the times of the same runs.", fix: "Write the time that was reached, between t and t + h." },
+    Check { id: "N03e", clause: STEP, levels: SHOULD, run: Run::Probe(truly_early),
+        requirement: "earlyReturn is true only if the step ended before its end.",
+        tried: "Looks at earlyReturn of the same runs.", fix: "Set earlyReturn only if lastSuccessfulTime is before t + h." },
+    Check { id: "N04", clause: "3.0.2, 2.2.4", levels: SHOULD, run: Run::Probe(without_event_mode),
+        requirement: "Without eventModeUsed, EnterEventMode returns Error.",
+        tried: "Calls EnterEventMode of an instance without event mode.", fix: "Return Error." },
+    Check { id: "N05", clause: "3.0.2, 2.2.4", levels: SHOULD, run: Run::Probe(wrong_mode),
+        requirement: "DoStep in Event Mode, and UpdateDiscreteStates and EnterStepMode in Step Mode, return Error.",
+        tried: "Makes calls of the other mode.", fix: "Check the mode at the beginning of every function." },
+    Check { id: "N06", clause: "3.0.2, 2.3.5", levels: SHOULD, run: Run::Probe(next_event_time),
+        requirement: "The next event time of an update is after now, if it is defined.",
+        tried: "Looks at nextEventTime of the updates.", fix: "Return an absolute time after now." },
+    Check { id: "N07", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(round_trip),
+        requirement: "Entering and leaving Event Mode where there is no event changes no result.",
+        tried: "Enters and leaves Event Mode between steps and compares.", fix: "Change nothing where there is no event." },
 ];
 
 /// Ends a probe of an FMU without event mode.
@@ -38,8 +57,8 @@ macro_rules! needs_event_mode {
 
 const COMBINATIONS: [(bool, bool); 4] = [(false, false), (false, true), (true, false), (true, true)];
 
-/// An importer that uses event mode and early return as it said.
-struct Importer<'b> {
+/// Steps an instance that uses event mode and early return as its instantiation said.
+struct Stepper<'b> {
     instance: Instance<'b>,
     event_mode: bool,
     early: bool,
@@ -48,20 +67,19 @@ struct Importer<'b> {
     over: bool,
 }
 
-impl<'b> Importer<'b> {
+impl<'b> Stepper<'b> {
     /// An instance in Step Mode.
     fn start(session: &'b Session, (event_mode, early): (bool, bool)) -> Result<Self, NotDetermined> {
         session.prepare(|| {
             let arguments = Arguments { event_mode, early_return: early, ..session.arguments("probe") };
-            let made = session.instantiate(&arguments)?;
-            let instance = made.ok_or_else(|| NotDetermined(format!("{} returned NULL", session.instantiation())))?;
+            let instance = session.made(&arguments)?;
             instance.enter()?;
             instance.must("ExitInitializationMode", instance.simple(Simple::ExitInitializationMode)?)?;
-            let mut importer = Self { instance, event_mode, early, next: None, over: false };
+            let mut stepper = Self { instance, event_mode, early, next: None, over: false };
             if event_mode {
-                importer.leave_event_mode()?;
+                stepper.leave_event_mode()?;
             }
-            Ok(importer)
+            Ok(stepper)
         })
     }
 
@@ -87,14 +105,14 @@ impl<'b> Importer<'b> {
     }
 
     /// A step of `h`, at most to the next event, and the event that it ends in: what it returned, and what was asked for.
-    fn step(&mut self, whole: f64) -> Result<(Status, Stepped, f64), NotDetermined> {
+    fn step(&mut self, whole: f64) -> Result<(Status, StepResults, f64), NotDetermined> {
         let t = self.instance.time.get();
         let variable = self.instance.session.flag("canHandleVariableCommunicationStepSize");
         // A step that ends where the event is: the importer must not go beyond. Closer than this it is reached.
         let near = 1e-9 * whole + 4.0 * f64::EPSILON * t.abs();
         let inside = |next: &f64| variable && *next > t + near && *next < t + whole;
         let h = self.next.filter(inside).map_or(whole, |next| next - t);
-        let mut stepped = Stepped { event: 0, terminate: 0, early: 0, last: t };
+        let mut stepped = StepResults { event: 0, terminate: 0, early: 0, last: t };
         let status = self.instance.call(&format!("DoStep(t={t:?}, h={h:?})"), |raw| {
             let (status, found) = raw.do_step(self.instance.handle, t, h, false, [true; 4])?;
             stepped = found;
@@ -114,7 +132,7 @@ impl<'b> Importer<'b> {
 }
 
 /// What is wrong with a step, from its status, its results, and its two ends as the importer asked for them.
-type Rule<'a> = &'a dyn Fn(&Importer<'_>, Status, Stepped, [f64; 2]) -> Option<String>;
+type Rule<'a> = &'a dyn Fn(&Stepper<'_>, Status, StepResults, [f64; 2]) -> Option<String>;
 
 /// Steps of one and of five communication steps, within the default experiment, for each combination of the two flags.
 fn each_step(session: &Session, rule: Rule<'_>) -> Result<(), NotDetermined> {
@@ -126,14 +144,14 @@ fn each_step(session: &Session, rule: Rule<'_>) -> Result<(), NotDetermined> {
         for multiple in if variable { &[1.0, 5.0][..] } else { &[1.0] } {
             session.case(|| {
                 let h = multiple * session.h();
-                let mut importer = Importer::start(session, flags)?;
+                let mut stepper = Stepper::start(session, flags)?;
                 for _ in 0..200 {
-                    let t = importer.instance.time.get();
-                    if importer.over || t + h > stop * (1.0 + 1e-9) || session.half_time_used() {
+                    let t = stepper.instance.time.get();
+                    if stepper.over || t + h > stop * (1.0 + 1e-9) || session.half_time_used() {
                         break;
                     }
-                    let (status, stepped, end) = importer.step(h)?;
-                    if let Some(text) = rule(&importer, status, stepped, [t, end]) {
+                    let (status, stepped, end) = stepper.step(h)?;
+                    if let Some(text) = rule(&stepper, status, stepped, [t, end]) {
                         session.violated(format!(
                             "eventModeUsed={}, earlyReturnAllowed={}: DoStep(t={t:?}, h={:?}) {text}",
                             flags.0,
@@ -158,15 +176,15 @@ fn combinations(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn permitted(session: &Session) -> Result<(), NotDetermined> {
-    each_step(session, &|importer, status, stepped, _| {
+    each_step(session, &|stepper, status, stepped, _| {
         let flags = [stepped.event, stepped.terminate, stepped.early];
         if !status.is_ok() {
             None
         } else if flags.iter().any(|f| *f > 1) {
             Some(format!("gave {stepped:?}: a Boolean is not 0 or 1, or was not written"))
-        } else if stepped.early == 1 && !importer.early {
+        } else if stepped.early == 1 && !stepper.early {
             Some("returned early, which was not allowed".into())
-        } else if stepped.event == 1 && !importer.event_mode {
+        } else if stepped.event == 1 && !stepper.event_mode {
             Some("asked for event handling, but event mode is not used".into())
         } else {
             None
@@ -202,44 +220,22 @@ fn truly_early(session: &Session) -> Result<(), NotDetermined> {
 
 fn without_event_mode(session: &Session) -> Result<(), NotDetermined> {
     needs_event_mode!(session);
-    let importer = Importer::start(session, (false, false))?;
-    let status = importer.instance.simple(Simple::EnterEventMode)?;
+    let stepper = Stepper::start(session, (false, false))?;
+    let status = stepper.instance.simple(Simple::EnterEventMode)?;
     session.require(status == Status::ERROR, || format!("EnterEventMode returned {status}"));
     Ok(())
 }
 
 fn wrong_mode(session: &Session) -> Result<(), NotDetermined> {
     needs_event_mode!(session);
-    let check = |call: &str, status: Status| {
-        session.require(status == Status::ERROR, || format!("{call} returned {status}"));
-    };
-    session.case(|| {
-        let importer = Importer::start(session, (true, false))?;
-        importer.instance.must("EnterEventMode", importer.instance.simple(Simple::EnterEventMode)?)?;
-        let (t, h) = (importer.instance.time.get(), session.h());
-        let status = importer.instance.call("DoStep in Event Mode", |raw| {
-            raw.do_step(importer.instance.handle, t, h, false, [true; 4]).map(|(status, _)| status)
-        })?;
-        check("DoStep in Event Mode", status);
-        Ok(())
-    });
-    session.case(|| {
-        let importer = Importer::start(session, (true, false))?;
-        check("UpdateDiscreteStates in Step Mode", importer.instance.update()?.0);
-        Ok(())
-    });
-    session.case(|| {
-        let importer = Importer::start(session, (true, false))?;
-        check("EnterStepMode in Step Mode", importer.instance.simple(Simple::EnterStepMode)?);
-        Ok(())
-    });
+    attempt(session, Life::EventMode, '-');
     Ok(())
 }
 
 fn next_event_time(session: &Session) -> Result<(), NotDetermined> {
-    each_step(session, &|importer, _, _, _| {
-        let t = importer.instance.time.get();
-        let bad = importer.next.filter(|next| importer.event_mode && !importer.over && *next <= t - 1e-9 * t.abs());
+    each_step(session, &|stepper, _, _, _| {
+        let t = stepper.instance.time.get();
+        let bad = stepper.next.filter(|next| stepper.event_mode && !stepper.over && *next <= t - 1e-9 * t.abs());
         bad.map(|next| format!("reached {t:?}, and the next event time is {next:?}"))
     })
 }
@@ -248,19 +244,19 @@ fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     needs_event_mode!(session);
     let outputs: Vec<_> = session.watched().into_iter().filter(|v| v.base == BaseType::Float64).collect();
     let run = |visits: bool| -> Result<Vec<Vec<f64>>, NotDetermined> {
-        let mut importer = Importer::start(session, (true, false))?;
+        let mut stepper = Stepper::start(session, (true, false))?;
         let mut rows = Vec::new();
         for _ in 0..30 {
-            if importer.over {
+            if stepper.over {
                 break;
             }
-            let (status, stepped, _) = importer.step(session.h())?;
-            importer.instance.must("DoStep", status)?;
-            let due = importer.next.is_some_and(|next| next <= stepped.last + 1e-6 * session.h());
-            if visits && stepped.event == 0 && !due && !importer.over {
-                importer.event()?;
+            let (status, stepped, _) = stepper.step(session.h())?;
+            stepper.instance.must("DoStep", status)?;
+            let due = stepper.next.is_some_and(|next| next <= stepped.last + 1e-6 * session.h());
+            if visits && stepped.event == 0 && !due && !stepper.over {
+                stepper.event()?;
             }
-            let values = importer.instance.snapshot(&outputs)?;
+            let values = stepper.instance.snapshot(&outputs)?;
             rows.push(values.into_iter().flatten().map(f64::from_bits).collect());
         }
         Ok(rows)

@@ -10,14 +10,30 @@ const UPDATE: &str = "2.0.5, 3.2.2; 3.0.2, 2.3.5";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "E20", requirement: "Every update of the discrete states returns Booleans of 0 or 1, and a time where it defines a next event (should: a finite one).", clause: UPDATE, levels: Levels::MUST, tried: "Looks at the results of every update.", fix: "Write all results before returning OK.", run: Run::Exchange(update_results) },
-    Check { id: "E21", requirement: "The next time event, from the first update after initialization on, is an absolute time after now.", clause: UPDATE, levels: Levels::SHOULD, tried: "Looks at nextEventTime of every update.", fix: "Return an absolute time after now, from the first update on.", run: Run::Exchange(next_event_time) },
-    Check { id: "E22", requirement: "An event before the next time event does not lose it: the update defines it anew.", clause: UPDATE, levels: Levels::SHOULD, tried: "Makes an event before the next time event and looks at nextEventTime.", fix: "Compute the next time event in every update.", run: Run::Exchange(renewed) },
-    Check { id: "E23", requirement: "The iteration of an event comes to an end within 100 updates.", clause: "hardening", levels: Levels::HARD, tried: "Updates until no further update is needed.", fix: "End the iteration: newDiscreteStatesNeeded only if something has changed.", run: Run::Exchange(ends) },
-    Check { id: "E24a", requirement: "An update that changes a state says so with valuesOfContinuousStatesChanged.", clause: UPDATE, levels: Levels::SHOULD, tried: "Compares states before and after every update.", fix: "Set valuesOfContinuousStatesChanged whenever a state is reinitialized.", run: Run::Exchange(told_changes) },
-    Check { id: "E24b", requirement: "valuesOfContinuousStatesChanged is true only if a state has changed.", clause: UPDATE, levels: Levels(Some(Level::Must), Some(Level::Should)), tried: "Compares states before and after every update.", fix: "Clear the flag where no state is reinitialized.", run: Run::Exchange(true_changes) },
-    Check { id: "E25", requirement: "After Event Mode no event indicator is 0.", clause: "2.0.5, 3.2.2; 3.0.2, 3.1.1", levels: Levels::MUST, tried: "Reads the event indicators after Event Mode.", fix: "Shift an indicator that is 0, with a small hysteresis.", run: Run::Exchange(indicators) },
-    Check { id: "E26", requirement: "Discrete variables do not change in Continuous-Time Mode.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, tried: "Reads discrete variables between events.", fix: "Assign discrete variables in updates only.", run: Run::Exchange(discrete) },
+    Check { id: "E20", clause: UPDATE, levels: Levels::MUST, run: Run::Exchange(update_results),
+        requirement: "Every update of the discrete states returns Booleans of 0 or 1, and a time where it defines a next event (should: a finite one).",
+        tried: "Looks at the results of every update.", fix: "Write all results before returning OK." },
+    Check { id: "E21", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(next_event_time),
+        requirement: "The next time event, from the first update after initialization on, is an absolute time after now.",
+        tried: "Looks at nextEventTime of every update.", fix: "Return an absolute time after now, from the first update on." },
+    Check { id: "E22", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(renewed),
+        requirement: "An event before the next time event does not lose it: the update defines it anew.",
+        tried: "Makes an event before the next time event and looks at nextEventTime.", fix: "Compute the next time event in every update." },
+    Check { id: "E23", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(ends),
+        requirement: "The iteration of an event comes to an end within 100 updates.",
+        tried: "Updates until no further update is needed.", fix: "End the iteration: newDiscreteStatesNeeded only if something has changed." },
+    Check { id: "E24a", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(told_changes),
+        requirement: "An update that changes a state says so with valuesOfContinuousStatesChanged.",
+        tried: "Compares states before and after every update.", fix: "Set valuesOfContinuousStatesChanged whenever a state is reinitialized." },
+    Check { id: "E24b", clause: UPDATE, levels: Levels(Some(Level::Must), Some(Level::Should)), run: Run::Exchange(true_changes),
+        requirement: "valuesOfContinuousStatesChanged is true only if a state has changed.",
+        tried: "Compares states before and after every update.", fix: "Clear the flag where no state is reinitialized." },
+    Check { id: "E25", clause: "2.0.5, 3.2.2; 3.0.2, 3.1.1", levels: Levels::MUST, run: Run::Exchange(indicators),
+        requirement: "After Event Mode no event indicator is 0.",
+        tried: "Reads the event indicators after Event Mode.", fix: "Shift an indicator that is 0, with a small hysteresis." },
+    Check { id: "E26", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::Exchange(discrete),
+        requirement: "Discrete variables do not change in Continuous-Time Mode.",
+        tried: "Reads discrete variables between events.", fix: "Assign discrete variables in updates only." },
 ];
 
 /// Steps of the integrator in a probe of events.

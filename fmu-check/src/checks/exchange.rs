@@ -1,11 +1,12 @@
 //! Model Exchange: life cycle, states and their derivatives (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2).
 
+use super::calls::attempt;
 use super::dependencies::exchange_dependencies;
-use super::exchange_table::{allowed, allowed_early, minimal_run, refused};
 use crate::check::{Check, Level, Levels, Run};
-use crate::exchange::{Importer, Mode, deviation, differ};
+use crate::exchange::{Importer, deviation, differ};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::{Life, State};
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
@@ -14,28 +15,98 @@ const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "E00", requirement: "A minimal run of Model Exchange succeeds: initialization, event iteration, integrator steps, termination.", clause: TABLE, levels: Levels::MUST, tried: "Initializes, iterates events, integrates with Euler's method, terminates.", fix: "Look at the call that is named; the other checks of Model Exchange rest on this run.", run: Run::Exchange(minimal_run) },
-    Check { id: "E01", requirement: "Every call that the state of a Model Exchange instance allows succeeds.", clause: TABLE, levels: Levels::MUST, tried: "Makes every allowed call in every state of Model Exchange.", fix: "Extend the table of allowed states by the call that is named.", run: Run::Exchange(allowed) },
-    Check { id: "E01i", requirement: "States, derivatives, event indicators and nominals can be read in Initialization Mode.", clause: "2.0.5, 3.2.3; 3.0.2, 2.3.3", levels: Levels::SHOULD, tried: "Reads the vectors in Initialization Mode.", fix: "Compute them when they are read.", run: Run::Exchange(allowed_early) },
-    Check { id: "E02", requirement: "Every call that the state of a Model Exchange instance does not allow returns Error.", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Makes every call in every state that does not allow it.", fix: "Check the state at the beginning of every function, log and return Error.", run: Run::Exchange(refused) },
-    Check { id: "E03", requirement: "States, derivatives, event indicators and nominals are as many as the description has, and nothing is written past them.", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, tried: "Reads the vectors with guards behind them, and in FMI 3.0 the numbers.", fix: "Take the sizes from ModelStructure and numberOfEventIndicators.", run: Run::Exchange(counts) },
-    Check { id: "E04a", requirement: "The nominals of the continuous states are above 0.", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::MUST, tried: "Reads the nominals.", fix: "Return 1 where nothing is known.", run: Run::Exchange(positive_nominals) },
-    Check { id: "E04b", requirement: "The nominals of the continuous states are those of the description, or 1 where it has none.", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, tried: "Compares the nominals with the description.", fix: "Generate both from one table.", run: Run::Exchange(declared_nominals) },
-    Check { id: "E05", requirement: "Continuous states that are set can be read back, as a vector and as variables.", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, tried: "Sets the states and reads them.", fix: "Store the states as they came, and mark what depends on them as old.", run: Run::Exchange(round_trip) },
-    Check { id: "E06a", requirement: "Derivatives depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls.", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, tried: "Evaluates derivatives in other orders, repeatedly and in another instance, and compares.", fix: "Mark cached results as old in every Set function.", run: Run::Exchange(pure) },
-    Check { id: "E06b", requirement: "The same time, states and inputs give the same derivatives bit for bit.", clause: "hardening", levels: Levels::HARD, tried: "Compares the same evaluations bit for bit.", fix: "Start iterations from a fixed guess, and initialize memory.", run: Run::Exchange(same_bits) },
-    Check { id: "E07", requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states nor derivatives.", clause: "2.0.5, 3.2.2; 3.0.2, 3.2.1", levels: Levels::SHOULD, tried: "Completes steps without an event and compares.", fix: "Return false for both flags, and change nothing.", run: Run::Exchange(completed_step) },
-    Check { id: "E08", requirement: "The independent variable is the time that SetTime set.", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::SHOULD, tried: "Sets the time and reads the independent variable.", fix: "Assign the argument of SetTime to it.", run: Run::Exchange(independent) },
-    Check { id: "E09", requirement: "States that are NaN, infinite or huge cause no crash, no hang and no Error, but Discard at most: with valid ones the derivatives are those of before.", clause: "hardening", levels: Levels::HARD, tried: "Sets states of NaN, infinity and 1e300, reads derivatives, then sets good ones.", fix: "Return Discard, and keep nothing of the bad evaluation.", run: Run::Exchange(wild_states) },
-    Check { id: "E10", requirement: "A vector of the wrong length is refused with Error.", clause: "hardening", levels: Levels::HARD, tried: "Passes vectors that are too long by one.", fix: "Compare the length with the number of states or indicators.", run: Run::Exchange(wrong_length) },
-    Check { id: "E11", requirement: "An output or derivative changes only with the states and inputs among its dependencies.", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, tried: "Changes states and inputs one at a time and reads outputs and derivatives that do not name them.", fix: "Add them to dependencies, or leave dependencies out.", run: Run::Exchange(exchange_dependencies) },
-    Check { id: "E12", requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, tried: "Resets in every state, runs again, and compares.", fix: "Assign everything that instantiation assigns, including the event iteration.", run: Run::Exchange(reset) },
-    Check { id: "E13", requirement: "An FMU state saved in Event Mode or in Continuous-Time Mode restores the run from there.", clause: "2.0.5, 2.1.8; 3.0.2, 2.2.7.4", levels: Levels::MUST, tried: "Saves in Event Mode and Continuous-Time Mode, restores, runs, and compares.", fix: "Save event counters, next event times and the mode too.", run: Run::Exchange(saved_states) },
-    Check { id: "E14", requirement: "A state of a Model Exchange instance does no harm to an instance for co-simulation, nor the reverse.", clause: "hardening", levels: Levels::HARD, tried: "Sets a state of one kind of instance into the other.", fix: "Store the kind, and return Error.", run: Run::Exchange(foreign_states) },
+    Check { id: "E00", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(minimal_run),
+        requirement: "A minimal run of Model Exchange succeeds: initialization, event iteration, integrator steps, termination.",
+        tried: "Initializes, iterates events, integrates with Euler's method, terminates.",
+        fix: "Look at the call that is named; the other checks of Model Exchange rest on this run." },
+    Check { id: "E01", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(allowed),
+        requirement: "Every call that the state of a Model Exchange instance allows succeeds.",
+        tried: "Makes every allowed call in every state of Model Exchange.", fix: "Extend the table of allowed states by the call that is named." },
+    Check { id: "E01i", clause: "2.0.5, 3.2.3; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(allowed_early),
+        requirement: "States, derivatives, event indicators and nominals can be read in Initialization Mode.",
+        tried: "Reads the vectors in Initialization Mode.", fix: "Compute them when they are read." },
+    Check { id: "E02", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Exchange(refused),
+        requirement: "Every call that the state of a Model Exchange instance does not allow returns Error.",
+        tried: "Makes every call in every state that does not allow it.", fix: "Check the state at the beginning of every function, log and return Error." },
+    Check { id: "E03", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(counts),
+        requirement: "States, derivatives, event indicators and nominals are as many as the description has, and nothing is written past them.",
+        tried: "Reads the vectors with guards behind them, and in FMI 3.0 the numbers.",
+        fix: "Take the sizes from ModelStructure and numberOfEventIndicators." },
+    Check { id: "E04a", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Exchange(positive_nominals),
+        requirement: "The nominals of the continuous states are above 0.",
+        tried: "Reads the nominals.", fix: "Return 1 where nothing is known." },
+    Check { id: "E04b", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(declared_nominals),
+        requirement: "The nominals of the continuous states are those of the description, or 1 where it has none.",
+        tried: "Compares the nominals with the description.", fix: "Generate both from one table." },
+    Check { id: "E05", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(round_trip),
+        requirement: "Continuous states that are set can be read back, as a vector and as variables.",
+        tried: "Sets the states and reads them.", fix: "Store the states as they came, and mark what depends on them as old." },
+    Check { id: "E06a", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure),
+        requirement: "Derivatives depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls.",
+        tried: "Evaluates derivatives in other orders, repeatedly and in another instance, and compares.",
+        fix: "Mark cached results as old in every Set function." },
+    Check { id: "E06b", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(same_bits),
+        requirement: "Equal time, states and inputs give equal derivatives, bit for bit.",
+        tried: "Compares the same evaluations bit for bit.", fix: "Start iterations from a fixed guess, and initialize memory." },
+    Check { id: "E07", clause: "2.0.5, 3.2.2; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(completed_step),
+        requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states nor derivatives.",
+        tried: "Completes steps without an event and compares.", fix: "Return false for both flags, and change nothing." },
+    Check { id: "E08", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(independent),
+        requirement: "The independent variable is the time that SetTime set.",
+        tried: "Sets the time and reads the independent variable.", fix: "Assign the argument of SetTime to it." },
+    Check { id: "E09", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wild_states),
+        requirement: "States that are NaN, infinite or huge cause no crash, no hang and no Error, but Discard at most: with valid ones the derivatives are \
+            those of before.",
+        tried: "Sets states of NaN, infinity and 1e300, reads derivatives, then sets good ones.",
+        fix: "Return Discard, and keep nothing of the bad evaluation." },
+    Check { id: "E10", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wrong_length),
+        requirement: "A vector of the wrong length is refused with Error.",
+        tried: "Passes vectors that are too long by one.", fix: "Compare the length with the number of states or indicators." },
+    Check { id: "E11", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(exchange_dependencies),
+        requirement: "An output or derivative changes only with the states and inputs among its dependencies.",
+        tried: "Changes states and inputs one at a time and reads outputs and derivatives that do not name them.",
+        fix: "Add them to dependencies, or leave dependencies out." },
+    Check { id: "E12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset),
+        requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.",
+        tried: "Resets in every state, runs again, and compares.", fix: "Assign everything that instantiation assigns, including the event iteration." },
+    Check { id: "E13", clause: "2.0.5, 2.1.8; 3.0.2, 2.2.7.4", levels: Levels::MUST, run: Run::Exchange(saved_states),
+        requirement: "An FMU state saved in Event Mode or in Continuous-Time Mode restores the run from there.",
+        tried: "Saves in Event Mode and Continuous-Time Mode, restores, runs, and compares.",
+        fix: "Save event counters, next event times and the mode too." },
+    Check { id: "E14", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(foreign_states),
+        requirement: "A state of a Model Exchange instance does no harm to an instance for co-simulation, nor the reverse.",
+        tried: "Sets a state of one kind of instance into the other.", fix: "Store the kind, and return Error." },
 ];
 
+fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
+    let instance = session.exchange(State::Event)?;
+    let mut importer = Importer::start(&instance)?;
+    importer.run(10, &mut |_| Ok(()))?;
+    let _ = instance.snapshot(&session.watched())?;
+    if !importer.over {
+        let status = instance.simple(Simple::Terminate)?;
+        session.require(status.is_ok(), || format!("{} returned {status}", session.raw.name("Terminate")));
+    }
+    Ok(())
+}
+
+fn allowed(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::ModelExchange, '+');
+    Ok(())
+}
+
+fn allowed_early(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::ModelExchange, 's');
+    Ok(())
+}
+
+fn refused(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::ModelExchange, '-');
+    Ok(())
+}
+
 fn counts(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.exchange(Mode::Event)?;
+    let instance = session.exchange(State::Event)?;
     let (states, indicators) = (session.states(), session.indicators());
     if session.description.version == FmiVersion::V3 {
         let counts = [(Count::GetNumberOfContinuousStates, states), (Count::GetNumberOfEventIndicators, indicators)];
@@ -81,7 +152,7 @@ macro_rules! needs_states {
 }
 
 fn nominals(session: &Session) -> Result<Vec<f64>, NotDetermined> {
-    let instance = session.exchange(Mode::Continuous)?;
+    let instance = session.exchange(State::Continuous)?;
     let (status, values, _) = instance.vector(Vector::GetNominalsOfContinuousStates, session.states())?;
     instance.must("GetNominalsOfContinuousStates", status)?;
     Ok(values)
@@ -116,7 +187,7 @@ fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
 
 fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     needs_states!(session);
-    let instance = session.exchange(Mode::Continuous)?;
+    let instance = session.exchange(State::Continuous)?;
     let x = moved(session, &instance.states()?, usize::MAX);
     let status = instance.set_states(&x)?;
     if !status.is_ok() {
@@ -213,7 +284,7 @@ fn same_bits(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn completed_step(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.exchange(Mode::Continuous)?;
+    let instance = session.exchange(State::Continuous)?;
     for k in 0..5 {
         instance.must("SetTime", instance.set_time(instance.time.get() + 1e-3 * session.integrator_step())?)?;
         let before = [instance.states()?, instance.derivatives()?];
@@ -238,7 +309,7 @@ fn independent(session: &Session) -> Result<(), NotDetermined> {
     let Some(time) = session.description.variables.iter().find(fits) else {
         return session.not_applicable("there is no independent variable of type Float64");
     };
-    let instance = session.exchange(Mode::Continuous)?;
+    let instance = session.exchange(State::Continuous)?;
     for _ in 0..3 {
         let t = instance.time.get() + 0.1 * session.integrator_step();
         instance.must("SetTime", instance.set_time(t)?)?;
@@ -255,7 +326,7 @@ fn wild_states(session: &Session) -> Result<(), NotDetermined> {
     needs_states!(session);
     for wild in [f64::NAN, f64::INFINITY, 1e300] {
         session.case(|| {
-            let instance = session.exchange(Mode::Continuous)?;
+            let instance = session.exchange(State::Continuous)?;
             let (x, f) = (instance.states()?, instance.derivatives()?);
             let set = instance.set_states(&vec![wild; x.len()])?;
             let mut told = vec![("SetContinuousStates", set)];
@@ -294,7 +365,7 @@ fn wrong_length(session: &Session) -> Result<(), NotDetermined> {
         (Vector::GetEventIndicators, session.indicators() + 1),
     ] {
         session.case(|| {
-            let instance = session.exchange(Mode::Continuous)?;
+            let instance = session.exchange(State::Continuous)?;
             let mut room = vec![0.0; n + 8];
             let call = format!("{}(n={n})", name.as_str());
             let status = instance.call(&call, |raw| raw.vector(name, instance.handle, Some(&mut room), n))?;
@@ -307,23 +378,24 @@ fn wrong_length(session: &Session) -> Result<(), NotDetermined> {
 
 fn reset(session: &Session) -> Result<(), NotDetermined> {
     let run = |instance: &Instance<'_>| Importer::start(instance)?.trajectory(100);
-    let first = run(&session.exchange(Mode::Event)?)?;
-    for mode in Mode::ALL {
+    let first = run(&session.exchange(State::Event)?)?;
+    for &state in Life::ModelExchange.states() {
         session.case(|| {
-            let running = mode == Mode::Continuous;
-            let instance = session.exchange(if running { Mode::Event } else { mode })?;
+            let running = state == State::Continuous;
+            let instance = session.exchange(if running { State::Event } else { state })?;
             if running {
                 Importer::start(&instance)?.run(20, &mut |_| Ok(()))?;
             }
             let status = instance.simple(Simple::Reset)?;
             if !status.is_ok() {
-                session.violated(format!("Reset after {mode:?} returned {status}"));
+                session.violated(format!("Reset after {state:?} returned {status}"));
                 return Ok(());
             }
             instance.experiment(session.start(), None);
-            instance.bring_to(Mode::Event)?;
+            instance.bring_to(State::Event)?;
             if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
-                let text = format!("Reset after {mode:?}: the run differs from that of a new instance after {k} steps");
+                let text =
+                    format!("Reset after {state:?}: the run differs from that of a new instance after {k} steps");
                 session.deviates(largest, &text);
             }
             Ok(())
@@ -393,7 +465,7 @@ fn foreign_states(session: &Session) -> Result<(), NotDetermined> {
     }
     for to_simulation in [true, false] {
         session.case(|| {
-            let (exchange, simulation) = (session.exchange(Mode::Continuous)?, session.stepping()?);
+            let (exchange, simulation) = (session.exchange(State::Continuous)?, session.stepping()?);
             let (from, to) = if to_simulation { (&exchange, &simulation) } else { (&simulation, &exchange) };
             let saved = from.save()?;
             let status = to.call("SetFMUState of the other interface", |raw| raw.set_state(to.handle, saved))?;

@@ -11,10 +11,21 @@ use std::time::Duration;
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "B06", requirement: "The binary loads and runs in a secondary thread with a stack of 256 KiB.", clause: "hardening", levels: Levels::HARD, tried: "Loads and runs in a thread with 256 KiB.", fix: "Put large arrays on the heap.", run: Run::Probe(small_stack) },
-    Check { id: "B08f", requirement: "Neither loading nor any call changes the floating-point control (rounding, exceptions, flushing to zero).", clause: "hardening", levels: Levels::HARD, tried: "Reads the control registers after each call.", fix: "Restore them before returning; avoid -ffast-math when linking.", run: Run::Probe(floating_point) },
-    Check { id: "B08p", requirement: "A complete run, from loading to unloading, leaves the process unchanged: threads, child processes, open files, working directory, environment, umask, signals and the folder of the FMU.", clause: "hardening", levels: Levels::HARD, tried: "Compares the process before loading and after unloading.", fix: "Close files, end threads and processes, and leave directory, environment and signals alone.", run: Run::Probe(surroundings) },
-    Check { id: "Z09", requirement: "The FMU runs from a folder whose path has blanks, '%', '#', non-ASCII letters and more than 200 characters, and that contains only its binaries and resources.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, tried: "Runs from such a folder and compares.", fix: "Decode the URI in FMI 2.0, and use paths of any length.", run: Run::Probe(unusual_path) },
+    Check { id: "B06", clause: "hardening", levels: Levels::HARD, run: Run::Probe(small_stack),
+        requirement: "The binary loads and runs in a secondary thread with a stack of 256 KiB.",
+        tried: "Loads and runs in a thread with 256 KiB.", fix: "Put large arrays on the heap." },
+    Check { id: "B08f", clause: "hardening", levels: Levels::HARD, run: Run::Probe(floating_point),
+        requirement: "Neither loading nor any call changes the floating-point control (rounding, exceptions, flushing to zero).",
+        tried: "Reads the control registers after each call.", fix: "Restore them before returning; avoid -ffast-math when linking." },
+    Check { id: "B08p", clause: "hardening", levels: Levels::HARD, run: Run::Probe(surroundings),
+        requirement: "A complete run, from loading to unloading, leaves the process unchanged: threads, child processes, open files, working directory, \
+            environment, umask, signals and the folder of the FMU.",
+        tried: "Compares the process before loading and after unloading.",
+        fix: "Close files, end threads and processes, and leave directory, environment and signals alone." },
+    Check { id: "Z09", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(unusual_path),
+        requirement: "The FMU runs from a folder whose path has blanks, '%', '#', non-ASCII letters and more than 200 characters, and that contains only \
+            its binaries and resources.",
+        tried: "Runs from such a folder and compares.", fix: "Decode the URI in FMI 2.0, and use paths of any length." },
 ];
 
 /// Stack in bytes of the smallest thread that an importer may run the FMU in.
@@ -74,7 +85,7 @@ fn small_stack(session: &Session) -> Result<(), NotDetermined> {
 }
 
 /// Name of a call and the call.
-type Call<'a> = (&'a str, &'a dyn Fn() -> Result<(), NotDetermined>);
+type Watched<'a> = (&'a str, &'a dyn Fn() -> Result<(), NotDetermined>);
 
 fn floating_point(session: &Session) -> Result<(), NotDetermined> {
     let Some(before) = float_control() else {
@@ -96,7 +107,7 @@ fn floating_point(session: &Session) -> Result<(), NotDetermined> {
         return Ok(());
     }
     let instance = duplicate.fresh()?;
-    let steps: [Call<'_>; 6] = [
+    let steps: [Watched<'_>; 6] = [
         ("the instantiation", &|| Ok(())),
         ("entering initialization mode", &|| instance.enter()),
         ("leaving initialization mode", &|| instance.exit()),

@@ -12,12 +12,25 @@ use std::thread::Builder;
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "L04a", requirement: "Interleaved instances give the same results as each alone.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, tried: "Runs 8 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics.", run: Run::Probe(interleaved) },
-    Check { id: "L04b", requirement: "Instances in several threads give the same results as each alone.", clause: "2.0.5, 2.1; 3.0.2, 2.2.1", levels: Levels::SHOULD, tried: "Runs 4 instances in 4 threads and compares each with one alone.", fix: "Keep all data in the instance; protect what instances share.", run: Run::Probe(threads) },
-    Check { id: "L04c", requirement: "An instance can be created in one thread, used in another and freed in a third.", clause: "hardening", levels: Levels::HARD, tried: "Steps in a second thread, frees in a third.", fix: "Use no thread-local data.", run: Run::Probe(moving_between_threads) },
-    Check { id: "B05d", requirement: "Two copies of the binary, loaded with their symbols visible to each other, do not interfere.", clause: "hardening", levels: Levels::HARD, tried: "Loads two copies with their symbols visible to each other and compares.", fix: "Hide all symbols but those of the standard, or link with -Bsymbolic.", run: Run::Probe(copies) },
-    Check { id: "B07a", requirement: "Creating and freeing instances leaks no memory.", clause: "hardening", levels: Levels::HARD, tried: "Creates and frees 300 instances and measures memory.", fix: "Free in FreeInstance what Instantiate allocated; a sanitizer finds it.", run: Run::Probe(leaks) },
-    Check { id: "B07b", requirement: "The binary can be loaded and unloaded repeatedly and does not stay loaded.", clause: "hardening", levels: Levels::HARD, tried: "Loads and unloads 20 times.", fix: "End threads and unregister handlers when the library is unloaded.", run: Run::Probe(reloads) },
+    Check { id: "L04a", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(interleaved),
+        requirement: "Interleaved instances give the same results as each alone.",
+        tried: "Runs 8 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
+    Check { id: "L04b", clause: "2.0.5, 2.1; 3.0.2, 2.2.1", levels: Levels::SHOULD, run: Run::Probe(threads),
+        requirement: "Instances in several threads give the same results as each alone.",
+        tried: "Runs 4 instances in 4 threads and compares each with one alone.", fix: "Keep all data in the instance; protect what instances share." },
+    Check { id: "L04c", clause: "hardening", levels: Levels::HARD, run: Run::Probe(moving_between_threads),
+        requirement: "An instance can be created in one thread, used in another and freed in a third.",
+        tried: "Steps in a second thread, frees in a third.", fix: "Use no thread-local data." },
+    Check { id: "B05d", clause: "hardening", levels: Levels::HARD, run: Run::Probe(copies),
+        requirement: "Two copies of the binary, loaded with their symbols visible to each other, do not interfere.",
+        tried: "Loads two copies with their symbols visible to each other and compares.",
+        fix: "Hide all symbols but those of the standard, or link with -Bsymbolic." },
+    Check { id: "B07a", clause: "hardening", levels: Levels::HARD, run: Run::Probe(leaks),
+        requirement: "Creating and freeing instances leaks no memory.",
+        tried: "Creates and frees 300 instances and measures memory.", fix: "Free in FreeInstance what Instantiate allocated; a sanitizer finds it." },
+    Check { id: "B07b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(reloads),
+        requirement: "The binary can be loaded and unloaded repeatedly and does not stay loaded.",
+        tried: "Loads and unloads 20 times.", fix: "End threads and unregister handlers when the library is unloaded." },
 ];
 
 fn only_once(session: &Session) -> bool {

@@ -1,12 +1,12 @@
 //! The life cycle: allowed calls succeed, others are refused, and none crashes the process
 //! (FMI 2.0.5, 2.1.5 and 4.2.4; FMI 3.0.2, 2.2.4, 2.3 and 4.2).
 
-use super::lifecycle_states::State::{Error, Initialization, Instantiated, Step, Terminated};
-use super::lifecycle_states::in_state;
-use super::state_table::{allowed, configuration, null_instance, refused, unsupported};
+use super::by_name::{configuration, null_instance, unsupported};
+use super::calls::attempt;
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
+use crate::states::{Life, State::Error, State::Step};
 use fmu_import::raw::{Handle, Interface, Simple};
 use model_description::{Causality, FmiVersion};
 use std::ffi::CString;
@@ -15,24 +15,62 @@ const STATES: &str = "2.0.5, 4.2.4; 3.0.2, 4.2";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "L00", requirement: "A minimal run succeeds: instantiation, initialization, steps, termination.", clause: STATES, levels: Levels::MUST, tried: "Instantiates, initializes, makes 10 steps of the default experiment, reads outputs, terminates.", fix: "Look at the call that is named; the other checks of the binary rest on this run.", run: Run::Probe(minimal_run) },
-    Check { id: "X04", requirement: "Instantiation with a wrong token (GUID) returns NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, tried: "Instantiates with a wrong token.", fix: "Compare the argument with the token compiled in, and return NULL if it differs.", run: Run::Probe(token) },
-    Check { id: "L01a", requirement: "Instantiation returns NULL if the instance name is NULL or empty or the token is NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Instantiates with an empty name, without a name and without a token.", fix: "Check the arguments, and return NULL.", run: Run::Probe(null_arguments) },
-    Check { id: "L01b", requirement: "An instance works without a log callback (hard, if logging is on).", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), tried: "Runs with NULL as the log callback, once with logging off and once with it on.", fix: "Check the pointer before every message.", run: Run::Probe(without_logger) },
-    Check { id: "L01c", requirement: "An FMU without resources works without a resource path.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Runs without a resource path and with one that does not exist.", fix: "Read the path only if the FMU has resources.", run: Run::Probe(without_resources) },
-    Check { id: "L02", requirement: "The FMU does not read the struct of callbacks after fmi2Instantiate has returned.", clause: "2.0.5, 2.1.5", levels: Levels(Some(Level::Should), None), tried: "Frees the struct of callbacks after fmi2Instantiate and makes the FMU log.", fix: "Copy the struct, not its pointer.", run: Run::Probe(callbacks) },
-    Check { id: "L03", requirement: "Instantiation returns NULL for an interface that the FMU does not have and for event mode without hasEventMode.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Instantiates interfaces that the description does not have.", fix: "Return NULL for them.", run: Run::Probe(interfaces) },
-    Check { id: "L05", requirement: "FreeInstance is allowed in every state and ignores NULL.", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, tried: "Frees instances in every state, and NULL.", fix: "Return at once for NULL; free whatever the instance has then.", run: Run::Probe(free) },
-    Check { id: "L06", requirement: "Reset, in any state, restores a new instance: a second run equals the first.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, tried: "Resets in every state and after parameters were set, runs again, and compares with a new instance.", fix: "Assign everything that instantiation assigns, including time, inputs, outputs and solver.", run: Run::Probe(reset) },
-    Check { id: "L07", requirement: "Every call that the state allows succeeds.", clause: STATES, levels: Levels::MUST, tried: "Makes every allowed call in every state.", fix: "Extend the table of allowed states by the call that is named.", run: Run::Probe(allowed) },
-    Check { id: "L08", requirement: "Every call that the state does not allow returns Error.", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Makes every call in every state that does not allow it.", fix: "Check the state at the beginning of every function, log and return Error.", run: Run::Probe(refused) },
-    Check { id: "L08u", requirement: "A function of a capability that the FMU does not have returns Error in every state.", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::HARD, tried: "Calls the functions of missing capabilities in every state.", fix: "Return Error from stubs.", run: Run::Probe(unsupported) },
-    Check { id: "C03", requirement: "Without structural parameters, configuration mode is refused.", clause: "3.0.2, 2.3.6", levels: Levels(None, Some(Level::Should)), tried: "Calls fmi3EnterConfigurationMode.", fix: "Return Error where there is no structural parameter.", run: Run::Probe(configuration) },
-    Check { id: "L08n", requirement: "Every call without an instance (NULL) returns Error.", clause: "3.0.2, 2.2.1", levels: Levels::HARD, tried: "Calls every function with NULL as the instance.", fix: "Begin every function with a test of the instance.", run: Run::Probe(null_instance) },
-    Check { id: "L09a", requirement: "After an Error, the next step is refused.", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Provokes an Error, then makes a step.", fix: "Enter a state Error that refuses everything but Reset, SetFMUState and FreeInstance.", run: Run::Probe(after_error) },
-    Check { id: "L09b", requirement: "After an Error, Reset restores a working instance.", clause: "2.0.5, 2.1.3; 3.0.2, 2.2.4", levels: Levels::MUST, tried: "Provokes an Error, resets and runs.", fix: "Let Reset restore the state of a new instance, also from the state Error.", run: Run::Probe(recovery) },
-    Check { id: "L10", requirement: "After Terminate, the last values can be read (hard: they are those of before).", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.8", levels: Levels::MUST, tried: "Terminates and reads the outputs.", fix: "Keep the values until Reset or FreeInstance.", run: Run::Probe(terminated) },
-    Check { id: "L12", requirement: "A step beyond the stop time returns Error.", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.2", levels: Levels::MUST, tried: "Steps to the stop time, then beyond it.", fix: "Compare t + h with stopTime, with a little room for rounding.", run: Run::Probe(past_stop_time) },
+    Check { id: "L00", clause: STATES, levels: Levels::MUST, run: Run::Probe(minimal_run),
+        requirement: "A minimal run succeeds: instantiation, initialization, steps, termination.",
+        tried: "Instantiates, initializes, makes 10 steps of the default experiment, reads outputs, terminates.",
+        fix: "Look at the call that is named; the other checks of the binary rest on this run." },
+    Check { id: "X04", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(token),
+        requirement: "Instantiation with a wrong token (GUID) returns NULL.",
+        tried: "Instantiates with a wrong token.", fix: "Compare the argument with the token compiled in, and return NULL if it differs." },
+    Check { id: "L01a", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(null_arguments),
+        requirement: "Instantiation returns NULL if the instance name is NULL or empty or the token is NULL.",
+        tried: "Instantiates with an empty name, without a name and without a token.", fix: "Check the arguments, and return NULL." },
+    Check { id: "L01b", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(without_logger),
+        requirement: "An instance works without a log callback (hard, if logging is on).",
+        tried: "Runs with NULL as the log callback, once with logging off and once with it on.", fix: "Check the pointer before every message." },
+    Check { id: "L01c", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(without_resources),
+        requirement: "An FMU without resources works without a resource path.",
+        tried: "Runs without a resource path and with one that does not exist.", fix: "Read the path only if the FMU has resources." },
+    Check { id: "L02", clause: "2.0.5, 2.1.5", levels: Levels(Some(Level::Should), None), run: Run::Probe(callbacks),
+        requirement: "The FMU does not read the struct of callbacks after fmi2Instantiate has returned.",
+        tried: "Frees the struct of callbacks after fmi2Instantiate and makes the FMU log.", fix: "Copy the struct, not its pointer." },
+    Check { id: "L03", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(interfaces),
+        requirement: "Instantiation returns NULL for an interface that the FMU does not have and for event mode without hasEventMode.",
+        tried: "Instantiates interfaces that the description does not have.", fix: "Return NULL for them." },
+    Check { id: "L05", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(free),
+        requirement: "FreeInstance is allowed in every state and ignores NULL.",
+        tried: "Frees instances in every state, and NULL.", fix: "Return at once for NULL; free whatever the instance has then." },
+    Check { id: "L06", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(reset),
+        requirement: "Reset, in any state, restores a new instance: a second run equals the first.",
+        tried: "Resets in every state and after parameters were set, runs again, and compares with a new instance.",
+        fix: "Assign everything that instantiation assigns, including time, inputs, outputs and solver." },
+    Check { id: "L07", clause: STATES, levels: Levels::MUST, run: Run::Probe(allowed),
+        requirement: "Every call that the state allows succeeds.",
+        tried: "Makes every allowed call in every state.", fix: "Extend the table of allowed states by the call that is named." },
+    Check { id: "L08", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(refused),
+        requirement: "Every call that the state does not allow returns Error.",
+        tried: "Makes every call in every state that does not allow it.", fix: "Check the state at the beginning of every function, log and return Error." },
+    Check { id: "L08u", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::HARD, run: Run::Probe(unsupported),
+        requirement: "A function of a capability that the FMU does not have returns Error in every state.",
+        tried: "Calls the functions of missing capabilities in every state.", fix: "Return Error from stubs." },
+    Check { id: "C03", clause: "3.0.2, 2.3.6", levels: Levels(None, Some(Level::Should)), run: Run::Probe(configuration),
+        requirement: "Without structural parameters, configuration mode is refused.",
+        tried: "Calls fmi3EnterConfigurationMode.", fix: "Return Error where there is no structural parameter." },
+    Check { id: "L08n", clause: "3.0.2, 2.2.1", levels: Levels::HARD, run: Run::Probe(null_instance),
+        requirement: "Every call without an instance (NULL) returns Error.",
+        tried: "Calls every function with NULL as the instance.", fix: "Begin every function with a test of the instance." },
+    Check { id: "L09a", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(after_error),
+        requirement: "After an Error, the next step is refused.",
+        tried: "Provokes an Error, then makes a step.", fix: "Enter a state Error that refuses everything but Reset, SetFMUState and FreeInstance." },
+    Check { id: "L09b", clause: "2.0.5, 2.1.3; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(recovery),
+        requirement: "After an Error, Reset restores a working instance.",
+        tried: "Provokes an Error, resets and runs.", fix: "Let Reset restore the state of a new instance, also from the state Error." },
+    Check { id: "L10", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.8", levels: Levels::MUST, run: Run::Probe(terminated),
+        requirement: "After Terminate, the last values can be read (hard: they are those of before).",
+        tried: "Terminates and reads the outputs.", fix: "Keep the values until Reset or FreeInstance." },
+    Check { id: "L12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.2", levels: Levels::MUST, run: Run::Probe(past_stop_time),
+        requirement: "A step beyond the stop time returns Error.",
+        tried: "Steps to the stop time, then beyond it.", fix: "Compare t + h with stopTime, with a little room for rounding." },
 ];
 
 fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
@@ -48,6 +86,16 @@ fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
     let _ = instance.snapshot(&session.watched())?;
     let status = instance.simple(Simple::Terminate)?;
     session.require(status.is_ok(), || format!("{} returned {status}", session.raw.name("Terminate")));
+    Ok(())
+}
+
+fn allowed(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::CoSimulation, '+');
+    Ok(())
+}
+
+fn refused(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::CoSimulation, '-');
     Ok(())
 }
 
@@ -186,8 +234,8 @@ fn free(session: &Session) -> Result<(), NotDetermined> {
         session.record_call(&format!("{}(NULL)", session.raw.name("FreeInstance")));
         session.raw.free(Handle::NULL).ok_or_else(|| NotDetermined("FreeInstance is missing".into()))
     });
-    for state in [Instantiated, Initialization, Step, Terminated, Error] {
-        session.case(|| match in_state(session, state) {
+    for &state in Life::CoSimulation.states().iter().chain([&Error]) {
+        session.case(|| match session.simulation(state) {
             Ok(instance) => instance.free(),
             // Some FMUs return no Error; another check reports that.
             Err(NotDetermined(why)) => {
@@ -206,9 +254,9 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
         instance.run(20, session.h())
     };
     let first = run(&session.fresh()?)?;
-    for state in [Instantiated, Initialization, Step, Terminated, Error] {
+    for &state in Life::CoSimulation.states().iter().chain([&Error]) {
         session.case(|| {
-            let Ok(instance) = in_state(session, state) else { return Ok(()) };
+            let Ok(instance) = session.simulation(state) else { return Ok(()) };
             // Reset must discard what was set.
             if matches!(state, Step) {
                 instance.change_inputs(1)?;
@@ -244,7 +292,7 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn after_error(session: &Session) -> Result<(), NotDetermined> {
-    let instance = in_state(session, Step)?;
+    let instance = session.simulation(Step)?;
     let how = instance.provoke()?;
     let status = instance.step_at(instance.time.get(), session.h())?;
     session.require(!status.is_ok(), || format!("after {how} had returned Error, DoStep returned {status}"));
@@ -252,7 +300,7 @@ fn after_error(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn recovery(session: &Session) -> Result<(), NotDetermined> {
-    let instance = in_state(session, Step)?;
+    let instance = session.simulation(Step)?;
     let how = instance.provoke()?;
     let status = instance.simple(Simple::Reset)?;
     if !status.is_ok() {
@@ -267,7 +315,7 @@ fn recovery(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn terminated(session: &Session) -> Result<(), NotDetermined> {
-    let instance = in_state(session, Step)?;
+    let instance = session.simulation(Step)?;
     let watched = session.watched();
     let before = instance.snapshot(&watched)?;
     let status = instance.simple(Simple::Terminate)?;

@@ -3,7 +3,7 @@
 use crate::check::{Check, Level, Levels, Run};
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
-use fmu_import::raw::{Event, allocations, take_events};
+use fmu_import::raw::{LogCall, allocations, take_events};
 use model_description::FmiVersion;
 use std::ffi::CString;
 
@@ -11,18 +11,34 @@ const LOG: &str = "2.0.5, 2.1.5; 3.0.2, 2.3.1";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "G-L1b", requirement: "Every message has a category from LogCategories, or NULL if there are none (in FMI 2.0 since 2.0.3).", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), tried: "Runs with an Error and logging on, and reads the categories of all messages.", fix: "List all categories that are used in LogCategories.", run: Run::Probe(categories) },
-    Check { id: "G-L2a", requirement: "SetDebugLogging accepts an empty list, meaning all categories, and each category of LogCategories.", clause: LOG, levels: Levels::MUST, tried: "Switches logging with an empty list and with each category.", fix: "Accept 0 categories with NULL, and every listed one.", run: Run::Probe(switch) },
-    Check { id: "G-L2b", requirement: "A category that does not exist or is NULL gives Error and does no harm.", clause: "hardening", levels: Levels::HARD, tried: "Switches logging with an unknown category and with NULL.", fix: "Look the category up, and return Error.", run: Run::Probe(unknown) },
-    Check { id: "G-L3a", requirement: "With logging on, every Error is accompanied by a message of that status.", clause: "3.0.2, 2.3.1", levels: Levels::SHOULD, tried: "Provokes an Error with logging on.", fix: "Log in the one place that returns Error.", run: Run::Probe(errors) },
-    Check { id: "G-L3b", requirement: "Messages are UTF-8, not empty, and have no trailing line break.", clause: LOG, levels: Levels::SHOULD, tried: "Reads the messages of a run with an Error.", fix: "Write UTF-8 without a line break at the end.", run: Run::Probe(texts) },
-    Check { id: "G-L4", requirement: "Messages carry the environment, and in FMI 2.0 the name, that were passed on instantiation.", clause: LOG, levels: Levels::MUST, tried: "Reads environment and name of all messages.", fix: "Store both per instance.", run: Run::Probe(identity) },
-    Check { id: "G-L5", requirement: "With logging off, the FMU logs only errors.", clause: LOG, levels: Levels::SHOULD, tried: "Runs with an Error and logging off, and reads the messages.", fix: "Check loggingOn before each message.", run: Run::Probe(silence) },
-    Check { id: "M01", requirement: "With canNotUseMemoryManagementFunctions, the FMU does not call the memory functions of the importer, and they may be NULL.", clause: "2.0.5, 2.1.5", levels: Levels(Some(Level::Must), None), tried: "Runs with counting memory functions, then with NULL instead.", fix: "Use malloc and free, as the flag says, or drop the flag.", run: Run::Probe(memory) },
+    Check { id: "G-L1b", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(categories),
+        requirement: "Every message has a category from LogCategories, or NULL if there are none (in FMI 2.0 since 2.0.3).",
+        tried: "Runs with an Error and logging on, and reads the categories of all messages.", fix: "List all categories that are used in LogCategories." },
+    Check { id: "G-L2a", clause: LOG, levels: Levels::MUST, run: Run::Probe(switch),
+        requirement: "SetDebugLogging accepts an empty list, meaning all categories, and each category of LogCategories.",
+        tried: "Switches logging with an empty list and with each category.", fix: "Accept 0 categories with NULL, and every listed one." },
+    Check { id: "G-L2b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(unknown),
+        requirement: "A category that does not exist or is NULL gives Error and does no harm.",
+        tried: "Switches logging with an unknown category and with NULL.", fix: "Look the category up, and return Error." },
+    Check { id: "G-L3a", clause: "3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(errors),
+        requirement: "With logging on, every Error is accompanied by a message of that status.",
+        tried: "Provokes an Error with logging on.", fix: "Log in the one place that returns Error." },
+    Check { id: "G-L3b", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(texts),
+        requirement: "Messages are UTF-8, not empty, and have no trailing line break.",
+        tried: "Reads the messages of a run with an Error.", fix: "Write UTF-8 without a line break at the end." },
+    Check { id: "G-L4", clause: LOG, levels: Levels::MUST, run: Run::Probe(identity),
+        requirement: "Messages carry the environment, and in FMI 2.0 the name, that were passed on instantiation.",
+        tried: "Reads environment and name of all messages.", fix: "Store both per instance." },
+    Check { id: "G-L5", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(silence),
+        requirement: "With logging off, the FMU logs only errors.",
+        tried: "Runs with an Error and logging off, and reads the messages.", fix: "Check loggingOn before each message." },
+    Check { id: "M01", clause: "2.0.5, 2.1.5", levels: Levels(Some(Level::Must), None), run: Run::Probe(memory),
+        requirement: "With canNotUseMemoryManagementFunctions, the FMU does not call the memory functions of the importer, and they may be NULL.",
+        tried: "Runs with counting memory functions, then with NULL instead.", fix: "Use malloc and free, as the flag says, or drop the flag." },
 ];
 
 /// The log of a run with an error, and the environment and name of its instance.
-fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<Event>, usize, String), NotDetermined> {
+fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<LogCall>, usize, String), NotDetermined> {
     let _ = take_events();
     let mut arguments = session.arguments("a probe's name");
     arguments.logging = logging;
@@ -40,7 +56,7 @@ fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<Event>, usize, 
     Ok((take_events(), environment, "a probe's name".into()))
 }
 
-fn show(event: &Event) -> String {
+fn show(event: &LogCall) -> String {
     let category = event.category.as_deref().unwrap_or("NULL");
     format!("{} [{category}] {:?}", Status(event.status), event.text.as_deref().unwrap_or("(none, or not UTF-8)"))
 }

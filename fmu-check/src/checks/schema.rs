@@ -12,7 +12,7 @@ pub(super) fn deviations(root: &Element, version: FmiVersion) -> Vec<String> {
     along(root, "fmiModelDescription", rules)
 }
 
-/// The same for terminalsAndIcons.xml, which is the same in both standards.
+/// Deviations of terminalsAndIcons.xml from its schema, which both standards share.
 pub(super) fn deviations_of_terminals(root: &Element) -> Vec<String> {
     along(root, "fmiTerminalsAndIcons", TERMINALS)
 }

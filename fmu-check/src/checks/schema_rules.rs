@@ -21,10 +21,19 @@ const REAL: &str = "quantity:s unit:s displayUnit:s relativeQuantity:b unbounded
 
 #[rustfmt::skip]
 pub(super) const V2: &[Rule] = &[
-    rule("fmiModelDescription", "fmiVersion:s! modelName:s! guid:s! description:s author:s version:s copyright:s license:s generationTool:s generationDateAndTime:t variableNamingConvention:s numberOfEventIndicators:u",
+    rule("fmiModelDescription",
+        "fmiVersion:s! modelName:s! guid:s! description:s author:s version:s copyright:s license:s generationTool:s generationDateAndTime:t \
+         variableNamingConvention:s numberOfEventIndicators:u",
         "ModelExchange|CoSimulation UnitDefinitions? TypeDefinitions? LogCategories? DefaultExperiment? VendorAnnotations? ModelVariables! ModelStructure!"),
-    rule("ModelExchange", "modelIdentifier:s! needsExecutionTool:b completedIntegratorStepNotNeeded:b canBeInstantiatedOnlyOncePerProcess:b canNotUseMemoryManagementFunctions:b canGetAndSetFMUstate:b canSerializeFMUstate:b providesDirectionalDerivative:b", "SourceFiles?"),
-    rule("CoSimulation", "modelIdentifier:s! needsExecutionTool:b canHandleVariableCommunicationStepSize:b canInterpolateInputs:b maxOutputDerivativeOrder:u canRunAsynchronuously:b canBeInstantiatedOnlyOncePerProcess:b canNotUseMemoryManagementFunctions:b canGetAndSetFMUstate:b canSerializeFMUstate:b providesDirectionalDerivative:b", "SourceFiles?"),
+    rule("ModelExchange",
+        "modelIdentifier:s! needsExecutionTool:b completedIntegratorStepNotNeeded:b canBeInstantiatedOnlyOncePerProcess:b \
+         canNotUseMemoryManagementFunctions:b canGetAndSetFMUstate:b canSerializeFMUstate:b providesDirectionalDerivative:b",
+        "SourceFiles?"),
+    rule("CoSimulation",
+        "modelIdentifier:s! needsExecutionTool:b canHandleVariableCommunicationStepSize:b canInterpolateInputs:b maxOutputDerivativeOrder:u \
+         canRunAsynchronuously:b canBeInstantiatedOnlyOncePerProcess:b canNotUseMemoryManagementFunctions:b canGetAndSetFMUstate:b \
+         canSerializeFMUstate:b providesDirectionalDerivative:b",
+        "SourceFiles?"),
     rule("SourceFiles", "", "File!"),
     rule("File", "name:s!", ""),
     rule("UnitDefinitions", "", "Unit!"),
@@ -45,9 +54,13 @@ pub(super) const V2: &[Rule] = &[
     rule("VendorAnnotations", "", "Tool!"),
     rule("Tool", "name:s!", "*"),
     rule("ModelVariables", "", "ScalarVariable!"),
-    rule("ScalarVariable", "name:s! valueReference:u! description:s causality:s variability:s initial:s canHandleMultipleSetPerTimeInstant:b", "Real|Integer|Boolean|String|Enumeration Annotations?"),
+    rule("ScalarVariable",
+        "name:s! valueReference:u! description:s causality:s variability:s initial:s canHandleMultipleSetPerTimeInstant:b",
+        "Real|Integer|Boolean|String|Enumeration Annotations?"),
     rule("Annotations", "", "Tool!"),
-    rule("ScalarVariable/Real", "declaredType:s quantity:s unit:s displayUnit:s relativeQuantity:b unbounded:b min:d max:d nominal:d start:d derivative:u reinit:b", ""),
+    rule("ScalarVariable/Real",
+        "declaredType:s quantity:s unit:s displayUnit:s relativeQuantity:b unbounded:b min:d max:d nominal:d start:d derivative:u reinit:b",
+        ""),
     rule("ScalarVariable/Integer", "declaredType:s quantity:s min:i max:i start:i", ""),
     rule("ScalarVariable/Boolean", "declaredType:s start:b", ""),
     rule("ScalarVariable/String", "declaredType:s start:s", ""),
@@ -59,22 +72,36 @@ pub(super) const V2: &[Rule] = &[
     rule("Unknown", "index:u! dependencies:l dependenciesKind:w", ""),
 ];
 
-const SUPPORT: &str = "modelIdentifier:s! needsExecutionTool:b canBeInstantiatedOnlyOncePerProcess:b canGetAndSetFMUState:b canSerializeFMUState:b providesDirectionalDerivatives:b providesAdjointDerivatives:b providesPerElementDependencies:b";
-const VARIABLE: &str = "name:s! valueReference:u! description:s causality:s variability:s canHandleMultipleSetPerTimeInstant:b clocks:l intermediateUpdate:b previous:u";
-const CLOCK: &str = "canBeDeactivated:b priority:u intervalVariability:s! intervalDecimal:d shiftDecimal:d supportsFraction:b resolution:u intervalCounter:u shiftCounter:u";
+const SUPPORT: &str = "\
+    modelIdentifier:s! needsExecutionTool:b canBeInstantiatedOnlyOncePerProcess:b canGetAndSetFMUState:b canSerializeFMUState:b \
+    providesDirectionalDerivatives:b providesAdjointDerivatives:b providesPerElementDependencies:b";
+const VARIABLE: &str = "\
+    name:s! valueReference:u! description:s causality:s variability:s canHandleMultipleSetPerTimeInstant:b clocks:l intermediateUpdate:b previous:u";
+const CLOCK: &str = "\
+    canBeDeactivated:b priority:u intervalVariability:s! intervalDecimal:d shiftDecimal:d supportsFraction:b resolution:u intervalCounter:u \
+    shiftCounter:u";
 
 #[rustfmt::skip]
 pub(super) const V3: &[Rule] = &[
-    rule("fmiModelDescription", "fmiVersion:s! modelName:s! instantiationToken:s! description:s author:s version:s copyright:s license:s generationTool:s generationDateAndTime:t variableNamingConvention:s",
-        "ModelExchange? CoSimulation? ScheduledExecution? UnitDefinitions? TypeDefinitions? LogCategories? DefaultExperiment? ModelVariables! ModelStructure! Annotations?"),
+    rule("fmiModelDescription",
+        "fmiVersion:s! modelName:s! instantiationToken:s! description:s author:s version:s copyright:s license:s generationTool:s \
+         generationDateAndTime:t variableNamingConvention:s",
+        "ModelExchange? CoSimulation? ScheduledExecution? UnitDefinitions? TypeDefinitions? LogCategories? DefaultExperiment? ModelVariables! \
+         ModelStructure! Annotations?"),
     rule("ModelExchange", "@support needsCompletedIntegratorStep:b providesEvaluateDiscreteStates:b *", "Annotations?"),
-    rule("CoSimulation", "@support canHandleVariableCommunicationStepSize:b fixedInternalStepSize:d maxOutputDerivativeOrder:u recommendedIntermediateInputSmoothness:i providesIntermediateUpdate:b mightReturnEarlyFromDoStep:b canReturnEarlyAfterIntermediateUpdate:b hasEventMode:b providesEvaluateDiscreteStates:b *", "Annotations?"),
+    rule("CoSimulation",
+        "@support canHandleVariableCommunicationStepSize:b fixedInternalStepSize:d maxOutputDerivativeOrder:u \
+         recommendedIntermediateInputSmoothness:i providesIntermediateUpdate:b mightReturnEarlyFromDoStep:b canReturnEarlyAfterIntermediateUpdate:b \
+         hasEventMode:b providesEvaluateDiscreteStates:b *",
+        "Annotations?"),
     rule("ScheduledExecution", "@support *", "Annotations?"),
     rule("UnitDefinitions", "", "Unit!"),
     rule("Unit", "name:s!", "BaseUnit? DisplayUnit Annotations?"),
     rule("BaseUnit", "kg:i m:i s:i A:i K:i mol:i cd:i rad:i factor:d offset:d", ""),
     rule("DisplayUnit", "name:s! factor:d offset:d inverse:b", "Annotations?"),
-    rule("TypeDefinitions", "", "~Float32Type Float64Type Int8Type UInt8Type Int16Type UInt16Type Int32Type UInt32Type Int64Type UInt64Type BooleanType StringType BinaryType EnumerationType ClockType"),
+    rule("TypeDefinitions", "",
+        "~Float32Type Float64Type Int8Type UInt8Type Int16Type UInt16Type Int32Type UInt32Type Int64Type UInt64Type \
+         BooleanType StringType BinaryType EnumerationType ClockType"),
     rule("Float32Type", "name:s! description:s @real", "Annotations?"),
     rule("Float64Type", "name:s! description:s @real", "Annotations?"),
     rule("@IntegerType", "name:s! description:s quantity:s min:i max:i", "Annotations?"),
@@ -97,7 +124,9 @@ pub(super) const V3: &[Rule] = &[
     rule("String", "@variable declaredType:s initial:s", "Annotations? Dimension Start Alias"),
     rule("Binary", "@variable declaredType:s initial:s mimeType:s maxSize:u", "Annotations? Dimension Start Alias"),
     rule("Enumeration", "@variable declaredType:s! initial:s quantity:s min:i max:i start:*", "Annotations? Dimension Alias"),
-    rule("Clock", "name:s! valueReference:u! description:s causality:s variability:s canHandleMultipleSetPerTimeInstant:b clocks:l declaredType:s @clock", "Annotations? Alias"),
+    rule("Clock",
+        "name:s! valueReference:u! description:s causality:s variability:s canHandleMultipleSetPerTimeInstant:b clocks:l declaredType:s @clock",
+        "Annotations? Alias"),
     rule("Dimension", "start:u valueReference:u", ""),
     rule("Start", "value:*!", ""),
     rule("Alias", "name:s! description:s displayUnit:s", "Annotations?"),

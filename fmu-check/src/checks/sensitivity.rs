@@ -12,11 +12,21 @@ const DIRECTIONAL: &str = "2.0.5, 2.1.9; 3.0.2, 2.2.12.1";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "D01", requirement: "Directional derivatives in Continuous-Time Mode agree with central differences of Set and Get, to 0.1 %.", clause: DIRECTIONAL, levels: Levels::SHOULD, tried: "Compares with central differences of the FMU's own values.", fix: "Check the order of the seed and the columns of the matrix.", run: Run::Exchange(differences) },
-    Check { id: "D02", requirement: "Adjoint and directional derivatives belong to one matrix: w'(J v) = (J'w)'v.", clause: "3.0.2, 2.2.12.2", levels: Levels(None, Some(Level::Should)), tried: "Multiplies both matrices with random vectors.", fix: "Transpose the same matrix.", run: Run::Exchange(adjoint) },
-    Check { id: "D03", requirement: "Partial derivatives of variables that do not exist, and with a seed or result of the wrong length, give Error.", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Passes references that do not exist, and wrong lengths.", fix: "Check references and lengths first.", run: Run::Exchange(wrong_arguments) },
-    Check { id: "D04", requirement: "A partial derivative changes no state, derivative, event indicator or output.", clause: "hardening", levels: Levels::HARD, tried: "Reads everything before and after.", fix: "Compute on a copy.", run: Run::Exchange(unchanged) },
-    Check { id: "D05", requirement: "With the flag on CoSimulation, directional derivatives can be read at communication points.", clause: "2.0.5, 4.2.4; 3.0.2, 4.2.1", levels: Levels::MUST, tried: "Reads a derivative of each output between steps.", fix: "Implement the function for co-simulation too, or drop the flag there.", run: Run::Probe(at_communication_points) },
+    Check { id: "D01", clause: DIRECTIONAL, levels: Levels::SHOULD, run: Run::Exchange(differences),
+        requirement: "Directional derivatives in Continuous-Time Mode agree with central differences of Set and Get, to 0.1 %.",
+        tried: "Compares with central differences of the FMU's own values.", fix: "Check the order of the seed and the columns of the matrix." },
+    Check { id: "D02", clause: "3.0.2, 2.2.12.2", levels: Levels(None, Some(Level::Should)), run: Run::Exchange(adjoint),
+        requirement: "Adjoint and directional derivatives belong to one matrix: w'(J v) = (J'w)'v.",
+        tried: "Multiplies both matrices with random vectors.", fix: "Transpose the same matrix." },
+    Check { id: "D03", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Exchange(wrong_arguments),
+        requirement: "Partial derivatives of variables that do not exist, and with a seed or result of the wrong length, give Error.",
+        tried: "Passes references that do not exist, and wrong lengths.", fix: "Check references and lengths first." },
+    Check { id: "D04", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(unchanged),
+        requirement: "A partial derivative changes no state, derivative, event indicator or output.",
+        tried: "Reads everything before and after.", fix: "Compute on a copy." },
+    Check { id: "D05", clause: "2.0.5, 4.2.4; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(at_communication_points),
+        requirement: "With the flag on CoSimulation, directional derivatives can be read at communication points.",
+        tried: "Reads a derivative of each output between steps.", fix: "Implement the function for co-simulation too, or drop the flag there." },
 ];
 
 fn directional(interface: Option<&Interface>) -> bool {

@@ -1,9 +1,9 @@
 //! Saved states (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
 
-use super::lifecycle_states::{State, in_state};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::State;
 use crate::trajectory::difference;
 use fmu_import::Status;
 use fmu_import::raw::SavedState;
@@ -13,17 +13,44 @@ const STATE: &str = "2.0.5, 2.1.8; 3.0.2, 2.2.7.4";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "F01a", requirement: "A state can be read, set repeatedly and freed in every state of the life cycle; freeing it returns NULL.", clause: STATE, levels: Levels::MUST, tried: "Gets, sets twice and frees a state in each state of the life cycle.", fix: "Allow the calls in all these states, and write NULL after freeing.", run: Run::Probe(in_every_state) },
-    Check { id: "F01b", requirement: "Reading a state into an existing one overwrites it, and freeing NULL is ignored.", clause: STATE, levels: Levels::MUST, tried: "Gets a state into an existing one, runs, restores, and compares; frees NULL.", fix: "Overwrite the memory that the pointer has; return OK for NULL.", run: Run::Probe(overwrite) },
-    Check { id: "F02a", requirement: "A run from a restored state equals the run from the time of saving.", clause: STATE, levels: Levels::MUST, tried: "Saves, runs 50 steps, restores twice, and compares.", fix: "Save everything that a step reads: solver memory, buffers, counters, file positions.", run: Run::Probe(rerun_from_state) },
-    Check { id: "F02b", requirement: "A restored state restores all variables: parameters, inputs and outputs.", clause: STATE, levels: Levels::MUST, tried: "Saves, changes inputs and parameters, steps, restores, and compares all variables.", fix: "Save parameters, inputs and outputs too.", run: Run::Probe(variables) },
-    Check { id: "F02c", requirement: "After an Error, a state saved earlier restores a working instance.", clause: "2.0.5, 2.1.3; 3.0.2, 2.2.4", levels: Levels(Some(Level::Should), Some(Level::Must)), tried: "Saves, provokes an Error, restores, runs, and compares.", fix: "Allow SetFMUState in the state Error, and save the state of the life cycle.", run: Run::Probe(after_error) },
-    Check { id: "F03a", requirement: "A state can be set into another instance of the FMU.", clause: "hardening", levels: Levels::HARD, tried: "Sets a state into another instance, runs, and compares.", fix: "Keep no pointer to the instance in the state.", run: Run::Probe(other_instance) },
-    Check { id: "F03b", requirement: "A NULL state and a NULL pointer to a state give Error.", clause: "hardening", levels: Levels::HARD, tried: "Passes NULL states and NULL pointers.", fix: "Check the pointers.", run: Run::Probe(null_states) },
-    Check { id: "F04a", requirement: "A serialized state can be restored in another instance: the run from it is the same.", clause: STATE, levels: Levels::MUST, tried: "Serializes, deserializes in another instance, runs, and compares.", fix: "Write every member by value.", run: Run::Probe(serialized) },
-    Check { id: "F04b", requirement: "Equal states give equal bytes: no addresses and no uninitialized memory.", clause: "hardening", levels: Levels::HARD, tried: "Serializes two instances after the same run and compares.", fix: "Write no addresses, and clear padding.", run: Run::Probe(equal_bytes) },
-    Check { id: "F04c", requirement: "Bytes that are not a state (empty, truncated, altered) give Error and never crash the process.", clause: "hardening", levels: Levels::HARD, tried: "Deserializes truncated, altered and random bytes, and steps if they are accepted.", fix: "Begin with a mark, a version and a length, and end with a checksum.", run: Run::Probe(corrupted) },
-    Check { id: "F04d", requirement: "A buffer of the wrong size gives Error, and the FMU writes nothing past it.", clause: "hardening", levels: Levels::HARD, tried: "Serializes into buffers that are too small.", fix: "Compare the size before writing.", run: Run::Probe(wrong_size) },
+    Check { id: "F01a", clause: STATE, levels: Levels::MUST, run: Run::Probe(in_every_state),
+        requirement: "A state can be read, set repeatedly and freed in every state of the life cycle; freeing it returns NULL.",
+        tried: "Gets, sets twice and frees a state in each state of the life cycle.",
+        fix: "Allow the calls in all these states, and write NULL after freeing." },
+    Check { id: "F01b", clause: STATE, levels: Levels::MUST, run: Run::Probe(overwrite),
+        requirement: "Reading a state into an existing one overwrites it, and freeing NULL is ignored.",
+        tried: "Gets a state into an existing one, runs, restores, and compares; frees NULL.",
+        fix: "Overwrite the memory that the pointer has; return OK for NULL." },
+    Check { id: "F02a", clause: STATE, levels: Levels::MUST, run: Run::Probe(rerun_from_state),
+        requirement: "A run from a restored state equals the run from the time of saving.",
+        tried: "Saves, runs 50 steps, restores twice, and compares.",
+        fix: "Save everything that a step reads: solver memory, buffers, counters, file positions." },
+    Check { id: "F02b", clause: STATE, levels: Levels::MUST, run: Run::Probe(variables),
+        requirement: "A restored state restores all variables: parameters, inputs and outputs.",
+        tried: "Saves, changes inputs and parameters, steps, restores, and compares all variables.", fix: "Save parameters, inputs and outputs too." },
+    Check { id: "F02c", clause: "2.0.5, 2.1.3; 3.0.2, 2.2.4", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(after_error),
+        requirement: "After an Error, a state saved earlier restores a working instance.",
+        tried: "Saves, provokes an Error, restores, runs, and compares.",
+        fix: "Allow SetFMUState in the state Error, and save the state of the life cycle." },
+    Check { id: "F03a", clause: "hardening", levels: Levels::HARD, run: Run::Probe(other_instance),
+        requirement: "A state can be set into another instance of the FMU.",
+        tried: "Sets a state into another instance, runs, and compares.", fix: "Keep no pointer to the instance in the state." },
+    Check { id: "F03b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(null_states),
+        requirement: "A NULL state and a NULL pointer to a state give Error.",
+        tried: "Passes NULL states and NULL pointers.", fix: "Check the pointers." },
+    Check { id: "F04a", clause: STATE, levels: Levels::MUST, run: Run::Probe(serialized),
+        requirement: "A serialized state can be restored in another instance: the run from it is the same.",
+        tried: "Serializes, deserializes in another instance, runs, and compares.", fix: "Write every member by value." },
+    Check { id: "F04b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(equal_bytes),
+        requirement: "Equal states give equal bytes: no addresses and no uninitialized memory.",
+        tried: "Serializes two instances after the same run and compares.", fix: "Write no addresses, and clear padding." },
+    Check { id: "F04c", clause: "hardening", levels: Levels::HARD, run: Run::Probe(corrupted),
+        requirement: "Bytes that are not a state (empty, truncated, altered) give Error and never crash the process.",
+        tried: "Deserializes truncated, altered and random bytes, and steps if they are accepted.",
+        fix: "Begin with a mark, a version and a length, and end with a checksum." },
+    Check { id: "F04d", clause: "hardening", levels: Levels::HARD, run: Run::Probe(wrong_size),
+        requirement: "A buffer of the wrong size gives Error, and the FMU writes nothing past it.",
+        tried: "Serializes into buffers that are too small.", fix: "Compare the size before writing." },
 ];
 
 fn can(session: &Session, flag: fn(&CoSimulation) -> bool) -> bool {
@@ -43,7 +70,7 @@ fn in_every_state(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     for state in [State::Instantiated, State::Initialization, State::Step, State::Terminated] {
         session.case(|| {
-            let instance = in_state(session, state)?;
+            let instance = session.simulation(state)?;
             let mut saved = SavedState::NULL;
             let got = instance.call("GetFMUState", |raw| raw.get_state(instance.handle, Some(&mut saved)))?;
             session.require(got.is_ok() && saved != SavedState::NULL, || {
@@ -118,7 +145,7 @@ fn report(
     }
 }
 
-/// As [`rerun`], for a check that takes F02a for granted: where a run from a restored state differs anyway, it cannot decide.
+/// Like [`rerun`], for a check that takes F02a for granted: where a run from a restored state differs anyway, it cannot decide.
 fn rerun_given_f02a(instance: &Instance<'_>, first: &[Vec<Vec<u64>>], what: &str) -> Result<(), NotDetermined> {
     let (session, h) = (instance.session, instance.session.h());
     let same = |second: &Result<Vec<Vec<Vec<u64>>>, NotDetermined>, first: &[Vec<Vec<u64>>]| {
@@ -211,11 +238,11 @@ fn other_instance(session: &Session) -> Result<(), NotDetermined> {
 }
 
 /// A call that ought to be refused.
-type Call = fn(&Instance<'_>) -> Result<Status, NotDetermined>;
+type Attempt = fn(&Instance<'_>) -> Result<Status, NotDetermined>;
 
 fn null_states(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
-    let cases: [(&str, Call); 2] = [
+    let cases: [(&str, Attempt); 2] = [
         ("SetFMUState(NULL)", |instance| {
             instance.call("SetFMUState(NULL)", |raw| raw.set_state(instance.handle, SavedState::NULL))
         }),

@@ -16,11 +16,23 @@ const FILE: &str = "terminalsAndIcons/terminalsAndIcons.xml";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "I01", requirement: "terminalsAndIcons.xml has the elements and version of the standard and names variables that exist.", clause: "2.0.5, 2.3.2; 3.0.2, 2.4.9", levels: Levels::MUST, tried: "Compares the file with rules that have the content of the schema, and looks variable names up.", fix: "Correct the line that is named; fmiVersion is 3.0 in both standards.", run: Run::File(elements) },
-    Check { id: "I01n", requirement: "Terminal names are present and unique, and so are member names wherever members are matched by name.", clause: TERMINALS, levels: Levels::MUST, tried: "Compares the names of terminals and members.", fix: "Give each terminal and, for plug and bus, each member a name of its own.", run: Run::File(names) },
-    Check { id: "I01k", requirement: "Members are inputs, outputs or parameters; inflows and outflows are scalar; vendor-specific matching rules have reverse domain names.", clause: TERMINALS, levels: Levels::MUST, tried: "Looks up what the members are, and the matching rules.", fix: "Use inputs, outputs and parameters as members, and reverse domain names for rules of your own.", run: Run::File(kinds) },
-    Check { id: "I01p", requirement: "Pictures are available as PNG, and the corners of the coordinate system are in order.", clause: "2.0.5, 2.3.2; 3.0.2, 2.4.9.1", levels: Levels::MUST, tried: "Looks for the PNG of every icon and reads the coordinate system.", fix: "Pack the PNG of every iconBaseName; x1 < x2 and y1 < y2.", run: Run::File(pictures) },
-    Check { id: "I02", requirement: "Without terminalsAndIcons/ and extra/ the FMU gives the same results.", clause: "2.0.5, 2.3.1; 3.0.2, 2.5.1.6", levels: Levels::MUST, tried: "Runs 20 steps from a copy of the folder without them, and compares.", fix: "Read at run time from resources/ only.", run: Run::Probe(stripped) },
+    Check { id: "I01", clause: "2.0.5, 2.3.2; 3.0.2, 2.4.9", levels: Levels::MUST, run: Run::File(elements),
+        requirement: "terminalsAndIcons.xml has the elements and version of the standard and names variables that exist.",
+        tried: "Compares the file with rules that have the content of the schema, and looks variable names up.",
+        fix: "Correct the line that is named; fmiVersion is 3.0 in both standards." },
+    Check { id: "I01n", clause: TERMINALS, levels: Levels::MUST, run: Run::File(names),
+        requirement: "Terminal names are present and unique, and so are member names wherever members are matched by name.",
+        tried: "Compares the names of terminals and members.", fix: "Give each terminal and, for plug and bus, each member a name of its own." },
+    Check { id: "I01k", clause: TERMINALS, levels: Levels::MUST, run: Run::File(kinds),
+        requirement: "Members are inputs, outputs or parameters; inflows and outflows are scalar; vendor-specific matching rules have reverse domain names.",
+        tried: "Looks up what the members are, and the matching rules.",
+        fix: "Use inputs, outputs and parameters as members, and reverse domain names for rules of your own." },
+    Check { id: "I01p", clause: "2.0.5, 2.3.2; 3.0.2, 2.4.9.1", levels: Levels::MUST, run: Run::File(pictures),
+        requirement: "Pictures are available as PNG, and the corners of the coordinate system are in order.",
+        tried: "Looks for the PNG of every icon and reads the coordinate system.", fix: "Pack the PNG of every iconBaseName; x1 < x2 and y1 < y2." },
+    Check { id: "I02", clause: "2.0.5, 2.3.1; 3.0.2, 2.5.1.6", levels: Levels::MUST, run: Run::Probe(stripped),
+        requirement: "Without terminalsAndIcons/ and extra/ the FMU gives the same results.",
+        tried: "Runs 20 steps from a copy of the folder without them, and compares.", fix: "Read at run time from resources/ only." },
 ];
 
 /// The file's text; `None` where there is none.

@@ -13,23 +13,63 @@ const STEP: &str = "2.0.5, 4.2.2; 3.0.2, 4.2.1";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "T01a", requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6.", clause: STEP, levels: Levels::SHOULD, tried: "Runs 20 steps from each start time.", fix: "Use startTime instead of 0.", run: Run::Probe(start_times) },
-    Check { id: "T01b", requirement: "A communication point other than the end of the last step gives Error.", clause: STEP, levels: Levels::HARD, tried: "Makes a step that does not begin where the last ended.", fix: "Compare currentCommunicationPoint with the time of the FMU, with room for rounding.", run: Run::Probe(gap) },
-    Check { id: "T01c", requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps.", clause: STEP, levels: Levels::MUST, tried: "Makes up to 100000 steps within the default experiment, with t = t + h.", fix: "Compare times with a tolerance relative to the step, and count steps in integers.", run: Run::Probe(accumulated) },
-    Check { id: "T02a", requirement: "A step size of 0 or less gives Error.", clause: STEP, levels: Levels(Some(Level::Hard), Some(Level::Should)), tried: "Makes steps of 0 and of -h.", fix: "Return Error unless the step is above 0.", run: Run::Probe(non_positive_step) },
-    Check { id: "T02b", requirement: "A step size or time that is NaN or infinite gives Error and returns promptly.", clause: "hardening", levels: Levels::HARD, tried: "Makes steps of NaN, infinity and 1e300, and from times of NaN and infinity.", fix: "Write the condition so that NaN fails it: !(h > 0 && h < limit).", run: Run::Probe(non_finite_step) },
-    Check { id: "T03", requirement: "Halving the communication step gives approximately the same results with inputs held.", clause: STEP, levels: Levels::HARD, tried: "Runs 40 steps whole and in halves, and compares to 10 %.", fix: "Integrate with internal steps; note an output that is a mean.", run: Run::Probe(halves) },
-    Check { id: "T04", requirement: "With canHandleVariableCommunicationStepSize, steps of 0.05 to 3 times the usual size succeed.", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::SHOULD, tried: "Makes 200 steps of random sizes.", fix: "Divide the step into internal ones, the last of them shorter.", run: Run::Probe(variable) },
-    Check { id: "T05", requirement: "With noSetFMUStatePriorToCurrentPoint, steps succeed, and the state at the current point can still be saved and set (should: no result changes).", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1", levels: Levels::MUST, tried: "Runs with and without the flag, saves and restores, and compares.", fix: "Treat the flag as a hint for result buffers only.", run: Run::Probe(no_set_state_before) },
-    Check { id: "T06a", requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has not returned early without permission (should: lastSuccessfulTime is less than a step from t + h).", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), tried: "Makes 20 steps and looks at the four results.", fix: "Write all four results before returning OK.", run: Run::Probe(step_results) },
-    Check { id: "T06b", requirement: "The independent variable equals the time of the last communication point.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, tried: "Reads the independent variable after steps.", fix: "Assign t + h to it at the end of a step.", run: Run::Probe(independent) },
-    Check { id: "T06c", requirement: "NULL pointers for results do no harm.", clause: "3.0.2, 2.2.1", levels: Levels(None, Some(Level::Hard)), tried: "Passes NULL for each result.", fix: "Check the pointers before writing.", run: Run::Probe(null_results) },
-    Check { id: "T07", requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), tried: "Asks each function for each kind of status.", fix: "Return Discard for what is not available.", run: Run::Probe(statuses) },
-    Check { id: "T09", requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::MUST, tried: "Reads first derivatives of all continuous outputs.", fix: "Implement the function, or set maxOutputDerivativeOrder to 0.", run: Run::Probe(output_derivatives) },
-    Check { id: "T09s", requirement: "First derivatives of outputs match the slopes, to 10 %; orders above the maximum give Error.", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::SHOULD, tried: "Compares derivatives with slopes over short steps, and asks for other orders.", fix: "Return the derivative at the end of the step, and Error for orders beyond the maximum.", run: Run::Probe(slopes) },
-    Check { id: "T11", requirement: "With canInterpolateInputs, first derivatives of continuous inputs can be set.", clause: "2.0.5, 4.2.1", levels: Levels(Some(Level::Must), None), tried: "Sets a derivative of an input of order 1.", fix: "Implement the function, or set canInterpolateInputs to false.", run: Run::Probe(input_derivatives) },
-    Check { id: "T10", requirement: "Two consecutive runs with the same inputs are equal bit for bit.", clause: "hardening", levels: Levels::HARD, tried: "Runs twice in one process and compares bits.", fix: "Initialize all memory.", run: Run::Probe(determinism) },
-    Check { id: "T10p", requirement: "Two processes with different addresses give the same results bit for bit.", clause: "hardening", levels: Levels::HARD, tried: "Runs in two processes and compares hashes.", fix: "Let nothing depend on addresses, time or the process.", run: Run::Twice(two_processes) },
+    Check { id: "T01a", clause: STEP, levels: Levels::SHOULD, run: Run::Probe(start_times),
+        requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6.",
+        tried: "Runs 20 steps from each start time.", fix: "Use startTime instead of 0." },
+    Check { id: "T01b", clause: STEP, levels: Levels::HARD, run: Run::Probe(gap),
+        requirement: "A communication point other than the end of the last step gives Error.",
+        tried: "Makes a step that does not begin where the last ended.",
+        fix: "Compare currentCommunicationPoint with the time of the FMU, with room for rounding." },
+    Check { id: "T01c", clause: STEP, levels: Levels::MUST, run: Run::Probe(accumulated),
+        requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps.",
+        tried: "Makes up to 100000 steps within the default experiment, with t = t + h.",
+        fix: "Compare times with a tolerance relative to the step, and count steps in integers." },
+    Check { id: "T02a", clause: STEP, levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(non_positive_step),
+        requirement: "A step size of 0 or less gives Error.",
+        tried: "Makes steps of 0 and of -h.", fix: "Return Error unless the step is above 0." },
+    Check { id: "T02b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(non_finite_step),
+        requirement: "A step size or time that is NaN or infinite gives Error and returns promptly.",
+        tried: "Makes steps of NaN, infinity and 1e300, and from times of NaN and infinity.",
+        fix: "Write the condition so that NaN fails it: !(h > 0 && h < limit)." },
+    Check { id: "T03", clause: STEP, levels: Levels::HARD, run: Run::Probe(halves),
+        requirement: "Halving the communication step gives approximately the same results with inputs held.",
+        tried: "Runs 40 steps whole and in halves, and compares to 10 %.", fix: "Integrate with internal steps; note an output that is a mean." },
+    Check { id: "T04", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::SHOULD, run: Run::Probe(variable),
+        requirement: "With canHandleVariableCommunicationStepSize, steps of 0.05 to 3 times the usual size succeed.",
+        tried: "Makes 200 steps of random sizes.", fix: "Divide the step into internal ones, the last of them shorter." },
+    Check { id: "T05", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(no_set_state_before),
+        requirement: "With noSetFMUStatePriorToCurrentPoint, steps succeed, and the state at the current point can still be saved and set (should: no \
+            result changes).",
+        tried: "Runs with and without the flag, saves and restores, and compares.", fix: "Treat the flag as a hint for result buffers only." },
+    Check { id: "T06a", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results),
+        requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has not returned early without permission (should: \
+            lastSuccessfulTime is less than a step from t + h).",
+        tried: "Makes 20 steps and looks at the four results.", fix: "Write all four results before returning OK." },
+    Check { id: "T06b", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent),
+        requirement: "The independent variable equals the time of the last communication point.",
+        tried: "Reads the independent variable after steps.", fix: "Assign t + h to it at the end of a step." },
+    Check { id: "T06c", clause: "3.0.2, 2.2.1", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(null_results),
+        requirement: "NULL pointers for results do no harm.",
+        tried: "Passes NULL for each result.", fix: "Check the pointers before writing." },
+    Check { id: "T07", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), run: Run::Probe(statuses),
+        requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.",
+        tried: "Asks each function for each kind of status.", fix: "Return Discard for what is not available." },
+    Check { id: "T09", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::MUST, run: Run::Probe(output_derivatives),
+        requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read.",
+        tried: "Reads first derivatives of all continuous outputs.", fix: "Implement the function, or set maxOutputDerivativeOrder to 0." },
+    Check { id: "T09s", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::SHOULD, run: Run::Probe(slopes),
+        requirement: "First derivatives of outputs match the slopes, to 10 %; orders above the maximum give Error.",
+        tried: "Compares derivatives with slopes over short steps, and asks for other orders.",
+        fix: "Return the derivative at the end of the step, and Error for orders beyond the maximum." },
+    Check { id: "T11", clause: "2.0.5, 4.2.1", levels: Levels(Some(Level::Must), None), run: Run::Probe(input_derivatives),
+        requirement: "With canInterpolateInputs, first derivatives of continuous inputs can be set.",
+        tried: "Sets a derivative of an input of order 1.", fix: "Implement the function, or set canInterpolateInputs to false." },
+    Check { id: "T10", clause: "hardening", levels: Levels::HARD, run: Run::Probe(determinism),
+        requirement: "Two consecutive runs with the same inputs are equal bit for bit.",
+        tried: "Runs twice in one process and compares bits.", fix: "Initialize all memory." },
+    Check { id: "T10p", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes),
+        requirement: "Two processes with different addresses give the same results bit for bit.",
+        tried: "Runs in two processes and compares hashes.", fix: "Let nothing depend on addresses, time or the process." },
 ];
 
 fn start_times(session: &Session) -> Result<(), NotDetermined> {
@@ -355,7 +395,7 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
         session.note("the FMU does not save states");
         return Ok(());
     }
-    // A state that does not lead back without the flag is no matter of the flag: F02a is about that.
+    // A state that does not lead back even without the flag is unrelated to the flag; F02a checks it.
     let (here, time) = (unrestricted.save()?, unrestricted.time.get());
     let first = unrestricted.run(10, session.h())?;
     unrestricted.restore(here, time)?;

@@ -1,6 +1,7 @@
 //! Variables, types and units (FMI 2.0.5, 2.2.2, 2.2.3, 2.2.7; FMI 3.0.2, 2.4.3, 2.4.4, 2.4.7).
 
 use super::clocked::alias_units;
+use super::names::grammar;
 use super::units;
 use super::xml::with_description;
 use crate::check::{Check, Level, Levels, Run, Verdict};
@@ -14,26 +15,77 @@ const TABLE: &str = "2.0.5, 2.2.7; 3.0.2, 2.4.7.4";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "V01a", requirement: "Names of variables and aliases are unique, not empty, and free of line breaks and tabs.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, tried: "Compares the names of all variables and aliases.", fix: "Make names unique, for example with the path of the component.", run: Run::File(names) },
-    Check { id: "V01b", requirement: "With the naming convention \"structured\", every name follows the grammar.", clause: "2.0.5, 2.2.9; 3.0.2, 2.4.7.5.1", levels: Levels::MUST, tried: "Parses every name if variableNamingConvention is structured.", fix: "Put names with other characters in single quotes, or declare the convention flat.", run: Run::File(structured) },
-    Check { id: "V02a", requirement: "Value references are unique.", clause: "3.0.2, 2.4.7.4", levels: Levels(None, Some(Level::Must)), tried: "Compares the value references of all variables.", fix: "Number the variables over all types; use Alias for a second name.", run: Run::File(references) },
-    Check { id: "V02b", requirement: "Variables that share a value reference are true aliases: at most one can be set, constants alias only equal constants, and there is one start value and one unit.", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), tried: "Compares variables of one base type that share a value reference.", fix: "Give settable variables references of their own, and one start value and one unit to a set of aliases.", run: Run::File(aliases) },
-    Check { id: "V03", requirement: "The independent variable is a continuous number without start and initial; FMI 3.0 requires exactly one, FMI 2.0 allows at most one.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, tried: "Looks at the variables with causality independent.", fix: "Add one variable time, continuous, without start and initial.", run: Run::File(independent) },
-    Check { id: "V04a", requirement: "Causality and variability are a legal pair.", clause: TABLE, levels: Levels::MUST, tried: "Looks causality and variability up in the table of the standard.", fix: "Take a pair of the table; parameters are fixed or tunable, inputs discrete or continuous.", run: Run::File(pairs) },
-    Check { id: "V04b", requirement: "The attribute initial has a value that causality and variability allow.", clause: TABLE, levels: Levels::MUST, tried: "Looks initial up in the table of the standard.", fix: "Leave initial out where its default is right, and always at inputs of FMI 2.0.", run: Run::File(initials) },
-    Check { id: "V04c", requirement: "A start value is present where it is required and absent where it is forbidden.", clause: TABLE, levels: Levels::MUST, tried: "Compares the start value with initial, or with its default.", fix: "Add start to inputs, parameters and initial exact or approx; drop it where initial is calculated, the default of outputs.", run: Run::File(starts) },
-    Check { id: "V05", requirement: "Only floating-point variables are continuous; in FMI 2.0 all others give their variability, because continuous is its default.", clause: TABLE, levels: Levels::MUST, tried: "Reads variability of all variables that are not floating-point.", fix: "Write variability=\"discrete\" (or fixed, tunable, constant) at Integer, Boolean, String and Enumeration.", run: Run::File(continuous) },
-    Check { id: "V06a", requirement: "min <= start <= max, and nominal is not 0.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::SHOULD, tried: "Compares min, start, max and nominal.", fix: "Correct the limits or the start value; leave nominal out if it is not known.", run: Run::File(ranges) },
-    Check { id: "V08a", requirement: "declaredType names a type definition of the same base type; every enumeration has one.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, tried: "Looks declaredType up in TypeDefinitions.", fix: "Define the type with the base type of the variable.", run: Run::File(types) },
-    Check { id: "V08b", requirement: "Type definitions have unique names; enumeration items have unique names and values.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, tried: "Compares names of types, and names and values of enumeration items.", fix: "Give each its own name and value.", run: Run::File(definitions) },
-    Check { id: "V09a", requirement: "Every unit is defined in UnitDefinitions, and a display unit comes with a unit; in FMI 3.0 it belongs to that unit.", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, tried: "Looks unit and displayUnit of variables and types up in UnitDefinitions.", fix: "Define the unit with its display units, or drop the attribute.", run: Run::File(unit_names) },
-    Check { id: "V09b", requirement: "Unit names are unique, and display unit names are unique within their unit.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::MUST, tried: "Compares the names of units and of display units within a unit.", fix: "Define each once.", run: Run::File(unique_units) },
-    Check { id: "V09c", requirement: "The base unit of a common unit has the exponents and factor that the name implies.", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, tried: "Compares the base units of about 100 common names with their meaning.", fix: "Correct exponents, factor and offset: value in base units = factor * value + offset.", run: Run::File(bases) },
-    Check { id: "V09d", requirement: "A common display unit has the factor that its name implies (display = factor * value + offset).", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, tried: "Compares the factors of common display units with their meaning.", fix: "Correct the factor: display value = factor * value + offset, the opposite direction to BaseUnit.", run: Run::File(displays) },
-    Check { id: "V10", requirement: "Only aliases of floating-point variables have a display unit, and it belongs to the unit of the variable.", clause: "3.0.2, 2.4.7.5", levels: Levels(None, Some(Level::Must)), tried: "Looks at the attribute displayUnit of aliases.", fix: "Define the display unit in the unit of the variable, or drop it.", run: Run::File(alias_units) },
-    Check { id: "V11", requirement: "Only continuous variables use intermediateUpdate, and only inputs use canHandleMultipleSetPerTimeInstant.", clause: "3.0.2, 2.4.7.4", levels: Levels(None, Some(Level::Must)), tried: "Looks at the two attributes of all variables.", fix: "Drop the attribute where it does not apply.", run: Run::File(flags) },
-    Check { id: "V13", requirement: "A dimension is a positive number or refers to a structural parameter or constant of type UInt64, and an array has one start value or as many as elements.", clause: "3.0.2, 2.4.7.2", levels: Levels(None, Some(Level::Must)), tried: "Follows dimensions to their structural parameters and counts start values.", fix: "Give one start value or one for each element, row by row.", run: Run::File(arrays) },
-    Check { id: "V14", requirement: "Start values have the type of the variable and lie within the range of that type.", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, tried: "Parses start values as values of the variable's type.", fix: "Write numbers with a point, in the range of the type.", run: Run::File(start_value_types) },
+    Check { id: "V01a", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::File(names),
+        requirement: "Names of variables and aliases are unique, not empty, and free of line breaks and tabs.",
+        tried: "Compares the names of all variables and aliases.", fix: "Make names unique, for example with the path of the component." },
+    Check { id: "V01b", clause: "2.0.5, 2.2.9; 3.0.2, 2.4.7.5.1", levels: Levels::MUST, run: Run::File(structured),
+        requirement: "With the naming convention \"structured\", every name follows the grammar.",
+        tried: "Parses every name if variableNamingConvention is structured.",
+        fix: "Put names with other characters in single quotes, or declare the convention flat." },
+    Check { id: "V02a", clause: "3.0.2, 2.4.7.4", levels: Levels(None, Some(Level::Must)), run: Run::File(references),
+        requirement: "Value references are unique.",
+        tried: "Compares the value references of all variables.", fix: "Number the variables over all types; use Alias for a second name." },
+    Check { id: "V02b", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(aliases),
+        requirement: "Variables that share a value reference are true aliases: at most one can be set, constants alias only equal constants, and there is \
+            one start value and one unit.",
+        tried: "Compares variables of one base type that share a value reference.",
+        fix: "Give settable variables references of their own, and one start value and one unit to a set of aliases." },
+    Check { id: "V03", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::File(independent),
+        requirement: "The independent variable is a continuous number without start and initial; FMI 3.0 requires exactly one, FMI 2.0 allows at most one.",
+        tried: "Looks at the variables with causality independent.", fix: "Add one variable time, continuous, without start and initial." },
+    Check { id: "V04a", clause: TABLE, levels: Levels::MUST, run: Run::File(pairs),
+        requirement: "Causality and variability are a legal pair.",
+        tried: "Looks causality and variability up in the table of the standard.",
+        fix: "Take a pair of the table; parameters are fixed or tunable, inputs discrete or continuous." },
+    Check { id: "V04b", clause: TABLE, levels: Levels::MUST, run: Run::File(initials),
+        requirement: "The attribute initial has a value that causality and variability allow.",
+        tried: "Looks initial up in the table of the standard.", fix: "Leave initial out where its default is right, and always at inputs of FMI 2.0." },
+    Check { id: "V04c", clause: TABLE, levels: Levels::MUST, run: Run::File(starts),
+        requirement: "A start value is present where it is required and absent where it is forbidden.",
+        tried: "Compares the start value with initial, or with its default.",
+        fix: "Add start to inputs, parameters and initial exact or approx; drop it where initial is calculated, the default of outputs." },
+    Check { id: "V05", clause: TABLE, levels: Levels::MUST, run: Run::File(continuous),
+        requirement: "Only floating-point variables are continuous; in FMI 2.0 all others give their variability, because continuous is its default.",
+        tried: "Reads variability of all variables that are not floating-point.",
+        fix: "Write variability=\"discrete\" (or fixed, tunable, constant) at Integer, Boolean, String and Enumeration." },
+    Check { id: "V06a", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::SHOULD, run: Run::File(ranges),
+        requirement: "min <= start <= max, and nominal is not 0.",
+        tried: "Compares min, start, max and nominal.", fix: "Correct the limits or the start value; leave nominal out if it is not known." },
+    Check { id: "V08a", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::File(types),
+        requirement: "declaredType names a type definition of the same base type; every enumeration has one.",
+        tried: "Looks declaredType up in TypeDefinitions.", fix: "Define the type with the base type of the variable." },
+    Check { id: "V08b", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(definitions),
+        requirement: "Type definitions have unique names; enumeration items have unique names and values.",
+        tried: "Compares names of types, and names and values of enumeration items.", fix: "Give each its own name and value." },
+    Check { id: "V09a", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(unit_names),
+        requirement: "Every unit is defined in UnitDefinitions, and a display unit comes with a unit; in FMI 3.0 it belongs to that unit.",
+        tried: "Looks unit and displayUnit of variables and types up in UnitDefinitions.",
+        fix: "Define the unit with its display units, or drop the attribute." },
+    Check { id: "V09b", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::MUST, run: Run::File(unique_units),
+        requirement: "Unit names are unique, and display unit names are unique within their unit.",
+        tried: "Compares the names of units and of display units within a unit.", fix: "Define each once." },
+    Check { id: "V09c", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(bases),
+        requirement: "The base unit of a common unit has the exponents and factor that the name implies.",
+        tried: "Compares the base units of about 100 common names with their meaning.",
+        fix: "Correct exponents, factor and offset: value in base units = factor * value + offset." },
+    Check { id: "V09d", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(displays),
+        requirement: "A common display unit has the factor that its name implies (display = factor * value + offset).",
+        tried: "Compares the factors of common display units with their meaning.",
+        fix: "Correct the factor: display value = factor * value + offset, the opposite direction to BaseUnit." },
+    Check { id: "V10", clause: "3.0.2, 2.4.7.5", levels: Levels(None, Some(Level::Must)), run: Run::File(alias_units),
+        requirement: "Only aliases of floating-point variables have a display unit, and it belongs to the unit of the variable.",
+        tried: "Looks at the attribute displayUnit of aliases.", fix: "Define the display unit in the unit of the variable, or drop it." },
+    Check { id: "V11", clause: "3.0.2, 2.4.7.4", levels: Levels(None, Some(Level::Must)), run: Run::File(flags),
+        requirement: "Only continuous variables use intermediateUpdate, and only inputs use canHandleMultipleSetPerTimeInstant.",
+        tried: "Looks at the two attributes of all variables.", fix: "Drop the attribute where it does not apply." },
+    Check { id: "V13", clause: "3.0.2, 2.4.7.2", levels: Levels(None, Some(Level::Must)), run: Run::File(arrays),
+        requirement: "A dimension is a positive number or refers to a structural parameter or constant of type UInt64, and an array has one start value or \
+            as many as elements.",
+        tried: "Follows dimensions to their structural parameters and counts start values.",
+        fix: "Give one start value or one for each element, row by row." },
+    Check { id: "V14", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::File(start_value_types),
+        requirement: "Start values have the type of the variable and lie within the range of that type.",
+        tried: "Parses start values as values of the variable's type.", fix: "Write numbers with a point, in the range of the type." },
 ];
 
 /// A finding for each variable that violates the rule.
@@ -70,56 +122,6 @@ fn structured(fmu: &FmuFile) -> Verdict {
         let mut all = std::iter::once(&v.name).chain(v.aliases.iter().map(|a| &a.name));
         all.find_map(|n| grammar(n).err().map(|why| format!("{n:?}: {why}")))
     })
-}
-
-/// `name = identifier | "der(" identifier ["," order] ")"`, identifiers joined by dots, each with indices; FMI 2.0.5,
-/// 2.2.9. A part in single quotes may have anything, with backslash escapes.
-fn grammar(name: &str) -> Result<(), String> {
-    let inner = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
-    let body = match inner {
-        Some(inner) => match inner.rsplit_once(',') {
-            Some((body, order)) if order.trim().bytes().all(|b| b.is_ascii_digit()) => body,
-            _ => inner,
-        },
-        None => name,
-    };
-    let mut rest = body;
-    loop {
-        rest = part(rest)?;
-        match rest.strip_prefix('.') {
-            Some(next) => rest = next,
-            None if rest.is_empty() => return Ok(()),
-            None => return Err(format!("{rest:?} is unexpected")),
-        }
-    }
-}
-
-fn part(text: &str) -> Result<&str, String> {
-    let mut rest = if let Some(quoted) = text.strip_prefix('\'') {
-        let mut escaped = false;
-        let end = quoted.char_indices().find(|&(_, c)| {
-            let closes = c == '\'' && !escaped;
-            escaped = c == '\\' && !escaped;
-            closes
-        });
-        &quoted[end.ok_or("a quote is not closed")?.0 + 1..]
-    } else {
-        let letter = |c: char| c.is_ascii_alphanumeric() || c == '_';
-        let end = text.find(|c| !letter(c)).unwrap_or(text.len());
-        if end == 0 || text.starts_with(|c: char| c.is_ascii_digit()) {
-            return Err("a part does not start with a letter or an underscore".into());
-        }
-        &text[end..]
-    };
-    if let Some(indices) = rest.strip_prefix('[') {
-        let (inside, after) = indices.split_once(']').ok_or("a bracket is not closed")?;
-        let number = |i: &str| !i.trim().is_empty() && i.trim().bytes().all(|b| b.is_ascii_digit());
-        if !inside.split(',').all(number) {
-            return Err(format!("[{inside}] is not a list of indices"));
-        }
-        rest = after;
-    }
-    Ok(rest)
 }
 
 fn references(fmu: &FmuFile) -> Verdict {
@@ -485,19 +487,4 @@ fn start_value_types(fmu: &FmuFile) -> Verdict {
             .find(|w| !good(w))
             .map(|w| format!("start={w:?} is not a value of the type {}", v.base))
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_the_grammar() {
-        for good in ["a", "_x1", "a.b.c", "a[1].b[2,3]", "der(a.b)", "der(a,2)", "'any thing.'", "a.'it\\'s'.c"] {
-            assert_eq!(grammar(good), Ok(()), "{good}");
-        }
-        for bad in ["", "1a", "a b", "a.", ".a", "a[", "a[]", "a[x]", "a-b", "'open", "der(a"] {
-            assert!(grammar(bad).is_err(), "{bad}");
-        }
-    }
 }

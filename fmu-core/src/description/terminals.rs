@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// A terminal of the description.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Terminal {
+pub struct TerminalDescription {
     /// Name, unique in the FMU.
     pub name: String,
     /// One sentence.
@@ -16,14 +16,14 @@ pub struct Terminal {
     /// How members find each other.
     pub rule: MatchingRule,
     /// The variables that it groups.
-    pub members: Vec<Member>,
+    pub members: Vec<MemberDescription>,
     /// Where and how it is drawn.
     pub picture: Option<TerminalPicture>,
 }
 
 /// A variable of a terminal.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Member {
+pub struct MemberDescription {
     /// Name within the terminal.
     pub name: String,
     /// Name of the variable.
@@ -46,8 +46,11 @@ pub struct TerminalPicture {
 }
 
 /// The terminals, after the checks that cannot run at compile time.
-pub(super) fn describe(terminals: &[terminal::Terminal], variables: &[Variable]) -> Result<Vec<Terminal>, Fault> {
-    let mut described: Vec<Terminal> = Vec::new();
+pub(super) fn describe(
+    terminals: &[terminal::Terminal],
+    variables: &[Variable],
+) -> Result<Vec<TerminalDescription>, Fault> {
+    let mut described: Vec<TerminalDescription> = Vec::new();
     for terminal::Terminal { name, description, rule, members, picture } in terminals {
         let wrong = |what: String| Fault::new(format!("the terminal {name} {what}"));
         if described.iter().any(|other| other.name == *name) {
@@ -78,8 +81,9 @@ pub(super) fn describe(terminals: &[terminal::Terminal], variables: &[Variable])
                 return Err(wrong(format!("draws its icon {icon} differently from an earlier terminal")));
             }
         }
-        let member = |m: &terminal::Member| Member { name: m.name.into(), variable: m.variable.into(), kind: m.kind };
-        described.push(Terminal {
+        let member =
+            |m: &terminal::Member| MemberDescription { name: m.name.into(), variable: m.variable.into(), kind: m.kind };
+        described.push(TerminalDescription {
             name: (*name).into(),
             description: (*description).into(),
             rule: *rule,

@@ -25,7 +25,7 @@ impl<W: 'static> Row<W> {
         Self::boolean((Causality::Output, Variability::Discrete), name, description, get)
     }
 
-    /// A Boolean variable that is no output.
+    /// A Boolean variable other than an output.
     pub const fn boolean_local(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut bool) -> Self {
         Self::boolean((Causality::Local, Variability::Discrete), name, description, get)
     }
@@ -67,7 +67,7 @@ impl<W: 'static> Row<W> {
         Self::enumeration((Causality::Output, Variability::Discrete), name, description, field)
     }
 
-    /// An enumeration that is no output.
+    /// An enumeration other than an output.
     pub const fn enumeration_local<E: Enumerated>(
         name: &'static str,
         description: &'static str,
@@ -116,7 +116,7 @@ impl<W: 'static> Row<W> {
         Self::single((Causality::Output, Variability::Discrete), name, quantity, description, get)
     }
 
-    /// A real variable in single precision that is no output and changes at sample instants.
+    /// A real variable in single precision other than an output, which changes at sample instants.
     pub const fn float32_local(
         name: &'static str,
         quantity: &'static Quantity,
@@ -171,7 +171,7 @@ impl<W: 'static> Row<W> {
         Self::array((Causality::Output, Variability::Continuous), name, quantity, description, dimension, get)
     }
 
-    /// An array of continuous real variables that are no outputs; `dimension` elements.
+    /// An array of `dimension` continuous real variables other than outputs.
     pub const fn array_local(
         name: &'static str,
         quantity: &'static Quantity,
@@ -193,12 +193,12 @@ impl<W: 'static> Row<W> {
         Self::array((Causality::Parameter, Variability::Fixed), name, quantity, description, dimension, get)
     }
 
-    /// A text parameter, fixed after initialization: a file name, a mode that has no list.
+    /// A text parameter, fixed after initialization: a file name, a mode that is not an enumeration.
     pub const fn text_parameter(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut String) -> Self {
         Self::new(name, description, Causality::Parameter, Variability::Fixed, Kind::Text, Access::Text(get))
     }
 
-    /// A text output. The model keeps it or chooses among constants: to say it allocates nothing in a step.
+    /// A text output. The model keeps it or chooses among constants: reading it in a step does not allocate.
     pub const fn text_output(name: &'static str, description: &'static str, say: fn(&W) -> &str) -> Self {
         Self::new(name, description, Causality::Output, Variability::Discrete, Kind::Text, Access::Said(say))
     }

@@ -13,7 +13,7 @@ impl<W: 'static> Row<W> {
     #[track_caller]
     pub const fn tunable(mut self) -> Self {
         let parameter = matches!(self.meta.causality, Causality::Parameter) && !matches!(self.meta.kind, Kind::Text);
-        demand(parameter, self.meta.name, "only a parameter that is no text can be tunable");
+        demand(parameter, self.meta.name, "only a parameter of a type other than text can be tunable");
         self.meta.variability = Variability::Tunable;
         self
     }
@@ -126,7 +126,7 @@ impl<W: 'static> Row<W> {
     /// The input need not be fed, because its start value is what is usually wanted. The description says so.
     ///
     /// # Panics
-    /// At compile time, if the variable is no input.
+    /// At compile time, if the variable is not an input.
     #[track_caller]
     pub const fn optional(self) -> Self {
         self.needed(Need::Never)
@@ -136,7 +136,7 @@ impl<W: 'static> Row<W> {
     /// this name. The description says so, with the parameter's full name.
     ///
     /// # Panics
-    /// At compile time, if the variable is no input. Describing the model checks the parameter and the value.
+    /// At compile time, if the variable is not an input. Describing the model checks the parameter and the value.
     #[track_caller]
     pub const fn read_with(self, parameter: &'static str, value: &'static str) -> Self {
         self.needed(Need::With { parameter, value })

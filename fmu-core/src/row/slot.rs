@@ -20,7 +20,7 @@ pub enum Slot<'a> {
     Enumeration(&'a mut dyn Choice),
     /// A text that can be set.
     Text(&'a mut String),
-    /// A text that the model says.
+    /// A text computed by the model.
     Said(&'a str),
 }
 

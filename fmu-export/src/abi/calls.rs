@@ -3,7 +3,7 @@
 use super::Abi;
 use super::gate::{Function, enter};
 use super::pointer::{array, numbers, place, room, text};
-use super::types::{FmuState, Instance, References};
+use super::types::{FmuState, InstancePointer, References};
 use crate::value::Value;
 use crate::{blob, registry};
 use fmu_core::{Exported, Fault};
@@ -17,7 +17,7 @@ use std::ffi::{c_char, c_int};
 impl<E: Exported> Abi<E> {
     pub unsafe fn get<T: Value>(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         references: References,
         n: usize,
         values: *mut T,
@@ -34,7 +34,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn set<T: Value>(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         references: References,
         n: usize,
         values: *const T,
@@ -52,7 +52,7 @@ impl<E: Exported> Abi<E> {
     /// The texts stay where they are until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
     pub unsafe fn get_texts(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         references: References,
         n: usize,
         values: *mut *const c_char,
@@ -73,7 +73,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn set_texts(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         references: References,
         n: usize,
         values: *const *const c_char,
@@ -92,7 +92,7 @@ impl<E: Exported> Abi<E> {
     /// A getter or setter of a type that no variable has: succeeds only for zero variables.
     pub unsafe fn none(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         references: References,
         n: usize,
         n_values: usize,
@@ -109,7 +109,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn set_debug_logging(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         on: bool,
         n: usize,
         categories: *const *const c_char,
@@ -127,12 +127,12 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn exit_initialization(entry: impl Function, instance: Instance) -> c_int {
+    pub unsafe fn exit_initialization(entry: impl Function, instance: InstancePointer) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.exit_initialization()?)) }
     }
 
-    pub unsafe fn terminate(entry: impl Function, instance: Instance) -> c_int {
+    pub unsafe fn terminate(entry: impl Function, instance: InstancePointer) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
             enter::<E, _>(entry, instance, |instance| {
@@ -142,7 +142,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn reset(entry: impl Function, instance: Instance) -> c_int {
+    pub unsafe fn reset(entry: impl Function, instance: InstancePointer) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
             enter::<E, _>(entry, instance, |instance| {
@@ -153,7 +153,7 @@ impl<E: Exported> Abi<E> {
     }
 
     /// `state` points to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
-    pub unsafe fn save_state(entry: impl Function, instance: Instance, state: *mut FmuState) -> c_int {
+    pub unsafe fn save_state(entry: impl Function, instance: InstancePointer, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
             enter::<E, _>(entry, instance, |instance| {
@@ -164,13 +164,13 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn restore_state(entry: impl Function, instance: Instance, state: FmuState) -> c_int {
+    pub unsafe fn restore_state(entry: impl Function, instance: InstancePointer, state: FmuState) -> c_int {
         // SAFETY: the importer's instance; the state is only a number.
         unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.restore(state.addr())?)) }
     }
 
     /// Ignores NULL and a variable that holds NULL.
-    pub unsafe fn free_state(entry: impl Function, instance: Instance, state: *mut FmuState) -> c_int {
+    pub unsafe fn free_state(entry: impl Function, instance: InstancePointer, state: *mut FmuState) -> c_int {
         // SAFETY: the importer's variable, which it has initialized as the standard says.
         unsafe {
             enter::<E, _>(entry, instance, |_| {
@@ -187,7 +187,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn serialized_size(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         state: FmuState,
         size: *mut usize,
     ) -> c_int {
@@ -203,7 +203,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn serialize(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         state: FmuState,
         bytes: *mut u8,
         size: usize,
@@ -227,7 +227,7 @@ impl<E: Exported> Abi<E> {
     /// Always creates a new state and ignores the previous value of the variable.
     pub unsafe fn deserialize(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         bytes: *const u8,
         size: usize,
         state: *mut FmuState,
@@ -242,50 +242,55 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn enter_event(entry: impl Function, instance: Instance) -> c_int {
+    pub unsafe fn enter_event(entry: impl Function, instance: InstancePointer) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.enter_event()?)) }
     }
 
-    pub unsafe fn enter_continuous(entry: impl Function, instance: Instance) -> c_int {
+    pub unsafe fn enter_continuous(entry: impl Function, instance: InstancePointer) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.leave_event()?)) }
     }
 
-    pub unsafe fn set_time(entry: impl Function, instance: Instance, time: f64) -> c_int {
+    pub unsafe fn set_time(entry: impl Function, instance: InstancePointer, time: f64) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.set_time(time)?)) }
     }
 
-    pub unsafe fn set_states(entry: impl Function, instance: Instance, x: *const f64, n: usize) -> c_int {
+    pub unsafe fn set_states(entry: impl Function, instance: InstancePointer, x: *const f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe { enter::<E, _>(entry, instance, |instance| instance.set_states(array(x, n, "continuous states")?)) }
     }
 
-    pub unsafe fn get_states(entry: impl Function, instance: Instance, x: *mut f64, n: usize) -> c_int {
+    pub unsafe fn get_states(entry: impl Function, instance: InstancePointer, x: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe {
             enter::<E, _>(entry, instance, |instance| Ok(instance.get_states(numbers(x, n, "continuous states")?)?))
         }
     }
 
-    pub unsafe fn derivatives(entry: impl Function, instance: Instance, dx: *mut f64, n: usize) -> c_int {
+    pub unsafe fn derivatives(entry: impl Function, instance: InstancePointer, dx: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe { enter::<E, _>(entry, instance, |instance| instance.derivatives(numbers(dx, n, "derivatives")?)) }
     }
 
-    pub unsafe fn indicators(entry: impl Function, instance: Instance, z: *mut f64, n: usize) -> c_int {
+    pub unsafe fn indicators(entry: impl Function, instance: InstancePointer, z: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe { enter::<E, _>(entry, instance, |instance| instance.indicators(numbers(z, n, "event indicators")?)) }
     }
 
-    pub unsafe fn nominals(entry: impl Function, instance: Instance, x: *mut f64, n: usize) -> c_int {
+    pub unsafe fn nominals(entry: impl Function, instance: InstancePointer, x: *mut f64, n: usize) -> c_int {
         // SAFETY: the importer's array, of this length.
         unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.nominals(numbers(x, n, "nominals")?)?)) }
     }
 
     /// No step of the integrator is an event, and none ends the simulation: both flags are 0.
-    pub unsafe fn completed_step<B>(entry: impl Function, instance: Instance, event: *mut B, end: *mut B) -> c_int
+    pub unsafe fn completed_step<B>(
+        entry: impl Function,
+        instance: InstancePointer,
+        event: *mut B,
+        end: *mut B,
+    ) -> c_int
     where
         B: From<bool>,
     {
@@ -302,7 +307,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn directional(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         (unknowns, n_unknowns): (References, usize),
         (knowns, n_knowns): (References, usize),
         (seed, n_seed): (*const f64, usize),
@@ -325,7 +330,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn output_derivatives(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         references: References,
         n: usize,
         orders: *const i32,
@@ -343,7 +348,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn input_derivatives(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         references: References,
         n: usize,
         orders: *const i32,
@@ -359,7 +364,7 @@ impl<E: Exported> Abi<E> {
     }
 
     /// A function of a capability that this FMU does not have.
-    pub unsafe fn unsupported(entry: impl Function, instance: Instance, why: &str) -> c_int {
+    pub unsafe fn unsupported(entry: impl Function, instance: InstancePointer, why: &str) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E, _>(entry, instance, |_| Err(Fault::new(format!("not supported: {why}")).into())) }
     }

@@ -3,7 +3,7 @@
 use super::gate::{Entry, Function, enter, open};
 use super::logger::Fmi2Sink;
 use super::pointer::{place, text};
-use super::types::{Fmi2Boolean, Fmi2Callbacks, Fmi2EventInfo, Instance, Text};
+use super::types::{Fmi2Boolean, Fmi2Callbacks, Fmi2EventInfo, InstancePointer, Text};
 use super::{Abi, credentials};
 use crate::instance::Refusal;
 use crate::log::Log;
@@ -32,7 +32,7 @@ impl<E: Exported> Abi<E> {
         resources: Text,
         callbacks: *const Fmi2Callbacks,
         logging_on: bool,
-    ) -> Instance {
+    ) -> InstancePointer {
         // SAFETY: the importer's texts and struct, valid during this call.
         let (name, token, resources, callbacks) =
             unsafe { (text(name), text(token), text(resources), callbacks.as_ref()) };
@@ -54,7 +54,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn fmi2_setup_experiment(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         start: f64,
         stop_defined: Fmi2Boolean,
         stop: f64,
@@ -69,12 +69,12 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi2_enter_initialization(entry: impl Function, instance: Instance) -> c_int {
+    pub unsafe fn fmi2_enter_initialization(entry: impl Function, instance: InstancePointer) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.enter_initialization()?)) }
     }
 
-    pub unsafe fn fmi2_do_step(entry: impl Function, instance: Instance, t: f64, h: f64) -> c_int {
+    pub unsafe fn fmi2_do_step(entry: impl Function, instance: InstancePointer, t: f64, h: f64) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
             enter::<E, _>(entry, instance, |instance| {
@@ -86,7 +86,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn fmi2_new_discrete_states(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         info: *mut Fmi2EventInfo,
     ) -> c_int {
         // SAFETY: the importer's struct.
@@ -108,7 +108,12 @@ impl<E: Exported> Abi<E> {
     }
 
     /// `fmi2LastSuccessfulTime`; the other kinds belong to asynchronous steps (FMI 2.0.5, 4.2.3).
-    pub unsafe fn fmi2_real_status(entry: impl Function, instance: Instance, kind: c_int, value: *mut f64) -> c_int {
+    pub unsafe fn fmi2_real_status(
+        entry: impl Function,
+        instance: InstancePointer,
+        kind: c_int,
+        value: *mut f64,
+    ) -> c_int {
         // SAFETY: the importer's variable.
         unsafe {
             enter::<E, _>(entry, instance, |instance| {
@@ -125,7 +130,7 @@ impl<E: Exported> Abi<E> {
     /// `fmi2Terminated`: this FMU never asks to end the simulation.
     pub unsafe fn fmi2_boolean_status(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         kind: c_int,
         value: *mut Fmi2Boolean,
     ) -> c_int {
@@ -142,7 +147,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi2_no_status(entry: impl Function, instance: Instance, kind: c_int) -> c_int {
+    pub unsafe fn fmi2_no_status(entry: impl Function, instance: InstancePointer, kind: c_int) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E, _>(entry, instance, |_| no_status(kind)) }
     }
@@ -180,7 +185,7 @@ macro_rules! export_fmi2 {
             callbacks: *const Fmi2Callbacks,
             _visible: Fmi2Boolean,
             logging_on: Fmi2Boolean,
-        ) -> Instance {
+        ) -> InstancePointer {
             $crate::abi::quiet();
             const ENTRY: &Entry = &Entry::new(Standard::Fmi2, Call::Instantiate, "fmi2Instantiate");
             // SAFETY: what the standard demands of the importer.
@@ -192,7 +197,7 @@ macro_rules! export_fmi2 {
         }
 
         #[unsafe(no_mangle)]
-        pub(crate) unsafe extern "C" fn fmi2FreeInstance(instance: Instance) {
+        pub(crate) unsafe extern "C" fn fmi2FreeInstance(instance: InstancePointer) {
             // SAFETY: what the standard demands of the importer.
             unsafe { $crate::abi::Abi::<$exported>::free_instance(instance) }
         }

@@ -3,7 +3,7 @@
 use super::gate::{Entry, Function, enter, open};
 use super::logger::{Fmi3Logger, Fmi3Sink};
 use super::pointer::{place, text};
-use super::types::{Fmi3Boolean, Instance, Text};
+use super::types::{Fmi3Boolean, InstancePointer, Text};
 use super::{Abi, credentials};
 use crate::log::Log;
 use fmu_core::{Exported, Fault, Interface};
@@ -26,7 +26,7 @@ impl<E: Exported> Abi<E> {
         interface: Interface,
         early_return: bool,
         refused: Option<&str>,
-    ) -> Instance {
+    ) -> InstancePointer {
         // SAFETY: the importer's texts, valid during this call.
         let (name, token, resources) = unsafe { (text(name), text(token), text(resources)) };
         let refused = refused.or(match interface {
@@ -46,7 +46,7 @@ impl<E: Exported> Abi<E> {
 
     pub unsafe fn fmi3_enter_initialization(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         start: f64,
         stop_defined: Fmi3Boolean,
         stop: f64,
@@ -65,7 +65,7 @@ impl<E: Exported> Abi<E> {
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_do_step(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         t: f64,
         h: f64,
         event_handling_needed: *mut Fmi3Boolean,
@@ -95,7 +95,7 @@ impl<E: Exported> Abi<E> {
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_update_discrete_states(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         again: *mut Fmi3Boolean,
         terminate: *mut Fmi3Boolean,
         nominals: *mut Fmi3Boolean,
@@ -124,7 +124,7 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi3_enter_step(entry: impl Function, instance: Instance) -> c_int {
+    pub unsafe fn fmi3_enter_step(entry: impl Function, instance: InstancePointer) -> c_int {
         // SAFETY: the importer's instance.
         unsafe {
             enter::<E, _>(entry, instance, |instance| {
@@ -135,14 +135,14 @@ impl<E: Exported> Abi<E> {
         }
     }
 
-    pub unsafe fn fmi3_evaluate(entry: impl Function, instance: Instance) -> c_int {
+    pub unsafe fn fmi3_evaluate(entry: impl Function, instance: InstancePointer) -> c_int {
         // SAFETY: the importer's instance.
         unsafe { enter::<E, _>(entry, instance, |_| Ok(())) }
     }
 
     pub unsafe fn fmi3_count(
         entry: impl Function,
-        instance: Instance,
+        instance: InstancePointer,
         count: *mut usize,
         of_indicators: bool,
     ) -> c_int {
@@ -181,7 +181,7 @@ macro_rules! export_fmi3 {
             environment: *mut c_void,
             logger: Option<Fmi3Logger>,
             _intermediate_update: *const c_void,
-        ) -> Instance {
+        ) -> InstancePointer {
             $crate::abi::quiet();
             const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateCoSimulation");
             let refused = (n_intermediate > 0)
@@ -206,7 +206,7 @@ macro_rules! export_fmi3 {
             logging_on: Fmi3Boolean,
             environment: *mut c_void,
             logger: Option<Fmi3Logger>,
-        ) -> Instance {
+        ) -> InstancePointer {
             $crate::abi::quiet();
             const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateModelExchange");
             let interface = Interface::ModelExchange;
@@ -230,7 +230,7 @@ macro_rules! export_fmi3 {
             _clock_update: *const c_void,
             _lock_preemption: *const c_void,
             _unlock_preemption: *const c_void,
-        ) -> Instance {
+        ) -> InstancePointer {
             $crate::abi::quiet();
             const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateScheduledExecution");
             let refused = Some("not supported: Scheduled Execution");
@@ -243,7 +243,7 @@ macro_rules! export_fmi3 {
         }
 
         #[unsafe(no_mangle)]
-        pub(crate) unsafe extern "C" fn fmi3FreeInstance(instance: Instance) {
+        pub(crate) unsafe extern "C" fn fmi3FreeInstance(instance: InstancePointer) {
             // SAFETY: what the standard demands of the importer.
             unsafe { $crate::abi::Abi::<$exported>::free_instance(instance) }
         }

@@ -20,7 +20,7 @@ use std::marker::PhantomData;
 use std::panic::{catch_unwind, set_hook};
 use std::path::Path;
 use std::sync::Once;
-use types::Instance;
+use types::InstancePointer;
 
 /// The functions for one exported model.
 pub struct Abi<E>(PhantomData<E>);
@@ -28,7 +28,7 @@ pub struct Abi<E>(PhantomData<E>);
 impl<E: Exported> Abi<E> {
     /// # Safety
     /// The instance is NULL, or one that this binary made and has not freed; it is not in use now and not used again.
-    pub unsafe fn free_instance(instance: Instance) {
+    pub unsafe fn free_instance(instance: InstancePointer) {
         // SAFETY: the caller's promise.
         unsafe { gate::close::<E>(instance) }
     }
@@ -48,7 +48,7 @@ impl<E: Exported> Abi<E> {
         let json = catch_unwind(|| {
             let mut made = Made::<E::Model>::described(resources.as_deref())?;
             if changes_on_loading(&made, resources.as_deref())? {
-                return Err(Fault::new("load changes what a state saves: what it reads belongs into a Resource"));
+                return Err(Fault::new("load changes what a state saves: store what it reads in a Resource"));
             }
             made.block.model.load(resources.as_deref())?;
             let mut description = Description::instantiated::<E>(made.block)?;
@@ -65,7 +65,7 @@ impl<E: Exported> Abi<E> {
     }
 }
 
-/// Whether `load` changes more than resources: a reset would undo it, and a saved state hold it.
+/// Whether `load` changes more than resources: a reset would undo it, and a saved state would hold it.
 fn changes_on_loading<M: Model>(made: &Made<M>, resources: Option<&Path>) -> Result<bool, Fault> {
     let fresh = || Snapshot::of(Interface::CoSimulation, made.block.clone());
     let mut loaded = fresh();
@@ -114,7 +114,7 @@ macro_rules! functions {
         $name:ident($($argument:ident: $type:ty),*) => $call:ident: $function:ident($($passed:expr),*);
     )*) => { $(
         #[unsafe(no_mangle)]
-        pub(crate) unsafe extern "C" fn $name(instance: Instance $(, $argument: $type)*) -> c_int {
+        pub(crate) unsafe extern "C" fn $name(instance: InstancePointer $(, $argument: $type)*) -> c_int {
             struct Here;
             impl Function for Here {
                 const ENTRY: Entry = Entry::new(Standard::$standard, Call::$call, stringify!($name));

@@ -5,7 +5,7 @@ use std::ffi::{CStr, c_char};
 use std::mem::MaybeUninit;
 use std::slice;
 
-/// An array of `n` elements. NULL is an array of none.
+/// An array of `n` elements. NULL is an empty array.
 ///
 /// # Safety
 /// A non-NULL aligned `pointer` is readable for `n` elements, and is not written during `'a`.
@@ -18,7 +18,7 @@ pub(crate) unsafe fn array<'a, T>(pointer: *const T, n: usize, name: &str) -> Re
     Ok(unsafe { slice::from_raw_parts(pointer, n) })
 }
 
-/// Room for `n` elements that the importer need not have initialized. NULL is room for none.
+/// Room for `n` elements that the importer need not have initialized. NULL is empty room.
 ///
 /// # Safety
 /// A non-NULL aligned `pointer` is writable for `n` elements, and is not used elsewhere during `'a`.

@@ -8,7 +8,7 @@ pub use fmu_core::Interface;
 pub use std::ffi::{c_char, c_int, c_void};
 
 /// `fmi2Component`, `fmi3Instance`.
-pub type Instance = *mut c_void;
+pub type InstancePointer = *mut c_void;
 /// `fmi2FMUstate`, `fmi3FMUState`.
 pub type FmuState = *mut c_void;
 /// `const fmi2ValueReference[]`, `const fmi3ValueReference[]`.
@@ -41,7 +41,7 @@ pub struct Fmi2EventInfo {
     pub new_discrete_states_needed: Fmi2Boolean,
     /// The simulation is to end.
     pub terminate_simulation: Fmi2Boolean,
-    /// The nominal values changed: never.
+    /// The nominal values changed; always false.
     pub nominals_of_continuous_states_changed: Fmi2Boolean,
     /// A state has another value.
     pub values_of_continuous_states_changed: Fmi2Boolean,

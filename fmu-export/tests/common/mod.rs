@@ -42,7 +42,7 @@ pub fn loud() {
 /// An instance of one of the standards.
 pub struct Fmu {
     pub version: u8,
-    pub it: Instance,
+    pub it: InstancePointer,
     pub journal: Rc<Journal>,
 }
 
@@ -61,7 +61,7 @@ impl Fmu {
         journal: *const Journal,
         logger: bool,
         logging_on: bool,
-    ) -> Instance {
+    ) -> InstancePointer {
         loud();
         let environment = journal.cast_mut().cast();
         let (name, token, on) = (name.as_ptr(), token.as_ptr(), u8::from(logging_on));

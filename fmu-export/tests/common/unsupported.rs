@@ -4,7 +4,7 @@ use super::model::X;
 use super::*;
 
 /// Name and a call with arguments that are NULL where they may be.
-pub type Unsupported = (&'static str, fn(Instance) -> c_int);
+pub type Unsupported = (&'static str, fn(InstancePointer) -> c_int);
 
 const NO: Fmi3Boolean = Fmi3Boolean(0);
 

@@ -34,7 +34,7 @@ pub(crate) enum Way {
 pub(crate) const WAYS: [Way; 4] = [Way::Two, Way::TwoExchange, Way::Three, Way::ThreeExchange];
 
 /// An instance, or what the logger was told.
-pub(crate) fn open(way: Way, token: &str, resources: Option<&str>) -> Result<Instance, String> {
+pub(crate) fn open(way: Way, token: &str, resources: Option<&str>) -> Result<InstancePointer, String> {
     static LOUD: Once = Once::new();
     let (token, resources) = (CString::new(token).unwrap(), resources.map(|path| CString::new(path).unwrap()));
     let (token, resources) = (token.as_ptr(), resources.as_ref().map_or(null(), |path| path.as_ptr()));
@@ -129,7 +129,7 @@ pub(crate) fn token(bytes: &[u8]) -> String {
 }
 
 /// An instance with a preset of these values, or why there is none.
-pub(crate) fn with(way: Way, values: &[(&str, &str)]) -> Result<Instance, String> {
+pub(crate) fn with(way: Way, values: &[(&str, &str)]) -> Result<InstancePointer, String> {
     let text = preset::write(values.iter().copied());
     let folder = Folder::new(text.as_bytes());
     open(way, &token(text.as_bytes()), Some(&folder.name(way)))
@@ -140,7 +140,7 @@ pub(crate) fn is_two(way: Way) -> bool {
 }
 
 /// In Initialization Mode, where both standards read everything.
-pub(crate) fn entered(way: Way, it: Instance) -> Instance {
+pub(crate) fn entered(way: Way, it: InstancePointer) -> InstancePointer {
     unsafe {
         if is_two(way) {
             assert_eq!(fmi2SetupExperiment(it, Fmi2Boolean(0), 0.0, 0.0, Fmi2Boolean(0), 0.0), 0);
@@ -152,19 +152,19 @@ pub(crate) fn entered(way: Way, it: Instance) -> Instance {
     it
 }
 
-pub(crate) fn exit(way: Way, it: Instance) -> c_int {
+pub(crate) fn exit(way: Way, it: InstancePointer) -> c_int {
     unsafe { if is_two(way) { fmi2ExitInitializationMode(it) } else { fmi3ExitInitializationMode(it) } }
 }
 
-pub(crate) fn reset(way: Way, it: Instance) {
+pub(crate) fn reset(way: Way, it: InstancePointer) {
     assert_eq!(unsafe { if is_two(way) { fmi2Reset(it) } else { fmi3Reset(it) } }, 0);
 }
 
-pub(crate) fn free(way: Way, it: Instance) {
+pub(crate) fn free(way: Way, it: InstancePointer) {
     unsafe { if is_two(way) { fmi2FreeInstance(it) } else { fmi3FreeInstance(it) } }
 }
 
-pub(crate) fn real(way: Way, it: Instance, reference: u32) -> f64 {
+pub(crate) fn real(way: Way, it: InstancePointer, reference: u32) -> f64 {
     let mut x = f64::NAN;
     let status = unsafe {
         if is_two(way) { fmi2GetReal(it, &reference, 1, &mut x) } else { fmi3GetFloat64(it, &reference, 1, &mut x, 1) }
@@ -173,7 +173,7 @@ pub(crate) fn real(way: Way, it: Instance, reference: u32) -> f64 {
     x
 }
 
-pub(crate) fn set(way: Way, it: Instance, reference: u32, x: f64) {
+pub(crate) fn set(way: Way, it: InstancePointer, reference: u32, x: f64) {
     let status = unsafe {
         if is_two(way) { fmi2SetReal(it, &reference, 1, &x) } else { fmi3SetFloat64(it, &reference, 1, &x, 1) }
     };
@@ -181,7 +181,7 @@ pub(crate) fn set(way: Way, it: Instance, reference: u32, x: f64) {
 }
 
 /// All values as FMI 3.0 reads them; FMI 2.0 reads what fits an Integer.
-pub(crate) fn values(way: Way, it: Instance) -> Vec<String> {
+pub(crate) fn values(way: Way, it: InstancePointer) -> Vec<String> {
     let mut all: Vec<String> = [U, REAL, DOUBLED, Y, SEEN].map(|r| real(way, it, r).to_string()).to_vec();
     unsafe {
         let mut text = null();

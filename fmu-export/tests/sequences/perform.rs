@@ -21,7 +21,7 @@ macro_rules! either {
     };
 }
 
-pub(crate) fn logging(version: u8, it: Instance, on: bool, categories: &Categories) -> Done {
+pub(crate) fn logging(version: u8, it: InstancePointer, on: bool, categories: &Categories) -> Done {
     let terminated: Vec<Option<Vec<u8>>> = match categories {
         Categories::Names(names) => names.iter().map(|n| n.map(|n| [n, b"\0"].concat())).collect(),
         Categories::NullOf(_) => Vec::new(),
@@ -40,12 +40,12 @@ pub(crate) fn logging(version: u8, it: Instance, on: bool, categories: &Categori
     )
 }
 
-pub(crate) fn set_up(it: Instance, start: f64, stop: Option<f64>) -> Done {
+pub(crate) fn set_up(it: InstancePointer, start: f64, stop: Option<f64>) -> Done {
     let (defined, stop) = (Fmi2Boolean(stop.is_some().into()), stop.unwrap_or(f64::NAN));
     (unsafe { fmi2SetupExperiment(it, Fmi2Boolean(0), f64::NAN, start, defined, stop) }, "fmi2SetupExperiment")
 }
 
-pub(crate) fn enter(version: u8, it: Instance, start: f64, stop: Option<f64>) -> Done {
+pub(crate) fn enter(version: u8, it: InstancePointer, start: f64, stop: Option<f64>) -> Done {
     let (defined, stop, no) = (Fmi3Boolean(stop.is_some().into()), stop.unwrap_or(f64::NAN), Fmi3Boolean(0));
     either!(
         version,
@@ -54,20 +54,20 @@ pub(crate) fn enter(version: u8, it: Instance, start: f64, stop: Option<f64>) ->
     )
 }
 
-pub(crate) fn exit(version: u8, it: Instance) -> Done {
+pub(crate) fn exit(version: u8, it: InstancePointer) -> Done {
     either!(version, fmi2ExitInitializationMode(it), fmi3ExitInitializationMode(it))
 }
 
-pub(crate) fn terminate(version: u8, it: Instance) -> Done {
+pub(crate) fn terminate(version: u8, it: InstancePointer) -> Done {
     either!(version, fmi2Terminate(it), fmi3Terminate(it))
 }
 
-pub(crate) fn reset(version: u8, it: Instance) -> Done {
+pub(crate) fn reset(version: u8, it: InstancePointer) -> Done {
     either!(version, fmi2Reset(it), fmi3Reset(it))
 }
 
 /// A step; `null` is the place of FMI 3.0 that is missing.
-pub(crate) fn step(version: u8, it: Instance, (t, h): (f64, f64), free: bool, null: usize) -> Done {
+pub(crate) fn step(version: u8, it: InstancePointer, (t, h): (f64, f64), free: bool, null: usize) -> Done {
     let (mut flags, mut last) = ([Fmi3Boolean(7); 3], f64::NAN);
     let [a, b, c] = std::array::from_fn(|i| if i == null { null_mut() } else { &raw mut flags[i] });
     let time = if null == 3 { null_mut() } else { &raw mut last };
@@ -143,7 +143,13 @@ macro_rules! access {
     }};
 }
 
-pub(crate) fn get(version: u8, it: Instance, kind: Kind, references: &[u32], arrays: Arrays) -> (Done, Vec<u64>) {
+pub(crate) fn get(
+    version: u8,
+    it: InstancePointer,
+    kind: Kind,
+    references: &[u32],
+    arrays: Arrays,
+) -> (Done, Vec<u64>) {
     let mut memory = Memory::new(version, kind, references, arrays);
     let m = memory.m;
     let mut sizes = [0_usize; 64];
@@ -179,7 +185,14 @@ pub(crate) fn get(version: u8, it: Instance, kind: Kind, references: &[u32], arr
     ((status, name), bits)
 }
 
-pub(crate) fn set(version: u8, it: Instance, kind: Kind, references: &[u32], values: &[Mixed], arrays: Arrays) -> Done {
+pub(crate) fn set(
+    version: u8,
+    it: InstancePointer,
+    kind: Kind,
+    references: &[u32],
+    values: &[Mixed],
+    arrays: Arrays,
+) -> Done {
     let mut memory = Memory::new(version, kind, references, arrays);
     let m = memory.m;
     let width = match (version, kind) {
@@ -224,31 +237,31 @@ pub(crate) fn set(version: u8, it: Instance, kind: Kind, references: &[u32], val
     (status, name)
 }
 
-pub(crate) fn save(version: u8, it: Instance, state: *mut FmuState) -> Done {
+pub(crate) fn save(version: u8, it: InstancePointer, state: *mut FmuState) -> Done {
     either!(version, fmi2GetFMUstate(it, state), fmi3GetFMUState(it, state))
 }
 
-pub(crate) fn restore(version: u8, it: Instance, state: FmuState) -> Done {
+pub(crate) fn restore(version: u8, it: InstancePointer, state: FmuState) -> Done {
     either!(version, fmi2SetFMUstate(it, state), fmi3SetFMUState(it, state))
 }
 
-pub(crate) fn free_state(version: u8, it: Instance, state: *mut FmuState) -> Done {
+pub(crate) fn free_state(version: u8, it: InstancePointer, state: *mut FmuState) -> Done {
     either!(version, fmi2FreeFMUstate(it, state), fmi3FreeFMUState(it, state))
 }
 
-pub(crate) fn size(version: u8, it: Instance, state: FmuState, size: *mut usize) -> Done {
+pub(crate) fn size(version: u8, it: InstancePointer, state: FmuState, size: *mut usize) -> Done {
     either!(version, fmi2SerializedFMUstateSize(it, state, size), fmi3SerializedFMUStateSize(it, state, size))
 }
 
-pub(crate) fn serialize(version: u8, it: Instance, state: FmuState, bytes: *mut u8, n: usize) -> Done {
+pub(crate) fn serialize(version: u8, it: InstancePointer, state: FmuState, bytes: *mut u8, n: usize) -> Done {
     either!(version, fmi2SerializeFMUstate(it, state, bytes, n), fmi3SerializeFMUState(it, state, bytes, n))
 }
 
-pub(crate) fn deserialize(version: u8, it: Instance, bytes: *const u8, n: usize, state: *mut FmuState) -> Done {
+pub(crate) fn deserialize(version: u8, it: InstancePointer, bytes: *const u8, n: usize, state: *mut FmuState) -> Done {
     either!(version, fmi2DeSerializeFMUstate(it, bytes, n, state), fmi3DeserializeFMUState(it, bytes, n, state))
 }
 
-pub(crate) fn status(it: Instance, function: u8, kind: c_int, null: bool) -> Done {
+pub(crate) fn status(it: InstancePointer, function: u8, kind: c_int, null: bool) -> Done {
     let (mut status, mut real, mut integer, mut truth, mut text) =
         (9, f64::NAN, Fmi2Integer(9), Fmi2Boolean(9), std::ptr::null());
     macro_rules! one {
@@ -269,7 +282,7 @@ pub(crate) fn status(it: Instance, function: u8, kind: c_int, null: bool) -> Don
     done
 }
 
-pub(crate) fn unsupported(version: u8, it: Instance, number: usize) -> Done {
+pub(crate) fn unsupported(version: u8, it: InstancePointer, number: usize) -> Done {
     let table = if version == 2 { FMI2_UNSUPPORTED } else { FMI3_UNSUPPORTED };
     let (name, call) = table[number % table.len()];
     (call(it), name)

@@ -168,7 +168,7 @@ impl World {
         &mut self,
         call: &Call,
         version: u8,
-        it: Instance,
+        it: InstancePointer,
         expected: &mut Reference,
     ) -> (c_int, c_int, &'static str) {
         let wanted = match call {
@@ -250,7 +250,7 @@ impl World {
     }
 
     /// The call alone; slots and blobs follow.
-    fn attempt(&mut self, call: &Call, version: u8, it: Instance) -> Done {
+    fn attempt(&mut self, call: &Call, version: u8, it: InstancePointer) -> Done {
         match call {
             Call::Logging { on, categories } => perform::logging(version, it, *on, categories),
             Call::SetUp(start, stop) if version == 2 => perform::set_up(it, *start, *stop),
@@ -332,7 +332,7 @@ impl World {
         }
     }
 
-    fn deserialize(&mut self, version: u8, it: Instance, blob: usize, damage: Damage, slot: Slot) -> Done {
+    fn deserialize(&mut self, version: u8, it: InstancePointer, blob: usize, damage: Damage, slot: Slot) -> Done {
         let (bytes, snapshot) = &self.blobs[blob];
         let mut bytes = bytes.clone();
         let n = bytes.len();

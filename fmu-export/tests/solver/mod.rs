@@ -68,7 +68,7 @@ pub struct Stepped {
 
 pub struct Fmu {
     pub kind: Kind,
-    pub it: Instance,
+    pub it: InstancePointer,
     pub journal: Rc<Journal>,
 }
 
@@ -94,7 +94,7 @@ impl Fmu {
         Self { kind, it, journal }
     }
 
-    pub fn open(kind: Kind, journal: &Journal, logger: bool, on: bool) -> Instance {
+    pub fn open(kind: Kind, journal: &Journal, logger: bool, on: bool) -> InstancePointer {
         let environment = std::ptr::from_ref(journal).cast_mut().cast();
         let token = CString::new(This::TOKEN.as_str()).unwrap();
         let (name, token, on, no) = (c"it".as_ptr(), token.as_ptr(), u8::from(on), Fmi3Boolean(0));

@@ -1,4 +1,4 @@
-//! The call that an FMU is in, in memory that another process reads after this one has died: two stores a call.
+//! The call that an FMU is in, in memory that another process can read after this one has died. A call costs two stores.
 
 macro_rules! calls {
     ($($name:ident = $text:literal,)*) => {
@@ -104,7 +104,7 @@ mod unix {
         named.0
     }
 
-    /// The call that comes now.
+    /// Records the call that is about to be made.
     #[inline]
     pub(crate) fn note(id: u32, call: Call) {
         if let Some(Page(words)) = PAGE.get() {

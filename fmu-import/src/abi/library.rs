@@ -5,41 +5,6 @@ use libloading::Library;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::Path;
 
-/// Declares a struct of C functions, each with the symbol it is found under, and a loader that names a missing one.
-/// A function behind `Option` may be missing.
-macro_rules! symbols {
-    ($(#[$doc:meta])* $name:ident { $($field:ident: $symbol:literal = $kind:ty,)* ; $($optional:ident: $other:literal = $other_kind:ty,)* }) => {
-        $(#[$doc])*
-        pub(crate) struct $name {
-            $(pub(in crate::abi) $field: $kind,)*
-            $(pub(in crate::abi) $optional: Option<$other_kind>,)*
-        }
-
-        impl $name {
-            /// Finds every function.
-            ///
-            /// # Safety
-            /// Where the library has these symbols, they are functions of the standard's types. The struct is not used
-            /// after the library is closed.
-            pub(crate) unsafe fn load(library: &libloading::Library) -> Result<Self, String> {
-                Ok(Self {
-                    $(
-                        // SAFETY: the caller promises the type.
-                        $field: unsafe { library.get::<$kind>($symbol) }
-                            .map(|symbol| *symbol)
-                            .map_err(|_| format!("the function {} is missing", $symbol))?,
-                    )*
-                    $(
-                        // SAFETY: as above.
-                        $optional: unsafe { library.get::<$other_kind>($other) }.ok().map(|symbol| *symbol),
-                    )*
-                })
-            }
-        }
-    };
-}
-pub(super) use symbols;
-
 /// Loads a shared library.
 pub(super) fn load(path: &Path) -> Result<Library, Error> {
     // SAFETY: loading runs the library's initializers. That is what running an FMU means: its code has every right of

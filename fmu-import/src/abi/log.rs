@@ -15,7 +15,7 @@ pub struct Message {
     pub status: Status,
     /// Log category.
     pub category: String,
-    /// The text; in FMI 2.0 it is not formatted, see `fmi2`.
+    /// The text; in FMI 2.0 it is not formatted, see `live`.
     pub text: String,
 }
 

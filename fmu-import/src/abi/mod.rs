@@ -1,42 +1,31 @@
-//! The C interface of both standards, from the importer's side: the only module with `unsafe` code.
+//! The C interface of both standards as an importer calls it: the only module with `unsafe` code.
 
-pub(crate) mod fmi2;
-pub(crate) mod fmi3;
+pub(crate) mod arguments;
+pub(crate) mod calls;
+pub(crate) mod functions;
 pub mod journal;
 pub(crate) mod library;
+pub(crate) mod live;
 pub(crate) mod log;
 pub mod raw;
 #[cfg(unix)]
 pub(crate) mod sandbox;
-pub(crate) mod shared;
 mod signatures;
 
 use crate::Error;
 use crate::folder::Folder;
-use crate::instance::Stepped;
-use crate::standard::{Kind, Outcome, Refusal, Standard};
+use crate::standard::{Kind, Outcome, Refusal};
+use functions::Calls;
+use live::Live;
 use log::Log;
 use model_description::FmiVersion;
-use shared::SharedFunctions;
 use std::ffi::CString;
-use std::ops::{Deref, DerefMut};
 use std::path::Path;
 use std::sync::Arc;
 
-/// The functions of a library, the library, and the folder that contains it, if it is kept; dropped in this order.
-pub(crate) struct Loaded<F> {
-    api: F,
-    shared: Arc<SharedFunctions>,
-    library: libloading::Library,
-    _folder: Option<Arc<Folder>>,
-}
-
-/// The functions of either standard.
+/// The functions of a library, for the instances of the facade.
 #[derive(Clone)]
-pub(crate) enum Functions {
-    V2(Arc<Loaded<fmi2::Functions>>),
-    V3(Arc<Loaded<fmi3::Functions>>),
-}
+pub(crate) struct Functions(Arc<Calls>);
 
 impl Functions {
     /// Loads the binary that a description with the interface of this kind promises, and keeps the folder as long as the
@@ -48,26 +37,13 @@ impl Functions {
         folder: Option<Arc<Folder>>,
     ) -> Result<Self, Error> {
         let library = library::load(binary)?;
-        // First: a library that is not an FMU lacks the one that instantiates.
-        promised(&library, version, kind).map_err(|cause| Error::file(binary, cause))?;
-        let load = move || {
-            // SAFETY: an FMU's functions have the types of the standard that its description names; the struct that they go
-            // to keeps the library.
-            let shared = || unsafe { SharedFunctions::load(&library, version) }.map(Arc::new);
-            Ok(match version {
-                FmiVersion::V2 => {
-                    // SAFETY: as above.
-                    let (api, shared) = (unsafe { fmi2::Functions::load(&library) }?, shared()?);
-                    Self::V2(Arc::new(Loaded { api, shared, library, _folder: folder }))
-                }
-                FmiVersion::V3 => {
-                    // SAFETY: as above.
-                    let (api, shared) = (unsafe { fmi3::Functions::load(&library) }?, shared()?);
-                    Self::V3(Arc::new(Loaded { api, shared, library, _folder: folder }))
-                }
-            })
-        };
-        load().map_err(|cause: String| Error::file(binary, cause))
+        // SAFETY: an FMU's functions have the types of the standard that its description names.
+        let calls = unsafe { Calls::new(library, version, folder) };
+        // Those that instantiate come first: a library that is not an FMU lacks them.
+        let required = if version == FmiVersion::V2 { REQUIRED_2 } else { REQUIRED_3 };
+        let found = promised(&calls, kind).and_then(|()| present(&calls, required));
+        found.map_err(|cause| Error::file(binary, cause))?;
+        Ok(Self(Arc::new(calls)))
     }
 
     /// An instance; `resources` is a URI in FMI 2.0 and a path in FMI 3.0.
@@ -79,89 +55,92 @@ impl Functions {
         log: &Arc<Log>,
         logging: bool,
         kind: Kind,
-    ) -> Outcome<AnyInstance> {
-        let (library, version) = match self {
-            Self::V2(functions) => (&functions.library, FmiVersion::V2),
-            Self::V3(functions) => (&functions.library, FmiVersion::V3),
-        };
-        promised(library, version, kind).map_err(Refusal::Impossible)?;
-        match self {
-            Self::V2(functions) => {
-                fmi2::Instance::new(functions.clone(), name, token, resources, log, logging, kind).map(AnyInstance::V2)
-            }
-            Self::V3(functions) => {
-                fmi3::Instance::new(functions.clone(), name, token, resources, log, logging, kind).map(AnyInstance::V3)
-            }
-        }
-    }
-}
-
-/// An instance of either standard. What a simulation calls at every communication point is known here; all else goes
-/// through [`Standard`].
-pub(crate) enum AnyInstance {
-    V2(fmi2::Instance),
-    V3(fmi3::Instance),
-}
-
-impl AnyInstance {
-    #[inline]
-    pub(crate) fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
-        match self {
-            Self::V2(instance) => instance.get_reals(references, values),
-            Self::V3(instance) => instance.get_reals(references, values),
-        }
-    }
-
-    #[inline]
-    pub(crate) fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        match self {
-            Self::V2(instance) => instance.set_reals(references, values),
-            Self::V3(instance) => instance.set_reals(references, values),
-        }
-    }
-
-    #[inline]
-    pub(crate) fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped> {
-        match self {
-            Self::V2(instance) => instance.do_step(t, h),
-            Self::V3(instance) => instance.do_step(t, h),
-        }
-    }
-}
-
-impl Deref for AnyInstance {
-    type Target = dyn Standard + Send;
-
-    fn deref(&self) -> &Self::Target {
-        match self {
-            Self::V2(instance) => instance,
-            Self::V3(instance) => instance,
-        }
-    }
-}
-
-impl DerefMut for AnyInstance {
-    fn deref_mut(&mut self) -> &mut Self::Target {
-        match self {
-            Self::V2(instance) => instance,
-            Self::V3(instance) => instance,
-        }
+    ) -> Outcome<Live> {
+        promised(&self.0, kind).map_err(Refusal::Impossible)?;
+        Live::new(&self.0, [name, token, resources], log, logging, kind)
     }
 }
 
 /// Names the first function that is missing of those that an instance of this kind needs.
-fn promised(library: &libloading::Library, version: FmiVersion, kind: Kind) -> Result<(), String> {
-    let (names, more): (&[&str], &[&str]) = match (version, kind) {
-        (FmiVersion::V2, Kind::CoSimulation { .. }) => (fmi2::CO_SIMULATION, &[]),
-        (FmiVersion::V2, Kind::ModelExchange) => (fmi2::MODEL_EXCHANGE, &[]),
-        (FmiVersion::V3, Kind::CoSimulation { event_mode: false, .. }) => (fmi3::CO_SIMULATION, &[]),
-        (FmiVersion::V3, Kind::CoSimulation { event_mode: true, .. }) => (fmi3::CO_SIMULATION, fmi3::EVENT_MODE),
-        (FmiVersion::V3, Kind::ModelExchange) => (fmi3::MODEL_EXCHANGE, &[]),
-    };
-    // SAFETY: only whether there is such a symbol is asked; nothing is called under this type.
-    let lacks = |name: &&&str| unsafe { library.get::<signatures::OfInstance>(**name) }.is_err();
-    match names.iter().chain(more).find(lacks) {
+fn promised(calls: &Calls, kind: Kind) -> Result<(), String> {
+    match (calls.version, kind) {
+        (FmiVersion::V2, Kind::CoSimulation { .. }) => present(calls, &["fmi2Instantiate", "fmi2DoStep"]),
+        (FmiVersion::V2, Kind::ModelExchange) => present(calls, MODEL_EXCHANGE_2),
+        (FmiVersion::V3, Kind::CoSimulation { event_mode, .. }) => {
+            present(calls, &["fmi3InstantiateCoSimulation", "fmi3DoStep"])?;
+            present(calls, if event_mode { EVENT_MODE } else { &[] })
+        }
+        (FmiVersion::V3, Kind::ModelExchange) => present(calls, MODEL_EXCHANGE_3),
+    }
+}
+
+fn present(calls: &Calls, names: &[&str]) -> Result<(), String> {
+    match names.iter().find(|name| !calls.has(name)) {
         Some(name) => Err(format!("the function {name} is missing")),
         None => Ok(()),
     }
 }
+
+/// Functions that no FMU of FMI 2.0 may omit. Some exporters omit others; a call reports them.
+const REQUIRED_2: &[&str] = &[
+    "fmi2SetupExperiment",
+    "fmi2EnterInitializationMode",
+    "fmi2GetReal",
+    "fmi2SetReal",
+    "fmi2GetInteger",
+    "fmi2SetInteger",
+    "fmi2GetBoolean",
+    "fmi2SetBoolean",
+    "fmi2GetString",
+    "fmi2SetString",
+    "fmi2FreeInstance",
+    "fmi2ExitInitializationMode",
+    "fmi2Terminate",
+    "fmi2Reset",
+];
+
+/// Functions that no FMU of FMI 3.0 may omit. Some exporters omit others; a call reports them.
+const REQUIRED_3: &[&str] = &[
+    "fmi3EnterInitializationMode",
+    "fmi3GetFloat64",
+    "fmi3SetFloat64",
+    "fmi3FreeInstance",
+    "fmi3ExitInitializationMode",
+    "fmi3Terminate",
+    "fmi3Reset",
+];
+
+/// Functions that `hasEventMode` promises.
+const EVENT_MODE: &[&str] = &["fmi3EnterEventMode", "fmi3UpdateDiscreteStates", "fmi3EnterStepMode"];
+
+/// Functions that Model Exchange promises in FMI 2.0.
+const MODEL_EXCHANGE_2: &[&str] = &[
+    "fmi2Instantiate",
+    "fmi2EnterEventMode",
+    "fmi2NewDiscreteStates",
+    "fmi2EnterContinuousTimeMode",
+    "fmi2CompletedIntegratorStep",
+    "fmi2SetTime",
+    "fmi2SetContinuousStates",
+    "fmi2GetDerivatives",
+    "fmi2GetEventIndicators",
+    "fmi2GetContinuousStates",
+    "fmi2GetNominalsOfContinuousStates",
+];
+
+/// Functions that Model Exchange promises in FMI 3.0.
+const MODEL_EXCHANGE_3: &[&str] = &[
+    "fmi3InstantiateModelExchange",
+    "fmi3EnterEventMode",
+    "fmi3UpdateDiscreteStates",
+    "fmi3EnterContinuousTimeMode",
+    "fmi3CompletedIntegratorStep",
+    "fmi3SetTime",
+    "fmi3SetContinuousStates",
+    "fmi3GetContinuousStateDerivatives",
+    "fmi3GetEventIndicators",
+    "fmi3GetContinuousStates",
+    "fmi3GetNominalsOfContinuousStates",
+    "fmi3GetNumberOfContinuousStates",
+    "fmi3GetNumberOfEventIndicators",
+];

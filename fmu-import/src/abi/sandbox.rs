@@ -8,7 +8,7 @@ pub(crate) fn enter() -> Result<(), String> {
     // SAFETY: the flags do not name the table of open files, which other threads could lose; there is one thread.
     unsafe { unshare_unsafe(UnshareFlags::NEWUSER | UnshareFlags::NEWNET | UnshareFlags::NEWIPC) }
         .map_err(|e| format!("the kernel gives this user no namespaces: {e}"))?;
-    // The same numbers inside as outside; other users and groups do not exist inside.
+    // User and group keep their numbers inside; others do not exist there.
     for (file, text) in [
         ("/proc/self/setgroups", "deny".to_owned()),
         ("/proc/self/uid_map", format!("{user} {user} 1")),
@@ -19,7 +19,7 @@ pub(crate) fn enter() -> Result<(), String> {
     Ok(())
 }
 
-/// Other systems have no such thing for a process without privileges.
+/// Other systems offer nothing like it to a process without privileges.
 #[cfg(all(unix, not(target_os = "linux")))]
 pub(crate) fn enter() -> Result<(), String> {
     Err("it needs the namespaces of Linux".into())

@@ -43,8 +43,8 @@ pub(super) mod v2 {
     ) -> InstancePointer;
     pub(in crate::abi) type SetupExperiment =
         unsafe extern "C" fn(InstancePointer, c_int, f64, f64, c_int, f64) -> Status;
-    pub(in crate::abi) type Get<T> = unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut T) -> Status;
-    pub(in crate::abi) type Set<T> = unsafe extern "C" fn(InstancePointer, *const u32, usize, *const T) -> Status;
+    /// A getter or a setter of any type; a setter only reads the values.
+    pub(in crate::abi) type Transfer = unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut c_void) -> Status;
     pub(in crate::abi) type DoStep = unsafe extern "C" fn(InstancePointer, f64, f64, c_int) -> Status;
     pub(in crate::abi) type SetDebugLogging =
         unsafe extern "C" fn(InstancePointer, c_int, usize, *const *const c_char) -> Status;
@@ -63,7 +63,6 @@ pub(super) mod v2 {
 
     /// `fmi2EventInfo`.
     #[repr(C)]
-    #[derive(Default)]
     pub(in crate::abi) struct EventInfo {
         pub(in crate::abi) new_discrete_states_needed: c_int,
         pub(in crate::abi) terminate_simulation: c_int,
@@ -140,9 +139,9 @@ pub(super) mod v3 {
     ) -> InstancePointer;
     pub(in crate::abi) type EnterInitializationMode =
         unsafe extern "C" fn(InstancePointer, bool, f64, f64, bool, f64) -> Status;
-    pub(in crate::abi) type Get<T> = unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut T, usize) -> Status;
-    pub(in crate::abi) type Set<T> =
-        unsafe extern "C" fn(InstancePointer, *const u32, usize, *const T, usize) -> Status;
+    /// A getter or a setter of any type; a setter only reads the values.
+    pub(in crate::abi) type Transfer =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut c_void, usize) -> Status;
     pub(in crate::abi) type DoStep =
         unsafe extern "C" fn(InstancePointer, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64) -> Status;
     pub(in crate::abi) type SetDebugLogging =

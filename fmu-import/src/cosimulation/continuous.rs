@@ -1,13 +1,12 @@
 //! Model Exchange: all FMUs of a system as one system of differential equations with events.
 //!
 //! At every evaluation all FMUs get time and states, and outputs are passed on to continuous inputs until nothing changes.
-//! Discrete inputs are set in event mode alone. At an event, whosever it is, all FMUs enter event mode; outputs are passed on
-//! before the first update of discrete states, and after each (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2). A point of a schedule is an event
-//! too.
+//! Discrete inputs are set in event mode alone. At an event of any FMU, all FMUs enter event mode; outputs are passed on before
+//! the first update of discrete states, and after each (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2). A point of a schedule is an event too.
 
 use super::exchange::{Exchange, Inputs};
 use super::grid::Grid;
-use super::iteration::{Outcome, iterate};
+use super::iteration::{Iterated, iterate};
 use super::method::Integration;
 use super::run::{Ended, Point};
 use crate::integration::{Driver, Hybrid, Trial};
@@ -27,7 +26,7 @@ struct Fmus<'a> {
     nominals: Vec<f64>,
     /// Order of updates.
     order: Vec<usize>,
-    outcomes: Vec<Outcome>,
+    outcomes: Vec<Iterated>,
     /// Time and states that the FMUs have; the time is NaN when they are not known.
     t: f64,
     x: Vec<f64>,
@@ -59,7 +58,7 @@ impl<'a> Fmus<'a> {
             order.reverse();
         }
         let mut fmus = Self {
-            outcomes: vec![Outcome::default(); instances.len()],
+            outcomes: vec![Iterated::default(); instances.len()],
             nominals: vec![1.0; n],
             x: vec![0.0; n],
             t: f64::NAN,
@@ -91,7 +90,7 @@ impl<'a> Fmus<'a> {
         }
     }
 
-    /// The name of a state of an instance; its number, from 1, where the description does not tell.
+    /// The name of a state of an instance; its number, from 1, where the description does not name it.
     fn state(&self, instance: usize, state: usize) -> String {
         let (description, count) = (self.instances[instance].description(), self.states[instance].len());
         match description.states().get(state) {
@@ -214,8 +213,7 @@ impl Hybrid for Fmus<'_> {
     }
 }
 
-/// Simulates instances that are initialized and in event mode. As [`simulate`](super::run::simulate), which begins and ends the
-/// run.
+/// Simulates instances that are initialized and in event mode; [`simulate`](super::run::simulate) begins and ends the run.
 pub(super) fn run(
     instances: &mut [Instance],
     exchange: &mut Exchange,

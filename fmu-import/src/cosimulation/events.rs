@@ -9,9 +9,9 @@
 
 use super::exchange::Exchange;
 use super::grid::Grid;
-use super::iteration::{Outcome, iterate};
+use super::iteration::{Iterated, iterate};
 use super::run::{Ended, Point};
-use crate::{Error, Instance, Kind, State, Stepped};
+use crate::{Error, FmuState, Instance, Kind, Stepped};
 use model_description::Interface;
 use std::ops::ControlFlow;
 
@@ -26,7 +26,7 @@ struct Fmus<'a> {
     with_events: Vec<usize>,
     early: Vec<usize>,
     plain: Vec<usize>,
-    outcomes: Vec<Outcome>,
+    outcomes: Vec<Iterated>,
     /// What the last step of each instance returned.
     stepped: Vec<Stepped>,
     /// Instants that are closer than this (s) are the same.
@@ -66,7 +66,7 @@ impl Fmus<'_> {
 
     /// Steps all instances from `t` by `h`, or to the earliest early return; returns the time (s) they came to.
     fn step(&mut self, t: f64, to: f64, h: f64) -> Result<f64, Error> {
-        let mut saved: Vec<Option<State>> = vec![None; self.instances.len()];
+        let mut saved: Vec<Option<FmuState>> = vec![None; self.instances.len()];
         if self.early.len() > 1 {
             for &index in &self.early {
                 let can = self.instances[index].description().co_simulation.as_ref();
@@ -93,7 +93,7 @@ impl Fmus<'_> {
     }
 
     /// Steps the instances that may return early until all have come to the same time.
-    fn step_early(&mut self, t: f64, to: f64, h: f64, saved: &[Option<State>]) -> Result<f64, Error> {
+    fn step_early(&mut self, t: f64, to: f64, h: f64, saved: &[Option<FmuState>]) -> Result<f64, Error> {
         let (mut goal, mut h) = (to, h);
         let mut came: Vec<Option<f64>> = vec![None; self.instances.len()];
         for _ in 0..STOPS {
@@ -133,7 +133,7 @@ impl Fmus<'_> {
     }
 
     /// Restores the state of an instance that stepped to `time` when another returned at `goal`.
-    fn go_back(&mut self, index: usize, time: f64, goal: f64, saved: &[Option<State>]) -> Result<(), Error> {
+    fn go_back(&mut self, index: usize, time: f64, goal: f64, saved: &[Option<FmuState>]) -> Result<(), Error> {
         self.stepped[index].event = false;
         let instance = &mut self.instances[index];
         let Some(state) = saved[index] else {
@@ -156,7 +156,7 @@ impl Fmus<'_> {
     }
 }
 
-/// Simulates instances that are initialized. As [`simulate`](super::run::simulate), which begins and ends the run.
+/// Simulates instances that are initialized; [`simulate`](super::run::simulate) begins and ends the run.
 pub(super) fn run(
     instances: &mut [Instance],
     exchange: &mut Exchange,
@@ -172,7 +172,7 @@ pub(super) fn run(
     let early = of(|kind| matches!(kind, Kind::CoSimulation { early_return: true, .. }));
     let plain = of(|kind| !matches!(kind, Kind::CoSimulation { early_return: true, .. }));
     let still = Stepped { terminate: false, event: false, early: false, last: start };
-    let (outcomes, stepped) = (vec![Outcome::default(); instances.len()], vec![still; instances.len()]);
+    let (outcomes, stepped) = (vec![Iterated::default(); instances.len()], vec![still; instances.len()]);
     let mut fmus = Fmus { instances, exchange, with_events, early, plain, outcomes, stepped, near, ended_by: None };
     let mut ended = Ended { time: start, by: None };
     let mut stops = 0;

@@ -2,12 +2,12 @@
 
 use crate::{Error, Instance};
 
-/// Most updates of one event.
+/// Largest number of updates of one event.
 const UPDATES: usize = 100;
 
 /// What an event left behind, for each instance.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Outcome {
+pub(super) struct Iterated {
     /// Time (s) of the next time event.
     pub(super) next: Option<f64>,
     pub(super) states_changed: bool,
@@ -21,12 +21,12 @@ pub(super) struct Outcome {
 pub(super) fn iterate(
     instances: &mut [Instance],
     order: &[usize],
-    outcomes: &mut [Outcome],
+    outcomes: &mut [Iterated],
     t: f64,
     mut pass_on: impl FnMut(&mut [Instance]) -> Result<bool, Error>,
 ) -> Result<Option<usize>, Error> {
     for &index in order {
-        outcomes[index] = Outcome::default();
+        outcomes[index] = Iterated::default();
     }
     pass_on(instances)?;
     for _ in 0..UPDATES {

@@ -25,8 +25,8 @@ impl Default for Method {
     }
 }
 
-/// Settings of Model Exchange. Results do not depend on those after the solver, up to its tolerance, if the FMUs are right:
-/// they are for tests of FMUs.
+/// Settings of Model Exchange. The settings after the solver are for tests of FMUs: if the FMUs are right, results do not
+/// depend on them beyond the solver's tolerance.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Integration {
     /// How states are integrated.

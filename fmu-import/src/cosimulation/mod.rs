@@ -178,7 +178,7 @@ impl System {
         self.record_as(port, port)
     }
 
-    /// The same under another name.
+    /// Records a variable under another name.
     ///
     /// # Errors
     /// As [`record`](Self::record).
@@ -238,12 +238,12 @@ impl System {
     /// Records all outputs of all instances.
     ///
     /// # Errors
-    /// None that is known.
+    /// The variables come from the descriptions, so no error is known.
     pub fn record_outputs(&mut self) -> Result<(), Error> {
         self.outputs().iter().try_for_each(|port| self.record(port))
     }
 
-    /// All outputs of all instances but those that are no numbers, written `instance.variable`.
+    /// All numeric outputs of all instances, written `instance.variable`.
     pub fn outputs(&self) -> Vec<String> {
         let outputs = |i: &Instance| {
             let is_scalar =

@@ -29,7 +29,7 @@ impl Part {
     }
 }
 
-/// All of them, in the order they were added.
+/// All FMUs, in the order they were added.
 #[derive(Clone, Default)]
 pub(super) struct Parts(pub(super) Vec<Part>);
 

@@ -63,7 +63,7 @@ impl Live {
     }
 }
 
-/// A variable that runs set, of a plan.
+/// A variable of a plan that each run sets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     port: Port,
@@ -141,7 +141,7 @@ impl Plan {
         &self.columns
     }
 
-    /// The same system and times with other variables recorded, each a pair of `instance.variable` and the name of its column.
+    /// A plan for this system and these times that records other variables, each a pair of `instance.variable` and the name of its column.
     ///
     /// # Errors
     /// The variable does not exist or is not a number.
@@ -176,7 +176,7 @@ impl Plan {
         self.parts.0.iter().find(only_one).map(|part| part.name.as_str())
     }
 
-    /// Someone who runs this plan, for one thread.
+    /// Makes a worker that runs this plan on one thread.
     ///
     /// # Errors
     /// An FMU refuses to make an instance.
@@ -197,9 +197,9 @@ impl Plan {
 /// Runs a plan again and again.
 pub struct Worker {
     plan: Arc<Plan>,
-    /// None after an error.
+    /// Empty after an error.
     instances: Vec<Instance>,
-    /// Of the FMU of each instance.
+    /// Generation of the FMU of each instance.
     generations: Vec<u32>,
     exchange: Exchange,
     row: Vec<f64>,
@@ -212,7 +212,7 @@ impl Worker {
         &self.plan
     }
 
-    /// Runs from start to stop with these values beside those that were set in the system. `hook` sees the time and the
+    /// Runs from start to stop with these values in addition to those that were set in the system. `hook` sees the time and the
     /// recorded values of every communication point, and may end the run. A run does not depend on those before it.
     ///
     /// # Errors

@@ -16,7 +16,7 @@ pub struct Point<'a> {
     /// The recorded values, in the order of [`System::record`].
     pub values: &'a [f64],
     pub(super) instances: &'a mut [Instance],
-    /// The hook had an instance in its hands.
+    /// The hook has used an instance.
     pub(super) touched: bool,
 }
 

@@ -47,7 +47,7 @@ impl Schedule {
         Ok(Self { points, linear, units: Vec::new() })
     }
 
-    /// The same with the values in the unit of the `variable`.
+    /// Converts the values to the unit of the `variable`.
     pub(super) fn in_unit_of(self, variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
         if self.units.is_empty() {
             return Ok(self);
@@ -65,7 +65,7 @@ impl Schedule {
     /// `0:0,0.1:52.36` for steps, `0:0~0.1:500rpm` for straight lines; a single number is a constant.
     ///
     /// # Errors
-    /// Says which point is none, or as [`steps`](Self::steps).
+    /// Names what is not a point; otherwise those of [`steps`](Self::steps).
     pub fn parse(text: &str) -> Result<Self, String> {
         let linear = text.contains('~');
         if linear && text.contains(',') {
@@ -94,7 +94,7 @@ impl Schedule {
     /// `speed_ref [rpm]`. Lines connect the points.
     ///
     /// # Errors
-    /// The file cannot be read, has no header, or a row has another number of numbers than the header.
+    /// The file cannot be read, has no header, or a row does not have as many numbers as the header.
     pub fn read_csv(path: &Path) -> Result<Vec<(String, Self)>, String> {
         let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
         Self::parse_csv(&text).map_err(|cause| format!("{}: {cause}", path.display()))
@@ -112,7 +112,7 @@ impl Schedule {
         }
         let names: Vec<String> = cells(header).into_iter().skip(1).collect();
         if names.is_empty() {
-            return Err("has no column besides time".into());
+            return Err("has no column but time".into());
         }
         let mut columns: Vec<Vec<(f64, f64)>> = vec![Vec::new(); names.len()];
         for (index, line) in lines {

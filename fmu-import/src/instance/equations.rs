@@ -1,10 +1,11 @@
-//! Model Exchange, event mode and derivatives, the same for both standards.
+//! Model Exchange, event mode and derivatives in either standard.
 
 use super::Instance;
 use crate::Error;
 use crate::abi::journal::Call;
-use crate::abi::shared::Vector;
-use crate::standard::Sensitivity;
+use crate::abi::live::Live;
+use crate::abi::raw::{Sensitivity, Simple, Vector};
+use crate::standard::Directions;
 
 /// What `DoStep` returned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +59,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_event_mode(&mut self) -> Result<(), Error> {
-        self.call(Call::Events, |s| s.shared().enter_event_mode())
+        self.call(Call::Events, |s| s.simple(Simple::EnterEventMode))
     }
 
     /// Updates the discrete states once, in event mode (`fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`).
@@ -66,7 +67,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn update_discrete_states(&mut self) -> Result<Update, Error> {
-        self.call(Call::Events, |s| s.update_discrete_states())
+        self.call(Call::Events, Live::update_discrete_states)
     }
 
     /// Leaves event mode for continuous-time mode (Model Exchange).
@@ -74,7 +75,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_continuous_time_mode(&mut self) -> Result<(), Error> {
-        self.call(Call::Events, |s| s.shared().enter_continuous_time_mode())
+        self.call(Call::Events, |s| s.simple(Simple::EnterContinuousTimeMode))
     }
 
     /// Leaves event mode for step mode (Co-Simulation of FMI 3.0).
@@ -82,7 +83,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_step_mode(&mut self) -> Result<(), Error> {
-        self.call(Call::Events, |s| s.shared().enter_step_mode())
+        self.call(Call::Events, |s| s.simple(Simple::EnterStepMode))
     }
 
     /// Numbers of continuous states and of event indicators. FMI 3.0 asks the FMU, FMI 2.0 the description.
@@ -90,7 +91,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn state_and_indicator_counts(&mut self) -> Result<(usize, usize), Error> {
-        let counts = self.call(Call::Evaluation, |s| s.counts())?;
+        let counts = self.call(Call::Evaluation, Live::counts)?;
         let indicators = || self.description.number_of_event_indicators.unwrap_or(0) as usize;
         Ok(counts.unwrap_or_else(|| (self.description.derivatives.len(), indicators())))
     }
@@ -101,7 +102,7 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn set_time(&mut self, t: f64) -> Result<(), Error> {
-        self.call(Call::Evaluation, |s| s.shared().set_time(t))
+        self.call(Call::Evaluation, |s| s.set_time(t))
     }
 
     /// Sets all continuous states.
@@ -110,7 +111,7 @@ impl Instance {
     /// The FMU refuses; a state that it does not take in a trial step is discarded: see [`Error::is_discard`].
     #[inline]
     pub fn set_continuous_states(&mut self, x: &[f64]) -> Result<(), Error> {
-        if x.is_empty() { Ok(()) } else { self.call(Call::Evaluation, |s| s.shared().set_states(x)) }
+        if x.is_empty() { Ok(()) } else { self.call(Call::Evaluation, |s| s.set_states(x)) }
     }
 
     /// Reads all continuous states.
@@ -118,7 +119,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn get_continuous_states(&mut self, x: &mut [f64]) -> Result<(), Error> {
-        self.vector(Vector::States, x)
+        self.vector(Vector::GetContinuousStates, x)
     }
 
     /// Computes the derivatives of all continuous states.
@@ -127,7 +128,7 @@ impl Instance {
     /// As [`set_continuous_states`](Self::set_continuous_states).
     #[inline]
     pub fn get_derivatives(&mut self, dx: &mut [f64]) -> Result<(), Error> {
-        self.vector(Vector::Derivatives, dx)
+        if dx.is_empty() { Ok(()) } else { self.call(Call::Evaluation, |s| s.derivatives(dx)) }
     }
 
     /// Computes all event indicators.
@@ -135,7 +136,7 @@ impl Instance {
     /// # Errors
     /// As [`set_continuous_states`](Self::set_continuous_states).
     pub fn get_event_indicators(&mut self, z: &mut [f64]) -> Result<(), Error> {
-        self.vector(Vector::Indicators, z)
+        self.vector(Vector::GetEventIndicators, z)
     }
 
     /// Reads the nominal values of all continuous states.
@@ -143,15 +144,15 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn get_nominals(&mut self, nominals: &mut [f64]) -> Result<(), Error> {
-        self.vector(Vector::Nominals, nominals)
+        self.vector(Vector::GetNominalsOfContinuousStates, nominals)
     }
 
-    /// Says that an integrator step is complete.
+    /// Reports a completed integrator step.
     ///
     /// # Errors
     /// The FMU refuses.
     pub fn completed_integrator_step(&mut self) -> Result<CompletedStep, Error> {
-        self.call(Call::Events, |s| s.completed_integrator_step())
+        self.call(Call::Events, Live::completed_integrator_step)
     }
 
     /// Partial derivatives of the unknowns in the direction of the seed of the knowns, both by value reference.
@@ -165,7 +166,7 @@ impl Instance {
         seed: &[f64],
         sensitivity: &mut [f64],
     ) -> Result<(), Error> {
-        self.call(Call::Evaluation, |s| s.directional_derivative(Sensitivity { unknowns, knowns, seed }, sensitivity))
+        self.sensitivity(Sensitivity::GetDirectionalDerivative, Directions { unknowns, knowns, seed }, sensitivity)
     }
 
     /// The seed of the unknowns times the partial derivatives: one number for each of the knowns (FMI 3.0 only).
@@ -179,7 +180,11 @@ impl Instance {
         seed: &[f64],
         sensitivity: &mut [f64],
     ) -> Result<(), Error> {
-        self.call(Call::Evaluation, |s| s.adjoint_derivative(Sensitivity { unknowns, knowns, seed }, sensitivity))
+        self.sensitivity(Sensitivity::GetAdjointDerivative, Directions { unknowns, knowns, seed }, sensitivity)
+    }
+
+    fn sensitivity(&mut self, name: Sensitivity, d: Directions<'_>, results: &mut [f64]) -> Result<(), Error> {
+        self.call(Call::Evaluation, |s| s.sensitivity(name, d, results))
     }
 
     /// Derivatives of outputs with respect to time at the end of the last step (Co-Simulation).
@@ -201,6 +206,6 @@ impl Instance {
     /// An FMU without states or indicators is not asked for them.
     #[inline]
     fn vector(&mut self, which: Vector, values: &mut [f64]) -> Result<(), Error> {
-        if values.is_empty() { Ok(()) } else { self.call(Call::Evaluation, |s| s.shared().get_vector(which, values)) }
+        if values.is_empty() { Ok(()) } else { self.call(Call::Evaluation, |s| s.vector(which, values)) }
     }
 }

@@ -55,7 +55,7 @@ pub(super) fn error(step: &Step, rtol: f64, nominals: &[f64]) -> f64 {
 
 /// Factor from the size of a step with this error to the size of the next one.
 pub(super) fn factor(error: f64) -> f64 {
-    // An error that is no number shrinks the step as much as a large one.
+    // An error that is not finite shrinks the step as much as a large one.
     if error.is_finite() { (0.9 * error.powf(-0.2)).clamp(0.2, 5.0) } else { 0.2 }
 }
 

@@ -1,7 +1,7 @@
 //! An SSP as a system of our co-simulation.
 
 use super::ssv::{self, Parameter};
-use super::structure::{Binding, Connection, Connector, End, Structure, Values};
+use super::structure::{Binding, Connection, ConnectionEnd, Connector, ParameterValues, Structure};
 use super::{DESCRIPTION, values};
 use crate::cosimulation::{Method, Schedule, Settings, System};
 use crate::{Fmu, archive};
@@ -19,7 +19,7 @@ pub struct Loaded {
     pub system: System,
     /// Default experiments: its own times, the FMUs' steps.
     pub experiments: Vec<Experiment>,
-    /// What an SSP's system has to the outside.
+    /// The connectors of an SSP's system.
     pub connectors: Connectors,
     /// Values for names that the system does not have, which SSP 1.0 lets pass (4.4, ParameterBindings).
     pub notes: Vec<String>,
@@ -35,7 +35,7 @@ pub struct Connectors {
 }
 
 impl Connectors {
-    /// What is behind a name to set: the inputs that one of the system feeds, or the name itself.
+    /// The ports that a name to set stands for: the inputs that one of the system feeds, or the name itself.
     ///
     /// # Errors
     /// The system has no input of this name, which has no dot.
@@ -51,8 +51,8 @@ impl Connectors {
         Ok(vec![name.to_owned()])
     }
 
-    /// What is behind a name to record: an output of the system, one of the inputs that one of the system feeds, or the name
-    /// itself.
+    /// The port that a name to record stands for: an output of the system, one of the inputs that one of the system feeds, or
+    /// the name itself.
     ///
     /// # Errors
     /// As for [`ports`](Self::ports).
@@ -101,7 +101,7 @@ impl Loaded {
         Self::open_files_with(files, folder, logging, |_| Method::default())
     }
 
-    /// As [`open_files`](Self::open_files), run by the method that suits the FMUs.
+    /// Like [`open_files`](Self::open_files), run by the method that suits the FMUs.
     ///
     /// # Errors
     /// As [`open_files`](Self::open_files), or an FMU does not have the interface that the method needs.
@@ -148,7 +148,7 @@ impl Loaded {
         Self::open_with(path, logging, |_| Method::default())
     }
 
-    /// As [`open`](Self::open), run by the method that suits the FMUs.
+    /// Like [`open`](Self::open), run by the method that suits the FMUs.
     fn open_with(path: &Path, logging: bool, method: impl FnOnce(&[(String, Fmu)]) -> Method) -> Result<Self> {
         let of = || path.display().to_string();
         let file = File::open(path).with_context(of)?;
@@ -172,7 +172,7 @@ impl Loaded {
         if let (Method::CoSimulation { .. }, Some(component)) =
             (&method, structure.components.iter().find(|component| component.model_exchange))
         {
-            let cause = "implementation=\"ModelExchange\" is no Co-Simulation: simulate it with --me";
+            let cause = "implementation=\"ModelExchange\" is not Co-Simulation: simulate it with --me";
             return Err(in_description(format!("line {}: {cause}", component.line)));
         }
         let mut loaded = Self { system: System::new(method), ..Self::default() };
@@ -274,7 +274,7 @@ impl Loaded {
 
     fn connect(&mut self, structure: &Structure, c: &Connection) -> Result<(), String> {
         let (start, end) = (find(structure, &c.start)?, find(structure, &c.end)?);
-        let kind = |end: &End, connector: &Connector| (end.element.is_some(), connector.kind.clone());
+        let kind = |end: &ConnectionEnd, connector: &Connector| (end.element.is_some(), connector.kind.clone());
         let (one, other) = (kind(&c.start, start), kind(&c.end, end));
         // What comes out of an element or into the system sends; start and end say nothing of direction.
         let sends = |(element, kind): &(bool, String)| kind == if *element { "output" } else { "input" };
@@ -298,7 +298,7 @@ impl Loaded {
                 c.start, c.end
             ));
         }
-        let port = |end: &End| end.element.as_ref().map(|element| format!("{element}.{}", end.connector));
+        let port = |end: &ConnectionEnd| end.element.as_ref().map(|element| format!("{element}.{}", end.connector));
         match (port(from), port(to)) {
             (_, Some(target)) if self.is_fed(&target)? => {
                 Err(format!("{target} is fed twice: remove one of the connections"))
@@ -375,7 +375,7 @@ pub fn name_and_path(text: &str) -> Result<(String, &Path)> {
 }
 
 /// The connector at an end of a connection.
-fn find<'a>(structure: &'a Structure, end: &End) -> Result<&'a Connector, String> {
+fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connector, String> {
     let (of, connectors) = match &end.element {
         None => (format!("the system {}", structure.name), &structure.connectors),
         Some(element) => {
@@ -394,8 +394,8 @@ impl Package<'_> {
     fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>)> {
         let path = self.path.display().to_string();
         let (file, parameters) = match &binding.values {
-            Values::Inline(parameters) => (format!("{path}: {DESCRIPTION}"), parameters.clone()),
-            Values::File(name) => {
+            ParameterValues::Inline(parameters) => (format!("{path}: {DESCRIPTION}"), parameters.clone()),
+            ParameterValues::File(name) => {
                 let file = format!("{path}: {name}");
                 let read = ssv::read(&self.text(name)?).map_err(|cause| anyhow!("{file}: {cause}"))?;
                 (file, read)

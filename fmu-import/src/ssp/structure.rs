@@ -58,9 +58,9 @@ pub struct Connector {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Connection {
     /// One end.
-    pub start: End,
+    pub start: ConnectionEnd,
     /// The other.
-    pub end: End,
+    pub end: ConnectionEnd,
     /// Whether values pass without conversion, whatever the units.
     pub no_conversion: bool,
     /// Line of the element.
@@ -69,14 +69,14 @@ pub struct Connection {
 
 /// An end of a connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct End {
+pub struct ConnectionEnd {
     /// The component; `None` for the system itself.
     pub element: Option<String>,
     /// Name of the connector.
     pub connector: String,
 }
 
-impl std::fmt::Display for End {
+impl std::fmt::Display for ConnectionEnd {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match &self.element {
             Some(element) => write!(f, "{element}.{}", self.connector),
@@ -89,14 +89,14 @@ impl std::fmt::Display for End {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Binding {
     /// File within the SSP, or the values themselves.
-    pub values: Values,
+    pub values: ParameterValues,
     /// Prefix of every name.
     pub prefix: String,
 }
 
 /// Location of values.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Values {
+pub enum ParameterValues {
     /// In a file of the archive.
     File(String),
     /// In the description itself.
@@ -233,7 +233,10 @@ fn connection(e: &Element) -> Result<Connection, String> {
         return Err(unsupported(t, "transformations are not supported: remove it, or put it into a component"));
     }
     let end = |element: &str, connector: &str| {
-        Ok::<_, String>(End { element: e.get(element).map(str::to_owned), connector: required(e, connector)? })
+        Ok::<_, String>(ConnectionEnd {
+            element: e.get(element).map(str::to_owned),
+            connector: required(e, connector)?,
+        })
     };
     Ok(Connection {
         start: end("startElement", "startConnector")?,
@@ -258,10 +261,12 @@ fn binding(e: &Element) -> Result<Binding, String> {
         return Err(at(e, "sourceBase=\"component\" is not supported: put the file beside the FMU"));
     }
     let values = if let Some(source) = e.get("source") {
-        Values::File(path(e, source)?)
+        ParameterValues::File(path(e, source)?)
     } else {
         let set = child(e, "ParameterValues").and_then(|v| child(v, "ParameterSet"));
-        Values::Inline(ssv::parameters(set.ok_or_else(|| at(e, "a binding without source and without values"))?)?)
+        ParameterValues::Inline(ssv::parameters(
+            set.ok_or_else(|| at(e, "a binding without source and without values"))?,
+        )?)
     };
     Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into() })
 }
@@ -288,8 +293,11 @@ mod tests {
         )
         .unwrap();
         assert_eq!(s.connectors[0].unit.as_deref(), Some("V"));
-        assert_eq!((&s.bindings[0].values, &*s.bindings[0].prefix), (&Values::File("resources/a b.ssv".into()), "a."));
-        let Values::Inline(values) = &s.bindings[1].values else { panic!("inline") };
+        assert_eq!(
+            (&s.bindings[0].values, &*s.bindings[0].prefix),
+            (&ParameterValues::File("resources/a b.ssv".into()), "a.")
+        );
+        let ParameterValues::Inline(values) = &s.bindings[1].values else { panic!("inline") };
         assert_eq!((values[0].name.as_str(), values[0].unit.as_deref()), ("a.x", Some("V")));
         assert_eq!(
             (s.connections[0].start.to_string(), s.connections[0].end.to_string()),

@@ -338,6 +338,8 @@ fn faults_are_named() {
             (&sampler, 5, "p: more than 100 events at t = 0 s; the next event time is 0 s", ""),
             (&plant, 6, "Derivatives returned Error", if version == 3 { "the plant has failed" } else { "" }),
             (&plant, 10, "p: state x is NaN at t = 0.69314", ""),
+            // Nominal values that an event has changed are read again.
+            (&plant, 11, "p: the nominal of state x is 0, must be positive and finite", ""),
         ] {
             for solver in SOLVERS {
                 let mut system = single(fmu, exchange(solver), &["p.x"]);
@@ -363,6 +365,13 @@ fn faults_are_named() {
         let error = refused(&mut system, &settings(1.0, 0.1));
         assert!(error.contains("discrete inputs still change after 100 updates at t = 0 s"), "{error}");
     }
+
+    // Co-Simulation with event mode: the next event is always now.
+    let sampler = workshop.plain("sampler", 3);
+    let mut system = single(&sampler, Method::CoSimulation { event_mode: true, early_return: false }, &["p.y"]);
+    system.set("p.fault", "5").unwrap();
+    let error = refused(&mut system, &settings(1.0, 0.1));
+    assert!(error.contains("events or early returns at t = 0 s"), "{error}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Rows of a design: each a function of the definition, the seed and its number alone, made without the others.
+//! Rows of a design: each is a function of the definition, the seed and its number alone, and is made without the other rows.
 
 mod list;
 mod normal;
@@ -13,7 +13,7 @@ use sobol::Dimension;
 use std::path::Path;
 use vary::Source;
 
-/// Most rows.
+/// Largest number of rows.
 const MOST: u64 = 1 << 40;
 
 /// The rows of a design.
@@ -292,7 +292,7 @@ mod tests {
         assert!(stratified(6, 1.0 - 1e-16, 7) < 1.0);
     }
 
-    /// The same bits on every platform: only exact operations, and functions of the crate `libm`.
+    /// Designs have equal bits on every platform: they use exact operations and functions of the crate `libm` alone.
     #[test]
     fn rows_have_these_bits() {
         #[rustfmt::skip]

@@ -45,7 +45,7 @@ impl Dimension {
     }
 }
 
-/// Of dimensions 2 to 64: degree of the primitive polynomial, its inner coefficients as bits, and initial numbers.
+/// For dimensions 2 to 64: degree of the primitive polynomial, its inner coefficients as bits, and initial numbers.
 #[rustfmt::skip]
 const NUMBERS: [(usize, u32, &[u32]); 63] = [
     (1, 0, &[1]),

@@ -7,7 +7,7 @@ use crate::terminals::CoordinateSystem;
 use crate::version::FmiVersion;
 use crate::xml::{Element, print};
 use fmu_core::Description;
-use fmu_core::description::{Member, Terminal};
+use fmu_core::description::{MemberDescription, TerminalDescription};
 use fmu_core::terminal::{MatchingRule, MemberKind};
 
 /// terminalsAndIcons.xml, for an FMU of either standard; `None` for a model without terminals and icon.
@@ -28,7 +28,7 @@ pub fn write_terminals(description: &Description) -> Option<String> {
     Some(print(&root))
 }
 
-fn terminal(t: &Terminal) -> Element {
+fn terminal(t: &TerminalDescription) -> Element {
     let rule = match t.rule {
         MatchingRule::Plug => "plug",
         MatchingRule::Bus => "bus",
@@ -46,7 +46,7 @@ fn terminal(t: &Terminal) -> Element {
         .children(picture)
 }
 
-fn member(m: &Member) -> Element {
+fn member(m: &MemberDescription) -> Element {
     let kind = match m.kind {
         MemberKind::Signal => "signal",
         MemberKind::Inflow => "inflow",

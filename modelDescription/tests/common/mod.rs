@@ -2,7 +2,9 @@
 
 #![allow(dead_code)] // each test file uses its own part
 
-use fmu_core::description::{Member, ModelExchange, Terminal, TerminalPicture, Value, Variable, VariableKind};
+use fmu_core::description::{
+    MemberDescription, ModelExchange, TerminalDescription, TerminalPicture, Value, Variable, VariableKind,
+};
 use fmu_core::terminal::{MatchingRule, MemberKind};
 use fmu_core::unit::{ONE, Quantity, RAD_PER_S, SPEED, Unit, VOLT};
 use fmu_core::{Causality, Description, Experiment, IntegerType, Variability};
@@ -200,19 +202,20 @@ pub(crate) fn sampled_sample() -> Description {
 pub(crate) const SVG: &str = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"8\" height=\"8\"/>";
 
 /// One drawn, one not; every kind of member.
-fn terminals() -> Vec<Terminal> {
-    let member = |name: &str, variable: &str, kind| Member { name: name.into(), variable: variable.into(), kind };
+fn terminals() -> Vec<TerminalDescription> {
+    let member =
+        |name: &str, variable: &str, kind| MemberDescription { name: name.into(), variable: variable.into(), kind };
     let picture =
         TerminalPicture { area: [-110.0, 30.5, -90.0, 50.5], icon: "dc".into(), svg: SVG.into(), color: [255, 0, 7] };
     vec![
-        Terminal {
+        TerminalDescription {
             name: "supply".into(),
             description: AWKWARD.into(),
             rule: MatchingRule::Plug,
             members: vec![member("u", "u_dc", MemberKind::Inflow), member("ready", "ready", MemberKind::Outflow)],
             picture: Some(picture),
         },
-        Terminal {
+        TerminalDescription {
             name: "all".into(),
             description: String::new(),
             rule: MatchingRule::Bus,

@@ -1,21 +1,21 @@
-//! What a machine presets: the values of `fmu tune`, and the inputs of its reference result.
+//! The preset of a machine: the values of `fmu tune`, and the inputs of its reference result.
 
 use crate::commands::tune::place;
-use crate::preset::{Course, Preset};
+use crate::message;
+use crate::preset::{Course, PresetFmu};
 use anyhow::{Result, bail};
 use drive_study::tune::{
     joined,
     rules::{Setting, Tuned, Value},
 };
-use fmu_check::message;
 use fmu_core::Description;
 
-/// Sets the values of the machine that the FMU has: also those that are the model's own, because the FMU may be a preset for
-/// another machine. Tells in a note what stays of that. Returns the default experiment.
+/// Sets the values of the machine, also those that equal the model's own, because the FMU may be a preset for another machine. A
+/// note names the values that stay from that one. Returns the default experiment.
 ///
 /// # Errors
-/// The FMU is none of the drive.
-pub(super) fn set(preset: &mut Preset, tuned: &Tuned) -> Result<Course> {
+/// The FMU is not one of the drive's.
+pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<Course> {
     let named = |settings: &[Setting]| settings.iter().map(|s| (s.name.to_owned(), s.value.clone())).collect();
     let values: Vec<(String, Value)> = match place(preset.own())? {
         Some(0) => joined(&tuned.plant, &tuned.controller),
@@ -43,9 +43,10 @@ pub(super) fn set(preset: &mut Preset, tuned: &Tuned) -> Result<Course> {
     Ok(course(preset.own(), tuned))
 }
 
-/// The default experiment for this machine: at rest until the rotor has aligned itself, then half of the rated speed, and when that is
-/// reached, after the I-f start if there is one, half of the rated torque. Alone, the plant gets a tenth of that torque and a third of the
-/// voltage that drives its largest current at standstill, the controller a tenth of the speed and an eighth of its largest current.
+/// The default experiment for this machine. The drive stays at rest until the rotor has aligned itself, then turns at half of the
+/// rated speed, and then takes half of the rated torque, after the I-f start if there is one. The plant alone gets a tenth of that
+/// torque and a third of the voltage for its largest current at standstill; the controller alone gets a tenth of the speed and an
+/// eighth of its largest current.
 fn course(own: &Description, tuned: &Tuned) -> Course {
     let of = |settings: &[Setting], wanted: &str| {
         settings.iter().find_map(|s| match s.value {

@@ -1,16 +1,15 @@
-//! What a run leaves: its files, and the last lines of the command.
+//! The output of a run: its files, and the last lines that the command prints.
 
-use super::Simulate;
+use super::{Simulate, curves, overview};
 use crate::{pack, picture};
 use anyhow::{Context, Result};
-use drive_study::figure::Figure;
-use drive_study::{overview, page, plot};
 use fmu_import::cosimulation::Recording;
+use fmu_plot::{page, svg};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes what was asked for; returns what to tell the user: where the run ended, and the files. `alone` is the
-/// name of the only instance.
+/// Writes the files that the arguments ask for. Returns the text for the user: the last values, and the files. `alone` is
+/// the name of the only instance.
 pub(super) fn write(
     mut recording: Recording,
     for_plot: usize,
@@ -20,9 +19,9 @@ pub(super) fn write(
 ) -> Result<String> {
     let first_plot = (args.plot.is_some() || args.html.is_some()) && args.record.is_empty() && !args.all;
     let plotted = (args.plot.is_some() || args.html.is_some())
-        .then(|| if first_plot { Figure::of(&overview::overview(&recording)) } else { Figure::of(&recording) });
+        .then(|| if first_plot { curves::figure(&overview::overview(&recording)) } else { curves::figure(&recording) });
     recording.columns.truncate(recording.columns.len() - for_plot);
-    let mut told = vec![match &plotted {
+    let mut lines = vec![match &plotted {
         Some(figure) if first_plot => overview::at_the_end(figure, alone),
         _ => recording.last_values(),
     }];
@@ -38,19 +37,19 @@ pub(super) fn write(
             let mut bytes = Vec::new();
             recording.write_csv(&mut bytes)?;
             pack::write(path, &bytes)?;
-            told.push(format!("recording: {}", path.display()));
+            lines.push(format!("recording: {}", path.display()));
         }
         None => {}
     }
     if let (Some(path), Some(plotted)) = (&args.plot, &plotted) {
-        let svg = plot::svg(plotted)?;
+        let svg = svg::draw(plotted)?;
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
             let png = picture::with_text(&svg).with_context(|| path.display().to_string())?;
             pack::write(path, &png)?;
         } else {
             pack::write(path, svg.as_bytes())?;
         }
-        told.push(format!("plot: {}", path.display()));
+        lines.push(format!("plot: {}", path.display()));
     }
     if let (Some(path), Some(plotted)) = (&args.html, &plotted) {
         let names: Vec<&str> = args.fmus.iter().map(|file| file.rsplit(['/', '\\']).next().unwrap_or(file)).collect();
@@ -62,15 +61,15 @@ pub(super) fn write(
             .map(|name| format!("<p>{} asked to end the simulation.</p>\n", page::escape(name)));
         let body = format!("{}{figure}", ended.unwrap_or_default());
         pack::write(path, page::page(&names.join(", "), &body).as_bytes())?;
-        told.push(format!("page: {}\n{}", path.display(), how_to_open(&std::path::absolute(path)?)));
+        lines.push(format!("page: {}\n{}", path.display(), how_to_open(&std::path::absolute(path)?)));
     }
     if let Some(name) = &recording.ended_by {
-        told.insert(0, format!("{name} asked to end the simulation"));
+        lines.insert(0, format!("{name} asked to end the simulation"));
     }
-    Ok(told.join("\n"))
+    Ok(lines.join("\n"))
 }
 
-/// How to see a page: with the command of this system, and in any browser.
+/// How to open a page: with the command of this system, and in any browser.
 fn how_to_open(page: &Path) -> String {
     let path = page.display().to_string();
     let command = if cfg!(windows) {

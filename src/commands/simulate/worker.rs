@@ -14,7 +14,7 @@ static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
 /// File for the status and the error of the worker, below its folder for temporary files.
 const RESULT: &str = "result";
 
-/// Time between two looks for Ctrl-C.
+/// Time between two checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// File there that tells the worker to end the run.
@@ -43,7 +43,7 @@ pub(super) fn guarded(args: &Simulate) -> Result<()> {
         !timeout.is_zero() && since.elapsed() > timeout
     })?;
     if !report.left.is_empty() {
-        fmu_check::message::warning(&format!(
+        crate::message::warning(&format!(
             "the FMUs left processes behind, which are ended now: {}",
             report.left.join(", ")
         ));
@@ -82,7 +82,7 @@ pub(super) fn catch_interrupts() -> Result<()> {
     Ok(())
 }
 
-/// Whether the run is to end, asked at every communication point; cheap, because it looks ten times a second.
+/// Whether the run must end. Every communication point asks; the answer is cheap, because it is looked up ten times a second.
 pub(super) fn look(args: &Simulate) -> impl FnMut() -> bool + use<> {
     let (mut looked, worker, interrupt) = (Instant::now(), args.worker, std::env::temp_dir().join(INTERRUPT));
     move || {
@@ -94,7 +94,7 @@ pub(super) fn look(args: &Simulate) -> impl FnMut() -> bool + use<> {
     }
 }
 
-/// The worker: leaves its status and its error in a file, because an FMU may have closed everything else.
+/// The worker. It leaves its status and its error in a file, because an FMU may have closed everything else.
 pub(super) fn work(args: &Simulate) -> Result<()> {
     guard::end_with_parent();
     let folder = std::env::temp_dir();

@@ -5,7 +5,7 @@ use model_description::{BaseType, FmiVersion};
 /// The values of a call, as the bytes that cross the interface; extra bytes follow, which show whether the FMU writes past the values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Buffer {
-    pub(super) words: Vec<u64>,
+    pub(in crate::abi) words: Vec<u64>,
     /// C name of the type.
     kind: &'static str,
     width: usize,
@@ -33,8 +33,8 @@ impl Buffer {
         Self::with_bits(base, version, bits)
     }
 
-    /// As [`of`](Self::of), for pointers too.
-    pub(super) fn with_bits(base: BaseType, version: FmiVersion, bits: &[u64]) -> Self {
+    /// Like [`of`](Self::of), for pointers too.
+    pub(in crate::abi) fn with_bits(base: BaseType, version: FmiVersion, bits: &[u64]) -> Self {
         let mut buffer = Self::room(base, version, bits.len());
         for (i, value) in bits.iter().enumerate() {
             let at = i * buffer.width;
@@ -55,6 +55,11 @@ impl Buffer {
     /// Whether nothing was written past the values.
     pub fn intact(&self) -> bool {
         self.words[(self.count * self.width).div_ceil(8)..].iter().all(|w| *w == CANARY)
+    }
+
+    /// Number of values.
+    pub(in crate::abi) fn count(&self) -> usize {
+        self.count
     }
 
     /// Number of values that fit, including the bytes after them.

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// A call of the log callback.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Event {
+pub struct LogCall {
     /// The first argument, a number that was given on instantiation.
     pub environment: usize,
     /// The instance's name (FMI 2.0 only).
@@ -17,17 +17,17 @@ pub struct Event {
     pub status: c_int,
     /// The category; `None` for NULL.
     pub category: Option<String>,
-    /// The message; `None` for NULL, or what is not UTF-8.
+    /// The message; `None` for NULL and for text that is not UTF-8.
     pub text: Option<String>,
     /// It came through a struct of callbacks that was no longer valid (FMI 2.0 only).
     pub late: bool,
 }
 
-static EVENTS: Mutex<Vec<Event>> = Mutex::new(Vec::new());
+static EVENTS: Mutex<Vec<LogCall>> = Mutex::new(Vec::new());
 static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 
 /// Takes the messages so far.
-pub fn take_events() -> Vec<Event> {
+pub fn take_events() -> Vec<LogCall> {
     std::mem::take(&mut *EVENTS.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
@@ -36,7 +36,7 @@ pub fn allocations() -> usize {
     ALLOCATIONS.load(Ordering::Relaxed)
 }
 
-fn push(event: Event) {
+fn push(event: LogCall) {
     let mut events = EVENTS.lock().unwrap_or_else(PoisonError::into_inner);
     if events.len() < 100_000 {
         events.push(event);
@@ -68,7 +68,7 @@ pub(super) unsafe extern "C" fn logger2<const LATE: bool>(
         let plain = cfg!(target_vendor = "apple") || format.as_deref() != Some("%s");
         (optional(instance), optional(category), if plain { format } else { Some(copy_text(first)) })
     };
-    push(Event { environment: environment.addr(), instance, status: status.0, category, text, late: LATE });
+    push(LogCall { environment: environment.addr(), instance, status: status.0, category, text, late: LATE });
 }
 
 pub(super) unsafe extern "C" fn logger3(
@@ -79,7 +79,7 @@ pub(super) unsafe extern "C" fn logger3(
 ) {
     // SAFETY: the FMU passes C strings.
     let (category, text) = unsafe { (optional(category), optional(text)) };
-    push(Event { environment: environment.addr(), instance: None, status: status.0, category, text, late: false });
+    push(LogCall { environment: environment.addr(), instance: None, status: status.0, category, text, late: false });
 }
 
 pub(super) unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {

@@ -1,15 +1,13 @@
 //! Calls of Model Exchange, event mode and derivatives with any arguments.
 
+use super::super::arguments::{Array, ArrayMut};
 use super::super::log::Status;
-use super::super::signatures::{GetVector, SetTime, v2, v3};
-use super::{Count, Handle, Raw, Sensitivity, Vector};
-use model_description::FmiVersion;
+use super::{Count, Handle, Raw, Sensitivity, UNTOUCHED, Vector};
 use std::ffi::c_int;
-use std::ptr;
 
 /// The results of an update of the discrete states; the flags as the FMU wrote them, 0xc5 where it did not.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Updated {
+pub struct UpdateResults {
     /// `newDiscreteStatesNeeded`, `discreteStatesNeedUpdate`.
     pub again: i32,
     /// `terminateSimulation`.
@@ -22,20 +20,6 @@ pub struct Updated {
     pub next_event_time_defined: i32,
     /// `nextEventTime`, NaN where the FMU did not write it.
     pub next_event_time: f64,
-}
-
-/// What a byte or an integer holds before the call.
-const UNTOUCHED: u8 = 0xc5;
-
-/// Pointer and length of an array that may be NULL; the count may be less than its length.
-fn array<T>(values: Option<&[T]>, n: usize) -> *const T {
-    assert!(values.is_none_or(|v| n <= v.len()), "the array has fewer than n elements");
-    values.map_or(ptr::null(), <[T]>::as_ptr)
-}
-
-fn array_mut<T>(values: Option<&mut [T]>, n: usize) -> *mut T {
-    assert!(values.as_ref().is_none_or(|v| n <= v.len()), "the array has fewer than n elements");
-    values.map_or(ptr::null_mut(), <[T]>::as_mut_ptr)
 }
 
 /// Arguments of a directional or adjoint derivative. An array may be NULL; its count may be less than its length.
@@ -51,61 +35,13 @@ pub struct SensitivityArguments<'a> {
 
 impl Raw {
     /// `fmi2NewDiscreteStates` or `fmi3UpdateDiscreteStates`; with `null`, all results get NULL.
-    pub fn update_discrete_states(&self, instance: Handle, null: bool) -> Option<(Status, Updated)> {
-        match self.version {
-            FmiVersion::V2 => {
-                let f: v2::NewDiscreteStates = self.function("NewDiscreteStates")?;
-                let untouched = c_int::from(UNTOUCHED);
-                let mut info = v2::EventInfo {
-                    new_discrete_states_needed: untouched,
-                    terminate_simulation: untouched,
-                    nominals_changed: untouched,
-                    states_changed: untouched,
-                    next_event_time_defined: untouched,
-                    next_event_time: f64::NAN,
-                };
-                let place = if null { ptr::null_mut() } else { &raw mut info };
-                // SAFETY: FMI 2.0's type; the struct is ours or NULL.
-                let status = unsafe { f(self.owned().pointer(instance), place) };
-                let updated = Updated {
-                    again: info.new_discrete_states_needed,
-                    terminate: info.terminate_simulation,
-                    nominals_changed: info.nominals_changed,
-                    states_changed: info.states_changed,
-                    next_event_time_defined: info.next_event_time_defined,
-                    next_event_time: info.next_event_time,
-                };
-                Some((status, updated))
-            }
-            FmiVersion::V3 => {
-                let f: v3::UpdateDiscreteStates = self.function("UpdateDiscreteStates")?;
-                let (mut flags, mut next) = ([UNTOUCHED; 5], f64::NAN);
-                let [a, b, c, d, e] =
-                    flags.each_mut().map(|flag| if null { ptr::null_mut() } else { ptr::from_mut(flag) });
-                let time = if null { ptr::null_mut() } else { &raw mut next };
-                // SAFETY: FMI 3.0's type; the places are ours or NULL.
-                let status = unsafe { f(self.owned().pointer(instance), a, b, c, d, e, time) };
-                let [again, terminate, nominals_changed, states_changed, next_event_time_defined] =
-                    flags.map(i32::from);
-                let next_event_time = next;
-                let updated = Updated {
-                    again,
-                    terminate,
-                    nominals_changed,
-                    states_changed,
-                    next_event_time_defined,
-                    next_event_time,
-                };
-                Some((status, updated))
-            }
-        }
+    pub fn update_discrete_states(&self, instance: Handle, null: bool) -> Option<(Status, UpdateResults)> {
+        self.calls.update_discrete_states(self.owned().pointer(instance), null, (UNTOUCHED, f64::NAN)).result()
     }
 
     /// `SetTime`.
     pub fn set_time(&self, instance: Handle, t: f64) -> Option<Status> {
-        let f: SetTime = self.function("SetTime")?;
-        // SAFETY: the type of both standards.
-        Some(unsafe { f(self.owned().pointer(instance), t) })
+        self.calls.set_time(self.owned().pointer(instance), t).status()
     }
 
     /// States, derivatives, event indicators or nominals: an array, which may be NULL, and its length.
@@ -113,10 +49,7 @@ impl Raw {
     /// # Panics
     /// The array has fewer than `n` elements.
     pub fn vector(&self, name: Vector, instance: Handle, values: Option<&mut [f64]>, n: usize) -> Option<Status> {
-        let f: GetVector = self.function(name.as_str())?;
-        // SAFETY: all functions that `Vector` names have this type, up to the mutability of the array, which is ours, at
-        // least n elements long, or NULL.
-        Some(unsafe { f(self.owned().pointer(instance), array_mut(values, n), n) })
+        self.calls.vector(name, self.owned().pointer(instance), ArrayMut::of(values, n)).status()
     }
 
     /// `CompletedIntegratorStep`: `enterEventMode` and `terminateSimulation` as the FMU wrote them; with `null`, both get NULL.
@@ -126,33 +59,12 @@ impl Raw {
         no_prior: bool,
         null: bool,
     ) -> Option<(Status, [i32; 2])> {
-        match self.version {
-            FmiVersion::V2 => {
-                let f: v2::CompletedIntegratorStep = self.function("CompletedIntegratorStep")?;
-                let mut flags = [c_int::from(UNTOUCHED); 2];
-                let [a, b] = flags.each_mut().map(|flag| if null { ptr::null_mut() } else { ptr::from_mut(flag) });
-                // SAFETY: the standard's type; the places are ours or NULL.
-                let status = unsafe { f(self.owned().pointer(instance), c_int::from(no_prior), a, b) };
-                Some((status, flags))
-            }
-            FmiVersion::V3 => {
-                let f: v3::CompletedIntegratorStep = self.function("CompletedIntegratorStep")?;
-                let mut flags = [UNTOUCHED; 2];
-                let [a, b] = flags.each_mut().map(|flag| if null { ptr::null_mut() } else { ptr::from_mut(flag) });
-                // SAFETY: the standard's type; the places are ours or NULL.
-                let status = unsafe { f(self.owned().pointer(instance), no_prior, a, b) };
-                Some((status, flags.map(i32::from)))
-            }
-        }
+        self.calls.completed(self.owned().pointer(instance), no_prior, null, UNTOUCHED).result()
     }
 
     /// Number of states or event indicators (FMI 3.0 only); with `null`, the result gets NULL.
     pub fn count(&self, name: Count, instance: Handle, null: bool) -> Option<(Status, usize)> {
-        let f: v3::Count = self.function(name.as_str())?;
-        let mut count = usize::MAX;
-        // SAFETY: FMI 3.0's type; the place is ours or NULL.
-        let status = unsafe { f(self.owned().pointer(instance), if null { ptr::null_mut() } else { &raw mut count }) };
-        Some((status, count))
+        self.calls.count(name, self.owned().pointer(instance), null).result()
     }
 
     /// Directional or adjoint derivatives.
@@ -169,23 +81,17 @@ impl Raw {
     ) -> Option<Status> {
         let SensitivityArguments { unknowns: (unknowns, n_unknowns), knowns: (knowns, n_knowns), seed: (seed, n_seed) } =
             arguments;
-        let owned = self.owned();
-        let (i, u, k) = (owned.pointer(instance), array(unknowns, n_unknowns), array(knowns, n_knowns));
-        // SAFETY: of both: the standard's type; arrays are NULL or have the lengths that are passed. In FMI 2.0 the lists tell
-        // the lengths of seed and sensitivity.
-        Some(unsafe {
-            match self.version {
-                FmiVersion::V2 => {
-                    let (s, to) = (array(seed, n_knowns), array_mut(sensitivity, n_unknowns));
-                    self.function::<v2::Sensitivity>(name.as_str())?(i, u, n_unknowns, k, n_knowns, s, to)
-                }
-                FmiVersion::V3 => {
-                    let (s, to) = (array(seed, n_seed), array_mut(sensitivity, n_sensitivity));
-                    let f: v3::Sensitivity = self.function(name.as_str())?;
-                    f(i, u, n_unknowns, k, n_knowns, s, n_seed, to, n_sensitivity)
-                }
-            }
-        })
+        let lists = [Array::of(unknowns, n_unknowns), Array::of(knowns, n_knowns)];
+        let (seed, results) = (Array::of(seed, n_seed), ArrayMut::of(sensitivity, n_sensitivity));
+        self.calls.sensitivity(name, self.owned().pointer(instance), lists, seed, results).status()
+    }
+
+    /// Derivatives of outputs with respect to time.
+    pub fn output_derivatives(&self, instance: Handle, references: &[u32], order: c_int) -> Option<(Status, Vec<f64>)> {
+        let (orders, mut values) = (vec![order; references.len()], vec![f64::NAN; references.len()]);
+        let i = self.owned();
+        let status = self.calls.output_derivatives(i.pointer(instance), references, &orders, &mut values).status()?;
+        Some((status, values))
     }
 
     /// `fmi2SetRealInputDerivatives`.
@@ -200,8 +106,7 @@ impl Raw {
         orders: Option<&[c_int]>,
         values: Option<&[f64]>,
     ) -> Option<Status> {
-        let f: v2::InputDerivatives = self.function("SetRealInputDerivatives")?;
-        // SAFETY: FMI 2.0's type; the arrays are NULL or have n elements.
-        Some(unsafe { f(self.owned().pointer(instance), array(references, n), n, array(orders, n), array(values, n)) })
+        let (list, orders, values) = (Array::of(references, n), Array::of(orders, n), Array::of(values, n));
+        self.calls.input_derivatives(self.owned().pointer(instance), list, orders, values).status()
     }
 }

@@ -9,6 +9,11 @@ macro_rules! names {
         pub enum $type { $($name),* }
 
         impl $type {
+            /// The full names in FMI 2.0 and FMI 3.0.
+            #[allow(dead_code, reason = "for names that index functions")]
+            pub(in crate::abi) const ALL: [[&'static str; 2]; [$(stringify!($name)),*].len()] =
+                [$([concat!("fmi2", stringify!($name)), concat!("fmi3", stringify!($name))]),*];
+
             /// The function of this name, if it is one of them.
             pub fn named(name: &str) -> Option<Self> {
                 match name {

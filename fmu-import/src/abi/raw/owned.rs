@@ -3,6 +3,7 @@
 //! Safe code holds no address, so it cannot pass one to the FMU that is wild, freed, or of another binary.
 
 use super::Raw;
+use crate::abi::arguments::Given;
 use std::ffi::c_void;
 use std::ptr;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -36,7 +37,7 @@ impl SavedState {
 
 /// A state that the FMU gave to an instance.
 #[derive(Debug)]
-struct State {
+struct Held {
     /// 0 after it was freed.
     address: usize,
     /// Index of the instance, with which the state ends.
@@ -50,7 +51,7 @@ pub(super) struct Owned {
     of: u64,
     /// Addresses of the instances; 0 after they were freed.
     instances: Vec<usize>,
-    states: Vec<State>,
+    states: Vec<Held>,
 }
 
 impl Owned {
@@ -74,8 +75,10 @@ impl Owned {
     ///
     /// # Panics
     /// As [`instance`](Self::instance).
-    pub(super) fn pointer(&self, handle: Handle) -> *mut c_void {
-        ptr::with_exposed_provenance_mut(self.instance(handle).map_or(0, |index| self.instances[index]))
+    pub(super) fn pointer<'a>(&self, handle: Handle) -> Given<'a> {
+        let address = self.instance(handle).map_or(0, |index| self.instances[index]);
+        // SAFETY: an instance that the table has, which is locked for one call, or NULL.
+        unsafe { Given::new(ptr::with_exposed_provenance_mut(address)) }
     }
 
     /// Index of a state that is alive; `None` for NULL.
@@ -90,8 +93,10 @@ impl Owned {
     ///
     /// # Panics
     /// The state is freed, by itself or with its instance, or of another binary.
-    pub(super) fn state(&self, state: SavedState) -> *mut c_void {
-        ptr::with_exposed_provenance_mut(self.state_index(state).map_or(0, |index| self.states[index].address))
+    pub(super) fn state<'a>(&self, state: SavedState) -> Given<'a> {
+        let address = self.state_index(state).map_or(0, |index| self.states[index].address);
+        // SAFETY: a state that the table has, which is locked for one call, or NULL.
+        unsafe { Given::new(ptr::with_exposed_provenance_mut(address)) }
     }
 
     /// Takes an instance from the FMU; `None` for NULL.
@@ -107,7 +112,7 @@ impl Owned {
     ///
     /// # Panics
     /// As [`instance`](Self::instance).
-    pub(super) fn forget_instance(&mut self, handle: Handle) -> *mut c_void {
+    pub(super) fn forget_instance<'a>(&mut self, handle: Handle) -> Given<'a> {
         let pointer = self.pointer(handle);
         if let Some(index) = self.instance(handle) {
             self.instances[index] = 0;
@@ -122,15 +127,17 @@ impl Owned {
         if address == 0 {
             return SavedState::NULL;
         }
-        self.states.push(State { address, instance: self.instance(instance) });
+        self.states.push(Held { address, instance: self.instance(instance) });
         SavedState(Some(Place { of: self.of, index: self.states.len() - 1 }))
     }
 
-    /// Forgets a state.
-    pub(super) fn forget_state(&mut self, state: SavedState) {
+    /// Forgets a state; returns its address, or NULL.
+    pub(super) fn forget_state<'a>(&mut self, state: SavedState) -> Given<'a> {
+        let pointer = self.state(state);
         if let Some(index) = self.state_index(state) {
             self.states[index].address = 0;
         }
+        pointer
     }
 }
 

@@ -1,0 +1,321 @@
+//! The current loop: PI in the estimated rotor frame, decoupled, limited to the hexagon, with back-calculation.
+//!
+//! u_d = K_p e_d + I_d - w^ L_q i_q, u_q = K_p e_q + I_q + w^ (L_d i_d + psi_M), with one PI controller per axis, K_p =
+//! w_c L and K_i = w_c R^. With active resistance, K_i = w_c^2 L and the term -(w_c L - R^) i is added. The voltage cut
+//! off by the hexagon drives the integrators back: I += T_s K_i (e + (u_limited - u) / K_p).
+//!
+//! The structure follows Rasmussen 2006, Fig. 2; the paper gives no gains. These gains cancel the pole of the axis, so
+//! the loop is first-order with bandwidth w_c (internal model control); active resistance and back-calculation are
+//! common practice in the field. u in V, i in A, w_c and w^ in rad/s (electrical).
+
+use crate::tables::{ControllerParameters, PARAMETERS};
+use drive_base::frame::{Axis, DqHat, Estimated};
+use drive_base::math::sin_cos;
+use drive_base::motor::Motor;
+use fmu_core::unit::{ONE, RAD_PER_S};
+use fmu_core::{Fault, Row, Table};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// Parameters of the current loop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CurrentLoop {
+    /// Bandwidth w_c in rad/s, > 0.
+    pub bandwidth: f64,
+    /// Integral gain w_c^2 L and active resistance w_c L - R instead of K_i = w_c R.
+    pub active_resistance: bool,
+    /// Integral gain in units of w_c^2 L, >= 0; 0: determined by `active_resistance`.
+    pub integral: f64,
+    /// Decouples with the references, including R, instead of with the measured currents.
+    pub reference_feed_forward: bool,
+    /// Maximum torque per ampere instead of i_d = 0 wherever the low-speed law is not active.
+    pub mtpa: bool,
+}
+
+impl Default for CurrentLoop {
+    fn default() -> Self {
+        Self {
+            bandwidth: 2.0 * std::f64::consts::PI * 250.0,
+            active_resistance: false,
+            integral: 0.0,
+            reference_feed_forward: false,
+            mtpa: false,
+        }
+    }
+}
+
+/// Gains of one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct AxisGains {
+    k_p: f64,
+    k_i: f64,
+    active_resistance: f64,
+}
+
+impl AxisGains {
+    fn new(par: &CurrentLoop, L: f64, R: f64) -> Self {
+        let w_c = par.bandwidth;
+        let (k_i, active_resistance) =
+            if par.active_resistance { (w_c * w_c * L, w_c * L - R) } else { (w_c * R, 0.0) };
+        let k_i = if par.integral > 0.0 { par.integral * w_c * w_c * L } else { k_i };
+        Self { k_p: w_c * L, k_i, active_resistance }
+    }
+}
+
+/// Gains of both axes, from bandwidth and machine estimates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CurrentGains {
+    d: AxisGains,
+    q: AxisGains,
+    reference_feed_forward: bool,
+    /// Feed-forward gain of the references in Ohm.
+    R: f64,
+}
+
+impl CurrentGains {
+    /// Gains for the machine estimates `motor`.
+    pub fn new(par: &CurrentLoop, motor: &Motor) -> Self {
+        Self {
+            d: AxisGains::new(par, motor.L_d, motor.R_s),
+            q: AxisGains::new(par, motor.L_q, motor.R_s),
+            reference_feed_forward: par.reference_feed_forward,
+            R: if par.reference_feed_forward { motor.R_s } else { 0.0 },
+        }
+    }
+}
+
+/// State: the integral part in V.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CurrentController {
+    integral: DqHat,
+}
+
+impl CurrentController {
+    /// Voltage command (V) for the current error at the electrical speed `w` (rad/s), before limiting.
+    #[inline]
+    pub fn command(&self, gains: &CurrentGains, motor: &Motor, i_ref: DqHat, i: DqHat, w: f64) -> DqHat {
+        let error = i_ref - i;
+        let forward = if gains.reference_feed_forward { i_ref } else { i };
+        let resistive = if gains.reference_feed_forward { i_ref * gains.R } else { DqHat::ZERO };
+        DqHat::new(
+            gains.d.k_p * error.d() + self.integral.d()
+                - gains.d.active_resistance * i.d()
+                - w * motor.L_q * forward.q()
+                + resistive.d(),
+            gains.q.k_p * error.q() + self.integral.q() - gains.q.active_resistance * i.q()
+                + w * (motor.L_d * forward.d() + motor.psi_M)
+                + resistive.q(),
+        )
+    }
+
+    /// Changes from the gains `old` to `new` without a step in the command at reference `i_ref` and current `i` (A).
+    pub fn retune(&mut self, old: &CurrentGains, new: &CurrentGains, i_ref: DqHat, i: DqHat) {
+        let error = i_ref - i;
+        let direct = |gains: &CurrentGains| {
+            DqHat::new(
+                gains.d.k_p * error.d() - gains.d.active_resistance * i.d(),
+                gains.q.k_p * error.q() - gains.q.active_resistance * i.q(),
+            ) + i_ref * gains.R
+        };
+        self.integral += direct(old) - direct(new);
+    }
+
+    /// The controller in a frame `angle` (rad) behind its previous frame: the voltage is unchanged.
+    pub fn in_frame_behind(self, angle: f64) -> Self {
+        let by = Axis::<Estimated>::at(angle);
+        let turned = by.to_stator(self.integral);
+        Self { integral: DqHat::new(turned.alpha(), turned.beta()) }
+    }
+
+    /// PI output for `error` (A) without decoupling and active resistance, in V.
+    #[inline]
+    pub fn output(&self, gains: &CurrentGains, error: DqHat) -> DqHat {
+        self.integral + DqHat::new(gains.d.k_p * error.d(), gains.q.k_p * error.q())
+    }
+
+    /// Integrates one sample of `T_s` (s); `limitation` (V) is the voltage minus the requested one, if that was limited.
+    #[inline]
+    pub fn integrate(&mut self, gains: &CurrentGains, error: DqHat, limitation: Option<DqHat>, T_s: f64) {
+        let CurrentGains { d, q, .. } = gains;
+        let error = limitation.map_or(error, |u| error + DqHat::new(u.d() / d.k_p, u.q() / q.k_p));
+        self.integral += DqHat::new(T_s * d.k_i * error.d(), T_s * q.k_i * error.q());
+    }
+}
+
+/// Greatest w_c T_s as a share of the gain at which a loop without resistance oscillates: 2 pi 0.06 with one sample of delay.
+const GREATEST_GAIN: f64 = 0.12 * PI;
+
+/// Checks that the sample period is short enough for the bandwidth.
+///
+/// A sampled integrator with d samples of delay oscillates at the gain w_c T_s = 2 sin(pi / (4 d + 2)): 2, 1 and 0.618 for d
+/// = 0, 1 and 2. With active resistance, which doubles the gain, it does at 2, 0.456 and 0.268.
+///
+/// # Errors
+/// The loop would oscillate, or nearly so.
+pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+    let critical = 2.0 * sin_cos(PI / f64::from(4 * par.delay + 2)).0;
+    let most = GREATEST_GAIN * critical / par.T_s;
+    if par.current.bandwidth <= most * (1.0 + 1e-9) {
+        return Ok(());
+    }
+    let table = PARAMETERS;
+    let allowed = format!(
+        "at most {most:.4} rad/s (2 pi {:.3} / T_s) with {} and {}, or the current oscillates; lower it or T_s",
+        0.06 * critical,
+        table.tell(par, |p| &mut p.T_s),
+        table.tell(par, |p| &mut p.delay)
+    );
+    Err(table.fault(par, |p| &mut p.current.bandwidth, allowed))
+}
+
+type P = Row<CurrentLoop>;
+
+/// Variables of the current loop; their owner supplies the prefix `current.`.
+pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
+    const {
+        &[
+            P::parameter(
+                "bandwidth",
+                &RAD_PER_S,
+                "Bandwidth of the current loop, at most 2 pi 0.06 / T_s with timing.delay = 1",
+                |p| &mut p.bandwidth,
+            )
+            .above(0.0)
+            .tunable(),
+            P::boolean_parameter(
+                "active_resistance",
+                "false: Kp = wc L, Ki = wc R; true: Ki = wc^2 L with active resistance wc L - R",
+                |p| &mut p.active_resistance,
+            ),
+            P::parameter("integral", &ONE, "Integral gain Ki in units of wc^2 L; 0: as active_resistance says", |p| {
+                &mut p.integral
+            })
+            .at_least(0.0)
+            .tunable(),
+            P::boolean_parameter(
+                "reference_feed_forward",
+                "Decoupling from the current references, with R, as in Kim & Sul (31); false: from the measured currents",
+                |p| &mut p.reference_feed_forward,
+            ),
+            P::boolean_parameter(
+                "mtpa",
+                "Maximum torque per ampere; false: i_d = 0. With Rasmussen and FluxObserver, as far as zero_speed is not active",
+                |p| &mut p.mtpa,
+            ),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Time constant of the closed loop on an R-L circuit, sampled so fast that the delay is negligible.
+    fn time_constant(active_resistance: bool) -> f64 {
+        let motor = Motor::default();
+        let gains = CurrentGains::new(&CurrentLoop { active_resistance, ..CurrentLoop::default() }, &motor);
+        let (mut controller, mut i, h) = (CurrentController::default(), 0.0, 1e-7);
+        for k in 0..100_000_u32 {
+            let (i_ref, measured) = (DqHat::new(0.0, 1.0), DqHat::new(0.0, i));
+            let u = controller.command(&gains, &motor, i_ref, measured, 0.0).q();
+            controller.integrate(&gains, i_ref - measured, None, h);
+            i += h * (u - motor.R_s * i) / motor.L_q;
+            if i > 1.0 - (-1.0_f64).exp() {
+                return f64::from(k) * h;
+            }
+        }
+        f64::NAN
+    }
+
+    #[test]
+    fn the_closed_loop_is_first_order_with_the_bandwidth() {
+        let expected = 1.0 / CurrentLoop::default().bandwidth;
+        assert!((time_constant(false) / expected - 1.0).abs() < 1e-3);
+        assert!((time_constant(true) / expected - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_voltage_stays_when_the_frame_changes() {
+        let c = CurrentController { integral: DqHat::new(3.0, 4.0) };
+        let stator = Axis::<Estimated>::at(1.2).to_stator(c.integral);
+        let turned = c.in_frame_behind(0.5);
+        assert!((Axis::<Estimated>::at(0.7).to_stator(turned.integral) - stator).magnitude() < 1e-14);
+    }
+
+    #[test]
+    fn back_calculation_settles_where_the_command_is_the_limit() {
+        let (motor, mut c) = (Motor::IPMSM_2_2_KW, CurrentController::default());
+        let gains = CurrentGains::new(&CurrentLoop::default(), &motor);
+        let (i_ref, i, limit) = (DqHat::new(-3.0, 5.0), DqHat::ZERO, DqHat::new(-12.0, motor.psi_M + 20.0));
+        for _ in 0..100_000 {
+            let wanted = c.command(&gains, &motor, i_ref, i, 0.0);
+            c.integrate(&gains, i_ref - i, Some(limit - wanted), 1e-4);
+        }
+        // limitation = -K_p e: the integral part stays bounded at the limit instead of growing with K_i e t.
+        assert!((c.integral - limit).magnitude() < 1e-6, "{:?}", c.integral);
+    }
+
+    /// Loops with every combination of the options.
+    fn loops() -> [CurrentLoop; 4] {
+        let with = |active_resistance, reference_feed_forward| CurrentLoop {
+            active_resistance,
+            reference_feed_forward,
+            ..CurrentLoop::default()
+        };
+        [with(false, false), with(true, false), with(false, true), with(true, true)]
+    }
+
+    /// On the currents of its references, the command is the voltage of the turning machine, u = R i + j w psi, once the
+    /// integrators hold what the decoupling leaves.
+    #[test]
+    fn the_command_is_the_voltage_of_the_turning_machine() {
+        let motor = Motor::IPMSM_2_2_KW;
+        for par in loops() {
+            for (i, w) in
+                [(DqHat::new(-2.0, 5.0), 300.0), (DqHat::new(1.0, -7.0), 300.0), (DqHat::new(-3.0, 4.0), -200.0)]
+            {
+                let psi = drive_plant::machine::flux(&motor, drive_base::frame::Dq::new(i.d(), i.q()));
+                let u = i * motor.R_s + DqHat::new(psi.d(), psi.q()).turned() * w;
+                let gains = CurrentGains::new(&par, &motor);
+                let by = |L: f64| par.bandwidth * L - motor.R_s;
+                let active = DqHat::new(by(motor.L_d) * i.d(), by(motor.L_q) * i.q());
+                let left = if par.reference_feed_forward { DqHat::ZERO } else { i * motor.R_s };
+                let integral = left + if par.active_resistance { active } else { DqHat::ZERO };
+                let command = CurrentController { integral }.command(&gains, &motor, i, i, w);
+                assert!((command - u).magnitude() < 1e-9, "{par:?} {i:?} {w}: {command:?}, not {u:?}");
+            }
+        }
+    }
+
+    /// An error adds K_p of its axis to the command, whatever else is in it, and this is what `output` shows too.
+    #[test]
+    fn an_error_acts_with_the_proportional_gain_of_its_axis() {
+        let motor = Motor::IPMSM_2_2_KW;
+        let gains = CurrentGains::new(&CurrentLoop::default(), &motor);
+        let c = CurrentController { integral: DqHat::new(3.0, -4.0) };
+        let (i, error) = (DqHat::new(-2.0, 5.0), DqHat::new(0.1, -0.2));
+        let w_c = CurrentLoop::default().bandwidth;
+        let expected = DqHat::new(w_c * motor.L_d * 0.1, w_c * motor.L_q * -0.2);
+        let added = c.command(&gains, &motor, i + error, i, 300.0) - c.command(&gains, &motor, i, i, 300.0);
+        assert!((added - expected).magnitude() < 1e-9, "{added:?}, not {expected:?}");
+        assert!((c.output(&gains, error) - c.integral - expected).magnitude() < 1e-9);
+    }
+
+    #[test]
+    fn tuning_does_not_change_the_command() {
+        let motor = Motor::IPMSM_2_2_KW;
+        let (i_ref, i) = (DqHat::new(-2.0, 5.0), DqHat::new(-1.7, 4.4));
+        for par in loops() {
+            let other = Motor { R_s: 1.3 * motor.R_s, ..motor.clone() };
+            let [old, new] = [
+                CurrentGains::new(&par, &motor),
+                CurrentGains::new(&CurrentLoop { bandwidth: 0.6 * par.bandwidth, ..par.clone() }, &other),
+            ];
+            let mut c = CurrentController { integral: DqHat::new(3.0, -4.0) };
+            let before = c.command(&old, &motor, i_ref, i, 300.0);
+            c.retune(&old, &new, i_ref, i);
+            let after = c.command(&new, &motor, i_ref, i, 300.0);
+            assert!((after - before).magnitude() < 1e-9, "{par:?}: {before:?} {after:?}");
+        }
+    }
+}

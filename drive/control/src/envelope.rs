@@ -1,0 +1,230 @@
+//! The most torque under a current and a voltage limit, and the currents for less: the algebra of field weakening.
+//!
+//! In steady state, with R exact, |u|^2 = R^2 |i|^2 + w^2 |psi|^2 + 2 R w t, t = tau / (1.5 n_p) = l i_q, l = psi_M - dL i_d,
+//! dL = L_q - L_d. Largest torque of one sign s (motoring +1, generating -1; w > 0) under |u| <= U and |i| <= I:
+//!
+//! - **MTPA end**: maximum torque per ampere at |i| = I, where its voltage suffices;
+//! - else **MTPV**, if it lies within I (which takes psi_M < L_d I): on the voltage limit, i(u) = Z^-1 (u - j w psi_M).
+//!   With u turned by an angle, i' = Z^-1 j u and i'' = -Z^-1 u; the torque is stationary where l i_q' - dL i_d' i_q = 0;
+//! - else **the circle**: i_d = -I (1 - x^2) / (1 + x^2), i_q = s 2 I x / (1 + x^2) make |u| = U a quartic in x > 0.
+//!
+//! For a torque below the limit, the least current on the voltage limit is the greater root of f(i_d) = |u|^2 - U^2 at i_q
+//! = t / l. The cross term is constant and f is convex, so Newton's method from the right does not overshoot, and from
+//! the inside it lands right of the root.
+//!
+//! MTPA and MTPV without R: Morimoto et al. 1990, DOI 10.1109/28.60058. The exact voltage, the quartic and the convexity
+//! are derived here. u in V, i in A, psi in Wb, w (electrical) in rad/s, tau in N.m.
+
+use drive_base::frame::DqHat;
+use drive_base::motor::Motor;
+use serde::{Deserialize, Serialize};
+
+/// Machine and current limit, with what stays the same from sample to sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Envelope {
+    /// Torque per Wb.A: 1.5 n_p.
+    k: f64,
+    R: f64,
+    L_d: f64,
+    L_q: f64,
+    dL: f64,
+    psi_M: f64,
+    /// Current limit in A.
+    I: f64,
+    /// Maximum torque per ampere on the circle: its x.
+    x_mtpa: f64,
+}
+
+/// The limit of one sign: its currents (A) and the magnitude of its torque (N.m).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Limit {
+    /// Currents in A.
+    pub i: DqHat,
+    /// Magnitude of the torque in N.m; 0: no current fits the voltage.
+    pub tau: f64,
+}
+
+/// Where the iterations for one sign ended at the last sample and the next ones begin; zeros: they begin anew.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WarmStart {
+    x: f64,
+    /// Direction of the voltage at MTPV.
+    u: [f64; 2],
+}
+
+impl Envelope {
+    /// For the estimates `motor` and the current limit `I` (A).
+    pub fn new(motor: &Motor, I: f64) -> Self {
+        let &Motor { n_p, R_s: R, L_d, L_q, psi_M } = motor;
+        let dL = L_q - L_d;
+        // i_d = (psi_M - sqrt(psi_M^2 + 8 (dL I)^2)) / (4 dL), without the division.
+        let i_d = -2.0 * dL * I * I / (psi_M + (psi_M * psi_M + 8.0 * dL * dL * I * I).sqrt());
+        Self { k: 1.5 * f64::from(n_p), R, L_d, L_q, dL, psi_M, I, x_mtpa: ((I + i_d) / (I - i_d)).sqrt() }
+    }
+
+    /// |u|^2 - U^2 (V^2) of the currents `i` (A) at the speed `w` (rad/s).
+    #[inline]
+    pub fn excess(&self, i: DqHat, w: f64, U: f64) -> f64 {
+        let (psi_d, psi_q) = (self.psi_M + self.L_d * i.d(), self.L_q * i.q());
+        let t = (self.psi_M - self.dL * i.d()) * i.q();
+        self.R * self.R * i.dot(i) + w * w * (psi_d * psi_d + psi_q * psi_q) + 2.0 * self.R * w * t - U * U
+    }
+
+    fn torque(&self, i: DqHat) -> f64 {
+        self.k * (self.psi_M - self.dL * i.d()) * i.q()
+    }
+
+    fn at(&self, i: DqHat) -> Limit {
+        Limit { i, tau: self.torque(i).abs() }
+    }
+
+    /// Currents (A) on the circle.
+    #[inline]
+    fn on_circle(&self, x: f64, s: f64) -> DqHat {
+        let r = self.I / (1.0 + x * x);
+        DqHat::new(-r * (1.0 - x * x), s * 2.0 * r * x)
+    }
+
+    /// The base speed (electrical, rad/s) under the voltage `U` (V): up to it, the machine gives its greatest torque.
+    pub fn base_speed(&self, U: f64) -> f64 {
+        let i = self.on_circle(self.x_mtpa, 1.0);
+        let (psi_d, psi_q) = (self.psi_M + self.L_d * i.d(), self.L_q * i.q());
+        let flux = psi_d * psi_d + psi_q * psi_q;
+        let half = self.R * (self.psi_M - self.dL * i.d()) * i.q();
+        let free = U * U - self.R * self.R * i.dot(i);
+        ((half * half + flux * free).max(0.0).sqrt() - half).max(0.0) / flux
+    }
+
+    /// The limit of the sign `s` at |w| = `w` (rad/s) under the voltage `U` (V).
+    #[inline]
+    pub fn limit(&self, w: f64, s: f64, U: f64, warm: &mut WarmStart) -> Limit {
+        let p = self.quartic(w, s, U);
+        let on_circle = |x: f64| self.on_circle(x, s);
+        let mut left = 0.0;
+        if value(&p, self.x_mtpa) <= 0.0 {
+            *warm = WarmStart::default();
+            return self.at(on_circle(self.x_mtpa));
+        }
+        if self.psi_M < self.L_d * self.I {
+            let i = self.max_torque_per_volt(w, s, U, &mut warm.u);
+            let magnitude = i.magnitude();
+            if magnitude <= self.I {
+                warm.x = 0.0;
+                return self.at(i);
+            }
+            if p[0] > 0.0 {
+                left = ((magnitude + i.d()) / (magnitude - i.d())).sqrt().min(self.x_mtpa);
+            }
+        }
+        if value(&p, left) > 0.0 {
+            *warm = WarmStart::default();
+            return Limit { i: DqHat::new(-self.I.min(self.psi_M / self.L_d), 0.0), tau: 0.0 };
+        }
+        warm.x = root(&p, left, self.x_mtpa, warm.x);
+        self.at(on_circle(warm.x))
+    }
+
+    /// Coefficients p_0 to p_4 of |u|^2 - U^2 on the circle, times (1 + x^2)^2.
+    fn quartic(&self, w: f64, s: f64, U: f64) -> [f64; 5] {
+        let &Self { R, L_d, L_q, dL, psi_M, I, .. } = self;
+        let (e, a, b) = (R * R * I * I - U * U, psi_M - L_d * I, psi_M + L_d * I);
+        let (w_2, c) = (w * w, 4.0 * R * w * s * I);
+        [
+            e + w_2 * a * a,
+            c * (psi_M + dL * I),
+            2.0 * e + w_2 * (2.0 * a * b + 4.0 * L_q * L_q * I * I),
+            c * (psi_M - dL * I),
+            e + w_2 * b * b,
+        ]
+    }
+
+    /// Currents (A) of the most torque per volt; `warm` is the direction of u, from the last sample on.
+    fn max_torque_per_volt(&self, w: f64, s: f64, U: f64, warm: &mut [f64; 2]) -> DqHat {
+        let &Self { R, L_d, L_q, dL, psi_M, .. } = self;
+        let (mut u, steps) =
+            if warm.iter().all(|&part| part == 0.0) { (self.without_resistance(w, s, U), 4) } else { (*warm, 2) };
+        let inverse = 1.0 / (R * R + w * w * L_d * L_q);
+        // Currents of the voltage (d, q) with the magnet's EMF set to zero.
+        let current = |d: f64, q: f64| ((R * d + w * L_q * q) * inverse, (R * q - w * L_d * d) * inverse);
+        for _ in 0..steps {
+            let (d, q) = (U * u[0], U * u[1]);
+            let (i_d, i_q) = current(d, q - w * psi_M);
+            let (i1_d, i1_q) = current(-q, d);
+            let (i2_d, i2_q) = current(-d, -q);
+            let l = psi_M - dL * i_d;
+            let slope = l * i2_q - 2.0 * dL * i1_d * i1_q - dL * i2_d * i_q;
+            let h = (-(l * i1_q - dL * i1_d * i_q) / slope).clamp(-0.3, 0.3);
+            let turned = [u[0] - h * u[1], u[1] + h * u[0]];
+            let length = (turned[0] * turned[0] + turned[1] * turned[1]).sqrt();
+            u = [turned[0] / length, turned[1] / length];
+        }
+        *warm = u;
+        let (i_d, i_q) = current(U * u[0], U * u[1] - w * psi_M);
+        DqHat::new(i_d, i_q)
+    }
+
+    /// Direction of the voltage at MTPV if R were 0.
+    fn without_resistance(&self, w: f64, s: f64, U: f64) -> [f64; 2] {
+        let (f, a) = (U / w, self.L_q * self.psi_M);
+        let psi_d = -2.0 * f * f * self.dL / (a + (a * a + 8.0 * self.dL * self.dL * f * f).sqrt());
+        [-s * (f * f - psi_d * psi_d).max(0.0).sqrt() / f, psi_d / f]
+    }
+
+    /// i_d (A) of the least current for the torque `tau` (N.m) on the voltage limit: the greater root of f, by `steps` of
+    /// Newton's method from `i_d`; none where the slope is not positive.
+    #[inline]
+    pub fn i_d(&self, tau: f64, w: f64, U: f64, mut i_d: f64, steps: u32) -> Option<f64> {
+        let &Self { k, R, L_d, L_q, dL, psi_M, .. } = self;
+        let (t, w_2) = (tau / k, w * w);
+        let (A2, A1) = (R * R + w_2 * L_d * L_d, w_2 * psi_M * L_d);
+        let A0 = w_2 * psi_M * psi_M + 2.0 * R * w * t - U * U;
+        let e = (R * R + w_2 * L_q * L_q) * t * t;
+        for _ in 0..steps {
+            let l = psi_M - dL * i_d;
+            let g = (A2 * i_d + 2.0 * A1) * i_d + A0;
+            let slope = 2.0 * ((A2 * i_d + A1) * l * l * l + e * dL);
+            if slope <= 0.0 {
+                return None;
+            }
+            i_d -= (g * l * l + e) * l / slope;
+        }
+        Some(i_d)
+    }
+
+    /// Change of the torque with the angle of the rotor ahead of the frame that holds the currents `i` (A), in N.m/rad: 0 at
+    /// maximum torque per ampere.
+    #[inline]
+    pub fn slope(&self, i: DqHat) -> f64 {
+        -self.k * (i.d() * (self.psi_M - self.dL * i.d()) + self.dL * i.q() * i.q())
+    }
+
+    /// Whether i_d is less than that of maximum torque per ampere at the same torque.
+    #[inline]
+    pub fn beyond_mtpa(&self, i: DqHat) -> bool {
+        self.slope(i) > 0.0
+    }
+
+    /// i_q (A) for the torque `tau` (N.m) with `i_d` (A).
+    #[inline]
+    pub fn i_q(&self, tau: f64, i_d: f64) -> f64 {
+        tau / (self.k * (self.psi_M - self.dL * i_d))
+    }
+}
+
+fn value(p: &[f64; 5], x: f64) -> f64 {
+    (((p[4] * x + p[3]) * x + p[2]) * x + p[1]) * x + p[0]
+}
+
+/// The root of `p` between `left`, where it is not positive, and `right`, where it is; starts at `x` if that is inside.
+/// A Newton step that leaves the bracket is replaced by bisection; one that hits its end stays.
+fn root(p: &[f64; 5], mut left: f64, mut right: f64, x: f64) -> f64 {
+    let (mut x, steps) = if x > left && x < right { (x, 2) } else { (0.5 * (left + right), 6) };
+    for _ in 0..steps {
+        let y = value(p, x);
+        *(if y > 0.0 { &mut right } else { &mut left }) = x;
+        let slope = ((4.0 * p[4] * x + 3.0 * p[3]) * x + 2.0 * p[2]) * x + p[1];
+        let next = x - y / slope;
+        x = if next >= left && next <= right { next } else { 0.5 * (left + right) };
+    }
+    x
+}

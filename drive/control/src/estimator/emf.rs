@@ -1,0 +1,253 @@
+//! Shared parts of the back-EMF estimators: parameters, the observer of one axis, the sign of the direction.
+//!
+//! In the estimated frame, which turns at w_f, each axis has the voltage equation v = R i + L p i + cross + e. The
+//! known terms give r = v - R i - cross. The remainder, e = r - L p i, contains the angle: (e_d, e_q) = E (-sin theta~,
+//! cos theta~) with theta~ = theta - theta^, where E has the sign of w.
+//!
+//! [`AxisObserver`] is Kim & Sul (14), (15) and (21) for one axis with corrections: the innovation is i - i^ with the
+//! MEASURED i, the EMF gain is negative (continuous: l_1 = 2 w_o - R/L, l_2 = -w_o^2 L), and R i and the cross terms
+//! use the measured current, so that the poles do not depend on the speed. Sampled, with both poles at z = exp(-w_o
+//! T_s): i' = i^ + T_s / L (r - e^), i^ = i' + (1 - z^2)(i - i'), e^ = e^ - (1 - z)^2 L / T_s (i - i').
+//!
+//! The paper neglects (w_f - w) L i in (18). Without this term, motoring produces a right-half-plane zero at about E /
+//! (L_d i_q), and the drive cannot hold rated load below 0.220 to 0.270 of the rated speed: `frame_term` keeps the term.
+//!
+//! A reversal at light load is lost in the papers' form: the sign of E is taken from w^, and where w^ changes its sign too
+//! late or too early, the angle error is off by half a turn. With `hold_reversal`, [`follow`] takes the direction from the
+//! EMF itself near standstill. The rotor's angle cannot jump, so the frame that was right before the reversal is right
+//! after it: e_q = w psi_M cos theta~ then gives the speed with its sign, and -e_d / e_q the angle error without one. With
+//! the share g = w_h^2 psi_M^2 / (|e|^2 + w_h^2 psi_M^2) of standstill, w_h = `w_hold`,
+//!
+//! ```text
+//! theta~ = (1 - g) atan2(-s e_d, s e_q), s = sign e_q where g > 1/2        dw^/dt += g w_o / 3 (e_q / psi_M - w^)
+//! ```
+//!
+//! The angle's gain fades with the EMF, and the speed goes on through zero with e_q, so that theta^ is its integral: the
+//! error grows with the time spent there, by (R - R^) i / psi_M in rad/s. It is for passing zero, not for staying.
+
+use crate::estimator::interval::Interval;
+use crate::estimator::tracker::Tracker;
+use crate::estimator::{Context, Estimate, Sample, Setup};
+use drive_base::frame::DqHat;
+use drive_base::math::{atan2, exp};
+use fmu_core::unit::RAD_PER_S;
+use fmu_core::{Fault, Row, Table};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// The parameters with the prefix `emf.`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EmfParameters {
+    /// EMF bandwidth in rad/s, > 0: both poles of the observers, and the pole of the direct-EMF filter.
+    pub bandwidth: f64,
+    /// Electrical speed in rad/s, > 0, that the estimate must reach in the opposite direction to change the sign.
+    pub w_sign: f64,
+    /// Keeps the frame-speed term.
+    pub frame_term: bool,
+    /// Holds the rotor in a reversal.
+    pub hold_reversal: bool,
+    /// Electrical speed w_h in rad/s, > 0, below which a reversal is held.
+    pub w_hold: f64,
+}
+
+impl Default for EmfParameters {
+    fn default() -> Self {
+        Self { bandwidth: TAU * 150.0, w_sign: 5.0, frame_term: true, hold_reversal: false, w_hold: 30.0 }
+    }
+}
+
+impl EmfParameters {
+    /// Frame speed minus the speed `w` (rad/s), or 0 if the term is neglected.
+    #[inline]
+    pub fn slip(&self, interval: &Interval, w: f64) -> f64 {
+        if self.frame_term { interval.w_frame - w } else { 0.0 }
+    }
+}
+
+/// Sign of the direction of rotation, with hysteresis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Direction(f64);
+
+impl Default for Direction {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
+
+impl Direction {
+    /// At the speed `w` (rad/s).
+    pub fn of(w: f64) -> Self {
+        Self(if w < 0.0 { -1.0 } else { 1.0 })
+    }
+
+    /// The sign for the speed `w` (rad/s): it changes when `w` passes `w_sign` in the opposite direction.
+    #[inline]
+    pub fn update(&mut self, w: f64, w_sign: f64) -> f64 {
+        if w * self.0 < -w_sign {
+            self.0 = -self.0;
+        }
+        self.0
+    }
+}
+
+/// The angle error theta - theta^ in rad from the EMF (`e_d`, `e_q`) (V), for the direction sign `s`.
+#[inline]
+pub fn angle_error(s: f64, e_d: f64, e_q: f64) -> f64 {
+    atan2(-s * e_d, s * e_q)
+}
+
+/// The last step of the methods that observe the EMF `e` (V): the tracker follows its angle.
+#[inline]
+pub fn follow(
+    tracker: &mut Tracker,
+    direction: &mut Direction,
+    context: &Context,
+    e: DqHat,
+    sample: &Sample,
+) -> Estimate {
+    let s = direction.update(tracker.w, context.par.emf.w_sign);
+    if !context.par.emf.hold_reversal {
+        return tracker.follow(context, angle_error(s, e.d(), e.q()), sample);
+    }
+    let g = hold(tracker, context, e);
+    let s = if g > 0.5 { 1.0_f64.copysign(e.q()) } else { s };
+    tracker.follow(context, (1.0 - g) * angle_error(s, e.d(), e.q()), sample)
+}
+
+/// Leads the speed through zero with the EMF `e` (V); returns the share g of standstill.
+#[inline]
+pub fn hold(tracker: &mut Tracker, context: &Context, e: DqHat) -> f64 {
+    let Context { motor, par, T_s, .. } = *context;
+    let least = par.emf.w_hold * motor.psi_M;
+    let g = least * least / (e.dot(e) + least * least);
+    tracker.w += T_s * g * par.emf.bandwidth / 3.0 * (e.q() / motor.psi_M - tracker.w);
+    g
+}
+
+/// Observer for the current and EMF of one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AxisObserver {
+    i: f64,
+    e: f64,
+}
+
+impl AxisObserver {
+    /// At the measured current `i` (A) and the EMF `e` (V).
+    pub fn at(i: f64, e: f64) -> Self {
+        Self { i, e }
+    }
+
+    /// The EMF in V. Inputs: the voltage `r` (V) without R i and cross terms, the current `i` (A) at the end of the
+    /// interval, and the inductance `L` (H); the pole is `z` = exp(-w_o T_s).
+    #[inline]
+    pub fn update(&mut self, z: f64, L: f64, T_s: f64, r: f64, i: f64) -> f64 {
+        let predicted = self.i + T_s / L * (r - self.e);
+        let innovation = i - predicted;
+        self.i = predicted + (1.0 - z * z) * innovation;
+        self.e -= (1.0 - z) * (1.0 - z) * L / T_s * innovation;
+        self.e
+    }
+}
+
+/// Checks that the tracker's bandwidth is at most one third of the EMF bandwidth.
+///
+/// # Errors
+/// States by how much the tracker is too fast.
+pub fn validate(setup: &Setup) -> Result<(), Fault> {
+    let (rho, w_o) = (setup.par.tracker.bandwidth, setup.par.emf.bandwidth);
+    if rho > w_o / 3.0 * (1.0 + 1e-9) {
+        let observer = setup.tell("emf.bandwidth");
+        let allowed = format!("at most a third of {observer}, or the tracker rings on the EMF's lag");
+        return Err(setup.fault("tracker.bandwidth", allowed));
+    }
+    Ok(())
+}
+
+/// Pole of a sampled first-order system with the bandwidth `w` (rad/s).
+#[inline]
+pub fn pole(w: f64, T_s: f64) -> f64 {
+    exp(-w * T_s)
+}
+
+type P = Row<EmfParameters>;
+
+/// The variables; their owner adds the prefix `emf.`.
+pub const EMF: &Table<EmfParameters> = &Table::new(
+    const {
+        &[
+            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the back-EMF observer or filter", |p| &mut p.bandwidth)
+                .above(0.0)
+                .tunable(),
+            P::parameter(
+                "w_sign",
+                &RAD_PER_S,
+                "Electrical speed beyond zero at which the estimated direction of rotation changes",
+                |p| &mut p.w_sign,
+            )
+            .above(0.0),
+            P::boolean_parameter(
+                "frame_term",
+                "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18); false: methods with this term alone",
+                |p| &mut p.frame_term,
+            ),
+            P::boolean_parameter(
+                "hold_reversal",
+                "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; estimators \
+                 other than the EMF methods refuse it",
+                |p| &mut p.hold_reversal,
+            ),
+            P::parameter(
+                "w_hold",
+                &RAD_PER_S,
+                "Electrical speed below which emf.hold_reversal takes the speed from the EMF",
+                |p| &mut p.w_hold,
+            )
+            .above(0.0),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_poles_of_the_axis_observer_are_where_they_should_be() {
+        // Free response: i = 0, r = 0. Both poles at z: error(k) = (a + b k) z^k, so x(k+2) - 2 z x(k+1) + z^2 x(k) = 0.
+        let (z, L, T_s) = (pole(TAU * 150.0, 1e-4), 36e-3, 1e-4);
+        let mut o = AxisObserver::at(0.0, 10.0);
+        let mut e = [10.0, o.update(z, L, T_s, 0.0, 0.0), 0.0];
+        for _ in 0..100 {
+            e[2] = o.update(z, L, T_s, 0.0, 0.0);
+            assert!((e[2] - 2.0 * z * e[1] + z * z * e[0]).abs() < 1e-12, "{e:?}");
+            e = [e[1], e[2], 0.0];
+        }
+    }
+
+    #[test]
+    fn the_sign_has_hysteresis() {
+        let mut direction = Direction::of(20.0);
+        for (w, sign) in [(-4.0, 1.0), (-6.0, -1.0), (4.0, -1.0), (6.0, 1.0)] {
+            assert!((direction.update(w, 5.0) - sign).abs() < 1e-15);
+        }
+    }
+
+    /// Near standstill, the correction of the angle fades and the speed follows e_q / psi_M; at speed, neither.
+    #[test]
+    fn a_reversal_is_held_near_standstill() {
+        let (mut par, motor) = (crate::estimator::EstimatorParameters::default(), drive_base::motor::Motor::default());
+        par.emf.hold_reversal = true;
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
+        let rho = par.tracker.bandwidth;
+        for (w, g) in [(par.emf.w_hold, 0.5), (3.0 * par.emf.w_hold, 0.1), (0.0, 1.0)] {
+            let (mut tracker, mut direction) = (Tracker::at(0.0, w, 1e-4), Direction::of(w));
+            let (angle, length) = (0.1, motor.psi_M * w);
+            let e = DqHat::new(-length * f64::sin(angle), length * f64::cos(angle));
+            follow(&mut tracker, &mut direction, &context, e, &Sample::default());
+            let slow = 1e-4 * g * par.emf.bandwidth / 3.0 * (e.q() / motor.psi_M - w);
+            let expected = if w > 0.0 { (1.0 - g) * angle } else { 0.0 };
+            assert!((tracker.w_frame - w - slow - 2.0 * rho * expected).abs() < 1e-9, "{w} rad/s: {tracker:?}");
+            assert!((tracker.w - w - slow - 1e-4 * rho * rho * expected).abs() < 1e-9, "{w} rad/s: {tracker:?}");
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! Flux observer in stator axes with speed-adaptive tracking (Hinkkanen, Saarakkala, Awan, Mölsä, Tuovinen, "Observers
+//! for sensorless synchronous motor drives: Framework for design and analysis", IEEE Trans. Ind. Appl. 54 (6), 2018, DOI
+//! 10.1109/TIA.2018.2845877), with an adaptation of the resistance that works at every speed.
+//!
+//! ```text
+//! d psi^/dt = u - R^ i + v        e = psi(i) - psi^        psi_a = psi_M^ + (L_d - L_q) i*        r + j s = e / psi_a
+//! ```
+//!
+//! i* is the conjugate of the current in the estimated frame. For small theta~ = theta - theta^, s = -theta~ + Im(psi~ /
+//! psi_a), psi~ = psi - psi^: the [tracker](crate::estimator::tracker) follows -s. The feedback v = c r psi_a, with
+//! c = 2 k_1 = R^/2 (1/L_d + 1/L_q) + k_w |w^|, acts along psi_a only, so that the flux error z = psi~ / psi_a obeys
+//!
+//! ```text
+//! dz/dt = -j w z - (R - R^) i / psi_a - c Re z,        poles s^2 + c s + w^2
+//! ```
+//!
+//! independently of the tracker, and r = Re z shows it.
+//!
+//! **Resistance.** What one ohm does to psi~ is known: h with dh/dt = -i - c rho psi_a, rho = Re(h / psi_a), integrated
+//! along with psi^. It gives r = (R - R^) rho, at rest (rho = -i_d / (c psi_M)), at speed (rho = -i_q / (w psi_M)) and in all
+//! transients between, with the right sign, also where rho passes zero. Hence the adaptive observer (Zhang, IEEE Trans.
+//! Autom. Control 47 (3), 2002), with rho_0 = `adaptation.i` / (c_0 psi_M), c_0 = c at rest:
+//!
+//! ```text
+//! dR^/dt = b r rho / (rho^2 + rho_0^2)        psi^ += h dR^        b = adaptation.bandwidth
+//! ```
+//!
+//! The second equation removes what the old R^ left in psi^. Neither the gate by standstill nor the freezing of R^ that
+//! Rasmussen's observer needs ([`resistance`](crate::estimator::resistance)) is left: both replaced the missing dynamics
+//! of r. A small c makes the angle insensitive and rho large: while the reference is a speed, c <= k_c |w|, as there.
+//! `adaptation.k_a` is not read: at creep it fought R^ and lost cells.
+//!
+//! **Magnet.** r also contains (psi_M^ - psi_M) / psi_a: psi_M^ follows -r where R^ has no part in it,
+//! d psi_M^/dt = -b_M r psi_M^ / (1 + (rho / (0.3 rho_0))^2), stable: s^3 + (c + b_M) s^2 + w^2 s + b_M w^2.
+//!
+//! Limits: at w = 0 the angle is not observable; without current, neither is R. An offset of the current sensors acts like
+//! a wrong R^ that turns: 20 mA loses cells at 0.01 pu. L_q^ = 1.2 L_q loses rated motoring load at 0.02 and 0.05 pu.
+
+use crate::estimator::resistance::{FILTER, STANDSTILL};
+use crate::estimator::tracker::Tracker;
+use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Sample};
+use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
+use drive_base::motor::Motor;
+use fmu_core::unit::{ONE, PER_SECOND};
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Share of `rho_0` above which the magnet flux adapts more slowly.
+const MAGNET_ALONE: f64 = 0.3;
+/// Least |psi_a|^2 as a share of `psi_M`^2.
+const LEAST: f64 = 0.01;
+
+/// Parameters of the observer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FluxObserverParameters {
+    /// Gain c per electrical speed, >= 0.
+    pub k_w: f64,
+    /// Rate at which the magnet flux adapts in 1/s, >= 0; 0: not at all.
+    pub magnet: f64,
+}
+
+impl Default for FluxObserverParameters {
+    fn default() -> Self {
+        Self { k_w: 0.4, magnet: 0.0 }
+    }
+}
+
+/// State at the last sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FluxObserver {
+    tracker: Tracker,
+    /// Estimated stator flux linkage in Wb.
+    psi: AlphaBeta,
+    /// Its feedback in V.
+    v: DqHat,
+    /// Change of the flux error per resistance in Wb/Ohm.
+    h: AlphaBeta,
+    /// Its feedback in V/Ohm.
+    v_h: DqHat,
+    /// Adapted resistance in Ohm.
+    R: f64,
+    /// Adapted magnet flux linkage in Wb.
+    psi_M: f64,
+    /// Low-passed electrical speed in rad/s.
+    w_f: f64,
+}
+
+impl Estimating for FluxObserver {
+    /// The first resistance is on the safe side for Rasmussen's observer; in torque mode, it is `motor.R_s`.
+    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        let Context { motor, par, T_s, .. } = *context;
+        let axis = Axis::<Estimated>::at(theta);
+        let psi = axis.to_stator(flux(motor, motor.psi_M, axis.from_stator(sample.i)));
+        let (R, psi_M) = (par.adaptation.first(motor, sample), motor.psi_M);
+        let tracker = Tracker::at(theta, w, T_s);
+        (Self { tracker, psi, R, psi_M, w_f: w, ..Self::default() }, Estimate::new(theta, w, sample))
+    }
+
+    #[inline]
+    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+        let Context { motor, T_s, par, .. } = *context;
+        self.tracker.advance(T_s);
+        let axis = Axis::<Estimated>::at(self.tracker.theta);
+        let half_way = axis.ahead(Turn::new(0.5 * (self.tracker.theta_last - self.tracker.theta)));
+        let R = self.resistance(par, motor);
+        let mean = (sample.i_last + sample.i) * 0.5;
+        self.psi += (sample.u - mean * R + half_way.to_stator(self.v)) * T_s;
+
+        if par.flux_observer.magnet == 0.0 {
+            self.psi_M = motor.psi_M;
+        }
+        let (i, psi_M, dL) = (axis.from_stator(sample.i), self.psi_M, motor.L_d - motor.L_q);
+        let psi_a = DqHat::new(psi_M + dL * i.d(), -dL * i.q());
+        let inverse = 1.0 / psi_a.dot(psi_a).max(LEAST * psi_M * psi_M);
+        let e = flux(motor, psi_M, i) - axis.from_stator(self.psi);
+        let r = inverse * psi_a.dot(e);
+
+        let w = self.tracker.w;
+        self.w_f += T_s * FILTER * (w - self.w_f);
+        let c_0 = 0.5 * R * (1.0 / motor.L_d + 1.0 / motor.L_q);
+        let mut c = c_0 + par.flux_observer.k_w * w.abs();
+        let mut others = 0.0;
+        if par.adaptation.resistance {
+            let asked = sample.speed_ref.map_or(0.0, f64::abs);
+            if asked >= STANDSTILL {
+                c = c.min(par.adaptation.k_c * self.w_f.abs().max(f64::from(motor.n_p) * asked));
+            }
+            self.h += (half_way.to_stator(self.v_h) - mean) * T_s;
+            let rho = inverse * psi_a.dot(axis.from_stator(self.h));
+            let rho_0 = par.adaptation.i / (c_0 * psi_M);
+            self.adapt(context, r * rho / (rho * rho + rho_0 * rho_0));
+            self.v_h = psi_a * (-c * rho);
+            others = rho / (MAGNET_ALONE * rho_0);
+        }
+        self.v = psi_a * (c * r);
+        self.psi_M -= T_s * par.flux_observer.magnet * r * psi_M / (1.0 + others * others);
+        self.tracker.correct(context, par.tracker.bandwidth, -inverse * psi_a.cross(e), sample);
+        Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, ..Estimate::default() }
+    }
+
+    #[inline]
+    fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
+        if par.adaptation.resistance { self.R } else { motor.R_s }
+    }
+
+    /// The adapted values of the machine stay.
+    fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
+        *self = Self { R: self.R, ..Self::start(context, sample, theta, w).0 };
+    }
+}
+
+impl FluxObserver {
+    /// Moves the resistance along its estimated error (Ohm), within the clamps, and the flux with it.
+    #[inline]
+    fn adapt(&mut self, context: &Context, error: f64) {
+        let Context { motor, T_s, par, .. } = *context;
+        let R = self.R + T_s * par.adaptation.bandwidth * error;
+        let R = par.adaptation.within(motor, R);
+        self.psi += self.h * (R - self.R);
+        self.R = R;
+    }
+}
+
+/// Stator flux linkage in Wb.
+#[inline]
+fn flux(motor: &Motor, psi_M: f64, i: DqHat) -> DqHat {
+    DqHat::new(psi_M + motor.L_d * i.d(), motor.L_q * i.q())
+}
+
+type P = Row<FluxObserverParameters>;
+
+/// The observer's variables; their owner adds the prefix `flux_observer.`.
+pub const FLUX_OBSERVER: &Table<FluxObserverParameters> = &Table::new(
+    const {
+        &[
+            P::parameter("k_w", &ONE, "Feedback gain of the flux error per electrical speed", |p| &mut p.k_w)
+                .at_least(0.0)
+                .tunable(),
+            P::parameter(
+                "magnet",
+                &PER_SECOND,
+                "Rate at which FluxObserver adapts psi_M, the others refuse it; 0: motor.psi_M",
+                |p| &mut p.magnet,
+            )
+            .at_least(0.0),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::testing::{beside, comes_to_the_rotor, salient, with_L_q};
+    use drive_base::frame::Dq;
+
+    #[test]
+    fn comes_to_the_rotor_without_bias() {
+        comes_to_the_rotor::<FluxObserver>(47.0);
+    }
+
+    #[test]
+    fn a_wrong_l_q_turns_it() {
+        let (more, less) = (with_L_q::<FluxObserver>(1.2), with_L_q::<FluxObserver>(0.8));
+        assert!((more - 6.29).abs() < 0.3 && (less + 6.37).abs() < 0.3, "{more} {less} deg");
+    }
+
+    /// In both directions, motoring and generating: a wrong R^ turns the angle, and the adaptation removes it.
+    #[test]
+    fn the_resistance_converges_with_every_sign() {
+        for w in [47.0, -47.0] {
+            for i_q in [5.59, -5.59] {
+                let hat = Motor { R_s: 1.3 * salient().R_s, ..salient() };
+                let mut par = EstimatorParameters::default();
+                let angle = |par: &EstimatorParameters, n| {
+                    beside::<FluxObserver>(par, &hat, (w, Dq::new(2.0, i_q)), 0.0, n).0.to_degrees()
+                };
+                assert!(angle(&par, 20_000).abs() > 2.0, "{w} rad/s, {i_q} A: {} deg", angle(&par, 20_000));
+                par.adaptation.resistance = true;
+                assert!(angle(&par, 50_000).abs() < 0.02, "{w} rad/s, {i_q} A: {} deg", angle(&par, 50_000));
+            }
+        }
+    }
+
+    /// The magnet flux adapts together with the resistance.
+    #[test]
+    fn the_magnet_flux_converges() {
+        let hat = Motor { psi_M: 1.2 * salient().psi_M, ..salient() };
+        let mut par = EstimatorParameters::default();
+        let angle = |par: &EstimatorParameters| {
+            beside::<FluxObserver>(par, &hat, (235.0, Dq::new(-0.84, 5.59)), 0.0, 50_000).0.to_degrees()
+        };
+        assert!(angle(&par).abs() > 5.0, "{} deg", angle(&par));
+        par.flux_observer.magnet = 5.0;
+        assert!(angle(&par).abs() < 0.02, "{} deg", angle(&par));
+    }
+}

@@ -1,0 +1,142 @@
+//! Options that only some estimators have. With any other estimator the controller refuses them by name, so that none is
+//! ignored silently.
+//!
+//! An option is a variable that is off at its start value. Values of a method (bandwidths, voltages, noise densities) are not
+//! options: each estimator reads its own, and a set of values may hold those of several.
+
+use crate::estimator::pulsating::Demodulation;
+use crate::estimator::tracker::TrackerKind;
+use crate::estimator::{Class, Kind, Setup};
+use fmu_core::Fault;
+
+struct Choice {
+    /// Name of its variable.
+    name: &'static str,
+    /// Whether it is on.
+    asked: fn(&Setup) -> bool,
+    /// Whether an estimator has it.
+    has: fn(Kind) -> bool,
+    /// What the others do not do.
+    why: &'static str,
+    /// How to turn it off.
+    off: &'static str,
+}
+
+const CHOICES: &[Choice] = &[
+    Choice {
+        name: "start.mode",
+        asked: |s| s.starts_by_injection,
+        has: |kind| kind.class().injects(),
+        why: "the start by injection needs an estimator that injects",
+        off: "set start.mode = CurrentFrequency or Direct",
+    },
+    Choice {
+        name: "weakening.use",
+        asked: |s| s.weakens,
+        has: |kind| kind.class() != Class::Injection,
+        why: "injection leaves no voltage for field weakening",
+        off: "set it to false",
+    },
+    Choice {
+        name: "tracker.kind",
+        asked: |s| s.par.tracker.kind != TrackerKind::Pll,
+        has: |kind| {
+            use Kind::{CurrentModel, KalmanFilter, Rasmussen, Sensored, VoltageModel};
+            !matches!(kind, Rasmussen | VoltageModel | CurrentModel | Sensored | KalmanFilter)
+        },
+        why: "it has no tracker",
+        off: "set it to Pll",
+    },
+    Choice {
+        name: "adaptation.resistance",
+        asked: |s| s.par.adaptation.resistance,
+        has: |kind| matches!(kind, Kind::Rasmussen | Kind::FluxObserver),
+        why: "it does not adapt the resistance",
+        off: "set it to false",
+    },
+    Choice {
+        name: "adaptation.tracking",
+        asked: |s| s.par.adaptation.tracking > 0.0,
+        has: |kind| kind == Kind::Rasmussen,
+        why: "only Rasmussen needs it; FluxObserver adapts the resistance at every speed",
+        off: "set adaptation.tracking = 0",
+    },
+    Choice {
+        name: "adaptation.k_a",
+        asked: |s| s.par.adaptation.k_a > 0.0,
+        has: |kind| kind == Kind::Rasmussen,
+        why: "it does not turn the frame at rest",
+        off: "set adaptation.k_a = 0",
+    },
+    Choice {
+        name: "flux_observer.magnet",
+        asked: |s| s.par.flux_observer.magnet > 0.0,
+        has: |kind| kind == Kind::FluxObserver,
+        why: "it does not adapt psi_M",
+        off: "set it to 0",
+    },
+    Choice {
+        name: "emf.hold_reversal",
+        asked: |s| s.par.emf.hold_reversal,
+        has: |kind| {
+            use Kind::{DirectEmf, EmfObserver, ExtendedEmf, SlidingMode, VoltageFeedback};
+            matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | SlidingMode)
+        },
+        why: "it does not take the direction of rotation from the sign of the EMF",
+        off: "set it to false",
+    },
+    Choice {
+        name: "emf.frame_term",
+        asked: |s| !s.par.emf.frame_term,
+        has: |kind| {
+            use Kind::{CurrentModel, DirectEmf, EmfObserver, ExtendedEmf, Hybrid, VoltageFeedback, VoltageModel};
+            let by_emf = matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | Hybrid);
+            by_emf || matches!(kind, VoltageModel | CurrentModel)
+        },
+        why: "it has no such term",
+        off: "set it to true",
+    },
+    Choice {
+        name: "matsui.integral",
+        asked: |s| !s.par.matsui.integral,
+        has: |kind| matches!(kind, Kind::VoltageModel | Kind::CurrentModel),
+        why: "it has no such integral",
+        off: "set it to true",
+    },
+    Choice {
+        name: "pulsating.demodulation",
+        asked: |s| s.par.pulsating.demodulation != Demodulation::Heterodyne,
+        has: |kind| kind == Kind::PulsatingInjection,
+        why: "it has no pulsating carrier",
+        off: "set it to Heterodyne",
+    },
+    Choice {
+        name: "gradient.clamped",
+        asked: |s| s.par.gradient.clamped,
+        has: |kind| kind == Kind::GradientObserver,
+        why: "it has no such clamp",
+        off: "set it to false",
+    },
+];
+
+/// Checks that the estimator has the options that are on.
+///
+/// # Errors
+/// It does not have one of them.
+pub fn validate(setup: &Setup) -> Result<(), Fault> {
+    let Some(choice) = CHOICES.iter().find(|choice| (choice.asked)(setup) && !(choice.has)(setup.kind)) else {
+        return Ok(());
+    };
+    let names: Vec<&str> = Kind::ALL.iter().filter(|&&kind| (choice.has)(kind)).map(|kind| kind.name()).collect();
+    let names = match names.as_slice() {
+        [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
+        one => one.concat(),
+    };
+    Err(Fault::new(format!(
+        "{} is not allowed with {}: {}; {}, or set estimator = {names}",
+        setup.tell(choice.name),
+        setup.tell("estimator"),
+        choice.why,
+        choice.off
+    )))
+}

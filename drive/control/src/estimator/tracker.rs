@@ -1,0 +1,176 @@
+//! Trackers: they calculate angle and speed from an angle error e = theta - theta^ (Kim & Sul's sign).
+//!
+//! - PLL, poles (s + rho)^2: theta^ += T_s (w^ + 2 rho e), w^ += T_s rho^2 e.
+//! - Mechanical observer, poles (s + rho)^3, with the torque reference tau* as feed-forward:
+//!   theta^ += T_s (w^ + 3 rho e), w^ += T_s (n_p / J (tau* - tau_L) + 3 rho^2 e), tau_L -= T_s J / n_p rho^3 e.
+//!
+//! The PLL follows a constant speed without an error. The mechanical observer follows a constant load without an error
+//! and, if J is correct, every change of its own torque, so its speed does not lag. Limits: after a filter or observer
+//! of bandwidth w_o, rho <= w_o / 3; below 2 pi 15 rad/s, a 50 % load step loses synchronism.
+
+use crate::estimator::{Context, Estimate, Sample, Setup};
+use drive_base::math::at_least;
+use fmu_core::unit::RAD_PER_S;
+use fmu_core::{Fault, Field, Row, Table, enumeration};
+use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
+
+enumeration! {
+    /// The trackers; values never change.
+    #[derive(Serialize, Deserialize)]
+    pub enum TrackerKind("Tracker", "Tracker of angle and speed from an angle error") {
+        1 Pll "Phase-locked loop of second order";
+        2 MechanicalObserver "Observer of speed and load torque, of third order";
+    }
+}
+
+/// The parameters with the prefix `tracker.`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrackerParameters {
+    /// The selected tracker.
+    pub kind: TrackerKind,
+    /// Pole rho in rad/s, > 0, with multiplicity two or three.
+    pub bandwidth: f64,
+}
+
+impl Default for TrackerParameters {
+    fn default() -> Self {
+        Self { kind: TrackerKind::Pll, bandwidth: 2.0 * std::f64::consts::PI * 20.0 }
+    }
+}
+
+/// State at a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tracker {
+    /// Electrical angle at this sample in rad, not wrapped.
+    pub theta: f64,
+    /// Electrical angle at the last sample in rad.
+    pub theta_last: f64,
+    /// Electrical speed in rad/s.
+    pub w: f64,
+    /// Frame speed from this sample to the next in rad/s: w plus the angle correction.
+    pub w_frame: f64,
+    /// Load torque in N.m (mechanical observer).
+    pub tau_load: f64,
+}
+
+impl Tracker {
+    /// At the electrical angle `theta` (rad), turning at `w` (rad/s).
+    pub fn at(theta: f64, w: f64, T_s: f64) -> Self {
+        Self { theta, theta_last: theta - w * T_s, w, w_frame: w, tau_load: 0.0 }
+    }
+
+    /// Advances to the next sample, `T_s` (s) later; each update calls this first.
+    #[inline]
+    pub fn advance(&mut self, T_s: f64) {
+        self.theta_last = self.theta;
+        self.theta += T_s * self.w_frame;
+    }
+
+    /// Corrects the state with the angle error `e` (rad) and the bandwidth `rho` (rad/s): the angle from the next
+    /// sample on, the speed immediately. Field weakening may require a faster one.
+    #[inline]
+    pub fn correct(&mut self, context: &Context, rho: f64, e: f64, sample: &Sample) {
+        let (T_s, rho) = (context.T_s, at_least(rho, sample.rho));
+        if context.par.tracker.kind == TrackerKind::MechanicalObserver {
+            let inertia = context.J / f64::from(context.motor.n_p);
+            self.w_frame = self.w + 3.0 * rho * e;
+            self.w += T_s * ((sample.tau_ref - self.tau_load) / inertia + 3.0 * rho * rho * e);
+            self.tau_load -= T_s * inertia * rho * rho * rho * e;
+        } else {
+            self.w_frame = self.w + 2.0 * rho * e;
+            self.w += T_s * rho * rho * e;
+        }
+    }
+}
+
+/// Checks that the tracker can work.
+///
+/// # Errors
+/// The mechanical observer has no inertia value.
+pub fn validate(setup: &Setup) -> Result<(), Fault> {
+    let observes_load = setup.par.tracker.kind == TrackerKind::MechanicalObserver;
+    if observes_load && setup.J.partial_cmp(&0.0) != Some(Ordering::Greater) {
+        return Err(Fault::new(format!(
+            "{} and {}: that observer divides torque by inertia, which must be above 0",
+            setup.tell("mechanics.J"),
+            setup.tell("tracker.kind")
+        )));
+    }
+    Ok(())
+}
+
+impl Tracker {
+    /// The common last step of the methods that calculate an angle error: the tracker follows `e` (rad) and supplies
+    /// the estimated angle and speed.
+    #[inline]
+    pub fn follow(&mut self, context: &Context, e: f64, sample: &Sample) -> Estimate {
+        self.correct(context, context.par.tracker.bandwidth, e, sample);
+        Estimate::new(self.theta, self.w, sample)
+    }
+}
+
+type P = Row<TrackerParameters>;
+
+/// The tracker's variables; their owner adds the prefix `tracker.`.
+pub const TRACKER: &Table<TrackerParameters> = &Table::new(
+    const {
+        &[
+            P::enumeration_parameter(
+                "kind",
+                "Tracker of angle and speed from the angle error; estimators without a tracker refuse the second",
+                &Field(|p| &mut p.kind),
+            ),
+            P::parameter(
+                "bandwidth",
+                &RAD_PER_S,
+                "Magnitude of the tracker's double or triple pole; field weakening raises it where angle errors make torque",
+                |p| &mut p.bandwidth,
+            )
+            .above(0.0)
+            .tunable(),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::EstimatorParameters;
+    use drive_base::motor::Motor;
+
+    /// Angle and speed error after `n` samples when following a rotor with a constant acceleration (rad/s2).
+    fn behind(kind: TrackerKind, acceleration: f64, tau_ref: f64, n: u32) -> (f64, f64) {
+        let par = EstimatorParameters {
+            tracker: TrackerParameters { kind, ..TrackerParameters::default() },
+            ..EstimatorParameters::default()
+        };
+        let motor = Motor::default();
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
+        let mut tracker = Tracker::at(0.3, 0.0, context.T_s);
+        let (mut theta, mut w) = (0.0, 50.0);
+        for _ in 0..n {
+            tracker.advance(context.T_s);
+            theta += context.T_s * w + 0.5 * context.T_s * context.T_s * acceleration;
+            w += context.T_s * acceleration;
+            tracker.correct(
+                &context,
+                par.tracker.bandwidth,
+                theta - tracker.theta,
+                &Sample { tau_ref, ..Sample::default() },
+            );
+        }
+        (theta - tracker.theta, w - tracker.w)
+    }
+
+    #[test]
+    fn steady_errors_are_those_of_the_loop_type() {
+        let rho = TrackerParameters::default().bandwidth;
+        let (angle, speed) = behind(TrackerKind::Pll, 0.0, 0.0, 5000);
+        assert!(angle.abs() < 1e-10 && speed.abs() < 1e-9, "PLL at constant speed: {angle} rad, {speed} rad/s");
+        let (angle, _) = behind(TrackerKind::Pll, 1000.0, 0.0, 5000);
+        assert!((angle - 1000.0 / (rho * rho)).abs() < 1e-4, "PLL at constant acceleration: {angle} rad");
+        let (angle, speed) = behind(TrackerKind::MechanicalObserver, 1000.0, 0.0, 10_000);
+        assert!(angle.abs() < 1e-9 && speed.abs() < 0.2, "the unknown load becomes tau_load: {angle}, {speed}");
+    }
+}

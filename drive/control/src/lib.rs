@@ -1,0 +1,32 @@
+//! Sensorless control of a permanent-magnet synchronous machine: current and speed loops, the low-speed law, field weakening,
+//! the start, every [`estimator`], and the model [`SensorlessController`] built from them.
+//!
+//! Nothing here knows the plant: the machine's values are the controller's estimates. The conventions are those of
+//! [`drive_base`].
+
+#![forbid(unsafe_code)]
+// The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
+#![allow(non_snake_case)]
+
+pub mod current;
+mod cycle;
+pub mod documentation;
+pub mod envelope;
+pub mod estimator;
+mod gains;
+pub mod lock;
+pub mod model;
+pub mod polarity;
+pub mod reference;
+pub mod sensor;
+pub mod signals;
+pub mod speed;
+pub mod start;
+mod state;
+pub mod tables;
+mod terminals;
+pub mod tracking;
+pub mod weakening;
+pub mod zero_speed;
+
+pub use model::SensorlessController;

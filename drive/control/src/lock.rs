@@ -1,0 +1,354 @@
+//! Detects a lost rotor from the voltage that it needs and from the speed that it does not reach.
+//!
+//! # Voltage
+//! psi^ = e^{j theta^} (L e^{-j theta^} i + psi_M) is the flux linkage of a rotor at the estimated angle with the
+//! measured current. Over the last interval, `epsilon = u - R (i[k-1] + i[k]) / 2 - (psi^[k] - psi^[k-1]) / T_s` is
+//! zero if the estimate and the machine values are correct, with any injection. A rotor at another angle leaves j w
+//! psi_M (e^{j theta} - e^{j theta^}), with magnitude 2 sin(theta~/2) |w| psi_M; a wrong speed leaves the difference of
+//! the two back EMFs. epsilon is transformed to the estimated frame and smoothed at 50 Hz. A resistance that is wrong
+//! by up to 30 % explains part of it; what remains is divided by lock.u + 2 sin(lock.angle / 2) psi_M |w^|.
+//!
+//! Near standstill the EMF is smaller than (R - R^) i and shows nothing. There the speed shows it:
+//!
+//! # Speed
+//! A rotor that turns with the estimated frame but not at the reference is lost: the estimate itself shows it. The
+//! speed error x, smoothed at 7 Hz, is the distance of the frame's speed from the reference, or from a model of the reference that a drive
+//! with half of its torque could follow, whichever is nearer:
+//!
+//! ```text
+//! S = (1 / S_0) int |x| dt     while |x| > w_0 + 5 % of the reference; otherwise S decays with 8 lock.time
+//! S_0 = 1.6 n_p i_max / K_i,   w_0 = n_p i_max / (K_i 60 lock.time)
+//! ```
+//!
+//! n_p i_max / K_i is the error integral for which the speed loop goes from no torque to its limit. No load that the
+//! drive can carry needs more, so no load step reaches S = 1, however it arrives; an error that stays does. S is at most 2,
+//! and 0 while the EMF confirms the angle: psi_M |w^| > 2 lock.u and a quotient below 0.5. There is no x in torque mode.
+//!
+//! The greater of the quotient and S, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
+//! fits, 1 and above that it is lost; the maximum is 10. It does not depend on the estimator.
+//!
+//! `lock.u` covers the errors that remain with a good estimate: what (R - R^) i leaves, and for the dead time 4/3 of a
+//! leg's voltage. A smaller value detects more if the machine values are accurate.
+//!
+//! Limits: a rotor that is blocked, or loaded beyond the torque, near standstill is reported as lost: the current is at
+//! its limit and the speed is not reached in both cases. At |w| psi_M < lock.u / 2, a rotor at a wrong angle that
+//! still turns at the reference is not seen; at standstill without a change of current, nothing shows it.
+//!
+//! The voltage is derived here from Kim & Sul 2011, eq (1), the speed from the PI speed loop; for every estimator.
+//! u in V, psi in Wb, theta in rad, w in rad/s (electrical).
+
+use crate::estimator::Sample;
+use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
+use drive_base::math::{at_least, at_most, exp, sin_cos, within};
+use drive_base::motor::Motor;
+use fmu_core::unit::{RADIAN, SECOND, VOLT};
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
+
+/// Maximum value, also reported by a controller that had to restart.
+pub const LOST: f64 = 10.0;
+/// Bandwidth in rad/s of the smoothing of the voltage.
+const FILTER: f64 = TAU * 50.0;
+/// Bandwidth in rad/s of the smoothing of the speed error: an injection turns current noise into a noisy speed.
+const SMOOTH: f64 = TAU * 7.0;
+/// Share of R^ by which the resistance may be wrong before the voltage shows it.
+const RESISTANCE: f64 = 0.3;
+/// S_0 in units of the speed loop's error integral.
+const MARGIN: f64 = 1.6;
+/// Share of the reference by which the speed may be off.
+const SPEED: f64 = 0.05;
+
+/// The parameters with the prefix `lock.`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LockParameters {
+    /// Tolerated voltage error in V, > 0.
+    pub u: f64,
+    /// Angle error in rad at which the lock counts as lost, if the back EMF reveals it, > 0.
+    pub angle: f64,
+    /// Time constant of the output in s, > 0.
+    pub time: f64,
+}
+
+impl Default for LockParameters {
+    fn default() -> Self {
+        Self { u: 5.0, angle: PI / 6.0, time: 0.05 }
+    }
+}
+
+/// What the speed loop can do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reach {
+    /// Integral of the electrical speed error in rad for which it goes from no torque to its limit.
+    pub integral: f64,
+    /// Electrical acceleration in rad/s2 that its greatest torque gives.
+    pub acceleration: f64,
+}
+
+/// Gains computed from the parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LockGains {
+    filter: f64,
+    /// Smoothing of the speed error.
+    smooth: f64,
+    level: f64,
+    u: f64,
+    /// Voltage per speed in Wb.
+    psi: f64,
+    /// 1/T_s in 1/s.
+    rate: f64,
+    /// w_0 in rad/s.
+    w_0: f64,
+    /// T_s / S_0 in 1/rad.
+    integrates: f64,
+    /// Decay of S in a sample.
+    decays: f64,
+    /// Change of the reference's model in a sample in rad/s.
+    follows: f64,
+}
+
+impl LockGains {
+    /// For the machine estimates `motor`, the sample period `T_s` (s) and the speed loop's `reach`.
+    pub fn new(par: &LockParameters, motor: &Motor, T_s: f64, reach: Reach) -> Self {
+        Self {
+            filter: 1.0 - exp(-FILTER * T_s),
+            smooth: 1.0 - exp(-SMOOTH * T_s),
+            level: 1.0 - exp(-T_s / par.time),
+            u: par.u,
+            psi: 2.0 * sin_cos(0.5 * par.angle).0 * motor.psi_M,
+            rate: 1.0 / T_s,
+            w_0: reach.integral / (60.0 * par.time),
+            integrates: T_s / (MARGIN * reach.integral),
+            decays: 1.0 - exp(-T_s / (8.0 * par.time)),
+            follows: 0.5 * reach.acceleration * T_s,
+        }
+    }
+}
+
+/// State at a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Lock {
+    /// Whether a sample has been taken.
+    started: bool,
+    /// Flux linkage of a rotor at the estimate in Wb.
+    psi: AlphaBeta,
+    /// Smoothed voltage in V.
+    e: DqHat,
+    /// The output.
+    level: f64,
+    following: Following,
+}
+
+/// Whether the frame's speed follows the reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Following {
+    /// d axis at the last sample.
+    d: AlphaBeta,
+    /// Model of the reference in rad/s.
+    w_m: f64,
+    /// Speed of the frame less the reference in rad/s, smoothed.
+    off: f64,
+    /// Speed of the frame less the model in rad/s, smoothed.
+    off_m: f64,
+    /// Integral of the speed error as a share of S_0.
+    S: f64,
+}
+
+impl Following {
+    /// S after a sample with the d axis at `d` and the reference `w_ref` (rad/s), none in torque mode; 0 if the EMF has
+    /// `confirmed` the angle.
+    #[inline]
+    fn update(&mut self, gains: &LockGains, d: AlphaBeta, w_ref: Option<f64>, confirmed: bool) -> f64 {
+        let w = self.d.cross(d) * gains.rate;
+        self.d = d;
+        let w_ref = w_ref.unwrap_or(w);
+        self.w_m += within(w_ref - self.w_m, gains.follows);
+        self.off += (w - w_ref - self.off) * gains.smooth;
+        self.off_m += (w - self.w_m - self.off_m) * gains.smooth;
+        let x = at_least(at_most(self.off, self.off_m), -at_least(self.off, self.off_m));
+        if confirmed {
+            self.S = 0.0;
+        } else if x > gains.w_0 + SPEED * w_ref.abs() {
+            self.S = at_most(self.S + gains.integrates * x, 2.0);
+        } else {
+            self.S -= self.S * gains.decays;
+        }
+        self.S
+    }
+}
+
+impl Lock {
+    /// Clearly lost.
+    pub fn lost() -> Self {
+        Self { level: LOST, ..Self::default() }
+    }
+
+    /// `lock_lost` after a sample with the estimated frame on `axis`, turning at `w` (rad/s) with the reference `w_ref`
+    /// (rad/s), none in torque mode; `R_s` (Ohm) is the resistance that the estimator uses.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
+    pub fn update(
+        &mut self,
+        gains: &LockGains,
+        motor: &Motor,
+        R_s: f64,
+        sample: &Sample,
+        axis: Axis<Estimated>,
+        (w, w_ref): (f64, Option<f64>),
+    ) -> f64 {
+        let i = axis.from_stator(sample.i);
+        let psi = DqHat::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q());
+        if self.started {
+            let resistive = (sample.i_last + sample.i) * (0.5 * R_s);
+            let epsilon = axis.from_stator(sample.u - resistive + self.psi * gains.rate) - psi * gains.rate;
+            self.e += (epsilon - self.e) * gains.filter;
+            // The error of the resistance that explains most; the tiny current keeps 0/0 away.
+            let dR = within(self.e.dot(i) / (i.dot(i) + 1e-12), RESISTANCE * R_s);
+            let quotient = at_most((self.e - i * dR).magnitude() / (gains.u + gains.psi * w.abs()), LOST);
+            let confirmed = quotient < 0.5 && motor.psi_M * w.abs() > 2.0 * gains.u;
+            let level = at_least(quotient, self.following.update(gains, axis.along(1.0), w_ref, confirmed));
+            self.level += (level - self.level) * gains.level;
+        }
+        (self.started, self.psi) = (true, axis.to_stator(psi));
+        self.level
+    }
+}
+
+type P = Row<LockParameters>;
+
+/// The variables; their owner supplies the prefix `lock.`.
+pub const LOCK: &Table<LockParameters> = &Table::new(
+    const {
+        &[
+            P::parameter("u", &VOLT, "Voltage error tolerated before lock_lost rises", |p| &mut p.u).above(0.0),
+            P::parameter("angle", &RADIAN, "Angle error at which lock_lost is 1, where the back EMF shows it", |p| {
+                &mut p.angle
+            })
+            .above(0.0)
+            .at_most(PI),
+            P::parameter("time", &SECOND, "Time constant of lock_lost", |p| &mut p.time).above(0.0),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use drive_base::frame::{Dq, Rotor};
+    use drive_plant::machine::flux;
+
+    const T_S: f64 = 1e-4;
+    /// Reach of the reference drive.
+    const REACH: Reach = Reach { integral: 5.0, acceleration: 8000.0 };
+
+    /// `lock_lost` for an estimate `theta_tilde` (rad) off a loaded rotor turning at `w` (rad/s), estimated as `w_hat`.
+    fn beside(theta_tilde: f64, w: f64, w_hat: f64) -> f64 {
+        let (motor, i) = (Motor { L_q: 9e-3, ..Motor::default() }, Dq::new(-1.0, 4.0));
+        let gains = LockGains::new(&LockParameters { u: 1e-9, ..LockParameters::default() }, &motor, T_S, REACH);
+        let at = |theta: f64, v: Dq| -> AlphaBeta { Axis::<Rotor>::at(theta).to_stator(v) };
+        let (mut lock, mut level) = (Lock::default(), 0.0);
+        for k in 0..10_000 {
+            let (t, last) = (T_S * f64::from(k), T_S * f64::from(k - 1));
+            let (i_now, i_last) = (at(w * t, i), at(w * last, i));
+            let u = (at(w * t, flux(&motor, i)) - at(w * last, flux(&motor, i))) * (1.0 / T_S)
+                + (i_now + i_last) * (0.5 * motor.R_s);
+            let sample = Sample { i: i_now, i_last, u, ..Sample::default() };
+            level = lock.update(&gains, &motor, motor.R_s, &sample, Axis::at(w_hat * t - theta_tilde), (w_hat, None));
+        }
+        level
+    }
+
+    #[test]
+    fn an_angle_error_is_measured_by_the_emf() {
+        assert!(beside(0.0, 300.0, 300.0) < 1e-9);
+        // Without saliency it would be exactly 1; here (L_q - L_d) i adds to the back EMF.
+        for (degrees, expected) in [(-30.0_f64, 1.0), (30.0, 1.0), (180.0, 1.0 / 15.0_f64.to_radians().sin())] {
+            let level = beside(degrees.to_radians(), -300.0, -300.0);
+            assert!((level / expected - 1.0).abs() < 0.1, "{degrees} deg: {level}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_speed_is_seen() {
+        let level = beside(0.0, 0.0, 300.0);
+        assert!(level > 1.5, "a rotor at rest, the estimate running: {level}");
+        let level = beside(0.0, 300.0, 1.0);
+        assert!(level > 5.0, "a rotor that runs, the estimate at rest: {level}");
+    }
+
+    /// A machine at rest with the current (3, 4) A in the estimated frame and the resistance `R` (Ohm).
+    fn at_rest(R: f64, gains: &LockGains) -> f64 {
+        let (motor, i) = (Motor::default(), AlphaBeta::new(3.0, 4.0));
+        let sample = Sample { i, i_last: i, u: i * R, ..Sample::default() };
+        let mut lock = Lock::default();
+        let mut update = || lock.update(gains, &motor, motor.R_s, &sample, Axis::at(0.0), (0.0, None));
+        (0..10_000).map(|_| update()).last().unwrap()
+    }
+
+    /// 30 % of R^ explain themselves; of 60 %, the other 30 % remain: 0.3 * 2 Ohm * 5 A = 3 V.
+    #[test]
+    fn a_wrong_resistance_explains_its_voltage() {
+        let gains = LockGains::new(&LockParameters::default(), &Motor::default(), T_S, REACH);
+        assert!(at_rest(2.6, &gains) < 1e-9 && at_rest(1.4, &gains) < 1e-9);
+        assert!((at_rest(3.2, &gains) - 0.6).abs() < 1e-3 && (at_rest(0.8, &gains) - 0.6).abs() < 1e-3);
+    }
+
+    /// S after `seconds` with the frame turning at `w` and the reference `w_ref` (rad/s).
+    fn followed(watch: &mut Following, w: f64, w_ref: f64, seconds: f64, confirmed: bool) -> f64 {
+        let gains = LockGains::new(&LockParameters::default(), &Motor::default(), T_S, REACH);
+        let (start, mut t) = (watch.d.beta().atan2(watch.d.alpha()), 0.0);
+        while t < seconds {
+            t += T_S;
+            let d = Axis::<Estimated>::at(start + w * t).to_stator(DqHat::new(1.0, 0.0));
+            watch.update(&gains, d, Some(w_ref), confirmed);
+        }
+        watch.S
+    }
+
+    /// An error of 10 rad/s takes S_0 / 10 = 0.8 s; a reference that moves is given the time that half of the torque needs;
+    /// the EMF clears it.
+    #[test]
+    fn a_speed_that_is_not_reached_is_seen() {
+        // Less the lag 1 / SMOOTH = 23 ms.
+        let S = followed(&mut Following::default(), 10.0, 0.0, 0.4, false);
+        assert!((S - (0.4 - 1.0 / SMOOTH) * 10.0 / 8.0).abs() < 0.01, "{S}");
+        // w_0 = 5 / 3 rad/s.
+        assert!(followed(&mut Following::default(), 1.6, 0.0, 20.0, false) < 1e-9);
+        assert!(followed(&mut Following::default(), 2.0, 0.0, 20.0, false) > 1.9);
+        // The model moves with 4000 rad/s2: with a = 1 / SMOOTH, 4000 (T^2 / 2 - a T + a^2 (1 - e^{-T/a})) in T = 0.04 s to a
+        // frame that stays, 0 to one as fast.
+        let S = followed(&mut Following::default(), 0.0, 400.0, 0.04, false);
+        let (T, a) = (0.04, 1.0 / SMOOTH);
+        let area = 4000.0 * (0.5 * T * T - a * T + a * a * (1.0 - (-T / a).exp()));
+        assert!((S - area / 8.0).abs() < 0.02, "{S}, not {}", area / 8.0);
+        let mut watch = Following::default();
+        (0..100).for_each(|k| assert!(followed(&mut watch, 4.0 * f64::from(k), 400.0, 1e-3, false) < 0.02));
+        let mut watch = Following::default();
+        assert!(followed(&mut watch, 0.0, 400.0, 0.3, false) > 1.0);
+        assert!(followed(&mut watch, 0.0, 400.0, T_S, true) < 1e-12);
+    }
+
+    /// A frame whose speed is noisy, as behind an injection, but right on the average: +-20 rad/s, 100 times a second.
+    #[test]
+    fn a_noisy_speed_is_no_loss() {
+        let mut watch = Following::default();
+        for k in 0..400 {
+            let w = if k % 2 == 0 { 20.0 } else { -20.0 };
+            assert!(followed(&mut watch, w, 0.0, 5e-3, false) < 0.1, "{}", watch.S);
+        }
+    }
+
+    /// The speed loop goes from no torque to i_q = 6 A over 6 A / K_i = 1.6875 rad, and 0.675 N.m/A times 6 A accelerate
+    /// 1.5e-3 kg.m2; both count pole pairs.
+    #[test]
+    fn the_gains_know_the_reach_of_the_speed_loop() {
+        let mut controller = crate::SensorlessController::default();
+        fmu_core::Model::derive(&mut controller);
+        let reach = Reach { integral: 3.0 * 1.6875, acceleration: 3.0 * 0.675 * 6.0 / 1.5e-3 };
+        let expected = LockGains::new(&LockParameters::default(), &controller.parameters.motor, T_S, reach);
+        let of = |gains: &LockGains| [gains.w_0, gains.integrates, gains.follows];
+        for (gain, expected) in of(&controller.gains.lock).into_iter().zip(of(&expected)) {
+            assert!((gain / expected - 1.0).abs() < 1e-9, "{gain}, not {expected}");
+        }
+    }
+}

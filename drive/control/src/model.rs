@@ -1,0 +1,334 @@
+//! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
+
+use crate::current::{self, CurrentGains};
+use crate::estimator::{Class, Estimator, Sample, Setup};
+use crate::gains::Gains;
+use crate::lock::{LOST, Lock, LockGains, Reach};
+use crate::polarity;
+use crate::reference::{max_torque, max_torque_per_ampere};
+use crate::signals::{ControllerInputs, ControllerOutputs};
+use crate::speed::SpeedGains;
+use crate::start::StartMode;
+use crate::state::{InUse, State, context};
+use crate::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
+use crate::weakening::{self, WeakeningGains};
+use crate::zero_speed::{self, ZeroSpeed};
+use drive_base::motor::Motor;
+use fmu_core::log::Warnings;
+use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
+use fmu_core::{
+    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns,
+    integrate,
+};
+use serde::{Deserialize, Serialize};
+
+/// Maximum rotation of the estimate in one sample in rad: faster rotation means that the estimator is lost.
+const MAX_TURN: f64 = 20.0 * std::f64::consts::PI;
+
+/// Sensorless speed control of a permanent-magnet synchronous machine (Rasmussen, Fig. 2).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SensorlessController {
+    /// Inputs, held over a communication step.
+    pub inputs: ControllerInputs,
+    /// Parameters; a step never changes them.
+    pub parameters: ControllerParameters,
+    pub(super) gains: Gains,
+    /// Gains of the last sample.
+    pub(super) last_gains: Gains,
+    /// A parameter has been set since the last sample.
+    pub(super) tuned: bool,
+    pub(super) in_use: InUse,
+    pub(super) state: State,
+}
+
+impl SensorlessController {
+    /// The outputs that are visible now: the results of the last sample but one.
+    #[inline]
+    pub fn shown(&self) -> &ControllerOutputs {
+        &self.state.shown
+    }
+
+    /// One sample of the controller: currents in, voltage references out. If a lost estimator makes the state
+    /// non-finite, the controller restarts at rest from its last angle and reports the loss.
+    fn compute(&mut self) {
+        if !self.inputs.enable {
+            self.state.computed = self.rest();
+            return;
+        }
+        let theta = self.state.computed.theta_est;
+        self.control();
+        self.state.k += 1;
+        let (out, par) = (&self.state.computed, &self.parameters);
+        let sane = (out.speed_est * f64::from(par.motor.n_p) * par.T_s).abs() < MAX_TURN;
+        if !(sane && out.is_finite()) {
+            self.start_again(theta);
+        }
+    }
+
+    /// Rejects inputs that are not finite.
+    #[inline]
+    fn finite(&self) -> Result<(), Fault> {
+        if self.inputs.is_finite() {
+            return Ok(());
+        }
+        Err(Fault::new("an input of the controller is not a finite number"))
+    }
+
+    /// Not enabled: resets everything except the sample grid and the displayed outputs.
+    #[cold]
+    fn rest(&mut self) -> ControllerOutputs {
+        let Self { parameters: par, state, .. } = self;
+        let new = State::new(par, false);
+        let out = new.computed;
+        let mut offset = state.offset;
+        if par.compensation.calibrate {
+            offset.update(par.sensor.measure(self.inputs.i, state.samples), par.T_s);
+        }
+        *state = State { samples: state.samples, shown: state.shown, offset, ..new };
+        out
+    }
+
+    /// Restarts at the angle `theta` (rad) of the last sample, at rest and without voltage.
+    #[cold]
+    fn start_again(&mut self, theta: f64) {
+        let Self { parameters: par, state, .. } = self;
+        let kind = par.estimator;
+        let nothing = Sample { k: state.k, ..Sample::default() };
+        let (estimator, _) = Estimator::start(kind, &context(par, &par.estimators, &par.motor), &nothing, theta, 0.0);
+        *state = State {
+            samples: state.samples,
+            k: state.k,
+            offset: state.offset,
+            estimator,
+            lock: Lock::lost(),
+            shown: state.shown,
+            ..State::default()
+        };
+        let R_s_est = state.estimator.resistance(&par.estimators, &par.motor);
+        state.computed = ControllerOutputs {
+            theta_est: theta,
+            lock_lost: LOST,
+            enabled: true,
+            R_s_est,
+            ..ControllerOutputs::default()
+        };
+    }
+
+    /// Checks that the parameters fit together, with a DC link of `u_dc` (V) at the start.
+    ///
+    /// # Errors
+    /// States which parameters do not fit together, and what to do.
+    pub fn validate_on(&self, u_dc: f64) -> Result<(), Fault> {
+        let par = &self.parameters;
+        let ControllerParameters { limit, zero_speed, estimator, start, .. } = par;
+        let tell = |name: &str| PARAMETERS.tell_name(par, name).unwrap_or_else(|| name.to_owned());
+        estimator.validate(&Setup {
+            kind: *estimator,
+            par: &par.estimators,
+            motor: &par.motor,
+            J: par.J,
+            T_s: par.T_s,
+            reference_feed_forward: par.current.reference_feed_forward,
+            active_resistance: par.current.active_resistance,
+            starts_by_injection: start.mode == StartMode::Injection,
+            weakens: par.weakening.used,
+            tell: &tell,
+        })?;
+        current::validate(par)?;
+        if start.mode == StartMode::CurrentFrequency && start.i > limit.i {
+            return Err(above_limit(par, |p| &mut p.start.i));
+        }
+        if start.mode == StartMode::Injection {
+            polarity::validate(par)?;
+        }
+        // A running drive has to live with its DC link.
+        weakening::validate(par, if self.state.samples == 0 { u_dc } else { 0.0 })?;
+        // The start value is accepted with an estimator that does not read it.
+        let reads = estimator.class() == Class::FluxObserver;
+        if zero_speed.i_0 > limit.i && (reads || zero_speed.i_0 > ZeroSpeed::default().i_0) {
+            return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
+        }
+        zero_speed::validate(par)
+    }
+}
+
+/// The fault reported for a current above the limit.
+fn above_limit(par: &ControllerParameters, get: impl FnOnce(&mut ControllerParameters) -> &mut f64) -> Fault {
+    let limit = PARAMETERS.tell(par, |p| &mut p.limit.i);
+    PARAMETERS.fault(par, get, format!("at most {limit}"))
+}
+
+impl Model for SensorlessController {
+    type Outputs = ControllerOutputs;
+
+    const INFO: Info = Info {
+        name: "SensorlessController",
+        description: "Sensorless speed control of a permanent-magnet synchronous machine, zero speed included",
+        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+        documentation: crate::documentation::CONTROLLER,
+        ..drive_base::PROJECT
+    };
+
+    const TABLE: &'static Table<Block<Self>> = TABLE;
+
+    const TERMINALS: &'static [Terminal] = crate::terminals::CONTROLLER;
+
+    const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
+
+    const STATE_VERSION: u16 = 13;
+
+    fn derive(&mut self) {
+        let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
+        // Finite, so that no current is no torque with any psi_M.
+        let k = motor.torque_constant().min(f64::MAX);
+        let observes_flux = estimator.class() == Class::FluxObserver;
+        // With i_d of the low-speed law, the limits of the currents are those of each sample.
+        let by_law = observes_flux && !current.mtpa;
+        let tau = if by_law { limit.tau } else { max_torque(motor, limit, current.mtpa) };
+        let weakening = WeakeningGains::new(&self.parameters, tau, current.mtpa);
+        let speed = SpeedGains::new(speed_loop, *J, k);
+        let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
+        let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p * k * i / J };
+        if !self.tuned {
+            self.last_gains.clone_from(&self.gains);
+        }
+        self.tuned = true;
+        self.gains = Gains {
+            current: CurrentGains::new(current, motor),
+            speed,
+            k,
+            i_tau: tau / k,
+            i_d_end: max_torque_per_ampere(motor, tau).d(),
+            observes_flux,
+            lock: LockGains::new(lock, motor, *T_s, reach),
+            weakening,
+        };
+    }
+
+    fn validate(&self) -> Result<(), Fault> {
+        self.validate_on(self.inputs.u_dc)
+    }
+
+    fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
+        // An importer that handles events exchanges values at the instant, before the sample is taken.
+        if interface != Interface::CoSimulation && self.parameters.delay == 0 {
+            let allowed =
+                "1 or 2: at an event, the voltages of the last sample act, and the currents are sampled after that";
+            return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.delay, allowed));
+        }
+        Ok(())
+    }
+
+    fn initialize(&mut self) {
+        self.state = State::new(&self.parameters, self.inputs.enable);
+        self.tuned = false;
+    }
+
+    fn output(&self, _now: Elapsed, out: &mut ControllerOutputs) {
+        out.clone_from(&self.state.shown);
+    }
+
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        integrate::sampled(self, step)
+    }
+}
+
+impl Sampled for SensorlessController {
+    fn period(&self) -> f64 {
+        self.parameters.T_s
+    }
+
+    fn samples(&self) -> u64 {
+        self.state.samples
+    }
+
+    fn show(&mut self) {
+        if std::mem::take(&mut self.state.hidden) {
+            self.state.shown.clone_from(&self.state.computed);
+        }
+    }
+
+    fn sample(&mut self) -> Result<(), Fault> {
+        self.finite()?;
+        self.compute();
+        self.state.hidden = true;
+        self.state.samples += 1;
+        Ok(())
+    }
+}
+
+impl Warns for SensorlessController {
+    fn warn(&self, log: &mut Warnings<'_>) {
+        let (out, par, tau_ref) = (&self.state.shown, &self.parameters, self.inputs.tau_ref);
+        let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
+        if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
+            log.warn("tau_ref", || {
+                format!(
+                    "tau_ref = {tau_ref} N.m has been clipped for a second: at this speed and u_dc, the drive gives {} to {} N.m (tau_min, tau_max)",
+                    out.tau_min, out.tau_max
+                )
+            });
+        }
+        if out.lock_lost < 1.0 {
+            return;
+        }
+        let restarted = ControllerOutputs {
+            theta_est: out.theta_est,
+            lock_lost: LOST,
+            enabled: true,
+            R_s_est: out.R_s_est,
+            ..ControllerOutputs::default()
+        };
+        if *out == restarted {
+            log.warn("restarted", || {
+                format!(
+                    "the estimate was not finite or turned by more than {MAX_TURN} rad in a sample: the controller \
+                     starts again at rest, theta_est = {} rad",
+                    out.theta_est
+                )
+            });
+            return;
+        }
+        let Motor { n_p, R_s, L_d, L_q, psi_M } = self.parameters.motor;
+        // A wrong resistance changes the voltage by at most R_s i, which a back EMF of twice that outweighs.
+        let emf = psi_M * (f64::from(n_p) * out.speed_est).abs();
+        let tells = emf <= 2.0 * R_s * par.limit.i;
+        log.warn("lock_lost", || {
+            let resistance = if tells { format!("R_s = {R_s} Ohm, ") } else { String::new() };
+            format!(
+                "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage, or the speed is not reached; \
+                 the rotor is not where theta_est = {} rad and speed_est = {} rad/s say, the load exceeds the torque, or the \
+                 controller's {resistance}L_d = {L_d} H, L_q = {L_q} H, psi_M = {psi_M} Wb do not fit the machine",
+                out.lock_lost, out.theta_est, out.speed_est
+            )
+        });
+    }
+}
+
+type V = Row<Block<SensorlessController>>;
+
+const TABLE: &Table<Block<SensorlessController>> = &Table::new(
+    const {
+        &[
+            V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
+            V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
+                .read_with("speed_loop.torque_mode", "true"),
+            V::boolean_input(
+                "enable",
+                "The controller runs; false: it commands 0 V, and starts anew when set to true",
+                |m| &mut m.model.inputs.enable,
+            )
+            .optional(),
+            V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
+            V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
+            V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
+            V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+            V::input("theta_meas", &RADIAN, "Electrical rotor angle of a sensor", |m| &mut m.model.inputs.theta_meas)
+                .read_with("estimator", "Sensored"),
+            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
+                .read_with("estimator", "Sensored"),
+            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+        ]
+    },
+);

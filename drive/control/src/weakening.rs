@@ -1,0 +1,392 @@
+//! Field weakening: the torque and the current references that the DC link allows, by feed-forward with a bounded trim.
+//!
+//! The voltage that the references may use is U = k_u u_dc / sqrt 3 - y. From U, the estimated speed and the machine
+//! estimates, [`Envelope`] gives the limits of the torque and, for the torque within them, the least current. Where
+//! the plain reference (maximum torque per ampere, i_d = 0 or the low-speed law) fits the voltage, nothing is changed.
+//!
+//! The trim y corrects wrong estimates: dy/dt = w_t (|u| - k_t u_dc / sqrt 3), 0 <= y <= 0.3 u_dc / sqrt 3, with the voltage
+//! |u| that the current loop requests, before the hexagon. It changes U, never i_d, so that MTPV and the current limit
+//! stay right; it also moves while the current error is large, where wrong estimates would saturate the loop for good.
+//!
+//! The speed loop's limits are those of the torque. They fall as the speed rises, so while one acts, the integrator
+//! follows: dI/dt = w_s (limited - wanted), in addition to the hold of [`speed`](crate::speed).
+//!
+//! A limit is computed at every sample while it acts, else at every eighth one and when the voltage has changed by 1 %.
+//!
+//! The tracker's bandwidth while weakening: [`tracking`](crate::tracking).
+
+use crate::envelope::{Envelope, Limit, WarmStart};
+use crate::estimator::Kind;
+use crate::reference::{max_torque, max_torque_per_ampere};
+use crate::tables::{ControllerParameters, PARAMETERS};
+use crate::tracking::LeastTracker;
+use drive_base::frame::DqHat;
+use fmu_core::unit::{ONE, RAD_PER_S};
+use fmu_core::{Fault, Row, Table};
+use serde::{Deserialize, Serialize};
+
+const SQRT_3: f64 = 1.732_050_807_568_877_2;
+const INVERSE_SQRT_3: f64 = 1.0 / SQRT_3;
+
+/// Least share of u_dc / sqrt 3 that the references may use.
+const LEAST_SHARE: f64 = 0.05;
+
+/// Greatest trim, as a share of u_dc / sqrt 3.
+const GREATEST_TRIM: f64 = 0.3;
+
+/// Samples after which a limit that does not act is computed again, and the change of the voltage, as a share, after which
+/// both are.
+const EVERY: u64 = 8;
+const LEAST_CHANGE: f64 = 0.01;
+
+/// Least electrical speed in rad/s that the limits are computed for.
+const LEAST_SPEED: f64 = 1e-3;
+
+/// Least torque per ampere of i_q, as a share of that of the magnet alone.
+pub(super) const LEAST_TORQUE: f64 = 0.2;
+
+/// Parameters of field weakening.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WeakeningParameters {
+    /// Field weakening is in use.
+    pub used: bool,
+    /// Share of u_dc / sqrt 3 that the references use, 0.5..1.
+    pub k_u: f64,
+    /// Share of u_dc / sqrt 3 above which the trim acts, k_u..1.1.
+    pub k_t: f64,
+    /// Bandwidth w_t of the trim in rad/s, >= 0; 0: no trim.
+    pub bandwidth: f64,
+}
+
+impl Default for WeakeningParameters {
+    fn default() -> Self {
+        Self { used: false, k_u: 0.95, k_t: 0.98, bandwidth: 10.0 * std::f64::consts::PI }
+    }
+}
+
+/// Computed from the parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WeakeningGains {
+    envelope: Envelope,
+    /// Currents (A) of the greatest positive torque of the plain reference.
+    end: DqHat,
+    /// Inverse of the torque constant in A/(N.m).
+    per_torque: f64,
+    /// Parts of |u|^2 that bound those of all its currents: constant, by w, by w^2.
+    voltage: [f64; 3],
+    /// Least useful i_d in A.
+    least: f64,
+    /// Least bandwidth of the tracker.
+    pub(super) tracker: LeastTracker,
+}
+
+impl WeakeningGains {
+    /// For a reference of up to `tau` (N.m), with maximum torque per ampere (`mtpa`) or i_d = 0.
+    pub fn new(par: &ControllerParameters, tau: f64, mtpa: bool) -> Self {
+        let ControllerParameters { motor, limit, .. } = par;
+        let end = if mtpa {
+            max_torque_per_ampere(motor, tau)
+        } else {
+            DqHat::new(0.0, (tau / motor.torque_constant()).min(limit.i_q).min(limit.i))
+        };
+        let psi = DqHat::new(motor.psi_M + motor.L_d * end.d(), motor.L_q * end.q());
+        let t = motor.torque(end.d(), end.q()) / (1.5 * f64::from(motor.n_p));
+        let R = motor.R_s;
+        Self {
+            envelope: Envelope::new(motor, limit.i),
+            end,
+            per_torque: 1.0 / motor.torque_constant(),
+            voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
+            least: -limit.i.min(motor.psi_M / motor.L_d),
+            tracker: LeastTracker::new(par),
+        }
+    }
+}
+
+impl WeakeningGains {
+    /// Least bandwidth in rad/s of the tracker with the currents `i` (A).
+    #[inline]
+    pub fn tracker(&self, i: DqHat) -> f64 {
+        self.tracker.at(self.envelope.slope(i))
+    }
+
+    /// Electrical speed in rad/s below which all plain references fit the voltage `U` (V).
+    pub fn onset(&self, U: f64) -> f64 {
+        let [copper, cross, flux] = self.voltage;
+        let free = U * U - copper;
+        if U <= 0.0 || free <= 0.0 { 0.0 } else { 2.0 * free / (cross + (cross * cross + 4.0 * flux * free).sqrt()) }
+    }
+}
+
+/// State from one sample to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "answers of the last sample, each on its own")]
+pub struct Weakening {
+    /// Trim in V.
+    trim: f64,
+    /// Voltage in V for the references of this sample.
+    U: f64,
+    /// Voltage in V at the last sample that had to compute both limits.
+    U_then: f64,
+    /// Some plain reference does not fit the voltage.
+    near: bool,
+    /// Limits for motoring and for generating.
+    limits: [Limit; 2],
+    warm: [WarmStart; 2],
+    /// The drive generates: the second limit is the one in use.
+    generates: bool,
+    /// The limit in use acts.
+    clipped: bool,
+    /// i_d of the last sample in A, read while weakening.
+    i_d: f64,
+    /// i_d is below that of the plain reference.
+    pub weakens: bool,
+}
+
+impl Weakening {
+    /// Greatest magnitudes of negative and positive torque at the electrical speed `w` (rad/s), as i_q (A) of the magnet's
+    /// torque and at most `i`, where the DC link of `u_dc` (V) also feeds an injection of `injected` (V). `k` counts the
+    /// samples.
+    #[inline]
+    pub fn limits(
+        &mut self,
+        gains: &WeakeningGains,
+        par: &WeakeningParameters,
+        (w, u_dc, injected): (f64, f64, f64),
+        i: f64,
+        k: u64,
+    ) -> (f64, f64) {
+        let highest = u_dc * INVERSE_SQRT_3;
+        self.U = (par.k_u * highest - self.trim - injected).max(LEAST_SHARE * highest);
+        let ([copper, cross, flux], speed) = (gains.voltage, w.abs());
+        if copper + speed * (cross + speed * flux) <= self.U * self.U {
+            if self.near {
+                let Self { trim, U, .. } = *self;
+                *self = Self { trim, U, ..Self::default() };
+            }
+            return (i, i);
+        }
+        self.near = true;
+        let [motoring, generating] = self.limits_near(gains, speed.max(LEAST_SPEED), i, k);
+        if w >= 0.0 { (generating, motoring) } else { (motoring, generating) }
+    }
+
+    /// The limits (A), motoring and generating, where the plain references may not fit; at most `i`.
+    fn limits_near(&mut self, gains: &WeakeningGains, w: f64, i: f64, k: u64) -> [f64; 2] {
+        let moved = (self.U - self.U_then).abs() > LEAST_CHANGE * self.U;
+        if moved {
+            self.U_then = self.U;
+        }
+        for (side, (s, turn)) in [(1.0, 0), (-1.0, EVERY / 2)].into_iter().enumerate() {
+            let acts = self.clipped && self.generates == (side == 1);
+            if moved || acts || (k + turn).is_multiple_of(EVERY) {
+                self.limits[side] = self.limit(gains, side, s, w);
+            }
+        }
+        // NaN if the speed is NaN: no torque then.
+        self.limits.map(|limit| (limit.tau * gains.per_torque).max(0.0).min(i))
+    }
+
+    fn limit(&mut self, gains: &WeakeningGains, side: usize, s: f64, w: f64) -> Limit {
+        let end = DqHat::new(gains.end.d(), s * gains.end.q());
+        if gains.envelope.excess(end, w, self.U) <= 0.0 {
+            self.warm[side] = WarmStart::default();
+            return Limit { i: DqHat::new(gains.least, 0.0), tau: f64::INFINITY };
+        }
+        gains.envelope.limit(w, s, self.U, &mut self.warm[side])
+    }
+
+    /// Currents (A) for the torque `tau` (N.m) at the electrical speed `w` (rad/s): the `plain` ones, of maximum torque per
+    /// ampere if `mtpa`, or on the voltage limit; |i_q| at most `i_q_max`.
+    #[inline]
+    pub fn currents(
+        &mut self,
+        gains: &WeakeningGains,
+        tau: f64,
+        w: f64,
+        i_q_max: f64,
+        mtpa: bool,
+        plain: impl Fn() -> DqHat,
+    ) -> DqHat {
+        if !self.near {
+            return plain();
+        }
+        self.generates = tau * w < 0.0;
+        let limit = self.limits[usize::from(self.generates)];
+        self.clipped = tau.abs() >= limit.tau * (1.0 - 1e-9);
+        let solve = |i_d, steps| gains.envelope.i_d(tau, w, self.U, i_d, steps);
+        let on_the_limit = |i_d: f64| {
+            let i_d = i_d.max(limit.i.d());
+            DqHat::new(i_d, gains.envelope.i_q(tau, i_d))
+        };
+        // While weakening, the root is near the last one, and left of maximum torque per ampere.
+        let warm = || solve(self.i_d, 2).map(on_the_limit).filter(|&i| gains.envelope.beyond_mtpa(i));
+        let i = if self.clipped {
+            // The root is double on MTPV, but its currents are known already.
+            DqHat::new(limit.i.d(), limit.i.q().abs().copysign(tau))
+        } else if let Some(i) = if self.weakens && mtpa { warm() } else { None } {
+            i
+        } else {
+            let plain = plain();
+            if gains.envelope.excess(plain, w, self.U) <= 0.0 {
+                self.weakens = false;
+                return plain;
+            }
+            let warm = if self.weakens && !mtpa { solve(self.i_d, 2) } else { None };
+            let i = on_the_limit(warm.or_else(|| solve(plain.d(), 8)).unwrap_or(limit.i.d()));
+            if i.d() >= plain.d() {
+                self.weakens = false;
+                return plain;
+            }
+            i
+        };
+        (self.i_d, self.weakens) = (i.d(), true);
+        DqHat::new(i.d(), i.q().clamp(-i_q_max, i_q_max))
+    }
+
+    /// Integrates the trim over one sample of `T_s` (s) with the voltage `u` (V) that the current loop requests.
+    #[inline]
+    pub fn integrate(&mut self, par: &WeakeningParameters, u: f64, u_dc: f64, T_s: f64) {
+        let highest = u_dc * INVERSE_SQRT_3;
+        self.trim = (self.trim + T_s * par.bandwidth * (u - par.k_t * highest)).min(GREATEST_TRIM * highest).max(0.0);
+    }
+}
+
+/// Share of u_dc / sqrt 3 that the voltage `u` (V) takes; 0 without a link.
+#[inline]
+pub fn share(u: f64, u_dc: f64) -> f64 {
+    if u_dc > 1e-3 { u * SQRT_3 / u_dc } else { 0.0 }
+}
+
+/// Checks that field weakening can work with the other parameters, on a DC link of `u_dc` (V).
+///
+/// # Errors
+/// States which parameters do not fit together, and what to do.
+pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
+    let ControllerParameters { weakening: own, motor, limit, estimator, .. } = par;
+    if !own.used {
+        return Ok(());
+    }
+    let table = PARAMETERS;
+    let estimator_is = table.tell(par, |p| &mut p.estimator);
+    let limit_is = table.tell(par, |p| &mut p.limit.i);
+    let use_is = table.tell(par, |p| &mut p.weakening.used);
+    if own.k_t < own.k_u {
+        let least = table.tell(par, |p| &mut p.weakening.k_u);
+        return Err(table.fault(par, |p| &mut p.weakening.k_t, format!("at least {least}")));
+    }
+    if *estimator == Kind::Hybrid && u_dc > 0.0 {
+        // Above this speed the references may need field weakening; an injection leaves them less voltage.
+        let gains = WeakeningGains::new(par, max_torque(motor, limit, par.current.mtpa), par.current.mtpa);
+        let onset = gains.onset(own.k_u * u_dc * INVERSE_SQRT_3 - par.estimators.square_wave.voltage);
+        if par.estimators.hybrid.w_high > onset {
+            let injected = table.tell(par, |p| &mut p.estimators.square_wave.voltage);
+            let allowed = format!(
+                "at most {onset:.4} rad/s, where field weakening begins with {use_is}, {injected} and a DC link of {u_dc} V; \
+                 lower it or the injected voltage, or raise the DC link's"
+            );
+            return Err(table.fault(par, |p| &mut p.estimators.hybrid.w_high, allowed));
+        }
+    }
+    if *estimator == Kind::VoltageFeedback && (own.k_u > 0.9 || own.k_t > own.k_u) {
+        return Err(Fault::new(format!(
+            "{} and {} with {estimator_is}, which mistakes a saturated hexagon for an angle error: set both to the same \
+             value, at most 0.9",
+            table.tell(par, |p| &mut p.weakening.k_u),
+            table.tell(par, |p| &mut p.weakening.k_t)
+        )));
+    }
+    let most = 0.7 * motor.psi_M / motor.L_d;
+    if *estimator == Kind::VoltageModel && limit.i > most {
+        return Err(Fault::new(format!(
+            "{limit_is} with {estimator_is} and {use_is}: the estimator's gain has no bound near the current -psi_M / L_d; at \
+             most {most:.4} A (0.7 psi_M / L_d), or another estimator"
+        )));
+    }
+    let most = (1.0 - LEAST_TORQUE) * motor.psi_M / (motor.L_d - motor.L_q);
+    if motor.L_q < motor.L_d && limit.i > most {
+        return Err(Fault::new(format!(
+            "{limit_is} with {use_is} and L_q < L_d: the torque of i_q vanishes at the current -psi_M / (L_d - L_q); at most \
+             {most:.4} A (0.8 psi_M / (L_d - L_q))"
+        )));
+    }
+    Ok(())
+}
+
+type P = Row<WeakeningParameters>;
+
+/// Variables of field weakening; their owner supplies the prefix `weakening.`.
+pub const WEAKENING: &Table<WeakeningParameters> = &Table::new(
+    const {
+        &[
+            P::boolean_parameter(
+                "use",
+                "Field weakening: i_d and the torque limits follow the voltage of u_dc, injection methods refuse it; false: no i_d beyond current.mtpa",
+                |p| &mut p.used,
+            ),
+            P::parameter(
+                "k_u",
+                &ONE,
+                "Share of u_dc / sqrt(3) that field weakening uses in steady state; the rest is for changes",
+                |p| &mut p.k_u,
+            )
+            .at_least(0.5)
+            .at_most(1.0),
+            P::parameter(
+                "k_t",
+                &ONE,
+                "Share of u_dc / sqrt(3) above which the trim reduces the voltage of field weakening; at least k_u",
+                |p| &mut p.k_t,
+            )
+            .at_least(0.5)
+            .at_most(1.1),
+            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the trim; 0: no trim", |p| &mut p.bandwidth)
+                .at_least(0.0)
+                .tunable(),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use drive_base::motor::Motor;
+
+    /// A request above k_t lowers the voltage of the references at the rate `bandwidth`, one below it raises it again, within
+    /// its bounds.
+    #[test]
+    fn the_trim_lowers_the_voltage_while_too_much_is_requested() {
+        let (par, u_dc) = (WeakeningParameters { used: true, ..WeakeningParameters::default() }, 540.0);
+        let (highest, mut weakening) = (u_dc * INVERSE_SQRT_3, Weakening::default());
+        weakening.integrate(&par, (par.k_t + 0.02) * highest, u_dc, 1e-4);
+        let expected = 1e-4 * par.bandwidth * 0.02 * highest;
+        assert!((weakening.trim - expected).abs() < 1e-9, "{} V, not {expected} V", weakening.trim);
+        let gains = WeakeningGains::new(&ControllerParameters::default(), 3.0, false);
+        weakening.limits(&gains, &par, (1.0, u_dc, 10.0), 5.0, 0);
+        assert!((weakening.U - (par.k_u * highest - expected - 10.0)).abs() < 1e-9, "{} V", weakening.U);
+        for _ in 0..200_000 {
+            weakening.integrate(&par, 1.2 * highest, u_dc, 1e-4);
+        }
+        assert!((weakening.trim - GREATEST_TRIM * highest).abs() < 1e-9, "{} V", weakening.trim);
+        for _ in 0..200_000 {
+            weakening.integrate(&par, 0.5 * highest, u_dc, 1e-4);
+        }
+        assert!(weakening.trim.abs() < 1e-12, "{} V", weakening.trim);
+    }
+
+    /// Up to the onset, the voltage of the torque's currents fits, and it does not above.
+    #[test]
+    fn the_onset_is_where_the_voltage_is_used_up() {
+        let motor = Motor::IPMSM_2_2_KW;
+        let par = ControllerParameters { motor: motor.clone(), ..ControllerParameters::default() };
+        let gains = WeakeningGains::new(&par, 14.0, true);
+        let i = max_torque_per_ampere(&motor, 14.0);
+        let w = gains.onset(200.0);
+        let u = i * motor.R_s + DqHat::new(motor.psi_M + motor.L_d * i.d(), motor.L_q * i.q()).turned() * w;
+        assert!(
+            (u.magnitude() / 200.0 - 1.0).abs() < 0.01 && u.magnitude() < 200.0 + 1e-9,
+            "{} V at {w} rad/s",
+            u.magnitude()
+        );
+    }
+}

@@ -1,0 +1,120 @@
+//! The low-speed law: a d-axis current that the rotor follows at speeds too low for estimation.
+//!
+//! Rasmussen (25): i_sd,ref = i_0 exp(-|w_r^| / w_0), with the MECHANICAL speed.
+//!
+//! With maximum torque per ampere, the share 1 - exp(-|w_r^| / w_0) of its i_d is added, and i_q gives the rest of the
+//! torque; the greatest torque is that of the current limit.
+
+use crate::estimator::Class;
+use crate::tables::{ControllerParameters, PARAMETERS};
+use crate::weakening::LEAST_TORQUE;
+use drive_base::math::exp;
+use fmu_core::unit::{AMPERE, SPEED};
+use fmu_core::{Fault, Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the law.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ZeroSpeed {
+    /// Current at standstill in A, >= 0; holds a load of up to K i_0.
+    pub i_0: f64,
+    /// Mechanical speed in rad/s at which the current has fallen to 1/e, > 0.
+    pub w_0: f64,
+}
+
+impl Default for ZeroSpeed {
+    fn default() -> Self {
+        Self { i_0: 5.0, w_0: 10.0 }
+    }
+}
+
+impl ZeroSpeed {
+    /// Share of `i_0` at the estimated mechanical speed in rad/s.
+    #[inline]
+    pub fn share(&self, speed_hat: f64) -> f64 {
+        exp(-speed_hat.abs() * (1.0 / self.w_0))
+    }
+
+    /// Reference of i_sd in A at the estimated mechanical speed in rad/s.
+    #[inline]
+    pub fn i_d_ref(&self, speed_hat: f64) -> f64 {
+        self.i_0 * self.share(speed_hat)
+    }
+}
+
+/// Checks that i_q gives torque in spite of the law's i_d, where the references depend on it.
+///
+/// # Errors
+/// The reluctance torque cancels most of the magnet's torque.
+pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
+    let ControllerParameters { current, weakening, speed_loop, motor, zero_speed, estimator, .. } = par;
+    let by_torque = current.mtpa || weakening.used || speed_loop.torque_mode;
+    let share = (motor.L_q - motor.L_d) / motor.psi_M;
+    if estimator.class() != Class::FluxObserver || !by_torque || zero_speed.i_0 * share <= 1.0 - LEAST_TORQUE {
+        return Ok(());
+    }
+    let table = PARAMETERS;
+    let with = if weakening.used {
+        table.tell(par, |p| &mut p.weakening.used)
+    } else if current.mtpa {
+        table.tell(par, |p| &mut p.current.mtpa)
+    } else {
+        table.tell(par, |p| &mut p.speed_loop.torque_mode)
+    };
+    Err(Fault::new(format!(
+        "{} with {}, {with} and L_q > L_d: the torque of i_q vanishes at the current psi_M / (L_q - L_d); at most {:.4} A \
+         (0.8 psi_M / (L_q - L_d))",
+        table.tell(par, |p| &mut p.zero_speed.i_0),
+        table.tell(par, |p| &mut p.estimator),
+        (1.0 - LEAST_TORQUE) / share
+    )))
+}
+
+type P = Row<ZeroSpeed>;
+
+/// Variables of the law; their owner supplies the prefix `zero_speed.`.
+pub const ZERO_SPEED: &Table<ZeroSpeed> = &Table::new(
+    const {
+        &[
+            P::parameter(
+                "i_0",
+                &AMPERE,
+                "d-axis current reference of Rasmussen and FluxObserver at standstill, eq (25)",
+                |p| &mut p.i_0,
+            )
+            .at_least(0.0)
+            .tunable(),
+            P::parameter(
+                "w_0",
+                &SPEED,
+                "Mechanical speed at which the d-axis current reference has fallen to 1/e, eq (25)",
+                |p| &mut p.w_0,
+            )
+            .above(0.0)
+            .tunable(),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn falls_to_one_over_e_on_both_sides() {
+        let law = ZeroSpeed::default();
+        assert!((law.i_d_ref(0.0) - 5.0).abs() < 1e-15);
+        assert!((law.i_d_ref(-10.0) - 5.0 / std::f64::consts::E).abs() < 1e-14);
+    }
+
+    /// i_0 holds a load of up to K i_0: the share at a speed is the one of both directions, and w_0 its scale.
+    #[test]
+    fn the_share_follows_the_speed() {
+        let law = ZeroSpeed { i_0: 4.0, w_0: 20.0 };
+        for (speed, share) in
+            [(0.0, 1.0), (20.0_f64 * std::f64::consts::LN_2, 0.5), (-20.0 * std::f64::consts::LN_2, 0.5)]
+        {
+            assert!((law.share(speed) - share).abs() < 1e-12 && (law.i_d_ref(speed) - 4.0 * share).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! `PmsmPlant` for Model Exchange: its states, their derivatives and tangents, and the events of blocking diodes.
+//!
+//! In the rotor frame, d psi_d/dt = u_d - R_s i_d + w psi_q and d psi_q/dt = u_q - R_s i_q - w psi_d, from the same
+//! equations as a step of [`PmsmPlant`]. They are continuous in states and inputs, with kinks at the hexagon limit and at
+//! the edges of the dead-time zone. With an imposed shaft, speed_shaft and angle_shaft take the place of the two
+//! mechanical states; the stator flux linkage stays in the rotor frame, so angle_shaft must be the integral of
+//! speed_shaft between events.
+//!
+//! The energies are counted over completed steps of the solver ([`counters`](crate::counters)). Beyond the speed of
+//! any machine there are no derivatives: the solver tries a shorter step.
+//!
+//! Whether the diodes block is decided in events only. While they block, the current is zero. Two indicators tell when
+//! this ends, or begins: the greatest current over the zone of [`legs`](crate::legs), and the line-to-line back
+//! EMF over the DC-link voltage, both less 1.
+
+use crate::circuit::{Circuit, Rates, blocked_rates};
+use crate::losses::flow::{Dissipation, Path, Switches};
+use crate::machine::{self, Machine};
+use crate::mechanics::{Shaft, Standstill};
+use crate::model::PmsmPlant;
+use crate::power::{Powers, dc_current};
+use crate::signals::{PlantInputs, PlantOutputs};
+use crate::state::Instant;
+use crate::tables::PlantParameters;
+use crate::thermal::ThermalMode;
+use drive_base::frame::{Axis, Phases, Rotor, Vector};
+use drive_base::modulation::limit_to_hexagon;
+use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
+use fmu_core::{
+    CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar,
+    State,
+};
+
+/// Shift of the indicators in the direction of the decision that an event took, so that none stays at 0.
+const SHIFT: f64 = 1e-9;
+
+impl PmsmPlant {
+    /// The state of flux linkage (Wb), speed (rad/s) and angle (rad) as the equations see it under these `inputs`.
+    #[inline]
+    fn instant<S: Scalar>(&self, inputs: &PlantInputs<S>, (psi, speed, angle): (Vector<Rotor, S>, S, S)) -> Instant<S> {
+        let PlantParameters { saturation, mechanics, iron, thermal, .. } = &self.parameters;
+        let motor = &self.motor(inputs);
+        let theta = |angle: S| angle * f64::from(motor.n_p);
+        let (speed, angle, axis) = if mechanics.imposed {
+            (inputs.speed_shaft, inputs.angle_shaft, Axis::at(theta(inputs.angle_shaft)))
+        } else {
+            (speed, angle, self.state.axis.with(theta(angle)))
+        };
+        let idle = self.blocked && !inputs.enable;
+        // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
+        let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
+        let psi = if follows { self.idle_flux(motor, speed) } else { psi };
+        let i = if idle { self.idle_current(motor, speed) } else { Machine::<_>::new(motor, saturation).current(psi) };
+        Instant { psi, i, speed, angle, axis, idle }
+    }
+
+    /// The present instant under these `inputs`.
+    #[inline]
+    fn present(&self, inputs: &PlantInputs) -> Instant {
+        self.instant(inputs, (self.state.psi, self.state.speed, self.state.angle))
+    }
+
+    /// The present instant and its change `along` that of `inputs` and of the states.
+    fn changing(&self, inputs: &PlantInputs<Dual>, along: &Self) -> Instant<Dual> {
+        let (x, v) = (&self.state, &along.state);
+        let psi = Vector::new(Dual::new(x.psi.d(), v.psi.d()), Dual::new(x.psi.q(), v.psi.q()));
+        self.instant(inputs, (psi, Dual::new(x.speed, v.speed), Dual::new(x.angle, v.angle)))
+    }
+
+    /// Derivatives and powers at an instant.
+    #[inline]
+    pub(super) fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
+        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let machine = Machine::<_>::new(&self.motor(inputs), saturation);
+        let shaft = Shaft::new(mechanics, inputs.tau_load, Standstill::new(mechanics, at.speed.value()));
+        if at.idle {
+            return blocked_rates(&machine, &shaft, at.psi, at.i, at.speed);
+        }
+        let path = Path {
+            u: if inputs.enable { limit_to_hexagon(inputs.u, inputs.u_dc) } else { Vector::fixed(Vector::ZERO) },
+            dissipation: Dissipation::at(&self.parameters, machine.resistance(), machine.electrical(at.speed)),
+            drops: Switches::new(&self.parameters, inputs.enable, inputs.u_dc, self.legs(inputs)),
+        };
+        let psi = machine.to_stator(at.axis, at.psi);
+        Circuit { machine, path, shaft }.rates(at.axis, psi, at.speed)
+    }
+
+    /// The derivatives of the states at an instant.
+    #[inline]
+    fn slopes<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> [S; 4] {
+        let rates = self.rates(inputs, at);
+        let w = at.speed * f64::from(self.parameters.motor.n_p);
+        let d_psi = if self.blocked && !inputs.enable {
+            Vector::fixed(Vector::ZERO)
+        } else {
+            at.axis.from_stator(rates.d_psi) - at.psi.turned().scaled(w)
+        };
+        [d_psi.d(), d_psi.q(), rates.acceleration, at.speed]
+    }
+
+    /// The outputs at an instant; their powers are those of the instant.
+    fn outputs<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> PlantOutputs<S> {
+        let Rates { p_in, losses, tau_given, i, .. } = self.rates(inputs, at);
+        let tau_shaft = self.parameters.mechanics.tau_shaft(tau_given, inputs.tau_load);
+        let p_mech = tau_shaft * at.speed;
+        let i = if self.parameters.iron.is_none() { at.i } else { at.axis.from_stator(i) };
+        // -0 W, the product of no current and a negative voltage, is 0 W.
+        let p_in = p_in + 0.0.into();
+        let currents = || Phases::from_stator(at.axis.to_stator(i));
+        let i_dc = dc_current(p_in, inputs, &self.legs(inputs), currents);
+        let powers = Powers { i_dc, p_in, p_mech, p_loss: losses.sum(), losses, tau_shaft };
+        self.shown(inputs, at, i, self.temperatures(inputs), powers)
+    }
+
+    /// [`ContinuousTime::derivatives`] under these `inputs`.
+    ///
+    /// # Errors
+    /// Those of [`ContinuousTime::derivatives`]: the shaft is too fast, or a derivative is not finite.
+    pub fn derivatives_under(&self, inputs: &PlantInputs, dx: &mut [f64]) -> Result<(), Fault> {
+        let at = self.present(inputs);
+        if self.is_too_fast(at.speed) {
+            let (speed, fastest) = (at.speed, self.fastest());
+            return Err(Fault::new(format!(
+                "the shaft turns at {speed} rad/s, beyond the {fastest} rad/s of any machine: there are no derivatives"
+            )));
+        }
+        let slopes = self.slopes(inputs, &at);
+        if !drive_base::math::all_finite(slopes) {
+            return Err(Fault::new(format!("the machine has no finite derivatives at {}", self.state.tell())));
+        }
+        dx.copy_from_slice(&slopes);
+        Ok(())
+    }
+
+    /// [`ContinuousTime::observe`] under these `inputs`.
+    pub fn outputs_under(&self, inputs: &PlantInputs) -> PlantOutputs {
+        self.outputs(inputs, &self.present(inputs))
+    }
+
+    /// [`Differentiable::tangent`] under these changing `inputs`.
+    pub fn tangent_under(&self, inputs: &PlantInputs<Dual>, along: &Self, dx: &mut [f64]) -> PlantOutputs {
+        let at = self.changing(inputs, along);
+        dx.copy_from_slice(&self.slopes(inputs, &at).map(|slope| slope.change));
+        self.outputs(inputs, &at).change()
+    }
+
+    /// [`Events::indicators`] under these `inputs`.
+    pub fn indicators_under(&self, inputs: &PlantInputs, z: &mut [f64]) {
+        if inputs.enable {
+            z.fill(1.0);
+            return;
+        }
+        let shift = if self.blocked { -SHIFT } else { SHIFT };
+        for (z, excess) in z.iter_mut().zip(self.diodes(inputs).1) {
+            let shifted = excess + shift;
+            *z = if shifted == 0.0 { shift } else { shifted };
+        }
+    }
+
+    /// Whether the gates are off and the diodes block the current that the flux linkage has.
+    pub(super) fn blocks(&self, inputs: &PlantInputs) -> bool {
+        !inputs.enable && self.diodes(inputs).0
+    }
+
+    /// Whether diodes block the current that the flux linkage has, and by how much this is exceeded.
+    fn diodes(&self, inputs: &PlantInputs) -> (bool, [f64; 2]) {
+        let (motor, saturation) = (&self.motor(inputs), &self.parameters.saturation);
+        let Instant { psi, speed, axis, .. } = self.present(inputs);
+        let idle = self.idle_current(motor, speed);
+        let (legs, i) = (self.legs(inputs), machine::current(motor, saturation, psi) - idle);
+        let w = f64::from(motor.n_p) * speed;
+        (legs.block(motor, axis, i, w), legs.excess(motor, axis, i, w))
+    }
+}
+
+impl ContinuousTime for PmsmPlant {
+    const STATES: &'static [State<Self>] = &[
+        State::<Self>::new("psi_d", &VOLT, |m| m.state.psi.parts_mut().0).reinit(),
+        State::<Self>::new("psi_q", &VOLT, |m| m.state.psi.parts_mut().1).reinit(),
+        State::<Self>::new("speed", &RAD_PER_S2, |m| &mut m.state.speed).reinit(),
+        State::<Self>::new("angle", &SPEED, |m| &mut m.state.angle).reinit(),
+    ];
+
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        self.derivatives_under(&self.inputs, dx)
+    }
+
+    fn settle(&mut self) {
+        self.state.axis = Axis::at(f64::from(self.parameters.motor.n_p) * self.state.angle);
+    }
+
+    fn observe(&self, _now: Elapsed, outputs: &mut PlantOutputs) {
+        *outputs = self.outputs_under(&self.inputs);
+    }
+
+    fn integrands(&self, _now: Elapsed, outputs: &mut PlantOutputs) {
+        outputs.energy = self.outputs_under(&self.inputs).powers.into();
+    }
+}
+
+impl CompletedSteps for PmsmPlant {
+    fn complete(&mut self, now: Elapsed) -> Result<(), Fault> {
+        let inputs = self.inputs.clone();
+        self.complete_under(&inputs, now)
+    }
+}
+
+impl Differentiable for PmsmPlant {
+    fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut PlantOutputs) -> Result<(), Fault> {
+        *outputs = self.tangent_under(&self.inputs.changing(&along.inputs), along, dx);
+        Ok(())
+    }
+}
+
+impl Events for PmsmPlant {
+    const INDICATORS: &'static [Indicator] = &[
+        Indicator {
+            name: "block_1",
+            description: "Gates off: greatest phase current over the zone in which diodes can block, less 1; else 1",
+        },
+        Indicator {
+            name: "block_2",
+            description: "Gates off: greatest line-to-line back EMF over the DC-link voltage, less 1; else 1",
+        },
+    ];
+
+    fn indicators(&self, _now: Elapsed, z: &mut [f64]) {
+        self.indicators_under(&self.inputs, z);
+    }
+
+    fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+        if self.parameters.thermal.mode == ThermalMode::Imposed {
+            self.judge_temperatures(&self.inputs)?;
+        }
+        let Instant { psi, speed, angle, axis, .. } = self.present(&self.inputs);
+        let mut state = crate::state::State { psi, speed, angle, axis };
+        if !state.is_finite() {
+            return Err(Fault::new(format!("the machine's state is not finite: {}", state.tell())));
+        }
+        self.blocked = self.blocks(&self.inputs);
+        if self.blocked {
+            let motor = self.motor(&self.inputs);
+            let idle = self.idle_flux(&motor, state.speed);
+            let stored = |psi| machine::magnetic_energy(&motor, &self.parameters.saturation, psi);
+            self.energy.loss += stored(state.psi) - stored(idle);
+            state.psi = idle;
+        }
+        let states_changed = state != self.state;
+        self.state = state;
+        Ok(Outcome { states_changed, ..Outcome::default() })
+    }
+
+    fn next(&self, _now: Elapsed) -> Next {
+        Next::Never
+    }
+}

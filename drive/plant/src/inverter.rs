@@ -1,0 +1,71 @@
+//! Parameters of the average inverter: the dead time between the two switches of a leg.
+//!
+//! While both switches are off, the current direction selects the diode: averaged over a PWM period, the leg voltage
+//! has an error of -u_dead sign(i) with u_dead = dead_time u_dc / T_pwm. Below i_zero, the current crosses zero within
+//! the dead time (ripple, switch capacitances) and the error falls linearly: -u_dead i / i_zero.
+//!
+//! [`modulation`](drive_base::modulation) computes the voltages. The dead-time model is the field's usual mean-value model;
+//! neither paper contains it. u in V, i in A, times in s.
+
+use crate::losses::conduction::{DEVICES, Devices};
+use fmu_core::unit::{AMPERE, SECOND};
+use fmu_core::{Part, Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Parameters; zero dead time gives the ideal average inverter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Inverter {
+    /// Dead time in s, >= 0.
+    pub dead_time: f64,
+    /// PWM period in s, > 0.
+    pub T_pwm: f64,
+    /// Current in A below which the error falls linearly, > 0.
+    pub i_zero: f64,
+    /// Losses of transistors and diodes.
+    pub devices: Devices,
+}
+
+impl Default for Inverter {
+    fn default() -> Self {
+        Self { dead_time: 0.0, T_pwm: 1e-4, i_zero: 0.1, devices: Devices::default() }
+    }
+}
+
+impl Inverter {
+    /// Voltage lost per leg in V at the DC-link voltage `u_dc` (V).
+    #[inline]
+    pub fn u_dead(&self, u_dc: f64) -> f64 {
+        self.dead_time / self.T_pwm * u_dc
+    }
+}
+
+type P = Row<Inverter>;
+
+/// Variables of the inverter; their owner supplies the prefix `inverter.`.
+pub const INVERTER: &Table<Inverter> = &Table::new(
+    const {
+        &[
+            P::parameter("dead_time", &SECOND, "Dead time between the two switches of a leg; 0: ideal inverter", |p| {
+                &mut p.dead_time
+            })
+            .at_least(0.0),
+            P::parameter("T_pwm", &SECOND, "PWM period", |p| &mut p.T_pwm).above(0.0),
+            P::parameter("i_zero", &AMPERE, "Current below which the dead-time voltage falls linearly to zero", |p| {
+                &mut p.i_zero
+            })
+            .above(0.0),
+            P::part("", &Part { table: DEVICES, lens: |p| &mut p.devices }),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_voltage_lost_is_the_share_of_the_dead_time() {
+        let inverter = Inverter { dead_time: 2e-6, ..Inverter::default() };
+        assert!((inverter.u_dead(540.0) - 10.8).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,197 @@
+//! Integration steps that end at the kinks of the inverter's voltages.
+//!
+//! Legs with dead time and devices with a threshold have a voltage that depends on the sign of a current. Across such a kink
+//! the method loses its order, so a step ends where a current enters or leaves the zone +-`inverter.i_zero`.
+
+use crate::circuit::{Circuit, Passed};
+use crate::integration::LONGEST_STEP;
+use crate::legs::Legs;
+use crate::losses::flow::{Dissipation, Drops, Path, Switches};
+use crate::losses::sides::{OneSided, Sides};
+use crate::mechanics::{Coulomb, SHORTEST_STEP, Shaft, Standstill, Whole};
+use crate::model::PmsmPlant;
+use crate::state::State;
+use drive_base::frame::{AlphaBeta, Dq};
+use drive_base::motor::Motor;
+
+/// Longest integration step in s while a current is in the zone.
+const LONGEST_STEP_IN_ZONE: f64 = 50e-6;
+
+/// Shortest integration step in s that looks for a kink; where the zone asks for shorter ones, as long as those.
+const SHORTEST_AT_KINK: f64 = 0.5e-6;
+
+/// Largest electrical angle in rad in an integration step with losses: the energies are then in balance to 1e-7 over a drive
+/// cycle.
+const LARGEST_TURN_WITH_LOSSES: f64 = 0.0625;
+
+/// An integration step of `h` (s) under the voltage `u` (V), with the legs' voltages if the currents keep their sides.
+struct Step<'a> {
+    h: f64,
+    u: AlphaBeta,
+    switches: &'a Switches,
+    one_sided: Option<&'a OneSided>,
+    /// The step is long beside the time constant of a current in the zone.
+    damped: bool,
+}
+
+/// Most steps per second that are taken again to end at a kink: they bound the work of a step whatever the parameters are.
+const MOST_SEARCHES: f64 = 1e6;
+
+/// Longest step that follows a current in the zone in s, below which steps are damped: they take three times the time.
+const SHORTEST_RESOLVED: f64 = 10e-6;
+
+/// Difference of the flux linkage from which the damping is found, as a share of that of the zone's current.
+const DIFFERENCE: f64 = 1e-3;
+
+impl PmsmPlant {
+    /// The integration steps over `h` (s) from `state` on with these `switches` under the voltage `u` (V), and the current (A)
+    /// by the iron at their end.
+    pub(super) fn pass_kinks(
+        &self,
+        state: &mut State,
+        h: f64,
+        u: AlphaBeta,
+        legs: &Legs,
+        switches: Switches,
+    ) -> (Passed, Dq) {
+        let (parameters, machine) = (&self.parameters, self.machine::<false>());
+        let (zone, kinks) = (legs.i_zone(), switches.kinks());
+        let resolved = Self::longest_in_zone(&self.warm.motor, legs, parameters.inverter.devices.threshold());
+        let dissipation = |speed| Dissipation::at(parameters, machine.resistance(), machine.electrical(speed));
+        let at_start = Path { u, dissipation: dissipation(state.speed), drops: &switches };
+        let guide = |state: &State| {
+            let psi = machine.to_stator(state.axis, state.psi);
+            let i = state.axis.to_stator(machine.current(state.psi));
+            switches.guided(at_start.guides(psi, i, machine.electrical(state.speed)))
+        };
+        let (mut passed, mut left, mut start) = (Passed::default(), h, guide(state));
+        let mut sides = Sides::of(start, zone);
+        let mut one_sided = switches.one_sided(u, &sides);
+        // The time since the last kink, or since the voltage changed; and how long the next step may be.
+        let (mut since, mut limit) = (0.0, f64::INFINITY);
+        let mut searches = 1000.0 + h * MOST_SEARCHES;
+        loop {
+            let apart = !kinks || sides.apart();
+            let longest = if apart { LONGEST_STEP } else { Self::longest_after(since, resolved) };
+            // With damping, it is two steps.
+            let turn = if apart { LARGEST_TURN_WITH_LOSSES } else { 2.0 * LARGEST_TURN_WITH_LOSSES };
+            let longest = longest.min(turn / machine.electrical(state.speed).abs());
+            let h = if left <= longest {
+                left
+            } else if apart {
+                left / (left / longest - 1e-9).ceil()
+            } else {
+                longest
+            };
+            let h = h.min(limit);
+            let step = Step { h, u, switches: &switches, one_sided: apart.then_some(&one_sided), damped: h > resolved };
+            let mechanics = &parameters.mechanics;
+            let (next, step) = if mechanics.is_whole(state.speed) {
+                self.integrate_kinks(state, &step, Whole::new(mechanics, state.speed))
+            } else {
+                self.integrate_kinks(state, &step, Standstill::new(mechanics, state.speed))
+            };
+            if let Some(shorter) = mechanics.shorter(h, state.speed, next.speed) {
+                limit = shorter;
+                continue;
+            }
+            let end = guide(&next);
+            let shortest = SHORTEST_AT_KINK.min(resolved).max(SHORTEST_STEP);
+            (limit, since) = (f64::INFINITY, since + h);
+            let then = Sides::of(end, zone);
+            if kinks && then != sides {
+                if h > shortest
+                    && searches > 0.0
+                    && let Some(share) = sides.first_crossing(start, end, zone)
+                {
+                    (limit, since) = ((h * share).max(shortest), since - h);
+                    searches -= 1.0;
+                    continue;
+                }
+                (sides, since) = (then, 0.0);
+                one_sided = switches.one_sided(u, &sides);
+            }
+            start = end;
+            passed.add(&step);
+            *state = next;
+            left -= h;
+            if left <= 1e-9 * h || self.is_too_fast(state.speed) {
+                let path = Path { u, dissipation: dissipation(state.speed), drops: switches };
+                return (passed, self.by_iron_at(state, &path));
+            }
+        }
+    }
+
+    /// Longest integration step in s with a current in the zone, `since` (s) the voltage changed, where steps up to `resolved`
+    /// (s) follow the current: 1.5 and 4.5 time constants first, so that the energies of its settling are right, too.
+    fn longest_after(since: f64, resolved: f64) -> f64 {
+        let steps = if resolved > SHORTEST_RESOLVED {
+            1.0
+        } else if since < 2.9 * resolved {
+            3.0
+        } else if since < 11.9 * resolved {
+            9.0
+        } else {
+            f64::INFINITY
+        };
+        LONGEST_STEP_IN_ZONE.min((steps * resolved).max(SHORTEST_STEP))
+    }
+
+    /// The current (A) at the terminals less that of the flux linkage.
+    #[inline(never)]
+    fn by_iron_at<D: Drops<f64>>(&self, state: &State, path: &Path<D>) -> Dq {
+        if path.dissipation.G.is_none() {
+            return Dq::ZERO;
+        }
+        let machine = self.machine::<false>();
+        let i = state.axis.to_stator(machine.current(state.psi));
+        let psi = machine.to_stator(state.axis, state.psi);
+        state.axis.from_stator(path.flow(psi, i, machine.electrical(state.speed)).i - i)
+    }
+
+    /// An integration step with resistance and conductance of the speed in its middle.
+    #[inline(never)]
+    fn integrate_kinks<C: Coulomb<f64>>(
+        &self,
+        start: &State,
+        &Step { h, u, switches, one_sided, damped }: &Step<'_>,
+        coulomb: C,
+    ) -> (State, Passed) {
+        let (parameters, machine) = (&self.parameters, self.machine::<false>());
+        let shaft = Shaft::new(&parameters.mechanics, self.inputs.tau_load, coulomb);
+        let tau_e = machine.torque(start.psi, machine.current(start.psi));
+        let speed = start.speed + 0.5 * h * shaft.motion(start.speed, tau_e).acceleration;
+        let dissipation = Dissipation::at(parameters, machine.resistance(), machine.electrical(speed));
+        if let Some(&drops) = one_sided {
+            let path = Path { u, dissipation, drops };
+            self.integrate(start, h, &Circuit { machine, path, shaft })
+        } else {
+            let path = Path { u, dissipation, drops: *switches };
+            let circuit = Circuit { machine, path, shaft };
+            if damped {
+                let small = DIFFERENCE * parameters.inverter.i_zero * self.warm.motor.L_d.min(self.warm.motor.L_q);
+                self.integrate_damped(start, h, &circuit, small)
+            } else {
+                self.integrate(start, h, &circuit)
+            }
+        }
+    }
+
+    /// [`integrate`](Self::integrate) with voltages that follow the currents.
+    #[inline(never)]
+    pub(super) fn integrate_switches(
+        &self,
+        start: &State,
+        h: f64,
+        circuit: &Circuit<'_, Switches, Standstill>,
+    ) -> (State, Passed) {
+        self.integrate(start, h, circuit)
+    }
+
+    /// Longest integration step in s with a current in the zone where the voltages of the legs and of devices with this
+    /// `threshold` (V) fall linearly.
+    #[inline]
+    pub(super) fn longest_in_zone(motor: &Motor, legs: &Legs, threshold: f64) -> f64 {
+        LONGEST_STEP_IN_ZONE.min(0.5 * legs.time(motor, threshold))
+    }
+}

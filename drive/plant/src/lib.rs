@@ -1,0 +1,32 @@
+//! The plant: machine, mechanics and inverter, and the model `PmsmPlant` built from them.
+//!
+//! It does not know the controller. The conventions are those of [`drive_base`].
+
+#![forbid(unsafe_code)]
+// The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
+#![allow(non_snake_case)]
+
+mod circuit;
+pub mod counters;
+mod damping;
+pub mod documentation;
+pub mod exchange;
+mod integration;
+pub mod inverter;
+pub mod iron;
+mod kinks;
+pub mod legs;
+pub mod losses;
+pub mod machine;
+pub mod mechanics;
+pub mod model;
+pub mod power;
+pub mod saturation;
+pub mod signals;
+mod state;
+mod step;
+pub mod tables;
+pub mod terminals;
+pub mod thermal;
+
+pub use model::PmsmPlant;

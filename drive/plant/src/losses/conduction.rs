@@ -1,0 +1,200 @@
+//! Conduction loss of the inverter: the voltage that transistors and diodes drop.
+//!
+//! A leg with the current i > 0 conducts for the share d of a PWM period through its upper transistor and for 1 - d through its
+//! lower diode; i < 0 is the mirror image with 1 - d for d:
+//!
+//! ```text
+//! d      = 1/2 + (u_x + u_0) / u_dc,  u_0 = -(max + min)/2 of the phases        p = drop i
+//! drop   = d (u_transistor + r_transistor i) + (1 - d) (u_diode + r_diode i)
+//! ```
+//!
+//! u_x is the leg's voltage with dead time, which moves d and loses no power. Below `inverter.i_zero` the constant part
+//! falls linearly, as the dead-time voltage does. Gates off: the diodes alone conduct. Over a period with a sinusoidal
+//! current of amplitude I, modulation m = 2 |u| / u_dc and angle phi, six switches lose 6 times the sum over transistor
+//! (+) and diode (-) of
+//!
+//! ```text
+//! u I (1/(2 pi) +- m cos phi / 8) + r I^2 (1/8 +- m cos phi / (3 pi) +- c_3),  c_3 = -(3 sqrt 3/(8 pi)) m cos(3 phi)/(15 pi)
+//! ```
+//!
+//! The two-level model of a device (threshold and resistance) is that of the data sheets; the closed form is the field's,
+//! and a test repeats it. u in V, i in A.
+
+use crate::losses::sides::{Affine, symmetric};
+use drive_base::frame::{AlphaBeta, Phases, Stator, Vector};
+use drive_base::modulation::clamp_unit;
+use fmu_core::Scalar;
+use fmu_core::unit::{AMPERE, JOULE, OHM, ONE, VOLT};
+use fmu_core::{Row, Table};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of transistors and diodes; all zero gives lossless devices.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Devices {
+    /// Threshold voltage of a transistor in V, >= 0.
+    pub u_transistor: f64,
+    /// Resistance of a transistor in Ohm, >= 0.
+    pub r_transistor: f64,
+    /// Threshold voltage of a diode in V, >= 0.
+    pub u_diode: f64,
+    /// Resistance of a diode in Ohm, >= 0.
+    pub r_diode: f64,
+    /// Energy of switching a leg on and off once, with the diode's recovery, in J at i_sw and u_sw, >= 0.
+    pub E_sw: f64,
+    /// Current of E_sw in A, > 0.
+    pub i_sw: f64,
+    /// DC-link voltage of E_sw in V, > 0.
+    pub u_sw: f64,
+    /// Exponent of the DC-link voltage in the switching energy, >= 1.
+    pub k_sw: f64,
+}
+
+impl Default for Devices {
+    fn default() -> Self {
+        Self {
+            u_transistor: 0.0,
+            r_transistor: 0.0,
+            u_diode: 0.0,
+            r_diode: 0.0,
+            E_sw: 0.0,
+            i_sw: 10.0,
+            u_sw: 300.0,
+            k_sw: 1.3,
+        }
+    }
+}
+
+impl Devices {
+    /// Whether they lose nothing.
+    #[inline]
+    pub fn is_none(&self) -> bool {
+        let &Self { u_transistor, r_transistor, u_diode, r_diode, E_sw, i_sw: _, u_sw: _, k_sw: _ } = self;
+        u_transistor + r_transistor + u_diode + r_diode + E_sw == 0.0
+    }
+
+    /// The greater threshold voltage in V.
+    #[inline]
+    pub fn threshold(&self) -> f64 {
+        self.u_transistor.max(self.u_diode)
+    }
+}
+
+/// Voltage drop of the conducting devices over an integration step.
+#[derive(Clone, Copy, Debug)]
+pub struct Conduction<S> {
+    /// Half of the sum and of the difference of transistor and diode: threshold in V, resistance in Ohm.
+    u: [f64; 2],
+    r: [f64; 2],
+    /// DC-link voltage in V.
+    u_dc: S,
+    /// Current in A below which the threshold falls linearly.
+    i_zone: S,
+}
+
+impl<S: Scalar> Conduction<S> {
+    /// With switching legs or, with the gates off, diodes only; `None` without a drop.
+    pub fn new(devices: &Devices, switching: bool, u_dc: S, i_zone: S) -> Option<Self> {
+        let &Devices { u_transistor, r_transistor, u_diode, r_diode, .. } = devices;
+        let (u, r) = if switching { (u_transistor, r_transistor) } else { (u_diode, r_diode) };
+        let halves = |a: f64, b: f64| [0.5 * (a + b), 0.5 * (a - b)];
+        let found = Self { u: halves(u, u_diode), r: halves(r, r_diode), u_dc, i_zone };
+        (found.u[0] > 0.0 || found.r[0] > 0.0).then_some(found)
+    }
+
+    /// Voltage drop (V) at the stator with the voltage `u` (V) of the legs and the current `i` (A).
+    pub fn drop(&self, u: Vector<Stator, S>, i: Vector<Stator, S>) -> Vector<Stator, S> {
+        let (on, i) = (self.on(u), Phases::from_stator(i));
+        let leg = |on: S, i: S| {
+            let sign = clamp_unit(i / self.i_zone);
+            let transistor = sign * on;
+            (transistor * self.u[1] + self.u[0].into()) * sign + (transistor * self.r[1] + self.r[0].into()) * i
+        };
+        Phases { a: leg(on.a, i.a), b: leg(on.b, i.b), c: leg(on.c, i.c) }.to_stator()
+    }
+
+    /// 2 d - 1 of the legs with the voltage `u` (V).
+    fn on(&self, u: Vector<Stator, S>) -> Phases<S> {
+        let u = Phases::from_stator(u);
+        let max = |a: S, b: S| if a.value() > b.value() { a } else { b };
+        let min = |a: S, b: S| if a.value() < b.value() { a } else { b };
+        let middle = (max(max(u.a, u.b), u.c) + min(min(u.a, u.b), u.c)) * 0.5;
+        let by_u_dc = if self.u_dc.value() > 0.0 { S::from(2.0) / self.u_dc } else { 0.0.into() };
+        let leg = |u: S| clamp_unit((u - middle) * by_u_dc);
+        Phases { a: leg(u.a), b: leg(u.b), c: leg(u.c) }
+    }
+}
+
+impl Conduction<f64> {
+    /// The [`drop`](Self::drop) (V) while the currents of the legs have these `signs`.
+    #[inline]
+    pub fn affine(&self, u: AlphaBeta, signs: Phases) -> Affine {
+        let on = self.on(u);
+        let leg = |on: f64, sign: f64| {
+            let transistor = sign * on;
+            ((transistor * self.u[1] + self.u[0]) * sign, transistor * self.r[1] + self.r[0])
+        };
+        let [(a, r_a), (b, r_b), (c, r_c)] = [leg(on.a, signs.a), leg(on.b, signs.b), leg(on.c, signs.c)];
+        Affine { at_0: Phases { a, b, c }.to_stator(), by: symmetric(Phases { a: r_a, b: r_b, c: r_c }) }
+    }
+}
+
+type P = Row<Devices>;
+
+/// Variables of the devices; their owner supplies the prefix `inverter.`.
+pub const DEVICES: &Table<Devices> = &Table::new(
+    const {
+        &[
+            P::parameter("u_transistor", &VOLT, "Threshold voltage of a transistor; 0: none", |p| &mut p.u_transistor)
+                .at_least(0.0),
+            P::parameter("r_transistor", &OHM, "Resistance of a transistor; 0: none", |p| &mut p.r_transistor)
+                .at_least(0.0),
+            P::parameter("u_diode", &VOLT, "Threshold voltage of a diode; 0: none", |p| &mut p.u_diode).at_least(0.0),
+            P::parameter("r_diode", &OHM, "Resistance of a diode; 0: none", |p| &mut p.r_diode).at_least(0.0),
+            P::parameter(
+                "E_sw",
+                &JOULE,
+                "Energy of switching a leg on and off once at i_sw and u_sw, with the diode's recovery; 0: none",
+                |p| &mut p.E_sw,
+            )
+            .at_least(0.0),
+            P::parameter("i_sw", &AMPERE, "Current of E_sw", |p| &mut p.i_sw).above(0.0),
+            P::parameter("u_sw", &VOLT, "DC-link voltage of E_sw", |p| &mut p.u_sw).above(0.0),
+            P::parameter("k_sw", &ONE, "Exponent of the DC-link voltage in the switching energy", |p| &mut p.k_sw)
+                .at_least(1.0),
+        ]
+    },
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use drive_base::frame::AlphaBeta;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn over_a_period_it_is_the_closed_form() {
+        let devices =
+            Devices { u_transistor: 0.8, r_transistor: 2.2e-3, u_diode: 0.9, r_diode: 1.6e-3, ..Devices::default() };
+        let (u_dc, i_hat) = (400.0, 150.0);
+        for (m, phi) in [(0.2, 0.0), (0.7, 0.5), (1.1, -0.3), (1.0, 2.8), (0.9, 1.5)] {
+            let conduction = Conduction::new(&devices, true, u_dc, 1e-6).unwrap();
+            let count = 36_000;
+            let at = |k: u32| {
+                let theta = 2.0 * PI * (f64::from(k) + 0.37) / f64::from(count);
+                let u = AlphaBeta::new(theta.cos(), theta.sin()) * (0.5 * m * u_dc);
+                let i = AlphaBeta::new((theta - phi).cos(), (theta - phi).sin()) * i_hat;
+                1.5 * conduction.drop(u, i).dot(i)
+            };
+            let mean = (0..count).map(at).sum::<f64>() / f64::from(count);
+            let cos = m * phi.cos();
+            let c_3 = -(3.0 * 3.0_f64.sqrt() / (8.0 * PI)) * m * (3.0 * phi).cos() / (15.0 * PI);
+            let device = |u: f64, r: f64, sign: f64| {
+                u * i_hat * (0.5 / PI + sign * cos / 8.0)
+                    + r * i_hat * i_hat * (0.125 + sign * cos / (3.0 * PI) + sign * c_3)
+            };
+            let closed = 6.0 * (device(0.8, 2.2e-3, 1.0) + device(0.9, 1.6e-3, -1.0));
+            println!("m = {m}, phi = {phi}: {mean} W, closed form {closed} W");
+            assert!((mean / closed - 1.0).abs() < 1e-4, "m = {m}, phi = {phi}: {mean} W, not {closed} W");
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! The salient permanent-magnet machine in its rotor frame (Rasmussen (2) for L_d = L_q, Kim & Sul (1) in general).
+//!
+//! d psi_d/dt = u_d - R_s i_d + w psi_q, d psi_q/dt = u_q - R_s i_q - w psi_d, psi_d = L_d i_d + psi_M, psi_q = L_q
+//! i_q, tau_e = 1.5 n_p (psi_d i_q - psi_q i_d); [`saturation`](crate::saturation) adds to the current. The flux
+//! linkages are the state, so the equations remain valid when the inductances saturate.
+
+use crate::saturation::Saturation;
+use drive_base::frame::{Axis, Dq, Rotor, Stator, Vector};
+use drive_base::math::reciprocal;
+use drive_base::motor::Motor;
+use fmu_core::Scalar;
+use serde::{Deserialize, Serialize};
+
+/// Flux linkage (Wb) for the current `i` (A) without saturation.
+#[inline]
+pub fn flux<S: Scalar>(motor: &Motor<S>, i: Vector<Rotor, S>) -> Vector<Rotor, S> {
+    Vector::new(i.d() * motor.L_d + motor.psi_M, i.q() * motor.L_q)
+}
+
+/// Current (A) for the flux linkage `psi` (Wb).
+#[inline]
+pub fn current(motor: &Motor, saturation: &Saturation, psi: Dq) -> Dq {
+    Machine::<_>::new(motor, saturation).current(psi)
+}
+
+/// Magnetic energy in J at the flux linkage `psi` (Wb), excluding that of the magnet: 0 without current.
+#[inline]
+pub fn magnetic_energy(motor: &Motor, saturation: &Saturation, psi: Dq) -> f64 {
+    let (x, q) = (psi.d() - motor.psi_M, psi.q());
+    0.75 * (x * x / motor.L_d + q * q / motor.L_q) + saturation.energy(motor, psi)
+}
+
+/// The reciprocals of the inductances in 1/H.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Inverse {
+    d: f64,
+    q: f64,
+}
+
+impl Inverse {
+    /// Computes them for a machine.
+    #[inline]
+    pub fn of<S>(motor: &Motor<S>) -> Self {
+        Self { d: reciprocal(motor.L_d), q: reciprocal(motor.L_q) }
+    }
+}
+
+/// The machine with constants for many evaluations.
+#[derive(Clone, Copy, Debug)]
+pub struct Machine<'a, S = f64, const LINEAR: bool = false> {
+    /// `None` for a linear machine; never asked if `LINEAR`.
+    saturation: Option<&'a Saturation>,
+    psi_M: S,
+    R_s: S,
+    by_L_q: f64,
+    /// 1/L_d - 1/L_q in 1/H.
+    saliency: f64,
+    n_p: f64,
+}
+
+impl<'a, S: Scalar, const LINEAR: bool> Machine<'a, S, LINEAR> {
+    /// From the parameters.
+    #[inline]
+    pub fn new(motor: &Motor<S>, saturation: &'a Saturation) -> Self {
+        Self::with(motor, saturation, Inverse::of(motor))
+    }
+
+    /// With the reciprocals at hand.
+    #[inline]
+    pub fn with(motor: &Motor<S>, saturation: &'a Saturation, Inverse { d, q }: Inverse) -> Self {
+        let Motor { n_p, R_s, L_d: _, L_q: _, psi_M } = *motor;
+        let saturation = (!saturation.is_none()).then_some(saturation);
+        Self { saturation, psi_M, R_s, by_L_q: q, saliency: d - q, n_p: f64::from(n_p) }
+    }
+
+    /// Current (A) for the flux linkage `psi` (Wb).
+    #[inline]
+    pub fn current(&self, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
+        let e = Vector::new(1.0.into(), 0.0.into());
+        let x = psi - e.scaled(self.psi_M);
+        self.linear_current(x, e)
+            + self.saturation.map_or(Vector::fixed(Vector::ZERO), |saturation| saturation.current(x))
+    }
+
+    /// [`current`](Self::current) in stator axes, for the flux linkage `psi` (Wb) in stator axes with the magnet on `axis`.
+    #[inline]
+    pub fn stator_current(&self, axis: Axis<Rotor, S>, psi: Vector<Stator, S>) -> Vector<Stator, S> {
+        let x = psi - axis.along(self.psi_M);
+        let linear = self.linear_current(x, axis.along(1.0.into()));
+        match self.saturation {
+            Some(saturation) if !LINEAR => linear + axis.to_stator(saturation.current(axis.from_stator(x))),
+            _ => linear,
+        }
+    }
+
+    /// Current (A) of the machine without saturation, for the flux linkage `x` (Wb) beyond that of the magnet with the d-axis
+    /// in the direction `e`: x / L_q + (1 / L_d - 1 / L_q) (x . e) e, in any axes.
+    #[inline]
+    fn linear_current<F>(&self, x: Vector<F, S>, e: Vector<F, S>) -> Vector<F, S> {
+        x * self.by_L_q + e.scaled(x.dot(e) * self.saliency)
+    }
+
+    /// Resistance (Ohm) of the stator.
+    #[inline]
+    pub fn resistance(&self) -> S {
+        self.R_s
+    }
+
+    /// Electrical speed in rad/s at the mechanical `speed` (rad/s).
+    #[inline]
+    pub fn electrical<T: Scalar>(&self, speed: T) -> T {
+        speed * self.n_p
+    }
+
+    /// Electromagnetic torque in N.m at the flux linkage `psi` (Wb) and the current `i` (A) in the same axes.
+    #[inline]
+    pub fn torque<F, T: Scalar>(&self, psi: Vector<F, T>, i: Vector<F, T>) -> T {
+        psi.cross(i) * (1.5 * self.n_p)
+    }
+}
+
+impl<S: Scalar, const LINEAR: bool> Machine<'_, S, LINEAR> {
+    /// Flux linkage (Wb) in stator axes with the magnet on `axis`. The part of the magnet is transformed separately, both
+    /// ways, so that a machine without current has none after a transformation either.
+    #[inline]
+    pub fn to_stator(&self, axis: Axis<Rotor, S>, psi: Vector<Rotor, S>) -> Vector<Stator, S> {
+        axis.to_stator(psi - Vector::new(self.psi_M, 0.0.into())) + axis.along(self.psi_M)
+    }
+
+    /// The inverse of [`to_stator`](Self::to_stator).
+    #[inline]
+    pub fn from_stator(&self, axis: Axis<Rotor, S>, psi: Vector<Stator, S>) -> Vector<Rotor, S> {
+        axis.from_stator(psi - axis.along(self.psi_M)) + Vector::new(self.psi_M, 0.0.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn torque_of_magnet_and_reluctance() {
+        let motor = Motor { L_q: 9e-3, ..Motor::default() };
+        let i = Dq::new(-2.0, 4.0);
+        let expected = 1.5 * 3.0 * (0.15 * 4.0 + (6e-3 - 9e-3) * -2.0 * 4.0);
+        let (linear, psi) = (Saturation::default(), flux(&motor, i));
+        assert!((Machine::<_>::new(&motor, &linear).torque(psi, i) - expected).abs() < 1e-14);
+        assert!((current(&motor, &linear, psi).q() - 4.0).abs() < 1e-14);
+    }
+}

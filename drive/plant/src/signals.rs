@@ -1,0 +1,137 @@
+//! Inputs and outputs of the plant.
+
+use crate::losses::efficiency;
+use crate::power::{Energy, Powers};
+use crate::thermal::{Heat, Temperatures, ThermalInputs};
+use drive_base::connection::{Commanded, Measured};
+use drive_base::frame::Phases;
+use fmu_core::Dual;
+use serde::{Deserialize, Serialize};
+
+/// Inputs, held over a communication step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlantInputs<S = f64> {
+    /// Stator voltage references in V, averages over a PWM period.
+    pub u: Phases<S>,
+    /// DC-link voltage in V, >= 0.
+    pub u_dc: S,
+    /// Load torque in N.m, positive against positive speed; ignored with an imposed speed.
+    pub tau_load: S,
+    /// Imposed mechanical speed of the shaft in rad/s.
+    pub speed_shaft: S,
+    /// Imposed mechanical angle of the shaft in rad, at the beginning of the step.
+    pub angle_shaft: S,
+    /// Whether the gates switch; false: only the diodes conduct.
+    pub enable: bool,
+    /// Temperatures in K.
+    pub thermal: ThermalInputs<S>,
+}
+
+impl Default for PlantInputs {
+    fn default() -> Self {
+        let (u, thermal) = (Phases::default(), ThermalInputs::default());
+        Self { u, u_dc: 325.0, tau_load: 0.0, speed_shaft: 0.0, angle_shaft: 0.0, enable: true, thermal }
+    }
+}
+
+impl PlantInputs {
+    /// Takes the voltages and the gates that a controller commands.
+    #[inline]
+    pub fn apply(&mut self, Commanded { u, enable }: Commanded) {
+        (self.u, self.enable) = (u, enable);
+    }
+
+    /// These inputs with the change `along` of the continuous ones.
+    pub fn changing(&self, along: &Self) -> PlantInputs<Dual> {
+        self.zip(along, Dual::new)
+    }
+
+    /// On the straight line from these inputs to those at its `end`, at the `share` (0..1) of the way; the gates stay.
+    pub fn toward(&self, end: &Self, share: f64) -> Self {
+        self.zip(end, |a, b| a + (b - a) * share)
+    }
+
+    /// Each continuous input and that of `other` by `f`.
+    fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> PlantInputs<T> {
+        let (u, v) = (&self.u, &other.u);
+        PlantInputs {
+            u: Phases { a: f(u.a, v.a), b: f(u.b, v.b), c: f(u.c, v.c) },
+            u_dc: f(self.u_dc, other.u_dc),
+            tau_load: f(self.tau_load, other.tau_load),
+            speed_shaft: f(self.speed_shaft, other.speed_shaft),
+            angle_shaft: f(self.angle_shaft, other.angle_shaft),
+            enable: self.enable,
+            thermal: self.thermal.zip(&other.thermal, f),
+        }
+    }
+}
+
+/// Outputs, at the end of a communication step.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlantOutputs<S = f64> {
+    /// Stator currents in A, positive into the machine.
+    pub i: Phases<S>,
+    /// Mechanical speed in rad/s.
+    pub speed: S,
+    /// Mechanical angle in rad, not wrapped.
+    pub angle: S,
+    /// Electrical angle in rad, in (-pi, pi].
+    pub theta_e: S,
+    /// Electromagnetic torque in N.m.
+    pub tau_e: S,
+    /// d-axis stator current in A.
+    pub i_d: S,
+    /// q-axis stator current in A.
+    pub i_q: S,
+    /// Power between DC link, machine and shaft and torque of the shaft, means over the last step.
+    pub powers: Powers<S>,
+    /// Energy since the start.
+    pub energy: Energy,
+    /// Efficiency of the powers.
+    pub efficiency: S,
+    /// Temperatures in K.
+    pub temperatures: Temperatures<S>,
+    /// Heat in W, of the powers.
+    pub heat: Heat<S>,
+}
+
+impl PlantOutputs {
+    /// What sensors measure of these outputs.
+    #[inline]
+    pub fn measured(&self) -> Measured {
+        Measured { i: self.i, theta_e: self.theta_e, speed: self.speed }
+    }
+
+    /// These outputs with other `powers` and their `heat`.
+    pub fn with(&self, powers: Powers, heat: Heat) -> Self {
+        Self { powers, heat, efficiency: efficiency(powers.p_in, powers.p_mech), ..self.clone() }
+    }
+}
+
+impl PlantOutputs<Dual> {
+    /// The change of the outputs; no energy changes.
+    pub fn change(&self) -> PlantOutputs {
+        let Self { i, powers, .. } = self;
+        PlantOutputs {
+            i: Phases { a: i.a.change, b: i.b.change, c: i.c.change },
+            speed: self.speed.change,
+            angle: self.angle.change,
+            theta_e: self.theta_e.change,
+            tau_e: self.tau_e.change,
+            i_d: self.i_d.change,
+            i_q: self.i_q.change,
+            powers: Powers {
+                i_dc: powers.i_dc.change,
+                p_in: powers.p_in.change,
+                p_mech: powers.p_mech.change,
+                p_loss: powers.p_loss.change,
+                losses: powers.losses.map(|p| p.change),
+                tau_shaft: powers.tau_shaft.change,
+            },
+            energy: Energy::default(),
+            efficiency: self.efficiency.change,
+            temperatures: self.temperatures.map(|T| T.change),
+            heat: self.heat.map(|Q| Q.change),
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! The state of machine and shaft, and an instant of it.
+
+use drive_base::frame::{Axis, Dq, Rotor, Vector};
+use drive_base::math::all_finite;
+use drive_base::motor::Motor;
+use serde::{Deserialize, Serialize};
+
+/// The state of machine and shaft.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct State {
+    /// Stator flux linkage in Wb.
+    pub(super) psi: Dq,
+    /// Mechanical speed in rad/s.
+    pub(super) speed: f64,
+    /// Mechanical angle in rad, not wrapped.
+    pub(super) angle: f64,
+    /// The rotor's d-axis at this angle.
+    pub(super) axis: Axis<Rotor>,
+}
+
+impl State {
+    #[inline]
+    pub(super) fn new(motor: &Motor, psi: Dq, speed: f64, angle: f64) -> Self {
+        Self { psi, speed, angle, axis: axis_at(motor, angle) }
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        all_finite([self.psi.d(), self.psi.q(), self.speed, self.angle])
+    }
+
+    /// For messages.
+    pub(super) fn tell(&self) -> String {
+        let Self { psi, speed, angle, .. } = self;
+        format!("psi_d = {} Wb, psi_q = {} Wb, speed = {speed} rad/s, angle = {angle} rad", psi.d(), psi.q())
+    }
+}
+
+/// The rotor's d-axis at the mechanical `angle` (rad).
+#[inline]
+pub(super) fn axis_at(motor: &Motor, angle: f64) -> Axis<Rotor> {
+    Axis::at(f64::from(motor.n_p) * angle)
+}
+
+/// The state at an instant, with or without its change.
+pub(super) struct Instant<S = f64> {
+    /// Stator flux linkage in Wb.
+    pub(super) psi: Vector<Rotor, S>,
+    /// Its current in A; with iron loss, that at the terminals differs.
+    pub(super) i: Vector<Rotor, S>,
+    /// Mechanical speed in rad/s.
+    pub(super) speed: S,
+    /// Mechanical angle in rad, not wrapped.
+    pub(super) angle: S,
+    /// The rotor's d-axis at this angle.
+    pub(super) axis: Axis<Rotor, S>,
+    /// The diodes block: there is no current at the terminals.
+    pub(super) idle: bool,
+}

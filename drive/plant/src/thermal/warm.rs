@@ -1,0 +1,146 @@
+//! How temperatures act in [`PmsmPlant`]: what holds over a step, and its change at the step's ends.
+//!
+//! A step begins with the imposed temperatures and ends with those of the network. In Model Exchange, the imposed
+//! temperatures act at once, and the derivatives depend on them.
+
+use super::{Heat, Temperatures, ThermalMode};
+use crate::losses::{self, Losses};
+use crate::machine::{Inverse, Machine};
+use crate::model::PmsmPlant;
+use crate::signals::PlantInputs;
+use crate::tables::PARAMETERS;
+use drive_base::motor::Motor;
+use fmu_core::{Fault, Interface, Scalar};
+use serde::{Deserialize, Serialize};
+
+/// Temperatures, and the machine that has them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Warm {
+    /// In K.
+    pub at: Temperatures,
+    /// Resistance and permanent-magnet flux linkage are those at the temperatures.
+    pub motor: Motor,
+    /// Reciprocals of its inductances.
+    inverse: Inverse,
+    /// [`losses::ideal`].
+    pub(crate) ideal: bool,
+}
+
+impl Default for Warm {
+    fn default() -> Self {
+        let motor = Motor::default();
+        Self { at: Temperatures::all(super::T_20), inverse: Inverse::of(&motor), motor, ideal: false }
+    }
+}
+
+/// What to do when the network leaves the possible temperatures.
+const RUNAWAY: &str = "the network became too hot; reduce the current, or raise thermal.G_ws and thermal.G_sc: with the \
+                       current held, the winding runs away where winding.alpha p_cu(T_ref) (1/G_ws + 1/G_sc) reaches 1";
+
+impl PmsmPlant {
+    /// The temperatures (K) under these `inputs`.
+    #[inline]
+    pub(crate) fn temperatures<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Temperatures<S> {
+        if self.parameters.thermal.mode == ThermalMode::Imposed {
+            return inputs.thermal.imposed;
+        }
+        self.warm.at.map(S::from)
+    }
+
+    /// The machine under these `inputs`.
+    #[inline]
+    pub(crate) fn motor<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Motor<S> {
+        if self.parameters.thermal.mode == ThermalMode::Imposed {
+            return self.parameters.thermal.motor(&self.parameters.motor, &inputs.thermal.imposed);
+        }
+        let Motor { n_p, R_s, L_d, L_q, psi_M } = self.warm.motor;
+        Motor { n_p, R_s: R_s.into(), L_d, L_q, psi_M: psi_M.into() }
+    }
+
+    /// The machine at its temperatures.
+    #[inline]
+    pub(crate) fn machine<const LINEAR: bool>(&self) -> Machine<'_, f64, LINEAR> {
+        Machine::with(&self.warm.motor, &self.parameters.saturation, self.warm.inverse)
+    }
+
+    /// The heat (W) of these `losses` (W) at the temperatures `at` (K) under these `inputs`.
+    #[inline]
+    pub fn heat<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Temperatures<S>, losses: &Losses<S>) -> Heat<S> {
+        let thermal = &self.parameters.thermal;
+        let heat = thermal.heat(losses);
+        match thermal.mode {
+            ThermalMode::Constant => heat,
+            ThermalMode::Network => Heat { coolant: thermal.network.to_coolant(at, inputs.thermal.coolant), ..heat },
+            ThermalMode::Imposed => Heat { coolant: 0.0.into(), ..heat },
+        }
+    }
+
+    /// From now on, the parts have these temperatures (K).
+    pub(crate) fn take(&mut self, at: Temperatures) {
+        let motor = self.parameters.thermal.motor(&self.parameters.motor, &at);
+        let (inverse, ideal) = (Inverse::of(&motor), losses::ideal(&self.parameters));
+        self.warm = Warm { at, motor, inverse, ideal };
+    }
+
+    /// The temperatures (K) that parameters and `inputs` say, and the names of those of winding and magnets.
+    fn given(&self, inputs: &PlantInputs) -> (Temperatures, [&'static str; 2]) {
+        match self.parameters.thermal.mode {
+            ThermalMode::Imposed => (inputs.thermal.imposed, ["T_winding_imposed", "T_magnet_imposed"]),
+            _ => (Temperatures::all(self.parameters.thermal.T_start), ["thermal.T_start"; 2]),
+        }
+    }
+
+    /// The temperatures at the start act.
+    pub(crate) fn start_temperatures(&mut self) {
+        self.take(self.given(&self.inputs).0);
+    }
+
+    /// The imposed temperatures act from the beginning of a step on.
+    #[inline(never)]
+    pub(crate) fn impose(&mut self) -> Result<(), Fault> {
+        let at = self.inputs.thermal.imposed;
+        if at != self.warm.at {
+            self.judge_temperatures(&self.inputs)?;
+            self.change(at);
+        }
+        Ok(())
+    }
+
+    /// The network passes the step of `h` (s) with its mean losses.
+    #[inline(never)]
+    pub(crate) fn warm_up(&mut self, h: f64) -> Result<(), Fault> {
+        let thermal = &self.parameters.thermal;
+        let heat = thermal.heat(&self.powers.losses);
+        let at = thermal.network.step(&self.warm.at, &heat, self.inputs.thermal.coolant, h);
+        super::check(&self.parameters, &at, ["T_winding", "T_magnet"], RUNAWAY)?;
+        self.change(at);
+        Ok(())
+    }
+
+    /// The temperatures (K) change between two steps. The flux linkage cannot jump, but a machine whose diodes block has
+    /// none besides that of its magnets.
+    fn change(&mut self, at: Temperatures) {
+        self.take(at);
+        if self.blocked {
+            self.state.psi = self.idle_flux(&self.warm.motor, self.state.speed);
+        }
+    }
+
+    /// Refuses given temperatures that cannot be.
+    pub(crate) fn judge_temperatures(&self, inputs: &PlantInputs) -> Result<(), Fault> {
+        let (at, names) = self.given(inputs);
+        let remedy = "temperatures are in K (20 degC are 293.15 K); correct the temperature or the coefficient";
+        super::check(&self.parameters, &at, names, remedy)
+    }
+
+    /// Refuses the network in Model Exchange.
+    pub(crate) fn validate_network(&self, interface: Interface) -> Result<(), Fault> {
+        if interface != Interface::ModelExchange || self.parameters.thermal.mode != ThermalMode::Network {
+            return Ok(());
+        }
+        let allowed = "1 (Constant) or 3 (Imposed) in Model Exchange: the network advances with the steps of \
+                       Co-Simulation; use Co-Simulation, or connect a thermal model to the inputs T_winding_imposed ... \
+                       with thermal.mode = 3";
+        Err(PARAMETERS.fault(&self.parameters, |p| &mut p.thermal.mode, allowed))
+    }
+}

@@ -1,0 +1,122 @@
+//! States of the life cycle, and bringing an instance to one of them.
+
+use crate::instance::Instance;
+use crate::session::{NotDetermined, Session};
+use State::{Continuous, Error, Event, Initialization, Instantiated, Step, Terminated};
+use fmu_import::Status;
+use fmu_import::raw::{Arguments, Interface, Simple};
+
+/// States of both interfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    Instantiated,
+    Initialization,
+    /// Step Mode.
+    Step,
+    /// Event Mode; its first update is still to come.
+    Event,
+    /// Continuous-Time Mode.
+    Continuous,
+    Terminated,
+    Error,
+}
+
+/// What an instance is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Life {
+    CoSimulation,
+    ModelExchange,
+    /// Co-Simulation with Event Mode (FMI 3.0).
+    EventMode,
+}
+
+impl Life {
+    /// The states that a call can be tried in.
+    pub(super) fn states(self) -> &'static [State] {
+        match self {
+            Self::CoSimulation => &[Instantiated, Initialization, Step, Terminated],
+            Self::ModelExchange => &[Instantiated, Initialization, Event, Continuous, Terminated],
+            Self::EventMode => &[Step, Event],
+        }
+    }
+}
+
+impl Session {
+    /// A new instance in this state.
+    pub(super) fn in_state(&self, life: Life, state: State) -> Result<Instance<'_>, NotDetermined> {
+        match life {
+            Life::CoSimulation => self.simulation(state),
+            Life::ModelExchange => self.exchange(state),
+            Life::EventMode => self.prepare(|| {
+                let instance = self.made(&Arguments { event_mode: true, ..self.arguments("probe") })?;
+                instance.enter()?;
+                instance.exit()?;
+                if state == Event {
+                    instance.must("EnterEventMode", instance.simple(Simple::EnterEventMode)?)?;
+                }
+                Ok(instance)
+            }),
+        }
+    }
+
+    /// A new instance for co-simulation in this state; two steps lead to Step Mode and to what follows it.
+    pub(super) fn simulation(&self, state: State) -> Result<Instance<'_>, NotDetermined> {
+        let instance = match state {
+            Instantiated => return self.fresh(),
+            Initialization => return self.initializing(),
+            _ => self.stepping()?,
+        };
+        instance.steps(2, self.h())?;
+        match state {
+            Terminated => instance.must("Terminate", instance.simple(Simple::Terminate)?)?,
+            Error => drop(instance.provoke()?),
+            _ => {}
+        }
+        Ok(instance)
+    }
+
+    /// A new instance for Model Exchange in this state.
+    pub(super) fn exchange(&self, state: State) -> Result<Instance<'_>, NotDetermined> {
+        self.prepare(|| {
+            let interface = Interface::ModelExchange;
+            let instance = self.made(&Arguments { interface, ..self.arguments("probe") })?;
+            instance.bring_to(state)?;
+            Ok(instance)
+        })
+    }
+}
+
+impl Instance<'_> {
+    /// Brings a new instance for Model Exchange to a state.
+    pub(super) fn bring_to(&self, state: State) -> Result<(), NotDetermined> {
+        if state == Instantiated {
+            return Ok(());
+        }
+        self.enter()?;
+        if state == Initialization {
+            return Ok(());
+        }
+        self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
+        if state == Event {
+            return Ok(());
+        }
+        let _ = self.iterate()?;
+        self.must("EnterContinuousTimeMode", self.simple(Simple::EnterContinuousTimeMode)?)?;
+        if state == Continuous {
+            return Ok(());
+        }
+        self.must("Terminate", self.simple(Simple::Terminate)?)
+    }
+
+    /// Makes the FMU return Error with one of two wrong calls; returns the call that succeeded in doing so.
+    pub(super) fn provoke(&self) -> Result<String, NotDetermined> {
+        let (t, h) = (self.time.get(), self.session.h());
+        if self.step_at(t, -h)? == Status::ERROR {
+            return Ok(format!("DoStep(h={})", -h));
+        }
+        if self.simple(Simple::ExitInitializationMode)? == Status::ERROR {
+            return Ok("ExitInitializationMode in step mode".into());
+        }
+        Err(NotDetermined("neither a negative step nor a call in the wrong state returned Error".into()))
+    }
+}

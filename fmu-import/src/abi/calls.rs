@@ -1,0 +1,418 @@
+//! Every call of both standards, once.
+//!
+//! Two users stand on these: [`Live`](super::live::Live), the instances of the facade, and [`Raw`](super::raw::Raw), the checker's
+//! calls with arguments that a well-behaved importer never passes. The argument types keep both from undefined behavior:
+//! [`Given`] is a pointer that the FMU gave out, [`Array`] and [`ArrayMut`] are NULL or at least as long as the count that goes
+//! with them. Getters, setters and instantiation take bare pointers and are `unsafe`.
+
+use super::arguments::{Answer, Array, ArrayMut, Given};
+use super::functions::{CType, Calls, Function, Way};
+use super::raw::{Count, Interface, Sensitivity, Simple, StepResults, StepStatus, UpdateResults, Vector};
+use super::signatures::{InstancePointer, OfInstance, StatePlace, StatePointer, v2, v3};
+use libloading::Library;
+use model_description::FmiVersion;
+use std::ffi::{CStr, c_char, c_int, c_void};
+use std::ptr;
+
+/// The arguments of an instantiation in both standards.
+pub(super) struct Request<'a> {
+    /// Name, token, resources.
+    pub(super) texts: [Option<&'a CStr>; 3],
+    pub(super) interface: Interface,
+    pub(super) logging: bool,
+    pub(super) event_mode: bool,
+    pub(super) early_return: bool,
+    /// FMI 2.0's.
+    pub(super) callbacks: *const v2::Callbacks,
+    /// FMI 3.0's, with the environment that it gets.
+    pub(super) logger: Option<v3::LogMessage>,
+    pub(super) environment: *mut c_void,
+}
+
+impl Calls {
+    /// The library, to be unloaded.
+    pub(super) fn into_library(self) -> Library {
+        self.library
+    }
+
+    /// Whether there is a function of this full name.
+    pub(super) fn has(&self, name: &str) -> bool {
+        // SAFETY: only whether there is such a symbol is asked; nothing is called under this type.
+        unsafe { self.library.get::<OfInstance>(name) }.is_ok()
+    }
+
+    /// A function of this full name, which only the checker calls.
+    ///
+    /// # Safety
+    /// The standard gives the name this type.
+    pub(super) unsafe fn function<T: Copy>(&self, name: &str) -> Option<T> {
+        // SAFETY: the caller promises the type.
+        unsafe { self.library.get::<T>(name) }.ok().map(|symbol| *symbol)
+    }
+
+    /// Creates an instance: the function's name, and the pointer that it returned; `None` if it is missing.
+    ///
+    /// # Safety
+    /// The callbacks are NULL or live as long as the instance, and so does what the environment leads to.
+    pub(super) unsafe fn instantiate(&self, r: &Request<'_>) -> (&'static str, Option<InstancePointer>) {
+        let [name, token, resources] = r.texts.map(|text| text.map_or(ptr::null(), CStr::as_ptr));
+        let (e, log, none) = (r.environment, r.logger, ptr::null());
+        // SAFETY: of all: the standards' types; the texts are NULL or C strings that outlive the call; no intermediate variables
+        // and no further callbacks; the caller promises the rest.
+        unsafe {
+            match (self.version, r.interface) {
+                (FmiVersion::V2, interface) => {
+                    let kind = c_int::from(interface == Interface::CoSimulation);
+                    let (Function(full, f), logging) = (&self.instantiate, c_int::from(r.logging));
+                    (*full, f.map(|f| f(name, kind, token, resources, r.callbacks, 0, logging)))
+                }
+                (FmiVersion::V3, Interface::CoSimulation) => {
+                    let (Function(full, f), event_mode, early) = (&self.co_simulation, r.event_mode, r.early_return);
+                    let call = |f: v3::InstantiateCoSimulation| {
+                        f(name, token, resources, false, r.logging, event_mode, early, ptr::null(), 0, e, log, none)
+                    };
+                    (*full, f.map(call))
+                }
+                (FmiVersion::V3, Interface::ModelExchange) => {
+                    let Function(full, f) = &self.model_exchange;
+                    (*full, f.map(|f| f(name, token, resources, false, r.logging, e, log)))
+                }
+                (FmiVersion::V3, Interface::ScheduledExecution) => {
+                    let Function(full, f) = &self.scheduled_execution;
+                    (*full, f.map(|f| f(name, token, resources, false, r.logging, e, log, none, none, none)))
+                }
+            }
+        }
+    }
+
+    /// Frees an instance; `None` if the function is missing.
+    ///
+    /// # Safety
+    /// Nothing uses the instance or its states after this.
+    pub(super) unsafe fn free(&self, instance: Given<'_>) -> Option<()> {
+        // SAFETY: an instance of this library or NULL; the caller promises that this is its last call.
+        self.free.1.map(|f| unsafe { f(instance.0) })
+    }
+
+    /// A function of an instance and nothing else. `fmi3EnterInitializationMode` takes more: see [`experiment`](Self::experiment).
+    #[inline]
+    pub(super) fn simple(&self, name: Simple, i: Given<'_>) -> Answer {
+        if name == Simple::EnterInitializationMode && self.version == FmiVersion::V3 {
+            return Answer(self.enter_3.0, None);
+        }
+        // SAFETY: all functions that `Simple` names have this type.
+        self.simple[name as usize].call(|f| unsafe { f(i.0) })
+    }
+
+    /// `fmi2SetupExperiment` or `fmi3EnterInitializationMode`.
+    pub(super) fn experiment(&self, i: Given<'_>, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Answer {
+        let (has, with) = (tolerance.is_some(), stop.is_some());
+        let (tolerance, stop) = (tolerance.unwrap_or(0.0), stop.unwrap_or(0.0));
+        // SAFETY: of both: the standard's type.
+        unsafe {
+            match self.version {
+                FmiVersion::V2 => {
+                    self.setup_2.call(|f| f(i.0, c_int::from(has), tolerance, start, c_int::from(with), stop))
+                }
+                FmiVersion::V3 => self.enter_3.call(|f| f(i.0, has, tolerance, start, with, stop)),
+            }
+        }
+    }
+
+    /// Gets or sets values.
+    ///
+    /// # Safety
+    /// `values` is NULL or leads to as many values of the type as both counts say, to which a getter may write; texts that are set
+    /// are NULL or C strings.
+    #[inline]
+    pub(super) unsafe fn transfer(
+        &self,
+        way: Way,
+        i: Given<'_>,
+        CType(kind): CType,
+        references: Array<'_, u32>,
+        values: *mut c_void,
+        n_values: usize,
+    ) -> Answer {
+        let (list, n) = (references.pointer(), references.1);
+        // SAFETY: of both: the standards' types, whatever the values are: they only differ in what the pointer leads to.
+        unsafe {
+            match self.version {
+                FmiVersion::V2 => self.transfer_2[kind][way as usize].call(|f| f(i.0, list, n, values)),
+                FmiVersion::V3 => self.transfer_3[kind][way as usize].call(|f| f(i.0, list, n, values, n_values)),
+            }
+        }
+    }
+
+    /// `DoStep`. `pointers` are FMI 3.0's: the results that do not get NULL; `before` is what the places hold before the call.
+    #[inline]
+    pub(super) fn do_step(
+        &self,
+        i: Given<'_>,
+        (t, h): (f64, f64),
+        no_prior: bool,
+        pointers: [bool; 4],
+        before: StepResults,
+    ) -> Answer<StepResults> {
+        // SAFETY: of both: the standard's type; the places are ours or NULL.
+        unsafe {
+            match self.version {
+                FmiVersion::V2 => self.do_step_2.write(before, |f, _| f(i.0, t, h, c_int::from(no_prior))),
+                FmiVersion::V3 => self.do_step_3.write(before, |f, StepResults { event, terminate, early, last }| {
+                    let place = |given, place: &mut u8| if given { ptr::from_mut(place) } else { ptr::null_mut() };
+                    let (event, terminate) = (place(pointers[0], event), place(pointers[1], terminate));
+                    let last = if pointers[3] { ptr::from_mut(last) } else { ptr::null_mut() };
+                    f(i.0, t, h, no_prior, event, terminate, place(pointers[2], early), last)
+                }),
+            }
+        }
+    }
+
+    /// `fmi2Get...Status` with a place for any of its results; returns the first eight bytes of it, which hold `before` at first.
+    pub(super) fn step_status(&self, name: StepStatus, i: Given<'_>, kind: c_int, before: u64) -> Answer<u64> {
+        let full = StepStatus::ALL[name as usize][0];
+        // SAFETY: of both: FMI 2.0's type but for the place, which has room for each of its values.
+        unsafe {
+            Function(full, self.function::<v2::GetStatus<u64>>(full)).write(before, |f, place| f(i.0, kind, place))
+        }
+    }
+
+    /// `SetDebugLogging`. The categories are C strings, or NULL.
+    pub(super) fn debug_logging(
+        &self,
+        i: Given<'_>,
+        on: bool,
+        categories: Option<&[Option<&CStr>]>,
+        n: usize,
+    ) -> Answer {
+        let list: Vec<*const c_char> =
+            categories.unwrap_or_default().iter().map(|c| c.map_or(ptr::null(), CStr::as_ptr)).collect();
+        let list = Array::of(categories.map(|_| &list[..]), n).pointer();
+        // SAFETY: of both: the standard's type; as many strings as said, or NULL.
+        unsafe {
+            match self.version {
+                FmiVersion::V2 => self.debug_logging_2.call(|f| f(i.0, c_int::from(on), n, list)),
+                FmiVersion::V3 => self.debug_logging_3.call(|f| f(i.0, on, n, list)),
+            }
+        }
+    }
+
+    /// `GetFMUState`: offers a state, or NULL for a new one, to be overwritten; `None` passes NULL for the place.
+    pub(super) fn get_state(&self, i: Given<'_>, place: Option<Given<'_>>) -> Answer<StatePointer> {
+        Self::with_place(&self.get_state, i, place)
+    }
+
+    /// `FreeFMUState`: what the place holds then; `None` passes NULL for the place.
+    ///
+    /// # Safety
+    /// Nothing uses the state after this.
+    pub(super) unsafe fn free_state(&self, i: Given<'_>, place: Option<Given<'_>>) -> Answer<StatePointer> {
+        Self::with_place(&self.free_state, i, place)
+    }
+
+    fn with_place(function: &Function<StatePlace>, i: Given<'_>, place: Option<Given<'_>>) -> Answer<StatePointer> {
+        // SAFETY: the standards' type; the place is ours or NULL, and the state alive or NULL.
+        function.write(place.unwrap_or(Given::NULL).0, |f, state| unsafe {
+            f(i.0, if place.is_some() { state } else { ptr::null_mut() })
+        })
+    }
+
+    /// `SetFMUState`.
+    pub(super) fn set_state(&self, i: Given<'_>, state: Given<'_>) -> Answer {
+        // SAFETY: the standards' type.
+        self.set_state.call(|f| unsafe { f(i.0, state.0) })
+    }
+
+    /// `SerializedFMUStateSize`.
+    pub(super) fn state_size(&self, i: Given<'_>, state: Given<'_>) -> Answer<usize> {
+        // SAFETY: the standards' type; the place is ours.
+        self.state_size.write(0, |f, size| unsafe { f(i.0, state.0, size) })
+    }
+
+    /// `SerializeFMUState`.
+    pub(super) fn serialize(&self, i: Given<'_>, state: Given<'_>, mut bytes: ArrayMut<'_, u8>) -> Answer {
+        // SAFETY: the standards' type; the array is as long as said.
+        self.serialize.call(|f| unsafe { f(i.0, state.0, bytes.pointer(), bytes.1) })
+    }
+
+    /// `DeserializeFMUState`.
+    pub(super) fn deserialize(&self, i: Given<'_>, bytes: Array<'_, u8>) -> Answer<StatePointer> {
+        // SAFETY: the standards' type; the array is NULL or as long as said; the place is ours.
+        self.deserialize.write(ptr::null_mut(), |f, state| unsafe { f(i.0, bytes.pointer(), bytes.1, state) })
+    }
+
+    /// `fmi2NewDiscreteStates` or `fmi3UpdateDiscreteStates`. `before` is what the places hold before the call; with `null`, all
+    /// results get NULL.
+    pub(super) fn update_discrete_states(
+        &self,
+        i: Given<'_>,
+        null: bool,
+        (fill, time): (u8, f64),
+    ) -> Answer<UpdateResults> {
+        // SAFETY: of both: the standard's type; the places are ours or NULL.
+        let Answer(name, result) = unsafe {
+            match self.version {
+                FmiVersion::V2 => {
+                    let flag = c_int::from(fill);
+                    let before = v2::EventInfo {
+                        new_discrete_states_needed: flag,
+                        terminate_simulation: flag,
+                        nominals_changed: flag,
+                        states_changed: flag,
+                        next_event_time_defined: flag,
+                        next_event_time: time,
+                    };
+                    let Answer(name, result) =
+                        self.update_2.write(before, |f, info| f(i.0, if null { ptr::null_mut() } else { info }));
+                    let flags = |x: &v2::EventInfo| {
+                        let changed = [x.nominals_changed, x.states_changed];
+                        [
+                            x.new_discrete_states_needed,
+                            x.terminate_simulation,
+                            changed[0],
+                            changed[1],
+                            x.next_event_time_defined,
+                        ]
+                    };
+                    Answer(name, result.map(|(status, info)| (status, (flags(&info), info.next_event_time))))
+                }
+                FmiVersion::V3 => {
+                    let Answer(name, result) = self.update_3.write(([fill; 5], time), |f, (flags, time)| {
+                        let [a, b, c, d, e] =
+                            flags.each_mut().map(|x| if null { ptr::null_mut() } else { ptr::from_mut(x) });
+                        f(i.0, a, b, c, d, e, if null { ptr::null_mut() } else { time })
+                    });
+                    Answer(name, result.map(|(status, (flags, time))| (status, (flags.map(i32::from), time))))
+                }
+            }
+        };
+        let updated =
+            |([again, terminate, nominals_changed, states_changed, defined], next_event_time): ([i32; 5], f64)| {
+                let next_event_time_defined = defined;
+                UpdateResults {
+                    again,
+                    terminate,
+                    nominals_changed,
+                    states_changed,
+                    next_event_time_defined,
+                    next_event_time,
+                }
+            };
+        Answer(name, result.map(|(status, values)| (status, updated(values))))
+    }
+
+    /// `CompletedIntegratorStep`: `enterEventMode` and `terminateSimulation`, which hold `fill` before the call; with `null`, both
+    /// get NULL.
+    pub(super) fn completed(&self, i: Given<'_>, no_prior: bool, null: bool, fill: u8) -> Answer<[i32; 2]> {
+        // SAFETY: of both: the standard's type; the places are ours or NULL.
+        unsafe {
+            match self.version {
+                FmiVersion::V2 => self.completed_2.write([c_int::from(fill); 2], |f, flags| {
+                    let [a, b] = flags.each_mut().map(|flag| if null { ptr::null_mut() } else { ptr::from_mut(flag) });
+                    f(i.0, c_int::from(no_prior), a, b)
+                }),
+                FmiVersion::V3 => {
+                    let Answer(name, result) = self.completed_3.write([fill; 2], |f, flags| {
+                        let [a, b] =
+                            flags.each_mut().map(|flag| if null { ptr::null_mut() } else { ptr::from_mut(flag) });
+                        f(i.0, no_prior, a, b)
+                    });
+                    Answer(name, result.map(|(status, flags)| (status, flags.map(i32::from))))
+                }
+            }
+        }
+    }
+
+    /// `SetTime`.
+    #[inline]
+    pub(super) fn set_time(&self, i: Given<'_>, t: f64) -> Answer {
+        // SAFETY: the standards' type.
+        self.set_time.call(|f| unsafe { f(i.0, t) })
+    }
+
+    /// `SetContinuousStates`.
+    #[inline]
+    pub(super) fn set_states(&self, i: Given<'_>, x: Array<'_, f64>) -> Answer {
+        // SAFETY: the standards' type; the array is NULL or as long as said.
+        self.set_states.call(|f| unsafe { f(i.0, x.pointer(), x.1) })
+    }
+
+    /// States, derivatives, event indicators or nominals.
+    #[inline]
+    pub(super) fn vector(&self, name: Vector, i: Given<'_>, mut values: ArrayMut<'_, f64>) -> Answer {
+        // SAFETY: all functions that `Vector` names have this type, up to the mutability of the array, which is ours, NULL or
+        // as long as said.
+        self.vectors[name as usize].call(|f| unsafe { f(i.0, values.pointer(), values.1) })
+    }
+
+    /// Number of states or event indicators (FMI 3.0); with `null`, the result gets NULL.
+    pub(super) fn count(&self, name: Count, i: Given<'_>, null: bool) -> Answer<usize> {
+        let function = match name {
+            Count::GetNumberOfContinuousStates => &self.number_of_states,
+            Count::GetNumberOfEventIndicators => &self.number_of_indicators,
+        };
+        // SAFETY: FMI 3.0's type; the place is ours or NULL.
+        function.write(usize::MAX, |f, n| unsafe { f(i.0, if null { ptr::null_mut() } else { n }) })
+    }
+
+    /// Directional or adjoint derivatives: value references of the unknowns and of the knowns, the seed, and the results.
+    pub(super) fn sensitivity(
+        &self,
+        name: Sensitivity,
+        i: Given<'_>,
+        [unknowns, knowns]: [Array<'_, u32>; 2],
+        seed: Array<'_, f64>,
+        mut results: ArrayMut<'_, f64>,
+    ) -> Answer {
+        let (u, n_u, k, n_k) = (unknowns.pointer(), unknowns.1, knowns.pointer(), knowns.1);
+        let function = match (self.version, name) {
+            (FmiVersion::V2, Sensitivity::GetAdjointDerivative) => return Answer("fmi2GetAdjointDerivative", None),
+            (FmiVersion::V2, Sensitivity::GetDirectionalDerivative) => {
+                let (s, to) = (seed.holding(n_k), results.holding(n_u));
+                // SAFETY: FMI 2.0's type; the lists tell the lengths of seed and results.
+                return self.directional_2.call(|f| unsafe { f(i.0, u, n_u, k, n_k, s, to) });
+            }
+            (FmiVersion::V3, Sensitivity::GetDirectionalDerivative) => &self.directional_3,
+            (FmiVersion::V3, Sensitivity::GetAdjointDerivative) => &self.adjoint_3,
+        };
+        let (s, n_s, to, n) = (seed.pointer(), seed.1, results.pointer(), results.1);
+        // SAFETY: FMI 3.0's type; arrays are NULL or as long as said.
+        function.call(|f| unsafe { f(i.0, u, n_u, k, n_k, s, n_s, to, n) })
+    }
+
+    /// Derivatives of outputs with respect to time.
+    pub(super) fn output_derivatives(
+        &self,
+        i: Given<'_>,
+        references: &[u32],
+        orders: &[c_int],
+        values: &mut [f64],
+    ) -> Answer {
+        let (r, n, orders) = (references.as_ptr(), references.len(), Array::from(orders).holding(references.len()));
+        let mut values = ArrayMut::from(values);
+        // SAFETY: of both: the standard's type; the arrays are as long as said.
+        unsafe {
+            match self.version {
+                FmiVersion::V2 => {
+                    let values = values.holding(n);
+                    self.output_derivatives_2.call(|f| f(i.0, r, n, orders, values))
+                }
+                FmiVersion::V3 => self.output_derivatives_3.call(|f| f(i.0, r, n, orders, values.pointer(), values.1)),
+            }
+        }
+    }
+
+    /// `fmi2SetRealInputDerivatives`.
+    pub(super) fn input_derivatives(
+        &self,
+        i: Given<'_>,
+        references: Array<'_, u32>,
+        orders: Array<'_, c_int>,
+        values: Array<'_, f64>,
+    ) -> Answer {
+        let (r, n) = (references.pointer(), references.1);
+        let (orders, values) = (orders.holding(n), values.holding(n));
+        // SAFETY: FMI 2.0's type; arrays are NULL or as long as said.
+        self.input_derivatives_2.call(|f| unsafe { f(i.0, r, n, orders, values) })
+    }
+}

@@ -1,0 +1,16 @@
+//! Figures, and pages that need no network. Knows neither motors nor FMUs.
+//!
+//! - [`figure`]: what a figure shows; whoever makes one chooses the colors of its curves.
+//! - [`svg`]: draws a figure as SVG.
+//! - [`page`]: a page, and a figure in it with zoom, legend switches and readings at the cursor.
+//! - [`ink`]: colors for curves that have none of their own.
+
+#![forbid(unsafe_code)]
+
+pub mod figure;
+pub mod ink;
+pub mod page;
+pub mod svg;
+
+/// The error of a figure without a point.
+const EMPTY: &str = "nothing was recorded, so there is nothing to plot";
