@@ -124,8 +124,14 @@ fn compare(moved: &[&str], without: &[f64]) -> f64 {
     let exchanged = run(moved, true);
     let error = apart(&run(moved, false), &exchanged);
     // Across a kink, the integration of Model Exchange here, which does not look for kinks, loses its order.
-    let kinks = moved.iter().any(|name| name.starts_with("inverter."));
-    assert!(error < if kinks { 1e-3 } else { 2e-4 }, "{moved:?}: Co-Simulation and Model Exchange are {error:e} apart");
+    let allowed = if moved.contains(&"inverter.dead_time") {
+        1e-3
+    } else if moved.iter().any(|name| name.starts_with("inverter.")) {
+        1e-4
+    } else {
+        1e-6
+    };
+    assert!(error < allowed, "{moved:?}: Co-Simulation and Model Exchange are {error:e} apart");
     apart(&exchanged, without)
 }
 
@@ -137,7 +143,7 @@ fn every_parameter_alone() {
         moved.push(&name);
         let change = compare(&moved, &without);
         println!("{name}: {change:e}");
-        assert!(change > 1e-9, "{name} changes nothing");
+        assert!(change > 5e-6, "{name} changes nothing");
     }
 }
 
