@@ -119,7 +119,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let journal = folder.path().join("call");
         // One call that computes without end, one that waits without end.
-        assert_eq!(end("while :; do :; done", 400, &journal), Pace::Hangs);
+        // On a busy machine, it may get too little of the processor to tell: slow.
+        let seen: Vec<Pace> =
+            (0..4).map(|_| end("while :; do :; done", 400, &journal)).take_while(|&p| p != Pace::Hangs).collect();
+        assert!(seen.len() < 4 && seen.iter().all(|&pace| pace == Pace::Slow), "{seen:?}");
         assert_eq!(end("exec sleep 60", 400, &journal), Pace::Hangs);
         // Call after call: slow, however long it takes.
         let calls = "n=0; while :; do n=$((n + 1)); echo \"C call $n\" > \"$JOURNAL\"; done";
