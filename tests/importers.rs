@@ -92,7 +92,7 @@ fn omsimulator() {
         // It writes instants twice, before and after the exchange, and may end with one more step of a rounding error.
         let instants = |csv: &str| column(csv, "time").iter().map(|t| (t / 1e-4).round()).collect::<Vec<_>>();
         let (at, at_theirs) = (instants(&ours), instants(&theirs));
-        for variable in ["speed", "speed_est", "i_a", "i_q", "tau_shaft", "p_in", "energy_in"] {
+        for variable in ["speed", "speed_est", "i_a", "i_q", "tau_e", "p_in", "energy_in"] {
             let (ours, theirs) =
                 (column(&ours, variable), column(&theirs, &format!("SensorlessDrive.SensorlessDrive.{variable}")));
             let scale = ours.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
