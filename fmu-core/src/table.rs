@@ -53,6 +53,14 @@ impl<W: 'static> Row<W> {
     }
 }
 
+/// A `&'static Table` from its rows, built and checked while compiling; [`Row`] has an example of every kind of row.
+#[macro_export]
+macro_rules! table {
+    ($($row:expr),* $(,)?) => {
+        &$crate::Table::new(const { &[$($row),*] })
+    };
+}
+
 /// A value of an enumeration with the name of its item.
 fn item(meta: &Meta, value: i32) -> String {
     let Kind::Enumeration(enumeration) = meta.kind else { return value.to_string() };
@@ -67,7 +75,7 @@ pub(crate) struct RowPlace {
     pub(crate) inner: u16,
 }
 
-/// All variables of `W`.
+/// All variables of `W`; [`table!`](crate::table!) makes one from its rows.
 pub struct Table<W: 'static> {
     pub(crate) rows: &'static [Row<W>],
     pub(crate) places: [RowPlace; CAPACITY],

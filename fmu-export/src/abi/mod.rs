@@ -145,7 +145,7 @@ macro_rules! functions {
 /// impl Model for Still {
 ///     # type Outputs = ();
 ///     # const INFO: Info = Info { name: "Still", ..Info::DEFAULT };
-///     # const TABLE: &'static Table<Whole> = &Table::new(const { &[] });
+///     # const TABLE: &'static Table<Whole> = table![];
 ///     # fn initialize(&mut self) {}
 ///     # fn output(&self, _: Elapsed, (): &mut ()) {}
 ///     # fn advance(&mut self, _: &Step) -> Result<(), Fault> { Ok(()) }
@@ -165,7 +165,7 @@ macro_rules! functions {
 /// # impl Model for Still {
 /// #     type Outputs = ();
 /// #     const INFO: Info = Info { name: "Still", ..Info::DEFAULT };
-/// #     const TABLE: &'static Table<Whole> = &Table::new(const { &[] });
+/// #     const TABLE: &'static Table<Whole> = table![];
 /// #     fn initialize(&mut self) {}
 /// #     fn output(&self, _: Elapsed, (): &mut ()) {}
 /// #     fn advance(&mut self, _: &Step) -> Result<(), Fault> { Ok(()) }

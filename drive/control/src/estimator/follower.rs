@@ -7,7 +7,7 @@
 use crate::estimator::Context;
 use crate::estimator::emf::Direction;
 use fmu_core::unit::RAD_PER_S;
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -83,27 +83,23 @@ impl Follower {
 type P = Row<MatsuiParameters>;
 
 /// The variables; their owner adds the prefix `matsui.`.
-pub const MATSUI: &Table<MatsuiParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("bandwidth", &RAD_PER_S, "Gain of the angle error in voltage and current model", |p| {
-                &mut p.bandwidth
-            })
-            .above(0.0)
-            .tunable(),
-            P::parameter("filter", &RAD_PER_S, "Bandwidth of the speed filter in voltage and current model", |p| {
-                &mut p.filter
-            })
-            .above(0.0)
-            .tunable(),
-            P::boolean_parameter(
-                "integral",
-                "Integrate the angle error, so that a speed bias causes no angle error; false: as printed, VoltageModel and CurrentModel alone",
-                |p| &mut p.integral,
-            ),
-        ]
-    },
-);
+pub const MATSUI: &Table<MatsuiParameters> = table![
+    P::parameter("bandwidth", &RAD_PER_S, "Gain of the angle error in voltage and current model", |p| {
+        &mut p.bandwidth
+    })
+    .above(0.0)
+    .tunable(),
+    P::parameter("filter", &RAD_PER_S, "Bandwidth of the speed filter in voltage and current model", |p| {
+        &mut p.filter
+    })
+    .above(0.0)
+    .tunable(),
+    P::boolean_parameter(
+        "integral",
+        "Integrate the angle error, so that a speed bias causes no angle error; false: as printed, VoltageModel and CurrentModel alone",
+        |p| &mut p.integral,
+    ),
+];
 
 #[cfg(test)]
 mod tests {

@@ -16,7 +16,7 @@ use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use drive_base::frame::{Axis, DqHat, Estimated};
 use fmu_core::unit::RAD_PER_S;
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -103,31 +103,24 @@ impl Estimating for Hybrid {
 type P = Row<HybridParameters>;
 
 /// The variables; their owner adds the prefix `hybrid.`.
-pub const HYBRID: &Table<HybridParameters> = &Table::new(
-    const {
-        &[
-            P::parameter(
-                "w_low",
-                &RAD_PER_S,
-                "Electrical speed up to which the hybrid uses the injection alone",
-                |p| &mut p.w_low,
-            )
-            .at_least(0.0),
-            P::parameter("w_high", &RAD_PER_S, "Electrical speed from which the hybrid uses the back EMF alone", |p| {
-                &mut p.w_high
-            })
-            .above(0.0),
-            P::parameter(
-                "bandwidth",
-                &RAD_PER_S,
-                "Magnitude of the tracker pole where the hybrid uses the back EMF alone",
-                |p| &mut p.bandwidth,
-            )
-            .above(0.0)
-            .tunable(),
-        ]
-    },
-);
+pub const HYBRID: &Table<HybridParameters> = table![
+    P::parameter("w_low", &RAD_PER_S, "Electrical speed up to which the hybrid uses the injection alone", |p| {
+        &mut p.w_low
+    })
+    .at_least(0.0),
+    P::parameter("w_high", &RAD_PER_S, "Electrical speed from which the hybrid uses the back EMF alone", |p| {
+        &mut p.w_high
+    })
+    .above(0.0),
+    P::parameter(
+        "bandwidth",
+        &RAD_PER_S,
+        "Magnitude of the tracker pole where the hybrid uses the back EMF alone",
+        |p| &mut p.bandwidth,
+    )
+    .above(0.0)
+    .tunable(),
+];
 
 #[cfg(test)]
 mod tests {
