@@ -86,18 +86,32 @@ impl Instance<'_> {
         call: &str,
         function: impl FnOnce(&Raw) -> Option<Status>,
     ) -> Result<Status, NotDetermined> {
+        Ok(self.call_for(call, |raw| Some((function(raw)?, ())))?.0)
+    }
+
+    /// Calls a function that also returns a value.
+    pub(super) fn call_for<T>(
+        &self,
+        call: &str,
+        function: impl FnOnce(&Raw) -> Option<(Status, T)>,
+    ) -> Result<(Status, T), NotDetermined> {
         let name = self.session.raw.name(call);
         self.session.record_call(&name);
         let missing =
             || NotDetermined(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
-        let status = function(&self.session.raw).ok_or_else(missing)?;
+        let (status, value) = function(&self.session.raw).ok_or_else(missing)?;
         self.session.record_result(&status);
-        Ok(status)
+        Ok((status, value))
     }
 
     /// A function without arguments.
     pub(super) fn simple(&self, name: Simple) -> Result<Status, NotDetermined> {
         self.call(name.as_str(), |raw| raw.simple(name, self.handle))
+    }
+
+    /// A function without arguments that must succeed.
+    pub(super) fn perform(&self, name: Simple) -> Result<(), NotDetermined> {
+        self.must(name.as_str(), self.simple(name)?)
     }
 
     pub(super) fn must(&self, name: &str, status: Status) -> Result<(), NotDetermined> {
@@ -128,32 +142,27 @@ impl Instance<'_> {
         })?;
         self.must(name, status)?;
         if self.session.description.version == FmiVersion::V2 {
-            self.must("EnterInitializationMode", self.simple(Simple::EnterInitializationMode)?)?;
+            self.perform(Simple::EnterInitializationMode)?;
         }
         Ok(())
     }
 
     /// Leaves initialization mode; the instance is then ready to step.
     pub(super) fn exit(&self) -> Result<(), NotDetermined> {
-        self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
+        self.perform(Simple::ExitInitializationMode)?;
         if self.event_mode { self.events() } else { Ok(()) }
     }
 
     /// Passes through event mode to step mode.
     fn events(&self) -> Result<(), NotDetermined> {
         for _ in 0..100 {
-            let mut again = false;
-            let status = self.call("UpdateDiscreteStates", |raw| {
-                let (status, updated) = raw.update_discrete_states(self.handle, false)?;
-                again = updated.again != 0;
-                Some(status)
-            })?;
+            let (status, updated) = self.update()?;
             self.must("UpdateDiscreteStates", status)?;
-            if !again {
+            if updated.again == 0 {
                 break;
             }
         }
-        self.must("EnterStepMode", self.simple(Simple::EnterStepMode)?)
+        self.perform(Simple::EnterStepMode)
     }
 
     /// A step from the end of the last one.
@@ -189,7 +198,7 @@ impl Instance<'_> {
             Some(status)
         })?;
         if self.event_mode && status.is_ok() {
-            self.must("EnterEventMode", self.simple(Simple::EnterEventMode)?)?;
+            self.perform(Simple::EnterEventMode)?;
             self.events()?;
         }
         Ok(status)
@@ -281,34 +290,20 @@ impl Instance<'_> {
 
     /// A saved state as bytes.
     pub(super) fn serialize(&self, state: SavedState) -> Result<Vec<u8>, NotDetermined> {
-        let mut size = 0;
-        let status = self.call("SerializedFMUStateSize", |raw| {
-            let (status, n) = raw.state_size(self.handle, state)?;
-            size = n;
-            Some(status)
-        })?;
+        let (status, size) = self.call_for("SerializedFMUStateSize", |raw| raw.state_size(self.handle, state))?;
         self.must("SerializedFMUStateSize", status)?;
-        let (mut out, mut too_large) = ((Vec::new(), true), None);
-        let status = self.call(&format!("SerializeFMUState(size={size})"), |raw| {
+        let (status, out) = self.call_for(&format!("SerializeFMUState(size={size})"), |raw| {
             match raw.serialize(self.handle, state, size) {
-                Ok(done) => done.map(|(status, bytes, intact)| {
-                    out = (bytes, intact);
-                    status
-                }),
-                Err(why) => {
-                    too_large = Some(why);
-                    Some(Status::ERROR)
-                }
+                Ok(done) => done.map(|(status, bytes, intact)| (status, Ok((bytes, intact)))),
+                Err(why) => Some((Status::ERROR, Err(why))),
             }
         })?;
-        if let Some(why) = too_large {
-            return Err(NotDetermined(why));
-        }
+        let (bytes, intact) = out.map_err(NotDetermined)?;
         self.must("SerializeFMUState", status)?;
-        if !out.1 {
+        if !intact {
             return Err(NotDetermined(format!("SerializeFMUState wrote past its {size} bytes")));
         }
-        Ok(out.0)
+        Ok(bytes)
     }
 
     /// Frees the instance.

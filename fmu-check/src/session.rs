@@ -273,6 +273,17 @@ impl Session {
         }
     }
 
+    /// Runs a case of a probe with each of these values.
+    #[expect(clippy::unnecessary_wraps, reason = "probes return it")]
+    pub(super) fn cases<T>(
+        &self,
+        values: impl IntoIterator<Item = T>,
+        case: impl Fn(T) -> Result<(), NotDetermined>,
+    ) -> Result<(), NotDetermined> {
+        values.into_iter().for_each(|value| self.case(|| case(value)));
+        Ok(())
+    }
+
     /// Whether half of the time is used up; loops end then.
     pub(super) fn half_time_used(&self) -> bool {
         self.began.elapsed() > self.timeout / 2

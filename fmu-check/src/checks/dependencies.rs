@@ -104,7 +104,7 @@ pub(super) fn exchange_dependencies(session: &Session) -> Result<(), NotDetermin
     // Discrete inputs change in Event Mode only.
     for discrete in [false, true] {
         if discrete {
-            instance.must("EnterEventMode", instance.simple(Simple::EnterEventMode)?)?;
+            instance.perform(Simple::EnterEventMode)?;
         }
         let before = instance.snapshot(&variables)?;
         for input in session.number_inputs().filter(|v| (v.variability == Variability::Discrete) == discrete) {

@@ -112,21 +112,17 @@ fn null_arguments(session: &Session) -> Result<(), NotDetermined> {
     let empty = Some(CString::default());
     let cases =
         [("instanceName = NULL", None, true), ("instanceName = \"\"", empty, true), ("token = NULL", None, false)];
-    for (what, value, name) in cases {
-        session.case(|| {
-            let mut arguments = session.arguments("probe");
-            if name {
-                arguments.name = value;
-            } else {
-                arguments.token = value;
-            }
-            let created = session.instantiate(&arguments)?;
-            session
-                .require(created.is_none(), || format!("{} with {what} created an instance", session.instantiation()));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases(cases, |(what, value, name)| {
+        let mut arguments = session.arguments("probe");
+        if name {
+            arguments.name = value;
+        } else {
+            arguments.token = value;
+        }
+        let created = session.instantiate(&arguments)?;
+        session.require(created.is_none(), || format!("{} with {what} created an instance", session.instantiation()));
+        Ok(())
+    })
 }
 
 /// Instantiates with the arguments, initializes, makes two steps and an invalid one.
@@ -186,14 +182,14 @@ fn without_resources(session: &Session) -> Result<(), NotDetermined> {
     }
     let v2 = session.description.version == FmiVersion::V2;
     let odd = if v2 { "file:/no%20such/pl%C3%A4ce#1" } else { "/no such/pl\u{e4}ce #1/" };
-    for (what, path) in [("a NULL resource path", None), ("a resource path that does not exist", Some(odd))] {
-        session.case(|| {
+    session.cases(
+        [("a NULL resource path", None), ("a resource path that does not exist", Some(odd))],
+        |(what, path)| {
             let mut arguments = session.arguments("probe");
             arguments.resources = path.and_then(|p| CString::new(p).ok());
             short_run(session, &arguments, what, Level::Must)
-        });
-    }
-    Ok(())
+        },
+    )
 }
 
 fn callbacks(session: &Session) -> Result<(), NotDetermined> {
@@ -217,16 +213,13 @@ fn interfaces(session: &Session) -> Result<(), NotDetermined> {
     if v3 && !session.flag("hasEventMode") {
         cases.push(("eventModeUsed = true", Interface::CoSimulation, true));
     }
-    for (what, interface, event_mode) in cases {
-        session.case(|| {
-            let mut arguments = session.arguments("probe");
-            (arguments.interface, arguments.event_mode) = (interface, event_mode);
-            let created = session.instantiate(&arguments)?;
-            session.require(created.is_none(), || format!("an instantiation for {what} created an instance"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases(cases, |(what, interface, event_mode)| {
+        let mut arguments = session.arguments("probe");
+        (arguments.interface, arguments.event_mode) = (interface, event_mode);
+        let created = session.instantiate(&arguments)?;
+        session.require(created.is_none(), || format!("an instantiation for {what} created an instance"));
+        Ok(())
+    })
 }
 
 fn free(session: &Session) -> Result<(), NotDetermined> {
@@ -234,17 +227,14 @@ fn free(session: &Session) -> Result<(), NotDetermined> {
         session.record_call(&format!("{}(NULL)", session.raw.name("FreeInstance")));
         session.raw.free(Handle::NULL).ok_or_else(|| NotDetermined("FreeInstance is missing".into()))
     });
-    for &state in Life::CoSimulation.states().iter().chain([&Error]) {
-        session.case(|| match session.simulation(state) {
-            Ok(instance) => instance.free(),
-            // Some FMUs return no Error; another check reports that.
-            Err(NotDetermined(why)) => {
-                session.note(format!("{state:?}: {why}"));
-                Ok(())
-            }
-        });
-    }
-    Ok(())
+    session.cases(Life::CoSimulation.states().iter().chain([&Error]), |&state| match session.simulation(state) {
+        Ok(instance) => instance.free(),
+        // Some FMUs return no Error; another check reports that.
+        Err(NotDetermined(why)) => {
+            session.note(format!("{state:?}: {why}"));
+            Ok(())
+        }
+    })
 }
 
 fn reset(session: &Session) -> Result<(), NotDetermined> {

@@ -89,17 +89,14 @@ fn switch(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn unknown(session: &Session) -> Result<(), NotDetermined> {
-    for (what, name) in [("no such category", CString::new("no such category").ok()), ("NULL", None)] {
-        session.case(|| {
-            let instance = session.fresh()?;
-            let call = format!("SetDebugLogging(true, 1, {what})");
-            let status =
-                instance.call(&call, |raw| raw.debug_logging(instance.handle, true, Some(&[name.as_deref()]), 1))?;
-            session.require(!status.is_ok(), || format!("{call} returned {status}"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([("no such category", CString::new("no such category").ok()), ("NULL", None)], |(what, name)| {
+        let instance = session.fresh()?;
+        let call = format!("SetDebugLogging(true, 1, {what})");
+        let status =
+            instance.call(&call, |raw| raw.debug_logging(instance.handle, true, Some(&[name.as_deref()]), 1))?;
+        session.require(!status.is_ok(), || format!("{call} returned {status}"));
+        Ok(())
+    })
 }
 
 fn errors(session: &Session) -> Result<(), NotDetermined> {
@@ -159,22 +156,19 @@ fn memory(session: &Session) -> Result<(), NotDetermined> {
     if !session.flag("canNotUseMemoryManagementFunctions") {
         return session.not_applicable("canNotUseMemoryManagementFunctions is false");
     }
-    for given in [true, false] {
-        session.case(|| {
-            let mut arguments = session.arguments("probe");
-            arguments.memory = given;
-            let Some(instance) = session.instantiate(&arguments)? else {
-                session.violated("fmi2Instantiate with NULL memory functions returned NULL");
-                return Ok(());
-            };
-            instance.enter()?;
-            instance.exit()?;
-            instance.steps(5, session.h())?;
-            instance.free()?;
-            let used = allocations();
-            session.require(used == 0, || format!("the FMU called the memory functions {used} times"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([true, false], |given| {
+        let mut arguments = session.arguments("probe");
+        arguments.memory = given;
+        let Some(instance) = session.instantiate(&arguments)? else {
+            session.violated("fmi2Instantiate with NULL memory functions returned NULL");
+            return Ok(());
+        };
+        instance.enter()?;
+        instance.exit()?;
+        instance.steps(5, session.h())?;
+        instance.free()?;
+        let used = allocations();
+        session.require(used == 0, || format!("the FMU called the memory functions {used} times"));
+        Ok(())
+    })
 }
