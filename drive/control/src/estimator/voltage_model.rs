@@ -9,53 +9,42 @@
 //! shifts the angle by 5.5 deg and makes rated load oscillate above 0.75 of the rated speed. The derivative of the
 //! current makes the speed noisy.
 
+use crate::estimator::Context;
 use crate::estimator::emf::pole;
-use crate::estimator::follower::Follower;
+use crate::estimator::follower::Rows;
 use crate::estimator::interval::Interval;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
 use serde::{Deserialize, Serialize};
 
-/// State kept from one sample to the next.
+/// The model's rows; its state is that of the [`Follower`](crate::estimator::follower::Follower).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct VoltageModel {
-    follower: Follower,
-}
+pub struct VoltageModel;
 
-impl Estimating for VoltageModel {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
-        (Self { follower: Follower::at(theta, w, context.T_s) }, Estimate::new(theta, w, sample))
-    }
-
+impl Rows for VoltageModel {
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn rows(w: &mut f64, context: &Context, x: &Interval, slip: f64) -> f64 {
         let Context { motor, par, T_s, .. } = *context;
-        let f = &mut self.follower;
-        f.advance(T_s);
-        let x = Interval::new(f.theta_last, f.theta, sample, T_s);
-        let slip = par.emf.slip(&x, f.w);
         let p_i = (x.i_now - x.i_last) * (1.0 / T_s);
         let w_cal = (x.v.q() - motor.R_s * x.i.q() - motor.L_q * p_i.q() - slip * motor.L_q * x.i.d())
             / (motor.psi_M + motor.L_d * x.i.d());
-        f.w += (1.0 - pole(par.matsui.filter, T_s)) * (w_cal - f.w);
-        let dv_d = x.v.d() - motor.R_s * x.i.d() - motor.L_d * p_i.d() + (f.w * motor.L_q + slip * motor.L_d) * x.i.q();
-        f.correct(context, dv_d);
-        Estimate::new(f.theta, f.speed(), sample)
+        *w += (1.0 - pole(par.matsui.filter, T_s)) * (w_cal - *w);
+        x.v.d() - motor.R_s * x.i.d() - motor.L_d * p_i.d() + (*w * motor.L_q + slip * motor.L_d) * x.i.q()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator::follower::Follower;
     use crate::estimator::testing::{comes_to_the_rotor, with_L_q};
 
     #[test]
     fn comes_to_the_rotor_without_bias() {
-        comes_to_the_rotor::<VoltageModel>(47.0);
+        comes_to_the_rotor::<Follower<VoltageModel>>(47.0);
     }
 
     #[test]
     fn a_wrong_l_q_turns_it() {
-        let (more, less) = (with_L_q::<VoltageModel>(1.2), with_L_q::<VoltageModel>(0.8));
+        let (more, less) = (with_L_q::<Follower<VoltageModel>>(1.2), with_L_q::<Follower<VoltageModel>>(0.8));
         assert!((more - 5.5).abs() < 0.3 && (less + 5.9).abs() < 0.3, "{more} {less} deg");
     }
 }
