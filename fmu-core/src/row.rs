@@ -12,7 +12,6 @@ use crate::integer::Getter;
 use crate::need::Need;
 use crate::reals::{Inputs, Interval};
 use crate::token::Hash;
-use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
 pub(crate) use settings::demand;
 pub use slot::Slot;
@@ -161,19 +160,13 @@ pub struct Row<W: 'static> {
 }
 
 impl<W: 'static> Row<W> {
-    pub(crate) const fn new(
-        name: &'static str,
-        description: &'static str,
-        causality: Causality,
-        variability: Variability,
-        kind: Kind,
-        access: Access<W>,
-    ) -> Self {
+    /// A fixed local variable; [`with`](Self::with) makes it another.
+    pub(crate) const fn new(name: &'static str, description: &'static str, kind: Kind, access: Access<W>) -> Self {
         let meta = Meta {
             name,
             description,
-            causality,
-            variability,
+            causality: Causality::Local,
+            variability: Variability::Fixed,
             kind,
             range: Range::ALL,
             nominal: None,
@@ -186,98 +179,14 @@ impl<W: 'static> Row<W> {
         Self { settable: Interval::of(&meta), meta, access }
     }
 
+    pub(crate) const fn with(mut self, causality: Causality, variability: Variability) -> Self {
+        (self.meta.causality, self.meta.variability) = (causality, variability);
+        self.settable = Interval::of(&self.meta);
+        self
+    }
+
     /// What the row says about its variable.
     pub(crate) const fn meta(&self) -> &Meta {
         &self.meta
-    }
-
-    const fn real(
-        (causality, variability): (Causality, Variability),
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::new(name, description, causality, variability, Kind::Real(quantity), Access::Real(get))
-    }
-
-    /// A continuous real input.
-    pub const fn input(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Input, Variability::Continuous), name, quantity, description, get)
-    }
-
-    /// A real input that changes at sample instants.
-    pub const fn discrete_input(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Input, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A continuous real output, calculated from the start on.
-    pub const fn output(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Output, Variability::Continuous), name, quantity, description, get)
-    }
-
-    /// A continuous real variable other than an output: a state that importers may read.
-    pub const fn state(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Local, Variability::Continuous), name, quantity, description, get)
-    }
-
-    /// A real output that changes at sample instants.
-    pub const fn discrete_output(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Output, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A real variable other than an output, which changes at sample instants.
-    pub const fn discrete_local(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Local, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A real parameter, fixed after initialization.
-    pub const fn parameter(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Parameter, Variability::Fixed), name, quantity, description, get)
-    }
-
-    /// A parameter computed by the model's `derive`, constant during the simulation.
-    pub const fn calculated(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::CalculatedParameter, Variability::Fixed), name, quantity, description, get)
     }
 }

@@ -7,7 +7,7 @@ use crate::fault::Fault;
 use crate::reals::Inputs;
 use crate::row::{Access, Node, Row, Slot, demand};
 use crate::token::Hash;
-use crate::variable::{Causality, Kind, Meta, Variability};
+use crate::variable::{Kind, Meta};
 use std::fmt::Display;
 use std::mem::MaybeUninit;
 use std::ptr;
@@ -49,7 +49,7 @@ impl<W: 'static> Row<W> {
     /// All variables of a part, under a prefix that ends with a dot (or none).
     pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
         let access = Access::Part { len: part.table.len(), hash: part.table.hash(), node: part };
-        Self::new(prefix, "", Causality::Local, Variability::Fixed, Kind::Boolean, access)
+        Self::new(prefix, "", Kind::Boolean, access)
     }
 }
 
