@@ -85,11 +85,7 @@ impl Event {
 impl Instance<'_> {
     /// One update of the discrete states.
     pub(super) fn update(&self) -> Result<(Status, UpdateResults), NotDetermined> {
-        let name = if self.session.description.version == FmiVersion::V2 {
-            "NewDiscreteStates"
-        } else {
-            "UpdateDiscreteStates"
-        };
+        let name = if self.session.is_v2() { "NewDiscreteStates" } else { "UpdateDiscreteStates" };
         self.call_for(name, |raw| raw.update_discrete_states(self.handle, false))
     }
 

@@ -132,16 +132,12 @@ impl Instance<'_> {
     /// Enters initialization mode.
     pub(super) fn enter(&self) -> Result<(), NotDetermined> {
         let (start, stop) = (self.start.get(), self.stop.get());
-        let name = if self.session.description.version == FmiVersion::V2 {
-            "SetupExperiment"
-        } else {
-            "EnterInitializationMode"
-        };
+        let name = if self.session.is_v2() { "SetupExperiment" } else { "EnterInitializationMode" };
         let status = self.call(&format!("{name}(startTime={start}, stopTime={stop:?})"), |raw| {
             raw.experiment(self.handle, None, start, stop)
         })?;
         self.must(name, status)?;
-        if self.session.description.version == FmiVersion::V2 {
+        if self.session.is_v2() {
             self.perform(Simple::EnterInitializationMode)?;
         }
         Ok(())
@@ -184,7 +180,7 @@ impl Instance<'_> {
     pub(super) fn step_with(&self, t: f64, h: f64, no_prior: bool) -> Result<Status, NotDetermined> {
         let mark = if no_prior { ", noSetFMUStatePriorToCurrentPoint=true" } else { "" };
         let call = if self.session.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?}{mark})") };
-        let v2 = self.session.description.version == FmiVersion::V2;
+        let v2 = self.session.is_v2();
         let status = self.call(&call, |raw| {
             let (status, stepped) = raw.do_step(self.handle, t, h, no_prior, [true; 4])?;
             // fmi2Terminated is 3.

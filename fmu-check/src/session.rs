@@ -394,6 +394,11 @@ impl Session {
         self.description.default_experiment.tolerance.filter(|t| t.is_finite()).unwrap_or(0.0).max(1e-6)
     }
 
+    /// The FMU is one of FMI 2.0.
+    pub(super) fn is_v2(&self) -> bool {
+        self.description.version == FmiVersion::V2
+    }
+
     /// Start time of the default experiment.
     pub(super) fn start(&self) -> f64 {
         self.description.default_experiment.start.filter(|t| t.is_finite()).unwrap_or(0.0)

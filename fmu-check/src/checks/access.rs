@@ -86,7 +86,7 @@ fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
 }
 
 fn start_values(session: &Session) -> Result<(), NotDetermined> {
-    let v2 = session.description.version == FmiVersion::V2;
+    let v2 = session.is_v2();
     let instance = if v2 { session.initializing()? } else { session.fresh()? };
     let mut compared = 0;
     for v in session.numeric().filter(|v| v.start.is_some() && v.clocks.is_empty()) {

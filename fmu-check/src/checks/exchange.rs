@@ -9,7 +9,7 @@ use crate::session::{NotDetermined, Session};
 use crate::states::{Life, State};
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
-use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
+use model_description::{BaseType, Causality, ModelVariable, Variability};
 
 const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2";
 
@@ -108,7 +108,7 @@ fn refused(session: &Session) -> Result<(), NotDetermined> {
 fn counts(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.exchange(State::Event)?;
     let (states, indicators) = (session.states(), session.indicators());
-    if session.description.version == FmiVersion::V3 {
+    if !session.is_v2() {
         let counts = [(Count::GetNumberOfContinuousStates, states), (Count::GetNumberOfEventIndicators, indicators)];
         for (name, expected) in counts {
             let (status, found) = instance.call_for(name.as_str(), |raw| raw.count(name, instance.handle, false))?;

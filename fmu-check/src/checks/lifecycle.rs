@@ -8,7 +8,7 @@ use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
 use crate::states::{Life, State::Error, State::Step};
 use fmu_import::raw::{Handle, Interface, Simple};
-use model_description::{Causality, FmiVersion};
+use model_description::Causality;
 use std::ffi::CString;
 
 const STATES: &str = "2.0.5, 4.2.4; 3.0.2, 4.2";
@@ -149,7 +149,7 @@ fn short_run(
 }
 
 fn without_logger(session: &Session) -> Result<(), NotDetermined> {
-    let v2 = session.description.version == FmiVersion::V2;
+    let v2 = session.is_v2();
     session.case(|| {
         let mut arguments = session.arguments("probe");
         arguments.logger = false;
@@ -180,7 +180,7 @@ fn without_resources(session: &Session) -> Result<(), NotDetermined> {
     if session.has_resources() {
         return session.not_applicable("the archive has resources");
     }
-    let v2 = session.description.version == FmiVersion::V2;
+    let v2 = session.is_v2();
     let odd = if v2 { "file:/no%20such/pl%C3%A4ce#1" } else { "/no such/pl\u{e4}ce #1/" };
     session.cases(
         [("a NULL resource path", None), ("a resource path that does not exist", Some(odd))],
@@ -202,7 +202,7 @@ fn callbacks(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn interfaces(session: &Session) -> Result<(), NotDetermined> {
-    let v3 = session.description.version == FmiVersion::V3;
+    let v3 = !session.is_v2();
     let mut cases = Vec::new();
     if session.description.model_exchange.is_none() {
         cases.push(("model exchange", Interface::ModelExchange, false));

@@ -4,7 +4,6 @@ use crate::check::{Check, Level, Levels, Run};
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::{LogCall, allocations, take_events};
-use model_description::FmiVersion;
 use std::ffi::CString;
 
 const LOG: &str = "2.0.5, 2.1.5; 3.0.2, 2.3.1";
@@ -131,7 +130,7 @@ fn identity(session: &Session) -> Result<(), NotDetermined> {
     let (events, environment, name) = log_of_a_run(session, true)?;
     for event in &events {
         session.require(event.environment == environment, || format!("{} has another environment", show(event)));
-        if session.description.version == FmiVersion::V2 {
+        if session.is_v2() {
             let logged_name = event.instance.as_deref();
             session.require(logged_name == Some(&name), || {
                 format!("{} has the instance name {logged_name:?}, expected {name:?}", show(event))

@@ -6,7 +6,7 @@ use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::{Sensitivity, SensitivityArguments};
-use model_description::{BaseType, Causality, FmiVersion, Interface, ModelVariable, Variability};
+use model_description::{BaseType, Causality, Interface, ModelVariable, Variability};
 
 const DIRECTIONAL: &str = "2.0.5, 2.1.9; 3.0.2, 2.2.12.1";
 
@@ -189,7 +189,7 @@ fn wrong_arguments(session: &Session) -> Result<(), NotDetermined> {
     let all = Variables::of(session);
     let (unknown, known) = (all.unknowns[0].value_reference, all.knowns()[0].value_reference);
     let none = u32::MAX;
-    let v3 = session.description.version == FmiVersion::V3;
+    let v3 = !session.is_v2();
     let mut cases = vec![
         ("an unknown that does not exist", none, known, 1, 1),
         ("a known that does not exist", unknown, none, 1, 1),
