@@ -149,6 +149,12 @@ impl Instance<'_> {
         if self.event_mode { self.events() } else { Ok(()) }
     }
 
+    /// Enters initialization mode and leaves it.
+    pub(super) fn initialize(&self) -> Result<(), NotDetermined> {
+        self.enter()?;
+        self.exit()
+    }
+
     /// Passes through event mode to step mode.
     fn events(&self) -> Result<(), NotDetermined> {
         for _ in 0..100 {

@@ -49,8 +49,7 @@ impl Session {
             Life::ModelExchange => self.exchange(state),
             Life::EventMode => self.prepare(|| {
                 let instance = self.made(&Arguments { event_mode: true, ..self.arguments("probe") })?;
-                instance.enter()?;
-                instance.exit()?;
+                instance.initialize()?;
                 if state == Event {
                     instance.perform(Simple::EnterEventMode)?;
                 }

@@ -51,8 +51,7 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
             session.violated(format!("instance {} could not be created beside {k} others", k + 2));
             return Ok(());
         };
-        instance.enter()?;
-        instance.exit()?;
+        instance.initialize()?;
         all.push((instance, Vec::new()));
     }
     for k in 0..20 {
@@ -181,8 +180,7 @@ fn leaks(session: &Session) -> Result<(), NotDetermined> {
                 let Some(instance) = session.instantiate(&session.arguments("probe"))? else {
                     return Err(NotDetermined("no instance".into()));
                 };
-                instance.enter()?;
-                instance.exit()?;
+                instance.initialize()?;
                 instance.steps(2, session.h())?;
                 instance.free()?;
                 if session.half_time_used() {

@@ -7,7 +7,7 @@ use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
 use crate::states::{Life, State::Error, State::Step};
-use fmu_import::raw::{Handle, Interface, Simple};
+use fmu_import::raw::{Arguments, Handle, Interface, Simple};
 use model_description::Causality;
 use std::ffi::CString;
 
@@ -126,18 +126,12 @@ fn null_arguments(session: &Session) -> Result<(), NotDetermined> {
 }
 
 /// Instantiates with the arguments, initializes, makes two steps and an invalid one.
-fn short_run(
-    session: &Session,
-    arguments: &fmu_import::raw::Arguments,
-    what: &str,
-    level: Level,
-) -> Result<(), NotDetermined> {
+fn short_run(session: &Session, arguments: &Arguments, what: &str, level: Level) -> Result<(), NotDetermined> {
     let Some(instance) = session.instantiate(arguments)? else {
         session.lesser(level, format!("{} with {what} returned NULL", session.instantiation()));
         return Ok(());
     };
-    instance.enter()?;
-    instance.exit()?;
+    instance.initialize()?;
     instance.steps(2, session.h())?;
     // A call that no importer may make, to provoke a message.
     session.lenient(Level::Hard, || {
@@ -151,21 +145,18 @@ fn short_run(
 fn without_logger(session: &Session) -> Result<(), NotDetermined> {
     let v2 = session.is_v2();
     session.case(|| {
-        let mut arguments = session.arguments("probe");
-        arguments.logger = false;
+        let arguments = Arguments { logger: false, ..session.arguments("probe") };
         short_run(session, &arguments, "a NULL log callback", Level::Must)
     });
     // FMI 3.0.2 leaves open what happens if logging is switched on nevertheless.
     session.case(|| {
-        let mut arguments = session.arguments("probe");
-        (arguments.logger, arguments.logging) = (false, true);
+        let arguments = Arguments { logger: false, logging: true, ..session.arguments("probe") };
         session
             .lenient(Level::Hard, || short_run(session, &arguments, "a NULL log callback and loggingOn", Level::Hard))
     });
     if v2 {
         session.case(|| {
-            let mut arguments = session.arguments("probe");
-            (arguments.callbacks, arguments.logging) = (false, true);
+            let arguments = Arguments { callbacks: false, logging: true, ..session.arguments("probe") };
             // The standard does not allow NULL here, so the FMU may return NULL.
             if let Some(instance) = session.instantiate(&arguments)? {
                 instance.free()?;
@@ -193,8 +184,7 @@ fn without_resources(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn callbacks(session: &Session) -> Result<(), NotDetermined> {
-    let mut arguments = session.arguments("probe");
-    (arguments.lasting, arguments.logging) = (false, true);
+    let arguments = Arguments { lasting: false, logging: true, ..session.arguments("probe") };
     short_run(session, &arguments, "valid arguments", Level::Must)?;
     let late = fmu_import::raw::take_events().iter().filter(|e| e.late).count();
     session.require(late == 0, || format!("{late} messages used the struct after fmi2Instantiate had returned"));
@@ -214,8 +204,7 @@ fn interfaces(session: &Session) -> Result<(), NotDetermined> {
         cases.push(("eventModeUsed = true", Interface::CoSimulation, true));
     }
     session.cases(cases, |(what, interface, event_mode)| {
-        let mut arguments = session.arguments("probe");
-        (arguments.interface, arguments.event_mode) = (interface, event_mode);
+        let arguments = Arguments { interface, event_mode, ..session.arguments("probe") };
         let created = session.instantiate(&arguments)?;
         session.require(created.is_none(), || format!("an instantiation for {what} created an instance"));
         Ok(())
@@ -239,8 +228,7 @@ fn free(session: &Session) -> Result<(), NotDetermined> {
 
 fn reset(session: &Session) -> Result<(), NotDetermined> {
     let run = |instance: &Instance<'_>| {
-        instance.enter()?;
-        instance.exit()?;
+        instance.initialize()?;
         instance.run(20, session.h())
     };
     let first = run(&session.fresh()?)?;
@@ -298,7 +286,7 @@ fn recovery(session: &Session) -> Result<(), NotDetermined> {
         return Ok(());
     }
     instance.experiment(session.start(), None);
-    if let Err(why) = instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(5, session.h())) {
+    if let Err(why) = instance.initialize().and_then(|()| instance.steps(5, session.h())) {
         session.failed(&format!("after {how} had returned Error and Reset had succeeded"), why);
     }
     Ok(())
@@ -326,8 +314,7 @@ fn past_stop_time(session: &Session) -> Result<(), NotDetermined> {
     let (h, start) = (session.h(), session.start());
     let instance = session.fresh()?;
     instance.experiment(start, Some(start + 4.0 * h));
-    instance.enter()?;
-    instance.exit()?;
+    instance.initialize()?;
     instance.steps(3, h)?;
     let ended = || NotDetermined(format!("{ENDED} before the stop time"));
     // Rounding may make the last step end slightly late.

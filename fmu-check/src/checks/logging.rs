@@ -3,7 +3,7 @@
 use crate::check::{Check, Level, Levels, Run};
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
-use fmu_import::raw::{LogCall, allocations, take_events};
+use fmu_import::raw::{Arguments, LogCall, allocations, take_events};
 use std::ffi::CString;
 
 const LOG: &str = "2.0.5, 2.1.5; 3.0.2, 2.3.1";
@@ -45,8 +45,7 @@ fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<LogCall>, usize
     let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
     // The FMU keeps its own copy of the name.
     drop(arguments);
-    instance.enter()?;
-    instance.exit()?;
+    instance.initialize()?;
     instance.steps(5, session.h())?;
     if let Err(NotDetermined(why)) = instance.provoke() {
         session.note(why);
@@ -100,11 +99,9 @@ fn unknown(session: &Session) -> Result<(), NotDetermined> {
 
 fn errors(session: &Session) -> Result<(), NotDetermined> {
     let _ = take_events();
-    let mut arguments = session.arguments("probe");
-    arguments.logging = true;
+    let arguments = Arguments { logging: true, ..session.arguments("probe") };
     let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
-    instance.enter()?;
-    instance.exit()?;
+    instance.initialize()?;
     instance.steps(2, session.h())?;
     let _ = take_events();
     let how = instance.provoke()?;
@@ -156,14 +153,12 @@ fn memory(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable("canNotUseMemoryManagementFunctions is false");
     }
     session.cases([true, false], |given| {
-        let mut arguments = session.arguments("probe");
-        arguments.memory = given;
+        let arguments = Arguments { memory: given, ..session.arguments("probe") };
         let Some(instance) = session.instantiate(&arguments)? else {
             session.violated("fmi2Instantiate with NULL memory functions returned NULL");
             return Ok(());
         };
-        instance.enter()?;
-        instance.exit()?;
+        instance.initialize()?;
         instance.steps(5, session.h())?;
         instance.free()?;
         let used = allocations();

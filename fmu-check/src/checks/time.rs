@@ -76,7 +76,7 @@ fn start_times(session: &Session) -> Result<(), NotDetermined> {
     session.cases([0.0, -1.0, 1000.0, 1e6], |start| {
         let instance = session.fresh()?;
         instance.experiment(start, None);
-        let life = instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(20, session.h()));
+        let life = instance.initialize().and_then(|()| instance.steps(20, session.h()));
         if let Err(why) = life {
             session.failed(&format!("startTime={start}"), why);
         }
