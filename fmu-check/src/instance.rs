@@ -248,6 +248,12 @@ impl Instance<'_> {
         variables.iter().map(read).collect()
     }
 
+    /// The values of scalars of the type Float64; NaN for those that cannot be read.
+    pub(super) fn numbers(&self, variables: &[&ModelVariable]) -> Result<Vec<f64>, NotDetermined> {
+        let all = self.snapshot(variables)?;
+        Ok(all.iter().map(|bits| bits.first().map_or(f64::NAN, |b| f64::from_bits(*b))).collect())
+    }
+
     /// Steps `n` times with held inputs and returns all watched variables after each step.
     pub(super) fn run(&self, n: usize, h: f64) -> Result<Vec<Vec<Vec<u64>>>, NotDetermined> {
         let watched = self.session.watched();

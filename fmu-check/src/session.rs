@@ -158,9 +158,9 @@ impl Session {
         })
     }
 
-    /// Loads the FMU once more, for another thread.
-    pub(super) fn duplicate(&self, number: usize) -> Result<Self, NotDetermined> {
-        let raw = Raw::open(&self.binary, self.description.version).map_err(NotDetermined)?;
+    /// Loads the FMU once more, from this copy of its binary: for another thread, or under another path.
+    pub(super) fn duplicate(&self, binary: &Path, number: usize) -> Result<Self, NotDetermined> {
+        let raw = Raw::open(binary, self.description.version).map_err(NotDetermined)?;
         self.duplicate_with(raw, number)
     }
 
@@ -197,11 +197,6 @@ impl Session {
             calls: self.calls.clone(),
             timeout: self.timeout,
         })
-    }
-
-    /// Passes another unpacked folder to all further instances.
-    pub(super) fn move_to(&mut self, dir: &Path) {
-        dir.clone_into(&mut self.dir);
     }
 
     /// Where the FMU's resources are, if it has any.

@@ -4,7 +4,7 @@ use super::derivatives::{input_derivatives, output_derivatives, slopes};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
-use crate::trajectory::difference;
+use crate::trajectory::{difference, trajectory};
 use fmu_import::Status;
 use fmu_import::raw::StepStatus;
 use model_description::{BaseType, Causality, CoSimulation};
@@ -309,16 +309,7 @@ fn statuses(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn determinism(session: &Session) -> Result<(), NotDetermined> {
-    let run = || {
-        let instance = session.stepping()?;
-        (0..30)
-            .map(|k| {
-                instance.change_inputs(k)?;
-                instance.steps(1, session.h())?;
-                instance.snapshot(&session.watched())
-            })
-            .collect::<Result<Vec<_>, _>>()
-    };
+    let run = || trajectory(&session.stepping()?, 30);
     let (first, second) = (run()?, run()?);
     session.compare("the second run", &first, &second);
     Ok(())
@@ -326,15 +317,10 @@ fn determinism(session: &Session) -> Result<(), NotDetermined> {
 
 /// Notes a hash of all outputs, which the parent process compares.
 fn two_processes(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.stepping()?;
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    for k in 0..30 {
-        instance.change_inputs(k)?;
-        instance.steps(1, session.h())?;
-        for bits in instance.snapshot(&session.watched())?.into_iter().flatten() {
-            hash = bits.to_le_bytes().iter().fold(hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3));
-        }
-    }
+    let values = trajectory(&session.stepping()?, 30)?.into_iter().flatten().flatten();
+    let hash = values
+        .flat_map(u64::to_le_bytes)
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
     session.note(format!("30 steps, all outputs hashed: {hash:016x}"));
     Ok(())
 }

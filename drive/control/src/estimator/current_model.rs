@@ -14,15 +14,18 @@
 
 use crate::estimator::Context;
 use crate::estimator::emf::pole;
-use crate::estimator::follower::Rows;
+use crate::estimator::follower::{Follower, Rows};
 use crate::estimator::interval::Interval;
 use serde::{Deserialize, Serialize};
 
-/// The model's rows; its state is that of the [`Follower`](crate::estimator::follower::Follower).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct CurrentModel;
+/// The model as an estimator.
+pub type CurrentModel = Follower<CurrentRows>;
 
-impl Rows for CurrentModel {
+/// The rows of the model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CurrentRows;
+
+impl Rows for CurrentRows {
     #[inline]
     fn rows(w: &mut f64, context: &Context, x: &Interval, slip: f64) -> f64 {
         let Context { motor, par, T_s, .. } = *context;
@@ -38,17 +41,16 @@ impl Rows for CurrentModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimator::follower::Follower;
     use crate::estimator::testing::{comes_to_the_rotor, with_L_q};
 
     #[test]
     fn comes_to_the_rotor_without_bias() {
-        comes_to_the_rotor::<Follower<CurrentModel>>(47.0);
+        comes_to_the_rotor::<CurrentModel>(47.0);
     }
 
     #[test]
     fn a_wrong_l_q_turns_it() {
-        let (more, less) = (with_L_q::<Follower<CurrentModel>>(1.2), with_L_q::<Follower<CurrentModel>>(0.8));
+        let (more, less) = (with_L_q::<CurrentModel>(1.2), with_L_q::<CurrentModel>(0.8));
         assert!((more - 5.5).abs() < 0.3 && (less + 5.9).abs() < 0.3, "{more} {less} deg");
     }
 }

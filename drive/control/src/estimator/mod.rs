@@ -312,9 +312,9 @@ estimators! {
         "State observer of the back EMF, Kim & Sul 2011, eq (14) and (15)";
     4 ExtendedEmf(extended_emf::ExtendedEmf): BackEmf, standstill false,
         "State observer of the extended EMF, Kim & Sul 2011, eq (16) to (23)";
-    5 VoltageModel(follower::Follower<voltage_model::VoltageModel>): BackEmf, standstill false,
+    5 VoltageModel(voltage_model::VoltageModel): BackEmf, standstill false,
         "Voltage model, Kim & Sul 2011, eq (24) to (27)";
-    6 CurrentModel(follower::Follower<current_model::CurrentModel>): BackEmf, standstill false,
+    6 CurrentModel(current_model::CurrentModel): BackEmf, standstill false,
         "Current model, Kim & Sul 2011, eq (28) to (30)";
     7 VoltageFeedback(voltage_feedback::VoltageFeedback): BackEmf, standstill false,
         "Feedback of the current controller's d-axis voltage, Kim & Sul 2011, eq (31) and (32)";

@@ -11,15 +11,18 @@
 
 use crate::estimator::Context;
 use crate::estimator::emf::pole;
-use crate::estimator::follower::Rows;
+use crate::estimator::follower::{Follower, Rows};
 use crate::estimator::interval::Interval;
 use serde::{Deserialize, Serialize};
 
-/// The model's rows; its state is that of the [`Follower`](crate::estimator::follower::Follower).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct VoltageModel;
+/// The model as an estimator.
+pub type VoltageModel = Follower<VoltageRows>;
 
-impl Rows for VoltageModel {
+/// The rows of the model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct VoltageRows;
+
+impl Rows for VoltageRows {
     #[inline]
     fn rows(w: &mut f64, context: &Context, x: &Interval, slip: f64) -> f64 {
         let Context { motor, par, T_s, .. } = *context;
@@ -34,17 +37,16 @@ impl Rows for VoltageModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimator::follower::Follower;
     use crate::estimator::testing::{comes_to_the_rotor, with_L_q};
 
     #[test]
     fn comes_to_the_rotor_without_bias() {
-        comes_to_the_rotor::<Follower<VoltageModel>>(47.0);
+        comes_to_the_rotor::<VoltageModel>(47.0);
     }
 
     #[test]
     fn a_wrong_l_q_turns_it() {
-        let (more, less) = (with_L_q::<Follower<VoltageModel>>(1.2), with_L_q::<Follower<VoltageModel>>(0.8));
+        let (more, less) = (with_L_q::<VoltageModel>(1.2), with_L_q::<VoltageModel>(0.8));
         assert!((more - 5.5).abs() < 0.3 && (less + 5.9).abs() < 0.3, "{more} {less} deg");
     }
 }
