@@ -78,7 +78,7 @@
 //! [`CompletedSteps`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
 //! and a [`preset`] is one of them.
 //!
-//! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`table`], [`terminal`], [`model`],
+//! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`terminal`], [`model`],
 //! [`continuous`], [`events`], [`capability`], [`description`]. No motor, no XML, no C, no `unsafe`.
 
 #![forbid(unsafe_code)]
