@@ -62,10 +62,7 @@ pub fn drive(kind: Kind) -> Pair {
         par.estimators.tracker.bandwidth = TAU * 60.0;
         par.estimators.adaptation.bandwidth = 5.0;
     }
-    if kind == Kind::GradientObserver {
-        par.estimators.tracker.bandwidth = TAU * 40.0;
-    }
-    if kind == Kind::Hybrid {
+    if matches!(kind, Kind::GradientObserver | Kind::Hybrid) {
         par.estimators.tracker.bandwidth = TAU * 40.0;
     }
     if matches!(kind, Kind::SquareWaveInjection | Kind::NearPwmInjection) {

@@ -18,7 +18,7 @@ use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
     Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns,
-    integrate,
+    integrate, table,
 };
 use serde::{Deserialize, Serialize};
 
@@ -307,28 +307,22 @@ impl Warns for SensorlessController {
 
 type V = Row<Block<SensorlessController>>;
 
-const TABLE: &Table<Block<SensorlessController>> = &Table::new(
-    const {
-        &[
-            V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
-            V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
-                .read_with("speed_loop.torque_mode", "true"),
-            V::boolean_input(
-                "enable",
-                "The controller runs; false: it commands 0 V, and starts anew when set to true",
-                |m| &mut m.model.inputs.enable,
-            )
-            .optional(),
-            V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
-            V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
-            V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
-            V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
-            V::input("theta_meas", &RADIAN, "Electrical rotor angle of a sensor", |m| &mut m.model.inputs.theta_meas)
-                .read_with("estimator", "Sensored"),
-            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
-                .read_with("estimator", "Sensored"),
-            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-        ]
-    },
-);
+const TABLE: &Table<Block<SensorlessController>> = table![
+    V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
+    V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
+        .read_with("speed_loop.torque_mode", "true"),
+    V::boolean_input("enable", "The controller runs; false: it commands 0 V, and starts anew when set to true", |m| {
+        &mut m.model.inputs.enable
+    })
+    .optional(),
+    V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
+    V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
+    V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
+    V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+    V::input("theta_meas", &RADIAN, "Electrical rotor angle of a sensor", |m| &mut m.model.inputs.theta_meas)
+        .read_with("estimator", "Sensored"),
+    V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
+        .read_with("estimator", "Sensored"),
+    V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+    V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+];

@@ -13,7 +13,7 @@
 use crate::start::RAD_PER_S2;
 use drive_base::math::{at_least, at_most};
 use fmu_core::unit::{ONE, RAD_PER_S};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the speed loop.
@@ -122,35 +122,24 @@ impl SpeedController {
 type P = Row<SpeedLoop>;
 
 /// Variables of the speed loop; their owner supplies the prefix `speed_loop.`.
-pub const SPEED_LOOP: &Table<SpeedLoop> = &Table::new(
-    const {
-        &[
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the speed loop", |p| &mut p.bandwidth)
-                .above(0.0)
-                .tunable(),
-            P::parameter("t_is", &ONE, "Integral time constant in units of 1/bandwidth", |p| &mut p.t_is)
-                .above(0.0)
-                .tunable(),
-            P::parameter("b", &ONE, "Set-point weight of the proportional part", |p| &mut p.b)
-                .at_least(0.0)
-                .at_most(1.0)
-                .tunable(),
-            P::parameter(
-                "ramp",
-                &RAD_PER_S2,
-                "Maximum rate of change of the mechanical speed reference; 0: no ramp",
-                |p| &mut p.ramp,
-            )
-            .at_least(0.0)
-            .tunable(),
-            P::boolean_parameter(
-                "torque_mode",
-                "Torque control by tau_ref within the limits, speed_ref ignored; false: speed control",
-                |p| &mut p.torque_mode,
-            ),
-        ]
-    },
-);
+pub const SPEED_LOOP: &Table<SpeedLoop> = table![
+    P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the speed loop", |p| &mut p.bandwidth).above(0.0).tunable(),
+    P::parameter("t_is", &ONE, "Integral time constant in units of 1/bandwidth", |p| &mut p.t_is).above(0.0).tunable(),
+    P::parameter("b", &ONE, "Set-point weight of the proportional part", |p| &mut p.b)
+        .at_least(0.0)
+        .at_most(1.0)
+        .tunable(),
+    P::parameter("ramp", &RAD_PER_S2, "Maximum rate of change of the mechanical speed reference; 0: no ramp", |p| {
+        &mut p.ramp
+    })
+    .at_least(0.0)
+    .tunable(),
+    P::boolean_parameter(
+        "torque_mode",
+        "Torque control by tau_ref within the limits, speed_ref ignored; false: speed control",
+        |p| &mut p.torque_mode,
+    ),
+];
 
 #[cfg(test)]
 mod tests {

@@ -22,7 +22,7 @@ use crate::tables::{ControllerParameters, PARAMETERS};
 use crate::tracking::LeastTracker;
 use drive_base::frame::DqHat;
 use fmu_core::unit::{ONE, RAD_PER_S};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
@@ -316,36 +316,32 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
 type P = Row<WeakeningParameters>;
 
 /// Variables of field weakening; their owner supplies the prefix `weakening.`.
-pub const WEAKENING: &Table<WeakeningParameters> = &Table::new(
-    const {
-        &[
-            P::boolean_parameter(
-                "use",
-                "Field weakening: i_d and the torque limits follow the voltage of u_dc, injection methods refuse it; false: no i_d beyond current.mtpa",
-                |p| &mut p.used,
-            ),
-            P::parameter(
-                "k_u",
-                &ONE,
-                "Share of u_dc / sqrt(3) that field weakening uses in steady state; the rest is for changes",
-                |p| &mut p.k_u,
-            )
-            .at_least(0.5)
-            .at_most(1.0),
-            P::parameter(
-                "k_t",
-                &ONE,
-                "Share of u_dc / sqrt(3) above which the trim reduces the voltage of field weakening; at least k_u",
-                |p| &mut p.k_t,
-            )
-            .at_least(0.5)
-            .at_most(1.1),
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the trim; 0: no trim", |p| &mut p.bandwidth)
-                .at_least(0.0)
-                .tunable(),
-        ]
-    },
-);
+pub const WEAKENING: &Table<WeakeningParameters> = table![
+    P::boolean_parameter(
+        "use",
+        "Field weakening: i_d and the torque limits follow the voltage of u_dc, injection methods refuse it; false: no i_d beyond current.mtpa",
+        |p| &mut p.used,
+    ),
+    P::parameter(
+        "k_u",
+        &ONE,
+        "Share of u_dc / sqrt(3) that field weakening uses in steady state; the rest is for changes",
+        |p| &mut p.k_u,
+    )
+    .at_least(0.5)
+    .at_most(1.0),
+    P::parameter(
+        "k_t",
+        &ONE,
+        "Share of u_dc / sqrt(3) above which the trim reduces the voltage of field weakening; at least k_u",
+        |p| &mut p.k_t,
+    )
+    .at_least(0.5)
+    .at_most(1.1),
+    P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the trim; 0: no trim", |p| &mut p.bandwidth)
+        .at_least(0.0)
+        .tunable(),
+];
 
 #[cfg(test)]
 mod tests {
