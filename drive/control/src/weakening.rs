@@ -32,12 +32,15 @@ const INVERSE_SQRT_3: f64 = 1.0 / SQRT_3;
 const LEAST_SHARE: f64 = 0.05;
 
 /// Greatest trim, as a share of u_dc / sqrt 3.
-const GREATEST_TRIM: f64 = 0.3;
+pub const GREATEST_TRIM: f64 = 0.3;
 
 /// Samples after which a limit that does not act is computed again, and the change of the voltage, as a share, after which
 /// both are.
 const EVERY: u64 = 8;
 const LEAST_CHANGE: f64 = 0.01;
+
+/// Passes after which the limits of a settled drive are exact, at most.
+const MOST_PASSES: usize = 6;
 
 /// Least electrical speed in rad/s that the limits are computed for.
 const LEAST_SPEED: f64 = 1e-3;
@@ -169,6 +172,30 @@ impl Weakening {
         self.near = true;
         let [motoring, generating] = self.limits_near(gains, speed.max(LEAST_SPEED), i, k);
         if w >= 0.0 { (generating, motoring) } else { (motoring, generating) }
+    }
+
+    /// The state of a drive that has settled at the electrical speed `w` (rad/s) on a DC link of `u_dc` (V) with this `trim`
+    /// (V), and its limits as of [`limits`](Self::limits): the iterations run to their end.
+    pub fn settled(
+        gains: &WeakeningGains,
+        par: &WeakeningParameters,
+        (w, u_dc): (f64, f64),
+        i: f64,
+        trim: f64,
+    ) -> (Self, (f64, f64)) {
+        let mut found = Self { trim, ..Self::default() };
+        let at = (w, u_dc, 0.0);
+        let mut limits = found.limits(gains, par, at, i, 0);
+        for _ in 0..MOST_PASSES {
+            let before = found.limits.map(|limit| limit.tau);
+            // One side in turn is computed again.
+            found.limits(gains, par, at, i, 0);
+            limits = found.limits(gains, par, at, i, EVERY / 2);
+            if found.limits.iter().zip(before).all(|(limit, before)| (limit.tau - before).abs() <= 1e-12 * before) {
+                break;
+            }
+        }
+        (found, limits)
     }
 
     /// The limits (A), motoring and generating, where the plain references may not fit; at most `i`.
