@@ -10,9 +10,10 @@ use drive_plant::losses::flow::Dissipation;
 use drive_plant::losses::{Losses, conduction, efficiency, switching};
 use drive_plant::machine;
 use drive_plant::power::Powers;
+use serde::{Deserialize, Serialize};
 
 /// Where a point lies among the limits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Region {
     /// The plain reference: maximum torque per ampere, i_d = 0 or the low-speed law.
     #[default]
@@ -38,7 +39,7 @@ impl Region {
 }
 
 /// A point in steady state.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Point {
     /// Torque reference of the controller in N.m, after its limits.
     pub tau_ref: f64,
