@@ -25,6 +25,7 @@ pub const DRIVE: &str = joined!(
 
 /// Documentation of [`PmsmDriveMean`](crate::PmsmDriveMean).
 pub const MEAN: &str = joined!(
+    include_str!("../docs/pmsm_drive.svg"),
     include_str!("../docs/pmsm_drive_mean.html"),
     ENVELOPE,
     include_str!("../docs/losses.html"),

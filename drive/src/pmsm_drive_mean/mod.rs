@@ -50,8 +50,9 @@ pub struct PmsmDriveMean {
     network: Temperatures,
     /// Means over the last step.
     powers: Powers,
-    /// The point at its end.
+    /// The point at its end, and what it answers; `None` after a parameter has changed.
     point: Point,
+    asked: Option<Question>,
     /// A step has been taken.
     moved: bool,
 }
@@ -68,6 +69,7 @@ impl Default for PmsmDriveMean {
             network,
             powers: Powers::default(),
             point: Point::default(),
+            asked: None,
             moved: false,
         }
     }
@@ -87,6 +89,9 @@ struct State {
     /// Mechanical angle in rad, not wrapped.
     angle: f64,
 }
+
+/// What decides on a point: the condition, the torque in N.m, and whether the drive is enabled.
+type Question = (Condition, f64, bool);
 
 /// Outputs: those of `PmsmDrive`, and the flux linkage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -120,8 +125,16 @@ impl PmsmDriveMean {
         Condition { speed: self.speed(state), u_dc: self.inputs.u_dc, temperatures: at }
     }
 
-    /// The point in this state at the temperatures `at` (K).
+    /// What decides on the point in this state at the temperatures `at` (K).
+    fn question(&self, state: &State, at: Temperatures) -> Question {
+        (self.condition(state, at), state.tau, self.inputs.enable)
+    }
+
+    /// The point in this state at the temperatures `at` (K); that of the last step's end is known.
     fn point_at(&self, state: &State, at: Temperatures) -> Point {
+        if Some(self.question(state, at)) == self.asked {
+            return self.point;
+        }
         let at = self.drive.at(&self.condition(state, at));
         if self.inputs.enable { at.by_reference(state.tau) } else { at.off() }
     }
@@ -186,6 +199,7 @@ impl Model for PmsmDriveMean {
 
     fn derive(&mut self) {
         self.drive.derive();
+        self.asked = None;
     }
 
     fn validate(&self) -> Result<(), Fault> {
@@ -206,7 +220,9 @@ impl Model for PmsmDriveMean {
         };
         self.state = State { speed, angle, speed_ref: controller.speed_est, ..State::default() };
         (self.energy, self.network, self.moved) = (Energy::default(), self.drive.start_temperatures(), false);
-        self.point = self.point_at(&self.state, self.temperatures());
+        let temperatures = self.temperatures();
+        self.point = self.point_at(&self.state, temperatures);
+        self.asked = Some(self.question(&self.state, temperatures));
         self.powers = self.powers_of(&self.point, speed);
     }
 
@@ -228,6 +244,7 @@ impl Model for PmsmDriveMean {
         let total = Energy::from(powers);
         self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
         (self.state, self.powers, self.point, self.moved) = (state, powers, point, true);
+        self.asked = Some(self.question(&state, temperatures));
         if thermal.mode == ThermalMode::Network {
             let (heat, coolant) = (thermal.heat(&powers.losses), self.inputs.thermal.coolant);
             let next = thermal.network.step(&self.network, &heat, coolant, step.h);

@@ -16,6 +16,7 @@
 //! A step with a greater error than [`SMALL`] is taken in parts. Powers are the trapezoid of both stages.
 
 use super::{PmsmDriveMean, State};
+use crate::pmsm_drive::DriveInputs;
 use crate::steady::{Point, Steady};
 use drive_base::math::exp;
 use drive_plant::power::Powers;
@@ -24,7 +25,7 @@ use fmu_core::{Dual, Fault};
 
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 
-/// Errors of torque and speed that a part of a step may have: of the greatest torque, and of the speed plus 1 rad/s.
+/// Errors that a part of a step may have: of torque and integral part over the greatest torque, of the speed over itself plus 1 rad/s.
 const SMALL: [f64; 2] = [2e-3, 1e-4];
 
 /// Shortest part in s, and most parts of a step.
@@ -58,8 +59,7 @@ impl PmsmDriveMean {
     pub(super) fn rates(&self, state: &State, at: Temperatures) -> Rates {
         let Steady { plant, controller, .. } = &self.drive;
         let condition = self.condition(state, at);
-        let drive = self.drive.at(&condition);
-        let speed = condition.speed;
+        let (speed, point) = (condition.speed, self.point_at(state, at));
         let accelerate = |point: &Point| {
             if plant.mechanics.imposed {
                 0.0
@@ -69,11 +69,9 @@ impl PmsmDriveMean {
         };
         let lag = controller.current.bandwidth;
         if !self.inputs.enable {
-            let (point, greatest) = (drive.off(), 0.0);
             let (tau, integral) = (-lag * state.tau, -lag * state.integral);
-            return Rates { tau, integral, speed: accelerate(&point), point, limited: true, greatest };
+            return Rates { tau, integral, speed: accelerate(&point), point, limited: true, greatest: 0.0 };
         }
-        let point = drive.by_reference(state.tau);
         let [low, high] = point.limits;
         let greatest = high.max(-low);
         let (wanted, integral, limited) = if controller.speed_loop.torque_mode {
@@ -94,6 +92,10 @@ impl PmsmDriveMean {
 
     /// A step of `h` (s) with the temperatures `at` (K).
     pub(super) fn pass(&self, h: f64, at: Temperatures) -> Result<Passed, Fault> {
+        let Steady { plant, controller, .. } = &self.drive;
+        if plant.mechanics.imposed && (controller.speed_loop.torque_mode || !self.inputs.enable) {
+            return Ok(self.pass_imposed(h, at));
+        }
         let (mut state, mut done, mut part, mut powers) = (self.state, 0.0, h, Powers::default());
         for _ in 0..MOST {
             let left = h - done;
@@ -108,15 +110,42 @@ impl PmsmDriveMean {
             state = next;
             powers = if ends && length >= h { mean } else { powers.with(mean, length / done) };
             if ends {
-                if self.drive.plant.mechanics.imposed {
-                    state.speed = self.inputs.speed_shaft;
-                    state.angle = self.inputs.angle_shaft + self.inputs.speed_shaft * h;
+                if plant.mechanics.imposed {
+                    state = self.on_the_shaft(state, h);
                 }
                 return Ok(Passed { point: self.point_at(&state, at), state, powers });
             }
             part = length * (0.9 / error.max(1e-3).sqrt()).clamp(0.5, 5.0);
         }
         Err(Fault::new(format!("a step of {h} s takes more than {MOST} parts: the coupling is unstable; shorten it")))
+    }
+
+    /// Torque in N.m after `h` (s) and its mean, from `start` (N.m) within these limits (N.m), with the held torque reference.
+    fn lagging(&self, start: f64, [low, high]: [f64; 2], h: f64) -> (f64, f64) {
+        let target = self.inputs.tau_ref.clamp(low, high);
+        let (x, off) = (h * self.drive.controller.current.bandwidth, start - target);
+        let decay = exp(-x);
+        (target + off * decay, target + off * (1.0 - decay) / x)
+    }
+
+    /// `state` after a step of `h` (s) with the imposed shaft.
+    fn on_the_shaft(&self, state: State, h: f64) -> State {
+        let DriveInputs { speed_shaft, angle_shaft, .. } = self.inputs;
+        State { speed: speed_shaft, angle: angle_shaft + speed_shaft * h, ..state }
+    }
+
+    /// A step of `h` (s) in torque mode, or without torque, on an imposed shaft: nothing is integrated.
+    fn pass_imposed(&self, h: f64, at: Temperatures) -> Passed {
+        let condition = self.condition(&self.state, at);
+        let drive = self.drive.at(&condition);
+        let enable = self.inputs.enable;
+        let limits = if enable { drive.limits() } else { [0.0; 2] };
+        let (tau, mean) = self.lagging(self.state.tau, limits, h);
+        let state = State { tau, integral: 0.0, speed_ref: self.inputs.speed_ref, ..self.state };
+        let point = if enable { drive.by_reference(tau) } else { drive.off() };
+        let settled = (mean - tau).abs() <= 1e-12 * limits[1];
+        let through = if settled || !enable { point } else { drive.by_reference(mean) };
+        Passed { state: self.on_the_shaft(state, h), powers: through.powers, point }
     }
 
     /// A part of a step, of `h` (s): the state after it, the mean powers, and the error in units of the allowed one.
@@ -132,22 +161,10 @@ impl PmsmDriveMean {
         }
         let mut end_tau = 0.0;
         if exact {
-            let [low, high] = if self.inputs.enable {
-                self.drive.settled().at(controller, self.speed(start), self.inputs.u_dc, 0.0).limits()
-            } else {
-                [0.0, 0.0]
-            };
-            let target = self.inputs.tau_ref.clamp(low, high);
-            let decay = exp(-h * lag);
-            let off = start.tau - target;
-            end_tau = target + off * decay;
-            y.tau = target + off * (1.0 - decay) / (h * lag);
+            let limits = if self.inputs.enable { self.point_at(start, at).limits } else { [0.0; 2] };
+            (end_tau, y.tau) = self.lagging(start.tau, limits, h);
         }
         let one = self.rates(&y, at);
-        if exact && imposed {
-            let state = State { tau: end_tau, integral: 0.0, speed_ref: self.inputs.speed_ref, ..*start };
-            return (state, self.powers_of(&one.point, self.speed(&y)), 0.0);
-        }
         let (gains, k) = self.drive.settled().speed_loop();
         let [k_p, k_i] = gains.slopes();
         let g = GAMMA * h;
@@ -173,7 +190,8 @@ impl PmsmDriveMean {
         let step = |n: usize| h * (1.5 * k_1[n] + 0.5 * k_2[n]);
         let off = |n: usize| 0.5 * h * (k_1[n] + k_2[n]).abs();
         let speed = y.speed + step(2);
-        let error = (off(0) / (SMALL[0] * one.greatest.max(1e-6))).max(off(2) / (SMALL[1] * (1.0 + speed.abs())));
+        let torque = off(0).max(k * off(1)) / (SMALL[0] * one.greatest.max(1e-6));
+        let error = torque.max(off(2) / (SMALL[1] * (1.0 + speed.abs())));
         let state = State {
             tau: if exact { end_tau } else { y.tau + step(0) },
             integral: y.integral + step(1),

@@ -53,7 +53,7 @@ pub struct Steady {
 }
 
 /// Where the drive operates, besides its torque.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
     /// Mechanical speed in rad/s.
     pub speed: f64,

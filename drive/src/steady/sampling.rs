@@ -13,7 +13,7 @@
 //!
 //! Derived here.
 
-use drive_base::math::sin_cos;
+use drive_base::math::sin_cos_small;
 
 /// x up to which the drive works; beyond, the factors stay.
 const MOST: f64 = 2.0;
@@ -35,7 +35,7 @@ impl Held {
     #[inline]
     pub(super) fn new(x: f64) -> Self {
         let half = 0.5 * x.clamp(-MOST, MOST);
-        let (sin, cos) = sin_cos(half);
+        let (sin, cos) = sin_cos_small(half);
         let share = if half == 0.0 { 1.0 } else { sin / half };
         Self { share, late: [share * cos, -share * sin] }
     }

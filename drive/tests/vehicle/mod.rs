@@ -6,8 +6,8 @@ const VEHICLE: &str = include_str!("../../../examples/vehicle/vehicle.toml");
 
 /// Energies of machine c in kWh on a link of 400 V at 20 degC, an independent calculation with steady operating points in the
 /// middle of each second: from the link (out, back), and copper, iron, conduction, switching, friction.
-pub(crate) const ENERGY: [f64; 3] = [1.322449, 1.497219, -0.174770];
-pub(crate) const LOSSES: [f64; 5] = [0.015373, 0.027246, 0.014992, 0.013319, 0.053891];
+pub(crate) const ENERGY: [f64; 3] = [1.322_449, 1.497_219, -0.174_770];
+pub(crate) const LOSSES: [f64; 5] = [0.015_373, 0.027_246, 0.014_992, 0.013_319, 0.053_891];
 
 /// A joule in kWh.
 pub(crate) const KWH: f64 = 1.0 / 3.6e6;
