@@ -5,7 +5,8 @@
 //! limit's torque beyond the limit, so that the rates are continuous. With field weakening it follows the limit at the speed loop's
 //! bandwidth, as the controller's.
 //!
-//! A step: in torque mode x is an exponential, exactly, and the shaft sees its mean. Otherwise x, I and the speed go together by
+//! A step: in torque mode, until a limit acts, x is an exponential, exactly, and the shaft sees its mean. Otherwise x, I and the speed
+//! go together by
 //! the Rosenbrock method of Verwer et al. 1999 (ROS2, DOI 10.1137/S1064827597326651), gamma = 1 - 1/sqrt 2: second order with any
 //! matrix, stable however fast the lag is. With the matrix M = 1 - gamma h J,
 //!
@@ -150,8 +151,33 @@ impl PmsmDriveMean {
 
     /// A part of a step, of `h` (s): the state after it, the mean powers, and the error in units of the allowed one.
     fn part(&self, start: &State, h: f64, at: Temperatures) -> (State, Powers, f64) {
+        let free = |[low, high]: [f64; 2]| self.inputs.tau_ref >= low && self.inputs.tau_ref <= high;
+        if !self.inputs.enable {
+            return self.part_with(start, h, at, Some([0.0; 2])).1;
+        }
+        if self.drive.controller.speed_loop.torque_mode {
+            let limits = self.point_at(start, at).limits;
+            if free(limits) {
+                let (end, found) = self.part_with(start, h, at, Some(limits));
+                if free(end) {
+                    return found;
+                }
+            }
+        }
+        self.part_with(start, h, at, None).1
+    }
+
+    /// [`part`](Self::part), with x as an exponential within these limits (N.m) or as one of the states; and the limits at
+    /// its end.
+    fn part_with(
+        &self,
+        start: &State,
+        h: f64,
+        at: Temperatures,
+        limits: Option<[f64; 2]>,
+    ) -> ([f64; 2], (State, Powers, f64)) {
         let Steady { plant, controller, .. } = &self.drive;
-        let (imposed, exact) = (plant.mechanics.imposed, controller.speed_loop.torque_mode || !self.inputs.enable);
+        let (imposed, exact) = (plant.mechanics.imposed, limits.is_some());
         let mut y = *start;
         let lag = controller.current.bandwidth;
         if !exact {
@@ -160,8 +186,7 @@ impl PmsmDriveMean {
             y.speed_ref = 0.5 * (if controller.speed_loop.ramp > 0.0 { start.speed_ref } else { reached } + reached);
         }
         let mut end_tau = 0.0;
-        if exact {
-            let limits = if self.inputs.enable { self.point_at(start, at).limits } else { [0.0; 2] };
+        if let Some(limits) = limits {
             (end_tau, y.tau) = self.lagging(start.tau, limits, h);
         }
         let one = self.rates(&y, at);
@@ -201,6 +226,6 @@ impl PmsmDriveMean {
         };
         let powers =
             self.powers_of(&one.point, self.speed(&y)).with(self.powers_of(&two.point, self.speed(&ahead)), 0.5);
-        (state, powers, error)
+        (two.point.limits, (state, powers, error))
     }
 }
