@@ -14,7 +14,8 @@ use drive::pmsm_drive::{DriveInputs, DriveOutputs};
 use drive::steady::{Condition, Steady};
 use drive::{PmsmDrive, PmsmDriveMean};
 use drive_control::tables::ControllerParameters;
-use fmu_core::{Block, Causality, ContinuousTime, Description, Elapsed, Model, Slot, Step};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, Causality, ContinuousTime, Description, Elapsed, Model, Slot, Step, Warns};
 use vehicle::{ENERGY, KWH, LOSSES, Vehicle};
 
 /// A drive that takes the same inputs and gives the same outputs.
@@ -452,4 +453,21 @@ fn parameters_have_an_effect_or_say_that_they_have_none() {
         }
     }
     assert!(idle.is_empty(), "{idle:?} have no effect here");
+}
+
+#[test]
+fn a_request_beyond_the_limits_is_clipped_and_told() {
+    let (plant, controller) = traction();
+    for (tau_ref, told) in [(100.0, false), (200.0, true)] {
+        let mut block = PmsmDriveMean::new(&plant, &controller);
+        let set = |_, i: &mut DriveInputs| (i.u_dc, i.tau_ref, i.speed_shaft) = (400.0, tau_ref, 630.0);
+        run(&mut block, 1.05, 0.01, set, |_, _| ());
+        let out = &block.out.drive.controller;
+        assert_eq!((out.current_limited, out.voltage_limited), (told, false), "{out:?}");
+        assert!(out.weakens && out.tau_max < 110.0 && out.tau_max > 100.0, "{out:?}");
+        let mut messages = Vec::new();
+        let mut sink = |key: &'static str, message: &dyn Fn() -> String| messages.push((key, message()));
+        block.model.warn(&mut Warnings::to(&mut sink));
+        assert_eq!(messages.iter().any(|(key, text)| *key == "tau_ref" && text.contains("tau_ref = 200 N.m")), told);
+    }
 }

@@ -235,17 +235,20 @@ impl Sampled for SensorlessController {
     }
 }
 
+/// The warning of a torque reference (N.m) that was beyond these limits (N.m) for a second.
+pub fn clipped(tau_ref: f64, [tau_min, tau_max]: [f64; 2]) -> String {
+    format!(
+        "tau_ref = {tau_ref} N.m has been clipped for a second: at this speed and u_dc, the drive gives {tau_min} to {tau_max} N.m \
+         (tau_min, tau_max)"
+    )
+}
+
 impl Warns for SensorlessController {
     fn warn(&self, log: &mut Warnings<'_>) {
         let (out, par, tau_ref) = (&self.state.shown, &self.parameters, self.inputs.tau_ref);
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
         if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
-            log.warn("tau_ref", || {
-                format!(
-                    "tau_ref = {tau_ref} N.m has been clipped for a second: at this speed and u_dc, the drive gives {} to {} N.m (tau_min, tau_max)",
-                    out.tau_min, out.tau_max
-                )
-            });
+            log.warn("tau_ref", || clipped(tau_ref, [out.tau_min, out.tau_max]));
         }
         if out.lock_lost < 1.0 {
             return;

@@ -26,13 +26,15 @@ use crate::pmsm_drive::{DriveInputs, DriveOutputs, INPUTS, OUTPUTS, in_part, sam
 use crate::steady::{Condition, Point, Steady};
 use drive_base::frame::Dq;
 use drive_base::math::all_finite;
+use drive_control::model::clipped;
 use drive_control::tables as control;
 use drive_plant::PmsmPlant;
 use drive_plant::power::{Energy, Powers};
 use drive_plant::tables as plant;
 use drive_plant::thermal::{self, Temperatures, ThermalMode};
+use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, SPEED};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Step, Table, Terminal};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Step, Table, Terminal, Warns};
 use motion::Passed;
 use serde::{Deserialize, Serialize};
 
@@ -50,11 +52,14 @@ pub struct PmsmDriveMean {
     network: Temperatures,
     /// Means over the last step.
     powers: Powers,
-    /// The point at its end, and what it answers; `None` after a parameter has changed.
+    /// The point at its end, what it answers, and whether it still does: a changed parameter ends that.
     point: Point,
-    asked: Option<Question>,
+    asked: Question,
+    known: bool,
     /// A step has been taken.
     moved: bool,
+    /// Time in s for which the torque reference has been beyond its limits.
+    clipped_for: f64,
 }
 
 impl Default for PmsmDriveMean {
@@ -69,8 +74,10 @@ impl Default for PmsmDriveMean {
             network,
             powers: Powers::default(),
             point: Point::default(),
-            asked: None,
+            asked: Question::default(),
+            known: false,
             moved: false,
+            clipped_for: 0.0,
         }
     }
 }
@@ -132,7 +139,7 @@ impl PmsmDriveMean {
 
     /// The point in this state at the temperatures `at` (K); that of the last step's end is known.
     fn point_at(&self, state: &State, at: Temperatures) -> Point {
-        if Some(self.question(state, at)) == self.asked {
+        if self.known && self.question(state, at) == self.asked {
             return self.point;
         }
         let at = self.drive.at(&self.condition(state, at));
@@ -145,6 +152,12 @@ impl PmsmDriveMean {
             return point.powers;
         }
         Powers { tau_shaft: self.inputs.tau_load, p_mech: self.inputs.tau_load * speed, ..point.powers }
+    }
+
+    /// Whether the torque reference is beyond its limits.
+    fn is_clipped(&self) -> bool {
+        let (tau_ref, [low, high]) = (self.inputs.tau_ref, self.point.limits);
+        self.drive.controller.speed_loop.torque_mode && self.inputs.enable && (tau_ref > high || tau_ref < low)
     }
 
     /// A plant with these parameters and inputs, for its rules.
@@ -199,7 +212,7 @@ impl Model for PmsmDriveMean {
 
     fn derive(&mut self) {
         self.drive.derive();
-        self.asked = None;
+        self.known = false;
     }
 
     fn validate(&self) -> Result<(), Fault> {
@@ -220,9 +233,10 @@ impl Model for PmsmDriveMean {
         };
         self.state = State { speed, angle, speed_ref: controller.speed_est, ..State::default() };
         (self.energy, self.network, self.moved) = (Energy::default(), self.drive.start_temperatures(), false);
+        self.clipped_for = 0.0;
         let temperatures = self.temperatures();
         self.point = self.point_at(&self.state, temperatures);
-        self.asked = Some(self.question(&self.state, temperatures));
+        (self.asked, self.known) = (self.question(&self.state, temperatures), true);
         self.powers = self.powers_of(&self.point, speed);
     }
 
@@ -244,7 +258,8 @@ impl Model for PmsmDriveMean {
         let total = Energy::from(powers);
         self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
         (self.state, self.powers, self.point, self.moved) = (state, powers, point, true);
-        self.asked = Some(self.question(&state, temperatures));
+        (self.asked, self.known) = (self.question(&state, temperatures), true);
+        self.clipped_for = if self.is_clipped() { self.clipped_for + step.h } else { 0.0 };
         if thermal.mode == ThermalMode::Network {
             let (heat, coolant) = (thermal.heat(&powers.losses), self.inputs.thermal.coolant);
             let next = thermal.network.step(&self.network, &heat, coolant, step.h);
@@ -252,6 +267,14 @@ impl Model for PmsmDriveMean {
             self.network = next;
         }
         Ok(())
+    }
+}
+
+impl Warns for PmsmDriveMean {
+    fn warn(&self, log: &mut Warnings<'_>) {
+        if self.clipped_for >= 1.0 {
+            log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.point.limits));
+        }
     }
 }
 

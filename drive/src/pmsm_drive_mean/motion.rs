@@ -18,7 +18,7 @@
 
 use super::{PmsmDriveMean, State};
 use crate::pmsm_drive::DriveInputs;
-use crate::steady::{Point, Steady};
+use crate::steady::{Point, Steady, within};
 use drive_base::math::exp;
 use drive_plant::power::Powers;
 use drive_plant::thermal::Temperatures;
@@ -31,7 +31,7 @@ const SMALL: [f64; 2] = [2e-3, 1e-4];
 
 /// Shortest part in s, and most parts of a step.
 const SHORTEST: f64 = 1e-8;
-const MOST: u32 = 10_000_000;
+const MOST: u32 = 100_000;
 
 /// Share of the limit beyond it in which the integral part comes to its hold.
 const BAND: f64 = 0.01;
@@ -81,13 +81,13 @@ impl PmsmDriveMean {
             let (gains, k) = self.drive.settled().speed_loop();
             let error = state.speed_ref - speed;
             let wanted = k * gains.wanted(state.integral, state.speed_ref, speed);
-            let cut = wanted - wanted.clamp(low, high);
+            let cut = wanted - within(wanted, point.limits);
             let [_, k_i] = gains.slopes();
             let share = if cut * error > 0.0 { (1.0 - cut.abs() / (BAND * greatest.max(1e-9))).max(0.0) } else { 1.0 };
             let follow = if controller.weakening.used { controller.speed_loop.bandwidth * cut / k } else { 0.0 };
             (wanted, share * k_i * error - follow, cut != 0.0)
         };
-        let tau = lag * (wanted.clamp(low, high) - state.tau);
+        let tau = lag * (within(wanted, point.limits) - state.tau);
         Rates { tau, integral, speed: accelerate(&point), point, limited, greatest }
     }
 
@@ -122,8 +122,8 @@ impl PmsmDriveMean {
     }
 
     /// Torque in N.m after `h` (s) and its mean, from `start` (N.m) within these limits (N.m), with the held torque reference.
-    fn lagging(&self, start: f64, [low, high]: [f64; 2], h: f64) -> (f64, f64) {
-        let target = self.inputs.tau_ref.clamp(low, high);
+    fn lagging(&self, start: f64, limits: [f64; 2], h: f64) -> (f64, f64) {
+        let target = within(self.inputs.tau_ref, limits);
         let (x, off) = (h * self.drive.controller.current.bandwidth, start - target);
         let decay = exp(-x);
         (target + off * decay, target + off * (1.0 - decay) / x)

@@ -2,7 +2,7 @@
 
 use super::{MeanOutputs, PmsmDriveMean, State};
 use crate::pmsm_drive::{DriveOutputs, Means};
-use crate::steady::{Point, Region};
+use crate::steady::{Point, Region, within};
 use drive_base::frame::{Axis, Phases, Rotor};
 use drive_base::math::wrap;
 use drive_control::signals::{ControllerOutputs, DqParts};
@@ -55,7 +55,7 @@ impl PmsmDriveMean {
                 i_ref: parts,
                 lock_lost: 0.0,
                 enabled,
-                voltage_limited: enabled && tau_ref.abs() < state.tau.clamp(tau_min, tau_max).abs() - 1e-9 * tau_max,
+                voltage_limited: enabled && tau_ref.abs() < within(state.tau, point.limits).abs() - 1e-9 * tau_max,
                 current_limited: enabled && at_limit,
                 tau_max,
                 tau_min,

@@ -37,6 +37,12 @@ use drive_plant::tables::PlantParameters;
 use drive_plant::thermal::Temperatures;
 use serde::{Deserialize, Serialize};
 
+/// `x` within the limits; limits that are not numbers do not stop the program.
+#[inline]
+pub(crate) fn within(x: f64, [low, high]: [f64; 2]) -> f64 {
+    x.max(low).min(high)
+}
+
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 /// A drive whose steady state is asked for.

@@ -1,7 +1,7 @@
 //! A point in steady state: the controller's currents, what the machine makes of them, and the powers.
 
 use super::sampling::Held;
-use super::{Condition, SQRT_3, Steady, flux};
+use super::{Condition, SQRT_3, Steady, flux, within};
 use drive_base::frame::Dq;
 use drive_base::motor::Motor;
 use drive_control::settled::SettledAt;
@@ -146,7 +146,7 @@ impl<'a> At<'a> {
     pub(super) fn of_reference(&self, tau: f64) -> Point {
         let limits = self.settled.limits();
         let [low, high] = limits;
-        let tau_ref = tau.clamp(low, high);
+        let tau_ref = within(tau, limits);
         let (i, weakens) = self.settled.currents(tau_ref);
         let i = Dq::new(i.d(), i.q());
         let near = 1e-9 * high.max(-low);

@@ -1,3 +1,3 @@
 //! The FMU PmsmDriveMean.
 
-fmu_export::export!(drive::PmsmDriveMean: ContinuousTime);
+fmu_export::export!(drive::PmsmDriveMean: ContinuousTime + Warns);
