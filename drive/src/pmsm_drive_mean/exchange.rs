@@ -1,13 +1,14 @@
 //! `PmsmDriveMean` for Model Exchange: the rates of its states; the energies are states too.
 //!
-//! The ramp of the speed reference follows it with the current loop's bandwidth, at most at its rate. Nothing switches, so there
-//! are no events: a solver takes steps as long as inputs and limits are smooth.
+//! The ramp of the speed reference follows it with the current loop's bandwidth, at most at its rate. Nothing switches, so the
+//! model has no events of its own: a solver takes steps as long as inputs and limits are smooth. The outputs of the controller,
+//! which are discrete, are those of the importer's last event.
 
 use super::{MeanOutputs, PmsmDriveMean, State};
 use drive_base::math::all_finite;
 use drive_plant::power::Energy;
 use fmu_core::unit::{Exponents, Quantity, RAD_PER_S2, SPEED, Unit, WATT};
-use fmu_core::{ContinuousTime, Elapsed, Fault, State as Variable};
+use fmu_core::{ContinuousTime, Elapsed, Events, Fault, Next, Outcome, State as Variable};
 
 const NEWTON_METER_PER_S: Quantity = Quantity::new("TorqueRate", Unit::si("N.m/s", Exponents::mechanical(1, 2, -3, 0)));
 const AMPERE_PER_S: Quantity = Quantity::new("CurrentRate", Unit::si("A/s", Exponents::mechanical(0, 0, -1, 1)));
@@ -51,11 +52,19 @@ impl ContinuousTime for PmsmDriveMean {
     fn observe(&self, _now: Elapsed, out: &mut MeanOutputs) {
         let (temperatures, state) = (self.temperatures(), self.referred());
         let point = self.point_at(&state, temperatures);
-        let powers = self.powers_of(&point, self.speed(&state));
-        self.show(&state, &point, powers, temperatures, out);
+        self.show(&state, &point, temperatures, out);
+        out.drive.controller = self.held;
+    }
+}
+
+impl Events for PmsmDriveMean {
+    fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+        let state = self.referred();
+        self.held = self.controller(&state, &self.point_at(&state, self.temperatures()));
+        Ok(Outcome::default())
     }
 
-    fn integrands(&self, _now: Elapsed, out: &mut MeanOutputs) {
-        out.drive.plant.energy = self.powers_of(&self.point, self.speed(&self.state)).into();
+    fn next(&self, _now: Elapsed) -> Next {
+        Next::Never
     }
 }

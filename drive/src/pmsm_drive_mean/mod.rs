@@ -9,9 +9,8 @@
 //! ```
 //!
 //! tau_min and tau_max are those of speed and u_dc. Nothing is sampled, so a step has any length: [`advance`] is exact for x
-//! in torque mode, and stable and of second order for the speed ([`motion`]). The powers are means over the step, the energies
-//! their integrals, so that the torque of an imposed shaft does the work of `energy_mech`. Currents, angle and estimates are those
-//! of the end; the estimates are the true values, the phase currents the sinusoids of i_d and i_q.
+//! in torque mode, and stable and of second order for the speed ([`motion`]). The energies are the integrals of the powers; all other
+//! outputs are those of the step's end. The estimates are the true values, the phase currents the sinusoids of i_d and i_q.
 //!
 //! No estimator, start, sensor error or injection, and no oscillation of the current loop: those parameters are accepted, and
 //! [`Model::has_effect`] names the others. In Model Exchange the importer integrates the same equations ([`exchange`]).
@@ -27,6 +26,7 @@ use crate::steady::{Condition, Point, Steady};
 use drive_base::frame::Dq;
 use drive_base::math::all_finite;
 use drive_control::model::clipped;
+use drive_control::signals::ControllerOutputs;
 use drive_control::tables as control;
 use drive_plant::PmsmPlant;
 use drive_plant::power::{Energy, Powers};
@@ -50,14 +50,14 @@ pub struct PmsmDriveMean {
     energy: Energy,
     /// Temperatures in K of the network.
     network: Temperatures,
-    /// Means over the last step.
-    powers: Powers,
     /// The point at its end, what it answers, and whether it still does: a changed parameter ends that.
     point: Point,
     asked: Question,
     known: bool,
     /// A step has been taken.
     moved: bool,
+    /// Model Exchange: what the controller shows since the last event.
+    held: ControllerOutputs,
     /// Time in s for which the torque reference has been beyond its limits.
     clipped_for: f64,
 }
@@ -72,11 +72,11 @@ impl Default for PmsmDriveMean {
             state: State::default(),
             energy: Energy::default(),
             network,
-            powers: Powers::default(),
             point: Point::default(),
             asked: Question::default(),
             known: false,
             moved: false,
+            held: ControllerOutputs::default(),
             clipped_for: 0.0,
         }
     }
@@ -237,11 +237,12 @@ impl Model for PmsmDriveMean {
         let temperatures = self.temperatures();
         self.point = self.point_at(&self.state, temperatures);
         (self.asked, self.known) = (self.question(&self.state, temperatures), true);
-        self.powers = self.powers_of(&self.point, speed);
+        self.held = self.controller(&self.state, &self.point);
     }
 
     fn output(&self, _now: Elapsed, out: &mut MeanOutputs) {
-        self.show(&self.state, &self.point, self.powers, self.temperatures(), out);
+        self.show(&self.state, &self.point, self.temperatures(), out);
+        out.drive.controller = self.controller(&self.state, &self.point);
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
@@ -257,7 +258,7 @@ impl Model for PmsmDriveMean {
         }
         let total = Energy::from(powers);
         self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
-        (self.state, self.powers, self.point, self.moved) = (state, powers, point, true);
+        (self.state, self.point, self.moved) = (state, point, true);
         (self.asked, self.known) = (self.question(&state, temperatures), true);
         self.clipped_for = if self.is_clipped() { self.clipped_for + step.h } else { 0.0 };
         if thermal.mode == ThermalMode::Network {

@@ -63,6 +63,8 @@ pub struct Point {
     pub efficiency: f64,
     /// Where it lies.
     pub region: Region,
+    /// Field weakening lowers i_d.
+    pub weakens: bool,
 }
 
 /// A drive under a condition.
@@ -158,7 +160,7 @@ impl<'a> At<'a> {
             (false, true) => Region::Weakening,
             (false, false) => Region::Mtpa,
         };
-        Point { tau_ref, limits, region, ..self.by_current(i) }
+        Point { tau_ref, limits, region, weakens, ..self.by_current(i) }
     }
 
     /// The point of the current `i_s` (A) at the terminals, as the controller samples it; its torque reference is that of the
