@@ -121,12 +121,15 @@ impl PmsmDriveMean {
         Err(Fault::new(format!("a step of {h} s takes more than {MOST} parts: the coupling is unstable; shorten it")))
     }
 
-    /// Torque in N.m after `h` (s) and its mean, from `start` (N.m) within these limits (N.m), with the held torque reference.
+    /// Torque in N.m after `h` (s) from `start` (N.m) within these limits (N.m), with the held torque reference; and the share
+    /// of the start in its mean, the rest being that of the end.
     fn lagging(&self, start: f64, limits: [f64; 2], h: f64) -> (f64, f64) {
         let target = within(self.inputs.tau_ref, limits);
-        let (x, off) = (h * self.drive.controller.current.bandwidth, start - target);
+        let x = h * self.drive.controller.current.bandwidth;
         let decay = exp(-x);
-        (target + off * decay, target + off * (1.0 - decay) / x)
+        // mean = target + (start - target) (1 - decay) / x, end = target + (start - target) decay.
+        let share = if x > 1e-3 { 1.0 / x - decay / (1.0 - decay) } else { 0.5 - x * (1.0 / 12.0) };
+        (target + (start - target) * decay, share)
     }
 
     /// `state` after a step of `h` (s) with the imposed shaft.
@@ -141,12 +144,11 @@ impl PmsmDriveMean {
         let drive = self.drive.at(&condition);
         let enable = self.inputs.enable;
         let limits = if enable { drive.limits() } else { [0.0; 2] };
-        let (tau, mean) = self.lagging(self.state.tau, limits, h);
+        let (tau, share) = self.lagging(self.state.tau, limits, h);
         let state = State { tau, integral: 0.0, speed_ref: self.inputs.speed_ref, ..self.state };
         let point = if enable { drive.by_reference(tau) } else { drive.off() };
-        let settled = (mean - tau).abs() <= 1e-12 * limits[1];
-        let through = if settled || !enable { point } else { drive.by_reference(mean) };
-        Passed { state: self.on_the_shaft(state, h), powers: through.powers, point }
+        // The powers go with the torque from the last step's end to this one's.
+        Passed { state: self.on_the_shaft(state, h), powers: point.powers.with(self.point.powers, share), point }
     }
 
     /// A part of a step, of `h` (s): the state after it, the mean powers, and the error in units of the allowed one.
@@ -187,7 +189,8 @@ impl PmsmDriveMean {
         }
         let mut end_tau = 0.0;
         if let Some(limits) = limits {
-            (end_tau, y.tau) = self.lagging(start.tau, limits, h);
+            let (end, share) = self.lagging(start.tau, limits, h);
+            (end_tau, y.tau) = (end, end + (start.tau - end) * share);
         }
         let one = self.rates(&y, at);
         let (gains, k) = self.drive.settled().speed_loop();
