@@ -27,7 +27,7 @@ pub enum Region {
 }
 
 impl Region {
-    /// As tables have it: `mtpa`, `fw`, `mtpv` or `limit`.
+    /// Its name in tables: `mtpa`, `fw`, `mtpv` or `limit`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mtpa => "mtpa",
@@ -125,7 +125,7 @@ impl<'a> At<'a> {
         self.condition.u_dc / SQRT_3
     }
 
-    /// The same condition with the trim `trim` (V) of field weakening.
+    /// This condition, with the trim `trim` (V) of field weakening.
     pub(super) fn trimmed(&self, trim: f64) -> Self {
         let (Steady { controller, settled, .. }, Condition { speed, u_dc, .. }) = (self.drive, self.condition);
         Self { settled: settled.at(controller, speed, u_dc, trim), ..self.clone() }

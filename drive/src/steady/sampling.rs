@@ -18,7 +18,7 @@ use drive_base::math::sin_cos_small;
 /// x up to which the drive works; beyond, the factors stay.
 const MOST: f64 = 2.0;
 
-/// Of a sample period in which the rotor turns by x.
+/// The factors of a sample period in which the rotor turns by x.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Held {
     /// s.
