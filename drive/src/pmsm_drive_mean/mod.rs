@@ -9,11 +9,11 @@
 //! ```
 //!
 //! tau_min and tau_max are those of speed and u_dc. Nothing is sampled, so a step has any length: [`advance`] is exact for x
-//! in torque mode, and stable and of second order for the speed ([`motion`]). The energies are the integrals of the powers; all other
+//! in torque mode, and stable and of second order for the speed. The energies are the integrals of the powers; all other
 //! outputs are those of the step's end. The estimates are the true values, the phase currents the sinusoids of i_d and i_q.
 //!
 //! No estimator, start, sensor error or injection, and no oscillation of the current loop: those parameters are accepted, and
-//! [`Model::has_effect`] names the others. In Model Exchange the importer integrates the same equations ([`exchange`]).
+//! [`Model::has_effect`] names the others. In Model Exchange the importer integrates the same equations.
 //!
 //! [`advance`]: Model::advance
 
