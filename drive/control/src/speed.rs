@@ -65,6 +65,18 @@ impl SpeedGains {
         Self { k_p, k_i: k_p * par.bandwidth / par.t_is, b: par.b }
     }
 
+    /// Reference of i_q in A without its limits, with the integral part `integral` (A) at the speeds `w_ref` and `w` (rad/s).
+    #[inline]
+    pub fn wanted(&self, integral: f64, w_ref: f64, w: f64) -> f64 {
+        self.k_p * (self.b * w_ref - w) + integral
+    }
+
+    /// K_p in A.s/rad, and the change of the integral part with time and speed error in A/rad.
+    #[inline]
+    pub fn slopes(&self) -> [f64; 2] {
+        [self.k_p, self.k_i]
+    }
+
     /// Integral of the speed error in rad, mechanical, for which the integral part goes from 0 to `i` (A).
     pub fn error_integral(&self, i: f64) -> f64 {
         i / self.k_i
@@ -83,7 +95,7 @@ impl SpeedController {
     #[inline]
     pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limits: (f64, f64), T_s: f64) -> (f64, f64) {
         let ((low, high), error) = (limits, w_ref - w);
-        let wanted = gains.k_p * (gains.b * w_ref - w) + self.integral;
+        let wanted = gains.wanted(self.integral, w_ref, w);
         let i_q_ref = if wanted >= low && wanted <= high { wanted } else { limited(wanted, low, high) };
         let further_in = (wanted - i_q_ref) * error > 0.0;
         if !further_in {
