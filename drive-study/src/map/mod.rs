@@ -108,13 +108,13 @@ pub fn make(motor: &MotorFile, request: &Request) -> Result<Map> {
     Ok(Map { name, source, drive, rated, u_dc, T, axes, sheets, shown, verified, notes })
 }
 
-/// The map of a drive that is given with its values, at one voltage (V) and 20 degC, without verification.
-pub fn of_drive(name: &str, drive: Steady, u_dc: f64, grid: (usize, usize), top: f64) -> Map {
-    let (axes, T) = (Axes::new(grid, top), vec![20.0]);
+/// The map of a drive that is given with its values: one voltage (V), 20 degC, speeds up to `top` (rad/s), without verification.
+pub fn of_drive(name: &str, drive: Steady, u_dc: f64, top: f64, rated: [f64; 2]) -> Map {
+    let (axes, T) = (Axes::new(Request::default().grid, top), vec![20.0]);
     let sheets = sheet::all(&drive, &axes, &[u_dc], &[20.0 + ZERO_CELSIUS]);
     let (name, u_dc) = (name.into(), vec![u_dc]);
     let (source, notes, verified) = (String::new(), Vec::new(), Verified::default());
-    Map { name, source, drive, rated: [0.0; 2], u_dc, T, axes, sheets, shown: 0, verified, notes }
+    Map { name, source, drive, rated, u_dc, T, axes, sheets, shown: 0, verified, notes }
 }
 
 /// Refuses a temperature at which the machine has no resistance or no magnet.
