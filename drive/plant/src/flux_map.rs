@@ -179,10 +179,16 @@ impl FluxMap {
         self.knots().map(|x| self.least_inductance_at(x)).fold(f64::INFINITY, f64::min)
     }
 
+    /// The smallest eigenvalue (1/H) of the Hessian at the flux linkage `x` (Wb) beyond that of the magnet: the inverse of the
+    /// greatest incremental inductance.
+    pub fn least_curvature(&self, x: Dq) -> f64 {
+        eigenvalues(self.hessian(x))[0]
+    }
+
     /// The first knot (Wb beyond the magnet's flux linkage) at which more flux takes less current in some direction.
     pub fn flaw(&self) -> Option<Dq> {
         // Also finds what is not a number.
-        self.knots().find(|&x| !(eigenvalues(self.hessian(x))[0] > 0.0))
+        self.knots().find(|&x| !(self.least_curvature(x) > 0.0))
     }
 }
 
@@ -234,15 +240,32 @@ fn eigenvalues([a, b, c]: [f64; 3]) -> [f64; 2] {
     [middle - radius, middle + radius]
 }
 
-/// All B-splines of the grid of `map` at the flux linkage `x` (Wb) beyond that of the magnet, as a fit needs them: coefficient,
-/// and the currents (A) that 1 J of it adds.
-pub fn contributions(map: &FluxMap, x: Dq) -> Vec<(usize, Dq)> {
+/// What 1 J of a coefficient adds at a point, as a fit needs it.
+#[derive(Clone, Copy, Debug)]
+pub struct Contribution {
+    /// Place of the coefficient, the q-axis fastest.
+    pub place: usize,
+    /// Current in A.
+    pub current: Dq,
+    /// As [`FluxMap::hessian`], in 1/H.
+    pub hessian: [f64; 3],
+}
+
+/// The contributions of all coefficients that count at the flux linkage `x` (Wb) beyond that of the magnet.
+pub fn contributions(map: &FluxMap, x: Dq) -> Vec<Contribution> {
     let (([d, q], sign), [h_d, h_q]) = (map.splines(x), map.interval());
     let mut all = Vec::with_capacity(16);
     for m in 0..4 {
         for n in 0..4 {
-            let place = (d.first + m) * Q + (q.first + n).abs_diff(1);
-            all.push((place, Dq::new(d.slope[m] * q.value[n] / h_d, d.value[m] * q.slope[n] * sign / h_q)));
+            all.push(Contribution {
+                place: (d.first + m) * Q + (q.first + n).abs_diff(1),
+                current: Dq::new(d.slope[m] * q.value[n] / h_d, d.value[m] * q.slope[n] * sign / h_q),
+                hessian: [
+                    d.curvature[m] * q.value[n] / (h_d * h_d),
+                    d.slope[m] * q.slope[n] * sign / (h_d * h_q),
+                    d.value[m] * q.curvature[n] / (h_q * h_q),
+                ],
+            });
         }
     }
     all
@@ -343,8 +366,13 @@ mod tests {
         let map = bent();
         for x in points() {
             let weights = map.w.as_flattened();
-            let sum = contributions(&map, x).iter().fold(Dq::ZERO, |sum, &(place, i)| sum + i * weights[place]);
-            assert!((sum - map.current(x)).magnitude() < 1e-11, "{x:?}");
+            let all = contributions(&map, x);
+            let current = all.iter().fold(Dq::ZERO, |sum, part| sum + part.current * weights[part.place]);
+            assert!((current - map.current(x)).magnitude() < 1e-11, "{x:?}");
+            for (k, wanted) in map.hessian(x).into_iter().enumerate() {
+                let found: f64 = all.iter().map(|part| part.hessian[k] * weights[part.place]).sum();
+                assert!((found - wanted).abs() < 1e-10 * (1.0 + wanted.abs()), "{x:?}");
+            }
         }
     }
 
