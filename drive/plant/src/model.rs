@@ -16,7 +16,8 @@ use drive_base::connection::Measured;
 use drive_base::frame::{Dq, Phases, Rotor, Vector};
 use drive_base::math::wrap;
 use drive_base::motor::Motor;
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal, Warns};
 use serde::{Deserialize, Serialize};
 
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
@@ -236,6 +237,22 @@ impl Model for PmsmPlant {
             self.advance_at_temperature(step.h)
         } else {
             self.advance_with_temperatures(step.h)
+        }
+    }
+}
+
+impl Warns for PmsmPlant {
+    fn warn(&self, log: &mut Warnings<'_>) {
+        let (map, psi) = (&self.parameters.flux_map, self.state.psi);
+        if map.used && !map.holds(psi - Dq::new(self.warm.motor.psi_M, 0.0)) {
+            log.warn("flux_map", || {
+                format!(
+                    "psi_d = {} Wb, psi_q = {} Wb is beyond the flux map: the inductances of its edge go on there; limit the current, \
+                     or fit a map to a table of greater currents",
+                    psi.d(),
+                    psi.q()
+                )
+            });
         }
     }
 }

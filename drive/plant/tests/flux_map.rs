@@ -6,7 +6,8 @@ use drive_plant::PmsmPlant;
 use drive_plant::flux_map::{FluxMap, linear};
 use drive_plant::machine::{self, Magnetics};
 use drive_plant::tables::PlantParameters;
-use fmu_core::{Block, ContinuousTime, Elapsed, Step, integrate};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, ContinuousTime, Elapsed, Step, Warns, integrate};
 
 /// The plant with what `set` changes, after 40 steps of 0.1 ms under a voltage that turns, in Co-Simulation or Model Exchange.
 fn run(exchange: bool, set: impl Fn(&mut PlantParameters)) -> Block<PmsmPlant> {
@@ -110,4 +111,17 @@ fn a_warm_magnet_moves_the_map() {
     block.initialize();
     assert!(block.out.i_d == 0.0 && block.out.i_q == 0.0, "no current without flux: {} A", block.out.i_d);
     assert!(apart(&run(false, hot), &run(false, |par| par.flux_map = saturating())) > 0.1);
+}
+
+#[test]
+fn a_state_beyond_the_map_is_told() {
+    let warned = |map: FluxMap| {
+        let block = run(false, |par| par.flux_map = map.clone());
+        let mut said = Vec::new();
+        block.model.warn(&mut Warnings::to(&mut |key, text| said.push(format!("{key}: {}", text()))));
+        said
+    };
+    assert!(warned(saturating()).is_empty());
+    let said = warned(linear(&Motor::default(), [-0.02, 0.01], 0.01));
+    assert!(said.len() == 1 && said[0].contains("is beyond the flux map"), "{said:?}");
 }
