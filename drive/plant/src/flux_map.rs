@@ -169,14 +169,9 @@ impl FluxMap {
         along_d.flat_map(move |x| (0..=INTERVALS[1]).map(move |n| Dq::new(x, q * n as f64)))
     }
 
-    /// The smallest incremental inductance (H) over all directions, at the flux linkage `x` (Wb) beyond that of the magnet.
-    pub fn least_inductance_at(&self, x: Dq) -> f64 {
-        1.0 / eigenvalues(self.hessian(x))[1]
-    }
-
     /// The smallest incremental inductance (H) over all directions and knots.
     pub fn least_inductance(&self) -> f64 {
-        self.knots().map(|x| self.least_inductance_at(x)).fold(f64::INFINITY, f64::min)
+        1.0 / self.knots().map(|x| eigenvalues(self.hessian(x))[1]).fold(0.0, f64::max)
     }
 
     /// The smallest eigenvalue (1/H) of the Hessian at the flux linkage `x` (Wb) beyond that of the magnet: the inverse of the
@@ -236,7 +231,7 @@ pub fn validate(parameters: &PlantParameters) -> Result<(), Fault> {
 
 /// The eigenvalues of a symmetric matrix, the smaller one first.
 fn eigenvalues([a, b, c]: [f64; 3]) -> [f64; 2] {
-    let (middle, radius) = (0.5 * (a + c), (0.5 * (a - c)).hypot(b));
+    let (middle, radius) = (0.5 * (a + c), (0.25 * (a - c) * (a - c) + b * b).sqrt());
     [middle - radius, middle + radius]
 }
 

@@ -48,13 +48,24 @@ pub fn magnetic_energy(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> f64 
     }
 }
 
+/// d i_d / d psi_d, d i_d / d psi_q and d i_q / d psi_q (1/H) at the flux linkage `psi` (Wb).
+#[inline]
+pub fn slope(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> [f64; 3] {
+    match magnetics {
+        Magnetics::Linear => [1.0 / motor.L_d, 0.0, 1.0 / motor.L_q],
+        Magnetics::Polynomial(saturation) => saturation.slope(motor, psi),
+        Magnetics::Map(map) => map.hessian(psi - Dq::new(motor.psi_M, 0.0)),
+    }
+}
+
 /// The smallest incremental inductance (H) of the machine over all directions at the flux linkage `psi` (Wb).
 pub fn least_inductance(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> f64 {
-    match magnetics {
-        Magnetics::Linear => motor.L_d.min(motor.L_q),
-        Magnetics::Polynomial(saturation) => saturation.least_inductance(motor, psi),
-        Magnetics::Map(map) => map.least_inductance_at(psi - Dq::new(motor.psi_M, 0.0)),
+    if let Magnetics::Linear = magnetics {
+        return motor.L_d.min(motor.L_q);
     }
+    let [d, cross, q] = slope(motor, magnetics, psi);
+    // The greatest eigenvalue.
+    1.0 / (0.5 * (d + q) + (0.25 * (d - q) * (d - q) + cross * cross).sqrt())
 }
 
 /// The reciprocals of the inductances in 1/H.

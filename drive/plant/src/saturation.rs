@@ -41,13 +41,12 @@ impl Saturation {
         Vector::new((x * self.s_3 + S::from(self.s_2)) * x * x + q * (0.5 * self.s_dq) * q, x * self.s_dq * q)
     }
 
-    /// The smallest incremental inductance (H) of the machine at the flux linkage `psi` (Wb) over all directions: 1
-    /// over the largest eigenvalue of d i / d psi, which is symmetric.
-    pub fn least_inductance(&self, motor: &Motor, psi: Dq) -> f64 {
+    /// d i / d psi (1/H) of the machine at the flux linkage `psi` (Wb), which is symmetric: d with d, d with q, q with q.
+    #[inline]
+    pub fn slope(&self, motor: &Motor, psi: Dq) -> [f64; 3] {
         let (x, q) = (psi.d() - motor.psi_M, psi.q());
         let by_d = 1.0 / motor.L_d + (2.0 * self.s_2 + 3.0 * self.s_3 * x) * x;
-        let (by_q, cross) = (1.0 / motor.L_q + self.s_dq * x, self.s_dq * q);
-        1.0 / (0.5 * (by_d + by_q) + (0.5 * (by_d - by_q)).hypot(cross))
+        [by_d, self.s_dq * q, 1.0 / motor.L_q + self.s_dq * x]
     }
 
     /// The energy (J) beyond the linear machine's at the flux linkage `psi` (Wb): 1.5 of the integral of i d psi.
@@ -77,6 +76,7 @@ pub const SATURATION: &Table<Saturation> = &Table::new(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::{self, Magnetics};
 
     #[test]
     fn is_reciprocal_and_tells_north_from_south() {
@@ -95,7 +95,10 @@ mod tests {
             1.0 / by(direction * h).dot(direction)
         };
         let least = (0..3600).map(|k| of(f64::from(k).to_radians() / 10.0)).fold(f64::INFINITY, f64::min);
-        assert!((s.least_inductance(&motor, psi) / least - 1.0).abs() < 1e-5, "{least} H");
+        assert!(
+            (machine::least_inductance(&motor, Magnetics::Polynomial(&s), psi) / least - 1.0).abs() < 1e-5,
+            "{least} H"
+        );
         let along = |x: f64| current(Dq::new(motor.psi_M + x, 0.0)).d();
         assert!(along(0.1) > 0.0 && along(0.1) > -along(-0.1));
     }
