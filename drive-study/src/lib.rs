@@ -12,6 +12,7 @@
 
 pub mod atlas;
 pub mod compare;
+pub mod csv;
 pub mod expected;
 pub mod ink;
 mod output;

@@ -268,6 +268,7 @@ impl Warns for PmsmDrive {
                 )
             });
         }
+        plant.warn(log);
         self.pair.controller.model.warn(log);
         if self.overload == Overload::Now {
             let ControllerOutputs { tau_max, tau_min, .. } = self.pair.controller.out;

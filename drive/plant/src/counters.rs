@@ -105,7 +105,7 @@ impl PmsmPlant {
     /// The rates with the flux linkage `psi` (Wb) in stator axes, the `speed` (rad/s) and the `angle` (rad).
     fn rates_at(&self, inputs: &PlantInputs, psi: AlphaBeta, speed: f64, angle: f64) -> Rates {
         let motor = self.motor(inputs);
-        let (machine, axis) = (Machine::<_>::new(&motor, &self.parameters.saturation), axis_at(&motor, angle));
+        let (machine, axis) = (Machine::<_>::new(&motor, self.parameters.magnetics()), axis_at(&motor, angle));
         let idle = self.blocked && !inputs.enable;
         let (psi, i) = if idle {
             let i = self.idle_current(&motor, speed);

@@ -38,7 +38,7 @@ impl PmsmPlant {
     /// The state of flux linkage (Wb), speed (rad/s) and angle (rad) as the equations see it under these `inputs`.
     #[inline]
     fn instant<S: Scalar>(&self, inputs: &PlantInputs<S>, (psi, speed, angle): (Vector<Rotor, S>, S, S)) -> Instant<S> {
-        let PlantParameters { saturation, mechanics, iron, thermal, .. } = &self.parameters;
+        let PlantParameters { mechanics, iron, thermal, .. } = &self.parameters;
         let motor = &self.motor(inputs);
         let theta = |angle: S| angle * f64::from(motor.n_p);
         let (speed, angle, axis) = if mechanics.imposed {
@@ -50,7 +50,11 @@ impl PmsmPlant {
         // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
         let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
         let psi = if follows { self.idle_flux(motor, speed) } else { psi };
-        let i = if idle { self.idle_current(motor, speed) } else { Machine::<_>::new(motor, saturation).current(psi) };
+        let i = if idle {
+            self.idle_current(motor, speed)
+        } else {
+            Machine::<_>::new(motor, self.parameters.magnetics()).current(psi)
+        };
         Instant { psi, i, speed, angle, axis, idle }
     }
 
@@ -70,8 +74,8 @@ impl PmsmPlant {
     /// Derivatives and powers at an instant.
     #[inline]
     pub(super) fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
-        let machine = Machine::<_>::new(&self.motor(inputs), saturation);
+        let mechanics = &self.parameters.mechanics;
+        let machine = Machine::<_>::new(&self.motor(inputs), self.parameters.magnetics());
         let shaft = Shaft::new(mechanics, inputs.tau_load, Standstill::new(mechanics, at.speed.value()));
         if at.idle {
             return blocked_rates(&machine, &shaft, at.psi, at.i, at.speed);
@@ -164,10 +168,10 @@ impl PmsmPlant {
 
     /// Whether diodes block the current that the flux linkage has, and by how much this is exceeded.
     fn diodes(&self, inputs: &PlantInputs) -> (bool, [f64; 2]) {
-        let (motor, saturation) = (&self.motor(inputs), &self.parameters.saturation);
+        let motor = &self.motor(inputs);
         let Instant { psi, speed, axis, .. } = self.present(inputs);
         let idle = self.idle_current(motor, speed);
-        let (legs, i) = (self.legs(inputs), machine::current(motor, saturation, psi) - idle);
+        let (legs, i) = (self.legs(inputs), machine::current(motor, self.parameters.magnetics(), psi) - idle);
         let w = f64::from(motor.n_p) * speed;
         (legs.block(motor, axis, i, w), legs.excess(motor, axis, i, w))
     }
@@ -241,7 +245,7 @@ impl Events for PmsmPlant {
         if self.blocked {
             let motor = self.motor(&self.inputs);
             let idle = self.idle_flux(&motor, state.speed);
-            let stored = |psi| machine::magnetic_energy(&motor, &self.parameters.saturation, psi);
+            let stored = |psi| machine::magnetic_energy(&motor, self.parameters.magnetics(), psi);
             self.energy.loss += stored(state.psi) - stored(idle);
             state.psi = idle;
         }

@@ -1,6 +1,7 @@
 //! The model `PmsmPlant`: inverter, machine and mechanics, integrated with held inputs.
 
 use crate::counters::Point;
+use crate::flux_map;
 use crate::legs::Legs;
 use crate::losses::{Losses, efficiency};
 use crate::machine::{self, Machine};
@@ -15,7 +16,8 @@ use drive_base::connection::Measured;
 use drive_base::frame::{Dq, Phases, Rotor, Vector};
 use drive_base::math::wrap;
 use drive_base::motor::Motor;
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal, Warns};
 use serde::{Deserialize, Serialize};
 
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
@@ -45,9 +47,12 @@ impl PmsmPlant {
     /// Voltage drop of the inverter legs.
     #[inline]
     pub(super) fn legs<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Legs<S> {
-        let PlantParameters { motor, inverter, .. } = &self.parameters;
-        let u_dc = inputs.u_dc;
-        if inputs.enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
+        let (inverter, u_dc) = (&self.parameters.inverter, inputs.u_dc);
+        if inputs.enable {
+            Legs::switching(inverter, u_dc)
+        } else {
+            Legs::off(inverter, self.warm.least_inductance, u_dc)
+        }
     }
 
     /// The current (A) that the flux linkage of this `motor` has while the diodes block, at the mechanical `speed` (rad/s).
@@ -105,9 +110,10 @@ impl PmsmPlant {
         temperatures: Temperatures<S>,
         powers: Powers<S>,
     ) -> PlantOutputs<S> {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
+        let motor = &self.parameters.motor;
         let &Instant { psi, speed, angle, axis, .. } = at;
-        let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::<_>::new(motor, saturation).torque(psi, at.i));
+        let (theta, tau_e) =
+            (angle * f64::from(motor.n_p), Machine::<_>::new(motor, self.parameters.magnetics()).torque(psi, at.i));
         PlantOutputs {
             i: Phases::from_stator(axis.to_stator(i)),
             speed,
@@ -176,9 +182,10 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 11;
+    const STATE_VERSION: u16 = 12;
 
     fn derive(&mut self) {
+        self.warm.least_inductance = self.parameters.least_inductance();
         self.take(self.warm.at);
     }
 
@@ -189,6 +196,7 @@ impl Model for PmsmPlant {
             let allowed = format!("at most {fastest} rad/s in magnitude, the speed of any machine with this motor.n_p");
             return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.initial.speed, allowed));
         }
+        flux_map::validate(&self.parameters)?;
         thermal::validate(&self.parameters)?;
         self.judge_temperatures(&self.inputs)
     }
@@ -235,6 +243,22 @@ impl Model for PmsmPlant {
             self.advance_at_temperature(step.h)
         } else {
             self.advance_with_temperatures(step.h)
+        }
+    }
+}
+
+impl Warns for PmsmPlant {
+    fn warn(&self, log: &mut Warnings<'_>) {
+        let (map, psi) = (&self.parameters.flux_map, self.state.psi);
+        if map.used && !map.holds(psi - Dq::new(self.warm.motor.psi_M, 0.0)) {
+            log.warn("flux_map", || {
+                format!(
+                    "psi_d = {} Wb, psi_q = {} Wb is beyond the flux map: the inductances of its edge go on there; limit the current, \
+                     or fit a map to a table of greater currents",
+                    psi.d(),
+                    psi.q()
+                )
+            });
         }
     }
 }

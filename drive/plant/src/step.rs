@@ -11,7 +11,6 @@ use crate::model::PmsmPlant;
 use crate::power::{Energy, Powers};
 use crate::signals::PlantInputs;
 use crate::state::{State, axis_at};
-use crate::tables::PlantParameters;
 use crate::thermal::ThermalMode;
 use drive_base::frame::{AlphaBeta, Dq};
 use drive_base::integrate::rk4;
@@ -35,7 +34,7 @@ impl PmsmPlant {
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     fn at_the_shaft(&self) -> (State, Passed) {
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let mechanics = &self.parameters.mechanics;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         if !mechanics.imposed {
             return (self.state, Passed::default());
@@ -44,7 +43,7 @@ impl PmsmPlant {
         let axis = axis_at(motor, angle_shaft);
         let machine = self.machine::<false>();
         let psi = machine.from_stator(axis, machine.to_stator(self.state.axis, self.state.psi));
-        let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
+        let stored = |psi| machine::magnetic_energy(motor, self.parameters.magnetics(), psi);
         let energy = Energy { mech: stored(self.state.psi) - stored(psi), ..Energy::default() };
         (State { psi, speed: speed_shaft, angle: angle_shaft, axis }, Passed { energy, ..Passed::default() })
     }
@@ -52,10 +51,10 @@ impl PmsmPlant {
     /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s), with a voltage that
     /// follows the currents.
     pub(super) fn substeps(&self, h: f64, speed: f64, legs: &Legs, switches: &Switches) -> Result<f64, Fault> {
-        let PlantParameters { motor, inverter, .. } = &self.parameters;
+        let inverter = &self.parameters.inverter;
         let longest = if switches.kinks() {
             // Half of a time constant in the zone: no kink is looked for, so that the energies need shorter steps.
-            0.5 * LONGEST_STEP.min(legs.time(motor, inverter.devices.threshold()))
+            0.5 * LONGEST_STEP.min(legs.time(self.warm.least_inductance, inverter.devices.threshold()))
         } else {
             LONGEST_STEP
         };
@@ -138,7 +137,7 @@ impl PmsmPlant {
     #[inline(never)]
     fn integrate_any(&self, start: &State, h: f64, u: AlphaBeta) -> (State, Passed) {
         let mechanics = &self.parameters.mechanics;
-        if self.parameters.saturation.is_none() {
+        if self.parameters.is_linear() {
             self.integrate_linear(start, h, u)
         } else if mechanics.is_whole(start.speed) {
             self.integrate_ideal::<_, false>(start, h, u, Whole::new(mechanics, start.speed))
@@ -152,9 +151,9 @@ impl PmsmPlant {
     #[inline(always)]
     fn pass_ideal(&self, h: f64) -> Result<(State, Passed), Fault> {
         let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let mechanics = &self.parameters.mechanics;
         let is_one = Self::is_one_step(h, self.machine::<true>().electrical(self.state.speed));
-        if is_one && saturation.is_none() && !mechanics.imposed {
+        if is_one && self.parameters.is_linear() && !mechanics.imposed {
             let (next, step) = self.integrate_linear(&self.state, h, u);
             if mechanics.shorter(h, self.state.speed, next.speed).is_none() {
                 return Ok((next, step));
@@ -307,10 +306,10 @@ impl PmsmPlant {
 
     /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.
     fn remaining(&self, state: &State, legs: &Legs) -> Option<f64> {
-        let (motor, saturation) = (&self.warm.motor, &self.parameters.saturation);
-        let i = machine::current(motor, saturation, state.psi) - self.idle_current(motor, state.speed);
+        let motor = &self.warm.motor;
+        let i = machine::current(motor, self.parameters.magnetics(), state.psi) - self.idle_current(motor, state.speed);
         let blocked = legs.block(motor, state.axis, i, f64::from(motor.n_p) * state.speed);
-        let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
+        let stored = |psi| machine::magnetic_energy(motor, self.parameters.magnetics(), psi);
         blocked.then(|| stored(state.psi) - stored(self.idle_flux(motor, state.speed)))
     }
 }

@@ -1,7 +1,9 @@
 //! The plant's parameters, and the tables of its variables.
 
+use crate::flux_map::{FLUX_MAP, FluxMap};
 use crate::inverter::{INVERTER, Inverter};
 use crate::iron::{IRON, Iron};
+use crate::machine::Magnetics;
 use crate::mechanics::{MECHANICS, Mechanics};
 use crate::model::PmsmPlant;
 use crate::power::{ENERGY, POWERS};
@@ -21,6 +23,8 @@ pub struct PlantParameters {
     pub motor: Motor,
     /// Its saturation.
     pub saturation: Saturation,
+    /// A map in place of inductances and saturation.
+    pub flux_map: FluxMap,
     /// Inertia and friction.
     pub mechanics: Mechanics,
     /// State at the start.
@@ -33,6 +37,31 @@ pub struct PlantParameters {
     pub winding: Winding,
     /// Temperatures and heat.
     pub thermal: Thermal,
+}
+
+impl PlantParameters {
+    /// How the current follows from the flux linkage.
+    #[inline]
+    pub fn magnetics(&self) -> Magnetics<'_> {
+        if self.flux_map.used {
+            Magnetics::Map(&self.flux_map)
+        } else if self.saturation.is_none() {
+            Magnetics::Linear
+        } else {
+            Magnetics::Polynomial(&self.saturation)
+        }
+    }
+
+    /// Whether the inductances alone give the current.
+    #[inline]
+    pub fn is_linear(&self) -> bool {
+        self.saturation.is_none() && !self.flux_map.used
+    }
+
+    /// The smallest inductance in H, over all states of a map.
+    pub fn least_inductance(&self) -> f64 {
+        if self.flux_map.used { self.flux_map.least_inductance() } else { self.motor.L_d.min(self.motor.L_q) }
+    }
 }
 
 /// The winding beyond its resistance.
@@ -100,6 +129,7 @@ pub const PARAMETERS: &Table<PlantParameters> = &Table::new(
         &[
             P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
             P::part("saturation.", &Part { table: SATURATION, lens: |p| &mut p.saturation }),
+            P::part("flux_map.", &Part { table: FLUX_MAP, lens: |p| &mut p.flux_map }),
             P::part("mechanics.", &Part { table: MECHANICS, lens: |p| &mut p.mechanics }),
             P::parameter("initial.theta_e", &RADIAN, "Electrical rotor angle at the start", |p| &mut p.initial.theta_e),
             P::parameter("initial.speed", &SPEED, "Mechanical rotor speed at the start", |p| &mut p.initial.speed),

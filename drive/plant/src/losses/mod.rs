@@ -83,8 +83,17 @@ impl Losses {
 /// Whether the legs are ideal and the winding's constant resistance is the machine's only loss: then a step is the quickest.
 /// Every parameter is named, so that a new one has to be thought of here.
 pub fn ideal(parameters: &PlantParameters) -> bool {
-    let PlantParameters { motor: _, saturation: _, inverter, mechanics: _, initial: _, iron, winding, thermal: _ } =
-        parameters;
+    let PlantParameters {
+        motor: _,
+        saturation: _,
+        flux_map: _,
+        inverter,
+        mechanics: _,
+        initial: _,
+        iron,
+        winding,
+        thermal: _,
+    } = parameters;
     let Inverter { dead_time, T_pwm: _, i_zero: _, devices } = inverter;
     let Winding { k_ac } = winding;
     *dead_time == 0.0 && devices.is_none() && iron.is_none() && *k_ac == 0.0
