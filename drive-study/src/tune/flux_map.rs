@@ -24,6 +24,9 @@ const SMOOTHNESS: f64 = 1e-5;
 /// Weight of an equation for the incremental inductance where there are no points, as a share of the same.
 const CONVEXITY: f64 = 1e-3;
 
+/// Factors of a third difference.
+const BINOMIAL: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
+
 /// Most rounds that add such equations.
 const ROUNDS: u32 = 40;
 
@@ -153,7 +156,9 @@ impl Squares {
     fn add(&mut self, row: &[(usize, f64)], y: f64, weight: f64) {
         for &(a, x) in row {
             self.right[a] += weight * x * y;
-            row.iter().for_each(|&(b, z)| self.normal[(a, b)] += weight * x * z);
+            for &(b, z) in row {
+                self.normal[(a, b)] += weight * x * z;
+            }
         }
     }
 
@@ -182,7 +187,6 @@ fn solve(map: &mut FluxMap, points: &[Point], psi_M: f64) -> Option<()> {
     }
     let mean = squares.mean();
     // Third differences along both axes; along the q-axis across 0 too, where the energy is even.
-    const BINOMIAL: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
     for m in 0..D {
         for n in 0..Q {
             let difference = |place: &dyn Fn(usize) -> usize| [0, 1, 2, 3].map(|k| (place(k), BINOMIAL[k]));

@@ -87,8 +87,8 @@ impl<S: Scalar> Splines<S> {
         let mut slope = [r * r * -0.5, (t * 1.5 - c(2.0)) * t, (c(2.0) - r * 1.5) * r, t * t * 0.5];
         let curvature = [r, t * 3.0 - c(2.0), r * 3.0 - c(2.0), t];
         for k in 0..4 {
-            value[k] = value[k] + (slope[k] + curvature[k] * beyond * 0.5) * beyond;
-            slope[k] = slope[k] + curvature[k] * beyond;
+            value[k] += (slope[k] + curvature[k] * beyond * 0.5) * beyond;
+            slope[k] += curvature[k] * beyond;
         }
         Self { first, value, slope, curvature }
     }
@@ -122,7 +122,7 @@ impl FluxMap {
                 + by_q[1] * coefficient(1)
                 + by_q[2] * coefficient(2)
                 + by_q[3] * coefficient(3);
-            sum = sum + along_q * *by_d;
+            sum += along_q * *by_d;
         }
         sum
     }
@@ -182,8 +182,8 @@ impl FluxMap {
 
     /// The first knot (Wb beyond the magnet's flux linkage) at which more flux takes less current in some direction.
     pub fn flaw(&self) -> Option<Dq> {
-        // Also finds what is not a number.
-        self.knots().find(|&x| !(self.least_curvature(x) > 0.0))
+        // The maximum of a NaN and 0 is 0.
+        self.knots().find(|&x| self.least_curvature(x).max(0.0) == 0.0)
     }
 }
 
@@ -310,6 +310,7 @@ pub const FLUX_MAP: &Table<FluxMap> = &Table::new(
 );
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "a few intervals")]
 mod tests {
     use super::*;
     use fmu_core::Dual;

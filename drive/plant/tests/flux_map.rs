@@ -1,4 +1,5 @@
 //! A map of the flux linkage in the plant: of a linear machine, of one that saturates, in both interfaces, over temperature.
+#![expect(clippy::cast_precision_loss, reason = "a few intervals")]
 
 use drive_base::frame::{Dq, Phases};
 use drive_base::motor::Motor;
