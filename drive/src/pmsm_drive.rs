@@ -17,7 +17,7 @@ pub use period::Means;
 use crate::pair::Pair;
 #[cfg(doc)]
 use crate::{PmsmPlant, SensorlessController};
-use drive_base::frame::Phases;
+use drive_base::connection::Commanded;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
 use drive_plant::signals::{PlantInputs, PlantOutputs};
@@ -51,6 +51,8 @@ pub struct DriveInputs {
     pub tau_ref: f64,
     /// The drive operates; false: the controller stays in its initial state and the gates are off.
     pub enable: bool,
+    /// Active short circuit.
+    pub asc: bool,
     /// Temperatures in K.
     pub thermal: ThermalInputs,
 }
@@ -65,6 +67,7 @@ impl Default for DriveInputs {
             angle_shaft: 0.0,
             tau_ref: 0.0,
             enable: true,
+            asc: false,
             thermal: ThermalInputs::default(),
         }
     }
@@ -88,8 +91,8 @@ pub struct PmsmDrive {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,
-    /// Model Exchange: voltages of the plant, and whether its gates switch, since the last sample.
-    before: (Phases, bool),
+    /// Model Exchange: the command that acts in the plant since the last sample.
+    before: Commanded,
     period: Period,
     overload: Overload,
 }
@@ -116,14 +119,14 @@ impl PmsmDrive {
         (plant.speed_shaft, plant.angle_shaft, plant.thermal) =
             (inputs.speed_shaft, inputs.angle_shaft, inputs.thermal);
         let controller = &mut pair.controller.model.inputs;
-        (controller.tau_ref, controller.enable) = (inputs.tau_ref, inputs.enable);
+        (controller.tau_ref, controller.enable, controller.asc) = (inputs.tau_ref, inputs.enable, inputs.asc);
     }
 
     /// The plant's inputs: those of the drive, and the voltages that the controller shows.
     fn plant_inputs(&self) -> PlantInputs {
         let DriveInputs { tau_load, u_dc, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
-        let PlantInputs { u, enable, .. } = self.pair.plant.model.inputs;
-        PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, thermal }
+        let PlantInputs { u, enable, asc, .. } = self.pair.plant.model.inputs;
+        PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, asc, thermal }
     }
 
     /// Watches the load after a step; a start sequence and a drive at rest have no torque limits.
@@ -156,7 +159,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 15;
+    const STATE_VERSION: u16 = 16;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -188,7 +191,7 @@ impl Model for PmsmDrive {
         self.pair.initialize();
         self.period = Period::new(self.pair.plant.out.powers);
         self.overload = Overload::default();
-        self.before = (self.pair.plant.model.inputs.u, self.pair.plant.model.inputs.enable);
+        self.before = self.pair.plant.model.inputs.commanded();
     }
 
     fn output(&self, _now: Elapsed, out: &mut DriveOutputs) {
@@ -297,6 +300,13 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 "enable",
                 "The drive operates; false: the controller stays in its initial state, and the gates are off once enabled is false",
                 |m| &mut m.model.inputs.enable,
+            )
+            .optional(),
+            V::boolean_input(
+                "asc",
+                "Active short circuit, whatever enable says: all upper or all lower transistors conduct once short_circuit is true, and \
+                 the controller stays in its initial state",
+                |m| &mut m.model.inputs.asc,
             )
             .optional(),
             V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)

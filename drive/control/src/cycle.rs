@@ -73,6 +73,7 @@ impl SensorlessController {
             i_ref: i_ref.into(),
             lock_lost,
             enabled: true,
+            short_circuit: false,
             voltage_limited,
             current_limited,
             tau_max: high,

@@ -51,7 +51,7 @@ impl SensorlessController {
     /// One sample of the controller: currents in, voltage references out. If a lost estimator makes the state
     /// non-finite, the controller restarts at rest from its last angle and reports the loss.
     fn compute(&mut self) {
-        if !self.inputs.enable {
+        if !self.inputs.enable || self.inputs.asc {
             self.state.computed = self.rest();
             return;
         }
@@ -74,15 +74,15 @@ impl SensorlessController {
         Err(Fault::new("an input of the controller is not a finite number"))
     }
 
-    /// Not enabled: resets everything except the sample grid and the displayed outputs.
+    /// Not enabled, or the machine is short-circuited: resets everything except the sample grid and the displayed outputs.
     #[cold]
     fn rest(&mut self) -> ControllerOutputs {
-        let Self { parameters: par, state, .. } = self;
+        let Self { inputs, parameters: par, state, .. } = self;
         let new = State::new(par, false);
-        let out = new.computed;
+        let out = ControllerOutputs { short_circuit: inputs.asc, ..new.computed };
         let mut offset = state.offset;
         if par.compensation.calibrate {
-            offset.update(par.sensor.measure(self.inputs.i, state.samples), par.T_s);
+            offset.update(par.sensor.measure(inputs.i, state.samples), par.T_s);
         }
         *state = State { samples: state.samples, shown: state.shown, offset, ..new };
         out
@@ -175,7 +175,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 13;
+    const STATE_VERSION: u16 = 14;
 
     fn derive(&mut self) {
         let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
@@ -220,7 +220,9 @@ impl Model for SensorlessController {
     }
 
     fn initialize(&mut self) {
-        self.state = State::new(&self.parameters, self.inputs.enable);
+        let ControllerInputs { enable, asc, .. } = self.inputs;
+        self.state = State::new(&self.parameters, enable && !asc);
+        self.state.shown.short_circuit = asc;
         self.tuned = false;
     }
 
@@ -317,6 +319,12 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
                 "enable",
                 "The controller runs; false: it commands 0 V, and starts anew when set to true",
                 |m| &mut m.model.inputs.enable,
+            )
+            .optional(),
+            V::boolean_input(
+                "asc",
+                "Active short circuit: the controller rests as without enable, and short_circuit passes the request to the inverter",
+                |m| &mut m.model.inputs.asc,
             )
             .optional(),
             V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),

@@ -22,6 +22,8 @@ pub struct ControllerInputs {
     pub tau_ref: f64,
     /// The controller operates; false: it stays in its initial state and commands 0 V.
     pub enable: bool,
+    /// Active short circuit: the controller stays in its initial state and short-circuits the machine.
+    pub asc: bool,
 }
 
 impl ControllerInputs {
@@ -33,7 +35,7 @@ impl ControllerInputs {
 
     /// Whether all values are finite.
     pub fn is_finite(&self) -> bool {
-        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _ } = self;
+        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _, asc: _ } = self;
         all_finite([i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref])
     }
 }
@@ -48,6 +50,7 @@ impl Default for ControllerInputs {
             speed_meas: 0.0,
             tau_ref: 0.0,
             enable: true,
+            asc: false,
         }
     }
 }
@@ -70,6 +73,8 @@ pub struct ControllerOutputs {
     pub lock_lost: f64,
     /// Whether the controller operates.
     pub enabled: bool,
+    /// Whether the inverter shall short-circuit the machine.
+    pub short_circuit: bool,
     /// Whether the hexagon of u_dc limited the voltage references.
     pub voltage_limited: bool,
     /// Whether a current or torque limit limited the current references.
@@ -90,7 +95,7 @@ impl ControllerOutputs {
     /// What the plant receives.
     #[inline]
     pub fn commanded(&self) -> Commanded {
-        Commanded { u: self.u, enable: self.enabled }
+        Commanded { u: self.u, enable: self.enabled, asc: self.short_circuit }
     }
 
     /// Whether all values are finite.

@@ -286,6 +286,11 @@ pub const STATUS: &Table<ControllerOutputs> = &Table::new(
             O::boolean_output("enabled", "The controller is running: the voltage references are its own", |o| {
                 &mut o.enabled
             }),
+            O::boolean_output(
+                "short_circuit",
+                "The inverter short-circuits the machine: all upper or all lower transistors conduct",
+                |o| &mut o.short_circuit,
+            ),
             O::discrete_output(
                 "lock_lost",
                 &ONE,

@@ -91,13 +91,12 @@ impl Events for PmsmDrive {
             // With iron loss, the currents depend on the voltages: the controller samples them before they change.
             let shown = self.pair.plant.model.inputs.clone();
             let Pair { plant, controller, .. } = &mut self.pair;
-            (plant.model.inputs.u, plant.model.inputs.enable) = self.before;
+            plant.model.inputs.apply(self.before);
             plant.model.observe(now, &mut plant.out);
             plant.model.inputs = shown;
             controller.model.inputs.measure(plant.out.measured());
             controller.model.sample()?;
-            let PlantInputs { u, enable, .. } = plant.model.inputs;
-            self.before = (u, enable);
+            self.before = plant.model.inputs.commanded();
             self.watch_load();
         }
         self.pair.plant.model.event(now)
