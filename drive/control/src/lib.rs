@@ -26,6 +26,7 @@ mod state;
 pub mod tables;
 mod terminals;
 pub mod tracking;
+pub mod trip;
 pub mod weakening;
 pub mod zero_speed;
 

@@ -1,7 +1,7 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
 use crate::current::{self, CurrentGains};
-use crate::estimator::{Class, Estimator, Sample, Setup};
+use crate::estimator::{Class, Estimator, Kind, Sample, Setup};
 use crate::gains::Gains;
 use crate::lock::{LOST, Lock, LockGains, Reach};
 use crate::polarity;
@@ -11,6 +11,7 @@ use crate::speed::SpeedGains;
 use crate::start::StartMode;
 use crate::state::{InUse, State, context};
 use crate::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
+use crate::trip::{self, Cause, Trip};
 use crate::weakening::{self, WeakeningGains};
 use crate::zero_speed::{self, ZeroSpeed};
 use drive_base::motor::Motor;
@@ -55,6 +56,9 @@ impl SensorlessController {
             self.state.computed = self.rest();
             return;
         }
+        if self.parameters.trip.used && self.trips() {
+            return;
+        }
         let theta = self.state.computed.theta_est;
         self.control();
         self.state.k += 1;
@@ -74,17 +78,36 @@ impl SensorlessController {
         Err(Fault::new("an input of the controller is not a finite number"))
     }
 
+    /// Whether the drive has tripped, at this sample or before: then the controller rests.
+    #[inline(never)]
+    fn trips(&mut self) -> bool {
+        if self.state.trip.cause == Cause::None {
+            let cause = self.parameters.trip.cause(self.currents(), self.inputs.u_dc);
+            if cause == Cause::None {
+                return false;
+            }
+            self.state.trip = Trip::new(cause, self.state.computed.speed_est);
+        }
+        let Self { inputs, parameters: par, state, .. } = self;
+        state.trip.update(par, inputs, par.estimator == Kind::Sensored);
+        self.state.computed = self.rest();
+        true
+    }
+
     /// Not enabled, or the machine is short-circuited: resets everything except the sample grid and the displayed outputs.
     #[cold]
     fn rest(&mut self) -> ControllerOutputs {
         let Self { inputs, parameters: par, state, .. } = self;
         let new = State::new(par, false);
-        let out = ControllerOutputs { short_circuit: inputs.asc, ..new.computed };
+        // A trip stays until enable falls.
+        let trip = if inputs.enable { state.trip } else { Trip::default() };
+        let short_circuit = inputs.asc || trip.shorts;
+        let out = ControllerOutputs { short_circuit, tripped: trip.cause, ..new.computed };
         let mut offset = state.offset;
-        if par.compensation.calibrate {
+        if par.compensation.calibrate && !short_circuit {
             offset.update(par.sensor.measure(inputs.i, state.samples), par.T_s);
         }
-        *state = State { samples: state.samples, shown: state.shown, offset, ..new };
+        *state = State { samples: state.samples, shown: state.shown, offset, trip, ..new };
         out
     }
 
@@ -142,7 +165,9 @@ impl SensorlessController {
             polarity::validate(par)?;
         }
         // A running drive has to live with its DC link.
-        weakening::validate(par, if self.state.samples == 0 { u_dc } else { 0.0 })?;
+        let u_dc = if self.state.samples == 0 { u_dc } else { 0.0 };
+        weakening::validate(par, u_dc)?;
+        trip::validate(par, u_dc)?;
         // The start value is accepted with an estimator that does not read it.
         let reads = estimator.class() == Class::FluxObserver;
         if zero_speed.i_0 > limit.i && (reads || zero_speed.i_0 > ZeroSpeed::default().i_0) {
@@ -262,6 +287,15 @@ impl Sampled for SensorlessController {
 impl Warns for SensorlessController {
     fn warn(&self, log: &mut Warnings<'_>) {
         let (out, par, tau_ref) = (&self.state.shown, &self.parameters, self.inputs.tau_ref);
+        if out.tripped != Cause::None {
+            let stopped = if out.short_circuit { "the machine is short-circuited" } else { "the gates are off" };
+            return log.warn("tripped", || {
+                format!(
+                    "{} beyond its limit: {stopped}, and the controller rests until enable falls",
+                    out.tripped.what(par)
+                )
+            });
+        }
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
         if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
             log.warn("tau_ref", || {

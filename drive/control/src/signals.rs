@@ -1,5 +1,6 @@
 //! Inputs and outputs of the controller.
 
+use crate::trip::Cause;
 use drive_base::connection::{Commanded, Measured};
 use drive_base::frame::{DqHat, Phases};
 use drive_base::math::all_finite;
@@ -75,6 +76,8 @@ pub struct ControllerOutputs {
     pub enabled: bool,
     /// Whether the inverter shall short-circuit the machine.
     pub short_circuit: bool,
+    /// What has tripped.
+    pub tripped: Cause,
     /// Whether the hexagon of u_dc limited the voltage references.
     pub voltage_limited: bool,
     /// Whether a current or torque limit limited the current references.

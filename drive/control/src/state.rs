@@ -10,6 +10,7 @@ use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::speed::{SpeedController, SpeedGains};
 use crate::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::tables::ControllerParameters;
+use crate::trip::Trip;
 use crate::weakening::Weakening;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::{within, wrap};
@@ -117,6 +118,7 @@ pub(super) struct State {
     pub(super) u_pi: DqHat,
     pub(super) offset: Offset,
     pub(super) lock: Lock,
+    pub(super) trip: Trip,
     pub(super) weakening: Weakening,
     /// Time in s for which a limit has reduced the references, while field weakening is in use.
     pub(super) limited_for: f64,

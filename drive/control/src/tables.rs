@@ -9,6 +9,7 @@ use crate::sensor::{SENSOR, Sensor};
 use crate::signals::ControllerOutputs;
 use crate::speed::{SPEED_LOOP, SpeedLoop};
 use crate::start::{START, StartParameters};
+use crate::trip::{TRIP, TripParameters};
 use crate::weakening::{WEAKENING, WeakeningParameters};
 use crate::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use drive_base::math::{at_least, at_most};
@@ -132,6 +133,8 @@ pub struct ControllerParameters {
     pub polarity: PolarityParameters,
     /// Detection of a lost rotor.
     pub lock: LockParameters,
+    /// Over-current and over-voltage trips.
+    pub trip: TripParameters,
     /// Current sensors.
     pub sensor: Sensor,
     /// Dead-time compensation.
@@ -161,6 +164,7 @@ impl Default for ControllerParameters {
             start: StartParameters::default(),
             polarity: PolarityParameters::default(),
             lock: LockParameters::default(),
+            trip: TripParameters::default(),
             sensor: Sensor::default(),
             compensation: Compensation::default(),
             estimators: EstimatorParameters::default(),
@@ -219,6 +223,7 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
             P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
             P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
+            P::part("trip.", &Part { table: TRIP, lens: |p| &mut p.trip }),
             P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
             P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
             P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
@@ -290,6 +295,11 @@ pub const STATUS: &Table<ControllerOutputs> = &Table::new(
                 "short_circuit",
                 "The inverter short-circuits the machine: all upper or all lower transistors conduct",
                 |o| &mut o.short_circuit,
+            ),
+            O::enumeration_output(
+                "tripped",
+                "What has tripped: the controller rests until enable falls",
+                &Field(|o| &mut o.tripped),
             ),
             O::discrete_output(
                 "lock_lost",
