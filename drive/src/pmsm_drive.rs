@@ -53,6 +53,8 @@ pub struct DriveInputs {
     pub enable: bool,
     /// Active short circuit.
     pub asc: bool,
+    /// The sensor of the shaft works.
+    pub sensor_valid: bool,
     /// Temperatures in K.
     pub thermal: ThermalInputs,
 }
@@ -68,6 +70,7 @@ impl Default for DriveInputs {
             tau_ref: 0.0,
             enable: true,
             asc: false,
+            sensor_valid: true,
             thermal: ThermalInputs::default(),
         }
     }
@@ -120,6 +123,7 @@ impl PmsmDrive {
             (inputs.speed_shaft, inputs.angle_shaft, inputs.thermal);
         let controller = &mut pair.controller.model.inputs;
         (controller.tau_ref, controller.enable, controller.asc) = (inputs.tau_ref, inputs.enable, inputs.asc);
+        controller.sensor_valid = inputs.sensor_valid;
     }
 
     /// The plant's inputs: those of the drive, and the voltages that the controller shows.
@@ -307,6 +311,12 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 "Active short circuit, whatever enable says: all upper or all lower transistors conduct once short_circuit is true, and \
                  the controller stays in its initial state",
                 |m| &mut m.model.inputs.asc,
+            )
+            .optional(),
+            V::boolean_input(
+                "sensor_valid",
+                "The sensor of the shaft works; false: controller.sensor.fallback takes over from it, if there is one",
+                |m| &mut m.model.inputs.sensor_valid,
             )
             .optional(),
             V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)

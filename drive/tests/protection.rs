@@ -1,4 +1,5 @@
-//! Protection of the drive, in Co-Simulation and in Model Exchange: over-current and over-voltage trips.
+//! Protection of the drive, in Co-Simulation and in Model Exchange: over-current and over-voltage trips, and a sensor that is
+//! lost during the run.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "../control/tests/machines/mod.rs"]
@@ -6,6 +7,7 @@ mod machines;
 
 use drive::PmsmDrive;
 use drive::control::trip::Cause;
+use drive::estimator::Kind;
 use drive::plant::signals::Gates;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, Warns, integrate};
@@ -182,6 +184,73 @@ fn a_trip_that_operation_would_reach_is_refused() {
     // Off, nothing is checked.
     let mut drive = PmsmDrive::default();
     drive.pair.controller.model.parameters.trip.i = -1.0;
+    drive.derive();
+    drive.validate().unwrap();
+}
+
+#[test]
+fn a_lost_sensor_hands_over_to_the_fallback() {
+    for exchange in [false, true] {
+        for fallback in [Kind::Rasmussen, Kind::ExtendedEmf, Kind::KalmanFilter, Kind::FluxObserver] {
+            let mut run = Run::new(&b(), exchange, |drive| {
+                drive.pair.controller.model.parameters.fallback = fallback;
+                drive.pair.controller.model.parameters.weakening.used = false;
+            });
+            let inputs = &mut run.drive.model.inputs;
+            (inputs.speed_ref, inputs.tau_load) = (1500.0 * RPM, 2.0);
+            run.run(0.4);
+            let before = run.drive.out.clone();
+            assert!(!before.controller.sensor_lost && (before.plant.speed - 1500.0 * RPM).abs() < 0.1);
+            run.drive.model.inputs.sensor_valid = false;
+            let (mut torque, mut speed) = (0.0_f64, 0.0_f64);
+            for _ in 0..3000 {
+                run.step();
+                let out = &run.drive.out;
+                torque = torque.max((out.plant.tau_e - before.plant.tau_e).abs());
+                speed = speed.max((out.plant.speed - before.plant.speed).abs());
+            }
+            println!(
+                "{fallback:?}, {exchange}: {torque} N.m, {speed} rad/s, lost {}",
+                run.drive.out.controller.lock_lost
+            );
+            let out = &run.drive.out.controller;
+            assert!(out.sensor_lost && out.enabled && out.lock_lost < 0.01, "{fallback:?}: {out:?}");
+            assert!(torque < 0.01 && speed < 0.05, "{fallback:?}, {exchange}: {torque} N.m, {speed} rad/s");
+            // The sensor's values do not matter any more, and it does not come back by itself.
+            run.drive.model.inputs.sensor_valid = true;
+            run.run(0.1);
+            assert!(run.drive.out.controller.sensor_lost);
+            run.drive.model.inputs.enable = false;
+            run.run(3.0 * T_S);
+            run.drive.model.inputs.enable = true;
+            run.run(0.3);
+            let out = &run.drive.out;
+            assert!(!out.controller.sensor_lost && (out.plant.speed - 1500.0 * RPM).abs() < 1.0, "{out:?}");
+        }
+    }
+}
+
+#[test]
+fn without_a_fallback_the_sensor_stays_in_use() {
+    let run = |valid: bool| {
+        let mut run = Run::new(&b(), false, |drive| drive.inputs.sensor_valid = valid);
+        run.drive.model.inputs.speed_ref = 1000.0 * RPM;
+        run.run(0.2);
+        run.drive.out
+    };
+    assert_eq!(run(true), run(false));
+}
+
+#[test]
+fn a_fallback_that_cannot_work_is_refused() {
+    let mut drive = PmsmDrive::default();
+    let par = &mut drive.pair.controller.model.parameters;
+    (par.estimator, par.fallback, par.weakening.used) = (Kind::Sensored, Kind::PulsatingInjection, true);
+    drive.derive();
+    let message = drive.validate().unwrap_err().message().to_owned();
+    assert!(message.contains("sensor.fallback") && message.contains("PulsatingInjection"), "{message}");
+    // It is checked only where it is in use.
+    drive.pair.controller.model.parameters.estimator = Kind::Rasmussen;
     drive.derive();
     drive.validate().unwrap();
 }

@@ -76,6 +76,7 @@ impl SensorlessController {
             enabled: true,
             short_circuit: false,
             tripped: Cause::None,
+            sensor_lost: self.state.sensor_lost,
             voltage_limited,
             current_limited,
             tau_max: high,

@@ -59,6 +59,9 @@ impl SensorlessController {
         if self.parameters.trip.used && self.trips() {
             return;
         }
+        if !self.inputs.sensor_valid && self.parameters.has_fallback() {
+            self.lose_sensor(true);
+        }
         let theta = self.state.computed.theta_est;
         self.control();
         self.state.k += 1;
@@ -78,6 +81,15 @@ impl SensorlessController {
         Err(Fault::new("an input of the controller is not a finite number"))
     }
 
+    /// The sensor is `lost`, or with a new start in use again; the gains follow the estimator.
+    #[cold]
+    fn lose_sensor(&mut self, lost: bool) {
+        if self.state.sensor_lost != lost {
+            self.state.sensor_lost = lost;
+            self.derive();
+        }
+    }
+
     /// Whether the drive has tripped, at this sample or before: then the controller rests.
     #[inline(never)]
     fn trips(&mut self) -> bool {
@@ -89,7 +101,8 @@ impl SensorlessController {
             self.state.trip = Trip::new(cause, self.state.computed.speed_est);
         }
         let Self { inputs, parameters: par, state, .. } = self;
-        state.trip.update(par, inputs, par.estimator == Kind::Sensored);
+        let sensor = par.estimator == Kind::Sensored && inputs.sensor_valid && !state.sensor_lost;
+        state.trip.update(par, inputs, sensor);
         self.state.computed = self.rest();
         true
     }
@@ -97,17 +110,19 @@ impl SensorlessController {
     /// Not enabled, or the machine is short-circuited: resets everything except the sample grid and the displayed outputs.
     #[cold]
     fn rest(&mut self) -> ControllerOutputs {
+        let sensor_lost = self.inputs.enable && self.state.sensor_lost;
+        self.lose_sensor(sensor_lost);
         let Self { inputs, parameters: par, state, .. } = self;
         let new = State::new(par, false);
         // A trip stays until enable falls.
         let trip = if inputs.enable { state.trip } else { Trip::default() };
         let short_circuit = inputs.asc || trip.shorts;
-        let out = ControllerOutputs { short_circuit, tripped: trip.cause, ..new.computed };
+        let out = ControllerOutputs { short_circuit, tripped: trip.cause, sensor_lost, ..new.computed };
         let mut offset = state.offset;
         if par.compensation.calibrate && !short_circuit {
             offset.update(par.sensor.measure(inputs.i, state.samples), par.T_s);
         }
-        *state = State { samples: state.samples, shown: state.shown, offset, trip, ..new };
+        *state = State { samples: state.samples, shown: state.shown, offset, trip, sensor_lost, ..new };
         out
     }
 
@@ -115,7 +130,7 @@ impl SensorlessController {
     #[cold]
     fn start_again(&mut self, theta: f64) {
         let Self { parameters: par, state, .. } = self;
-        let kind = par.estimator;
+        let kind = par.estimator_with(state.sensor_lost);
         let nothing = Sample { k: state.k, ..Sample::default() };
         let (estimator, _) = Estimator::start(kind, &context(par, &par.estimators, &par.motor), &nothing, theta, 0.0);
         *state = State {
@@ -124,6 +139,7 @@ impl SensorlessController {
             offset: state.offset,
             estimator,
             lock: Lock::lost(),
+            sensor_lost: state.sensor_lost,
             shown: state.shown,
             ..State::default()
         };
@@ -132,6 +148,7 @@ impl SensorlessController {
             theta_est: theta,
             lock_lost: LOST,
             enabled: true,
+            sensor_lost: state.sensor_lost,
             R_s_est,
             ..ControllerOutputs::default()
         };
@@ -143,6 +160,18 @@ impl SensorlessController {
     /// States which parameters do not fit together, and what to do.
     pub fn validate_on(&self, u_dc: f64) -> Result<(), Fault> {
         let par = &self.parameters;
+        self.validate_with(par, u_dc)?;
+        if !par.has_fallback() {
+            return Ok(());
+        }
+        let fallback = ControllerParameters { estimator: par.fallback, ..par.clone() };
+        let is = PARAMETERS.tell(par, |p| &mut p.fallback);
+        self.validate_with(&fallback, u_dc)
+            .map_err(|fault| Fault::new(format!("{is} does not fit: as the estimator, {fault}")))
+    }
+
+    /// [`validate_on`](Self::validate_on) for these parameters.
+    fn validate_with(&self, par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
         let ControllerParameters { limit, zero_speed, estimator, start, .. } = par;
         let tell = |name: &str| PARAMETERS.tell_name(par, name).unwrap_or_else(|| name.to_owned());
         estimator.validate(&Setup {
@@ -203,10 +232,10 @@ impl Model for SensorlessController {
     const STATE_VERSION: u16 = 14;
 
     fn derive(&mut self) {
-        let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = &self.parameters;
+        let ControllerParameters { current, speed_loop, motor, J, limit, lock, T_s, .. } = &self.parameters;
         // Finite, so that no current is no torque with any psi_M.
         let k = motor.torque_constant().min(f64::MAX);
-        let observes_flux = estimator.class() == Class::FluxObserver;
+        let observes_flux = self.parameters.estimator_with(self.state.sensor_lost).class() == Class::FluxObserver;
         // With i_d of the low-speed law, the limits of the currents are those of each sample.
         let by_law = observes_flux && !current.mtpa;
         let tau = if by_law { limit.tau } else { max_torque(motor, limit, current.mtpa) };
@@ -245,6 +274,7 @@ impl Model for SensorlessController {
     }
 
     fn initialize(&mut self) {
+        self.lose_sensor(false);
         let ControllerInputs { enable, asc, .. } = self.inputs;
         self.state = State::new(&self.parameters, enable && !asc);
         self.state.shown.short_circuit = asc;
@@ -312,6 +342,7 @@ impl Warns for SensorlessController {
             theta_est: out.theta_est,
             lock_lost: LOST,
             enabled: true,
+            sensor_lost: out.sensor_lost,
             R_s_est: out.R_s_est,
             ..ControllerOutputs::default()
         };
@@ -369,6 +400,12 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(
                 .read_with("estimator", "Sensored"),
             V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
                 .read_with("estimator", "Sensored"),
+            V::boolean_input(
+                "sensor_valid",
+                "The sensor works; false: sensor.fallback takes over from it, if there is one",
+                |m| &mut m.model.inputs.sensor_valid,
+            )
+            .optional(),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
         ]

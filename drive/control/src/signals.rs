@@ -25,6 +25,8 @@ pub struct ControllerInputs {
     pub enable: bool,
     /// Active short circuit: the controller stays in its initial state and short-circuits the machine.
     pub asc: bool,
+    /// The sensor of the shaft works.
+    pub sensor_valid: bool,
 }
 
 impl ControllerInputs {
@@ -36,7 +38,7 @@ impl ControllerInputs {
 
     /// Whether all values are finite.
     pub fn is_finite(&self) -> bool {
-        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _, asc: _ } = self;
+        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _, asc: _, sensor_valid: _ } = self;
         all_finite([i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref])
     }
 }
@@ -52,6 +54,7 @@ impl Default for ControllerInputs {
             tau_ref: 0.0,
             enable: true,
             asc: false,
+            sensor_valid: true,
         }
     }
 }
@@ -78,6 +81,8 @@ pub struct ControllerOutputs {
     pub short_circuit: bool,
     /// What has tripped.
     pub tripped: Cause,
+    /// The sensor of the shaft is lost: the fallback supplies angle and speed.
+    pub sensor_lost: bool,
     /// Whether the hexagon of u_dc limited the voltage references.
     pub voltage_limited: bool,
     /// Whether a current or torque limit limited the current references.

@@ -1,7 +1,7 @@
 //! The controller state from one sample to the next, and the source of the angle: a start sequence or the estimator.
 
 use crate::current::CurrentController;
-use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Sample};
+use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::gains::{Gains, Law};
 use crate::lock::Lock;
 use crate::polarity::{PolaritySearch, SearchStep};
@@ -119,6 +119,8 @@ pub(super) struct State {
     pub(super) offset: Offset,
     pub(super) lock: Lock,
     pub(super) trip: Trip,
+    /// The sensor is lost: `sensor.fallback` has taken its place until enable falls.
+    pub(super) sensor_lost: bool,
     pub(super) weakening: Weakening,
     /// Time in s for which a limit has reduced the references, while field weakening is in use.
     pub(super) limited_for: f64,
@@ -173,12 +175,14 @@ impl State {
         sample: &Sample,
     ) -> (Estimate, Mode) {
         let context = context(par, &in_use.estimators, &in_use.motor);
+        let kind = par.estimator_with(self.sensor_lost);
         let first = (sample.k == 0).then(|| {
             let w = f64::from(par.motor.n_p) * par.speed_est;
-            let (estimator, estimate) = Estimator::start(par.estimator, &context, sample, par.theta_est, w);
+            let (estimator, estimate) = Estimator::start(kind, &context, sample, par.theta_est, w);
             self.estimator = estimator;
             estimate
         });
+        let first = first.or_else(|| self.fall_back(kind, &context, sample));
         let reference = if par.speed_loop.torque_mode { inputs.tau_ref } else { inputs.speed_ref };
         match &mut self.leader {
             Leader::Start(start) => match start.update(&par.start, &context, par.theta_est, reference, sample) {
@@ -204,6 +208,17 @@ impl State {
             },
             Leader::Estimator => (first.unwrap_or_else(|| self.estimator.update(&context, sample)), Mode::ClosedLoop),
         }
+    }
+
+    /// The estimate of the fallback, if the sensor was lost at this sample: it starts where the last one with the sensor leads.
+    fn fall_back(&mut self, kind: Kind, context: &Context, sample: &Sample) -> Option<Estimate> {
+        if !self.sensor_lost || !matches!(self.estimator, Estimator::Sensored(_)) {
+            return None;
+        }
+        let (theta, w) = (self.computed.theta_est, f64::from(context.motor.n_p) * self.computed.speed_est);
+        (self.estimator, _) = Estimator::start(kind, context, sample, theta, w);
+        self.estimator.place(context, sample, theta, w);
+        Some(Estimate::new(theta, w, sample))
     }
 
     /// The references at the estimated mechanical `speed` (rad/s) in addition to an `injection`; `old` are the gains of a speed loop

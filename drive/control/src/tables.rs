@@ -137,6 +137,8 @@ pub struct ControllerParameters {
     pub trip: TripParameters,
     /// Current sensors.
     pub sensor: Sensor,
+    /// Estimator that takes the place of a lost sensor; `Sensored`: none.
+    pub fallback: Kind,
     /// Dead-time compensation.
     pub compensation: Compensation,
     /// Parameters of the estimators.
@@ -166,9 +168,24 @@ impl Default for ControllerParameters {
             lock: LockParameters::default(),
             trip: TripParameters::default(),
             sensor: Sensor::default(),
+            fallback: Kind::Sensored,
             compensation: Compensation::default(),
             estimators: EstimatorParameters::default(),
         }
+    }
+}
+
+impl ControllerParameters {
+    /// The estimator in use; `lost`: the sensor is lost.
+    #[inline]
+    pub(crate) fn estimator_with(&self, lost: bool) -> Kind {
+        if lost { self.fallback } else { self.estimator }
+    }
+
+    /// Whether the drive reads a sensor that it can lose.
+    #[inline]
+    pub(crate) fn has_fallback(&self) -> bool {
+        self.estimator == Kind::Sensored && self.fallback != Kind::Sensored
     }
 }
 
@@ -225,6 +242,11 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
             P::part("trip.", &Part { table: TRIP, lens: |p| &mut p.trip }),
             P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
+            P::enumeration_parameter(
+                "sensor.fallback",
+                "Estimator that takes over when sensor_valid becomes false, until enable falls; Sensored: none",
+                &Field(|p| &mut p.fallback),
+            ),
             P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
             P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
         ]
@@ -301,6 +323,9 @@ pub const STATUS: &Table<ControllerOutputs> = &Table::new(
                 "What has tripped: the controller rests until enable falls",
                 &Field(|o| &mut o.tripped),
             ),
+            O::boolean_output("sensor_lost", "The sensor is lost: sensor.fallback supplies angle and speed", |o| {
+                &mut o.sensor_lost
+            }),
             O::discrete_output(
                 "lock_lost",
                 &ONE,
