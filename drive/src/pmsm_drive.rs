@@ -14,10 +14,13 @@ mod period;
 
 pub use period::Means;
 
+use crate::dc_link::ripple::ripple;
+use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
 use crate::pair::Pair;
 #[cfg(doc)]
 use crate::{PmsmPlant, SensorlessController};
 use drive_base::connection::Commanded;
+use drive_base::frame::Phases;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
 use drive_plant::signals::{PlantInputs, PlantOutputs};
@@ -85,6 +88,8 @@ pub struct DriveOutputs {
     pub controller: ControllerOutputs,
     /// Means over the last sample period, in both interfaces.
     pub means: Means,
+    /// The DC link's.
+    pub link: LinkOutputs,
 }
 
 /// A complete sensorless drive.
@@ -94,6 +99,10 @@ pub struct PmsmDrive {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,
+    /// Parameters of the DC link.
+    pub link_parameters: LinkParameters,
+    /// The DC link.
+    link: Link,
     /// Model Exchange: the command that acts in the plant since the last sample.
     before: Commanded,
     period: Period,
@@ -116,19 +125,41 @@ const FAR: f64 = 2.0;
 
 impl PmsmDrive {
     fn set_inputs(&mut self) {
-        let Self { inputs, pair, .. } = self;
-        pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
+        let u_dc = self.link_voltage();
+        let Self { inputs, pair, link, .. } = self;
+        pair.set_inputs(inputs.speed_ref, inputs.tau_load, u_dc);
         let plant = &mut pair.plant.model.inputs;
         (plant.speed_shaft, plant.angle_shaft, plant.thermal) =
             (inputs.speed_shaft, inputs.angle_shaft, inputs.thermal);
         let controller = &mut pair.controller.model.inputs;
-        (controller.tau_ref, controller.enable, controller.asc) = (inputs.tau_ref, inputs.enable, inputs.asc);
+        (controller.tau_ref, controller.asc) = (inputs.tau_ref, inputs.asc);
+        // There is no voltage to control with.
+        controller.enable = inputs.enable && !link.precharges;
         controller.sensor_valid = inputs.sensor_valid;
+    }
+
+    /// Voltage of the DC-link capacitor in V; 0 without the link.
+    pub fn link_u(&self) -> f64 {
+        self.link.u
+    }
+
+    /// Voltage (V) of inverter and controller.
+    #[inline]
+    fn link_voltage(&self) -> f64 {
+        // A solver may try voltages below 0, which the diodes of the inverter do not let pass.
+        if self.link_parameters.dc_link.used { self.link.u.max(0.0) } else { self.inputs.u_dc }
+    }
+
+    /// Ripple current (A, rms) of the capacitor with the `currents` (A) of the machine and the power `p_in` (W).
+    fn ripple(&self, currents: Phases, p_in: f64) -> f64 {
+        let inputs = &self.pair.plant.model.inputs;
+        ripple(inputs.voltage(), currents.to_stator(), p_in, inputs.u_dc)
     }
 
     /// The plant's inputs: those of the drive, and the voltages that the controller shows.
     fn plant_inputs(&self) -> PlantInputs {
-        let DriveInputs { tau_load, u_dc, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
+        let DriveInputs { tau_load, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
+        let u_dc = self.link_voltage();
         let PlantInputs { u, enable, asc, .. } = self.pair.plant.model.inputs;
         PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, asc, thermal }
     }
@@ -163,7 +194,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 16;
+    const STATE_VERSION: u16 = 17;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -182,7 +213,7 @@ impl Model for PmsmDrive {
                 control::PARAMETERS.tell(controller, |p| &mut p.motor.n_p)
             )));
         }
-        Ok(())
+        self.link_parameters.validate()
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
@@ -191,6 +222,7 @@ impl Model for PmsmDrive {
     }
 
     fn initialize(&mut self) {
+        self.link = Link::new(&self.link_parameters, self.inputs.u_dc);
         self.set_inputs();
         self.pair.initialize();
         self.period = Period::new(self.pair.plant.out.powers);
@@ -203,11 +235,21 @@ impl Model for PmsmDrive {
         out.plant = plant.with(powers, model.heat(&model.inputs, &plant.temperatures, &powers.losses));
         out.controller.clone_from(&self.pair.controller.out);
         out.means = self.period.means();
+        out.link = if self.link_parameters.dc_link.used {
+            LinkOutputs {
+                i_rms: self.ripple(out.plant.i, powers.p_in),
+                ..self.link.reached(&self.link_parameters, self.inputs.u_dc)
+            }
+        } else {
+            LinkOutputs { i_source: powers.i_dc, ..LinkOutputs::default() }
+        };
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         self.set_inputs();
-        let Self { inputs, pair, period, .. } = self;
+        self.link.begin(step.h);
+        let Self { inputs, pair, period, link, link_parameters, .. } = self;
+        let linked = link_parameters.dc_link.used;
         let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
         let end = step.end();
         if step.h > MAX_SAMPLES * grid.period {
@@ -227,7 +269,10 @@ impl Model for PmsmDrive {
             // An imposed shaft keeps turning at the held speed over all samples of the step.
             pair.plant.model.inputs.angle_shaft = inputs.angle_shaft + inputs.speed_shaft * before.since(step.start);
             let ends = next <= left + grid.width();
-            let h = if ends { next } else { left };
+            let whole = if ends { next } else { left };
+            let i_dc = pair.plant.model.powers().i_dc;
+            let h = if linked { link.longest(link_parameters, whole, grid.period, i_dc) } else { whole };
+            let ends = ends && h >= whole;
             // Between the samples of a step, nobody reads the outputs.
             if std::mem::take(&mut outputs_are_present) {
                 pair.exchange();
@@ -236,7 +281,15 @@ impl Model for PmsmDrive {
             }
             pair.advance(h)?;
             at_sample = ends;
-            period.add(pair.plant.model.powers(), h, ends);
+            let powers = pair.plant.model.powers();
+            period.add(powers, h, ends);
+            if linked {
+                link.advance(link_parameters, inputs.u_dc, h, powers.p_in * h);
+                if ends {
+                    link.sample(inputs.u_dc);
+                }
+                pair.supply(link.u, inputs.enable && !link.precharges);
+            }
             if pair.now == before {
                 return Err(Fault::new(format!(
                     "{} s after the start, T_s is below the resolution of time",
@@ -319,7 +372,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 |m| &mut m.model.inputs.sensor_valid,
             )
             .optional(),
-            V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |m| &mut m.model.inputs.u_dc)
+            V::input("u_dc", &VOLT, "DC-link voltage of inverter and controller; with dc_link.use, voltage of the source of the DC link", |m| &mut m.model.inputs.u_dc)
                 .at_least(0.0),
             V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
                 &mut m.model.inputs.tau_load
@@ -332,6 +385,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
             V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
             V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),
             V::part("", &Part { table: MEANS, lens: |m| &mut m.out.means }),
+            V::part("", &Part { table: LINK_OUTPUTS, lens: |m| &mut m.out.link }),
             V::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |m| &mut m.out.controller }),
             V::part("", &Part { table: plant::STATES, lens: |m| &mut m.model.pair.plant.model }),
             V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
@@ -339,6 +393,7 @@ const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
                 "controller.",
                 &Part { table: control::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
             ),
+            V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
         ]
     },
 );

@@ -42,7 +42,7 @@ impl Run {
         inputs.angle_shaft = inputs.speed_shaft * self.now.seconds();
         let step = Step { start: self.now, h: T_S };
         if self.exchange {
-            integrate::hybrid::<PmsmDrive, 4>(&mut self.drive.model, &step, 1e-5).unwrap();
+            integrate::hybrid::<PmsmDrive, 5>(&mut self.drive.model, &step, 1e-5).unwrap();
             let Block { model, out } = &mut self.drive;
             model.observe(step.end(), out);
         } else {

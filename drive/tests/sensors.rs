@@ -36,7 +36,7 @@ fn torque(tau: f64, exchange: bool, set: impl FnOnce(&mut Sensor)) -> [f64; 3] {
         drive.model.inputs.angle_shaft = w / 3.0 * now.seconds();
         let step = Step { start: now, h: T_S };
         if exchange {
-            integrate::hybrid::<PmsmDrive, 4>(&mut drive.model, &step, T_S).unwrap();
+            integrate::hybrid::<PmsmDrive, 5>(&mut drive.model, &step, T_S).unwrap();
             let Block { model, out } = &mut drive;
             model.observe(step.end(), out);
         } else {

@@ -196,7 +196,7 @@ fn model_exchange_takes_the_same_way() {
         }
         let step = Step { start: now, h: T_S };
         stepped.step(&step).unwrap();
-        integrate::hybrid::<PmsmDrive, 4>(&mut integrated.model, &step, 5e-6).unwrap();
+        integrate::hybrid::<PmsmDrive, 5>(&mut integrated.model, &step, 5e-6).unwrap();
         now = step.end();
         integrated.model.observe(now, &mut integrated.out);
         let (a, b) = (&stepped.out.plant, &integrated.out.plant);
