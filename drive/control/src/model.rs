@@ -1,5 +1,6 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
+use crate::battery;
 use crate::current::{self, CurrentGains};
 use crate::estimator::{Class, Estimator, Kind, Sample, Setup};
 use crate::gains::Gains;
@@ -197,6 +198,7 @@ impl SensorlessController {
         let u_dc = if self.state.samples == 0 { u_dc } else { 0.0 };
         weakening::validate(par, u_dc)?;
         trip::validate(par, u_dc)?;
+        battery::validate(par)?;
         // The start value is accepted with an estimator that does not read it.
         let reads = estimator.class() == Class::FluxObserver;
         if zero_speed.i_0 > limit.i && (reads || zero_speed.i_0 > ZeroSpeed::default().i_0) {

@@ -1,5 +1,6 @@
 //! The controller state from one sample to the next, and the source of the angle: a start sequence or the estimator.
 
+use crate::battery::Battery;
 use crate::current::CurrentController;
 use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::gains::{Gains, Law};
@@ -122,7 +123,8 @@ pub(super) struct State {
     /// The sensor is lost: `sensor.fallback` has taken its place until enable falls.
     pub(super) sensor_lost: bool,
     pub(super) weakening: Weakening,
-    /// Time in s for which a limit has reduced the references, while field weakening is in use.
+    pub(super) battery: Battery,
+    /// Time in s for which a limit has reduced the references, while field weakening or limits of the DC link are in use.
     pub(super) limited_for: f64,
     /// Outputs of the last sample.
     pub(super) computed: ControllerOutputs,
@@ -241,8 +243,8 @@ impl State {
         }
         let law = gains.law(par, speed);
         let limit = law.limit;
-        if par.weakening.used {
-            return self.weakened(gains, par, inputs, (speed, w_ref), &law, injection);
+        if par.weakening.used || par.dc.used {
+            return self.limited(gains, par, inputs, (speed, w_ref), &law, injection);
         }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
@@ -255,9 +257,9 @@ impl State {
         References { i, limited: requested.abs() > limit, tau: (tau, tau), weakens: false }
     }
 
-    /// [`references`](Self::references) with field weakening.
+    /// [`references`](Self::references) with field weakening or with limits of the DC link.
     #[inline(never)]
-    fn weakened(
+    fn limited(
         &mut self,
         gains: &Gains,
         par: &ControllerParameters,
@@ -268,7 +270,15 @@ impl State {
     ) -> References {
         let w = f64::from(par.motor.n_p) * speed;
         let at = (w, inputs.u_dc, injection.magnitude());
-        let (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, law.limit, self.k);
+        let (mut low, mut high) = if par.weakening.used {
+            self.weakening.limits(&gains.weakening, &par.weakening, at, law.limit, self.k)
+        } else {
+            (law.limit, law.limit)
+        };
+        if par.dc.used {
+            let (least, most) = self.battery.limits(&par.dc, &par.motor, inputs.u_dc, speed, self.i_ref);
+            (low, high) = (low.min(least / gains.k), high.min(most / gains.k));
+        }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
             (requested.clamp(-low, high), requested)
@@ -281,6 +291,9 @@ impl State {
         self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
         let tau = gains.k * i_q_ref;
         let plain = || gains.currents(par, law, i_q_ref);
+        if !par.weakening.used {
+            return References { i: plain(), limited, tau: (gains.k * low, gains.k * high), weakens: false };
+        }
         let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, par.current.mtpa, plain);
         References { i, limited, tau: (gains.k * low, gains.k * high), weakens: self.weakening.weakens }
     }

@@ -1,5 +1,6 @@
 //! The controller's parameters, and the tables of its parameters and outputs.
 
+use crate::battery::{DC_LIMITS, DcLimits};
 use crate::current::{CURRENT_LOOP, CurrentLoop};
 use crate::estimator::Kind;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
@@ -119,6 +120,8 @@ pub struct ControllerParameters {
     pub speed_est: f64,
     /// Limits of the references.
     pub limit: Limits,
+    /// Limits of the current of the DC link.
+    pub dc: DcLimits,
     /// The speed loop.
     pub speed_loop: SpeedLoop,
     /// The current loop.
@@ -159,6 +162,7 @@ impl Default for ControllerParameters {
             theta_est: 0.0,
             speed_est: 0.0,
             limit: Limits { i_q: 6.0, i: 7.5, tau: 1000.0 },
+            dc: DcLimits::default(),
             speed_loop: SpeedLoop::default(),
             current: CurrentLoop::default(),
             zero_speed: ZeroSpeed::default(),
@@ -233,6 +237,7 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::parameter("limit.tau", &NEWTON_METER, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
                 .above(0.0)
                 .tunable(),
+            P::part("limit.", &Part { table: DC_LIMITS, lens: |p| &mut p.dc }),
             P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
             P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
@@ -306,7 +311,7 @@ pub const STATUS: &Table<ControllerOutputs> = &Table::new(
             ),
             O::boolean_output(
                 "current_limited",
-                "limit.i_q, limit.i, limit.tau or field weakening limited the current references of the last sample",
+                "limit.i_q, limit.i, limit.tau, limit.i_dc_max, limit.i_dc_min or field weakening limited the current references of the last sample",
                 |o| &mut o.current_limited,
             ),
             O::boolean_output("weakens", "Field weakening lowers i_d_ref", |o| &mut o.weakens),

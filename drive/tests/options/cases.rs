@@ -5,6 +5,7 @@ use drive::Pair;
 use drive::control::reference::{max_torque, max_torque_per_ampere};
 use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters as Par;
+use drive::control::trip::Cause;
 use drive::estimator::Kind;
 use drive::estimator::pulsating::Demodulation;
 use drive::estimator::tracker::TrackerKind;
@@ -45,6 +46,29 @@ fn references(mut pair: Pair) -> Figures {
     pair.controller.model.inputs.tau_ref = 10.0;
     run(&mut pair, 0.1, |_, _| ());
     [pair.controller.out.i_ref.d, pair.controller.out.tau_max]
+}
+
+/// Whether a link of 600 V trips, and whether the machine is short-circuited once the link has lost its voltage.
+fn over_voltage(mut pair: Pair) -> Figures {
+    run(&mut pair, 0.1, |t, p| {
+        p.set_inputs(
+            SLOW,
+            0.0,
+            if t < 0.05 {
+                540.0
+            } else if t < 0.08 {
+                600.0
+            } else {
+                5.0
+            },
+        )
+    });
+    let out = &pair.controller.out;
+    [f64::from(u8::from(out.tripped == Cause::OverVoltage)), f64::from(u8::from(out.short_circuit))]
+}
+
+fn trips(_: Kind, without: Figures, with: Figures) -> bool {
+    without == [0.0, 0.0] && with == [1.0, 0.0]
 }
 
 /// Mean angle error in degrees, and estimate, after a load step of 7 N.m.
@@ -288,6 +312,46 @@ pub(super) const CASES: &[Case] = &[
         ask: |p| p.limit.tau = 2.0,
         figures: |pair| [references(pair)[1], 0.0],
         acts: |_, _, [tau_max, _]| (tau_max - 2.0).abs() < 1e-9,
+    },
+    Case {
+        option: "limit.i_dc_use",
+        on: slow,
+        ask: |p| (p.dc.used, p.dc.max) = (true, 0.3),
+        figures: |pair| [0.0, references(pair)[1]],
+        // The greatest torque takes 162 W, at a speed of 15.7 rad/s.
+        acts: |_, _, [_, tau_max]| tau_max * SLOW < 162.0 && tau_max > 3.0,
+    },
+    Case {
+        option: "trip.use",
+        on: slow,
+        ask: |p| (p.trip.used, p.trip.i, p.trip.u_dc) = (true, 15.1, 560.0),
+        figures: over_voltage,
+        acts: trips,
+    },
+    Case {
+        option: "trip.asc",
+        on: |kind| {
+            let mut pair = slow(kind);
+            (pair.controller.model.parameters.trip.used, pair.controller.model.parameters.trip.u_dc) = (true, 560.0);
+            pair.controller.model.parameters.trip.i = 15.1;
+            pair
+        },
+        ask: |p| p.trip.asc = true,
+        figures: over_voltage,
+        // On a link that a short circuit has discharged, any speed is above that of the diodes.
+        acts: |_, without, with| without == [1.0, 0.0] && with == [1.0, 1.0],
+    },
+    Case {
+        option: "sensor.fallback",
+        on: slow,
+        ask: |p| p.fallback = Kind::RotatingInjection,
+        figures: |mut pair| {
+            run(&mut pair, 0.2, |t, p| p.controller.model.inputs.sensor_valid = t < 0.1);
+            [f64::from(u8::from(pair.controller.out.sensor_lost)), off(&pair)]
+        },
+        acts: |kind, [without, _], [with, off]| {
+            without == 0.0 && if kind == Kind::Sensored { with == 1.0 && off > 1e-9 && off < 5.0 } else { with == 0.0 }
+        },
     },
     Case {
         option: "start.mode",
