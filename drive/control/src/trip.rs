@@ -28,6 +28,7 @@ enumeration! {
     }
 }
 
+#[expect(clippy::derivable_impls, reason = "the macro writes the variants")]
 impl Default for Cause {
     fn default() -> Self {
         Self::None
@@ -118,12 +119,11 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
     if !trip.used {
         return Ok(());
     }
-    // The negation also refuses NaN.
-    if !(trip.i > par.limit.i) {
+    if trip.i.is_nan() || trip.i <= par.limit.i {
         let limit = table.tell(par, |p| &mut p.limit.i);
         return Err(table.fault(par, |p| &mut p.trip.i, format!("above {limit}, the current limit")));
     }
-    if !(trip.u_dc > u_dc && trip.u_dc > 0.0) {
+    if trip.u_dc.is_nan() || trip.u_dc <= u_dc.max(0.0) {
         return Err(table.fault(par, |p| &mut p.trip.u_dc, format!("above u_dc, {u_dc} V at the start")));
     }
     Ok(())

@@ -105,23 +105,23 @@ impl LinkParameters {
         if !dc_link.used {
             return Ok(());
         }
-        // The negations also refuse NaN.
-        if !(dc_link.C > 0.0) {
+        let is_above = |x: f64, bound: f64| x > bound;
+        if !is_above(dc_link.C, 0.0) {
             return refuse(|p| &mut p.dc_link.C, "above 0 F; without a capacitor set dc_link.use to false");
         }
-        if !(dc_link.R_source > 0.0) {
+        if !is_above(dc_link.R_source, 0.0) {
             return refuse(|p| &mut p.dc_link.R_source, "above 0 Ohm; for an ideal source set dc_link.use to false");
         }
-        if !(dc_link.R_precharge >= 0.0) {
+        if dc_link.R_precharge.is_nan() || dc_link.R_precharge < 0.0 {
             return refuse(|p| &mut p.dc_link.R_precharge, "at least 0 Ohm, which is no precharge");
         }
         if !chopper.used {
             return Ok(());
         }
-        if !(chopper.R > 0.0) {
+        if !is_above(chopper.R, 0.0) {
             return refuse(|p| &mut p.chopper.R, "above 0 Ohm");
         }
-        if !(chopper.u_off > 0.0 && chopper.u_off < chopper.u_on) {
+        if !is_above(chopper.u_off, 0.0) || !is_above(chopper.u_on, chopper.u_off) {
             let on = LINK.tell(self, |p| &mut p.chopper.u_on);
             let allowed = format!("above 0 V and below {on}");
             return Err(LINK.fault(self, |p| &mut p.chopper.u_off, allowed));

@@ -45,7 +45,7 @@ impl<M: CompletedSteps + Events + Clone> Importer<M> {
             }
             let next = self.block.model.next(self.now).left(self.now).unwrap_or(left).min(left);
             let steps = (next / self.longest - 1e-9).ceil().max(1.0);
-            let crossed = self.to_crossing(next / steps, &set);
+            let crossed = self.until_crossing(next / steps, &set);
             self.done += 1;
             if self.told > 0 && self.done.is_multiple_of(self.told) {
                 self.block.model.complete(self.now).unwrap();
@@ -65,7 +65,7 @@ impl<M: CompletedSteps + Events + Clone> Importer<M> {
     }
 
     /// A step of `h` (s), or a shorter one to where an indicator has just changed its sign; whether one has.
-    fn to_crossing(&mut self, h: f64, set: &impl Fn(&mut M, f64)) -> bool {
+    fn until_crossing(&mut self, h: f64, set: &impl Fn(&mut M, f64)) -> bool {
         let (start, now, signs) = (self.block.model.clone(), self.now, self.signs());
         self.rk4(h, set);
         if self.signs() == signs {
