@@ -29,7 +29,8 @@ use drive_plant::thermal::{THERMAL_INPUTS, ThermalInputs};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
-    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, SampleGrid, Step, Table, Terminal, Warns,
+    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, SampleGrid, Sampled, Step, Table, Terminal,
+    Warns,
 };
 use period::{MEANS, Period};
 use serde::{Deserialize, Serialize};
@@ -213,7 +214,8 @@ impl Model for PmsmDrive {
                 control::PARAMETERS.tell(controller, |p| &mut p.motor.n_p)
             )));
         }
-        self.link_parameters.validate()
+        let starts = self.pair.controller.model.samples() == 0;
+        self.link_parameters.validate(if starts { self.inputs.u_dc } else { 0.0 })
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
@@ -269,10 +271,13 @@ impl Model for PmsmDrive {
             // An imposed shaft keeps turning at the held speed over all samples of the step.
             pair.plant.model.inputs.angle_shaft = inputs.angle_shaft + inputs.speed_shaft * before.since(step.start);
             let ends = next <= left + grid.width();
-            let whole = if ends { next } else { left };
-            let i_dc = pair.plant.model.powers().i_dc;
-            let h = if linked { link.longest(link_parameters, whole, grid.period, i_dc) } else { whole };
-            let ends = ends && h >= whole;
+            let h = if ends { next } else { left };
+            let (h, ends) = if linked {
+                let longest = link.longest(link_parameters, h, grid.period, pair.plant.model.powers().i_dc);
+                (longest, ends && longest >= h)
+            } else {
+                (h, ends)
+            };
             // Between the samples of a step, nobody reads the outputs.
             if std::mem::take(&mut outputs_are_present) {
                 pair.exchange();
@@ -281,14 +286,9 @@ impl Model for PmsmDrive {
             }
             pair.advance(h)?;
             at_sample = ends;
-            let powers = pair.plant.model.powers();
-            period.add(powers, h, ends);
+            period.add(pair.plant.model.powers(), h, ends);
             if linked {
-                link.advance(link_parameters, inputs.u_dc, h, powers.p_in * h);
-                if ends {
-                    link.sample(inputs.u_dc);
-                }
-                pair.supply(link.u, inputs.enable && !link.precharges);
+                supply(link, link_parameters, inputs, pair, (h, ends));
             }
             if pair.now == before {
                 return Err(Fault::new(format!(
@@ -301,6 +301,16 @@ impl Model for PmsmDrive {
         self.watch_load();
         Ok(())
     }
+}
+
+/// The `link` supplies the `pair` over a piece of `h` (s), at whose end a sample period may end.
+#[inline(never)]
+fn supply(link: &mut Link, par: &LinkParameters, inputs: &DriveInputs, pair: &mut Pair, (h, ends): (f64, bool)) {
+    link.advance(par, inputs.u_dc, h, pair.plant.model.powers().p_in * h);
+    if ends {
+        link.sample(inputs.u_dc);
+    }
+    pair.supply(link.u, inputs.enable && !link.precharges);
 }
 
 fn in_part(part: &str, fault: &Fault) -> Fault {

@@ -57,11 +57,8 @@ impl SensorlessController {
             self.state.computed = self.rest();
             return;
         }
-        if self.parameters.trip.used && self.trips() {
+        if (self.parameters.trip.used || !self.inputs.sensor_valid) && self.protect() {
             return;
-        }
-        if !self.inputs.sensor_valid && self.parameters.has_fallback() {
-            self.lose_sensor(true);
         }
         let theta = self.state.computed.theta_est;
         self.control();
@@ -84,6 +81,7 @@ impl SensorlessController {
 
     /// The sensor is `lost`, or with a new start in use again; the gains follow the estimator.
     #[cold]
+    #[inline(never)]
     fn lose_sensor(&mut self, lost: bool) {
         if self.state.sensor_lost != lost {
             self.state.sensor_lost = lost;
@@ -91,8 +89,20 @@ impl SensorlessController {
         }
     }
 
-    /// Whether the drive has tripped, at this sample or before: then the controller rests.
+    /// Watches the limits of the trips and the sensor; returns whether the controller rests.
+    #[cold]
     #[inline(never)]
+    fn protect(&mut self) -> bool {
+        if self.parameters.trip.used && self.trips() {
+            return true;
+        }
+        if !self.inputs.sensor_valid && self.parameters.has_fallback() {
+            self.lose_sensor(true);
+        }
+        false
+    }
+
+    /// Whether the drive has tripped, at this sample or before: then the controller rests.
     fn trips(&mut self) -> bool {
         if self.state.trip.cause == Cause::None {
             let cause = self.parameters.trip.cause(self.currents(), self.inputs.u_dc);

@@ -87,11 +87,11 @@ pub struct LinkParameters {
 }
 
 impl LinkParameters {
-    /// Checks what is in use.
+    /// Checks what is in use, on a source of `u_dc` (V) at the start, or 0 later.
     ///
     /// # Errors
     /// Names the variable, its value and what is allowed.
-    pub fn validate(&self) -> Result<(), Fault> {
+    pub fn validate(&self, u_dc: f64) -> Result<(), Fault> {
         let Self { dc_link, chopper } = self;
         let refuse = |get: fn(&mut Self) -> &mut f64, allowed: &str| Err(LINK.fault(self, get, allowed));
         if chopper.used && !dc_link.used {
@@ -121,10 +121,14 @@ impl LinkParameters {
         if !is_above(chopper.R, 0.0) {
             return refuse(|p| &mut p.chopper.R, "above 0 Ohm");
         }
-        if !is_above(chopper.u_off, 0.0) || !is_above(chopper.u_on, chopper.u_off) {
-            let on = LINK.tell(self, |p| &mut p.chopper.u_on);
-            let allowed = format!("above 0 V and below {on}");
+        let on = LINK.tell(self, |p| &mut p.chopper.u_on);
+        if !is_above(chopper.u_off, u_dc) {
+            let allowed =
+                format!("above u_dc, {u_dc} V at the start, and below {on}: the source would supply the chopper");
             return Err(LINK.fault(self, |p| &mut p.chopper.u_off, allowed));
+        }
+        if !is_above(chopper.u_on, chopper.u_off) {
+            return Err(LINK.fault(self, |p| &mut p.chopper.u_off, format!("below {on}")));
         }
         Ok(())
     }
@@ -196,7 +200,9 @@ impl Link {
         }
         let precharges = par.dc_link.R_precharge > 0.0;
         let u = if precharges { 0.0 } else { u_dc };
-        Self { u, precharges, point: Point { u, source: u_dc, ..Point::default() }, ..Self::default() }
+        let mut link = Self { u, precharges, point: Point { u, source: u_dc, ..Point::default() }, ..Self::default() };
+        link.event(par);
+        link
     }
 
     fn conductances(&self, par: &LinkParameters) -> Conductances {
@@ -239,6 +245,7 @@ impl Link {
     /// The longest piece in s, of `h` (s) that are left of a sample period `T_s` (s), in which the inverter with the current
     /// `i_dc` (A) changes the voltage by a tenth at most: it sees that of the beginning. A stiff source holds the voltage,
     /// however small the capacitor is.
+    #[inline(never)]
     pub fn longest(&self, par: &LinkParameters, h: f64, T_s: f64, i_dc: f64) -> f64 {
         let parts = (self.circuit(par, 0.0).change(h, i_dc) / (LARGEST_CHANGE * self.u)).ceil();
         // Without a voltage, as short as may be; NaN is one part.
@@ -282,13 +289,16 @@ impl Link {
     }
 
     /// Model Exchange: at a point of the solution, when the inverter has `taken` this energy (J) since the start, on a source of
-    /// `U` (V).
+    /// `U` (V). What is lost since the last point is that of a constant power; with the voltage of the solution, the energy of
+    /// the source follows from the balance, which then holds for steps of any length and for any tolerance of the solver.
     pub fn complete(&mut self, par: &LinkParameters, now: Elapsed, U: f64, taken: f64) {
         let h = now.since(self.point.time);
         if h > 0.0 {
             let Point { u, source, taken: before, .. } = self.point;
-            let piece = self.circuit(par, 0.5 * (source + U)).over(u, h, taken - before);
-            self.energy.add(&piece.energy);
+            let LinkEnergy { resistor, chopper, .. } =
+                self.circuit(par, 0.5 * (source + U)).over(u, h, taken - before).energy;
+            let stored = 0.5 * par.dc_link.C * (self.u * self.u - u * u);
+            self.energy.add(&LinkEnergy { source: resistor + chopper + taken - before + stored, resistor, chopper });
         }
         self.point = Point { time: now, u: self.u, source: U, taken };
     }
