@@ -28,7 +28,11 @@ impl Folder {
         loop {
             let dir = tempfile::Builder::new().prefix(&format!("{PREFIX}{owner}-")).tempdir()?;
             let name = dir.path().join(LOCK);
-            let lock = File::create_new(&name)?;
+            let lock = match File::create_new(&name) {
+                // Another process took the empty folder for an abandoned one.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                made => made?,
+            };
             match lock.try_lock() {
                 // Another thread or process took the new folder for an abandoned one: it removes it, or has removed it.
                 Err(TryLockError::WouldBlock) => {}
@@ -50,20 +54,37 @@ impl Drop for Folder {
         // A forked process has a copy of this and not the right to remove what its parent still uses.
         if self.owner == process::id() {
             self.lock = None;
-            let _ = fs::remove_dir_all(&self.path);
+            remove(&self.path);
         }
     }
 }
 
-/// Removes the folders whose lock no process holds. Skips those that this user cannot read or remove.
+/// Removes a folder as far as possible, its lock last: whatever a kill leaves has a lock or is empty.
+fn remove(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten().filter(|entry| entry.file_name() != LOCK) {
+        let path = entry.path();
+        let _ = if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            fs::remove_dir_all(path)
+        } else {
+            fs::remove_file(path)
+        };
+    }
+    let _ = fs::remove_dir_all(folder);
+}
+
+/// Removes the folders whose lock no process holds, and the empty ones, whose process was killed before it had made the lock or
+/// after it had removed it. Skips those that this user cannot read or remove.
 fn remove_abandoned() {
     let Ok(entries) = fs::read_dir(std::env::temp_dir()) else { return };
     for entry in entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX)) {
-        if entry.file_type().is_ok_and(|kind| kind.is_dir())
-            && let Ok(lock) = File::open(entry.path().join(LOCK))
-            && lock.try_lock().is_ok()
-        {
-            let _ = fs::remove_dir_all(entry.path());
+        if !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            continue;
+        }
+        match File::open(entry.path().join(LOCK)) {
+            Ok(lock) if lock.try_lock().is_ok() => remove(&entry.path()),
+            // Removes an empty folder only.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => drop(fs::remove_dir(entry.path())),
+            _ => {}
         }
     }
 }
@@ -82,8 +103,18 @@ mod tests {
         abandoned.lock = None;
         abandoned.owner = 0;
         drop(abandoned);
+        // A process that is killed before it has made the lock, and folders that are none of these.
+        let temporary = |prefix| tempfile::Builder::new().prefix(prefix).tempdir().unwrap();
+        let (empty, full) = (temporary("fmu-0-"), temporary("fmu-0-"));
+        fs::write(full.path().join("x"), "").unwrap();
         let later = Folder::new().unwrap();
-        assert!(!path.exists() && used.path().is_dir() && later.path().is_dir());
+        assert!(
+            !path.exists()
+                && !empty.path().exists()
+                && full.path().is_dir()
+                && used.path().is_dir()
+                && later.path().is_dir()
+        );
         assert!(used.path().file_name().unwrap().to_string_lossy().starts_with(&format!("fmu-{}-", process::id())));
     }
 

@@ -12,17 +12,22 @@ use crate::mechanics::{Coulomb, SHORTEST_STEP, Shaft, Standstill, Whole};
 use crate::model::PmsmPlant;
 use crate::state::State;
 use drive_base::frame::{AlphaBeta, Dq};
-use drive_base::motor::Motor;
-
-/// Longest integration step in s while a current is in the zone.
-const LONGEST_STEP_IN_ZONE: f64 = 50e-6;
 
 /// Shortest integration step in s that looks for a kink; where the zone asks for shorter ones, as long as those.
 const SHORTEST_AT_KINK: f64 = 0.5e-6;
 
+/// Longest integration step that follows a current in the zone, as a share of its time constant.
+const RESOLVED: f64 = 0.5;
+
 /// Largest electrical angle in rad in an integration step with losses: the energies are then in balance to 1e-7 over a drive
 /// cycle.
 const LARGEST_TURN_WITH_LOSSES: f64 = 0.0625;
+
+/// As above with a current in the zone, where a damped step is two of half its length.
+const LARGEST_TURN_DAMPED: f64 = 0.125;
+
+/// Longest damped step in s.
+const LONGEST_STEP_DAMPED: f64 = 50e-6;
 
 /// An integration step of `h` (s) under the voltage `u` (V), with the legs' voltages if the currents keep their sides.
 struct Step<'a> {
@@ -56,15 +61,19 @@ impl PmsmPlant {
     ) -> (Passed, Dq) {
         let (parameters, machine) = (&self.parameters, self.machine::<false>());
         let (zone, kinks) = (legs.i_zone(), switches.kinks());
-        let resolved = Self::longest_in_zone(&self.warm.motor, legs, parameters.inverter.devices.threshold());
+        let time = legs.time(&self.warm.motor, parameters.inverter.devices.threshold());
+        let resolved = LONGEST_STEP.min(RESOLVED * time);
         let dissipation = |speed| Dissipation::at(parameters, machine.resistance(), machine.electrical(speed));
-        let at_start = Path { u, dissipation: dissipation(state.speed), drops: &switches };
-        let guide = |state: &State| {
+        let at_start = dissipation(state.speed);
+        let guide = |state: &State, one_sided: Option<&OneSided>| {
             let psi = machine.to_stator(state.axis, state.psi);
-            let i = state.axis.to_stator(machine.current(state.psi));
-            switches.guided(at_start.guides(psi, i, machine.electrical(state.speed)))
+            let (i, w) = (state.axis.to_stator(machine.current(state.psi)), machine.electrical(state.speed));
+            switches.guided(match one_sided {
+                Some(&drops) => Path { u, dissipation: at_start, drops }.guides(psi, i, w),
+                None => Path { u, dissipation: at_start, drops: switches }.guides(psi, i, w),
+            })
         };
-        let (mut passed, mut left, mut start) = (Passed::default(), h, guide(state));
+        let (mut passed, mut left, mut start) = (Passed::default(), h, guide(state, None));
         let mut sides = Sides::of(start, zone);
         let mut one_sided = switches.one_sided(u, &sides);
         // The time since the last kink, or since the voltage changed; and how long the next step may be.
@@ -72,9 +81,8 @@ impl PmsmPlant {
         let mut searches = 1000.0 + h * MOST_SEARCHES;
         loop {
             let apart = !kinks || sides.apart();
-            let longest = if apart { LONGEST_STEP } else { Self::longest_after(since, resolved) };
-            // With damping, it is two steps.
-            let turn = if apart { LARGEST_TURN_WITH_LOSSES } else { 2.0 * LARGEST_TURN_WITH_LOSSES };
+            let longest = if apart { LONGEST_STEP } else { Self::longest_after(since, time) };
+            let turn = if apart { LARGEST_TURN_WITH_LOSSES } else { LARGEST_TURN_DAMPED };
             let longest = longest.min(turn / machine.electrical(state.speed).abs());
             let h = if left <= longest {
                 left
@@ -95,7 +103,7 @@ impl PmsmPlant {
                 limit = shorter;
                 continue;
             }
-            let end = guide(&next);
+            let end = guide(&next, apart.then_some(&one_sided));
             let shortest = SHORTEST_AT_KINK.min(resolved).max(SHORTEST_STEP);
             (limit, since) = (f64::INFINITY, since + h);
             let then = Sides::of(end, zone);
@@ -122,19 +130,20 @@ impl PmsmPlant {
         }
     }
 
-    /// Longest integration step in s with a current in the zone, `since` (s) the voltage changed, where steps up to `resolved`
-    /// (s) follow the current: 1.5 and 4.5 time constants first, so that the energies of its settling are right, too.
-    fn longest_after(since: f64, resolved: f64) -> f64 {
-        let steps = if resolved > SHORTEST_RESOLVED {
-            1.0
-        } else if since < 2.9 * resolved {
-            3.0
-        } else if since < 11.9 * resolved {
-            9.0
+    /// Longest integration step in s with a current in the zone that settles with this `time` constant (s), `since` (s) the
+    /// voltage changed. Damped steps begin with 1.5 and 4.5 time constants, so that the energies of the settling are right, too.
+    fn longest_after(since: f64, time: f64) -> f64 {
+        if RESOLVED * time > SHORTEST_RESOLVED {
+            return LONGEST_STEP.min(RESOLVED * time);
+        }
+        let longest = if since < 1.4 * time {
+            1.5 * time
+        } else if since < 5.9 * time {
+            4.5 * time
         } else {
-            f64::INFINITY
+            LONGEST_STEP_DAMPED
         };
-        LONGEST_STEP_IN_ZONE.min((steps * resolved).max(SHORTEST_STEP))
+        longest.clamp(SHORTEST_STEP, LONGEST_STEP_DAMPED)
     }
 
     /// The current (A) at the terminals less that of the flux linkage.
@@ -186,12 +195,5 @@ impl PmsmPlant {
         circuit: &Circuit<'_, Switches, Standstill>,
     ) -> (State, Passed) {
         self.integrate(start, h, circuit)
-    }
-
-    /// Longest integration step in s with a current in the zone where the voltages of the legs and of devices with this
-    /// `threshold` (V) fall linearly.
-    #[inline]
-    pub(super) fn longest_in_zone(motor: &Motor, legs: &Legs, threshold: f64) -> f64 {
-        LONGEST_STEP_IN_ZONE.min(0.5 * legs.time(motor, threshold))
     }
 }

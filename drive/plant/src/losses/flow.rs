@@ -183,7 +183,7 @@ impl<S: Scalar, D: Drops<S>> Path<D, S> {
     }
 }
 
-impl Path<&Switches> {
+impl<D: Drops<f64>> Path<D> {
     /// The currents (A) whose signs the dead time follows, and those that the devices follow; arguments as for
     /// [`flow`](Self::flow).
     #[inline]
@@ -214,7 +214,7 @@ mod tests {
         assert!((flow.i - steady).magnitude() < 1e-13 && (steady - i).magnitude() > 0.1, "{:?}, {steady:?}", flow.i);
         let none: Vector<_> = AlphaBeta::ZERO;
         let switches = Switches::new(&par, true, 300.0, Legs::switching(&par.inverter, 300.0));
-        let path = Path { u: none, dissipation: Dissipation { R: 2.0, G: None }, drops: &switches };
+        let path = Path { u: none, dissipation: Dissipation { R: 2.0, G: None }, drops: switches };
         assert_eq!(path.guides(psi, i, w), [i; 2], "without iron, both are the current of the flux linkage");
     }
 }

@@ -16,8 +16,8 @@ use drive_base::frame::{AlphaBeta, Phases, SQRT_3};
 
 /// The side of the zone on which the current of each leg is: 1 above, -1 below, 0 within; first that which the dead time
 /// follows, then that which the devices follow ([`Path::guides`](super::flow::Path::guides)).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sides([[f64; 3]; 2]);
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sides([[i8; 3]; 2]);
 
 impl Sides {
     /// How far beyond its edge, as a share of the zone, a current may be at the end of a step.
@@ -26,7 +26,7 @@ impl Sides {
     /// The sides of the currents `i` (A) with the zone +-`zone` (A).
     #[inline]
     pub fn of(i: [AlphaBeta; 2], zone: f64) -> Self {
-        let side = |i: f64| f64::from(i8::from(i > zone) - i8::from(i < -zone));
+        let side = |i: f64| i8::from(i > zone) - i8::from(i < -zone);
         Self(i.map(|i| {
             let Phases { a, b, c } = Phases::from_stator(i);
             [side(a), side(b), side(c)]
@@ -36,7 +36,7 @@ impl Sides {
     /// Whether no current is within the zone.
     #[inline]
     pub fn apart(&self) -> bool {
-        self.0.iter().flatten().product::<f64>() != 0.0
+        self.0.iter().flatten().all(|&side| side != 0)
     }
 
     /// Where in a step, as a share of it, the first current meets the edge of its side, if one leaves it by more than the
@@ -44,12 +44,12 @@ impl Sides {
     #[inline]
     pub fn first_crossing(&self, start: [AlphaBeta; 2], end: [AlphaBeta; 2], zone: f64) -> Option<f64> {
         let tolerance = Self::TOLERANCE * zone;
-        let leg = |side: f64, from: f64, to: f64| {
+        let leg = |side: i8, from: f64, to: f64| {
             // The edges below and above: a side beyond the zone has one only.
-            let (below, above) = (if side > 0.0 { zone } else { -zone }, if side < 0.0 { -zone } else { zone });
-            let edge = if side <= 0.0 && to > above + tolerance {
+            let (below, above) = (if side > 0 { zone } else { -zone }, if side < 0 { -zone } else { zone });
+            let edge = if side <= 0 && to > above + tolerance {
                 above + 0.5 * tolerance
-            } else if side >= 0.0 && to < below - tolerance {
+            } else if side >= 0 && to < below - tolerance {
                 below - 0.5 * tolerance
             } else {
                 return 1.0;
@@ -65,7 +65,8 @@ impl Sides {
     }
 }
 
-fn phases([a, b, c]: [f64; 3]) -> Phases {
+fn phases(signs: [i8; 3]) -> Phases {
+    let [a, b, c] = signs.map(f64::from);
     Phases { a, b, c }
 }
 
@@ -192,7 +193,7 @@ mod tests {
         assert!((share - 0.4 - half / 0.5).abs() < 1e-12 && !sides.apart(), "{share}");
         // b has left the zone: a is the next, and its edge is the upper one.
         let next = Sides::of(phases(1.4, 0.2 + half), 0.2);
-        assert_eq!(next.0, [[1.0, 1.0, -1.0]; 2]);
+        assert_eq!(next.0, [[1, 1, -1]; 2]);
         let share = next.first_crossing(start, end, 0.2).unwrap();
         assert!((share - 0.7 - half / 4.0).abs() < 1e-12, "{share}");
         assert!(sides.first_crossing(start, phases(2.0, 0.1), 0.2).is_none());
