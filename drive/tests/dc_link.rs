@@ -10,7 +10,7 @@ use drive::dc_link::LinkParameters;
 use drive::plant::machine::{flux, magnetic_energy};
 use drive::pmsm_drive::DriveOutputs;
 use drive_base::frame::Dq;
-use fmu_core::{Block, ContinuousTime, Differentiable, Events, Model, Step};
+use fmu_core::{Block, Capabilities, ContinuousTime, Description, Differentiable, Events, Exported, Model, Step};
 use importer::Importer;
 use machines::{Machine, RPM, b, c};
 
@@ -378,8 +378,8 @@ fn what_cannot_be_is_refused() {
         (|p| p.dc_link.R_source = 0.0, ["dc_link.R_source = 0 Ohm", "above 0 Ohm"]),
         (|p| p.dc_link.R_precharge = -1.0, ["dc_link.R_precharge = -1 Ohm", "at least 0 Ohm"]),
         (
-            |p| (p.chopper.used, p.chopper.u_off) = (true, 390.0),
-            ["chopper.u_off = 390 V", "below chopper.u_on = 390 V"],
+            |p| (p.chopper.used, p.chopper.u_off) = (true, 360.0),
+            ["chopper.u_off = 360 V", "below chopper.u_on = 360 V"],
         ),
         (|p| (p.chopper.used, p.chopper.u_off) = (true, 325.0), ["chopper.u_off = 325 V", "above u_dc, 325 V"]),
         (|p| (p.chopper.used, p.chopper.R) = (true, 0.0), ["chopper.R = 0 Ohm", "above 0 Ohm"]),
@@ -394,4 +394,20 @@ fn what_cannot_be_is_refused() {
     drive.derive();
     drive.validate().unwrap();
     assert_eq!(PmsmDrive::INDICATORS.len(), 3);
+}
+
+/// Dependencies are found by trying; among the points tried, the chopper is on somewhere.
+#[test]
+fn the_choppers_power_depends_on_the_voltage() {
+    struct Drive;
+    impl Exported for Drive {
+        type Model = PmsmDrive;
+        const CAN: Capabilities<PmsmDrive> = Capabilities::NONE.ContinuousTime().Events().Differentiable();
+    }
+    let description = Description::exported::<Drive>().unwrap();
+    let reference = |name: &str| description.variable(name).unwrap().value_reference;
+    for (name, on) in [("p_chopper", "u_cap"), ("i_source", "u_cap"), ("i_source", "u_dc"), ("i_cap_rms", "u_cap")] {
+        let known = description.variable(name).unwrap().dependencies.clone().unwrap();
+        assert!(known.contains(&reference(on)), "{name} depends on {on}");
+    }
 }

@@ -4,8 +4,9 @@
 //! i_cap,rms = I_rms sqrt(2 m (sqrt 3 / (4 pi) + cos^2 phi (sqrt 3 / pi - 9 m / 16))),  m = 2 |u| / u_dc
 //! ```
 //!
-//! I_rms of a phase, phi the angle from the current to the voltage: cos phi = p_in / (1.5 |u| |i|). It holds for sinusoidal currents without ripple of their own and
-//! a source that takes no ripple (Kolar); references with switched sine waves agree to 1e-4. u in V, i in A.
+//! I_rms of a phase, phi the angle from the current to the voltage: cos phi = p_in / (1.5 |u| |i|). It holds for sinusoidal
+//! currents without ripple of their own and a source that takes no ripple (Kolar); references with switched sine waves agree to
+//! 1e-4. u in V, i in A, p_in in W.
 
 use drive_base::frame::{Stator, Vector};
 use fmu_core::Scalar;
