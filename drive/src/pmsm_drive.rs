@@ -245,7 +245,7 @@ impl Model for PmsmDrive {
                 ..self.link.reached(&self.link_parameters, self.inputs.u_dc)
             }
         } else {
-            LinkOutputs { i_source: powers.i_dc, ..LinkOutputs::default() }
+            LinkOutputs { u: self.link.u, i_source: powers.i_dc, ..LinkOutputs::default() }
         };
     }
 

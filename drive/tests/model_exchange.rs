@@ -461,6 +461,8 @@ fn the_states_are_rows_of_the_tables() {
     block.model.pair.plant.model.parameters.initial.speed = 20.0;
     block.initialize();
     for (state, index) in PmsmDrive::STATES.iter().zip(drive.rows().unwrap()) {
+        *(state.at)(&mut block.model) += 0.1;
+        block.model.settle();
         let x = *(state.at)(&mut block.model);
         block.model.observe(Elapsed::ZERO, &mut block.out);
         let Some((_, Slot::Real(shown))) = PmsmDrive::TABLE.entry(&mut block, index) else {

@@ -10,7 +10,7 @@
 //! `chopper.u_on` and off at `chopper.u_off`.
 //!
 //! In Co-Simulation the link advances with each piece of the plant's steps, from the energy that passed in it
-//! ([`circuit`]); the plant sees the voltage of the beginning of the piece. In Model Exchange u is a continuous state, the
+//! (`circuit`); the plant sees the voltage of the beginning of the piece. In Model Exchange u is a continuous state, the
 //! chopper's switching is a state event, and the energies are those of the same circuit between two points of the solution.
 
 mod circuit;

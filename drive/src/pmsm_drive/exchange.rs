@@ -35,7 +35,8 @@ impl PmsmDrive {
         (u, U): (S, S),
     ) -> LinkOutputs<S> {
         if !self.link_parameters.dc_link.used {
-            return LinkOutputs { i_source: plant.powers.i_dc, ..LinkOutputs::none() };
+            // The state shows what was set.
+            return LinkOutputs { u, i_source: plant.powers.i_dc, ..LinkOutputs::none() };
         }
         let i_rms = ripple(inputs.voltage(), plant.i.to_stator(), plant.powers.p_in, inputs.u_dc);
         LinkOutputs { i_rms, ..self.link.shown(&self.link_parameters, u, U) }
