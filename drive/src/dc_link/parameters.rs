@@ -78,7 +78,7 @@ impl LinkParameters {
             return refuse(|p| &mut p.dc_link.R_source, "above 0 Ohm; for an ideal source set dc_link.use to false");
         }
         if dc_link.R_precharge.is_nan() || dc_link.R_precharge < 0.0 {
-            return refuse(|p| &mut p.dc_link.R_precharge, "at least 0 Ohm, which is no precharge");
+            return refuse(|p| &mut p.dc_link.R_precharge, "at least 0 Ohm; 0: without a precharge");
         }
         if !chopper.used {
             return Ok(());
