@@ -9,7 +9,7 @@
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, Exponents, OHM, Quantity, Unit, VOLT};
 use fmu_core::{
-    Block, ContinuousTime, Elapsed, Experiment, Fault, Info, Model, Row, State, Step, Table, Warns, integrate,
+    Block, ContinuousTime, Elapsed, Experiment, Fault, Info, Model, Row, State, Step, Table, Warns, integrate, table,
 };
 use serde::{Deserialize, Serialize};
 
@@ -58,19 +58,15 @@ impl Model for RcCircuit {
     };
 
     // Name, unit, range and place of every variable; names must differ, or this does not compile.
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("u", &VOLT, "Source voltage", |m| &mut m.model.u),
-                V::output("u_c", &VOLT, "Voltage of the capacitor", |m| &mut m.out.u_c),
-                V::output("i", &AMPERE, "Current into the capacitor", |m| &mut m.out.i),
-                V::parameter("R", &OHM, "Resistance", |m| &mut m.model.resistance).above(0.0),
-                V::parameter("C", &FARAD, "Capacitance", |m| &mut m.model.capacitance).above(0.0),
-                V::parameter("u_start", &VOLT, "Voltage of the capacitor at the start", |m| &mut m.model.u_start),
-                V::parameter("u_rated", &VOLT, "Rated voltage of the capacitor", |m| &mut m.model.u_rated).above(0.0),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("u", &VOLT, "Source voltage", |m| &mut m.model.u),
+        V::output("u_c", &VOLT, "Voltage of the capacitor", |m| &mut m.out.u_c),
+        V::output("i", &AMPERE, "Current into the capacitor", |m| &mut m.out.i),
+        V::parameter("R", &OHM, "Resistance", |m| &mut m.model.resistance).above(0.0),
+        V::parameter("C", &FARAD, "Capacitance", |m| &mut m.model.capacitance).above(0.0),
+        V::parameter("u_start", &VOLT, "Voltage of the capacitor at the start", |m| &mut m.model.u_start),
+        V::parameter("u_rated", &VOLT, "Rated voltage of the capacitor", |m| &mut m.model.u_rated).above(0.0),
+    ];
 
     fn initialize(&mut self) {
         self.u_c = self.u_start;

@@ -1,7 +1,9 @@
 //! A heated body: C dT/dt = heat - G (T - T_ambient).
 
 use fmu_core::unit::{Exponents, JOULE_PER_KELVIN, KELVIN, Quantity, Unit, WATT, WATT_PER_KELVIN};
-use fmu_core::{Block, ContinuousTime, Elapsed, Experiment, Fault, Info, Model, Row, State, Step, Table, integrate};
+use fmu_core::{
+    Block, ContinuousTime, Elapsed, Experiment, Fault, Info, Model, Row, State, Step, Table, integrate, table,
+};
 use serde::{Deserialize, Serialize};
 
 /// A quantity of your own: a name, a unit, its exponents of kg, m, s, A, and K.
@@ -49,20 +51,16 @@ impl Model for Body {
     };
 
     // Every variable once: name, unit, description, place, range.
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("heat", &WATT, "Power of the heater", |m| &mut m.model.heat),
-                V::input("T_ambient", &KELVIN, "Temperature of the surroundings", |m| &mut m.model.ambient),
-                V::output("T", &KELVIN, "Temperature of the body", |m| &mut m.out.temperature),
-                V::output("loss", &WATT, "Heat flow to the surroundings", |m| &mut m.out.loss),
-                V::parameter("C", &JOULE_PER_KELVIN, "Heat capacity", |m| &mut m.model.capacity).above(0.0),
-                V::parameter("G", &WATT_PER_KELVIN, "Conductance to the surroundings", |m| &mut m.model.conductance)
-                    .at_least(0.0),
-                V::parameter("T_start", &KELVIN, "Temperature at the start", |m| &mut m.model.initial).above(0.0),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("heat", &WATT, "Power of the heater", |m| &mut m.model.heat),
+        V::input("T_ambient", &KELVIN, "Temperature of the surroundings", |m| &mut m.model.ambient),
+        V::output("T", &KELVIN, "Temperature of the body", |m| &mut m.out.temperature),
+        V::output("loss", &WATT, "Heat flow to the surroundings", |m| &mut m.out.loss),
+        V::parameter("C", &JOULE_PER_KELVIN, "Heat capacity", |m| &mut m.model.capacity).above(0.0),
+        V::parameter("G", &WATT_PER_KELVIN, "Conductance to the surroundings", |m| &mut m.model.conductance)
+            .at_least(0.0),
+        V::parameter("T_start", &KELVIN, "Temperature at the start", |m| &mut m.model.initial).above(0.0),
+    ];
 
     fn initialize(&mut self) {
         self.temperature = self.initial;

@@ -8,7 +8,7 @@ mod counting;
 use counting::{calls, neighbor};
 use drive::estimator::Kind;
 use drive_study::runner::{self, RATED_SPEED};
-use fmu_core::{Block, Model, Plain};
+use fmu_core::{Block, Elapsed, Model, Plain, Step};
 use fmu_export::instance::Instance;
 use fmu_export::lifecycle::Standard;
 use fmu_export::log::{Log, Sink, Status};
@@ -55,6 +55,17 @@ fn a_step_does_not_allocate() {
         again_and_again(pair.controller, kind.name());
         again_and_again(pair.plant, kind.name());
     }
+    let mut mean = Block::<drive::PmsmDriveMean>::default();
+    mean.model.inputs.speed_ref = 100.0;
+    mean.initialize();
+    let (mut now, before) = (Elapsed::ZERO, calls());
+    for _ in 0..200 {
+        let step = Step { start: now, h: 1e-2 };
+        mean.step(&step).unwrap();
+        now = step.end();
+    }
+    assert_eq!(calls(), before, "PmsmDriveMean");
+    again_and_again(mean, "speed control");
     let before = calls();
     drop(std::hint::black_box(Box::new(1)));
     assert!(calls() > before, "the counter counts");

@@ -7,7 +7,7 @@ use common::shows::{differs, shows};
 use common::{Native, words};
 use drive::estimator::Kind;
 use drive::plant::losses::Losses;
-use drive::{PmsmDrive, PmsmPlant, SensorlessController, documentation as fragments};
+use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController, documentation as fragments};
 use drive_study::plane::{self, OperatingPoint};
 use drive_study::reproduce::experiment::{
     ClosedLoop, Experiment, LOAD_0, LOAD_1000, Record, START, STEP_20, STEP_500, STEP_1000, STEP_1500,
@@ -224,6 +224,7 @@ fn pages_stand_alone() {
         ("PmsmPlant", include_str!("../drive/plant/docs/pmsm_plant.svg")),
         ("SensorlessController", include_str!("../drive/control/docs/sensorless_controller.svg")),
         ("PmsmDrive", include_str!("../drive/docs/pmsm_drive.svg")),
+        ("PmsmDriveMean", include_str!("../drive/docs/pmsm_drive.svg")),
     ] {
         for standard in ["fmi2", "fmi3"] {
             let archive = common::archives().join(standard).join(name).with_extension("fmu");
@@ -250,6 +251,7 @@ fn pages_stand_alone() {
         let description = match name {
             "PmsmPlant" => Description::of::<PmsmPlant>(),
             "PmsmDrive" => Description::of::<PmsmDrive>(),
+            "PmsmDriveMean" => Description::of::<PmsmDriveMean>(),
             _ => Description::of::<SensorlessController>(),
         };
         let inputs = description.unwrap().variables;

@@ -73,7 +73,7 @@ fn misuse_under_asan() {
     let libasan = fs::canonicalize(String::from_utf8_lossy(&libasan.stdout).trim()).expect("libasan.so of gcc");
     let (target, triple) = (scratch().join("asan"), fmu::target::host_triple().unwrap());
     let (libraries, archives) = (target.join(&triple).join("release"), target.join("fmu"));
-    let fmus = ["pmsm-drive", "pmsm-plant", "sensorless-controller"];
+    let fmus = ["pmsm-drive", "pmsm-drive-mean", "pmsm-plant", "sensorless-controller"];
     let mut build = Command::new(env!("CARGO"));
     build.args(["build", "--locked", "--release", "--target", &triple, "--target-dir"]).arg(&target);
     build.args(fmus.iter().flat_map(|name| ["--package", name]));

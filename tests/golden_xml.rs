@@ -49,3 +49,8 @@ fn controller() {
 fn whole_drive() {
     check("PmsmDrive");
 }
+
+#[test]
+fn mean_drive() {
+    check("PmsmDriveMean");
+}

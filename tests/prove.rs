@@ -18,7 +18,7 @@ fn prove(folder: &Path, archives: &[PathBuf]) -> Output {
 }
 
 fn archives() -> Vec<PathBuf> {
-    let names = ["PmsmDrive", "PmsmPlant", "SensorlessController"];
+    let names = ["PmsmDrive", "PmsmDriveMean", "PmsmPlant", "SensorlessController"];
     let of =
         |standard: &'static str| names.map(|name| common::archives().join(standard).join(name).with_extension("fmu"));
     ["fmi2", "fmi3"].into_iter().flat_map(of).collect()

@@ -4,7 +4,7 @@
 #![allow(missing_docs)]
 
 use drive::estimator::Kind;
-use drive::{PmsmDrive, PmsmPlant, SensorlessController};
+use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
 use drive_study::runner;
 use fmu_core::{Block, Model, Plain};
 use fmu_export::instance::Instance;
@@ -272,6 +272,11 @@ fn plant() {
 fn controller() {
     let each = Kind::ALL.iter().flat_map(|&kind| seeds(runner::drive(kind).controller));
     damage::<SensorlessController>(&each.collect::<Vec<_>>(), trials());
+}
+
+#[test]
+fn mean() {
+    damage::<PmsmDriveMean>(&seeds(Block::<PmsmDriveMean>::default()), trials());
 }
 
 #[test]

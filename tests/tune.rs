@@ -196,33 +196,13 @@ fn a_wrong_file_is_told_with_place_and_remedy() {
     refused("[bandwidth]", "[bandwidth", &["m.toml:26:"]);
 }
 
-/// A motor of 150 W, whose rated torque takes more than its speed at 0.1 pu.
-const LIGHT: &str = "
-name = \"light-24v\"
-source = \"a data sheet\"
-[machine]
-n_p = 1
-R_s = 0.103
-L_d = 1.36e-5
-L_q = 1.36e-5
-psi_M = 2.75e-3
-[mechanics]
-J = 4.55e-7
-[rating]
-speed = 2380.0
-torque = 0.0617
-current = 27.7
-[dc_link]
-u_dc = 24.0
-";
-
 #[test]
 fn the_check_prints_what_holds_and_what_was_announced() {
     let motor = motors().into_iter().find(|p| p.ends_with("ipmsm-2.2kw.toml")).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().to_str().unwrap();
-    let light = dir.path().join("light.toml");
-    std::fs::write(&light, LIGHT).unwrap();
+    // Its rated torque takes more than its speed at 0.1 pu.
+    let light = Path::new(env!("CARGO_MANIFEST_DIR")).join("drive-study/tests/verdicts/machines/light-24v.toml");
     let checked = |motor: &Path, first: &str| {
         let checked = fmu(&["tune", motor.to_str().unwrap(), "--check", "--out", out]);
         let text = String::from_utf8(checked.stdout).unwrap();

@@ -405,10 +405,10 @@ fn a_wrong_row_is_an_error_at_its_place() {
     fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
     for (name, row, ..) in CASES {
         let source = format!(
-            "use fmu_core::{{Row, Table, unit::VOLT}};\n\
+            "use fmu_core::{{Row, Table, table, unit::VOLT}};\n\
              struct M {{ u: f64, on: bool, a: [f64; 4], t: String, f: f32 }} type V = Row<M>;\n\
-             const TABLE: &Table<M> = &Table::new(const {{ &[\n    V::input(\"u\", &VOLT, \"\", |m| &mut m.u),\n    \
-             {row},\n] }});\nfn main() {{ let _ = TABLE.len(); }}\n"
+             const TABLE: &Table<M> = table![\n    V::input(\"u\", &VOLT, \"\", |m| &mut m.u),\n    \
+             {row},\n];\nfn main() {{ let _ = TABLE.len(); }}\n"
         );
         fs::write(sources.join(format!("{name}.rs")), source).unwrap();
     }

@@ -22,6 +22,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("pmsm-plant", &["drive", "fmu-export"]),
     ("sensorless-controller", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
+    ("pmsm-drive-mean", &["drive", "fmu-export"]),
     ("fmurun", &["fmu-import", "fmu-sweep", "model-description"]),
     (
         "fmu",

@@ -97,7 +97,7 @@ impl Reference {
 
     /// The greatest torque of the sign `s`.
     fn limit(&self, rpm: f64, s: f64) -> Limit {
-        runner::settled_limit(&self.envelope, self.electrical(rpm), s, self.U)
+        self.envelope.settled(self.electrical(rpm), s, self.U)
     }
 
     /// The current (A) for `tau` (N.m): i_d = 0 where the voltage suffices, because L_d = L_q.

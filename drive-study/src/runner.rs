@@ -4,7 +4,6 @@
 //! Speeds are relative to rated speed, torques to rated torque (pu); angle errors are theta - theta^ in degrees, as in
 //! Kim & Sul.
 
-use drive::control::envelope::{Envelope, Limit, WarmStart};
 use drive::estimator::Kind;
 use drive::estimator::kalman::KalmanParameters;
 use drive::estimator::tracker::TrackerKind;
@@ -62,10 +61,7 @@ pub fn drive(kind: Kind) -> Pair {
         par.estimators.tracker.bandwidth = TAU * 60.0;
         par.estimators.adaptation.bandwidth = 5.0;
     }
-    if kind == Kind::GradientObserver {
-        par.estimators.tracker.bandwidth = TAU * 40.0;
-    }
-    if kind == Kind::Hybrid {
+    if matches!(kind, Kind::GradientObserver | Kind::Hybrid) {
         par.estimators.tracker.bandwidth = TAU * 40.0;
     }
     if matches!(kind, Kind::SquareWaveInjection | Kind::NearPwmInjection) {
@@ -334,11 +330,4 @@ pub fn injected_current(mut pair: Pair) -> f64 {
         }
     });
     d.std().hypot(q.std())
-}
-
-/// The greatest torque of the sign `s` and its currents at the electrical speed `w` (rad/s) with the voltage `U` (V), after the
-/// iterations of several samples.
-pub fn settled_limit(envelope: &Envelope, w: f64, s: f64, U: f64) -> Limit {
-    let mut iterate = WarmStart::default();
-    (0..8).map(|_| envelope.limit(w, s, U, &mut iterate)).last().unwrap_or_default()
 }

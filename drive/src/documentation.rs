@@ -22,3 +22,12 @@ pub const DRIVE: &str = joined!(
     control::EQUATIONS,
     LIMITS_AND_TUNING,
 );
+
+/// Documentation of [`PmsmDriveMean`](crate::PmsmDriveMean).
+pub const MEAN: &str = joined!(
+    include_str!("../docs/pmsm_drive.svg"),
+    include_str!("../docs/pmsm_drive_mean.html"),
+    ENVELOPE,
+    include_str!("../docs/losses.html"),
+    include_str!("../docs/losses.svg"),
+);

@@ -5,7 +5,7 @@
 //! | `drive-base` | `drive/base/` | frames, elementary functions, the data of a machine, modulation; the conventions |
 //! | `drive-plant` | `drive/plant/` | [`PmsmPlant`]: machine, inverter, losses, temperatures, mechanics |
 //! | `drive-control` | `drive/control/` | [`SensorlessController`], and every [`estimator`] |
-//! | `drive` | `drive/src/` | [`PmsmDrive`], and the [`Pair`] of plant and controller |
+//! | `drive` | `drive/src/` | [`PmsmDrive`], the [`Pair`] of plant and controller, [`PmsmDriveMean`]; [`steady`]: the drive in steady state, by algebra |
 
 #![forbid(unsafe_code)]
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
@@ -15,6 +15,8 @@ pub mod dc_link;
 pub mod documentation;
 pub mod pair;
 pub mod pmsm_drive;
+pub mod pmsm_drive_mean;
+pub mod steady;
 mod terminals;
 
 pub use drive_base::{frame, integrate, math, modulation, motor};
@@ -23,3 +25,4 @@ pub use drive_control::{self as control, estimator};
 pub use drive_plant::{self as plant, PmsmPlant};
 pub use pair::Pair;
 pub use pmsm_drive::PmsmDrive;
+pub use pmsm_drive_mean::PmsmDriveMean;

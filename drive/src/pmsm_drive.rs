@@ -24,9 +24,9 @@ use crate::{PmsmPlant, SensorlessController};
 use drive_base::connection::Commanded;
 use drive_base::frame::Phases;
 use drive_control::signals::ControllerOutputs;
-use drive_control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
+use drive_control::tables::{self as control, ControllerParameters, ESTIMATES, STATUS, VOLTAGES};
 use drive_plant::signals::{PlantInputs, PlantOutputs};
-use drive_plant::tables as plant;
+use drive_plant::tables::{self as plant, PlantParameters};
 use drive_plant::thermal::{THERMAL_INPUTS, ThermalInputs};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
@@ -208,14 +208,7 @@ impl Model for PmsmDrive {
         self.pair.plant.model.validate().map_err(|fault| in_part("plant", &fault))?;
         self.pair.controller.model.validate_on(self.inputs.u_dc).map_err(|fault| in_part("controller", &fault))?;
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
-        if plant.motor.n_p != controller.motor.n_p {
-            return Err(Fault::new(format!(
-                "plant.{} and controller.{}: the drive would run at another speed than its reference; set both to the same \
-                 number of pole pairs",
-                plant::PARAMETERS.tell(plant, |p| &mut p.motor.n_p),
-                control::PARAMETERS.tell(controller, |p| &mut p.motor.n_p)
-            )));
-        }
+        same_pole_pairs(plant, controller)?;
         let starts = self.pair.controller.model.samples() == 0;
         self.link_parameters.validate(if starts { self.inputs.u_dc } else { 0.0 })
     }
@@ -315,7 +308,20 @@ fn supply(link: &mut Link, par: &LinkParameters, inputs: &DriveInputs, pair: &mu
     pair.supply(link.u, inputs.enable && !link.precharges);
 }
 
-fn in_part(part: &str, fault: &Fault) -> Fault {
+/// Refuses a controller with another number of pole pairs than the machine.
+pub(crate) fn same_pole_pairs(plant: &PlantParameters, controller: &ControllerParameters) -> Result<(), Fault> {
+    if plant.motor.n_p == controller.motor.n_p {
+        return Ok(());
+    }
+    Err(Fault::new(format!(
+        "plant.{} and controller.{}: the drive would run at another speed than its reference; set both to the same number of pole \
+         pairs",
+        plant::PARAMETERS.tell(plant, |p| &mut p.motor.n_p),
+        control::PARAMETERS.tell(controller, |p| &mut p.motor.n_p)
+    )))
+}
+
+pub(crate) fn in_part(part: &str, fault: &Fault) -> Fault {
     Fault::new(format!("{part}.{fault}"))
 }
 
@@ -357,60 +363,82 @@ fn to_next_sample(grid: SampleGrid, now: Elapsed) -> f64 {
     if k > 0 && !grid.passed(k - 1, now) { grid.period } else { -now.minus_periods(k, grid.period) }
 }
 
+type I = Row<DriveInputs>;
+
+/// The inputs, of `PmsmDrive` and of `PmsmDriveMean`.
+pub(crate) const INPUTS: &Table<DriveInputs> = &Table::new(
+    const {
+        &[
+            I::input("speed_ref", &SPEED, "Mechanical speed reference", |i| &mut i.speed_ref),
+            I::input("tau_ref", &NEWTON_METER, "Torque reference", |i| &mut i.tau_ref)
+                .read_with("speed_loop.torque_mode", "true"),
+            I::boolean_input(
+                "enable",
+                "The drive operates; false: the controller stays in its initial state, and the gates are off once enabled is false",
+                |i| &mut i.enable,
+            )
+            .optional(),
+            I::boolean_input(
+                "asc",
+                "Active short circuit, whatever enable says: all upper or all lower transistors conduct once short_circuit is true, and \
+                 the controller stays in its initial state",
+                |i| &mut i.asc,
+            )
+            .optional(),
+            I::boolean_input(
+                "sensor_valid",
+                "The sensor of the shaft works; false: controller.sensor.fallback takes over from it, if there is one",
+                |i| &mut i.sensor_valid,
+            )
+            .optional(),
+            I::input(
+                "u_dc",
+                &VOLT,
+                "DC-link voltage of inverter and controller; with dc_link.use, voltage of the source of the DC link",
+                |i| &mut i.u_dc,
+            )
+            .at_least(0.0),
+            I::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |i| {
+                &mut i.tau_load
+            }),
+            I::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |i| &mut i.speed_shaft)
+                .read_with("mechanics.imposed", "true"),
+            I::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |i| &mut i.angle_shaft)
+                .unbounded()
+                .read_with("mechanics.imposed", "true"),
+            I::part("", &Part { table: THERMAL_INPUTS, lens: |i| &mut i.thermal }),
+        ]
+    },
+);
+
 type V = Row<Block<PmsmDrive>>;
 
 const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
     const {
         &[
-            V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
-            V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
-                .read_with("speed_loop.torque_mode", "true"),
-            V::boolean_input(
-                "enable",
-                "The drive operates; false: the controller stays in its initial state, and the gates are off once enabled is false",
-                |m| &mut m.model.inputs.enable,
-            )
-            .optional(),
-            V::boolean_input(
-                "asc",
-                "Active short circuit, whatever enable says: all upper or all lower transistors conduct once short_circuit is true, and \
-                 the controller stays in its initial state",
-                |m| &mut m.model.inputs.asc,
-            )
-            .optional(),
-            V::boolean_input(
-                "sensor_valid",
-                "The sensor of the shaft works; false: controller.sensor.fallback takes over from it, if there is one",
-                |m| &mut m.model.inputs.sensor_valid,
-            )
-            .optional(),
-            V::input(
-                "u_dc",
-                &VOLT,
-                "DC-link voltage of inverter and controller; with dc_link.use, voltage of the source of the DC link",
-                |m| &mut m.model.inputs.u_dc,
-            )
-            .at_least(0.0),
-            V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
-                &mut m.model.inputs.tau_load
-            }),
-            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
-                .read_with("mechanics.imposed", "true"),
-            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
-                .unbounded()
-                .read_with("mechanics.imposed", "true"),
-            V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
-            V::part("", &Part { table: plant::OUTPUTS, lens: |m| &mut m.out.plant }),
-            V::part("", &Part { table: MEANS, lens: |m| &mut m.out.means }),
-            V::part("", &Part { table: LINK_OUTPUTS, lens: |m| &mut m.out.link }),
-            V::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |m| &mut m.out.controller }),
-            V::part("", &Part { table: plant::STATES, lens: |m| &mut m.model.pair.plant.model }),
+            V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
+            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+            V::part("", &Part { table: plant::FLUX, lens: |m| m.model.pair.plant.model.flux_mut() }),
             V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
             V::part(
                 "controller.",
                 &Part { table: control::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
             ),
             V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
+        ]
+    },
+);
+
+type D = Row<DriveOutputs>;
+
+/// The outputs, of `PmsmDrive` and of `PmsmDriveMean`.
+pub(crate) const OUTPUTS: &Table<DriveOutputs> = &Table::new(
+    const {
+        &[
+            D::part("", &Part { table: plant::OUTPUTS, lens: |o| &mut o.plant }),
+            D::part("", &Part { table: MEANS, lens: |o| &mut o.means }),
+            D::part("", &Part { table: LINK_OUTPUTS, lens: |o| &mut o.link }),
+            D::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |o| &mut o.controller }),
         ]
     },
 );

@@ -124,6 +124,11 @@ impl From<Verdict> for Judgement {
 }
 
 impl Verdict {
+    /// A pass if it holds, otherwise a violation.
+    pub(super) fn holds(holds: bool, finding: impl FnOnce() -> String) -> Self {
+        if holds { Self::Pass(Vec::new()) } else { Self::Violated(vec![finding()]) }
+    }
+
     /// A pass if there are no findings, otherwise a violation.
     pub(super) fn of(findings: Vec<String>) -> Self {
         if findings.is_empty() { Self::Pass(Vec::new()) } else { Self::Violated(findings) }

@@ -85,18 +85,8 @@ impl Event {
 impl Instance<'_> {
     /// One update of the discrete states.
     pub(super) fn update(&self) -> Result<(Status, UpdateResults), NotDetermined> {
-        let name = if self.session.description.version == FmiVersion::V2 {
-            "NewDiscreteStates"
-        } else {
-            "UpdateDiscreteStates"
-        };
-        let mut result = None;
-        let status = self.call(name, |raw| {
-            let (status, updated) = raw.update_discrete_states(self.handle, false)?;
-            result = Some(updated);
-            Some(status)
-        })?;
-        result.map(|updated| (status, updated)).ok_or_else(|| NotDetermined(format!("{name} is missing")))
+        let name = if self.session.is_v2() { "NewDiscreteStates" } else { "UpdateDiscreteStates" };
+        self.call_for(name, |raw| raw.update_discrete_states(self.handle, false))
     }
 
     /// The iteration of an event, in Event Mode.
@@ -176,13 +166,7 @@ impl Instance<'_> {
 
     /// Ends a step of the integrator.
     pub(super) fn completed(&self) -> Result<(Status, [i32; 2]), NotDetermined> {
-        let mut flags = [0; 2];
-        let status = self.call("CompletedIntegratorStep", |raw| {
-            let (status, found) = raw.completed_integrator_step(self.handle, false, false)?;
-            flags = found;
-            Some(status)
-        })?;
-        Ok((status, flags))
+        self.call_for("CompletedIntegratorStep", |raw| raw.completed_integrator_step(self.handle, false, false))
     }
 
     /// A directional derivative, or an adjoint one.
@@ -291,8 +275,7 @@ impl<'a, 'b> Importer<'a, 'b> {
         self.next = event.next();
         self.over |= event.terminates() || !event.ended();
         if !self.over {
-            let status = self.instance.simple(Simple::EnterContinuousTimeMode)?;
-            self.instance.must("EnterContinuousTimeMode", status)?;
+            self.instance.perform(Simple::EnterContinuousTimeMode)?;
             self.z = self.instance.indicators()?;
         }
         Ok(event)
@@ -300,8 +283,7 @@ impl<'a, 'b> Importer<'a, 'b> {
 
     /// An event at this time.
     pub(super) fn event(&mut self, see: &mut dyn FnMut(&Instance<'_>, &Event)) -> Result<Event, NotDetermined> {
-        let status = self.instance.simple(Simple::EnterEventMode)?;
-        self.instance.must("EnterEventMode", status)?;
+        self.instance.perform(Simple::EnterEventMode)?;
         self.leave(see)
     }
 

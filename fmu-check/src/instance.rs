@@ -86,18 +86,32 @@ impl Instance<'_> {
         call: &str,
         function: impl FnOnce(&Raw) -> Option<Status>,
     ) -> Result<Status, NotDetermined> {
+        Ok(self.call_for(call, |raw| Some((function(raw)?, ())))?.0)
+    }
+
+    /// Calls a function that also returns a value.
+    pub(super) fn call_for<T>(
+        &self,
+        call: &str,
+        function: impl FnOnce(&Raw) -> Option<(Status, T)>,
+    ) -> Result<(Status, T), NotDetermined> {
         let name = self.session.raw.name(call);
         self.session.record_call(&name);
         let missing =
             || NotDetermined(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
-        let status = function(&self.session.raw).ok_or_else(missing)?;
+        let (status, value) = function(&self.session.raw).ok_or_else(missing)?;
         self.session.record_result(&status);
-        Ok(status)
+        Ok((status, value))
     }
 
     /// A function without arguments.
     pub(super) fn simple(&self, name: Simple) -> Result<Status, NotDetermined> {
         self.call(name.as_str(), |raw| raw.simple(name, self.handle))
+    }
+
+    /// A function without arguments that must succeed.
+    pub(super) fn perform(&self, name: Simple) -> Result<(), NotDetermined> {
+        self.must(name.as_str(), self.simple(name)?)
     }
 
     pub(super) fn must(&self, name: &str, status: Status) -> Result<(), NotDetermined> {
@@ -118,42 +132,39 @@ impl Instance<'_> {
     /// Enters initialization mode.
     pub(super) fn enter(&self) -> Result<(), NotDetermined> {
         let (start, stop) = (self.start.get(), self.stop.get());
-        let name = if self.session.description.version == FmiVersion::V2 {
-            "SetupExperiment"
-        } else {
-            "EnterInitializationMode"
-        };
+        let name = if self.session.is_v2() { "SetupExperiment" } else { "EnterInitializationMode" };
         let status = self.call(&format!("{name}(startTime={start}, stopTime={stop:?})"), |raw| {
             raw.experiment(self.handle, None, start, stop)
         })?;
         self.must(name, status)?;
-        if self.session.description.version == FmiVersion::V2 {
-            self.must("EnterInitializationMode", self.simple(Simple::EnterInitializationMode)?)?;
+        if self.session.is_v2() {
+            self.perform(Simple::EnterInitializationMode)?;
         }
         Ok(())
     }
 
     /// Leaves initialization mode; the instance is then ready to step.
     pub(super) fn exit(&self) -> Result<(), NotDetermined> {
-        self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
+        self.perform(Simple::ExitInitializationMode)?;
         if self.event_mode { self.events() } else { Ok(()) }
+    }
+
+    /// Enters initialization mode and leaves it.
+    pub(super) fn initialize(&self) -> Result<(), NotDetermined> {
+        self.enter()?;
+        self.exit()
     }
 
     /// Passes through event mode to step mode.
     fn events(&self) -> Result<(), NotDetermined> {
         for _ in 0..100 {
-            let mut again = false;
-            let status = self.call("UpdateDiscreteStates", |raw| {
-                let (status, updated) = raw.update_discrete_states(self.handle, false)?;
-                again = updated.again != 0;
-                Some(status)
-            })?;
+            let (status, updated) = self.update()?;
             self.must("UpdateDiscreteStates", status)?;
-            if !again {
+            if updated.again == 0 {
                 break;
             }
         }
-        self.must("EnterStepMode", self.simple(Simple::EnterStepMode)?)
+        self.perform(Simple::EnterStepMode)
     }
 
     /// A step from the end of the last one.
@@ -175,7 +186,7 @@ impl Instance<'_> {
     pub(super) fn step_with(&self, t: f64, h: f64, no_prior: bool) -> Result<Status, NotDetermined> {
         let mark = if no_prior { ", noSetFMUStatePriorToCurrentPoint=true" } else { "" };
         let call = if self.session.silent.get() { "DoStep".into() } else { format!("DoStep(t={t:?}, h={h:?}{mark})") };
-        let v2 = self.session.description.version == FmiVersion::V2;
+        let v2 = self.session.is_v2();
         let status = self.call(&call, |raw| {
             let (status, stepped) = raw.do_step(self.handle, t, h, no_prior, [true; 4])?;
             // fmi2Terminated is 3.
@@ -189,7 +200,7 @@ impl Instance<'_> {
             Some(status)
         })?;
         if self.event_mode && status.is_ok() {
-            self.must("EnterEventMode", self.simple(Simple::EnterEventMode)?)?;
+            self.perform(Simple::EnterEventMode)?;
             self.events()?;
         }
         Ok(status)
@@ -237,6 +248,12 @@ impl Instance<'_> {
         variables.iter().map(read).collect()
     }
 
+    /// The values of scalars of the type Float64; NaN for those that cannot be read.
+    pub(super) fn numbers(&self, variables: &[&ModelVariable]) -> Result<Vec<f64>, NotDetermined> {
+        let all = self.snapshot(variables)?;
+        Ok(all.iter().map(|bits| bits.first().map_or(f64::NAN, |b| f64::from_bits(*b))).collect())
+    }
+
     /// Steps `n` times with held inputs and returns all watched variables after each step.
     pub(super) fn run(&self, n: usize, h: f64) -> Result<Vec<Vec<Vec<u64>>>, NotDetermined> {
         let watched = self.session.watched();
@@ -281,34 +298,20 @@ impl Instance<'_> {
 
     /// A saved state as bytes.
     pub(super) fn serialize(&self, state: SavedState) -> Result<Vec<u8>, NotDetermined> {
-        let mut size = 0;
-        let status = self.call("SerializedFMUStateSize", |raw| {
-            let (status, n) = raw.state_size(self.handle, state)?;
-            size = n;
-            Some(status)
-        })?;
+        let (status, size) = self.call_for("SerializedFMUStateSize", |raw| raw.state_size(self.handle, state))?;
         self.must("SerializedFMUStateSize", status)?;
-        let (mut out, mut too_large) = ((Vec::new(), true), None);
-        let status = self.call(&format!("SerializeFMUState(size={size})"), |raw| {
+        let (status, out) = self.call_for(&format!("SerializeFMUState(size={size})"), |raw| {
             match raw.serialize(self.handle, state, size) {
-                Ok(done) => done.map(|(status, bytes, intact)| {
-                    out = (bytes, intact);
-                    status
-                }),
-                Err(why) => {
-                    too_large = Some(why);
-                    Some(Status::ERROR)
-                }
+                Ok(done) => done.map(|(status, bytes, intact)| (status, Ok((bytes, intact)))),
+                Err(why) => Some((Status::ERROR, Err(why))),
             }
         })?;
-        if let Some(why) = too_large {
-            return Err(NotDetermined(why));
-        }
+        let (bytes, intact) = out.map_err(NotDetermined)?;
         self.must("SerializeFMUState", status)?;
-        if !out.1 {
+        if !intact {
             return Err(NotDetermined(format!("SerializeFMUState wrote past its {size} bytes")));
         }
-        Ok(out.0)
+        Ok(bytes)
     }
 
     /// Frees the instance.

@@ -158,9 +158,9 @@ impl Session {
         })
     }
 
-    /// Loads the FMU once more, for another thread.
-    pub(super) fn duplicate(&self, number: usize) -> Result<Self, NotDetermined> {
-        let raw = Raw::open(&self.binary, self.description.version).map_err(NotDetermined)?;
+    /// Loads the FMU once more, from this copy of its binary: for another thread, or under another path.
+    pub(super) fn duplicate(&self, binary: &Path, number: usize) -> Result<Self, NotDetermined> {
+        let raw = Raw::open(binary, self.description.version).map_err(NotDetermined)?;
         self.duplicate_with(raw, number)
     }
 
@@ -197,11 +197,6 @@ impl Session {
             calls: self.calls.clone(),
             timeout: self.timeout,
         })
-    }
-
-    /// Passes another unpacked folder to all further instances.
-    pub(super) fn move_to(&mut self, dir: &Path) {
-        dir.clone_into(&mut self.dir);
     }
 
     /// Where the FMU's resources are, if it has any.
@@ -271,6 +266,17 @@ impl Session {
         if let Err(NotDetermined(why)) = case() {
             self.write(&Line::NotDetermined(why));
         }
+    }
+
+    /// Runs a case of a probe with each of these values.
+    #[expect(clippy::unnecessary_wraps, reason = "probes return it")]
+    pub(super) fn cases<T>(
+        &self,
+        values: impl IntoIterator<Item = T>,
+        case: impl Fn(T) -> Result<(), NotDetermined>,
+    ) -> Result<(), NotDetermined> {
+        values.into_iter().for_each(|value| self.case(|| case(value)));
+        Ok(())
     }
 
     /// Whether half of the time is used up; loops end then.
@@ -381,6 +387,11 @@ impl Session {
     /// tolerance of the default experiment, at least 1e-6.
     pub(super) fn tolerance(&self) -> f64 {
         self.description.default_experiment.tolerance.filter(|t| t.is_finite()).unwrap_or(0.0).max(1e-6)
+    }
+
+    /// The FMU is one of FMI 2.0.
+    pub(super) fn is_v2(&self) -> bool {
+        self.description.version == FmiVersion::V2
     }
 
     /// Start time of the default experiment.

@@ -49,10 +49,9 @@ impl Session {
             Life::ModelExchange => self.exchange(state),
             Life::EventMode => self.prepare(|| {
                 let instance = self.made(&Arguments { event_mode: true, ..self.arguments("probe") })?;
-                instance.enter()?;
-                instance.exit()?;
+                instance.initialize()?;
                 if state == Event {
-                    instance.must("EnterEventMode", instance.simple(Simple::EnterEventMode)?)?;
+                    instance.perform(Simple::EnterEventMode)?;
                 }
                 Ok(instance)
             }),
@@ -68,7 +67,7 @@ impl Session {
         };
         instance.steps(2, self.h())?;
         match state {
-            Terminated => instance.must("Terminate", instance.simple(Simple::Terminate)?)?,
+            Terminated => instance.perform(Simple::Terminate)?,
             Error => drop(instance.provoke()?),
             _ => {}
         }
@@ -96,16 +95,16 @@ impl Instance<'_> {
         if state == Initialization {
             return Ok(());
         }
-        self.must("ExitInitializationMode", self.simple(Simple::ExitInitializationMode)?)?;
+        self.perform(Simple::ExitInitializationMode)?;
         if state == Event {
             return Ok(());
         }
         let _ = self.iterate()?;
-        self.must("EnterContinuousTimeMode", self.simple(Simple::EnterContinuousTimeMode)?)?;
+        self.perform(Simple::EnterContinuousTimeMode)?;
         if state == Continuous {
             return Ok(());
         }
-        self.must("Terminate", self.simple(Simple::Terminate)?)
+        self.perform(Simple::Terminate)
     }
 
     /// Makes the FMU return Error with one of two wrong calls; returns the call that succeeded in doing so.

@@ -250,6 +250,10 @@ impl Description {
             let words = words(&variables[i].name, need, &variables)?;
             variables[i].description += &words;
         }
+        let accepted = |v: &Variable| v.causality == Causality::Parameter && !M::has_effect(&v.name);
+        for v in variables.iter_mut().filter(|v| accepted(v)) {
+            v.description += "; accepted, without effect in this model";
+        }
         let terminals = terminals::describe(M::TERMINALS, &variables)?;
         let after = |i: usize| reference(table.len() + i);
         let model_exchange = can.model_exchange().then(|| ModelExchange {

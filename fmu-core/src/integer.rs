@@ -77,7 +77,7 @@ macro_rules! integers {
             get: fn(&mut W) -> &mut $type,
         ) -> Self {
             let (kind, access) = (Kind::Integer(IntegerType::$name), Access::Integer(Getter::$name(get)));
-            Self::new(name, description, Causality::$causality, Variability::$variability, kind, access)
+            Self::new(name, description, kind, access).with(Causality::$causality, Variability::$variability)
         }
     };
 }

@@ -6,7 +6,7 @@
 //! ```
 //! use fmu_core::unit::{Exponents, JOULE_PER_KELVIN, KELVIN, Quantity, Unit, WATT, WATT_PER_KELVIN};
 //! use fmu_core::{
-//!     Block, ContinuousTime, Elapsed, Fault, Info, Model, Row, State, Step, Table, integrate,
+//!     Block, ContinuousTime, Elapsed, Fault, Info, Model, Row, State, Step, Table, table, integrate,
 //! };
 //! use serde::{Deserialize, Serialize};
 //!
@@ -29,13 +29,13 @@
 //! impl Model for Heater {
 //!     type Outputs = Outputs;
 //!     const INFO: Info = Info { name: "Heater", description: "A heated body", ..Info::DEFAULT };
-//!     const TABLE: &'static Table<Block<Self>> = &Table::new(const { &[
+//!     const TABLE: &'static Table<Block<Self>> = table![
 //!         V::input("P", &WATT, "Heating power", |m| &mut m.model.p).at_least(0.0),
 //!         V::output("T", &KELVIN, "Temperature", |m| &mut m.out.t),
 //!         V::parameter("T_ambient", &KELVIN, "Temperature around it, and at the start", |m| &mut m.model.t_ambient),
 //!         V::parameter("C", &JOULE_PER_KELVIN, "Heat capacity", |m| &mut m.model.c).above(0.0),
 //!         V::parameter("G", &WATT_PER_KELVIN, "Conductance to the ambient", |m| &mut m.model.g).tunable(),
-//!     ] });
+//!     ];
 //!
 //!     fn initialize(&mut self) {
 //!         self.t = self.t_ambient;
@@ -78,7 +78,7 @@
 //! [`CompletedSteps`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
 //! and a [`preset`] is one of them.
 //!
-//! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`table`], [`terminal`], [`model`],
+//! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`terminal`], [`model`],
 //! [`continuous`], [`events`], [`capability`], [`description`]. No motor, no XML, no C, no `unsafe`.
 
 #![forbid(unsafe_code)]

@@ -129,6 +129,12 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
         Ok(())
     }
 
+    /// Whether the parameter of this name has an effect. A model that has the parameters of another one, so that it can take its
+    /// place, need not read them all; the descriptions of those without effect say so.
+    fn has_effect(_parameter: &str) -> bool {
+        true
+    }
+
     /// Calculated parameters from the parameters; runs again when a tunable parameter was set.
     fn derive(&mut self) {}
 

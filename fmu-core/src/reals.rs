@@ -112,7 +112,7 @@ impl Interval {
 mod tests {
     use super::*;
     use crate::unit::VOLT;
-    use crate::{Part, Row};
+    use crate::{Part, Row, table};
 
     #[derive(Default)]
     struct Pair {
@@ -132,20 +132,15 @@ mod tests {
     type V = Row<Whole>;
     type P = Row<Pair>;
 
-    const PAIR: &Table<Pair> = &Table::new(
-        const { &[P::input("a", &VOLT, "", |p| &mut p.a), P::discrete_input("b", &VOLT, "", |p| &mut p.b).at_most(5.0)] },
-    );
-    const TABLE: &Table<Whole> = &Table::new(
-        const {
-            &[
-                V::input("u", &VOLT, "", |m| &mut m.u),
-                V::boolean_input("on", "", |m| &mut m.on),
-                V::part("pair.", &Part { table: PAIR, lens: |m| &mut m.pair }),
-                V::parameter("k", &VOLT, "", |m| &mut m.k),
-                V::output("y", &VOLT, "", |m| &mut m.y),
-            ]
-        },
-    );
+    const PAIR: &Table<Pair> =
+        table![P::input("a", &VOLT, "", |p| &mut p.a), P::discrete_input("b", &VOLT, "", |p| &mut p.b).at_most(5.0)];
+    const TABLE: &Table<Whole> = table![
+        V::input("u", &VOLT, "", |m| &mut m.u),
+        V::boolean_input("on", "", |m| &mut m.on),
+        V::part("pair.", &Part { table: PAIR, lens: |m| &mut m.pair }),
+        V::parameter("k", &VOLT, "", |m| &mut m.k),
+        V::output("y", &VOLT, "", |m| &mut m.y),
+    ];
 
     fn read(list: &[u32]) -> usize {
         let mut whole = Whole::default();

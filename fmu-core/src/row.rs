@@ -12,7 +12,6 @@ use crate::integer::Getter;
 use crate::need::Need;
 use crate::reals::{Inputs, Interval};
 use crate::token::Hash;
-use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
 pub(crate) use settings::demand;
 pub use slot::Slot;
@@ -49,11 +48,11 @@ pub(crate) enum Access<W: 'static> {
 ///
 /// ```
 /// # use fmu_core::unit::{AMPERE, KELVIN, OHM, Quantity, VOLT};
-/// # use fmu_core::{Row, Table};
+/// # use fmu_core::{Row, Table, table};
 /// # #[derive(Default)] struct Model { u: f64, u_k: f64, i: f64, i_k: f64, x: f64, x_k: f64, r: f64, g: f64, band: f64 }
 /// # type V = Row<Model>;
 /// const BAND: Quantity = KELVIN.relative("TemperatureDifference");
-/// const TABLE: &Table<Model> = &Table::new(const { &[
+/// const TABLE: &Table<Model> = table![
 ///     V::input("u", &VOLT, "Continuous, held over a step of Co-Simulation", |m| &mut m.u),
 ///     V::discrete_input("u_k", &VOLT, "Read at sample instants", |m| &mut m.u_k).at_least(-5.0).at_most(5.0),
 ///     V::output("i", &AMPERE, "Continuous", |m| &mut m.i).mean(),
@@ -63,7 +62,7 @@ pub(crate) enum Access<W: 'static> {
 ///     V::parameter("R", &OHM, "Fixed after initialization", |m| &mut m.r).above(0.0).below(1e6),
 ///     V::parameter("band", &BAND, "May change while the simulation runs", |m| &mut m.band).tunable(),
 ///     V::calculated("G", &OHM, "From parameters, by `derive`", |m| &mut m.g),
-/// ] });
+/// ];
 /// let mut model = Model::default();
 /// assert_eq!(TABLE.tell(&model, |m| &mut m.band), "band = 0 K");
 /// assert_eq!(TABLE.fault(&model, |m| &mut m.r, "above 0").to_string(), "R = 0 Ohm is not allowed: above 0");
@@ -74,7 +73,7 @@ pub(crate) enum Access<W: 'static> {
 /// `uint64_parameter`; `integer_input` is of 32 bits:
 ///
 /// ```
-/// # use fmu_core::{Field, Row, Table, enumeration};
+/// # use fmu_core::{Field, Row, Table, table, enumeration};
 /// enumeration! {
 ///     enum Fan("FanMode", "What the fan does") {
 ///         1 Off "Stands still";
@@ -83,7 +82,7 @@ pub(crate) enum Access<W: 'static> {
 /// }
 /// # struct Model { on: bool, n: i32, small: u8, count: u64, fan: Fan }
 /// # type V = Row<Model>;
-/// const TABLE: &Table<Model> = &Table::new(const { &[
+/// const TABLE: &Table<Model> = table![
 ///     V::boolean_input("on", "Input", |m| &mut m.on),
 ///     V::boolean_output("on_out", "Output", |m| &mut m.on),
 ///     V::boolean_local("on_local", "For inspection", |m| &mut m.on),
@@ -98,7 +97,7 @@ pub(crate) enum Access<W: 'static> {
 ///     V::enumeration_output("fan_out", "Output", &Field(|m| &mut m.fan)),
 ///     V::enumeration_local("fan_local", "For inspection", &Field(|m| &mut m.fan)),
 ///     V::enumeration_parameter("fan_parameter", "Parameter", &Field(|m| &mut m.fan)),
-/// ] });
+/// ];
 /// # let mut model = Model { on: false, n: 0, small: 0, count: 0, fan: Fan::Off };
 /// if let Some((_, fmu_core::Slot::Enumeration(fan))) = TABLE.entry(&mut model, 10) {
 ///     assert!(fan.set(2) && !fan.set(3));
@@ -111,10 +110,10 @@ pub(crate) enum Access<W: 'static> {
 ///
 /// ```
 /// # use fmu_core::unit::{ONE, VOLT};
-/// # use fmu_core::{Row, Table};
+/// # use fmu_core::{Row, Table, table};
 /// # #[derive(Default)] struct Model { u: [f64; 3], y: [f64; 3], a: [[f64; 3]; 2], x: f32, label: String, on: bool }
 /// # type V = Row<Model>;
-/// const TABLE: &Table<Model> = &Table::new(const { &[
+/// const TABLE: &Table<Model> = table![
 ///     V::array_input("u", &VOLT, "Three inputs", 3, |m| &mut m.u),
 ///     V::array_output("y", &VOLT, "Three outputs, sampled", 3, |m| &mut m.y).discrete(),
 ///     V::array_local("y_local", &VOLT, "For inspection", 3, |m| &mut m.y),
@@ -126,7 +125,7 @@ pub(crate) enum Access<W: 'static> {
 ///     V::text_parameter("label", "Fixed after initialization", |m| &mut m.label),
 ///     V::text_output("status", "Chosen or kept, never made in a step", |m| if m.on { &m.label } else { "off" }),
 ///     V::text_constant("revision", "Never changes", "r1"),
-/// ] });
+/// ];
 /// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 4 + 3);
 /// ```
 ///
@@ -134,24 +133,24 @@ pub(crate) enum Access<W: 'static> {
 ///
 /// ```
 /// # use fmu_core::unit::OHM;
-/// # use fmu_core::{Part, Row, Table};
+/// # use fmu_core::{Part, Row, Table, table};
 /// # struct Motor { r: f64 }
 /// # struct Drive { motor: Motor }
-/// const MOTOR: &Table<Motor> = &Table::new(const { &[Row::parameter("R", &OHM, "Resistance", |m: &mut Motor| &mut m.r)] });
+/// const MOTOR: &Table<Motor> = table![Row::parameter("R", &OHM, "Resistance", |m: &mut Motor| &mut m.r)];
 /// const DRIVE: &Table<Drive> =
-///     &Table::new(const { &[Row::part("motor.", &Part { table: MOTOR, lens: |d: &mut Drive| &mut d.motor })] });
+///     table![Row::part("motor.", &Part { table: MOTOR, lens: |d: &mut Drive| &mut d.motor })];
 /// assert_eq!(DRIVE.locate(0).map(|(name, ..)| name), Some("motor.R".into()));
 /// ```
 ///
 /// A row that contradicts itself does not compile; the compiler shows it, with its name and the reason:
 ///
 /// ```compile_fail,E0080
-/// # use fmu_core::{Row, Table};
+/// # use fmu_core::{Row, Table, table};
 /// # struct Model { on: bool }
 /// # type V = Row<Model>;
-/// const TABLE: &Table<Model> = &Table::new(const { &[
+/// const TABLE: &Table<Model> = table![
 ///     V::boolean_input("on", "Input", |m| &mut m.on).at_least(0.0), // on: only a number can have a bound
-/// ] });
+/// ];
 /// # let _ = TABLE.len();
 /// ```
 pub struct Row<W: 'static> {
@@ -161,19 +160,13 @@ pub struct Row<W: 'static> {
 }
 
 impl<W: 'static> Row<W> {
-    pub(crate) const fn new(
-        name: &'static str,
-        description: &'static str,
-        causality: Causality,
-        variability: Variability,
-        kind: Kind,
-        access: Access<W>,
-    ) -> Self {
+    /// A fixed local variable; [`with`](Self::with) makes it another.
+    pub(crate) const fn new(name: &'static str, description: &'static str, kind: Kind, access: Access<W>) -> Self {
         let meta = Meta {
             name,
             description,
-            causality,
-            variability,
+            causality: Causality::Local,
+            variability: Variability::Fixed,
             kind,
             range: Range::ALL,
             nominal: None,
@@ -186,98 +179,14 @@ impl<W: 'static> Row<W> {
         Self { settable: Interval::of(&meta), meta, access }
     }
 
+    pub(crate) const fn with(mut self, causality: Causality, variability: Variability) -> Self {
+        (self.meta.causality, self.meta.variability) = (causality, variability);
+        self.settable = Interval::of(&self.meta);
+        self
+    }
+
     /// What the row says about its variable.
     pub(crate) const fn meta(&self) -> &Meta {
         &self.meta
-    }
-
-    const fn real(
-        (causality, variability): (Causality, Variability),
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::new(name, description, causality, variability, Kind::Real(quantity), Access::Real(get))
-    }
-
-    /// A continuous real input.
-    pub const fn input(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Input, Variability::Continuous), name, quantity, description, get)
-    }
-
-    /// A real input that changes at sample instants.
-    pub const fn discrete_input(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Input, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A continuous real output, calculated from the start on.
-    pub const fn output(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Output, Variability::Continuous), name, quantity, description, get)
-    }
-
-    /// A continuous real variable other than an output: a state that importers may read.
-    pub const fn state(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Local, Variability::Continuous), name, quantity, description, get)
-    }
-
-    /// A real output that changes at sample instants.
-    pub const fn discrete_output(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Output, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A real variable other than an output, which changes at sample instants.
-    pub const fn discrete_local(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Local, Variability::Discrete), name, quantity, description, get)
-    }
-
-    /// A real parameter, fixed after initialization.
-    pub const fn parameter(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::Parameter, Variability::Fixed), name, quantity, description, get)
-    }
-
-    /// A parameter computed by the model's `derive`, constant during the simulation.
-    pub const fn calculated(
-        name: &'static str,
-        quantity: &'static Quantity,
-        description: &'static str,
-        get: fn(&mut W) -> &mut f64,
-    ) -> Self {
-        Self::real((Causality::CalculatedParameter, Variability::Fixed), name, quantity, description, get)
     }
 }

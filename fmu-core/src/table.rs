@@ -7,7 +7,7 @@ use crate::fault::Fault;
 use crate::reals::Inputs;
 use crate::row::{Access, Node, Row, Slot, demand};
 use crate::token::Hash;
-use crate::variable::{Causality, Kind, Meta, Variability};
+use crate::variable::{Kind, Meta};
 use std::fmt::Display;
 use std::mem::MaybeUninit;
 use std::ptr;
@@ -49,8 +49,16 @@ impl<W: 'static> Row<W> {
     /// All variables of a part, under a prefix that ends with a dot (or none).
     pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
         let access = Access::Part { len: part.table.len(), hash: part.table.hash(), node: part };
-        Self::new(prefix, "", Causality::Local, Variability::Fixed, Kind::Boolean, access)
+        Self::new(prefix, "", Kind::Boolean, access)
     }
+}
+
+/// A `&'static Table` from its rows, built and checked while compiling; [`Row`] has an example of every kind of row.
+#[macro_export]
+macro_rules! table {
+    ($($row:expr),* $(,)?) => {
+        &$crate::Table::new(const { &[$($row),*] })
+    };
 }
 
 /// A value of an enumeration with the name of its item.
@@ -67,7 +75,7 @@ pub(crate) struct RowPlace {
     pub(crate) inner: u16,
 }
 
-/// All variables of `W`.
+/// All variables of `W`; [`table!`](crate::table!) makes one from its rows.
 pub struct Table<W: 'static> {
     pub(crate) rows: &'static [Row<W>],
     pub(crate) places: [RowPlace; CAPACITY],

@@ -144,7 +144,7 @@ impl Token {
 mod tests {
     use super::*;
     use crate::unit::VOLT;
-    use crate::{Row, Table};
+    use crate::{Row, Table, table};
 
     #[test]
     fn known_fnv_vectors() {
@@ -159,15 +159,11 @@ mod tests {
         weights: [f64; 6],
     }
 
-    const TABLE: &Table<Probe> = &Table::new(
-        const {
-            &[
-                Row::input("u", &VOLT, "", |m: &mut Probe| &mut m.u),
-                Row::array_parameter("map", &VOLT, "", 3, |m: &mut Probe| &mut m.map),
-                Row::array_parameter("weights", &VOLT, "", 6, |m: &mut Probe| &mut m.weights).shape(&[2, 3]),
-            ]
-        },
-    );
+    const TABLE: &Table<Probe> = table![
+        Row::input("u", &VOLT, "", |m: &mut Probe| &mut m.u),
+        Row::array_parameter("map", &VOLT, "", 3, |m: &mut Probe| &mut m.map),
+        Row::array_parameter("weights", &VOLT, "", 6, |m: &mut Probe| &mut m.weights).shape(&[2, 3]),
+    ];
 
     /// The compiler judges this for every target: one with a `usize` of 32 bits hashes lengths, dimensions and extents as one
     /// with 64 bits does. The values come from an FNV-1a written in Python over the fields in the order of `meta`.

@@ -18,9 +18,8 @@ type V = Row<Block<Both>>;
 impl Model for Both {
     type Outputs = ();
     const INFO: Info = Info { name: "Both", ..Info::DEFAULT };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const { &[V::output("x", &ONE, "", |m| &mut m.model.x), V::integer_output("n", "", |m| &mut m.model.n)] },
-    );
+    const TABLE: &'static Table<Block<Self>> =
+        table![V::output("x", &ONE, "", |m| &mut m.model.x), V::integer_output("n", "", |m| &mut m.model.n)];
     fn initialize(&mut self) {}
     fn output(&self, _: Elapsed, (): &mut ()) {}
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {

@@ -38,29 +38,25 @@ type V = Row<Block<Known>>;
 impl Model for Known {
     type Outputs = Outputs;
     const INFO: Info = Info { name: "Known", ..Info::DEFAULT };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("u", &ONE, "", |m| &mut m.model.u),
-                V::discrete_input("k", &ONE, "", |m| &mut m.model.k).at_least(-1.0).at_most(1.0),
-                V::boolean_input("on", "", |m| &mut m.model.on),
-                V::input("unused", &ONE, "", |m| &mut m.model.unused),
-                V::parameter("fixed", &ONE, "", |m| &mut m.model.fixed),
-                V::parameter("tunable", &ONE, "", |m| &mut m.model.tunable).tunable(),
-                V::parameter("x_start", &ONE, "", |m| &mut m.model.x_start),
-                V::calculated("twice", &ONE, "", |m| &mut m.model.twice),
-                V::output("x", &ONE, "", |m| &mut m.model.x),
-                V::state("y", &ONE, "", |m| &mut m.model.y),
-                V::output("through", &ONE, "", |m| &mut m.out.through),
-                V::output("gated", &ONE, "", |m| &mut m.out.gated),
-                V::output("tuned", &ONE, "", |m| &mut m.out.tuned),
-                V::output("clock", &ONE, "", |m| &mut m.out.clock),
-                V::discrete_output("held", &ONE, "", |m| &mut m.out.held),
-                V::output("constant", &ONE, "", |m| &mut m.out.constant),
-                V::output("sum", &ONE, "", |m| &mut m.out.sum),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("u", &ONE, "", |m| &mut m.model.u),
+        V::discrete_input("k", &ONE, "", |m| &mut m.model.k).at_least(-1.0).at_most(1.0),
+        V::boolean_input("on", "", |m| &mut m.model.on),
+        V::input("unused", &ONE, "", |m| &mut m.model.unused),
+        V::parameter("fixed", &ONE, "", |m| &mut m.model.fixed),
+        V::parameter("tunable", &ONE, "", |m| &mut m.model.tunable).tunable(),
+        V::parameter("x_start", &ONE, "", |m| &mut m.model.x_start),
+        V::calculated("twice", &ONE, "", |m| &mut m.model.twice),
+        V::output("x", &ONE, "", |m| &mut m.model.x),
+        V::state("y", &ONE, "", |m| &mut m.model.y),
+        V::output("through", &ONE, "", |m| &mut m.out.through),
+        V::output("gated", &ONE, "", |m| &mut m.out.gated),
+        V::output("tuned", &ONE, "", |m| &mut m.out.tuned),
+        V::output("clock", &ONE, "", |m| &mut m.out.clock),
+        V::discrete_output("held", &ONE, "", |m| &mut m.out.held),
+        V::output("constant", &ONE, "", |m| &mut m.out.constant),
+        V::output("sum", &ONE, "", |m| &mut m.out.sum),
+    ];
 
     fn derive(&mut self) {
         self.twice = 2.0 * self.tunable;

@@ -13,7 +13,7 @@ macro_rules! model {
         impl Model for $model {
             type Outputs = ();
             const INFO: Info = Info { name: stringify!($model), ..Info::DEFAULT };
-            const TABLE: &'static Table<Block<Self>> = &Table::new(const { &[] });
+            const TABLE: &'static Table<Block<Self>> = table![];
             fn initialize(&mut self) {}
             fn output(&self, _now: Elapsed, _out: &mut ()) {}
             fn advance(&mut self, _step: &Step) -> Result<(), Fault> {

@@ -36,32 +36,24 @@ impl<const VALUE: u8> Default for Heater<VALUE> {
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct None_;
 
-const PART: &Table<Part_> = &Table::new(
-    const {
-        &[
-            Row::enumeration_parameter("thermal.mode", "Mode", &Field(|p: &mut Part_| &mut p.mode)),
-            Row::boolean_parameter("on", "On", |p| &mut p.on),
-        ]
-    },
-);
+const PART: &Table<Part_> = table![
+    Row::enumeration_parameter("thermal.mode", "Mode", &Field(|p: &mut Part_| &mut p.mode)),
+    Row::boolean_parameter("on", "On", |p| &mut p.on),
+];
 
 impl<const VALUE: u8> Model for Heater<VALUE> {
     type Outputs = None_;
     const INFO: Info =
         Info { name: "Heater", experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 }, ..Info::DEFAULT };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                Row::input("u", &VOLT, "Voltage", |m: &mut Block<Self>| &mut m.model.u).optional(),
-                Row::input("bias", &VOLT, "Bias", |m: &mut Block<Self>| &mut m.model.bias).read_with("on", "true"),
-                Row::input("T", &KELVIN, "Coolant", |m: &mut Block<Self>| &mut m.model.coolant).read_with(
-                    ["thermal.mode", "mode", "thermal", "u"][VALUE as usize % 4],
-                    ["Network", "Imposed"][VALUE as usize / 4],
-                ),
-                Row::part("plant.", &Part { table: PART, lens: |m: &mut Block<Self>| &mut m.model.part }),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        Row::input("u", &VOLT, "Voltage", |m: &mut Block<Self>| &mut m.model.u).optional(),
+        Row::input("bias", &VOLT, "Bias", |m: &mut Block<Self>| &mut m.model.bias).read_with("on", "true"),
+        Row::input("T", &KELVIN, "Coolant", |m: &mut Block<Self>| &mut m.model.coolant).read_with(
+            ["thermal.mode", "mode", "thermal", "u"][VALUE as usize % 4],
+            ["Network", "Imposed"][VALUE as usize / 4],
+        ),
+        Row::part("plant.", &Part { table: PART, lens: |m: &mut Block<Self>| &mut m.model.part }),
+    ];
 
     fn initialize(&mut self) {}
 

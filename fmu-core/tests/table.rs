@@ -21,15 +21,11 @@ fmu_core::enumeration! {
 }
 
 type P = Row<Load>;
-const LOAD: &Table<Load> = &Table::new(
-    const {
-        &[
-            P::parameter("R", &OHM, "Resistance", |m| &mut m.r).above(0.0),
-            P::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.map),
-            P::enumeration_parameter("mode", "Mode", &Field(|m| &mut m.mode)),
-        ]
-    },
-);
+const LOAD: &Table<Load> = table![
+    P::parameter("R", &OHM, "Resistance", |m| &mut m.r).above(0.0),
+    P::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.map),
+    P::enumeration_parameter("mode", "Mode", &Field(|m| &mut m.mode)),
+];
 
 #[derive(Clone, Serialize, Deserialize)]
 struct Small {
@@ -70,18 +66,14 @@ impl Model for Small {
         experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
         ..Info::DEFAULT
     };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("u", &VOLT, "Voltage", |m| &mut m.model.u),
-                V::output("i", &AMPERE, "Current", |m| &mut m.out.i),
-                V::part("load.", &Part { table: LOAD, lens: |m| &mut m.model.load }),
-                V::boolean_parameter("on", "On", |m| &mut m.model.on),
-                V::integer_parameter("n", "Count", |m| &mut m.model.n).at_least(1.0),
-                V::calculated("gain", &OHM, "Gain", |m| &mut m.model.gain),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("u", &VOLT, "Voltage", |m| &mut m.model.u),
+        V::output("i", &AMPERE, "Current", |m| &mut m.out.i),
+        V::part("load.", &Part { table: LOAD, lens: |m| &mut m.model.load }),
+        V::boolean_parameter("on", "On", |m| &mut m.model.on),
+        V::integer_parameter("n", "Count", |m| &mut m.model.n).at_least(1.0),
+        V::calculated("gain", &OHM, "Gain", |m| &mut m.model.gain),
+    ];
     fn derive(&mut self) {
         self.gain = 2.0 * self.load.r;
     }
@@ -143,15 +135,11 @@ mod terminals {
             impl Model for $name {
                 type Outputs = SmallOutputs;
                 const INFO: Info = Small::INFO;
-                const TABLE: &'static Table<Block<Self>> = &Table::new(
-                    const {
-                        &[
-                            Row::<Block<Self>>::input("u", &VOLT, "Voltage", |m| &mut m.model.0.u),
-                            Row::<Block<Self>>::output("i", &AMPERE, "Current", |m| &mut m.out.i),
-                            Row::<Block<Self>>::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.model.0.load.map),
-                        ]
-                    },
-                );
+                const TABLE: &'static Table<Block<Self>> = table![
+                    Row::<Block<Self>>::input("u", &VOLT, "Voltage", |m| &mut m.model.0.u),
+                    Row::<Block<Self>>::output("i", &AMPERE, "Current", |m| &mut m.out.i),
+                    Row::<Block<Self>>::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.model.0.load.map),
+                ];
                 const TERMINALS: &'static [Terminal] = $terminals;
                 fn initialize(&mut self) {}
                 fn output(&self, _: Elapsed, _: &mut SmallOutputs) {}

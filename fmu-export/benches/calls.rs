@@ -5,7 +5,7 @@
 mod timing;
 
 use fmu_core::unit::VOLT;
-use fmu_core::{Block, Elapsed, Experiment, Exported, Fault, Info, Model, Row, Step, Table};
+use fmu_core::{Block, Elapsed, Experiment, Exported, Fault, Info, Model, Row, Step, Table, table};
 use fmu_export::abi::types::{Fmi2Boolean, InstancePointer, References, c_int};
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;
@@ -33,24 +33,20 @@ impl Model for Empty {
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
         ..Info::DEFAULT
     };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("u1", &VOLT, "", |m| &mut m.model.u[0]),
-                V::input("u2", &VOLT, "", |m| &mut m.model.u[1]),
-                V::input("u3", &VOLT, "", |m| &mut m.model.u[2]),
-                V::input("u4", &VOLT, "", |m| &mut m.model.u[3]),
-                V::input("u5", &VOLT, "", |m| &mut m.model.u[4]),
-                V::input("u6", &VOLT, "", |m| &mut m.model.u[5]),
-                V::output("y1", &VOLT, "", |m| &mut m.out.y[0]),
-                V::output("y2", &VOLT, "", |m| &mut m.out.y[1]),
-                V::output("y3", &VOLT, "", |m| &mut m.out.y[2]),
-                V::output("y4", &VOLT, "", |m| &mut m.out.y[3]),
-                V::output("y5", &VOLT, "", |m| &mut m.out.y[4]),
-                V::output("y6", &VOLT, "", |m| &mut m.out.y[5]),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("u1", &VOLT, "", |m| &mut m.model.u[0]),
+        V::input("u2", &VOLT, "", |m| &mut m.model.u[1]),
+        V::input("u3", &VOLT, "", |m| &mut m.model.u[2]),
+        V::input("u4", &VOLT, "", |m| &mut m.model.u[3]),
+        V::input("u5", &VOLT, "", |m| &mut m.model.u[4]),
+        V::input("u6", &VOLT, "", |m| &mut m.model.u[5]),
+        V::output("y1", &VOLT, "", |m| &mut m.out.y[0]),
+        V::output("y2", &VOLT, "", |m| &mut m.out.y[1]),
+        V::output("y3", &VOLT, "", |m| &mut m.out.y[2]),
+        V::output("y4", &VOLT, "", |m| &mut m.out.y[3]),
+        V::output("y5", &VOLT, "", |m| &mut m.out.y[4]),
+        V::output("y6", &VOLT, "", |m| &mut m.out.y[5]),
+    ];
     fn initialize(&mut self) {}
     fn output(&self, _: Elapsed, _: &mut Outputs) {}
     fn advance(&mut self, _: &Step) -> Result<(), Fault> {

@@ -6,7 +6,7 @@ mod timing;
 
 use fmu_core::unit::{ONE, PER_SECOND};
 use fmu_core::{
-    Block, ContinuousTime, Elapsed, Experiment, Exported, Fault, Info, Model, Row, State, Step, Table, integrate,
+    Block, ContinuousTime, Elapsed, Experiment, Exported, Fault, Info, Model, Row, State, Step, Table, integrate, table,
 };
 use fmu_export::abi::types::{Fmi2Boolean, InstancePointer, References, c_int};
 use serde::{Deserialize, Serialize};
@@ -31,22 +31,18 @@ impl Model for Chain {
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
         ..Info::DEFAULT
     };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("u1", &ONE, "", |m| &mut m.model.u[0]),
-                V::input("u2", &ONE, "", |m| &mut m.model.u[1]),
-                V::input("u3", &ONE, "", |m| &mut m.model.u[2]),
-                V::input("u4", &ONE, "", |m| &mut m.model.u[3]),
-                V::input("u5", &ONE, "", |m| &mut m.model.u[4]),
-                V::input("u6", &ONE, "", |m| &mut m.model.u[5]),
-                V::output("x1", &ONE, "", |m| &mut m.model.x[0]),
-                V::output("x2", &ONE, "", |m| &mut m.model.x[1]),
-                V::output("x3", &ONE, "", |m| &mut m.model.x[2]),
-                V::output("x4", &ONE, "", |m| &mut m.model.x[3]),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("u1", &ONE, "", |m| &mut m.model.u[0]),
+        V::input("u2", &ONE, "", |m| &mut m.model.u[1]),
+        V::input("u3", &ONE, "", |m| &mut m.model.u[2]),
+        V::input("u4", &ONE, "", |m| &mut m.model.u[3]),
+        V::input("u5", &ONE, "", |m| &mut m.model.u[4]),
+        V::input("u6", &ONE, "", |m| &mut m.model.u[5]),
+        V::output("x1", &ONE, "", |m| &mut m.model.x[0]),
+        V::output("x2", &ONE, "", |m| &mut m.model.x[1]),
+        V::output("x3", &ONE, "", |m| &mut m.model.x[2]),
+        V::output("x4", &ONE, "", |m| &mut m.model.x[3]),
+    ];
     fn initialize(&mut self) {}
     fn output(&self, _: Elapsed, (): &mut ()) {}
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {

@@ -9,8 +9,8 @@ use crate::access::index;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Standard, State};
 use crate::message;
-use crate::snapshot::ramps;
-use fmu_core::{Block, Causality, Elapsed, Exported, Fault, Kind, Model, Slot, Step, Variability};
+use crate::snapshot::{Snapshot, ramps};
+use fmu_core::{Block, Causality, Elapsed, Exported, Fault, Kind, Meta, Model, Slot, Step, Variability};
 
 /// Parts into which a step with changing inputs is divided: each uses the inputs at its middle.
 const PARTS: u32 = 32;
@@ -63,14 +63,12 @@ impl<E: Exported> Instance<E> {
         self.with_elements(unknowns, knowns, |instance, unknowns, knowns| {
             instance.check_sides(unknowns, knowns)?;
             check_sizes(seed, unknowns.len(), (out.len(), knowns.len()))?;
-            let mut column = std::mem::take(&mut instance.scratch().column);
-            column.clear();
-            column.resize(unknowns.len(), 0.0);
+            let mut column = zeros(&mut instance.scratch().1.column, unknowns.len());
             for (known, out) in knowns.iter().zip(out) {
                 instance.column(unknowns, std::slice::from_ref(known), &[1.0], &mut column)?;
                 *out = column.iter().zip(seed).map(|(x, w)| x * w).sum();
             }
-            instance.scratch().column = column;
+            instance.scratch().1.column = column;
             Ok(())
         })
     }
@@ -95,11 +93,9 @@ impl<E: Exported> Instance<E> {
                 return Err(Self::no_side(unknown, "a continuous output").into());
             }
         }
-        let mut rates = std::mem::take(&mut self.scratch().rates);
-        rates.clear();
-        rates.resize(E::CAN.states().len(), 0.0);
+        let mut rates = zeros(&mut self.scratch().1.rates, E::CAN.states().len());
         let done = self.derivatives(&mut rates).and_then(|()| self.along(unknowns, &[], &rates, 1.0, out));
-        self.scratch().rates = rates;
+        self.scratch().1.rates = rates;
         done?;
         self.add_integrands(unknowns, out);
         Ok(())
@@ -108,9 +104,7 @@ impl<E: Exported> Instance<E> {
     /// Adds the rates of outputs that grow with time.
     fn add_integrands(&mut self, unknowns: &[u32], out: &mut [f64]) {
         let Some(continuous) = &E::CAN.continuous else { return };
-        self.scratch();
-        let Self { current, scratch, .. } = self;
-        let Some(scratch) = scratch else { return };
+        let (current, scratch) = self.scratch();
         for sign in [-1.0, 1.0] {
             scratch.block.out = <E::Model as Model>::Outputs::default();
             if sign > 0.0 {
@@ -129,9 +123,7 @@ impl<E: Exported> Instance<E> {
     pub fn input_derivatives(&mut self, knowns: &[u32], orders: &[i32], values: &[f64]) -> Result<(), Fault> {
         supported::<E>("canInterpolateInputs = false")?;
         for ((&known, order), value) in knowns.iter().zip(orders).zip(values) {
-            let input =
-                E::Model::TABLE.entry(&mut self.current.block, index(known)).is_some_and(|(meta, _)| ramps(meta));
-            if !input {
+            if !self.is_continuous_input(known) {
                 return Err(Self::no_side(known, "a continuous real input"));
             }
             if *order != 1 {
@@ -200,10 +192,10 @@ impl<E: Exported> Instance<E> {
         if !self.arrays {
             return work(self, unknowns, knowns);
         }
-        let mut sides = std::mem::take(&mut self.scratch().sides);
+        let mut sides = std::mem::take(&mut self.scratch().1.sides);
         let done = self.each(unknowns, &mut sides[0]).and_then(|()| self.each(knowns, &mut sides[1]));
         let done = done.map_err(Refusal::from).and_then(|()| work(self, &sides[0], &sides[1]));
-        self.scratch().sides = sides;
+        self.scratch().1.sides = sides;
         done
     }
 
@@ -216,25 +208,26 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    fn scratch(&mut self) -> &mut Scratch<E::Model> {
-        self.scratch.get_or_insert_with(|| {
-            Box::new(Scratch {
-                block: self.current.block.clone(),
-                dx: vec![0.0; E::CAN.states().len()],
-                rates: Vec::new(),
-                others: Vec::new(),
-                column: Vec::new(),
-                sides: [Vec::new(), Vec::new()],
-            })
-        })
+    /// The instance's values and the memory for derivatives.
+    fn scratch(&mut self) -> (&mut Snapshot<E::Model>, &mut Scratch<E::Model>) {
+        let Self { current, scratch, .. } = self;
+        let new = || Scratch {
+            block: current.block.clone(),
+            dx: vec![0.0; E::CAN.states().len()],
+            rates: Vec::new(),
+            others: Vec::new(),
+            column: Vec::new(),
+            sides: [Vec::new(), Vec::new()],
+        };
+        let scratch = scratch.get_or_insert_with(|| Box::new(new()));
+        (current, scratch)
     }
 
     /// Divides the knowns into states and others, and takes the derivative.
     fn column(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
-        let scratch = self.scratch();
-        let (mut rates, mut others) = (std::mem::take(&mut scratch.rates), std::mem::take(&mut scratch.others));
-        rates.clear();
-        rates.resize(E::CAN.states().len(), 0.0);
+        let (_, scratch) = self.scratch();
+        let mut rates = zeros(&mut scratch.rates, E::CAN.states().len());
+        let mut others = std::mem::take(&mut scratch.others);
         others.clear();
         for (&known, &seed) in knowns.iter().zip(seed) {
             match self.states.iter().position(|&row| row == index(known)) {
@@ -243,7 +236,7 @@ impl<E: Exported> Instance<E> {
             }
         }
         let done = self.along(unknowns, &others, &rates, 0.0, out);
-        let scratch = self.scratch();
+        let (_, scratch) = self.scratch();
         (scratch.rates, scratch.others) = (rates, others);
         done
     }
@@ -269,9 +262,7 @@ impl<E: Exported> Instance<E> {
             // A tangent is along states and inputs.
             self.difference(unknowns, &[], &[], time, out)?;
         }
-        self.scratch();
-        let Self { current, scratch, .. } = self;
-        let Some(scratch) = scratch else { return Ok(()) };
+        let (current, scratch) = self.scratch();
         let direction = &mut scratch.block;
         clear::<E>(direction);
         for &(known, seed) in others {
@@ -315,14 +306,9 @@ impl<E: Exported> Instance<E> {
         }
         let eps = if largest > 0.0 { SHARE / largest } else { SHARE };
         let initial = self.current.life.state() == State::Initialization;
-        let mut parameters = false;
-        for &(known, _) in others {
-            let row = E::Model::TABLE.entry(&mut self.current.block, index(known));
-            parameters |= row.is_some_and(|(meta, _)| meta.causality == Causality::Parameter);
-        }
-        self.scratch();
-        let Self { current, scratch, .. } = self;
-        let Some(scratch) = scratch else { return Ok(()) };
+        let is_parameter = |meta: &Meta| meta.causality == Causality::Parameter;
+        let parameters = others.iter().any(|&(known, _)| self.meta(known).is_some_and(is_parameter));
+        let (current, scratch) = self.scratch();
         for side in [1.0, -1.0] {
             let block = &mut scratch.block;
             block.model.clone_from(&current.block.model);
@@ -350,26 +336,27 @@ impl<E: Exported> Instance<E> {
 
     /// Refuses derivatives that are not finite: they do not exist.
     fn finite(unknowns: &[u32], out: &[f64]) -> Result<(), Refusal> {
-        match out.iter().position(|x| !x.is_finite()) {
-            None => Ok(()),
-            Some(i) => {
-                let name = format!("the derivative of {}", Self::name_of(unknowns[i]));
-                Err(Refusal::Discard(Fault::value(&name, out[i], "a finite number")))
-            }
-        }
+        let Some(i) = out.iter().position(|x| !x.is_finite()) else { return Ok(()) };
+        let name = format!("the derivative of {}", Self::name_of(unknowns[i]));
+        Err(Refusal::Discard(Fault::value(&name, out[i], "a finite number")))
     }
 
     fn is_derivative(unknown: u32) -> bool {
         index(unknown).wrapping_sub(E::Model::TABLE.len()) < E::CAN.states().len()
     }
 
+    /// What the table says of a variable.
+    fn meta(&mut self, reference: u32) -> Option<&'static Meta> {
+        E::Model::TABLE.entry(&mut self.current.block, index(reference)).map(|(meta, _)| meta)
+    }
+
     fn is_continuous_input(&mut self, known: u32) -> bool {
-        E::Model::TABLE.entry(&mut self.current.block, index(known)).is_some_and(|(meta, _)| ramps(meta))
+        self.meta(known).is_some_and(ramps)
     }
 
     /// A continuous real output, or in Event Mode any real output.
     fn is_output(&mut self, unknown: u32, discrete: bool) -> bool {
-        E::Model::TABLE.entry(&mut self.current.block, index(unknown)).is_some_and(|(meta, _)| {
+        self.meta(unknown).is_some_and(|meta| {
             meta.causality == Causality::Output
                 && matches!(meta.kind, Kind::Real(_))
                 && (discrete || meta.variability == Variability::Continuous)
@@ -381,8 +368,7 @@ impl<E: Exported> Instance<E> {
         let state = self.current.life.state();
         let initial = state == State::Initialization;
         for (i, &unknown) in unknowns.iter().enumerate() {
-            let entry = E::Model::TABLE.entry(&mut self.current.block, index(unknown));
-            let calculated = entry.is_some_and(|(meta, _)| {
+            let calculated = self.meta(unknown).is_some_and(|meta| {
                 meta.causality == Causality::CalculatedParameter && matches!(meta.kind, Kind::Real(_))
             });
             let of_start = initial && (calculated || self.states.contains(&index(unknown)));
@@ -397,8 +383,7 @@ impl<E: Exported> Instance<E> {
         for (i, &known) in knowns.iter().enumerate() {
             let state_row = self.states.contains(&index(known)) && !initial;
             let parameters = self.standard == Standard::Fmi3;
-            let entry = E::Model::TABLE.entry(&mut self.current.block, index(known));
-            let input = entry.is_some_and(|(meta, _)| {
+            let input = self.meta(known).is_some_and(|meta| {
                 let fits = match meta.causality {
                     Causality::Input => meta.variability == Variability::Continuous || state == State::Event || initial,
                     Causality::Parameter => initial || (parameters && meta.variability == Variability::Tunable),
@@ -432,6 +417,14 @@ impl<E: Exported> Instance<E> {
             None => format!("value reference {reference}"),
         }
     }
+}
+
+/// Takes the memory of a vector for `n` zeros.
+fn zeros(memory: &mut Vec<f64>, n: usize) -> Vec<f64> {
+    let mut zeros = std::mem::take(memory);
+    zeros.clear();
+    zeros.resize(n, 0.0);
+    zeros
 }
 
 /// Checks that the seed has as many numbers as it needs, all finite, and that there is room for the results.
@@ -473,10 +466,8 @@ fn evaluate<E: Exported>(
 
 /// An unknown's value: a derivative, or a row of the table.
 fn pick<E: Exported>(block: &mut Block<E::Model>, dx: &[f64], index: usize) -> f64 {
-    match dx.get(index.wrapping_sub(E::Model::TABLE.len())) {
-        Some(x) => *x,
-        None => real(block, index),
-    }
+    let derivative = dx.get(index.wrapping_sub(E::Model::TABLE.len())).copied();
+    derivative.unwrap_or_else(|| real(block, index))
 }
 
 /// Makes a direction: no continuous input and no state changes, and so far no output.

@@ -58,43 +58,9 @@ pub trait Value: Copy + Display + PartialEq {
 #[repr(transparent)]
 pub struct Fmi2Integer(pub c_int);
 
-/// `fmi2Boolean`: everything but 0 is true.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(transparent)]
-pub struct Fmi2Boolean(pub c_int);
-
-/// `fmi3Boolean`, a C `bool`: received as a byte, because an importer may pass any value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(transparent)]
-pub struct Fmi3Boolean(pub u8);
-
-impl From<bool> for Fmi2Boolean {
-    fn from(value: bool) -> Self {
-        Self(c_int::from(value))
-    }
-}
-
-impl From<bool> for Fmi3Boolean {
-    fn from(value: bool) -> Self {
-        Self(u8::from(value))
-    }
-}
-
 impl Display for Fmi2Integer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
-    }
-}
-
-impl Display for Fmi2Boolean {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        (self.0 != 0).fmt(f)
-    }
-}
-
-impl Display for Fmi3Boolean {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        (self.0 != 0).fmt(f)
     }
 }
 
@@ -267,36 +233,49 @@ impl Value for Fmi2Integer {
     }
 }
 
-impl Value for Fmi2Boolean {
-    const CARRIES: &'static str = "a truth value";
+/// The truth values of the standards: the C type, and the number that it is. Everything but 0 is true.
+macro_rules! truth_values {
+    ($($(#[$doc:meta])* $name:ident $number:ident;)*) => { $(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(transparent)]
+        pub struct $name(pub $number);
 
-    fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
-        if let Slot::Boolean(x) = slot { Some(Self(c_int::from(**x))) } else { None }
-    }
-
-    fn write(self, slot: Slot<'_>) {
-        if let Slot::Boolean(x) = slot {
-            *x = self.0 != 0;
+        impl From<bool> for $name {
+            fn from(value: bool) -> Self {
+                Self($number::from(value))
+            }
         }
-    }
 
-    fn judge(self, meta: &Meta, _: Standard) -> Option<bool> {
-        matches!(meta.kind, Kind::Boolean).then_some(true)
-    }
+        impl Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                (self.0 != 0).fmt(f)
+            }
+        }
+
+        impl Value for $name {
+            const CARRIES: &'static str = "a truth value";
+
+            fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
+                if let Slot::Boolean(x) = slot { Some((**x).into()) } else { None }
+            }
+
+            fn write(self, slot: Slot<'_>) {
+                if let Slot::Boolean(x) = slot {
+                    *x = self.0 != 0;
+                }
+            }
+
+            fn judge(self, meta: &Meta, _: Standard) -> Option<bool> {
+                matches!(meta.kind, Kind::Boolean).then_some(true)
+            }
+        }
+    )* };
 }
 
-impl Value for Fmi3Boolean {
-    const CARRIES: &'static str = Fmi2Boolean::CARRIES;
-
-    fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
-        if let Slot::Boolean(x) = slot { Some(Self(u8::from(**x))) } else { None }
-    }
-
-    fn write(self, slot: Slot<'_>) {
-        Fmi2Boolean(c_int::from(self.0)).write(slot);
-    }
-
-    fn judge(self, meta: &Meta, _: Standard) -> Option<bool> {
-        matches!(meta.kind, Kind::Boolean).then_some(true)
-    }
+truth_values! {
+    /// `fmi2Boolean`.
+    Fmi2Boolean c_int;
+    /// `fmi3Boolean`, a C `bool`: received as a byte, because an importer may pass any value.
+    Fmi3Boolean u8;
 }

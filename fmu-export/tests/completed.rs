@@ -7,7 +7,7 @@ mod solver;
 use fmu_core::unit::{Exponents, Quantity, SECOND, Unit};
 use fmu_core::{
     Block, CompletedSteps, ContinuousTime, Description, Elapsed, Events, Fault, Info, Model, Next, Outcome, Row, State,
-    Step, Table, integrate,
+    Step, Table, integrate, table,
 };
 use serde::{Deserialize, Serialize};
 use solver::{CS, ERROR, Fmu, ME, OK};
@@ -41,16 +41,12 @@ type Var = Row<Block<Meter>>;
 impl Model for Meter {
     type Outputs = Outputs;
     const INFO: Info = Info { name: "Meter", description: "An area under a curve", version: "1.0", ..Info::DEFAULT };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                Var::input("u", &ONE_PER_S, "Slope", |m| &mut m.model.u),
-                Var::output("x", &SECOND, "Height", |m| &mut m.model.x),
-                Var::output("area", &SECOND, "Area below x", |m| &mut m.out.area),
-                Var::integer_output("points", "Points told", |m| &mut m.out.points),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        Var::input("u", &ONE_PER_S, "Slope", |m| &mut m.model.u),
+        Var::output("x", &SECOND, "Height", |m| &mut m.model.x),
+        Var::output("area", &SECOND, "Area below x", |m| &mut m.out.area),
+        Var::integer_output("points", "Points told", |m| &mut m.out.points),
+    ];
 
     fn initialize(&mut self) {
         *self = Self { u: self.u, ..Self::default() };

@@ -11,7 +11,7 @@
 )]
 
 use fmu_core::unit::SECOND;
-use fmu_core::{Block, Elapsed, Experiment, Exported, Fault, Info, Model, Row, SampleGrid, Step, Table};
+use fmu_core::{Block, Elapsed, Experiment, Exported, Fault, Info, Model, Row, SampleGrid, Step, Table, table};
 use fmu_export::abi::types::*;
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;
@@ -49,14 +49,10 @@ impl Model for Sampler {
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
         ..Info::DEFAULT
     };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::integer_output("count", "Instants after the start that have come", |m| &mut m.out.count),
-                V::parameter("T_s", &SECOND, "Sample period", |m| &mut m.model.period).above(0.0),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::integer_output("count", "Instants after the start that have come", |m| &mut m.out.count),
+        V::parameter("T_s", &SECOND, "Sample period", |m| &mut m.model.period).above(0.0),
+    ];
 
     fn initialize(&mut self) {
         self.count = 0;

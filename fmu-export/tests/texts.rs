@@ -7,7 +7,7 @@
 )]
 
 use fmi::*;
-use fmu_core::{Block, Elapsed, Exported, Fault, Info, Model, Resource, Row, Step, Table};
+use fmu_core::{Block, Elapsed, Exported, Fault, Info, Model, Resource, Row, Step, Table, table};
 use fmu_export::abi::types::*;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
@@ -38,16 +38,12 @@ type V = Row<Block<Speaker>>;
 impl Model for Speaker {
     type Outputs = Outputs;
     const INFO: Info = Info { name: "Speaker", ..Info::DEFAULT };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::text_parameter("label", "Text", |m| &mut m.model.label),
-                V::boolean_input("nul", "Makes the text one that C cannot have", |m| &mut m.model.nul),
-                V::text_output("said", "The text", |m| if m.model.nul { "a\0b" } else { &m.model.label }),
-                V::uint8_output("size", "Bytes that were loaded", |m| &mut m.out.size),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::text_parameter("label", "Text", |m| &mut m.model.label),
+        V::boolean_input("nul", "Makes the text one that C cannot have", |m| &mut m.model.nul),
+        V::text_output("said", "The text", |m| if m.model.nul { "a\0b" } else { &m.model.label }),
+        V::uint8_output("size", "Bytes that were loaded", |m| &mut m.out.size),
+    ];
 
     fn load(&mut self, resources: Option<&Path>) -> Result<(), Fault> {
         match resources.and_then(|folder| folder.file_name()?.to_str()) {

@@ -76,7 +76,7 @@ fn remove(folder: &Path) {
 /// after it had removed it. Skips those that this user cannot read or remove.
 fn remove_abandoned() {
     let Ok(entries) = fs::read_dir(std::env::temp_dir()) else { return };
-    for entry in entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX)) {
+    for entry in entries.flatten().filter(|entry| is_ours(&entry.file_name().to_string_lossy())) {
         if !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
             continue;
         }
@@ -87,6 +87,12 @@ fn remove_abandoned() {
             _ => {}
         }
     }
+}
+
+/// Whether it is the name of such a folder: others may begin alike, as those of the checker's probes do.
+fn is_ours(name: &str) -> bool {
+    let owner = name.strip_prefix(PREFIX).and_then(|rest| rest.split_once('-'));
+    owner.is_some_and(|(owner, _)| owner.parse::<u32>().is_ok())
 }
 
 #[cfg(test)]
@@ -105,13 +111,14 @@ mod tests {
         drop(abandoned);
         // A process that is killed before it has made the lock, and folders that are none of these.
         let temporary = |prefix| tempfile::Builder::new().prefix(prefix).tempdir().unwrap();
-        let (empty, full) = (temporary("fmu-0-"), temporary("fmu-0-"));
+        let (empty, full, of_probe) = (temporary("fmu-0-"), temporary("fmu-0-"), temporary("fmu-probe-"));
         fs::write(full.path().join("x"), "").unwrap();
         let later = Folder::new().unwrap();
         assert!(
             !path.exists()
                 && !empty.path().exists()
                 && full.path().is_dir()
+                && of_probe.path().is_dir()
                 && used.path().is_dir()
                 && later.path().is_dir()
         );

@@ -79,7 +79,7 @@ impl Instance {
     /// The variable does not exist, or the FMU refuses.
     pub fn get(&mut self, name: &str) -> Result<Values, Error> {
         let (base, reference, count) = self.place(name)?;
-        self.read(base, reference, count)
+        self.get_at(base, reference, count)
     }
 
     /// Writes a variable.
@@ -91,17 +91,7 @@ impl Instance {
         if values.len() != count {
             return Err(Error::usage(&self.name, format!("{name} has {count} elements, not {}", values.len())));
         }
-        self.write(base, reference, values)
-    }
-
-    /// Reads a variable whose place is known.
-    pub(super) fn read(&mut self, base: BaseType, reference: u32, count: usize) -> Result<Values, Error> {
-        self.call(Call::Get, |s| s.get(base, reference, count))
-    }
-
-    /// Writes a variable whose place and size are known.
-    pub(super) fn write(&mut self, base: BaseType, reference: u32, values: &Values) -> Result<(), Error> {
-        self.call(Call::Set, |s| s.set(base, reference, values))
+        self.set_at(base, reference, values)
     }
 
     /// Writes a variable as a user writes it: `3.3`, `true`, `Rasmussen`, or elements with commas between them.

@@ -78,6 +78,13 @@ impl Instance {
         if self.opened.arrays.is_empty() { 1 } else { self.opened.arrays.get(&reference).copied().unwrap_or(1) }
     }
 
+    /// Checks that the variables have this many elements.
+    fn count(&self, references: &[u32], given: usize) -> PyResult<()> {
+        let expected: usize = references.iter().map(|&r| self.elements(r)).sum();
+        let cause = || format!("{given} values for {expected} elements of {} variables", references.len());
+        if expected == given { Ok(()) } else { Err(PyValueError::new_err(cause())) }
+    }
+
     /// The description of the FMU.
     pub(crate) fn opened(&self) -> &Arc<Opened> {
         &self.opened
@@ -157,11 +164,7 @@ impl Instance {
     #[pyo3(name = "_set_reals")]
     fn set_reals(&self, py: Python<'_>, vr: &Bound<'_, PyAny>, values: &Bound<'_, PyAny>) -> PyResult<()> {
         let (references, values): (_, Vec<f64>) = (references(vr)?, values.extract()?);
-        let expected: usize = references.iter().map(|&r| self.elements(r)).sum();
-        if expected != values.len() {
-            let cause = format!("{} values for {expected} elements of {} variables", values.len(), references.len());
-            return Err(PyValueError::new_err(cause));
-        }
+        self.count(&references, values.len())?;
         if self.opened.arrays.is_empty() {
             return self.call(py, |i| i.set_reals(&references, &values));
         }
@@ -196,11 +199,7 @@ impl Instance {
     fn set(&self, py: Python<'_>, kind: &str, vr: &Bound<'_, PyAny>, items: &Bound<'_, PyAny>) -> PyResult<()> {
         let (base, references) = (base(kind)?, references(vr)?);
         let items: Vec<Bound<'_, PyAny>> = items.try_iter()?.collect::<PyResult<_>>()?;
-        let expected: usize = references.iter().map(|&r| self.elements(r)).sum();
-        if expected != items.len() {
-            let cause = format!("{} values for {expected} elements of {} variables", items.len(), references.len());
-            return Err(PyValueError::new_err(cause));
-        }
+        self.count(&references, items.len())?;
         let mut rest = items.as_slice();
         for reference in references {
             let (one, more) = rest.split_at(self.elements(reference));

@@ -5,7 +5,7 @@ use crate::workspace::output_folder;
 use crate::{pack, ssv};
 use anyhow::{Result, anyhow};
 use clap::Args;
-use drive::{PmsmDrive, PmsmPlant, SensorlessController};
+use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
 use drive_study::tune::motor::MotorFile;
 use drive_study::tune::rules::{self, Setting, Value};
 use drive_study::tune::trial::{self, Trial};
@@ -135,17 +135,18 @@ pub fn example_for(description: &Description) -> Result<Option<(String, String)>
     Ok(Some((tuned.name, text)))
 }
 
-/// Which of the three models an FMU is, in the order of [`texts`].
+/// Which of the three models an FMU is, in the order of [`texts`]; `PmsmDriveMean` has the values of `PmsmDrive`.
 pub(super) fn place(description: &Description) -> Result<Option<usize>> {
     let of = |found: Result<Description, _>| found.map_err(|e: fmu_core::Fault| anyhow!("{e}"));
     let known = [
-        of(Description::of::<PmsmDrive>())?,
-        of(Description::of::<PmsmPlant>())?,
-        of(Description::of::<SensorlessController>())?,
+        (0, of(Description::of::<PmsmDrive>())?),
+        (0, of(Description::of::<PmsmDriveMean>())?),
+        (1, of(Description::of::<PmsmPlant>())?),
+        (2, of(Description::of::<SensorlessController>())?),
     ];
     let names = |d: &Description| d.variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
     let is_it = |d: &Description| d.name == description.name && names(description).starts_with(&names(d));
-    Ok(known.iter().position(is_it))
+    Ok(known.iter().find(|(_, known)| is_it(known)).map(|(place, _)| *place))
 }
 
 /// Writes `NAME.PmsmDrive.ssv`, `NAME.PmsmPlant.ssv` and `NAME.SensorlessController.ssv` to a folder; returns their paths.

@@ -1,9 +1,12 @@
 """A vehicle on a drive cycle with the packed drive, and full torque from standstill to far above base speed.
 
-The machine and its losses are those of test_losses_and_temperature.py. The vehicle is assumed: 1300 kg, rolling
-resistance 0.010 of its weight, c_d A 0.60 m2, wheels of 0.30 m, a gear of 9.0 without loss. A cascaded torque correction
-stands for the driver: the drive controls the current, and iron and friction reduce the torque at the shaft.
+The machine and its losses are those of test_losses_and_temperature.py, vehicle and cycle those of examples/vehicle. A
+cascaded torque correction stands for the driver: the drive controls the current, and iron and friction reduce the torque at
+the shaft.
 """
+
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +18,16 @@ from test_losses_and_temperature import DRIVE, FRICTION, INVERTER, MACHINE, NETW
 STANDARDS = pytest.mark.parametrize("standard", [2, 3], ids=["fmi2", "fmi3"])
 H, KWH, SENSORED = 1e-3, 3.6e6, 13
 I_MAX, U_DC, COOLANT = 240.0, 400.0, 338.15
+FOLDER = Path(__file__).parents[2] / "examples/vehicle"
 # Corners of the cycle: time in s, speed in km/h.
-TIME = [0, 10, 22, 45, 55, 70, 90, 140, 155, 170, 240, 262, 280, 310, 390, 420, 470, 545, 575, 600, 610]
-SPEED = [0, 0, 32, 32, 0, 0, 50, 50, 20, 60, 60, 0, 0, 80, 80, 100, 130, 130, 80, 0, 0]
-MASS, ROLLING, DRAG, RHO, WHEEL, GEAR, J_ROTOR = 1300.0, 0.010, 0.60, 1.2, 0.30, 9.0, 0.03883
+TIME, SPEED = np.genfromtxt(FOLDER / "cycle.csv", delimiter=",", skip_header=2, unpack=True)
+VEHICLE = tomllib.loads((FOLDER / "vehicle.toml").read_text())
+MASS, ROLLING, DRAG, RHO, WHEEL, GEAR, J_ROTOR = (
+    VEHICLE[name]
+    for name in (
+        "mass", "rolling_resistance", "drag_area", "air_density", "wheel_radius", "gear_ratio", "rotor_inertia"
+    )
+)
 # An independent calculation: steady operating points in the middle of each second, sinusoidal currents. In kWh.
 ENERGY, DRAWN, RETURNED = 1.322449, 1.497219, -0.174770
 LOSSES = {"p_cu": 0.015373, "p_iron": 0.027246, "p_cond": 0.014992, "p_sw": 0.013319, "p_friction": 0.053891}
@@ -72,7 +81,7 @@ def heated(loss, held_for=0.1):
 @STANDARDS
 def test_cycle(archives, standard):
     t = np.arange(round(TIME[-1] / H) + 1) * H
-    v = np.interp(t, TIME, np.array(SPEED) / 3.6)
+    v = np.interp(t, TIME, SPEED / 3.6)
     a = np.append(np.diff(v) / H, 0.0)
     force = MASS * (a + ROLLING * 9.81 * (v > 0.0)) + 0.5 * RHO * DRAG * v**2
     speed = v * GEAR / WHEEL

@@ -6,7 +6,7 @@
 use super::Outcome;
 use super::candidate::Candidate;
 use super::measure::Measure;
-use crate::runner::{self, RATED_SPEED, Statistics, line, settled_limit};
+use crate::runner::{self, RATED_SPEED, Statistics, line};
 use drive::Pair;
 use drive::control::envelope::Envelope;
 use drive::estimator::Kind;
@@ -52,7 +52,7 @@ impl Truth {
 
     /// Greatest torque (N.m) at `speed` (pu).
     fn torque(&self, speed: f64) -> f64 {
-        settled_limit(&self.envelope, speed * RATED_SPEED * self.n_p, 1.0, self.U).tau
+        self.envelope.settled(speed * RATED_SPEED * self.n_p, 1.0, self.U).tau
     }
 }
 

@@ -43,42 +43,19 @@ pub const START: Experiment = Experiment {
     duration: 3.2,
     ..REST
 };
+/// A speed step at 0.1 s.
+const fn speed_step(id: &'static str, figure: &'static str, title: &'static str, speed_ref: Schedule) -> Experiment {
+    Experiment { id, figure, title, speed_ref, duration: 1.1, ..REST }
+}
+
 /// Speed step to 20 rpm.
-pub const STEP_20: Experiment = Experiment {
-    id: "step-20",
-    figure: "4c",
-    title: "speed step 0 - 20 rpm",
-    speed_ref: &[(0.1, 20.0)],
-    duration: 1.1,
-    ..REST
-};
+pub const STEP_20: Experiment = speed_step("step-20", "4c", "speed step 0 - 20 rpm", &[(0.1, 20.0)]);
 /// Speed step to 500 rpm.
-pub const STEP_500: Experiment = Experiment {
-    id: "step-500",
-    figure: "4d",
-    title: "speed step 0 - 500 rpm",
-    speed_ref: &[(0.1, 500.0)],
-    duration: 1.1,
-    ..REST
-};
+pub const STEP_500: Experiment = speed_step("step-500", "4d", "speed step 0 - 500 rpm", &[(0.1, 500.0)]);
 /// Speed step to 1000 rpm.
-pub const STEP_1000: Experiment = Experiment {
-    id: "step-1000",
-    figure: "4e",
-    title: "speed step 0 - 1000 rpm",
-    speed_ref: &[(0.1, 1000.0)],
-    duration: 1.1,
-    ..REST
-};
+pub const STEP_1000: Experiment = speed_step("step-1000", "4e", "speed step 0 - 1000 rpm", &[(0.1, 1000.0)]);
 /// Speed step to 1500 rpm.
-pub const STEP_1500: Experiment = Experiment {
-    id: "step-1500",
-    figure: "4f",
-    title: "speed step 0 - 1500 rpm",
-    speed_ref: &[(0.1, 1500.0)],
-    duration: 1.1,
-    ..REST
-};
+pub const STEP_1500: Experiment = speed_step("step-1500", "4f", "speed step 0 - 1500 rpm", &[(0.1, 1500.0)]);
 /// Load step at standstill.
 pub const LOAD_0: Experiment = Experiment {
     id: "load-0",

@@ -5,7 +5,6 @@
 
 use super::motor::{Data, MotorFile};
 use super::rules::{Setting, Value, electrical, set};
-use crate::runner::settled_limit;
 use anyhow::{Result, bail};
 use drive::control::envelope::Envelope;
 use drive::control::reference::max_torque_per_ampere;
@@ -50,7 +49,7 @@ pub fn of(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Result<V
             motor.place(&rating.current)
         );
     }
-    let most = |speed: f64| settled_limit(&envelope, n_p * speed, 1.0, U).tau;
+    let most = |speed: f64| envelope.settled(n_p * speed, 1.0, U).tau;
     let fits = |torque: f64, speed: f64| envelope.excess(currents(torque), n_p * speed, U) <= 0.0;
     let rated_fits = fits(torque, speed);
     if !rated_fits && most(speed) < torque {

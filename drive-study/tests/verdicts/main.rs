@@ -23,61 +23,10 @@ use std::path::Path;
 const SEED: u64 = 1;
 
 /// The three machines that were judged too early.
-const TRACTION: &str = "
-name = \"traction\"
-source = \"a car\"
-[machine]
-n_p = 6
-R_s = 5.5e-3
-L_d = 0.09e-3
-L_q = 0.25e-3
-psi_M = 0.038
-[mechanics]
-J = 0.06
-[rating]
-speed = 400.0
-torque = 250.0
-current = 450.0
-[dc_link]
-u_dc = 360.0
-";
-const SERVO: &str = "
-name = \"servo-400w\"
-source = \"a data sheet\"
-[machine]
-n_p = 5
-R_s = 0.775
-L_d = 3.36e-3
-L_q = 3.36e-3
-psi_M = 0.0462
-[mechanics]
-J = 0.277e-4
-[rating]
-speed = 314.16
-torque = 1.27
-current = 11.0
-[dc_link]
-u_dc = 310.0
-";
+const TRACTION: &str = include_str!("machines/traction.toml");
+const SERVO: &str = include_str!("machines/servo-400w.toml");
 /// 0.13 N.m and 10 A at 24 V: R_s i is 0.34 of the EMF at rated speed. With R^ = 0.9 R it lost its load at 0.1 pu, untold.
-const SMALL: &str = "
-name = \"small-24v\"
-source = \"a data sheet\"
-[machine]
-n_p = 4
-R_s = 0.6
-L_d = 0.4e-3
-L_q = 0.4e-3
-psi_M = 0.0055
-[mechanics]
-J = 8e-6
-[rating]
-speed = 314.16
-torque = 0.13
-current = 10.0
-[dc_link]
-u_dc = 24.0
-";
+const SMALL: &str = include_str!("machines/small-24v.toml");
 
 fn read(text: &str) -> MotorFile {
     MotorFile::parse(text, Path::new("m.toml")).unwrap()
@@ -262,24 +211,7 @@ fn a_verdict_waits_for_the_slowest_time_constant() {
 }
 
 /// A motor of 150 W at 22,700 rpm, whose rated torque takes twice its speed at 0.1 pu.
-const LIGHT: &str = "
-name = \"light-24v\"
-source = \"a data sheet\"
-[machine]
-n_p = 1
-R_s = 0.103
-L_d = 1.36e-5
-L_q = 1.36e-5
-psi_M = 2.75e-3
-[mechanics]
-J = 4.55e-7
-[rating]
-speed = 2380.0
-torque = 0.0617
-current = 27.7
-[dc_link]
-u_dc = 24.0
-";
+const LIGHT: &str = include_str!("machines/light-24v.toml");
 
 #[test]
 fn a_small_machine_holds_what_it_lost() {

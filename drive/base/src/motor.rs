@@ -1,7 +1,7 @@
 //! Electrical parameters of the machine: the plant's true ones, or the controller's estimates of them.
 
 use fmu_core::unit::{Exponents, HENRY, OHM, Quantity, Unit, WEBER};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Unit of the second-order saturation coefficient A/Wb2.
@@ -56,17 +56,13 @@ impl Motor {
 type P = Row<Motor>;
 
 /// Variables of the machine; their owner supplies the prefix `motor.`.
-pub const MOTOR: &Table<Motor> = &Table::new(
-    const {
-        &[
-            P::integer_parameter("n_p", "Number of pole pairs", |m| &mut m.n_p).at_least(1.0).at_most(1000.0),
-            P::parameter("R_s", &OHM, "Stator resistance", |m| &mut m.R_s).above(0.0).tunable(),
-            P::parameter("L_d", &HENRY, "d-axis inductance", |m| &mut m.L_d).above(0.0),
-            P::parameter("L_q", &HENRY, "q-axis inductance", |m| &mut m.L_q).above(0.0),
-            P::parameter("psi_M", &WEBER, "Permanent-magnet flux linkage (peak)", |m| &mut m.psi_M).above(0.0),
-        ]
-    },
-);
+pub const MOTOR: &Table<Motor> = table![
+    P::integer_parameter("n_p", "Number of pole pairs", |m| &mut m.n_p).at_least(1.0).at_most(1000.0),
+    P::parameter("R_s", &OHM, "Stator resistance", |m| &mut m.R_s).above(0.0).tunable(),
+    P::parameter("L_d", &HENRY, "d-axis inductance", |m| &mut m.L_d).above(0.0),
+    P::parameter("L_q", &HENRY, "q-axis inductance", |m| &mut m.L_q).above(0.0),
+    P::parameter("psi_M", &WEBER, "Permanent-magnet flux linkage (peak)", |m| &mut m.psi_M).above(0.0),
+];
 
 #[cfg(test)]
 mod tests {

@@ -13,7 +13,7 @@ use drive_base::frame::{Axis, DqHat, Estimated};
 use drive_base::math::sin_cos;
 use drive_base::motor::Motor;
 use fmu_core::unit::{ONE, RAD_PER_S};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -171,40 +171,36 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
 type P = Row<CurrentLoop>;
 
 /// Variables of the current loop; their owner supplies the prefix `current.`.
-pub const CURRENT_LOOP: &Table<CurrentLoop> = &Table::new(
-    const {
-        &[
-            P::parameter(
-                "bandwidth",
-                &RAD_PER_S,
-                "Bandwidth of the current loop, at most 2 pi 0.06 / T_s with timing.delay = 1",
-                |p| &mut p.bandwidth,
-            )
-            .above(0.0)
-            .tunable(),
-            P::boolean_parameter(
-                "active_resistance",
-                "false: Kp = wc L, Ki = wc R; true: Ki = wc^2 L with active resistance wc L - R",
-                |p| &mut p.active_resistance,
-            ),
-            P::parameter("integral", &ONE, "Integral gain Ki in units of wc^2 L; 0: as active_resistance says", |p| {
-                &mut p.integral
-            })
-            .at_least(0.0)
-            .tunable(),
-            P::boolean_parameter(
-                "reference_feed_forward",
-                "Decoupling from the current references, with R, as in Kim & Sul (31); false: from the measured currents",
-                |p| &mut p.reference_feed_forward,
-            ),
-            P::boolean_parameter(
-                "mtpa",
-                "Maximum torque per ampere; false: i_d = 0. With Rasmussen and FluxObserver, as far as zero_speed is not active",
-                |p| &mut p.mtpa,
-            ),
-        ]
-    },
-);
+pub const CURRENT_LOOP: &Table<CurrentLoop> = table![
+    P::parameter(
+        "bandwidth",
+        &RAD_PER_S,
+        "Bandwidth of the current loop, at most 2 pi 0.06 / T_s with timing.delay = 1",
+        |p| &mut p.bandwidth,
+    )
+    .above(0.0)
+    .tunable(),
+    P::boolean_parameter(
+        "active_resistance",
+        "false: Kp = wc L, Ki = wc R; true: Ki = wc^2 L with active resistance wc L - R",
+        |p| &mut p.active_resistance,
+    ),
+    P::parameter("integral", &ONE, "Integral gain Ki in units of wc^2 L; 0: as active_resistance says", |p| {
+        &mut p.integral
+    })
+    .at_least(0.0)
+    .tunable(),
+    P::boolean_parameter(
+        "reference_feed_forward",
+        "Decoupling from the current references, with R, as in Kim & Sul (31); false: from the measured currents",
+        |p| &mut p.reference_feed_forward,
+    ),
+    P::boolean_parameter(
+        "mtpa",
+        "Maximum torque per ampere; false: i_d = 0. With Rasmussen and FluxObserver, as far as zero_speed is not active",
+        |p| &mut p.mtpa,
+    ),
+];
 
 #[cfg(test)]
 mod tests {

@@ -35,6 +35,10 @@ pub struct Envelope {
     x_mtpa: f64,
 }
 
+/// Iterations run to their end, at most so many and until a step is as small as this: the next one would be below the rounding.
+const MOST: u32 = 60;
+const SMALL: f64 = 1e-8;
+
 /// The limit of one sign: its currents (A) and the magnitude of its torque (N.m).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Limit {
@@ -98,6 +102,16 @@ impl Envelope {
     /// The limit of the sign `s` at |w| = `w` (rad/s) under the voltage `U` (V).
     #[inline]
     pub fn limit(&self, w: f64, s: f64, U: f64, warm: &mut WarmStart) -> Limit {
+        self.iterated::<false>(w, s, U, warm)
+    }
+
+    /// [`limit`](Self::limit) with its iterations run to the end: that of a drive that has settled.
+    pub fn settled(&self, w: f64, s: f64, U: f64) -> Limit {
+        self.iterated::<true>(w, s, U, &mut WarmStart::default())
+    }
+
+    #[inline]
+    fn iterated<const TO_THE_END: bool>(&self, w: f64, s: f64, U: f64, warm: &mut WarmStart) -> Limit {
         let p = self.quartic(w, s, U);
         let on_circle = |x: f64| self.on_circle(x, s);
         let mut left = 0.0;
@@ -106,7 +120,7 @@ impl Envelope {
             return self.at(on_circle(self.x_mtpa));
         }
         if self.psi_M < self.L_d * self.I {
-            let i = self.max_torque_per_volt(w, s, U, &mut warm.u);
+            let i = self.max_torque_per_volt::<TO_THE_END>(w, s, U, &mut warm.u);
             let magnitude = i.magnitude();
             if magnitude <= self.I {
                 warm.x = 0.0;
@@ -120,7 +134,7 @@ impl Envelope {
             *warm = WarmStart::default();
             return Limit { i: DqHat::new(-self.I.min(self.psi_M / self.L_d), 0.0), tau: 0.0 };
         }
-        warm.x = root(&p, left, self.x_mtpa, warm.x);
+        warm.x = root::<TO_THE_END>(&p, left, self.x_mtpa, warm.x);
         self.at(on_circle(warm.x))
     }
 
@@ -139,14 +153,14 @@ impl Envelope {
     }
 
     /// Currents (A) of the most torque per volt; `warm` is the direction of u, from the last sample on.
-    fn max_torque_per_volt(&self, w: f64, s: f64, U: f64, warm: &mut [f64; 2]) -> DqHat {
+    fn max_torque_per_volt<const TO_THE_END: bool>(&self, w: f64, s: f64, U: f64, warm: &mut [f64; 2]) -> DqHat {
         let &Self { R, L_d, L_q, dL, psi_M, .. } = self;
         let (mut u, steps) =
             if warm.iter().all(|&part| part == 0.0) { (self.without_resistance(w, s, U), 4) } else { (*warm, 2) };
         let inverse = 1.0 / (R * R + w * w * L_d * L_q);
         // Currents of the voltage (d, q) with the magnet's EMF set to zero.
         let current = |d: f64, q: f64| ((R * d + w * L_q * q) * inverse, (R * q - w * L_d * d) * inverse);
-        for _ in 0..steps {
+        for _ in 0..if TO_THE_END { MOST } else { steps } {
             let (d, q) = (U * u[0], U * u[1]);
             let (i_d, i_q) = current(d, q - w * psi_M);
             let (i1_d, i1_q) = current(-q, d);
@@ -157,6 +171,9 @@ impl Envelope {
             let turned = [u[0] - h * u[1], u[1] + h * u[0]];
             let length = (turned[0] * turned[0] + turned[1] * turned[1]).sqrt();
             u = [turned[0] / length, turned[1] / length];
+            if TO_THE_END && h.abs() < SMALL {
+                break;
+            }
         }
         *warm = u;
         let (i_d, i_q) = current(U * u[0], U * u[1] - w * psi_M);
@@ -217,14 +234,18 @@ fn value(p: &[f64; 5], x: f64) -> f64 {
 
 /// The root of `p` between `left`, where it is not positive, and `right`, where it is; starts at `x` if that is inside.
 /// A Newton step that leaves the bracket is replaced by bisection; one that hits its end stays.
-fn root(p: &[f64; 5], mut left: f64, mut right: f64, x: f64) -> f64 {
+fn root<const TO_THE_END: bool>(p: &[f64; 5], mut left: f64, mut right: f64, x: f64) -> f64 {
     let (mut x, steps) = if x > left && x < right { (x, 2) } else { (0.5 * (left + right), 6) };
-    for _ in 0..steps {
+    for _ in 0..if TO_THE_END { MOST } else { steps } {
         let y = value(p, x);
         *(if y > 0.0 { &mut right } else { &mut left }) = x;
         let slope = ((4.0 * p[4] * x + 3.0 * p[3]) * x + 2.0 * p[2]) * x + p[1];
         let next = x - y / slope;
+        let last = x;
         x = if next >= left && next <= right { next } else { 0.5 * (left + right) };
+        if TO_THE_END && (x - last).abs() < SMALL * x {
+            break;
+        }
     }
     x
 }

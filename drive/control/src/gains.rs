@@ -2,8 +2,9 @@
 //! the currents of a torque.
 
 use crate::current::CurrentGains;
-use crate::lock::LockGains;
-use crate::reference::max_torque_per_ampere;
+use crate::estimator::{Class, Kind};
+use crate::lock::{LockGains, Reach};
+use crate::reference::{max_torque, max_torque_per_ampere};
 use crate::speed::SpeedGains;
 use crate::tables::ControllerParameters;
 use crate::weakening::WeakeningGains;
@@ -30,6 +31,36 @@ pub(crate) struct Gains {
 }
 
 impl Gains {
+    /// From the parameters.
+    pub(crate) fn new(par: &ControllerParameters) -> Self {
+        Self::with(par, par.estimator)
+    }
+
+    /// From the parameters, with another `estimator` in use.
+    pub(crate) fn with(par: &ControllerParameters, estimator: Kind) -> Self {
+        let ControllerParameters { current, speed_loop, motor, J, limit, lock, T_s, .. } = par;
+        // Finite, so that no current is no torque with any psi_M.
+        let k = motor.torque_constant().min(f64::MAX);
+        let observes_flux = estimator.class() == Class::FluxObserver;
+        // With i_d of the low-speed law, the limits of the currents are those of each sample.
+        let by_law = observes_flux && !current.mtpa;
+        let tau = if by_law { limit.tau } else { max_torque(motor, limit, current.mtpa) };
+        let weakening = WeakeningGains::new(par, tau, current.mtpa);
+        let speed = SpeedGains::new(speed_loop, *J, k);
+        let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
+        let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p * k * i / J };
+        Self {
+            current: CurrentGains::new(current, motor),
+            speed,
+            k,
+            i_tau: tau / k,
+            i_d_end: max_torque_per_ampere(motor, tau).d(),
+            observes_flux,
+            lock: LockGains::new(lock, motor, *T_s, reach),
+            weakening,
+        }
+    }
+
     /// The low-speed law of a flux observer at the estimated mechanical `speed` (rad/s), and the torque that remains; other
     /// estimators have no such law.
     #[inline]

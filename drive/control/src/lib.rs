@@ -20,6 +20,7 @@ pub mod model;
 pub mod polarity;
 pub mod reference;
 pub mod sensor;
+pub mod settled;
 pub mod signals;
 pub mod speed;
 pub mod start;

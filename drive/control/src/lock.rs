@@ -42,7 +42,7 @@ use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::{at_least, at_most, exp, sin_cos, within};
 use drive_base::motor::Motor;
 use fmu_core::unit::{RADIAN, SECOND, VOLT};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
@@ -217,19 +217,15 @@ impl Lock {
 type P = Row<LockParameters>;
 
 /// The variables; their owner supplies the prefix `lock.`.
-pub const LOCK: &Table<LockParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("u", &VOLT, "Voltage error tolerated before lock_lost rises", |p| &mut p.u).above(0.0),
-            P::parameter("angle", &RADIAN, "Angle error at which lock_lost is 1, where the back EMF shows it", |p| {
-                &mut p.angle
-            })
-            .above(0.0)
-            .at_most(PI),
-            P::parameter("time", &SECOND, "Time constant of lock_lost", |p| &mut p.time).above(0.0),
-        ]
-    },
-);
+pub const LOCK: &Table<LockParameters> = table![
+    P::parameter("u", &VOLT, "Voltage error tolerated before lock_lost rises", |p| &mut p.u).above(0.0),
+    P::parameter("angle", &RADIAN, "Angle error at which lock_lost is 1, where the back EMF shows it", |p| {
+        &mut p.angle
+    })
+    .above(0.0)
+    .at_most(PI),
+    P::parameter("time", &SECOND, "Time constant of lock_lost", |p| &mut p.time).above(0.0),
+];
 
 #[cfg(test)]
 mod tests {

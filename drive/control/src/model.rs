@@ -1,26 +1,24 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
 use crate::battery;
-use crate::current::{self, CurrentGains};
+use crate::current;
 use crate::estimator::{Class, Estimator, Kind, Sample, Setup};
 use crate::gains::Gains;
-use crate::lock::{LOST, Lock, LockGains, Reach};
+use crate::lock::{LOST, Lock};
 use crate::polarity;
-use crate::reference::{max_torque, max_torque_per_ampere};
 use crate::signals::{ControllerInputs, ControllerOutputs};
-use crate::speed::SpeedGains;
 use crate::start::StartMode;
 use crate::state::{InUse, State, context};
 use crate::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::trip::{self, Cause, Trip};
-use crate::weakening::{self, WeakeningGains};
+use crate::weakening;
 use crate::zero_speed::{self, ZeroSpeed};
 use drive_base::motor::Motor;
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
     Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns,
-    integrate,
+    integrate, table,
 };
 use serde::{Deserialize, Serialize};
 
@@ -244,31 +242,11 @@ impl Model for SensorlessController {
     const STATE_VERSION: u16 = 14;
 
     fn derive(&mut self) {
-        let ControllerParameters { current, speed_loop, motor, J, limit, lock, T_s, .. } = &self.parameters;
-        // Finite, so that no current is no torque with any psi_M.
-        let k = motor.torque_constant().min(f64::MAX);
-        let observes_flux = self.parameters.estimator_with(self.state.sensor_lost).class() == Class::FluxObserver;
-        // With i_d of the low-speed law, the limits of the currents are those of each sample.
-        let by_law = observes_flux && !current.mtpa;
-        let tau = if by_law { limit.tau } else { max_torque(motor, limit, current.mtpa) };
-        let weakening = WeakeningGains::new(&self.parameters, tau, current.mtpa);
-        let speed = SpeedGains::new(speed_loop, *J, k);
-        let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
-        let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p * k * i / J };
         if !self.tuned {
             self.last_gains.clone_from(&self.gains);
         }
         self.tuned = true;
-        self.gains = Gains {
-            current: CurrentGains::new(current, motor),
-            speed,
-            k,
-            i_tau: tau / k,
-            i_d_end: max_torque_per_ampere(motor, tau).d(),
-            observes_flux,
-            lock: LockGains::new(lock, motor, *T_s, reach),
-            weakening,
-        };
+        self.gains = Gains::with(&self.parameters, self.parameters.estimator_with(self.state.sensor_lost));
     }
 
     fn validate(&self) -> Result<(), Fault> {
@@ -326,6 +304,14 @@ impl Sampled for SensorlessController {
     }
 }
 
+/// The warning of a torque reference (N.m) that was beyond these limits (N.m) for a second.
+pub fn clipped(tau_ref: f64, [tau_min, tau_max]: [f64; 2]) -> String {
+    format!(
+        "tau_ref = {tau_ref} N.m has been clipped for a second: at this speed and u_dc, the drive gives {tau_min} to {tau_max} N.m \
+         (tau_min, tau_max)"
+    )
+}
+
 impl Warns for SensorlessController {
     fn warn(&self, log: &mut Warnings<'_>) {
         let (out, par, tau_ref) = (&self.state.shown, &self.parameters, self.inputs.tau_ref);
@@ -340,12 +326,7 @@ impl Warns for SensorlessController {
         }
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
         if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
-            log.warn("tau_ref", || {
-                format!(
-                    "tau_ref = {tau_ref} N.m has been clipped for a second: at this speed and u_dc, the drive gives {} to {} N.m (tau_min, tau_max)",
-                    out.tau_min, out.tau_max
-                )
-            });
+            log.warn("tau_ref", || clipped(tau_ref, [out.tau_min, out.tau_max]));
         }
         if out.lock_lost < 1.0 {
             return;
@@ -386,40 +367,32 @@ impl Warns for SensorlessController {
 
 type V = Row<Block<SensorlessController>>;
 
-const TABLE: &Table<Block<SensorlessController>> = &Table::new(
-    const {
-        &[
-            V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
-            V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
-                .read_with("speed_loop.torque_mode", "true"),
-            V::boolean_input(
-                "enable",
-                "The controller runs; false: it commands 0 V, and starts anew when set to true",
-                |m| &mut m.model.inputs.enable,
-            )
-            .optional(),
-            V::boolean_input(
-                "asc",
-                "Active short circuit: the controller rests as without enable, and short_circuit passes the request to the inverter",
-                |m| &mut m.model.inputs.asc,
-            )
-            .optional(),
-            V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
-            V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
-            V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
-            V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
-            V::input("theta_meas", &RADIAN, "Electrical rotor angle of a sensor", |m| &mut m.model.inputs.theta_meas)
-                .read_with("estimator", "Sensored"),
-            V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
-                .read_with("estimator", "Sensored"),
-            V::boolean_input(
-                "sensor_valid",
-                "The sensor works; false: sensor.fallback takes over from it, if there is one",
-                |m| &mut m.model.inputs.sensor_valid,
-            )
-            .optional(),
-            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-        ]
-    },
-);
+const TABLE: &Table<Block<SensorlessController>> = table![
+    V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
+    V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
+        .read_with("speed_loop.torque_mode", "true"),
+    V::boolean_input("enable", "The controller runs; false: it commands 0 V, and starts anew when set to true", |m| {
+        &mut m.model.inputs.enable
+    })
+    .optional(),
+    V::boolean_input(
+        "asc",
+        "Active short circuit: the controller rests as without enable, and short_circuit passes the request to the inverter",
+        |m| &mut m.model.inputs.asc,
+    )
+    .optional(),
+    V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
+    V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
+    V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
+    V::input("u_dc", &VOLT, "Measured DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+    V::input("theta_meas", &RADIAN, "Electrical rotor angle of a sensor", |m| &mut m.model.inputs.theta_meas)
+        .read_with("estimator", "Sensored"),
+    V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
+        .read_with("estimator", "Sensored"),
+    V::boolean_input("sensor_valid", "The sensor works; false: sensor.fallback takes over from it, if there is one", |m| {
+        &mut m.model.inputs.sensor_valid
+    })
+    .optional(),
+    V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+    V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+];

@@ -18,7 +18,7 @@ use crate::estimator::{Context, Sample};
 use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::{Axis, DqHat, Estimated};
 use fmu_core::unit::{SECOND, VOLT};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -160,23 +160,19 @@ impl PolaritySearch {
 type P = Row<PolarityParameters>;
 
 /// Variables of the search; their owner supplies the prefix `polarity.`.
-pub const POLARITY: &Table<PolarityParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("t_find", &SECOND, "Duration of the injection before the pulses, start by injection", |p| {
-                &mut p.t_find
-            })
-            .above(0.0),
-            P::parameter("voltage", &VOLT, "Amplitude of the d-axis voltage pulses, start by injection", |p| {
-                &mut p.voltage
-            })
-            .above(0.0),
-            P::integer_parameter("samples", "Duration of a pulse in samples, start by injection", |p| &mut p.samples)
-                .at_least(1.0)
-                .at_most(1000.0),
-        ]
-    },
-);
+pub const POLARITY: &Table<PolarityParameters> = table![
+    P::parameter("t_find", &SECOND, "Duration of the injection before the pulses, start by injection", |p| {
+        &mut p.t_find
+    })
+    .above(0.0),
+    P::parameter("voltage", &VOLT, "Amplitude of the d-axis voltage pulses, start by injection", |p| {
+        &mut p.voltage
+    })
+    .above(0.0),
+    P::integer_parameter("samples", "Duration of a pulse in samples, start by injection", |p| &mut p.samples)
+        .at_least(1.0)
+        .at_most(1000.0),
+];
 
 #[cfg(test)]
 mod tests {

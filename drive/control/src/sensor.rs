@@ -10,7 +10,7 @@
 use drive_base::frame::Phases;
 use drive_base::math::{ln, sin_cos};
 use fmu_core::unit::{AMPERE, ONE};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -105,25 +105,21 @@ impl Offset {
 type P = Row<Sensor>;
 
 /// Variables of the sensors; their owner supplies the prefix `sensor.`.
-pub const SENSOR: &Table<Sensor> = &Table::new(
-    const {
-        &[
-            P::parameter("gain_a", &ONE, "Gain of the current sensor of phase a", |p| &mut p.gain.a),
-            P::parameter("gain_b", &ONE, "Gain of the current sensor of phase b", |p| &mut p.gain.b),
-            P::parameter("gain_c", &ONE, "Gain of the current sensor of phase c", |p| &mut p.gain.c),
-            P::parameter("offset_a", &AMPERE, "Offset of the current sensor of phase a", |p| &mut p.offset.a),
-            P::parameter("offset_b", &AMPERE, "Offset of the current sensor of phase b", |p| &mut p.offset.b),
-            P::parameter("offset_c", &AMPERE, "Offset of the current sensor of phase c", |p| &mut p.offset.c),
-            P::parameter("noise", &AMPERE, "Standard deviation of the noise of each current sample; 0: none", |p| {
-                &mut p.noise
-            })
-            .at_least(0.0),
-            P::integer_parameter("seed", "Seed of the noise: the same seed gives the same noise", |p| &mut p.seed),
-            P::parameter("resolution", &AMPERE, "Step of the current measurement; 0: none", |p| &mut p.resolution)
-                .at_least(0.0),
-        ]
-    },
-);
+pub const SENSOR: &Table<Sensor> = table![
+    P::parameter("gain_a", &ONE, "Gain of the current sensor of phase a", |p| &mut p.gain.a),
+    P::parameter("gain_b", &ONE, "Gain of the current sensor of phase b", |p| &mut p.gain.b),
+    P::parameter("gain_c", &ONE, "Gain of the current sensor of phase c", |p| &mut p.gain.c),
+    P::parameter("offset_a", &AMPERE, "Offset of the current sensor of phase a", |p| &mut p.offset.a),
+    P::parameter("offset_b", &AMPERE, "Offset of the current sensor of phase b", |p| &mut p.offset.b),
+    P::parameter("offset_c", &AMPERE, "Offset of the current sensor of phase c", |p| &mut p.offset.c),
+    P::parameter("noise", &AMPERE, "Standard deviation of the noise of each current sample; 0: none", |p| {
+        &mut p.noise
+    })
+    .at_least(0.0),
+    P::integer_parameter("seed", "Seed of the noise: the same seed gives the same noise", |p| &mut p.seed),
+    P::parameter("resolution", &AMPERE, "Step of the current measurement; 0: none", |p| &mut p.resolution)
+        .at_least(0.0),
+];
 
 #[cfg(test)]
 mod tests {

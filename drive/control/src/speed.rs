@@ -13,7 +13,7 @@
 use crate::start::RAD_PER_S2;
 use drive_base::math::{at_least, at_most};
 use fmu_core::unit::{ONE, RAD_PER_S};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the speed loop.
@@ -65,6 +65,18 @@ impl SpeedGains {
         Self { k_p, k_i: k_p * par.bandwidth / par.t_is, b: par.b }
     }
 
+    /// Reference of i_q in A without its limits, with the integral part `integral` (A) at the speeds `w_ref` and `w` (rad/s).
+    #[inline]
+    pub fn wanted(&self, integral: f64, w_ref: f64, w: f64) -> f64 {
+        self.k_p * (self.b * w_ref - w) + integral
+    }
+
+    /// K_p in A.s/rad, and the change of the integral part with time and speed error in A/rad.
+    #[inline]
+    pub fn slopes(&self) -> [f64; 2] {
+        [self.k_p, self.k_i]
+    }
+
     /// Integral of the speed error in rad, mechanical, for which the integral part goes from 0 to `i` (A).
     pub fn error_integral(&self, i: f64) -> f64 {
         i / self.k_i
@@ -83,7 +95,7 @@ impl SpeedController {
     #[inline]
     pub fn update(&mut self, gains: &SpeedGains, w_ref: f64, w: f64, limits: (f64, f64), T_s: f64) -> (f64, f64) {
         let ((low, high), error) = (limits, w_ref - w);
-        let wanted = gains.k_p * (gains.b * w_ref - w) + self.integral;
+        let wanted = gains.wanted(self.integral, w_ref, w);
         let i_q_ref = if wanted >= low && wanted <= high { wanted } else { limited(wanted, low, high) };
         let further_in = (wanted - i_q_ref) * error > 0.0;
         if !further_in {
@@ -122,35 +134,24 @@ impl SpeedController {
 type P = Row<SpeedLoop>;
 
 /// Variables of the speed loop; their owner supplies the prefix `speed_loop.`.
-pub const SPEED_LOOP: &Table<SpeedLoop> = &Table::new(
-    const {
-        &[
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the speed loop", |p| &mut p.bandwidth)
-                .above(0.0)
-                .tunable(),
-            P::parameter("t_is", &ONE, "Integral time constant in units of 1/bandwidth", |p| &mut p.t_is)
-                .above(0.0)
-                .tunable(),
-            P::parameter("b", &ONE, "Set-point weight of the proportional part", |p| &mut p.b)
-                .at_least(0.0)
-                .at_most(1.0)
-                .tunable(),
-            P::parameter(
-                "ramp",
-                &RAD_PER_S2,
-                "Maximum rate of change of the mechanical speed reference; 0: no ramp",
-                |p| &mut p.ramp,
-            )
-            .at_least(0.0)
-            .tunable(),
-            P::boolean_parameter(
-                "torque_mode",
-                "Torque control by tau_ref within the limits, speed_ref ignored; false: speed control",
-                |p| &mut p.torque_mode,
-            ),
-        ]
-    },
-);
+pub const SPEED_LOOP: &Table<SpeedLoop> = table![
+    P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the speed loop", |p| &mut p.bandwidth).above(0.0).tunable(),
+    P::parameter("t_is", &ONE, "Integral time constant in units of 1/bandwidth", |p| &mut p.t_is).above(0.0).tunable(),
+    P::parameter("b", &ONE, "Set-point weight of the proportional part", |p| &mut p.b)
+        .at_least(0.0)
+        .at_most(1.0)
+        .tunable(),
+    P::parameter("ramp", &RAD_PER_S2, "Maximum rate of change of the mechanical speed reference; 0: no ramp", |p| {
+        &mut p.ramp
+    })
+    .at_least(0.0)
+    .tunable(),
+    P::boolean_parameter(
+        "torque_mode",
+        "Torque control by tau_ref within the limits, speed_ref ignored; false: speed control",
+        |p| &mut p.torque_mode,
+    ),
+];
 
 #[cfg(test)]
 mod tests {

@@ -25,7 +25,7 @@ use crate::estimator::{Context, Sample};
 use drive_base::frame::DqHat;
 use drive_base::math::{atan2, exp};
 use fmu_core::unit::{AMPERE, Exponents, Quantity, SECOND, SPEED, Unit};
-use fmu_core::{Field, Row, Table, enumeration};
+use fmu_core::{Field, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -181,35 +181,28 @@ impl CurrentFrequencyStart {
 type P = Row<StartParameters>;
 
 /// Variables of the start; their owner supplies the prefix `start.`.
-pub const START: &Table<StartParameters> = &Table::new(
-    const {
-        &[
-            P::enumeration_parameter(
-                "mode",
-                "Start sequence before the estimator takes over; Injection needs an estimator that injects",
-                &Field(|p| &mut p.mode),
-            ),
-            P::parameter("i", &AMPERE, "Magnitude of the rotating current vector, I-f start", |p| &mut p.i).above(0.0),
-            P::parameter("t_align", &SECOND, "Duration of each of the two alignments, I-f start", |p| &mut p.t_align)
-                .above(0.0),
-            P::parameter(
-                "acceleration",
-                &RAD_PER_S2,
-                "Mechanical acceleration of the current vector, I-f start",
-                |p| &mut p.acceleration,
-            )
-            .above(0.0),
-            P::parameter("speed", &SPEED, "Mechanical speed at which the estimator takes over, I-f start", |p| {
-                &mut p.speed
-            })
-            .above(0.0),
-            P::parameter("settle", &SECOND, "Time at start.speed before the estimator takes over, I-f start", |p| {
-                &mut p.settle
-            })
-            .at_least(0.0),
-        ]
-    },
-);
+pub const START: &Table<StartParameters> = table![
+    P::enumeration_parameter(
+        "mode",
+        "Start sequence before the estimator takes over; Injection needs an estimator that injects",
+        &Field(|p| &mut p.mode),
+    ),
+    P::parameter("i", &AMPERE, "Magnitude of the rotating current vector, I-f start", |p| &mut p.i).above(0.0),
+    P::parameter("t_align", &SECOND, "Duration of each of the two alignments, I-f start", |p| &mut p.t_align)
+        .above(0.0),
+    P::parameter("acceleration", &RAD_PER_S2, "Mechanical acceleration of the current vector, I-f start", |p| {
+        &mut p.acceleration
+    })
+    .above(0.0),
+    P::parameter("speed", &SPEED, "Mechanical speed at which the estimator takes over, I-f start", |p| {
+        &mut p.speed
+    })
+    .above(0.0),
+    P::parameter("settle", &SECOND, "Time at start.speed before the estimator takes over, I-f start", |p| {
+        &mut p.settle
+    })
+    .at_least(0.0),
+];
 
 #[cfg(test)]
 mod tests {

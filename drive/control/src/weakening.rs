@@ -22,7 +22,7 @@ use crate::tables::{ControllerParameters, PARAMETERS};
 use crate::tracking::LeastTracker;
 use drive_base::frame::DqHat;
 use fmu_core::unit::{ONE, RAD_PER_S};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
@@ -32,7 +32,7 @@ const INVERSE_SQRT_3: f64 = 1.0 / SQRT_3;
 const LEAST_SHARE: f64 = 0.05;
 
 /// Greatest trim, as a share of u_dc / sqrt 3.
-const GREATEST_TRIM: f64 = 0.3;
+pub const GREATEST_TRIM: f64 = 0.3;
 
 /// Samples after which a limit that does not act is computed again, and the change of the voltage, as a share, after which
 /// both are.
@@ -110,6 +110,15 @@ impl WeakeningGains {
         self.tracker.at(self.envelope.slope(i))
     }
 
+    /// The limit of the sign `s` where the greatest plain reference fits the voltage `U` (V) at the electrical speed `w` (rad/s):
+    /// none.
+    #[inline]
+    fn beyond(&self, s: f64, w: f64, U: f64) -> Option<Limit> {
+        let end = DqHat::new(self.end.d(), s * self.end.q());
+        let fits = self.envelope.excess(end, w, U) <= 0.0;
+        fits.then(|| Limit { i: DqHat::new(self.least, 0.0), tau: f64::INFINITY })
+    }
+
     /// Electrical speed in rad/s below which all plain references fit the voltage `U` (V).
     pub fn onset(&self, U: f64) -> f64 {
         let [copper, cross, flux] = self.voltage;
@@ -156,10 +165,7 @@ impl Weakening {
         i: f64,
         k: u64,
     ) -> (f64, f64) {
-        let highest = u_dc * INVERSE_SQRT_3;
-        self.U = (par.k_u * highest - self.trim - injected).max(LEAST_SHARE * highest);
-        let ([copper, cross, flux], speed) = (gains.voltage, w.abs());
-        if copper + speed * (cross + speed * flux) <= self.U * self.U {
+        if self.fits(gains, par, (w, u_dc, injected)) {
             if self.near {
                 let Self { trim, U, .. } = *self;
                 *self = Self { trim, U, ..Self::default() };
@@ -167,12 +173,56 @@ impl Weakening {
             return (i, i);
         }
         self.near = true;
-        let [motoring, generating] = self.limits_near(gains, speed.max(LEAST_SPEED), i, k);
+        self.limits_near(gains, w.abs().max(LEAST_SPEED), k);
+        self.both(gains, w, i)
+    }
+
+    /// The state of a drive that has settled at the electrical speed `w` (rad/s) on a DC link of `u_dc` (V) with this `trim`
+    /// (V), and its limits as of [`limits`](Self::limits): the iterations run to their end.
+    pub fn settled(
+        gains: &WeakeningGains,
+        par: &WeakeningParameters,
+        (w, u_dc): (f64, f64),
+        i: f64,
+        trim: f64,
+    ) -> (Self, (f64, f64)) {
+        let mut found = Self { trim, ..Self::default() };
+        if found.fits(gains, par, (w, u_dc, 0.0)) {
+            return (found, (i, i));
+        }
+        found.near = true;
+        let speed = w.abs().max(LEAST_SPEED);
+        for (side, s) in [1.0, -1.0].into_iter().enumerate() {
+            found.limits[side] =
+                gains.beyond(s, speed, found.U).unwrap_or_else(|| gains.envelope.settled(speed, s, found.U));
+        }
+        (found, found.both(gains, w, i))
+    }
+
+    /// Sets the voltage for the references, and tells whether all plain references fit it.
+    #[inline]
+    fn fits(
+        &mut self,
+        gains: &WeakeningGains,
+        par: &WeakeningParameters,
+        (w, u_dc, injected): (f64, f64, f64),
+    ) -> bool {
+        let highest = u_dc * INVERSE_SQRT_3;
+        self.U = (par.k_u * highest - self.trim - injected).max(LEAST_SHARE * highest);
+        let ([copper, cross, flux], speed) = (gains.voltage, w.abs());
+        copper + speed * (cross + speed * flux) <= self.U * self.U
+    }
+
+    /// The limits (A) of negative and positive torque at the electrical speed `w` (rad/s), at most `i`.
+    #[inline]
+    fn both(&self, gains: &WeakeningGains, w: f64, i: f64) -> (f64, f64) {
+        // NaN if the speed is NaN: no torque then.
+        let [motoring, generating] = self.limits.map(|limit| (limit.tau * gains.per_torque).max(0.0).min(i));
         if w >= 0.0 { (generating, motoring) } else { (motoring, generating) }
     }
 
-    /// The limits (A), motoring and generating, where the plain references may not fit; at most `i`.
-    fn limits_near(&mut self, gains: &WeakeningGains, w: f64, i: f64, k: u64) -> [f64; 2] {
+    /// Computes the limits, motoring and generating, where the plain references may not fit.
+    fn limits_near(&mut self, gains: &WeakeningGains, w: f64, k: u64) {
         let moved = (self.U - self.U_then).abs() > LEAST_CHANGE * self.U;
         if moved {
             self.U_then = self.U;
@@ -183,15 +233,12 @@ impl Weakening {
                 self.limits[side] = self.limit(gains, side, s, w);
             }
         }
-        // NaN if the speed is NaN: no torque then.
-        self.limits.map(|limit| (limit.tau * gains.per_torque).max(0.0).min(i))
     }
 
     fn limit(&mut self, gains: &WeakeningGains, side: usize, s: f64, w: f64) -> Limit {
-        let end = DqHat::new(gains.end.d(), s * gains.end.q());
-        if gains.envelope.excess(end, w, self.U) <= 0.0 {
+        if let Some(limit) = gains.beyond(s, w, self.U) {
             self.warm[side] = WarmStart::default();
-            return Limit { i: DqHat::new(gains.least, 0.0), tau: f64::INFINITY };
+            return limit;
         }
         gains.envelope.limit(w, s, self.U, &mut self.warm[side])
     }
@@ -316,36 +363,32 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
 type P = Row<WeakeningParameters>;
 
 /// Variables of field weakening; their owner supplies the prefix `weakening.`.
-pub const WEAKENING: &Table<WeakeningParameters> = &Table::new(
-    const {
-        &[
-            P::boolean_parameter(
-                "use",
-                "Field weakening: i_d and the torque limits follow the voltage of u_dc, injection methods refuse it; false: no i_d beyond current.mtpa",
-                |p| &mut p.used,
-            ),
-            P::parameter(
-                "k_u",
-                &ONE,
-                "Share of u_dc / sqrt(3) that field weakening uses in steady state; the rest is for changes",
-                |p| &mut p.k_u,
-            )
-            .at_least(0.5)
-            .at_most(1.0),
-            P::parameter(
-                "k_t",
-                &ONE,
-                "Share of u_dc / sqrt(3) above which the trim reduces the voltage of field weakening; at least k_u",
-                |p| &mut p.k_t,
-            )
-            .at_least(0.5)
-            .at_most(1.1),
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the trim; 0: no trim", |p| &mut p.bandwidth)
-                .at_least(0.0)
-                .tunable(),
-        ]
-    },
-);
+pub const WEAKENING: &Table<WeakeningParameters> = table![
+    P::boolean_parameter(
+        "use",
+        "Field weakening: i_d and the torque limits follow the voltage of u_dc, injection methods refuse it; false: no i_d beyond current.mtpa",
+        |p| &mut p.used,
+    ),
+    P::parameter(
+        "k_u",
+        &ONE,
+        "Share of u_dc / sqrt(3) that field weakening uses in steady state; the rest is for changes",
+        |p| &mut p.k_u,
+    )
+    .at_least(0.5)
+    .at_most(1.0),
+    P::parameter(
+        "k_t",
+        &ONE,
+        "Share of u_dc / sqrt(3) above which the trim reduces the voltage of field weakening; at least k_u",
+        |p| &mut p.k_t,
+    )
+    .at_least(0.5)
+    .at_most(1.1),
+    P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the trim; 0: no trim", |p| &mut p.bandwidth)
+        .at_least(0.0)
+        .tunable(),
+];
 
 #[cfg(test)]
 mod tests {

@@ -10,7 +10,7 @@ use crate::tables::{ControllerParameters, PARAMETERS};
 use crate::weakening::LEAST_TORQUE;
 use drive_base::math::exp;
 use fmu_core::unit::{AMPERE, SPEED};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the law.
@@ -73,28 +73,24 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
 type P = Row<ZeroSpeed>;
 
 /// Variables of the law; their owner supplies the prefix `zero_speed.`.
-pub const ZERO_SPEED: &Table<ZeroSpeed> = &Table::new(
-    const {
-        &[
-            P::parameter(
-                "i_0",
-                &AMPERE,
-                "d-axis current reference of Rasmussen and FluxObserver at standstill, eq (25)",
-                |p| &mut p.i_0,
-            )
-            .at_least(0.0)
-            .tunable(),
-            P::parameter(
-                "w_0",
-                &SPEED,
-                "Mechanical speed at which the d-axis current reference has fallen to 1/e, eq (25)",
-                |p| &mut p.w_0,
-            )
-            .above(0.0)
-            .tunable(),
-        ]
-    },
-);
+pub const ZERO_SPEED: &Table<ZeroSpeed> = table![
+    P::parameter(
+        "i_0",
+        &AMPERE,
+        "d-axis current reference of Rasmussen and FluxObserver at standstill, eq (25)",
+        |p| &mut p.i_0,
+    )
+    .at_least(0.0)
+    .tunable(),
+    P::parameter(
+        "w_0",
+        &SPEED,
+        "Mechanical speed at which the d-axis current reference has fallen to 1/e, eq (25)",
+        |p| &mut p.w_0,
+    )
+    .above(0.0)
+    .tunable(),
+];
 
 #[cfg(test)]
 mod tests {

@@ -10,32 +10,11 @@ use drive_base::frame::DqHat;
 use drive_base::motor::Motor;
 use drive_control::envelope::{Limit, WarmStart};
 use drive_control::weakening::{Weakening, WeakeningGains};
-use machines::{Machine, a, b, c, currents};
+use machines::{Machine, a, b, c, currents, envelope_figures, inside_figures};
 
 #[test]
 fn the_envelope() {
-    let figures = [
-        (a(), 1000.0, 39.4584, 39.4584),
-        (a(), 1500.0, 31.7936, 38.4032),
-        (a(), 2000.0, 24.9058, 32.8101),
-        (a(), 3000.0, 17.0599, 23.7330),
-        (a(), 4000.0, 12.9075, 18.2818),
-        (b(), 3000.0, 5.0625, 5.0625),
-        (b(), 4000.0, 4.2045, 5.0493),
-        (b(), 4500.0, 3.0945, 4.5584),
-        (b(), 5000.0, 1.7105, 3.4982),
-        (c(240.0), 3000.0, 160.612, 160.612),
-        (c(240.0), 4000.0, 145.520, 148.200),
-        (c(240.0), 6000.0, 105.892, 109.118),
-        (c(240.0), 9000.0, 71.4046, 73.9718),
-        (c(240.0), 12_000.0, 52.1503, 54.1841),
-        (c(400.0), 3000.0, 295.149, 307.700),
-        (c(400.0), 4000.0, 218.983, 231.184),
-        (c(400.0), 6000.0, 126.747, 134.171),
-        (c(400.0), 9000.0, 74.2701, 77.7263),
-        (c(400.0), 12_000.0, 52.1988, 54.3298),
-    ];
-    for (machine, rpm, motoring, generating) in figures {
+    for (machine, rpm, motoring, generating) in envelope_figures() {
         for (s, figure) in [(1.0, motoring), (-1.0, generating)] {
             let [cold, warm] = machine.limit(rpm, s);
             let digits = if figure > 100.0 { 6e-4 } else { 6e-5 };
@@ -100,18 +79,7 @@ fn resistance_counts() {
 
 #[test]
 fn points_inside() {
-    let figures = [
-        (a(), 100.0, 14.0, -0.8376, 5.5798, false),
-        (c(240.0), 100.0, 100.0, -108.261, 142.581, false),
-        (a(), 1900.0, 10.0, -3.28415, 3.73946, true),
-        (a(), 3000.0, 10.0, -8.7774, 3.2841, true),
-        (a(), 2500.0, -20.0, -8.06669, -6.67334, true),
-        (b(), 4500.0, 2.0, -5.10044, 2.96296, true),
-        (c(240.0), 8000.0, 25.0, -36.569, 57.6588, true),
-        (c(240.0), 10_000.0, -30.0, -80.3153, -50.2531, true),
-        (c(400.0), 9000.0, 60.0, -172.622, 63.7117, true),
-    ];
-    for (machine, rpm, tau, i_d, i_q, weakens) in figures {
+    for (machine, rpm, tau, i_d, i_q, weakens) in inside_figures() {
         let (i, state) = currents(&machine, rpm, tau);
         let error = (i - DqHat::new(i_d, i_q)).magnitude() / machine.i;
         println!("{rpm} rpm {tau} N.m: {i:?}, {i_d} {i_q}: {error:e}");

@@ -23,7 +23,7 @@ const RESOLVED: f64 = 0.5;
 /// cycle.
 const LARGEST_TURN_WITH_LOSSES: f64 = 0.0625;
 
-/// As above with a current in the zone, where a damped step is two of half its length.
+/// [`LARGEST_TURN_WITH_LOSSES`] with a current in the zone, where a damped step is two of half its length.
 const LARGEST_TURN_DAMPED: f64 = 0.125;
 
 /// Longest damped step in s.

@@ -6,6 +6,10 @@
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
 #![allow(non_snake_case)]
 
+// A unit test shares its machines with tests outside.
+#[cfg(test)]
+extern crate self as drive_plant;
+
 mod circuit;
 pub mod counters;
 mod damping;

@@ -40,7 +40,14 @@ impl Mechanics {
     /// Friction torque in N.m at `speed` in rad/s, positive against positive speed.
     #[inline]
     pub fn friction<S: Scalar>(&self, speed: S) -> S {
-        viscous(self.B, self.k_w, speed) + Standstill::new(self, speed.value()).coulomb(speed)
+        let whole = self.is_whole(speed.value());
+        let coulomb = if whole { Whole::new(self, speed.value()).coulomb(speed) } else { self.near(speed) };
+        viscous(self.B, self.k_w, speed) + coulomb
+    }
+
+    /// The Coulomb torque where it is not the whole one.
+    fn near<S: Scalar>(&self, speed: S) -> S {
+        Standstill::new(self, speed.value()).coulomb(speed)
     }
 
     /// Torque of the shaft on the load in N.m: `tau_load`, or with an imposed speed what the machine gives, `given` (N.m).

@@ -128,6 +128,12 @@ impl PmsmPlant {
         }
     }
 
+    /// The flux linkage (Wb), for its variables.
+    #[inline]
+    pub fn flux_mut(&mut self) -> &mut Dq {
+        &mut self.state.psi
+    }
+
     /// Mean powers over the last step.
     #[inline]
     pub fn powers(&self) -> Powers {

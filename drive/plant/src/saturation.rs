@@ -41,12 +41,18 @@ impl Saturation {
         Vector::new((x * self.s_3 + S::from(self.s_2)) * x * x + q * (0.5 * self.s_dq) * q, x * self.s_dq * q)
     }
 
-    /// The smallest incremental inductance (H) of the machine at the flux linkage `psi` (Wb) over all directions: 1
-    /// over the largest eigenvalue of d i / d psi, which is symmetric.
-    pub fn least_inductance(&self, motor: &Motor, psi: Dq) -> f64 {
+    /// d i / d psi (1/H) of the machine at the flux linkage `psi` (Wb), which is symmetric: d with d, d with q, q with q.
+    #[inline]
+    pub fn slope(&self, motor: &Motor, psi: Dq) -> [f64; 3] {
         let (x, q) = (psi.d() - motor.psi_M, psi.q());
         let by_d = 1.0 / motor.L_d + (2.0 * self.s_2 + 3.0 * self.s_3 * x) * x;
-        let (by_q, cross) = (1.0 / motor.L_q + self.s_dq * x, self.s_dq * q);
+        [by_d, self.s_dq * q, 1.0 / motor.L_q + self.s_dq * x]
+    }
+
+    /// The smallest incremental inductance (H) of the machine at the flux linkage `psi` (Wb) over all directions: 1
+    /// over the largest eigenvalue of d i / d psi.
+    pub fn least_inductance(&self, motor: &Motor, psi: Dq) -> f64 {
+        let [by_d, cross, by_q] = self.slope(motor, psi);
         1.0 / (0.5 * (by_d + by_q) + (0.5 * (by_d - by_q)).hypot(cross))
     }
 

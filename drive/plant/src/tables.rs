@@ -8,6 +8,7 @@ use crate::power::{ENERGY, POWERS};
 use crate::saturation::{SATURATION, Saturation};
 use crate::signals::PlantOutputs;
 use crate::thermal::{THERMAL, THERMAL_INPUTS, THERMAL_OUTPUTS, Thermal};
+use drive_base::frame::Dq;
 use drive_base::motor::{MOTOR, Motor};
 use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, PER_KELVIN, RADIAN, S2_PER_RAD2, SPEED, VOLT, WEBER};
 use fmu_core::{Block, Part, Row, Table};
@@ -136,14 +137,14 @@ pub const PARAMETERS: &Table<PlantParameters> = &Table::new(
     },
 );
 
-type S = Row<PmsmPlant>;
+type S = Row<Dq>;
 
-/// The states that are not outputs, of the plant and of `PmsmDrive`.
-pub const STATES: &Table<PmsmPlant> = &Table::new(
+/// The flux linkage: the states that are not outputs, of the plant and of `PmsmDrive`.
+pub const FLUX: &Table<Dq> = &Table::new(
     const {
         &[
-            S::state("psi_d", &WEBER, "d-axis stator flux linkage", |m| m.state.psi.parts_mut().0).nominal(0.1),
-            S::state("psi_q", &WEBER, "q-axis stator flux linkage", |m| m.state.psi.parts_mut().1).nominal(0.1),
+            S::state("psi_d", &WEBER, "d-axis stator flux linkage", |psi| psi.parts_mut().0).nominal(0.1),
+            S::state("psi_q", &WEBER, "q-axis stator flux linkage", |psi| psi.parts_mut().1).nominal(0.1),
         ]
     },
 );
@@ -180,7 +181,7 @@ pub const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
                 .read_with("mechanics.imposed", "true"),
             V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
             V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: STATES, lens: |m| &mut m.model }),
+            V::part("", &Part { table: FLUX, lens: |m| m.model.flux_mut() }),
             V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
         ]
     },

@@ -86,7 +86,7 @@ fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
 }
 
 fn start_values(session: &Session) -> Result<(), NotDetermined> {
-    let v2 = session.description.version == FmiVersion::V2;
+    let v2 = session.is_v2();
     let instance = if v2 { session.initializing()? } else { session.fresh()? };
     let mut compared = 0;
     for v in session.numeric().filter(|v| v.start.is_some() && v.clocks.is_empty()) {
@@ -170,54 +170,43 @@ fn pass(
 }
 
 fn zero_variables(session: &Session) -> Result<(), NotDetermined> {
-    for base in plain_types(session.description.version) {
-        session.case(|| {
-            let instance = session.stepping()?;
-            for way in WAYS {
-                let call = format!("{way}({base}, NULL, 0, NULL, 0)");
-                let status = pass(&instance, way, &call, base, (None, 0), (None, 0))?;
-                session.require(status.is_ok(), || format!("{way}{base} of zero variables returned {status}"));
-            }
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases(plain_types(session.description.version), |base| {
+        let instance = session.stepping()?;
+        for way in WAYS {
+            let call = format!("{way}({base}, NULL, 0, NULL, 0)");
+            let status = pass(&instance, way, &call, base, (None, 0), (None, 0))?;
+            session.require(status.is_ok(), || format!("{way}{base} of zero variables returned {status}"));
+        }
+        Ok(())
+    })
 }
 
 fn null_arrays(session: &Session) -> Result<(), NotDetermined> {
-    for (references, values) in [(false, true), (true, false)] {
-        for way in WAYS {
-            session.case(|| {
-                let instance = session.stepping()?;
-                let Some(v) = subject(session, way) else { return Ok(()) };
-                let mut buffer = Buffer::of(v.base, session.description.version, &[bits(v.base, 0.0)]);
-                let (list, place) = (references.then_some(v.value_reference), values.then_some(&mut buffer));
-                let names = [if references { "vr" } else { "NULL" }, if values { "values" } else { "NULL" }];
-                let call = format!("{way}({}, {}, 1, {}, 1)", v.base, names[0], names[1]);
-                let status = pass(&instance, way, &call, v.base, (list.as_ref().map(slice::from_ref), 1), (place, 1))?;
-                session.require(status == Status::ERROR, || format!("{call} returned {status}"));
-                Ok(())
-            });
-        }
-    }
-    Ok(())
+    session.cases([(false, "Get"), (false, "Set"), (true, "Get"), (true, "Set")], |(references, way)| {
+        let instance = session.stepping()?;
+        let Some(v) = subject(session, way) else { return Ok(()) };
+        let mut buffer = Buffer::of(v.base, session.description.version, &[bits(v.base, 0.0)]);
+        let (list, place) = (references.then_some(v.value_reference), (!references).then_some(&mut buffer));
+        let names = if references { "vr, 1, NULL" } else { "NULL, 1, values" };
+        let call = format!("{way}({}, {names}, 1)", v.base);
+        let status = pass(&instance, way, &call, v.base, (list.as_ref().map(slice::from_ref), 1), (place, 1))?;
+        session.require(status == Status::ERROR, || format!("{call} returned {status}"));
+        Ok(())
+    })
 }
 
 fn wrong_counts(session: &Session) -> Result<(), NotDetermined> {
-    for (n, way) in [(0, "Get"), (2, "Get"), (0, "Set"), (2, "Set")] {
-        session.case(|| {
-            let instance = session.stepping()?;
-            let Some(v) = subject(session, way) else { return Ok(()) };
-            let mut buffer = Buffer::of(v.base, session.description.version, &vec![bits(v.base, 0.0); n]);
-            let call = format!("{way}({}, nValueReferences=1, nValues={n})", v.name);
-            let list = (Some(&[v.value_reference][..]), 1);
-            let status = pass(&instance, way, &call, v.base, list, (Some(&mut buffer), n))?;
-            session.require(status == Status::ERROR, || format!("{call} returned {status}"));
-            session.require(buffer.intact(), || format!("{call} wrote past the {n} values"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([(0, "Get"), (2, "Get"), (0, "Set"), (2, "Set")], |(n, way)| {
+        let instance = session.stepping()?;
+        let Some(v) = subject(session, way) else { return Ok(()) };
+        let mut buffer = Buffer::of(v.base, session.description.version, &vec![bits(v.base, 0.0); n]);
+        let call = format!("{way}({}, nValueReferences=1, nValues={n})", v.name);
+        let list = (Some(&[v.value_reference][..]), 1);
+        let status = pass(&instance, way, &call, v.base, list, (Some(&mut buffer), n))?;
+        session.require(status == Status::ERROR, || format!("{call} returned {status}"));
+        session.require(buffer.intact(), || format!("{call} wrote past the {n} values"));
+        Ok(())
+    })
 }
 
 /// A scalar to get, an output, or to set, an input.

@@ -103,7 +103,7 @@ fn headers_of(entry: &Entry) -> impl Iterator<Item = (&'static str, &Header)> {
 
 fn extension(fmu: &FmuFile) -> Verdict {
     let found = fmu.path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    Verdict::of(if found == "fmu" { Vec::new() } else { vec![format!("the extension is {found:?}, expected fmu")] })
+    Verdict::holds(found == "fmu", || format!("the extension is {found:?}, expected fmu"))
 }
 
 fn names(fmu: &FmuFile) -> Verdict {
@@ -207,11 +207,14 @@ fn headers(fmu: &FmuFile) -> Verdict {
     Verdict::of(findings)
 }
 
+/// Whether the archive has a file in a folder.
+fn has_files(fmu: &FmuFile, folder: &str) -> bool {
+    fmu.zip.names().iter().any(|n| n.starts_with(folder) && !n.ends_with('/'))
+}
+
 fn implementation(fmu: &FmuFile) -> Verdict {
-    let sources = fmu.zip.names().iter().any(|n| n.starts_with("sources/") && !n.ends_with('/'));
-    let binaries = fmu.zip.names().iter().any(|n| n.starts_with("binaries/") && !n.ends_with('/'));
-    let present = sources || binaries;
-    Verdict::of(if present { Vec::new() } else { vec!["the archive contains neither binaries/ nor sources/".into()] })
+    let present = has_files(fmu, "sources/") || has_files(fmu, "binaries/");
+    Verdict::holds(present, || "the archive contains neither binaries/ nor sources/".into())
 }
 
 fn root(fmu: &FmuFile) -> Verdict {
@@ -264,7 +267,7 @@ fn base_names(fmu: &FmuFile) -> Verdict {
     if fmu.binaries.is_empty() {
         return Verdict::NotApplicable("there are no shared libraries".into());
     }
-    let sources = fmu.zip.names().iter().any(|n| n.starts_with("sources/") && !n.ends_with('/'));
+    let sources = has_files(fmu, "sources/");
     let mut findings = Vec::new();
     for identifier in &identifiers {
         let c_name = identifier.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
@@ -306,7 +309,7 @@ fn base_names(fmu: &FmuFile) -> Verdict {
 
 fn documentation(fmu: &FmuFile) -> Verdict {
     let present = fmu.zip.find("documentation/index.html").is_some();
-    Verdict::of(if present { Vec::new() } else { vec!["documentation/index.html is missing".into()] })
+    Verdict::holds(present, || "documentation/index.html is missing".into())
 }
 
 fn licenses(fmu: &FmuFile) -> Verdict {
@@ -319,11 +322,7 @@ fn licenses(fmu: &FmuFile) -> Verdict {
         FmiVersion::V3 => &["license.txt", "license.html", "license.spdx"][..],
     };
     let present = entries.iter().any(|e| names.contains(&format!("documentation/licenses/{e}")));
-    Verdict::of(if present {
-        Vec::new()
-    } else {
-        vec![format!("documentation/licenses has none of {}", entries.join(", "))]
-    })
+    Verdict::holds(present, || format!("documentation/licenses has none of {}", entries.join(", ")))
 }
 
 fn dependencies(fmu: &FmuFile) -> Verdict {
@@ -334,11 +333,12 @@ fn dependencies(fmu: &FmuFile) -> Verdict {
             let present = ["txt", "html"]
                 .iter()
                 .any(|e| fmu.zip.find(&format!("documentation/externalDependencies.{e}")).is_some());
-            let missing = format!(
-                "line {}: needsExecutionTool is true, but documentation/externalDependencies is missing",
-                i.line
-            );
-            Verdict::of(if present { Vec::new() } else { vec![missing] })
+            Verdict::holds(present, || {
+                format!(
+                    "line {}: needsExecutionTool is true, but documentation/externalDependencies is missing",
+                    i.line
+                )
+            })
         }
     }
 }
@@ -368,7 +368,7 @@ fn extra(fmu: &FmuFile) -> Verdict {
 
 fn sources(fmu: &FmuFile) -> Verdict {
     let names = fmu.zip.names();
-    if !names.iter().any(|n| n.starts_with("sources/") && !n.ends_with('/')) {
+    if !has_files(fmu, "sources/") {
         return Verdict::NotApplicable("there are no sources".into());
     }
     let mut findings = Vec::new();

@@ -10,6 +10,7 @@ use model_description::FmiVersion;
 use object::elf;
 use object::read::elf::{ElfFile64, ProgramHeader};
 use object::{Architecture, BinaryFormat, Object, ObjectSection, ObjectSymbol};
+use std::cell::Cell;
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
@@ -112,52 +113,41 @@ fn libraries(fmu: &FmuFile) -> Vec<&Binary> {
     fmu.binaries.iter().filter(|b| base(b).is_some_and(|base| names.contains(&base.as_str()))).collect()
 }
 
+/// The verdict from the findings about each of these libraries; what a rule cannot read is not determined.
+fn of_each<'f>(
+    libraries: impl IntoIterator<Item = &'f Binary>,
+    rule: impl Fn(&Binary, &[u8]) -> Result<Vec<String>, String>,
+) -> Verdict {
+    let found = libraries.into_iter().map(|binary| {
+        let named = |text: String| format!("{}: {text}", binary.name);
+        let findings = rule(binary, &binary.bytes()?).map_err(named)?;
+        Ok(findings.into_iter().map(named).collect::<Vec<_>>())
+    });
+    found.collect::<Result<Vec<_>, String>>().map_or_else(Verdict::NotDetermined, |all| Verdict::of(all.concat()))
+}
+
 /// Findings about each of these libraries, and about each image of a universal one.
 fn each(fmu: &FmuFile, rule: impl Fn(&Binary, &object::File<'_>) -> Vec<String>) -> Verdict {
     let libraries = libraries(fmu);
     if libraries.is_empty() {
         return Verdict::NotApplicable("no shared library is named after modelIdentifier".into());
     }
-    let mut findings = Vec::new();
-    for binary in libraries {
-        let bytes = match binary.bytes() {
-            Ok(bytes) => bytes,
-            Err(why) => return Verdict::NotDetermined(why),
-        };
-        let images = match machine::images(&bytes) {
-            Ok(images) => images,
-            Err(why) => return Verdict::NotDetermined(format!("{}: {why}", binary.name)),
-        };
-        for image in images {
-            match object::File::parse(image) {
-                Ok(file) => findings.extend(rule(binary, &file).into_iter().map(|f| format!("{}: {f}", binary.name))),
-                Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
-            }
-        }
-    }
-    Verdict::of(findings)
+    of_each(libraries, |binary, bytes| {
+        let found = machine::images(bytes)?.into_iter().map(|image| Ok(rule(binary, &object::File::parse(image)?)));
+        found.collect::<Result<Vec<_>, object::Error>>().map(|all| all.concat()).map_err(|e| e.to_string())
+    })
 }
 
 /// Findings about each of these libraries that is a 64-bit ELF file.
 fn elf(fmu: &FmuFile, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<String>, object::Error>) -> Verdict {
-    let (mut findings, mut found_elf) = (Vec::new(), false);
-    for binary in libraries(fmu) {
-        let bytes = match binary.bytes() {
-            Ok(bytes) => bytes,
-            Err(why) => return Verdict::NotDetermined(why),
-        };
-        let Ok(file) = ElfFile64::parse(&*bytes) else { continue };
-        found_elf = true;
-        match rule(binary, &file) {
-            Ok(found) => findings.extend(found.into_iter().map(|f| format!("{}: {f}", binary.name))),
-            Err(e) => return Verdict::NotDetermined(format!("{}: {e}", binary.name)),
-        }
-    }
-    if found_elf {
-        Verdict::of(findings)
-    } else {
-        Verdict::NotApplicable("the archive has no 64-bit ELF binary".into())
-    }
+    let found_elf = Cell::new(false);
+    let verdict = of_each(libraries(fmu), |binary, bytes| {
+        let Ok(file) = ElfFile64::parse(bytes) else { return Ok(Vec::new()) };
+        found_elf.set(true);
+        rule(binary, &file).map_err(|e| e.to_string())
+    });
+    let none = || Verdict::NotApplicable("the archive has no 64-bit ELF binary".into());
+    if found_elf.get() || matches!(verdict, Verdict::NotDetermined(_)) { verdict } else { none() }
 }
 
 fn format(fmu: &FmuFile) -> Verdict {
@@ -389,7 +379,7 @@ fn loads(_: &Session) -> Result<(), NotDetermined> {
 
 fn versions(session: &Session) -> Result<(), NotDetermined> {
     let mut texts = vec![(Text::GetVersion, session.description.version.to_string())];
-    if session.description.version == FmiVersion::V2 {
+    if session.is_v2() {
         texts.push((Text::GetTypesPlatform, "default".into()));
     }
     for (name, expected) in texts {

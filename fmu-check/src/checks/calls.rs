@@ -101,7 +101,7 @@ fn experiment(instance: &Instance<'_>, name: &str) -> Result<Status, NotDetermin
 
 /// FMI 2.0 requires SetupExperiment first.
 fn enter_initialization(instance: &Instance<'_>, state: State) -> Result<Status, NotDetermined> {
-    if instance.session.description.version == FmiVersion::V3 {
+    if !instance.session.is_v2() {
         return experiment(instance, "EnterInitializationMode");
     }
     if state == State::Instantiated {

@@ -5,6 +5,15 @@ use crate::session::{NotDetermined, Session, settable};
 use fmu_import::raw::Simple;
 use model_description::{BaseType, ModelVariable, Unknown, Variability};
 
+/// Reports that the unknown, if it could be read both times, changes with a known that is not among its dependencies.
+fn undeclared(session: &Session, unknown: &ModelVariable, known: &ModelVariable, (old, new): (&[u64], &[u64])) {
+    if !old.is_empty() && !new.is_empty() {
+        let (line, name, other) = (unknown.line, &unknown.name, &known.name);
+        let text = format!("line {line}: {name} changes with {other}, which is not among its dependencies");
+        session.value_deviates(unknown, old, new.to_vec(), &text);
+    }
+}
+
 /// Changes every known that is not a dependency of an initial unknown and requires that the unknown stays the same.
 pub(super) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> {
     let unknowns: Vec<_> = session
@@ -35,12 +44,8 @@ pub(super) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
         for (((unknown, dependencies), old), new) in unknowns.iter().zip(&before).zip(&after) {
             let named =
                 dependencies.iter().any(|d| session.description.referenced(*d).is_some_and(|v| v.name == known.name));
-            if !named && old != new && !old.is_empty() && !new.is_empty() {
-                let text = format!(
-                    "line {}: {} changes with {}, which is not among its dependencies",
-                    unknown.line, unknown.name, known.name
-                );
-                session.value_deviates(unknown, old, new.clone(), &text);
+            if !named && old != new {
+                undeclared(session, unknown, known, (old, new));
             }
         }
         let _ = one.free();
@@ -72,12 +77,8 @@ pub(super) fn exchange_dependencies(session: &Session) -> Result<(), NotDetermin
             let named = same(unknown) || dependencies.iter().any(|r| d.referenced(*r).is_some_and(same));
             let reals = |bits: &[u64]| bits.iter().map(|b| f64::from_bits(*b)).collect::<Vec<_>>();
             let changed = if unknown.base == BaseType::Float64 { differ(&reals(old), &reals(new)) } else { old != new };
-            if !named && changed && !old.is_empty() && !new.is_empty() {
-                let text = format!(
-                    "line {}: {} changes with {}, which is not among its dependencies",
-                    unknown.line, unknown.name, known.name
-                );
-                session.value_deviates(unknown, old, new.clone(), &text);
+            if !named && changed {
+                undeclared(session, unknown, known, (old, new));
             }
         }
     };
@@ -104,7 +105,7 @@ pub(super) fn exchange_dependencies(session: &Session) -> Result<(), NotDetermin
     // Discrete inputs change in Event Mode only.
     for discrete in [false, true] {
         if discrete {
-            instance.must("EnterEventMode", instance.simple(Simple::EnterEventMode)?)?;
+            instance.perform(Simple::EnterEventMode)?;
         }
         let before = instance.snapshot(&variables)?;
         for input in session.number_inputs().filter(|v| (v.variability == Variability::Discrete) == discrete) {

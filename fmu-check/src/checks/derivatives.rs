@@ -65,10 +65,7 @@ pub(super) fn slopes(session: &Session) -> Result<(), NotDetermined> {
     }
     session.case(|| {
         let instance = moving(session)?;
-        let values = || -> Result<Vec<f64>, NotDetermined> {
-            let rows = instance.snapshot(&outputs)?;
-            Ok(rows.iter().map(|bits| bits.first().map_or(f64::NAN, |b| f64::from_bits(*b))).collect())
-        };
+        let values = || instance.numbers(&outputs);
         // A hundredth of the step, so that the slope has no time to change much.
         let short_step = session.h() / 100.0;
         if !session.flag("canHandleVariableCommunicationStepSize") || !instance.step(short_step)?.is_ok() {

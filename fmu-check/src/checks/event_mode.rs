@@ -74,7 +74,7 @@ impl<'b> Stepper<'b> {
             let arguments = Arguments { event_mode, early_return: early, ..session.arguments("probe") };
             let instance = session.made(&arguments)?;
             instance.enter()?;
-            instance.must("ExitInitializationMode", instance.simple(Simple::ExitInitializationMode)?)?;
+            instance.perform(Simple::ExitInitializationMode)?;
             let mut stepper = Self { instance, event_mode, early, next: None, over: false };
             if event_mode {
                 stepper.leave_event_mode()?;
@@ -96,11 +96,11 @@ impl<'b> Stepper<'b> {
         if self.over {
             return Ok(());
         }
-        self.instance.must("EnterStepMode", self.instance.simple(Simple::EnterStepMode)?)
+        self.instance.perform(Simple::EnterStepMode)
     }
 
     fn event(&mut self) -> Result<(), NotDetermined> {
-        self.instance.must("EnterEventMode", self.instance.simple(Simple::EnterEventMode)?)?;
+        self.instance.perform(Simple::EnterEventMode)?;
         self.leave_event_mode()
     }
 
@@ -112,12 +112,9 @@ impl<'b> Stepper<'b> {
         let near = 1e-9 * whole + 4.0 * f64::EPSILON * t.abs();
         let inside = |next: &f64| variable && *next > t + near && *next < t + whole;
         let h = self.next.filter(inside).map_or(whole, |next| next - t);
-        let mut stepped = StepResults { event: 0, terminate: 0, early: 0, last: t };
-        let status = self.instance.call(&format!("DoStep(t={t:?}, h={h:?})"), |raw| {
-            let (status, found) = raw.do_step(self.instance.handle, t, h, false, [true; 4])?;
-            stepped = found;
-            Some(status)
-        })?;
+        let call = format!("DoStep(t={t:?}, h={h:?})");
+        let (status, stepped) =
+            self.instance.call_for(&call, |raw| raw.do_step(self.instance.handle, t, h, false, [true; 4]))?;
         if !status.is_ok() {
             return Ok((status, stepped, t + h));
         }

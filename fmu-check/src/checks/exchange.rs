@@ -9,7 +9,7 @@ use crate::session::{NotDetermined, Session};
 use crate::states::{Life, State};
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
-use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
+use model_description::{BaseType, Causality, ModelVariable, Variability};
 
 const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2";
 
@@ -108,15 +108,10 @@ fn refused(session: &Session) -> Result<(), NotDetermined> {
 fn counts(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.exchange(State::Event)?;
     let (states, indicators) = (session.states(), session.indicators());
-    if session.description.version == FmiVersion::V3 {
+    if !session.is_v2() {
         let counts = [(Count::GetNumberOfContinuousStates, states), (Count::GetNumberOfEventIndicators, indicators)];
         for (name, expected) in counts {
-            let mut found = 0;
-            let status = instance.call(name.as_str(), |raw| {
-                let (status, n) = raw.count(name, instance.handle, false)?;
-                found = n;
-                Some(status)
-            })?;
+            let (status, found) = instance.call_for(name.as_str(), |raw| raw.count(name, instance.handle, false))?;
             session.require(status.is_ok() && found == expected, || {
                 format!("fmi3{} returned {status}, {found}; the description has {expected}", name.as_str())
             });
@@ -324,36 +319,35 @@ fn independent(session: &Session) -> Result<(), NotDetermined> {
 
 fn wild_states(session: &Session) -> Result<(), NotDetermined> {
     needs_states!(session);
-    for wild in [f64::NAN, f64::INFINITY, 1e300] {
-        session.case(|| {
-            let instance = session.exchange(State::Continuous)?;
-            let (x, f) = (instance.states()?, instance.derivatives()?);
-            let set = instance.set_states(&vec![wild; x.len()])?;
-            let mut told = vec![("SetContinuousStates", set)];
-            if set.is_ok() {
-                told.push((instance.derivatives_name().as_str(), instance.vector(instance.derivatives_name(), x.len())?.0));
-                if session.indicators() > 0 {
-                    let (status, ..) = instance.vector(Vector::GetEventIndicators, session.indicators())?;
-                    told.push(("GetEventIndicators", status));
-                }
+    session.cases([f64::NAN, f64::INFINITY, 1e300], |wild| {
+        let instance = session.exchange(State::Continuous)?;
+        let (x, f) = (instance.states()?, instance.derivatives()?);
+        let set = instance.set_states(&vec![wild; x.len()])?;
+        let mut told = vec![("SetContinuousStates", set)];
+        if set.is_ok() {
+            told.push((instance.derivatives_name().as_str(), instance.vector(instance.derivatives_name(), x.len())?.0));
+            if session.indicators() > 0 {
+                let (status, ..) = instance.vector(Vector::GetEventIndicators, session.indicators())?;
+                told.push(("GetEventIndicators", status));
             }
-            for (name, status) in told {
-                session.require(status.is_ok() || status == Status::DISCARD, || {
-                    format!("{name} with states of {wild:e} returned {status}, which ends the simulation")
-                });
-                if !status.is_ok() && status != Status::DISCARD {
-                    return Ok(());
-                }
-            }
-            let status = instance.set_states(&x)?;
-            let again = if status.is_ok() { instance.derivatives()? } else { Vec::new() };
-            session.require(!differ(&again, &f), || {
-                format!("the derivatives were {f:?}; after states of {wild:e} and the old ones ({status}) they are {again:?}")
+        }
+        for (name, status) in told {
+            session.require(status.is_ok() || status == Status::DISCARD, || {
+                format!("{name} with states of {wild:e} returned {status}, which ends the simulation")
             });
-            Ok(())
+            if !status.is_ok() && status != Status::DISCARD {
+                return Ok(());
+            }
+        }
+        let status = instance.set_states(&x)?;
+        let again = if status.is_ok() { instance.derivatives()? } else { Vec::new() };
+        session.require(!differ(&again, &f), || {
+            format!(
+                "the derivatives were {f:?}; after states of {wild:e} and the old ones ({status}) they are {again:?}"
+            )
         });
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 fn wrong_length(session: &Session) -> Result<(), NotDetermined> {
@@ -379,29 +373,25 @@ fn wrong_length(session: &Session) -> Result<(), NotDetermined> {
 fn reset(session: &Session) -> Result<(), NotDetermined> {
     let run = |instance: &Instance<'_>| Importer::start(instance)?.trajectory(100);
     let first = run(&session.exchange(State::Event)?)?;
-    for &state in Life::ModelExchange.states() {
-        session.case(|| {
-            let running = state == State::Continuous;
-            let instance = session.exchange(if running { State::Event } else { state })?;
-            if running {
-                Importer::start(&instance)?.run(20, &mut |_| Ok(()))?;
-            }
-            let status = instance.simple(Simple::Reset)?;
-            if !status.is_ok() {
-                session.violated(format!("Reset after {state:?} returned {status}"));
-                return Ok(());
-            }
-            instance.experiment(session.start(), None);
-            instance.bring_to(State::Event)?;
-            if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
-                let text =
-                    format!("Reset after {state:?}: the run differs from that of a new instance after {k} steps");
-                session.deviates(largest, &text);
-            }
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases(Life::ModelExchange.states(), |&state| {
+        let running = state == State::Continuous;
+        let instance = session.exchange(if running { State::Event } else { state })?;
+        if running {
+            Importer::start(&instance)?.run(20, &mut |_| Ok(()))?;
+        }
+        let status = instance.simple(Simple::Reset)?;
+        if !status.is_ok() {
+            session.violated(format!("Reset after {state:?} returned {status}"));
+            return Ok(());
+        }
+        instance.experiment(session.start(), None);
+        instance.bring_to(State::Event)?;
+        if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
+            let text = format!("Reset after {state:?}: the run differs from that of a new instance after {k} steps");
+            session.deviates(largest, &text);
+        }
+        Ok(())
+    })
 }
 
 fn saved_states(session: &Session) -> Result<(), NotDetermined> {
@@ -443,7 +433,7 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
         if importer.over {
             return Ok(());
         }
-        instance.must("EnterEventMode", instance.simple(Simple::EnterEventMode)?)?;
+        instance.perform(Simple::EnterEventMode)?;
         let (saved, t) = (instance.save()?, instance.time.get());
         let first = Importer::start(&instance)?.trajectory(100)?;
         instance.restore(saved, t)?;
@@ -463,27 +453,24 @@ fn foreign_states(session: &Session) -> Result<(), NotDetermined> {
     if !exchange.can_get_and_set_state() || !simulation.can_get_and_set_state() {
         return session.not_applicable("canGetAndSetFMUState is false");
     }
-    for to_simulation in [true, false] {
-        session.case(|| {
-            let (exchange, simulation) = (session.exchange(State::Continuous)?, session.stepping()?);
-            let (from, to) = if to_simulation { (&exchange, &simulation) } else { (&simulation, &exchange) };
-            let saved = from.save()?;
-            let status = to.call("SetFMUState of the other interface", |raw| raw.set_state(to.handle, saved))?;
-            session.note(format!("SetFMUState returned {status}"));
-            if status == Status::FATAL {
-                return Ok(());
-            }
-            // Whatever it answered, the next calls and a reset must not crash.
-            if to_simulation {
-                let _ = to.step(session.h())?;
-            } else {
-                let _ = to.set_time(to.time.get() + session.integrator_step())?;
-                let _ = to.vector(to.derivatives_name(), session.states())?;
-            }
-            let status = to.simple(Simple::Reset)?;
-            session.require(status.is_ok(), || format!("Reset after a state of the other interface returned {status}"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([true, false], |to_simulation| {
+        let (exchange, simulation) = (session.exchange(State::Continuous)?, session.stepping()?);
+        let (from, to) = if to_simulation { (&exchange, &simulation) } else { (&simulation, &exchange) };
+        let saved = from.save()?;
+        let status = to.call("SetFMUState of the other interface", |raw| raw.set_state(to.handle, saved))?;
+        session.note(format!("SetFMUState returned {status}"));
+        if status == Status::FATAL {
+            return Ok(());
+        }
+        // Whatever it answered, the next calls and a reset must not crash.
+        if to_simulation {
+            let _ = to.step(session.h())?;
+        } else {
+            let _ = to.set_time(to.time.get() + session.integrator_step())?;
+            let _ = to.vector(to.derivatives_name(), session.states())?;
+        }
+        let status = to.simple(Simple::Reset)?;
+        session.require(status.is_ok(), || format!("Reset after a state of the other interface returned {status}"));
+        Ok(())
+    })
 }

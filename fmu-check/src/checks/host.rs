@@ -53,7 +53,7 @@ fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
 }
 
 /// A copy of the binary below the working directory, which is temporary; under the new path it is loaded again.
-fn second_binary(session: &Session, folder: &str) -> Result<PathBuf, NotDetermined> {
+pub(super) fn second_binary(session: &Session, folder: &str) -> Result<PathBuf, NotDetermined> {
     let folder_of_run = session.home.join(folder);
     copy(session.binary.parent().unwrap_or(&folder_of_run), &folder_of_run).map_err(|e| failed(&e))?;
     Ok(folder_of_run.join(session.binary.file_name().unwrap_or_default()))
@@ -61,7 +61,7 @@ fn second_binary(session: &Session, folder: &str) -> Result<PathBuf, NotDetermin
 
 fn small_stack(session: &Session) -> Result<(), NotDetermined> {
     let binary = second_binary(session, "small")?;
-    let mut duplicate = session.duplicate(60)?;
+    let mut duplicate = session.duplicate(&session.binary, 60)?;
     session.record_call(&format!("loading and running in a thread with {STACK} bytes of stack"));
     let version = session.description.version;
     let work = move || {
@@ -100,8 +100,7 @@ fn floating_point(session: &Session) -> Result<(), NotDetermined> {
     };
     let binary = second_binary(session, "floating")?;
     session.record_call("loading the binary once more");
-    let duplicate =
-        session.duplicate_with(Raw::open(&binary, session.description.version).map_err(NotDetermined)?, 61)?;
+    let duplicate = session.duplicate(&binary, 61)?;
     // One finding is enough: afterwards everything differs.
     if !check_control("loading") {
         return Ok(());
@@ -216,8 +215,7 @@ fn surroundings(session: &Session) -> Result<(), NotDetermined> {
     let before = Surroundings::current(&fmu_folder);
     session.record_call("loading, a complete run, unloading");
     {
-        let duplicate =
-            session.duplicate_with(Raw::open(&binary, session.description.version).map_err(NotDetermined)?, 62)?;
+        let duplicate = session.duplicate(&binary, 62)?;
         let instance = duplicate.stepping()?;
         for k in 0..20 {
             instance.change_inputs(k)?;
@@ -266,8 +264,7 @@ fn unusual_path(session: &Session) -> Result<(), NotDetermined> {
             return Ok(());
         }
     };
-    let mut duplicate = session.duplicate_with(raw, 63)?;
-    duplicate.move_to(&folder_of_run);
+    let duplicate = session.duplicate_at(&folder_of_run, raw, 63)?;
     match run(&duplicate) {
         Err(why) => session.failed(&format!("in {}", folder_of_run.display()), why),
         Ok(rows) => session.compare("from there", &plain, &rows),

@@ -1,6 +1,6 @@
 //! Several instances, threads, copies, loading and unloading.
 
-use super::host::failed;
+use super::host::{failed, second_binary};
 use crate::check::{Check, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
@@ -51,8 +51,7 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
             session.violated(format!("instance {} could not be created beside {k} others", k + 2));
             return Ok(());
         };
-        instance.enter()?;
-        instance.exit()?;
+        instance.initialize()?;
         all.push((instance, Vec::new()));
     }
     for k in 0..20 {
@@ -75,7 +74,7 @@ fn threads(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable(ONLY_ONCE);
     }
     let alone = trajectory(&session.stepping()?, 40)?;
-    let duplicates = (0..4).map(|k| session.duplicate(k)).collect::<Result<Vec<_>, _>>()?;
+    let duplicates = (0..4).map(|k| session.duplicate(&session.binary, k)).collect::<Result<Vec<_>, _>>()?;
     session.record_call("4 threads, each with an instance, 40 steps");
     let duplicates: Vec<_> = duplicates.into_iter().map(|duplicate| Mutex::new(Some(duplicate))).collect();
     let results: Vec<Result<Vec<Vec<Vec<u64>>>, NotDetermined>> = std::thread::scope(|scope| {
@@ -129,19 +128,9 @@ fn copies(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable(ONLY_ONCE);
     }
     let alone = trajectory(&session.stepping()?, 20)?;
-    let folder = session.binary.parent().ok_or_else(|| NotDetermined("the binary has no folder".into()))?;
-    let failed = |e: std::io::Error| NotDetermined(e.to_string());
     let mut duplicates = Vec::new();
     for k in 0..2 {
-        // Below the working directory of the probe, which is temporary.
-        let target = session.home.join(format!("copy {k} %23 \u{e4}"));
-        std::fs::create_dir_all(&target).map_err(failed)?;
-        for file in std::fs::read_dir(folder).map_err(failed)?.flatten() {
-            if file.path().is_file() {
-                std::fs::copy(file.path(), target.join(file.file_name())).map_err(failed)?;
-            }
-        }
-        let binary = target.join(session.binary.file_name().unwrap_or_default());
+        let binary = second_binary(session, &format!("copy {k} %23 \u{e4}"))?;
         session.record_call("dlopen(RTLD_NOW | RTLD_GLOBAL)");
         let raw = Raw::open_global(&binary, session.description.version).map_err(NotDetermined)?;
         duplicates.push(session.duplicate_with(raw, 10 + k)?);
@@ -181,8 +170,7 @@ fn leaks(session: &Session) -> Result<(), NotDetermined> {
                 let Some(instance) = session.instantiate(&session.arguments("probe"))? else {
                     return Err(NotDetermined("no instance".into()));
                 };
-                instance.enter()?;
-                instance.exit()?;
+                instance.initialize()?;
                 instance.steps(2, session.h())?;
                 instance.free()?;
                 if session.half_time_used() {
@@ -204,19 +192,11 @@ fn leaks(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn reloads(session: &Session) -> Result<(), NotDetermined> {
-    let name = session.binary.file_name().unwrap_or_default();
     // Another path, so that the session's own copy does not keep it loaded.
-    let target = session.home.join("reloaded");
-    let folder = session.binary.parent().unwrap_or(&session.home);
-    std::fs::create_dir_all(&target).map_err(|e| NotDetermined(e.to_string()))?;
-    for file in std::fs::read_dir(folder).into_iter().flatten().flatten().filter(|f| f.path().is_file()) {
-        std::fs::copy(file.path(), target.join(file.file_name())).map_err(|e| NotDetermined(e.to_string()))?;
-    }
-    let binary = target.join(name);
+    let binary = second_binary(session, "reloaded")?;
     for k in 0..20 {
         session.record_call(&format!("loading the binary, round {}", k + 1));
-        let raw = Raw::open(&binary, session.description.version).map_err(NotDetermined)?;
-        let duplicate = session.duplicate_with(raw, 20 + k)?;
+        let duplicate = session.duplicate(&binary, 20 + k)?;
         {
             let instance = duplicate.stepping()?;
             instance.steps(3, session.h())?;

@@ -7,8 +7,8 @@ use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
 use crate::states::{Life, State::Error, State::Step};
-use fmu_import::raw::{Handle, Interface, Simple};
-use model_description::{Causality, FmiVersion};
+use fmu_import::raw::{Arguments, Handle, Interface, Simple};
+use model_description::Causality;
 use std::ffi::CString;
 
 const STATES: &str = "2.0.5, 4.2.4; 3.0.2, 4.2";
@@ -112,36 +112,26 @@ fn null_arguments(session: &Session) -> Result<(), NotDetermined> {
     let empty = Some(CString::default());
     let cases =
         [("instanceName = NULL", None, true), ("instanceName = \"\"", empty, true), ("token = NULL", None, false)];
-    for (what, value, name) in cases {
-        session.case(|| {
-            let mut arguments = session.arguments("probe");
-            if name {
-                arguments.name = value;
-            } else {
-                arguments.token = value;
-            }
-            let created = session.instantiate(&arguments)?;
-            session
-                .require(created.is_none(), || format!("{} with {what} created an instance", session.instantiation()));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases(cases, |(what, value, name)| {
+        let mut arguments = session.arguments("probe");
+        if name {
+            arguments.name = value;
+        } else {
+            arguments.token = value;
+        }
+        let created = session.instantiate(&arguments)?;
+        session.require(created.is_none(), || format!("{} with {what} created an instance", session.instantiation()));
+        Ok(())
+    })
 }
 
 /// Instantiates with the arguments, initializes, makes two steps and an invalid one.
-fn short_run(
-    session: &Session,
-    arguments: &fmu_import::raw::Arguments,
-    what: &str,
-    level: Level,
-) -> Result<(), NotDetermined> {
+fn short_run(session: &Session, arguments: &Arguments, what: &str, level: Level) -> Result<(), NotDetermined> {
     let Some(instance) = session.instantiate(arguments)? else {
         session.lesser(level, format!("{} with {what} returned NULL", session.instantiation()));
         return Ok(());
     };
-    instance.enter()?;
-    instance.exit()?;
+    instance.initialize()?;
     instance.steps(2, session.h())?;
     // A call that no importer may make, to provoke a message.
     session.lenient(Level::Hard, || {
@@ -153,23 +143,20 @@ fn short_run(
 }
 
 fn without_logger(session: &Session) -> Result<(), NotDetermined> {
-    let v2 = session.description.version == FmiVersion::V2;
+    let v2 = session.is_v2();
     session.case(|| {
-        let mut arguments = session.arguments("probe");
-        arguments.logger = false;
+        let arguments = Arguments { logger: false, ..session.arguments("probe") };
         short_run(session, &arguments, "a NULL log callback", Level::Must)
     });
     // FMI 3.0.2 leaves open what happens if logging is switched on nevertheless.
     session.case(|| {
-        let mut arguments = session.arguments("probe");
-        (arguments.logger, arguments.logging) = (false, true);
+        let arguments = Arguments { logger: false, logging: true, ..session.arguments("probe") };
         session
             .lenient(Level::Hard, || short_run(session, &arguments, "a NULL log callback and loggingOn", Level::Hard))
     });
     if v2 {
         session.case(|| {
-            let mut arguments = session.arguments("probe");
-            (arguments.callbacks, arguments.logging) = (false, true);
+            let arguments = Arguments { callbacks: false, logging: true, ..session.arguments("probe") };
             // The standard does not allow NULL here, so the FMU may return NULL.
             if let Some(instance) = session.instantiate(&arguments)? {
                 instance.free()?;
@@ -184,21 +171,20 @@ fn without_resources(session: &Session) -> Result<(), NotDetermined> {
     if session.has_resources() {
         return session.not_applicable("the archive has resources");
     }
-    let v2 = session.description.version == FmiVersion::V2;
+    let v2 = session.is_v2();
     let odd = if v2 { "file:/no%20such/pl%C3%A4ce#1" } else { "/no such/pl\u{e4}ce #1/" };
-    for (what, path) in [("a NULL resource path", None), ("a resource path that does not exist", Some(odd))] {
-        session.case(|| {
+    session.cases(
+        [("a NULL resource path", None), ("a resource path that does not exist", Some(odd))],
+        |(what, path)| {
             let mut arguments = session.arguments("probe");
             arguments.resources = path.and_then(|p| CString::new(p).ok());
             short_run(session, &arguments, what, Level::Must)
-        });
-    }
-    Ok(())
+        },
+    )
 }
 
 fn callbacks(session: &Session) -> Result<(), NotDetermined> {
-    let mut arguments = session.arguments("probe");
-    (arguments.lasting, arguments.logging) = (false, true);
+    let arguments = Arguments { lasting: false, logging: true, ..session.arguments("probe") };
     short_run(session, &arguments, "valid arguments", Level::Must)?;
     let late = fmu_import::raw::take_events().iter().filter(|e| e.late).count();
     session.require(late == 0, || format!("{late} messages used the struct after fmi2Instantiate had returned"));
@@ -206,7 +192,7 @@ fn callbacks(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn interfaces(session: &Session) -> Result<(), NotDetermined> {
-    let v3 = session.description.version == FmiVersion::V3;
+    let v3 = !session.is_v2();
     let mut cases = Vec::new();
     if session.description.model_exchange.is_none() {
         cases.push(("model exchange", Interface::ModelExchange, false));
@@ -217,16 +203,12 @@ fn interfaces(session: &Session) -> Result<(), NotDetermined> {
     if v3 && !session.flag("hasEventMode") {
         cases.push(("eventModeUsed = true", Interface::CoSimulation, true));
     }
-    for (what, interface, event_mode) in cases {
-        session.case(|| {
-            let mut arguments = session.arguments("probe");
-            (arguments.interface, arguments.event_mode) = (interface, event_mode);
-            let created = session.instantiate(&arguments)?;
-            session.require(created.is_none(), || format!("an instantiation for {what} created an instance"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases(cases, |(what, interface, event_mode)| {
+        let arguments = Arguments { interface, event_mode, ..session.arguments("probe") };
+        let created = session.instantiate(&arguments)?;
+        session.require(created.is_none(), || format!("an instantiation for {what} created an instance"));
+        Ok(())
+    })
 }
 
 fn free(session: &Session) -> Result<(), NotDetermined> {
@@ -234,23 +216,19 @@ fn free(session: &Session) -> Result<(), NotDetermined> {
         session.record_call(&format!("{}(NULL)", session.raw.name("FreeInstance")));
         session.raw.free(Handle::NULL).ok_or_else(|| NotDetermined("FreeInstance is missing".into()))
     });
-    for &state in Life::CoSimulation.states().iter().chain([&Error]) {
-        session.case(|| match session.simulation(state) {
-            Ok(instance) => instance.free(),
-            // Some FMUs return no Error; another check reports that.
-            Err(NotDetermined(why)) => {
-                session.note(format!("{state:?}: {why}"));
-                Ok(())
-            }
-        });
-    }
-    Ok(())
+    session.cases(Life::CoSimulation.states().iter().chain([&Error]), |&state| match session.simulation(state) {
+        Ok(instance) => instance.free(),
+        // Some FMUs return no Error; another check reports that.
+        Err(NotDetermined(why)) => {
+            session.note(format!("{state:?}: {why}"));
+            Ok(())
+        }
+    })
 }
 
 fn reset(session: &Session) -> Result<(), NotDetermined> {
     let run = |instance: &Instance<'_>| {
-        instance.enter()?;
-        instance.exit()?;
+        instance.initialize()?;
         instance.run(20, session.h())
     };
     let first = run(&session.fresh()?)?;
@@ -308,7 +286,7 @@ fn recovery(session: &Session) -> Result<(), NotDetermined> {
         return Ok(());
     }
     instance.experiment(session.start(), None);
-    if let Err(why) = instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(5, session.h())) {
+    if let Err(why) = instance.initialize().and_then(|()| instance.steps(5, session.h())) {
         session.failed(&format!("after {how} had returned Error and Reset had succeeded"), why);
     }
     Ok(())
@@ -336,8 +314,7 @@ fn past_stop_time(session: &Session) -> Result<(), NotDetermined> {
     let (h, start) = (session.h(), session.start());
     let instance = session.fresh()?;
     instance.experiment(start, Some(start + 4.0 * h));
-    instance.enter()?;
-    instance.exit()?;
+    instance.initialize()?;
     instance.steps(3, h)?;
     let ended = || NotDetermined(format!("{ENDED} before the stop time"));
     // Rounding may make the last step end slightly late.

@@ -3,8 +3,7 @@
 use crate::check::{Check, Level, Levels, Run};
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
-use fmu_import::raw::{LogCall, allocations, take_events};
-use model_description::FmiVersion;
+use fmu_import::raw::{Arguments, LogCall, allocations, take_events};
 use std::ffi::CString;
 
 const LOG: &str = "2.0.5, 2.1.5; 3.0.2, 2.3.1";
@@ -46,8 +45,7 @@ fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<LogCall>, usize
     let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
     // The FMU keeps its own copy of the name.
     drop(arguments);
-    instance.enter()?;
-    instance.exit()?;
+    instance.initialize()?;
     instance.steps(5, session.h())?;
     if let Err(NotDetermined(why)) = instance.provoke() {
         session.note(why);
@@ -89,26 +87,21 @@ fn switch(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn unknown(session: &Session) -> Result<(), NotDetermined> {
-    for (what, name) in [("no such category", CString::new("no such category").ok()), ("NULL", None)] {
-        session.case(|| {
-            let instance = session.fresh()?;
-            let call = format!("SetDebugLogging(true, 1, {what})");
-            let status =
-                instance.call(&call, |raw| raw.debug_logging(instance.handle, true, Some(&[name.as_deref()]), 1))?;
-            session.require(!status.is_ok(), || format!("{call} returned {status}"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([("no such category", CString::new("no such category").ok()), ("NULL", None)], |(what, name)| {
+        let instance = session.fresh()?;
+        let call = format!("SetDebugLogging(true, 1, {what})");
+        let status =
+            instance.call(&call, |raw| raw.debug_logging(instance.handle, true, Some(&[name.as_deref()]), 1))?;
+        session.require(!status.is_ok(), || format!("{call} returned {status}"));
+        Ok(())
+    })
 }
 
 fn errors(session: &Session) -> Result<(), NotDetermined> {
     let _ = take_events();
-    let mut arguments = session.arguments("probe");
-    arguments.logging = true;
+    let arguments = Arguments { logging: true, ..session.arguments("probe") };
     let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
-    instance.enter()?;
-    instance.exit()?;
+    instance.initialize()?;
     instance.steps(2, session.h())?;
     let _ = take_events();
     let how = instance.provoke()?;
@@ -134,7 +127,7 @@ fn identity(session: &Session) -> Result<(), NotDetermined> {
     let (events, environment, name) = log_of_a_run(session, true)?;
     for event in &events {
         session.require(event.environment == environment, || format!("{} has another environment", show(event)));
-        if session.description.version == FmiVersion::V2 {
+        if session.is_v2() {
             let logged_name = event.instance.as_deref();
             session.require(logged_name == Some(&name), || {
                 format!("{} has the instance name {logged_name:?}, expected {name:?}", show(event))
@@ -159,22 +152,17 @@ fn memory(session: &Session) -> Result<(), NotDetermined> {
     if !session.flag("canNotUseMemoryManagementFunctions") {
         return session.not_applicable("canNotUseMemoryManagementFunctions is false");
     }
-    for given in [true, false] {
-        session.case(|| {
-            let mut arguments = session.arguments("probe");
-            arguments.memory = given;
-            let Some(instance) = session.instantiate(&arguments)? else {
-                session.violated("fmi2Instantiate with NULL memory functions returned NULL");
-                return Ok(());
-            };
-            instance.enter()?;
-            instance.exit()?;
-            instance.steps(5, session.h())?;
-            instance.free()?;
-            let used = allocations();
-            session.require(used == 0, || format!("the FMU called the memory functions {used} times"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([true, false], |given| {
+        let arguments = Arguments { memory: given, ..session.arguments("probe") };
+        let Some(instance) = session.instantiate(&arguments)? else {
+            session.violated("fmi2Instantiate with NULL memory functions returned NULL");
+            return Ok(());
+        };
+        instance.initialize()?;
+        instance.steps(5, session.h())?;
+        instance.free()?;
+        let used = allocations();
+        session.require(used == 0, || format!("the FMU called the memory functions {used} times"));
+        Ok(())
+    })
 }

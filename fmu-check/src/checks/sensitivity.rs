@@ -6,7 +6,7 @@ use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use fmu_import::raw::{Sensitivity, SensitivityArguments};
-use model_description::{BaseType, Causality, FmiVersion, Interface, ModelVariable, Variability};
+use model_description::{BaseType, Causality, Interface, ModelVariable, Variability};
 
 const DIRECTIONAL: &str = "2.0.5, 2.1.9; 3.0.2, 2.2.12.1";
 
@@ -90,15 +90,11 @@ fn at_a_point(session: &Session) -> Result<Instance<'_>, NotDetermined> {
     if importer.over { Err(NotDetermined("the FMU ends the simulation at once".into())) } else { Ok(instance) }
 }
 
-fn numbers(instance: &Instance<'_>, variables: &[&ModelVariable]) -> Result<Vec<f64>, NotDetermined> {
-    Ok(instance.snapshot(variables)?.iter().map(|b| b.first().map_or(f64::NAN, |b| f64::from_bits(*b))).collect())
-}
-
 fn differences(session: &Session) -> Result<(), NotDetermined> {
     needs_derivatives!(session);
     let (instance, all) = (at_a_point(session)?, Variables::of(session));
     let (unknowns, mut compared, mut kinks) = (Variables::references(&all.unknowns), 0, 0);
-    let (x, middle) = (instance.states()?, numbers(&instance, &all.unknowns)?);
+    let (x, middle) = (instance.states()?, instance.numbers(&all.unknowns)?);
     for (j, known) in all.knowns().into_iter().enumerate() {
         let at = f64::from_bits(instance.get(known)?.1.first().copied().unwrap_or(0));
         // The cube root of the precision is best for a central difference.
@@ -115,7 +111,7 @@ fn differences(session: &Session) -> Result<(), NotDetermined> {
         let mut sides = [Vec::new(), Vec::new()];
         for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
             if put(at + sign * step)?.is_ok() {
-                *side = numbers(&instance, &all.unknowns)?;
+                *side = instance.numbers(&all.unknowns)?;
             }
         }
         instance.must("Set", put(at)?)?;
@@ -189,7 +185,7 @@ fn wrong_arguments(session: &Session) -> Result<(), NotDetermined> {
     let all = Variables::of(session);
     let (unknown, known) = (all.unknowns[0].value_reference, all.knowns()[0].value_reference);
     let none = u32::MAX;
-    let v3 = session.description.version == FmiVersion::V3;
+    let v3 = !session.is_v2();
     let mut cases = vec![
         ("an unknown that does not exist", none, known, 1, 1),
         ("a known that does not exist", unknown, none, 1, 1),

@@ -68,30 +68,26 @@ macro_rules! needs {
 
 fn in_every_state(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
-    for state in [State::Instantiated, State::Initialization, State::Step, State::Terminated] {
-        session.case(|| {
-            let instance = session.simulation(state)?;
-            let mut saved = SavedState::NULL;
-            let got = instance.call("GetFMUState", |raw| raw.get_state(instance.handle, Some(&mut saved)))?;
-            session.require(got.is_ok() && saved != SavedState::NULL, || {
-                format!("GetFMUState in {state:?} returned {got}")
-            });
-            if !got.is_ok() {
-                return Ok(());
-            }
-            for _ in 0..2 {
-                let status = instance.call("SetFMUState", |raw| raw.set_state(instance.handle, saved))?;
-                session.require(status.is_ok(), || format!("SetFMUState in {state:?} returned {status}"));
-            }
-            let status = instance.call("FreeFMUState", |raw| raw.free_state(instance.handle, Some(&mut saved)))?;
-            session.require(status.is_ok(), || format!("FreeFMUState in {state:?} returned {status}"));
-            session.require(saved == SavedState::NULL, || {
-                format!("FreeFMUState in {state:?} did not set the pointer to NULL")
-            });
-            Ok(())
+    session.cases([State::Instantiated, State::Initialization, State::Step, State::Terminated], |state| {
+        let instance = session.simulation(state)?;
+        let mut saved = SavedState::NULL;
+        let got = instance.call("GetFMUState", |raw| raw.get_state(instance.handle, Some(&mut saved)))?;
+        session
+            .require(got.is_ok() && saved != SavedState::NULL, || format!("GetFMUState in {state:?} returned {got}"));
+        if !got.is_ok() {
+            return Ok(());
+        }
+        for _ in 0..2 {
+            let status = instance.call("SetFMUState", |raw| raw.set_state(instance.handle, saved))?;
+            session.require(status.is_ok(), || format!("SetFMUState in {state:?} returned {status}"));
+        }
+        let status = instance.call("FreeFMUState", |raw| raw.free_state(instance.handle, Some(&mut saved)))?;
+        session.require(status.is_ok(), || format!("FreeFMUState in {state:?} returned {status}"));
+        session.require(saved == SavedState::NULL, || {
+            format!("FreeFMUState in {state:?} did not set the pointer to NULL")
         });
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 fn overwrite(session: &Session) -> Result<(), NotDetermined> {
@@ -250,14 +246,11 @@ fn null_states(session: &Session) -> Result<(), NotDetermined> {
             instance.call("GetFMUState(NULL)", |raw| raw.get_state(instance.handle, None))
         }),
     ];
-    for (what, call) in cases {
-        session.case(|| {
-            let status = call(&session.stepping()?)?;
-            session.require(status == Status::ERROR, || format!("{what} returned {status}"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases(cases, |(what, call)| {
+        let status = call(&session.stepping()?)?;
+        session.require(status == Status::ERROR, || format!("{what} returned {status}"));
+        Ok(())
+    })
 }
 
 fn serialized(session: &Session) -> Result<(), NotDetermined> {
@@ -267,12 +260,8 @@ fn serialized(session: &Session) -> Result<(), NotDetermined> {
     let bytes = instance.serialize(state)?;
     let first = instance.run(30, h)?;
     let other = session.stepping()?;
-    let mut back = SavedState::NULL;
-    let status = other.call("DeserializeFMUState", |raw| {
-        let (status, state) = raw.deserialize(other.handle, Some(&bytes), bytes.len())?;
-        back = state;
-        Some(status)
-    })?;
+    let (status, back) =
+        other.call_for("DeserializeFMUState", |raw| raw.deserialize(other.handle, Some(&bytes), bytes.len()))?;
     if !status.is_ok() {
         session.violated(format!("DeserializeFMUState of {} bytes just serialized returned {status}", bytes.len()));
         return Ok(());
@@ -327,29 +316,22 @@ fn corrupted(session: &Session) -> Result<(), NotDetermined> {
         }
         cases.push((format!("bit {bit} of byte {byte} of {n} flipped"), Some(changed)));
     }
-    for (what, bytes) in cases {
-        session.case(|| {
-            let instance = session.stepping()?;
-            let mut back = SavedState::NULL;
-            let size = bytes.as_ref().map_or(n, Vec::len);
-            let status = instance.call(&format!("DeserializeFMUState({what})"), |raw| {
-                let (status, state) = raw.deserialize(instance.handle, bytes.as_deref(), size)?;
-                back = state;
-                Some(status)
-            })?;
-            session.require(!status.is_ok(), || format!("DeserializeFMUState of {what} returned {status}"));
-            if status.is_ok() && back != SavedState::NULL {
-                // If the FMU accepts the bytes, it must keep working.
-                let status =
-                    instance.call(&format!("SetFMUState({what})"), |raw| raw.set_state(instance.handle, back))?;
-                if status.is_ok() {
-                    let _ = instance.step(session.h())?;
-                }
+    session.cases(cases, |(what, bytes)| {
+        let instance = session.stepping()?;
+        let size = bytes.as_ref().map_or(n, Vec::len);
+        let (status, back) = instance.call_for(&format!("DeserializeFMUState({what})"), |raw| {
+            raw.deserialize(instance.handle, bytes.as_deref(), size)
+        })?;
+        session.require(!status.is_ok(), || format!("DeserializeFMUState of {what} returned {status}"));
+        if status.is_ok() && back != SavedState::NULL {
+            // If the FMU accepts the bytes, it must keep working.
+            let status = instance.call(&format!("SetFMUState({what})"), |raw| raw.set_state(instance.handle, back))?;
+            if status.is_ok() {
+                let _ = instance.step(session.h())?;
             }
-            Ok(())
-        });
-    }
-    Ok(())
+        }
+        Ok(())
+    })
 }
 
 fn wrong_size(session: &Session) -> Result<(), NotDetermined> {
@@ -357,21 +339,14 @@ fn wrong_size(session: &Session) -> Result<(), NotDetermined> {
     let instance = running_instance(session)?;
     let state = instance.save()?;
     let n = instance.serialize(state)?.len();
-    for size in [0, n / 2, n.saturating_sub(1)] {
-        session.case(|| {
-            let instance = running_instance(session)?;
-            let state = instance.save()?;
-            let mut intact = true;
-            let status = instance.call(&format!("SerializeFMUState(size={size} of {n})"), |raw| {
-                let (status, _, whole) = raw.serialize(instance.handle, state, size).ok().flatten()?;
-                intact = whole;
-                Some(status)
-            })?;
-            session.require(intact, || format!("SerializeFMUState into {size} of {n} bytes wrote past them"));
-            session
-                .require(!status.is_ok(), || format!("SerializeFMUState into {size} of {n} bytes returned {status}"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([0, n / 2, n.saturating_sub(1)], |size| {
+        let instance = running_instance(session)?;
+        let state = instance.save()?;
+        let (status, intact) = instance.call_for(&format!("SerializeFMUState(size={size} of {n})"), |raw| {
+            raw.serialize(instance.handle, state, size).ok().flatten().map(|(status, _, intact)| (status, intact))
+        })?;
+        session.require(intact, || format!("SerializeFMUState into {size} of {n} bytes wrote past them"));
+        session.require(!status.is_ok(), || format!("SerializeFMUState into {size} of {n} bytes returned {status}"));
+        Ok(())
+    })
 }

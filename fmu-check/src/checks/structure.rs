@@ -112,17 +112,20 @@ fn sorted(fmu: &FmuFile) -> Verdict {
     })
 }
 
-fn lists(d: &ModelDescription) -> [(&'static str, &[Unknown]); 3] {
-    [("output", &d.outputs), ("derivative", &d.derivatives), ("initial unknown", &d.initial_unknowns)]
+/// Every entry of the lists: of what list it is, the place and the name for a finding.
+fn entries(d: &ModelDescription) -> impl Iterator<Item = (&'static str, &Unknown, String)> {
+    let lists: [(_, &[Unknown]); 3] =
+        [("output", &d.outputs), ("derivative", &d.derivatives), ("initial unknown", &d.initial_unknowns)];
+    let all = lists.into_iter().flat_map(|(kind, unknowns)| unknowns.iter().map(move |u| (kind, u)));
+    all.map(|(kind, u)| (kind, u, format!("line {}: {kind} {}", u.line, name(d, u.reference))))
 }
 
 fn dependencies_exist(fmu: &FmuFile) -> Verdict {
     with_description(fmu, |d| {
         let mut findings = Vec::new();
-        for (kind, unknown) in lists(d).iter().flat_map(|(kind, unknowns)| unknowns.iter().map(move |u| (kind, u))) {
+        for (_, unknown, at) in entries(d) {
             for reference in unknown.dependencies.iter().flatten().filter(|r| d.referenced(**r).is_none()) {
-                let (line, name) = (unknown.line, name(d, unknown.reference));
-                findings.push(format!("line {line}: {kind} {name}: the dependency {reference} does not exist"));
+                findings.push(format!("{at}: the dependency {reference} does not exist"));
             }
         }
         findings
@@ -133,20 +136,15 @@ fn knowns(fmu: &FmuFile) -> Verdict {
     with_description(fmu, |d| {
         let states: Vec<&str> = states_and_derivatives(d).iter().map(|v| v.name.as_str()).collect();
         let mut findings = Vec::new();
-        for (kind, unknowns) in lists(d) {
-            let initial = kind == "initial unknown";
-            for unknown in unknowns {
-                let at = format!("line {}: {kind} {}", unknown.line, name(d, unknown.reference));
-                for (i, &reference) in unknown.dependencies.iter().flatten().enumerate() {
-                    let deps = unknown.dependencies.as_deref().unwrap_or_default();
-                    if deps[..i].contains(&reference) {
-                        findings.push(format!("{at}: the dependency {reference} occurs twice"));
-                    }
-                    let Some(v) = d.referenced(reference) else { continue };
-                    if !is_known(d, v, initial, &states) {
-                        findings
-                            .push(format!("{at}: {} is not a known here ({}, {})", v.name, v.causality, v.variability));
-                    }
+        for (kind, unknown, at) in entries(d) {
+            let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
+            for (i, &reference) in dependencies.iter().enumerate() {
+                if dependencies[..i].contains(&reference) {
+                    findings.push(format!("{at}: the dependency {reference} occurs twice"));
+                }
+                let Some(v) = d.referenced(reference) else { continue };
+                if !is_known(d, v, kind == "initial unknown", &states) {
+                    findings.push(format!("{at}: {} is not a known here ({}, {})", v.name, v.causality, v.variability));
                 }
             }
         }
@@ -170,21 +168,14 @@ fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &[&s
 fn kinds(fmu: &FmuFile) -> Verdict {
     with_description(fmu, |d| {
         let mut findings = Vec::new();
-        for (kind, unknowns) in lists(d) {
-            for unknown in unknowns {
-                let at = format!("line {}: {kind} {}", unknown.line, name(d, unknown.reference));
-                let Some(words) = &unknown.kinds else { continue };
-                let count = unknown.dependencies.as_ref().map_or(0, Vec::len);
-                if words.len() != count {
-                    findings.push(format!("{at}: {} kinds for {count} dependencies", words.len()));
-                }
-                let bad = words
-                    .iter()
-                    .find(|w| kind == "initial unknown" && !["dependent", "constant"].contains(&w.as_str()));
-                if let Some(word) = bad {
-                    findings.push(format!("{at}: the kind {word}"));
-                }
+        for (kind, unknown, at) in entries(d) {
+            let Some(words) = &unknown.kinds else { continue };
+            let count = unknown.dependencies.as_ref().map_or(0, Vec::len);
+            if words.len() != count {
+                findings.push(format!("{at}: {} kinds for {count} dependencies", words.len()));
             }
+            let bad = |w: &&String| kind == "initial unknown" && !["dependent", "constant"].contains(&w.as_str());
+            findings.extend(words.iter().find(bad).map(|word| format!("{at}: the kind {word}")));
         }
         findings
     })

@@ -4,7 +4,7 @@ use super::derivatives::{input_derivatives, output_derivatives, slopes};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
-use crate::trajectory::difference;
+use crate::trajectory::{difference, trajectory};
 use fmu_import::Status;
 use fmu_import::raw::StepStatus;
 use model_description::{BaseType, Causality, CoSimulation};
@@ -73,34 +73,28 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn start_times(session: &Session) -> Result<(), NotDetermined> {
-    for start in [0.0, -1.0, 1000.0, 1e6] {
-        session.case(|| {
-            let instance = session.fresh()?;
-            instance.experiment(start, None);
-            let life = instance.enter().and_then(|()| instance.exit()).and_then(|()| instance.steps(20, session.h()));
-            if let Err(why) = life {
-                session.failed(&format!("startTime={start}"), why);
-            }
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([0.0, -1.0, 1000.0, 1e6], |start| {
+        let instance = session.fresh()?;
+        instance.experiment(start, None);
+        let life = instance.initialize().and_then(|()| instance.steps(20, session.h()));
+        if let Err(why) = life {
+            session.failed(&format!("startTime={start}"), why);
+        }
+        Ok(())
+    })
 }
 
 fn gap(session: &Session) -> Result<(), NotDetermined> {
-    for shift in [0.5, -0.5, 2.0] {
-        session.case(|| {
-            let (instance, h) = (session.stepping()?, session.h());
-            instance.steps(3, h)?;
-            let t = instance.time.get();
-            let status = instance.step_at(t + shift * h, h)?;
-            session.require(!status.is_ok(), || {
-                format!("the last step ended at {t}, and DoStep(t={}, h={h}) returned {status}", t + shift * h)
-            });
-            Ok(())
+    session.cases([0.5, -0.5, 2.0], |shift| {
+        let (instance, h) = (session.stepping()?, session.h());
+        instance.steps(3, h)?;
+        let t = instance.time.get();
+        let status = instance.step_at(t + shift * h, h)?;
+        session.require(!status.is_ok(), || {
+            format!("the last step ended at {t}, and DoStep(t={}, h={h}) returned {status}", t + shift * h)
         });
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 fn accumulated(session: &Session) -> Result<(), NotDetermined> {
@@ -134,38 +128,30 @@ fn accumulated(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn non_positive_step(session: &Session) -> Result<(), NotDetermined> {
-    for h in [0.0, -session.h()] {
-        session.case(|| {
-            let instance = session.stepping()?;
-            instance.steps(2, session.h())?;
-            let status = instance.step_at(instance.time.get(), h)?;
-            session.require(status == Status::ERROR, || {
-                format!("DoStep(t={}, h={h}) returned {status}", instance.time.get())
-            });
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([0.0, -session.h()], |h| {
+        let instance = session.stepping()?;
+        instance.steps(2, session.h())?;
+        let status = instance.step_at(instance.time.get(), h)?;
+        session
+            .require(status == Status::ERROR, || format!("DoStep(t={}, h={h}) returned {status}", instance.time.get()));
+        Ok(())
+    })
 }
 
 fn non_finite_step(session: &Session) -> Result<(), NotDetermined> {
     let h = session.h();
-    for (t, h) in
-        [(None, f64::NAN), (None, f64::INFINITY), (Some(f64::NAN), h), (Some(f64::INFINITY), h), (None, 1e300)]
-    {
-        session.case(|| {
-            let instance = session.stepping()?;
-            instance.steps(2, session.h())?;
-            let t = t.unwrap_or(instance.time.get());
-            let status = instance.step_at(t, h)?;
-            // A step of 1e300 is finite and may succeed; only a hang is a violation.
-            session.require(!status.is_ok() || (1e300..f64::INFINITY).contains(&h), || {
-                format!("DoStep(t={t}, h={h}) returned {status}")
-            });
-            Ok(())
+    let wild = [(None, f64::NAN), (None, f64::INFINITY), (Some(f64::NAN), h), (Some(f64::INFINITY), h), (None, 1e300)];
+    session.cases(wild, |(t, h)| {
+        let instance = session.stepping()?;
+        instance.steps(2, session.h())?;
+        let t = t.unwrap_or(instance.time.get());
+        let status = instance.step_at(t, h)?;
+        // A step of 1e300 is finite and may succeed; only a hang is a violation.
+        session.require(!status.is_ok() || (1e300..f64::INFINITY).contains(&h), || {
+            format!("DoStep(t={t}, h={h}) returned {status}")
         });
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 fn halves(session: &Session) -> Result<(), NotDetermined> {
@@ -236,15 +222,9 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
     }
     for _ in 0..20 {
         let t = instance.time.get();
-        let mut result = None;
-        let status = instance.call(&format!("DoStep(t={t}, h={h})"), |raw| {
-            let (status, step_results) = raw.do_step(instance.handle, t, h, false, [true; 4])?;
-            result = Some(step_results);
-            Some(status)
-        })?;
-        let Some(step_results) = result.filter(|_| status.is_ok()) else {
-            return Err(NotDetermined(format!("DoStep returned {status}")));
-        };
+        let (status, step_results) = instance
+            .call_for(&format!("DoStep(t={t}, h={h})"), |raw| raw.do_step(instance.handle, t, h, false, [true; 4]))?;
+        instance.must("DoStep", status)?;
         session
             .require([step_results.event, step_results.terminate, step_results.early].iter().all(|b| *b <= 1), || {
                 format!("DoStep(t={t}, h={h}) gave {step_results:?}: a Boolean is not 0 or 1, or was not written")
@@ -291,20 +271,17 @@ fn independent(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn null_results(session: &Session) -> Result<(), NotDetermined> {
-    for missing in 0..4 {
-        session.case(|| {
-            let instance = session.stepping()?;
-            let mut given = [true; 4];
-            given[missing] = false;
-            let name = ["eventHandlingNeeded", "terminateSimulation", "earlyReturn", "lastSuccessfulTime"][missing];
-            let status = instance.call(&format!("DoStep({name}=NULL)"), |raw| {
-                raw.do_step(instance.handle, instance.time.get(), session.h(), false, given).map(|(s, _)| s)
-            })?;
-            session.note(format!("{name}=NULL: {status}"));
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases(0..4, |missing| {
+        let instance = session.stepping()?;
+        let mut given = [true; 4];
+        given[missing] = false;
+        let name = ["eventHandlingNeeded", "terminateSimulation", "earlyReturn", "lastSuccessfulTime"][missing];
+        let status = instance.call(&format!("DoStep({name}=NULL)"), |raw| {
+            raw.do_step(instance.handle, instance.time.get(), session.h(), false, given).map(|(s, _)| s)
+        })?;
+        session.note(format!("{name}=NULL: {status}"));
+        Ok(())
+    })
 }
 
 fn statuses(session: &Session) -> Result<(), NotDetermined> {
@@ -332,16 +309,7 @@ fn statuses(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn determinism(session: &Session) -> Result<(), NotDetermined> {
-    let run = || {
-        let instance = session.stepping()?;
-        (0..30)
-            .map(|k| {
-                instance.change_inputs(k)?;
-                instance.steps(1, session.h())?;
-                instance.snapshot(&session.watched())
-            })
-            .collect::<Result<Vec<_>, _>>()
-    };
+    let run = || trajectory(&session.stepping()?, 30);
     let (first, second) = (run()?, run()?);
     session.compare("the second run", &first, &second);
     Ok(())
@@ -349,15 +317,10 @@ fn determinism(session: &Session) -> Result<(), NotDetermined> {
 
 /// Notes a hash of all outputs, which the parent process compares.
 fn two_processes(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.stepping()?;
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    for k in 0..30 {
-        instance.change_inputs(k)?;
-        instance.steps(1, session.h())?;
-        for bits in instance.snapshot(&session.watched())?.into_iter().flatten() {
-            hash = bits.to_le_bytes().iter().fold(hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3));
-        }
-    }
+    let values = trajectory(&session.stepping()?, 30)?.into_iter().flatten().flatten();
+    let hash = values
+        .flat_map(u64::to_le_bytes)
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
     session.note(format!("30 steps, all outputs hashed: {hash:016x}"));
     Ok(())
 }

@@ -37,28 +37,25 @@ pub(super) fn strings(session: &Session) -> Result<(), NotDetermined> {
     let Some(v) = session.description.variables.iter().find(fits) else {
         return session.not_applicable("no string can be set");
     };
-    for text in ["", "probe \u{e4}\u{1f50b}", &"x".repeat(1 << 20)] {
-        session.case(|| {
-            let instance = session.initializing()?;
-            let c_text = CString::new(text).unwrap_or_default();
-            let status = instance.call(&format!("SetString({})", v.name), |raw| {
-                raw.set_strings(instance.handle, &[v.value_reference], &[Some(&c_text)])
-            })?;
-            if !status.is_ok() {
-                return Err(NotDetermined(format!("SetString({}) returned {status}", v.name)));
-            }
-            session.record_call(&format!("GetString({})", v.name));
-            let (_, back) = session
-                .raw
-                .get_strings(instance.handle, &[v.value_reference], 1)
-                .ok_or_else(|| NotDetermined("GetString is missing".into()))?;
-            session.require(back.first().is_some_and(|b| b.as_deref() == Some(text)), || {
-                format!("{}: a string of {} bytes did not read back", v.name, text.len())
-            });
-            Ok(())
+    session.cases(["", "probe \u{e4}\u{1f50b}", &"x".repeat(1 << 20)], |text| {
+        let instance = session.initializing()?;
+        let c_text = CString::new(text).unwrap_or_default();
+        let status = instance.call(&format!("SetString({})", v.name), |raw| {
+            raw.set_strings(instance.handle, &[v.value_reference], &[Some(&c_text)])
+        })?;
+        if !status.is_ok() {
+            return Err(NotDetermined(format!("SetString({}) returned {status}", v.name)));
+        }
+        session.record_call(&format!("GetString({})", v.name));
+        let (_, back) = session
+            .raw
+            .get_strings(instance.handle, &[v.value_reference], 1)
+            .ok_or_else(|| NotDetermined("GetString is missing".into()))?;
+        session.require(back.first().is_some_and(|b| b.as_deref() == Some(text)), || {
+            format!("{}: a string of {} bytes did not read back", v.name, text.len())
         });
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 pub(super) fn not_a_number(session: &Session) -> Result<(), NotDetermined> {
@@ -123,20 +120,17 @@ pub(super) fn booleans(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable("no Boolean can be set");
     };
     let width = 8 * fmu_import::raw::width(v.base, session.description.version);
-    for value in [2, 0xff, u64::MAX >> (64 - width)] {
-        session.case(|| {
-            let instance = session.initializing()?;
-            let status = instance.set(v, &[value])?;
-            if status.is_ok() {
-                let (_, back) = instance.get(v)?;
-                session.require(back[0] <= 1, || format!("{}: set to {value}, got {}", v.name, back[0]));
-                let _ = instance.simple(Simple::ExitInitializationMode)?;
-                let _ = instance.step(session.h())?;
-            }
-            Ok(())
-        });
-    }
-    Ok(())
+    session.cases([2, 0xff, u64::MAX >> (64 - width)], |value| {
+        let instance = session.initializing()?;
+        let status = instance.set(v, &[value])?;
+        if status.is_ok() {
+            let (_, back) = instance.get(v)?;
+            session.require(back[0] <= 1, || format!("{}: set to {value}, got {}", v.name, back[0]));
+            let _ = instance.simple(Simple::ExitInitializationMode)?;
+            let _ = instance.step(session.h())?;
+        }
+        Ok(())
+    })
 }
 
 pub(super) fn tunable(session: &Session) -> Result<(), NotDetermined> {
@@ -147,33 +141,28 @@ pub(super) fn tunable(session: &Session) -> Result<(), NotDetermined> {
     if tunable.is_empty() {
         return session.not_applicable("there is no tunable parameter");
     }
-    for v in tunable {
-        session.case(|| {
-            let instance = session.stepping()?;
-            instance.steps(2, session.h())?;
-            let Some(values) = session.different_value(v, 1.0) else { return Ok(()) };
-            let status = instance.set(v, &values)?;
-            session.require(status.is_ok(), || {
-                format!("line {}: Set({}) between steps returned {status}", v.line, v.name)
-            });
-            if !status.is_ok() {
-                return Ok(());
-            }
-            if let Err(NotDetermined(why)) = instance.steps(2, session.h()) {
-                // The model may have rules that the description cannot express.
-                session.note(format!("{} = {}: {why}", v.name, show(v, session.description.version, &values)));
-                return Ok(());
-            }
-            let (_, back) = instance.get(v)?;
-            session.require(same(v, session.description.version, &values, &back), || {
-                let (set, got) =
-                    (show(v, session.description.version, &values), show(v, session.description.version, &back));
-                format!("line {}: {}: set to {set}, but two steps later it is {got}", v.line, v.name)
-            });
-            Ok(())
+    session.cases(tunable, |v| {
+        let instance = session.stepping()?;
+        instance.steps(2, session.h())?;
+        let Some(values) = session.different_value(v, 1.0) else { return Ok(()) };
+        let status = instance.set(v, &values)?;
+        session.require(status.is_ok(), || format!("line {}: Set({}) between steps returned {status}", v.line, v.name));
+        if !status.is_ok() {
+            return Ok(());
+        }
+        if let Err(NotDetermined(why)) = instance.steps(2, session.h()) {
+            // The model may have rules that the description cannot express.
+            session.note(format!("{} = {}: {why}", v.name, show(v, session.description.version, &values)));
+            return Ok(());
+        }
+        let (_, back) = instance.get(v)?;
+        session.require(same(v, session.description.version, &values, &back), || {
+            let (set, got) =
+                (show(v, session.description.version, &values), show(v, session.description.version, &back));
+            format!("line {}: {}: set to {set}, but two steps later it is {got}", v.line, v.name)
         });
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Sets values in one instance directly; in another, sets other values, reads the outputs, then sets the same values.

@@ -1,10 +1,10 @@
 //! FMI 2.0.5: its own calls, and the table of its functions.
 
-use super::gate::{Entry, Function, enter, open};
+use super::gate::{Entry, open};
 use super::logger::Fmi2Sink;
 use super::pointer::{place, text};
 use super::types::{Fmi2Boolean, Fmi2Callbacks, Fmi2EventInfo, InstancePointer, Text};
-use super::{Abi, credentials};
+use super::{Abi, Answer, credentials};
 use crate::instance::Refusal;
 use crate::log::Log;
 use fmu_core::{Exported, Fault, Interface};
@@ -19,10 +19,10 @@ const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Terminated` of `fmi2StatusKind`.
 const TERMINATED: c_int = 3;
 
-/// # Safety
-/// As in `calls.rs`.
-#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
-impl<E: Exported> Abi<E> {
+/// Errors and safety as in `calls.rs`.
+#[allow(missing_docs, reason = "named as in the standards")]
+#[allow(clippy::missing_safety_doc, clippy::missing_errors_doc, reason = "the sections above cover all")]
+impl<E: Exported> Abi<'_, E> {
     /// FMI 2.0.5, 2.1.5. The callbacks' struct is copied: its pointer is valid only during this call.
     pub unsafe fn fmi2_instantiate(
         entry: &'static Entry,
@@ -52,113 +52,50 @@ impl<E: Exported> Abi<E> {
         open::<E>(entry, Log::new(Box::new(sink), logging_on), judged, resources, interface, false)
     }
 
-    pub unsafe fn fmi2_setup_experiment(
-        entry: impl Function,
-        instance: InstancePointer,
-        start: f64,
-        stop_defined: Fmi2Boolean,
-        stop: f64,
-    ) -> c_int {
-        // SAFETY: the importer's instance.
-        unsafe {
-            enter::<E, _>(
-                entry,
-                instance,
-                |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?),
-            )
-        }
-    }
-
-    pub unsafe fn fmi2_enter_initialization(entry: impl Function, instance: InstancePointer) -> c_int {
-        // SAFETY: the importer's instance.
-        unsafe { enter::<E, _>(entry, instance, |instance| Ok(instance.enter_initialization()?)) }
-    }
-
-    pub unsafe fn fmi2_do_step(entry: impl Function, instance: InstancePointer, t: f64, h: f64) -> c_int {
-        // SAFETY: the importer's instance.
-        unsafe {
-            enter::<E, _>(entry, instance, |instance| {
-                instance.do_step(t, h)?;
-                Ok(())
-            })
-        }
-    }
-
-    pub unsafe fn fmi2_new_discrete_states(
-        entry: impl Function,
-        instance: InstancePointer,
-        info: *mut Fmi2EventInfo,
-    ) -> c_int {
+    pub unsafe fn fmi2_new_discrete_states(&mut self, info: *mut Fmi2EventInfo) -> Answer {
         // SAFETY: the importer's struct.
-        unsafe {
-            enter::<E, _>(entry, instance, |instance| {
-                let info = place(info, "fmi2EventInfo")?;
-                let update = instance.update_discrete()?;
-                info.write(Fmi2EventInfo {
-                    new_discrete_states_needed: update.outcome.again.into(),
-                    terminate_simulation: update.outcome.terminate.into(),
-                    nominals_of_continuous_states_changed: false.into(),
-                    values_of_continuous_states_changed: update.outcome.states_changed.into(),
-                    next_event_time_defined: update.next.is_some().into(),
-                    next_event_time: update.next.unwrap_or(0.0),
-                });
-                Ok(())
-            })
-        }
+        let info = unsafe { place(info, "fmi2EventInfo")? };
+        let update = self.0.update_discrete()?;
+        info.write(Fmi2EventInfo {
+            new_discrete_states_needed: update.outcome.again.into(),
+            terminate_simulation: update.outcome.terminate.into(),
+            nominals_of_continuous_states_changed: false.into(),
+            values_of_continuous_states_changed: update.outcome.states_changed.into(),
+            next_event_time_defined: update.next.is_some().into(),
+            next_event_time: update.next.unwrap_or(0.0),
+        });
+        Ok(())
     }
 
     /// `fmi2LastSuccessfulTime`; the other kinds belong to asynchronous steps (FMI 2.0.5, 4.2.3).
-    pub unsafe fn fmi2_real_status(
-        entry: impl Function,
-        instance: InstancePointer,
-        kind: c_int,
-        value: *mut f64,
-    ) -> c_int {
+    pub unsafe fn fmi2_real_status(&mut self, kind: c_int, value: *mut f64) -> Answer {
         // SAFETY: the importer's variable.
-        unsafe {
-            enter::<E, _>(entry, instance, |instance| {
-                let value = place(value, "value")?;
-                if kind != LAST_SUCCESSFUL_TIME {
-                    return no_status(kind);
-                }
-                value.write(instance.current.end);
-                Ok(())
-            })
+        let value = unsafe { place(value, "value")? };
+        if kind != LAST_SUCCESSFUL_TIME {
+            return self.fmi2_no_status(kind);
         }
+        value.write(self.0.current.end);
+        Ok(())
     }
 
     /// `fmi2Terminated`: this FMU never asks to end the simulation.
-    pub unsafe fn fmi2_boolean_status(
-        entry: impl Function,
-        instance: InstancePointer,
-        kind: c_int,
-        value: *mut Fmi2Boolean,
-    ) -> c_int {
+    pub unsafe fn fmi2_boolean_status(&mut self, kind: c_int, value: *mut Fmi2Boolean) -> Answer {
         // SAFETY: the importer's variable.
-        unsafe {
-            enter::<E, _>(entry, instance, |_| {
-                let value = place(value, "value")?;
-                if kind != TERMINATED {
-                    return no_status(kind);
-                }
-                value.write(Fmi2Boolean(0));
-                Ok(())
-            })
+        let value = unsafe { place(value, "value")? };
+        if kind != TERMINATED {
+            return self.fmi2_no_status(kind);
         }
+        value.write(Fmi2Boolean(0));
+        Ok(())
     }
 
-    pub unsafe fn fmi2_no_status(entry: impl Function, instance: InstancePointer, kind: c_int) -> c_int {
-        // SAFETY: the importer's instance.
-        unsafe { enter::<E, _>(entry, instance, |_| no_status(kind)) }
+    /// FMI 2.0.5, 4.2.3: Discard if the status is not available.
+    pub fn fmi2_no_status(&mut self, kind: c_int) -> Answer {
+        let kind = ["fmi2DoStepStatus", "fmi2PendingStatus", "fmi2LastSuccessfulTime", "fmi2Terminated"]
+            .get(usize::try_from(kind).unwrap_or(usize::MAX))
+            .map_or_else(|| kind.to_string(), ToString::to_string);
+        Err(Refusal::Discard(Fault::new(format!("{kind} is not available: every step ends before fmi2DoStep returns"))))
     }
-}
-
-/// FMI 2.0.5, 4.2.3: Discard if the status is not available.
-fn no_status(kind: c_int) -> Result<(), Refusal> {
-    let kind = ["fmi2DoStepStatus", "fmi2PendingStatus", "fmi2LastSuccessfulTime", "fmi2Terminated"]
-        .get(usize::try_from(kind).unwrap_or(usize::MAX))
-        .map_or_else(|| kind.to_string(), ToString::to_string);
-    Err(Refusal::Discard(Fault::new(format!("{kind} is not available: every step ends before fmi2DoStep returns"))))
 }
 
 /// The functions of `fmi2Functions.h`: name, arguments, row of the lifecycle table, and the function that does the work.
@@ -206,8 +143,8 @@ macro_rules! export_fmi2 {
             fmi2SetDebugLogging(on: Fmi2Boolean, n: usize, categories: *const Text)
                 => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
             fmi2SetupExperiment(_tolerance_defined: Fmi2Boolean, _tolerance: f64, start: f64, stop_defined: Fmi2Boolean, stop: f64)
-                => SetupExperiment: fmi2_setup_experiment(start, stop_defined, stop);
-            fmi2EnterInitializationMode() => EnterInitialization: fmi2_enter_initialization();
+                => SetupExperiment: set_up(start, (stop_defined.0 != 0).then_some(stop));
+            fmi2EnterInitializationMode() => EnterInitialization: enter_initialization();
             fmi2ExitInitializationMode() => ExitInitialization: exit_initialization();
             fmi2Terminate() => Terminate: terminate();
             fmi2Reset() => Reset: reset();
@@ -229,7 +166,7 @@ macro_rules! export_fmi2 {
             fmi2DeSerializeFMUstate(bytes: *const u8, size: usize, state: *mut FmuState)
                 => UseState: deserialize(bytes, size, state);
 
-            fmi2DoStep(t: f64, h: f64, _no_set_state_prior: Fmi2Boolean) => DoStep: fmi2_do_step(t, h);
+            fmi2DoStep(t: f64, h: f64, _no_set_state_prior: Fmi2Boolean) => DoStep: do_step(t, h);
             fmi2CancelStep() => Unsupported: unsupported("no step is ever in progress");
             fmi2GetStatus(kind: c_int, _value: *mut c_int) => Status: fmi2_no_status(kind);
             fmi2GetRealStatus(kind: c_int, value: *mut f64) => Status: fmi2_real_status(kind, value);
@@ -249,7 +186,7 @@ macro_rules! export_fmi2 {
 
             fmi2EnterEventMode() => EnterEvent: enter_event();
             fmi2NewDiscreteStates(info: *mut Fmi2EventInfo) => UpdateDiscrete: fmi2_new_discrete_states(info);
-            fmi2EnterContinuousTimeMode() => EnterContinuous: enter_continuous();
+            fmi2EnterContinuousTimeMode() => EnterContinuous: leave_event();
             fmi2CompletedIntegratorStep(_no_set_state_prior: Fmi2Boolean, event: *mut Fmi2Boolean, end: *mut Fmi2Boolean)
                 => Integrate: completed_step(event, end);
             fmi2SetTime(time: f64) => SetTime: set_time(time);

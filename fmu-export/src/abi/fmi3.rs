@@ -1,18 +1,18 @@
 //! FMI 3.0.2: its own calls, and the table of its functions.
 
-use super::gate::{Entry, Function, enter, open};
+use super::gate::{Entry, open};
 use super::logger::{Fmi3Logger, Fmi3Sink};
 use super::pointer::{place, text};
 use super::types::{Fmi3Boolean, InstancePointer, Text};
-use super::{Abi, credentials};
+use super::{Abi, Answer, credentials};
 use crate::log::Log;
 use fmu_core::{Exported, Fault, Interface};
-use std::ffi::{c_int, c_void};
+use std::ffi::c_void;
 
-/// # Safety
-/// As in `calls.rs`.
-#[allow(missing_docs, clippy::missing_safety_doc, reason = "named as in the standards; the section above covers all")]
-impl<E: Exported> Abi<E> {
+/// Errors and safety as in `calls.rs`.
+#[allow(missing_docs, reason = "named as in the standards")]
+#[allow(clippy::missing_safety_doc, clippy::missing_errors_doc, reason = "the sections above cover all")]
+impl<E: Exported> Abi<'_, E> {
     /// FMI 3.0.2, 2.3.1. `refused` names a requested feature that this FMU lacks.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_instantiate(
@@ -44,116 +44,81 @@ impl<E: Exported> Abi<E> {
         open::<E>(entry, log, judged, resources, interface, early_return)
     }
 
-    pub unsafe fn fmi3_enter_initialization(
-        entry: impl Function,
-        instance: InstancePointer,
-        start: f64,
-        stop_defined: Fmi3Boolean,
-        stop: f64,
-    ) -> c_int {
-        // SAFETY: the importer's instance.
-        unsafe {
-            enter::<E, _>(
-                entry,
-                instance,
-                |instance| Ok(instance.set_up(start, (stop_defined.0 != 0).then_some(stop))?),
-            )
-        }
-    }
-
     /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information.
-    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_do_step(
-        entry: impl Function,
-        instance: InstancePointer,
+        &mut self,
         t: f64,
         h: f64,
         event_handling_needed: *mut Fmi3Boolean,
         terminate_simulation: *mut Fmi3Boolean,
         early_return: *mut Fmi3Boolean,
         last_successful_time: *mut f64,
-    ) -> c_int {
+    ) -> Answer {
         // SAFETY: the importer's variables.
-        unsafe {
-            enter::<E, _>(entry, instance, |instance| {
-                let time = place(last_successful_time, "lastSuccessfulTime")?;
-                let event = place(event_handling_needed, "eventHandlingNeeded")?;
-                let early = place(early_return, "earlyReturn")?;
-                place(terminate_simulation, "terminateSimulation")?.write(false.into());
-                event.write(false.into());
-                early.write(false.into());
-                time.write(instance.current.end);
-                let stepped = instance.do_step(t, h)?;
-                event.write(stepped.event.into());
-                early.write(stepped.early.into());
-                time.write(instance.current.end);
-                Ok(())
-            })
-        }
+        let (time, event, early, terminate) = unsafe {
+            (
+                place(last_successful_time, "lastSuccessfulTime")?,
+                place(event_handling_needed, "eventHandlingNeeded")?,
+                place(early_return, "earlyReturn")?,
+                place(terminate_simulation, "terminateSimulation")?,
+            )
+        };
+        terminate.write(false.into());
+        event.write(false.into());
+        early.write(false.into());
+        time.write(self.0.current.end);
+        let stepped = self.0.do_step(t, h)?;
+        event.write(stepped.event.into());
+        early.write(stepped.early.into());
+        time.write(self.0.current.end);
+        Ok(())
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_update_discrete_states(
-        entry: impl Function,
-        instance: InstancePointer,
+        &mut self,
         again: *mut Fmi3Boolean,
         terminate: *mut Fmi3Boolean,
         nominals: *mut Fmi3Boolean,
         values: *mut Fmi3Boolean,
         next_defined: *mut Fmi3Boolean,
         next: *mut f64,
-    ) -> c_int {
+    ) -> Answer {
         // SAFETY: the importer's variables.
-        unsafe {
-            enter::<E, _>(entry, instance, |instance| {
-                let again = place(again, "discreteStatesNeedUpdate")?;
-                let terminate = place(terminate, "terminateSimulation")?;
-                let nominals = place(nominals, "nominalsOfContinuousStatesChanged")?;
-                let values = place(values, "valuesOfContinuousStatesChanged")?;
-                let next_defined = place(next_defined, "nextEventTimeDefined")?;
-                let next = place(next, "nextEventTime")?;
-                let update = instance.update_discrete()?;
-                again.write(update.outcome.again.into());
-                terminate.write(update.outcome.terminate.into());
-                nominals.write(false.into());
-                values.write(update.outcome.states_changed.into());
-                next_defined.write(update.next.is_some().into());
-                next.write(update.next.unwrap_or(0.0));
-                Ok(())
-            })
-        }
+        let (again, terminate, nominals, values, next_defined, next) = unsafe {
+            (
+                place(again, "discreteStatesNeedUpdate")?,
+                place(terminate, "terminateSimulation")?,
+                place(nominals, "nominalsOfContinuousStatesChanged")?,
+                place(values, "valuesOfContinuousStatesChanged")?,
+                place(next_defined, "nextEventTimeDefined")?,
+                place(next, "nextEventTime")?,
+            )
+        };
+        let update = self.0.update_discrete()?;
+        again.write(update.outcome.again.into());
+        terminate.write(update.outcome.terminate.into());
+        nominals.write(false.into());
+        values.write(update.outcome.states_changed.into());
+        next_defined.write(update.next.is_some().into());
+        next.write(update.next.unwrap_or(0.0));
+        Ok(())
     }
 
-    pub unsafe fn fmi3_enter_step(entry: impl Function, instance: InstancePointer) -> c_int {
-        // SAFETY: the importer's instance.
-        unsafe {
-            enter::<E, _>(entry, instance, |instance| {
-                // A sample that the importer did not ask for is taken by the next step.
-                instance.current.pending = false;
-                Ok(())
-            })
-        }
+    /// A sample that the importer did not ask for is taken by the next step.
+    pub fn fmi3_enter_step(&mut self) -> Answer {
+        self.0.current.pending = false;
+        Ok(())
     }
 
-    pub unsafe fn fmi3_evaluate(entry: impl Function, instance: InstancePointer) -> c_int {
-        // SAFETY: the importer's instance.
-        unsafe { enter::<E, _>(entry, instance, |_| Ok(())) }
+    pub fn fmi3_evaluate(&mut self) -> Answer {
+        Ok(())
     }
 
-    pub unsafe fn fmi3_count(
-        entry: impl Function,
-        instance: InstancePointer,
-        count: *mut usize,
-        of_indicators: bool,
-    ) -> c_int {
+    pub unsafe fn fmi3_count(&mut self, count: *mut usize, of_indicators: bool) -> Answer {
+        let number = if of_indicators { E::CAN.indicators().len() } else { E::CAN.states().len() };
         // SAFETY: the importer's variable.
-        unsafe {
-            enter::<E, _>(entry, instance, |_| {
-                let number = if of_indicators { E::CAN.indicators().len() } else { E::CAN.states().len() };
-                place(count, "the number")?.write(number);
-                Ok(())
-            })
-        }
+        unsafe { place(count, "the number")? }.write(number);
+        Ok(())
     }
 }
 
@@ -252,7 +217,7 @@ macro_rules! export_fmi3 {
             fmi3SetDebugLogging(on: Fmi3Boolean, n: usize, categories: *const Text)
                 => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
             fmi3EnterInitializationMode(_tolerance_defined: Fmi3Boolean, _tolerance: f64, start: f64, stop_defined: Fmi3Boolean, stop: f64)
-                => EnterInitialization: fmi3_enter_initialization(start, stop_defined, stop);
+                => EnterInitialization: set_up(start, (stop_defined.0 != 0).then_some(stop));
             fmi3ExitInitializationMode() => ExitInitialization: exit_initialization();
             fmi3Terminate() => Terminate: terminate();
             fmi3Reset() => Reset: reset();
@@ -347,7 +312,7 @@ macro_rules! export_fmi3 {
                 => Unsupported: unsupported("clocks");
             fmi3ActivateModelPartition(_clock: u32, _time: f64) => Unsupported: unsupported("Scheduled Execution");
 
-            fmi3EnterContinuousTimeMode() => EnterContinuous: enter_continuous();
+            fmi3EnterContinuousTimeMode() => EnterContinuous: leave_event();
             fmi3CompletedIntegratorStep(_no_set_state_prior: Fmi3Boolean, event: *mut Fmi3Boolean, end: *mut Fmi3Boolean)
                 => Integrate: completed_step(event, end);
             fmi3SetTime(time: f64) => SetTime: set_time(time);

@@ -1,7 +1,7 @@
 //! The gate: every call on an instance passes here. NULL, re-entry, standard and lifecycle are checked, panics caught,
 //! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
 
-use super::Wanted;
+use super::{Abi, Answer, Wanted};
 use crate::blob;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Allowed, Call, Next, Standard};
@@ -50,9 +50,8 @@ struct Handle<E: Exported> {
 /// `pointer` is NULL, or comes from [`open`] for the same `E` and was not closed; no other thread uses it now.
 #[inline]
 pub(crate) unsafe fn enter<E: Exported, F: Function>(
-    _: F,
     pointer: *mut c_void,
-    body: impl FnOnce(&mut Instance<E>) -> Result<(), Refusal>,
+    body: impl FnOnce(Abi<'_, E>) -> Answer,
 ) -> c_int {
     if pointer.is_null() {
         return Status::Error as c_int;
@@ -73,14 +72,14 @@ pub(crate) unsafe fn enter<E: Exported, F: Function>(
 fn pass<E: Exported>(
     entry: &'static Entry,
     instance: &mut Instance<E>,
-    body: impl FnOnce(&mut Instance<E>) -> Result<(), Refusal>,
+    body: impl FnOnce(Abi<'_, E>) -> Answer,
 ) -> Status {
     let life = instance.current.life;
     if instance.standard != entry.standard || !entry.allowed.of_interface(life.interface()).contains(life.state()) {
         return fail(entry, instance, Refusal::Error(misplaced(entry, instance)));
     }
     // A panic can leave a half-done step; from the Error state, only Reset, SetFMUState and Free lead out.
-    match catch_unwind(AssertUnwindSafe(|| body(instance))) {
+    match catch_unwind(AssertUnwindSafe(|| body(Abi(instance)))) {
         Ok(Ok(())) => {
             instance.current.life.after(true, entry.next);
             Status::Ok

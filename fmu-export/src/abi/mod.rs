@@ -12,20 +12,51 @@ mod pointer;
 pub mod types;
 
 use crate::blob;
+use crate::instance::{Instance, Refusal};
 use crate::preset::Made;
 use crate::snapshot::Snapshot;
 use fmu_core::{Description, Exported, Fault, Interface, Model, preset};
 use std::ffi::{CStr, c_int, c_void};
-use std::marker::PhantomData;
+use std::ops::{Deref, DerefMut};
 use std::panic::{catch_unwind, set_hook};
 use std::path::Path;
 use std::sync::Once;
 use types::InstancePointer;
 
-/// The functions for one exported model.
-pub struct Abi<E>(PhantomData<E>);
+/// The answer to a call: done, or why not.
+pub type Answer = Result<(), Refusal>;
 
-impl<E: Exported> Abi<E> {
+/// An instance behind the gate, with the functions of the C interface; calls without pointers are those of the instance.
+pub struct Abi<'a, E: Exported>(&'a mut Instance<E>);
+
+impl<E: Exported> Deref for Abi<'_, E> {
+    type Target = Instance<E>;
+
+    fn deref(&self) -> &Instance<E> {
+        self.0
+    }
+}
+
+impl<E: Exported> DerefMut for Abi<'_, E> {
+    fn deref_mut(&mut self) -> &mut Instance<E> {
+        self.0
+    }
+}
+
+impl<E: Exported> Abi<'_, E> {
+    /// Passes a call through the gate.
+    ///
+    /// # Safety
+    /// The instance is NULL, or one that this binary made and has not freed, used by one thread at a time.
+    #[inline]
+    pub unsafe fn enter<F: types::Function>(
+        instance: InstancePointer,
+        body: impl FnOnce(Abi<'_, E>) -> Answer,
+    ) -> c_int {
+        // SAFETY: the caller's promise.
+        unsafe { gate::enter::<E, F>(instance, body) }
+    }
+
     /// # Safety
     /// The instance is NULL, or one that this binary made and has not freed; it is not in use now and not used again.
     pub unsafe fn free_instance(instance: InstancePointer) {
@@ -106,7 +137,7 @@ fn credentials<E: Exported>(name: Option<&CStr>, token: Option<&CStr>) -> Result
 }
 
 /// C functions from a table of them. One line of the table reads: name in C, arguments after the instance, row of the
-/// lifecycle table, function of [`Abi`] with the arguments it gets.
+/// lifecycle table, function of [`Abi`] or of the instance with the arguments it gets.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! functions {
@@ -120,7 +151,12 @@ macro_rules! functions {
                 const ENTRY: Entry = Entry::new(Standard::$standard, Call::$call, stringify!($name));
             }
             // SAFETY: what the standard demands of the importer.
-            unsafe { $crate::abi::Abi::<$exported>::$function(Here, instance $(, $passed)*) }
+            unsafe {
+                $crate::abi::Abi::<$exported>::enter::<Here>(instance, |mut abi| {
+                    abi.$function($($passed),*)?;
+                    Ok(())
+                })
+            }
         }
     )* };
 }
@@ -145,7 +181,7 @@ macro_rules! functions {
 /// impl Model for Still {
 ///     # type Outputs = ();
 ///     # const INFO: Info = Info { name: "Still", ..Info::DEFAULT };
-///     # const TABLE: &'static Table<Whole> = &Table::new(const { &[] });
+///     # const TABLE: &'static Table<Whole> = table![];
 ///     # fn initialize(&mut self) {}
 ///     # fn output(&self, _: Elapsed, (): &mut ()) {}
 ///     # fn advance(&mut self, _: &Step) -> Result<(), Fault> { Ok(()) }
@@ -165,7 +201,7 @@ macro_rules! functions {
 /// # impl Model for Still {
 /// #     type Outputs = ();
 /// #     const INFO: Info = Info { name: "Still", ..Info::DEFAULT };
-/// #     const TABLE: &'static Table<Whole> = &Table::new(const { &[] });
+/// #     const TABLE: &'static Table<Whole> = table![];
 /// #     fn initialize(&mut self) {}
 /// #     fn output(&self, _: Elapsed, (): &mut ()) {}
 /// #     fn advance(&mut self, _: &Step) -> Result<(), Fault> { Ok(()) }

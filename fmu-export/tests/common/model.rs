@@ -1,7 +1,7 @@
 //! A model with every kind of variable, that can be told to fail.
 
 use fmu_core::unit::{AMPERE, OHM, SPEED, VOLT};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Field, Info, Model, Row, Step, Table, enumeration};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Field, Info, Model, Row, Step, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -89,25 +89,21 @@ impl Model for Probe {
         experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
         ..Info::DEFAULT
     };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("u", &VOLT, "Voltage", |m| &mut m.model.u),
-                V::discrete_input("k", &VOLT, "Another", |m| &mut m.model.k).at_least(-5.0).at_most(5.0),
-                V::boolean_input("on", "On", |m| &mut m.model.on),
-                V::output("x", &AMPERE, "State", |m| &mut m.out.x),
-                V::integer_output("count", "Steps done", |m| &mut m.out.count),
-                V::boolean_output("high", "State above 1", |m| &mut m.out.high),
-                V::parameter("motor.R", &OHM, "Resistance", |m| &mut m.model.r).above(0.0),
-                V::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.model.map).at_least(-1.0),
-                V::parameter("gain", &OHM, "Gain", |m| &mut m.model.gain).at_least(0.0).at_most(10.0).tunable(),
-                V::integer_parameter("n", "Count", |m| &mut m.model.n).at_least(1.0),
-                V::enumeration_parameter("mode", "Mode", &Field(|m| &mut m.model.mode)),
-                V::boolean_parameter("flag", "Flag", |m| &mut m.model.flag),
-                V::calculated("double_gain", &OHM, "Twice the gain", |m| &mut m.model.double_gain),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("u", &VOLT, "Voltage", |m| &mut m.model.u),
+        V::discrete_input("k", &VOLT, "Another", |m| &mut m.model.k).at_least(-5.0).at_most(5.0),
+        V::boolean_input("on", "On", |m| &mut m.model.on),
+        V::output("x", &AMPERE, "State", |m| &mut m.out.x),
+        V::integer_output("count", "Steps done", |m| &mut m.out.count),
+        V::boolean_output("high", "State above 1", |m| &mut m.out.high),
+        V::parameter("motor.R", &OHM, "Resistance", |m| &mut m.model.r).above(0.0),
+        V::array_parameter("map", &SPEED, "Map", 3, |m| &mut m.model.map).at_least(-1.0),
+        V::parameter("gain", &OHM, "Gain", |m| &mut m.model.gain).at_least(0.0).at_most(10.0).tunable(),
+        V::integer_parameter("n", "Count", |m| &mut m.model.n).at_least(1.0),
+        V::enumeration_parameter("mode", "Mode", &Field(|m| &mut m.model.mode)),
+        V::boolean_parameter("flag", "Flag", |m| &mut m.model.flag),
+        V::calculated("double_gain", &OHM, "Twice the gain", |m| &mut m.model.double_gain),
+    ];
 
     fn derive(&mut self) {
         self.double_gain = 2.0 * self.gain;

@@ -2,7 +2,7 @@
 
 use fmu_core::unit::VOLT;
 use fmu_core::{
-    Block, Elapsed, Events, Fault, Field, Info, Model, Next, Outcome, Resource, Row, Step, Table, enumeration,
+    Block, Elapsed, Events, Fault, Field, Info, Model, Next, Outcome, Resource, Row, Step, Table, enumeration, table,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -62,26 +62,22 @@ type V = Row<Block<All>>;
 impl Model for All {
     type Outputs = Outputs;
     const INFO: Info = Info { name: "All", ..Info::DEFAULT };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("u", &VOLT, "", |m| &mut m.model.u).at_most(1e3),
-                V::parameter("real", &VOLT, "", |m| &mut m.model.real).above(0.0).tunable(),
-                V::float32_parameter("single", &VOLT, "", |m| &mut m.model.single).at_most(0.3),
-                V::integer_parameter("n", "", |m| &mut m.model.n).at_least(1.0),
-                V::uint8_parameter("small", "", |m| &mut m.model.small).at_most(200.0),
-                V::uint64_parameter("large", "", |m| &mut m.model.large),
-                V::boolean_parameter("on", "", |m| &mut m.model.on),
-                V::enumeration_parameter("fan", "", &Field(|m| &mut m.model.fan)),
-                V::text_parameter("label", "", |m| &mut m.model.label),
-                V::array_parameter("weights", &VOLT, "", 4, |m| &mut m.model.weights).shape(&[2, 2]),
-                V::calculated("doubled", &VOLT, "", |m| &mut m.model.doubled),
-                V::output("y", &VOLT, "", |m| &mut m.out.y),
-                V::output("seen", &VOLT, "", |m| &mut m.out.seen),
-                V::text_constant("made", "", "here"),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("u", &VOLT, "", |m| &mut m.model.u).at_most(1e3),
+        V::parameter("real", &VOLT, "", |m| &mut m.model.real).above(0.0).tunable(),
+        V::float32_parameter("single", &VOLT, "", |m| &mut m.model.single).at_most(0.3),
+        V::integer_parameter("n", "", |m| &mut m.model.n).at_least(1.0),
+        V::uint8_parameter("small", "", |m| &mut m.model.small).at_most(200.0),
+        V::uint64_parameter("large", "", |m| &mut m.model.large),
+        V::boolean_parameter("on", "", |m| &mut m.model.on),
+        V::enumeration_parameter("fan", "", &Field(|m| &mut m.model.fan)),
+        V::text_parameter("label", "", |m| &mut m.model.label),
+        V::array_parameter("weights", &VOLT, "", 4, |m| &mut m.model.weights).shape(&[2, 2]),
+        V::calculated("doubled", &VOLT, "", |m| &mut m.model.doubled),
+        V::output("y", &VOLT, "", |m| &mut m.out.y),
+        V::output("seen", &VOLT, "", |m| &mut m.out.seen),
+        V::text_constant("made", "", "here"),
+    ];
 
     fn load(&mut self, _: Option<&Path>) -> Result<(), Fault> {
         self.seen = self.real.into();

@@ -7,7 +7,7 @@ use fmu_core::log::Warnings;
 use fmu_core::unit::{Exponents, ONE, Quantity, SECOND, Unit};
 use fmu_core::{
     Block, ContinuousTime, Differentiable, Dual, Elapsed, Events, Experiment, Fault, Indicator, Info, Model, Next,
-    Outcome, Row, Scalar, State, Step, Table, Warns, integrate,
+    Outcome, Row, Scalar, State, Step, Table, Warns, integrate, table,
 };
 use serde::{Deserialize, Serialize};
 
@@ -130,29 +130,25 @@ impl Model for Ball {
         experiment: Experiment { start: 0.0, stop: 3.0, step: 0.1 },
         ..Info::DEFAULT
     };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                Var::input("u", &ACCELERATION, "Lift", |m| &mut m.model.u).at_least(-100.0).at_most(100.0),
-                Var::discrete_input("k", &ONE, "Tenfold lift", |m| &mut m.model.k).at_least(-5.0).at_most(5.0),
-                Var::output("h", &HEIGHT, "Height", |m| &mut m.model.h),
-                Var::output("e", &ONE, "Energy", |m| &mut m.out.e).nominal(10.0),
-                Var::output("a", &ACCELERATION, "Acceleration", |m| &mut m.out.a),
-                Var::discrete_output("held", &ONE, "u + k at the last tick", |m| &mut m.out.held),
-                Var::state("v", &VELOCITY, "Velocity", |m| &mut m.model.v).nominal(5.0).at_least(-1e9).at_most(1e9),
-                Var::parameter("c", &ONE, "Drag", |m| &mut m.model.c).at_least(0.0).tunable(),
-                Var::parameter("m", &ONE, "Mass", |m| &mut m.model.m).above(0.0),
-                Var::parameter("r", &ONE, "Restitution", |m| &mut m.model.r).at_least(0.0).at_most(1.0),
-                Var::parameter("T", &SECOND, "Time between two ticks", |m| &mut m.model.period).above(0.0),
-                Var::parameter("h_start", &HEIGHT, "Height at the start", |m| &mut m.model.h_start).at_least(0.0),
-                Var::calculated("c_m", &ONE, "Drag over mass", |m| &mut m.model.c_m),
-                Var::integer_output("bounces", "Bounces so far", |m| &mut m.out.bounces),
-                Var::boolean_output("resting", "The ball lies on the ground", |m| &mut m.out.resting),
-                Var::array_parameter("map", &ONE, "Gravity, and what swings", 2, |m| &mut m.model.map),
-                Var::output("v_mean", &VELOCITY, "Mean velocity over a step", |m| &mut m.out.v_mean).mean(),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        Var::input("u", &ACCELERATION, "Lift", |m| &mut m.model.u).at_least(-100.0).at_most(100.0),
+        Var::discrete_input("k", &ONE, "Tenfold lift", |m| &mut m.model.k).at_least(-5.0).at_most(5.0),
+        Var::output("h", &HEIGHT, "Height", |m| &mut m.model.h),
+        Var::output("e", &ONE, "Energy", |m| &mut m.out.e).nominal(10.0),
+        Var::output("a", &ACCELERATION, "Acceleration", |m| &mut m.out.a),
+        Var::discrete_output("held", &ONE, "u + k at the last tick", |m| &mut m.out.held),
+        Var::state("v", &VELOCITY, "Velocity", |m| &mut m.model.v).nominal(5.0).at_least(-1e9).at_most(1e9),
+        Var::parameter("c", &ONE, "Drag", |m| &mut m.model.c).at_least(0.0).tunable(),
+        Var::parameter("m", &ONE, "Mass", |m| &mut m.model.m).above(0.0),
+        Var::parameter("r", &ONE, "Restitution", |m| &mut m.model.r).at_least(0.0).at_most(1.0),
+        Var::parameter("T", &SECOND, "Time between two ticks", |m| &mut m.model.period).above(0.0),
+        Var::parameter("h_start", &HEIGHT, "Height at the start", |m| &mut m.model.h_start).at_least(0.0),
+        Var::calculated("c_m", &ONE, "Drag over mass", |m| &mut m.model.c_m),
+        Var::integer_output("bounces", "Bounces so far", |m| &mut m.out.bounces),
+        Var::boolean_output("resting", "The ball lies on the ground", |m| &mut m.out.resting),
+        Var::array_parameter("map", &ONE, "Gravity, and what swings", 2, |m| &mut m.model.map),
+        Var::output("v_mean", &VELOCITY, "Mean velocity over a step", |m| &mut m.out.v_mean).mean(),
+    ];
 
     fn derive(&mut self) {
         self.c_m = self.c / self.m;

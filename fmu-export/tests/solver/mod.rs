@@ -3,11 +3,20 @@
 #![allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
 #![allow(clippy::float_cmp, reason = "values that are set or counted, to the last bit")]
 
+/// The function of one of the standards.
+macro_rules! either {
+    ($fmu:expr, $two:ident($($a:expr),*), $three:ident($($b:expr),*)) => {
+        if $fmu.kind.version() == 2 { unsafe { $two($fmu.it $(, $a)*) } } else { unsafe { $three($fmu.it $(, $b)*) } }
+    };
+}
+
 pub mod ball;
 #[path = "../common/journal.rs"]
 pub mod journal;
 pub mod random;
+pub mod rk4;
 pub mod sampler;
+mod saved;
 pub mod slopes;
 pub mod table;
 
@@ -70,13 +79,6 @@ pub struct Fmu {
     pub kind: Kind,
     pub it: InstancePointer,
     pub journal: Rc<Journal>,
-}
-
-/// The function of one of the standards.
-macro_rules! either {
-    ($fmu:expr, $two:ident($($a:expr),*), $three:ident($($b:expr),*)) => {
-        if $fmu.kind.version() == 2 { unsafe { $two($fmu.it $(, $a)*) } } else { unsafe { $three($fmu.it $(, $b)*) } }
-    };
 }
 
 impl Fmu {
@@ -416,47 +418,6 @@ impl Fmu {
             fmi2SetDebugLogging(Fmi2Boolean(on.into()), n, p),
             fmi3SetDebugLogging(Fmi3Boolean(on.into()), n, p)
         )
-    }
-
-    pub fn save(&self, state: &mut FmuState) -> c_int {
-        either!(self, fmi2GetFMUstate(state), fmi3GetFMUState(state))
-    }
-
-    pub fn restore(&self, state: FmuState) -> c_int {
-        either!(self, fmi2SetFMUstate(state), fmi3SetFMUState(state))
-    }
-
-    pub fn free_state(&self, state: &mut FmuState) -> c_int {
-        either!(self, fmi2FreeFMUstate(state), fmi3FreeFMUState(state))
-    }
-
-    pub fn deserialize(&self, bytes: &[u8], state: &mut FmuState) -> c_int {
-        let (p, n) = (bytes.as_ptr(), bytes.len());
-        either!(self, fmi2DeSerializeFMUstate(p, n, state), fmi3DeserializeFMUState(p, n, state))
-    }
-
-    /// A saved state as bytes.
-    pub fn serialized(&self, state: FmuState) -> Vec<u8> {
-        let mut size = 0;
-        let status = either!(
-            self,
-            fmi2SerializedFMUstateSize(state, &raw mut size),
-            fmi3SerializedFMUStateSize(state, &raw mut size)
-        );
-        assert_eq!(status, OK);
-        let mut bytes = vec![0xaa; size];
-        let p = bytes.as_mut_ptr();
-        assert_eq!(either!(self, fmi2SerializeFMUstate(state, p, size), fmi3SerializeFMUState(state, p, size)), OK);
-        bytes
-    }
-
-    /// The state as bytes.
-    pub fn bytes(&self) -> Vec<u8> {
-        let mut state = null_mut();
-        assert_eq!(self.save(&mut state), OK);
-        let bytes = self.serialized(state);
-        assert_eq!(self.free_state(&mut state), OK);
-        bytes
     }
 
     /// The messages since the last look.

@@ -2,7 +2,7 @@
 
 use fmu_core::log::Warnings;
 use fmu_core::unit::{ONE, SECOND};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Row, Sampled, Step, Table, Warns, integrate};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Model, Row, Sampled, Step, Table, Warns, integrate, table};
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -69,22 +69,18 @@ impl Model for Sampler {
         experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-2 },
         ..Info::DEFAULT
     };
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("x", &ONE, "Input", |m| &mut m.model.x),
-                V::discrete_input("d", &ONE, "Added", |m| &mut m.model.d).at_least(-5.0).at_most(5.0),
-                V::boolean_input("on", "On", |m| &mut m.model.on),
-                V::discrete_output("y", &ONE, "Filtered", |m| &mut m.out.y),
-                V::integer_output("count", "Samples taken", |m| &mut m.out.count),
-                V::parameter("gain", &ONE, "Gain", |m| &mut m.model.gain).at_least(0.0).at_most(10.0).tunable(),
-                V::parameter("T", &SECOND, "Sample period", |m| &mut m.model.period).above(0.0),
-                V::parameter("fixed", &ONE, "Factor", |m| &mut m.model.fixed).at_least(0.0).at_most(10.0),
-                V::calculated("product", &ONE, "gain times fixed", |m| &mut m.model.product),
-                V::integer_output("derived", "How often derive ran", |m| &mut m.out.derived),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("x", &ONE, "Input", |m| &mut m.model.x),
+        V::discrete_input("d", &ONE, "Added", |m| &mut m.model.d).at_least(-5.0).at_most(5.0),
+        V::boolean_input("on", "On", |m| &mut m.model.on),
+        V::discrete_output("y", &ONE, "Filtered", |m| &mut m.out.y),
+        V::integer_output("count", "Samples taken", |m| &mut m.out.count),
+        V::parameter("gain", &ONE, "Gain", |m| &mut m.model.gain).at_least(0.0).at_most(10.0).tunable(),
+        V::parameter("T", &SECOND, "Sample period", |m| &mut m.model.period).above(0.0),
+        V::parameter("fixed", &ONE, "Factor", |m| &mut m.model.fixed).at_least(0.0).at_most(10.0),
+        V::calculated("product", &ONE, "gain times fixed", |m| &mut m.model.product),
+        V::integer_output("derived", "How often derive ran", |m| &mut m.out.derived),
+    ];
 
     fn derive(&mut self) {
         self.product = self.gain * self.fixed;

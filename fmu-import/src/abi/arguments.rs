@@ -10,6 +10,11 @@ use std::ptr;
 pub(super) struct Answer<T = ()>(pub(super) &'static str, pub(super) Option<(Status, T)>);
 
 impl<T> Answer<T> {
+    /// The answer with another form of its value.
+    pub(super) fn map<U>(self, form: impl FnOnce(T) -> U) -> Answer<U> {
+        Answer(self.0, self.1.map(|(status, value)| (status, form(value))))
+    }
+
     /// For the facade: the value of a call that succeeded.
     #[inline]
     pub(super) fn outcome(self) -> Outcome<T> {

@@ -250,7 +250,7 @@ impl Calls {
         (fill, time): (u8, f64),
     ) -> Answer<UpdateResults> {
         // SAFETY: of both: the standard's type; the places are ours or NULL.
-        let Answer(name, result) = unsafe {
+        unsafe {
             match self.version {
                 FmiVersion::V2 => {
                     let flag = c_int::from(fill);
@@ -262,43 +262,37 @@ impl Calls {
                         next_event_time_defined: flag,
                         next_event_time: time,
                     };
-                    let Answer(name, result) =
-                        self.update_2.write(before, |f, info| f(i.0, if null { ptr::null_mut() } else { info }));
-                    let flags = |x: &v2::EventInfo| {
-                        let changed = [x.nominals_changed, x.states_changed];
-                        [
-                            x.new_discrete_states_needed,
-                            x.terminate_simulation,
-                            changed[0],
-                            changed[1],
-                            x.next_event_time_defined,
-                        ]
-                    };
-                    Answer(name, result.map(|(status, info)| (status, (flags(&info), info.next_event_time))))
+                    let answer = self.update_2.write(before, |f, x| f(i.0, if null { ptr::null_mut() } else { x }));
+                    answer.map(|x| UpdateResults {
+                        again: x.new_discrete_states_needed,
+                        terminate: x.terminate_simulation,
+                        nominals_changed: x.nominals_changed,
+                        states_changed: x.states_changed,
+                        next_event_time_defined: x.next_event_time_defined,
+                        next_event_time: x.next_event_time,
+                    })
                 }
                 FmiVersion::V3 => {
-                    let Answer(name, result) = self.update_3.write(([fill; 5], time), |f, (flags, time)| {
+                    let answer = self.update_3.write(([fill; 5], time), |f, (flags, time)| {
                         let [a, b, c, d, e] =
                             flags.each_mut().map(|x| if null { ptr::null_mut() } else { ptr::from_mut(x) });
                         f(i.0, a, b, c, d, e, if null { ptr::null_mut() } else { time })
                     });
-                    Answer(name, result.map(|(status, (flags, time))| (status, (flags.map(i32::from), time))))
+                    answer.map(|(flags, next_event_time)| {
+                        let [again, terminate, nominals_changed, states_changed, next_event_time_defined] =
+                            flags.map(i32::from);
+                        UpdateResults {
+                            again,
+                            terminate,
+                            nominals_changed,
+                            states_changed,
+                            next_event_time_defined,
+                            next_event_time,
+                        }
+                    })
                 }
             }
-        };
-        let updated =
-            |([again, terminate, nominals_changed, states_changed, defined], next_event_time): ([i32; 5], f64)| {
-                let next_event_time_defined = defined;
-                UpdateResults {
-                    again,
-                    terminate,
-                    nominals_changed,
-                    states_changed,
-                    next_event_time_defined,
-                    next_event_time,
-                }
-            };
-        Answer(name, result.map(|(status, values)| (status, updated(values))))
+        }
     }
 
     /// `CompletedIntegratorStep`: `enterEventMode` and `terminateSimulation`, which hold `fill` before the call; with `null`, both
@@ -312,12 +306,12 @@ impl Calls {
                     f(i.0, c_int::from(no_prior), a, b)
                 }),
                 FmiVersion::V3 => {
-                    let Answer(name, result) = self.completed_3.write([fill; 2], |f, flags| {
+                    let answer = self.completed_3.write([fill; 2], |f, flags| {
                         let [a, b] =
                             flags.each_mut().map(|flag| if null { ptr::null_mut() } else { ptr::from_mut(flag) });
                         f(i.0, no_prior, a, b)
                     });
-                    Answer(name, result.map(|(status, flags)| (status, flags.map(i32::from))))
+                    answer.map(|flags| flags.map(i32::from))
                 }
             }
         }

@@ -274,7 +274,7 @@ impl Exchange {
 
 fn write_single(instance: &mut Instance, port: &Port, value: f64) -> Result<(), Error> {
     let value = Values::from_number(value, port.base).map_err(|cause| Error::usage(instance.name(), cause))?;
-    instance.write(port.base, port.reference, &value)
+    instance.set_at(port.base, port.reference, &value)
 }
 
 impl Traffic {
@@ -285,7 +285,7 @@ impl Traffic {
             instance.get_reals(&self.read[..fast], &mut numbers[..fast])?;
         }
         for (port, value) in self.read_singly[..single].iter().zip(others) {
-            *value = instance.read(port.base, port.reference, 1)?.number().unwrap_or(f64::NAN);
+            *value = instance.get_at(port.base, port.reference, 1)?.number().unwrap_or(f64::NAN);
         }
         Ok(())
     }

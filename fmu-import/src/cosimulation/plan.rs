@@ -282,7 +282,7 @@ impl Worker {
             self.renew()?;
         }
         for (port, values) in &self.plan.set {
-            self.instances[port.instance].write(port.base, port.reference, values)?;
+            self.instances[port.instance].set_at(port.base, port.reference, values)?;
         }
         Ok(())
     }
@@ -295,7 +295,7 @@ impl Worker {
             } else {
                 let values = Values::from_number(value, port.base);
                 let values = values.map_err(|cause| Error::usage(instance.name(), cause));
-                values.and_then(|values| instance.write(port.base, port.reference, &values))
+                values.and_then(|values| instance.set_at(port.base, port.reference, &values))
             };
             outcome.map_err(|error| error.during(&format!("{written} = {value}")))?;
         }

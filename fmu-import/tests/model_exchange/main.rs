@@ -2,100 +2,17 @@
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #![allow(clippy::float_cmp)] // Counts, and numbers that nothing rounds.
 
+mod workshop;
+
 use fmu_import::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
 use fmu_import::{Fmu, Kind};
 use model_description::FmiVersion;
 use std::f64::consts::LN_2;
-use std::io::Write;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use workshop::Workshop;
 
 /// Sample period of the sampler in s, unless a test sets another.
 const T: f64 = 0.1;
-
-/// FMUs that are made for one test.
-struct Workshop(tempfile::TempDir);
-
-impl Workshop {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    /// An FMU: `plant` or `sampler`; `change` edits its description.
-    fn fmu(&self, name: &str, version: u32, defines: &[&str], change: impl Fn(String) -> String) -> Fmu {
-        Fmu::open(self.archive(name, version, defines, change)).unwrap()
-    }
-
-    fn plain(&self, name: &str, version: u32) -> Fmu {
-        self.fmu(name, version, &[], |xml| xml)
-    }
-
-    fn archive(&self, name: &str, version: u32, defines: &[&str], change: impl Fn(String) -> String) -> PathBuf {
-        let library = self.0.path().join("x.so");
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/model_exchange/fmu.c");
-        let states = format!("-DSTATES={}", u8::from(name == "plant"));
-        let mut cc = Command::new("cc");
-        cc.args(["-std=c11", "-D_GNU_SOURCE", "-shared", "-fPIC", "-O1", "-w", &states]).args(defines);
-        assert!(cc.arg(source).arg("-o").arg(&library).arg("-lm").status().unwrap().success());
-        let path = self.0.path().join(format!("{name}.fmu"));
-        let folder = if version == 2 { "linux64" } else { "x86_64-linux" };
-        let mut zip = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
-        for (entry, bytes) in [
-            ("modelDescription.xml".to_owned(), change(description(name, version)).into_bytes()),
-            (format!("binaries/{folder}/x.so"), std::fs::read(library).unwrap()),
-        ] {
-            zip.start_file(entry, zip::write::SimpleFileOptions::default()).unwrap();
-            zip.write_all(&bytes).unwrap();
-        }
-        zip.finish().unwrap();
-        path
-    }
-}
-
-/// The description of a model in a standard, with both interfaces.
-fn description(name: &str, version: u32) -> String {
-    // Name, causality, variability, start.
-    let variables = [
-        ("u", "input", "continuous", "0"),
-        ("x", "output", "continuous", ""),
-        ("der(x)", "local", "continuous", ""),
-        ("i", "input", "discrete", "0"),
-        ("y", "output", "discrete", ""),
-        ("T", "parameter", "fixed", "0.1"),
-        ("level", "parameter", "fixed", "-1"),
-        ("count", "output", "discrete", ""),
-        ("fault", "parameter", "fixed", "0"),
-    ];
-    let state = name == "plant";
-    let variable = |(index, (name, causality, variability, start)): (usize, &(&str, &str, &str, &str))| {
-        let start = if start.is_empty() { String::new() } else { format!("start='{start}'") };
-        let derivative = if *name == "der(x)" && state { "derivative='2'" } else { "" };
-        let common =
-            format!("name='{name}' valueReference='{}' causality='{causality}' variability='{variability}'", index + 1);
-        if version == 2 {
-            format!("<ScalarVariable {common}><Real {start} {derivative}/></ScalarVariable>")
-        } else {
-            format!("<Float64 {common} {start} {derivative}/>")
-        }
-    };
-    let variables: String = variables.iter().enumerate().map(variable).collect();
-    let (root, structure, capabilities) = if version == 2 {
-        let derivatives = if state { "<Derivatives><Unknown index='3'/></Derivatives>" } else { "" };
-        (format!("fmiVersion='2.0' guid='g' numberOfEventIndicators='{}'", u8::from(state)), derivatives, "")
-    } else {
-        let derivatives = if state { "<ContinuousStateDerivative valueReference='3'/>" } else { "" };
-        let events = "hasEventMode='true' mightReturnEarlyFromDoStep='true' canGetAndSetFMUState='true'";
-        let capabilities = if state { "" } else { events };
-        ("fmiVersion='3.0' instantiationToken='g'".to_owned(), derivatives, capabilities)
-    };
-    let step = if version == 2 { "" } else { "needsCompletedIntegratorStep='true'" };
-    format!(
-        "<fmiModelDescription {root} modelName='{name}'><ModelExchange modelIdentifier='x' {step}/>\
-         <CoSimulation modelIdentifier='x' {capabilities}/><ModelVariables>{variables}</ModelVariables>\
-         <ModelStructure>{structure}</ModelStructure></fmiModelDescription>"
-    )
-}
 
 fn settings(stop: f64, step: f64) -> Settings {
     Settings { start: 0.0, stop, step, sequential: false }

@@ -22,7 +22,7 @@ pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<Course> {
         Some(1) => named(&tuned.plant),
         Some(2) => named(&tuned.controller),
         _ => bail!(
-            "{}: a machine is for PmsmDrive, PmsmPlant and SensorlessController as this program builds them; \
+            "{}: a machine is for PmsmDrive, PmsmDriveMean, PmsmPlant and SensorlessController as this program builds them; \
              --set and --ssv are for every FMU",
             preset.own().name
         ),

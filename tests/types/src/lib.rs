@@ -3,7 +3,7 @@
 use fmu_core::unit::{KELVIN, ONE, PER_SECOND, Quantity, SECOND, VOLT};
 use fmu_core::{
     Block, ContinuousTime, Elapsed, Experiment, Fault, Field, Info, Model, Resource, Row, State, Step, Table,
-    enumeration, integrate,
+    enumeration, integrate, table,
 };
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -130,87 +130,81 @@ impl Model for EveryType {
         ..Info::DEFAULT
     };
 
-    const TABLE: &'static Table<Block<Self>> = &Table::new(
-        const {
-            &[
-                V::input("voltage", &VOLT, "Input of the state", |m| &mut m.model.voltage),
-                V::array_input("vector", &VOLT, "Three inputs", 3, |m| &mut m.model.vector),
-                V::array_input("matrix", &ONE, "Four sampled inputs", 4, |m| m.model.matrix.as_flattened_mut())
-                    .shape(&[2, 2])
-                    .discrete(),
-                V::discrete_input("in.real", &VOLT, "Sampled", |m| &mut m.model.held.real),
-                V::float32_input("in.single", &VOLT, "Sampled", |m| &mut m.model.held.single).at_most(0.3),
-                V::boolean_input("in.truth", "Sampled", |m| &mut m.model.held.truth),
-                V::enumeration_input("in.fan", "Sampled", &Field(|m| &mut m.model.held.fan)),
-                V::int8_input("in.int8", "Sampled", |m| &mut m.model.held.int8),
-                V::uint8_input("in.uint8", "Sampled", |m| &mut m.model.held.uint8).at_most(200.0),
-                V::int16_input("in.int16", "Sampled", |m| &mut m.model.held.int16),
-                V::uint16_input("in.uint16", "Sampled", |m| &mut m.model.held.uint16),
-                V::integer_input("in.int32", "Sampled", |m| &mut m.model.held.int32),
-                V::uint32_input("in.uint32", "Sampled", |m| &mut m.model.held.uint32),
-                V::int64_input("in.int64", "Sampled", |m| &mut m.model.held.int64),
-                V::uint64_input("in.uint64", "Sampled", |m| &mut m.model.held.uint64),
-                V::output("x", &VOLT, "The state", |m| &mut m.out.x),
-                V::array_output("sums", &VOLT, "weights times vector, and offsets", 2, |m| &mut m.out.sums),
-                V::array_output("transposed", &ONE, "matrix, transposed", 4, |m| m.out.transposed.as_flattened_mut())
-                    .shape(&[2, 2])
-                    .discrete(),
-                V::discrete_output("square", &ONE, "Square of in.int32 from the file", |m| &mut m.out.square),
-                V::float32_output("out.single", &VOLT, "As the input", |m| &mut m.out.each.single),
-                V::boolean_output("out.truth", "As the input", |m| &mut m.out.each.truth),
-                V::enumeration_output("out.fan", "As the input", &Field(|m| &mut m.out.each.fan)),
-                V::int8_output("out.int8", "As the input", |m| &mut m.out.each.int8),
-                V::uint8_output("out.uint8", "As the input", |m| &mut m.out.each.uint8),
-                V::int16_output("out.int16", "As the input", |m| &mut m.out.each.int16),
-                V::uint16_output("out.uint16", "As the input", |m| &mut m.out.each.uint16),
-                V::integer_output("out.int32", "As the input", |m| &mut m.out.each.int32),
-                V::uint32_output("out.uint32", "As the input", |m| &mut m.out.each.uint32),
-                V::int64_output("out.int64", "As the input", |m| &mut m.out.each.int64),
-                V::uint64_output("out.uint64", "As the input", |m| &mut m.out.each.uint64),
-                V::integer_output("letters", "Length of the label", |m| &mut m.out.letters),
-                V::text_output("status", "The label, while in.truth is true", |m| {
-                    if m.model.held.truth { &m.model.label } else { "off" }
-                }),
-                V::state("state", &VOLT, "The state again", |m| &mut m.model.x).nominal(2.0),
-                V::array_local("distances", &VOLT, "Of the state from 1 V and 2 V", 2, |m| &mut m.model.distances),
-                V::discrete_local("local.real", &ONE, "As the parameter", |m| &mut m.model.local.real),
-                V::float32_local("local.single", &ONE, "As the parameter", |m| &mut m.model.local.single),
-                V::boolean_local("local.truth", "As the parameter", |m| &mut m.model.local.truth),
-                V::enumeration_local("local.fan", "As the parameter", &Field(|m| &mut m.model.local.fan)),
-                V::int8_local("local.int8", "As the parameter", |m| &mut m.model.local.int8),
-                V::uint8_local("local.uint8", "As the parameter", |m| &mut m.model.local.uint8),
-                V::int16_local("local.int16", "As the parameter", |m| &mut m.model.local.int16),
-                V::uint16_local("local.uint16", "As the parameter", |m| &mut m.model.local.uint16),
-                V::integer_local("local.int32", "As the parameter", |m| &mut m.model.local.int32),
-                V::uint32_local("local.uint32", "As the parameter", |m| &mut m.model.local.uint32),
-                V::int64_local("local.int64", "As the parameter", |m| &mut m.model.local.int64),
-                V::uint64_local("local.uint64", "Square of the parameter", |m| &mut m.model.local.uint64),
-                V::parameter("tau", &SECOND, "Time constant of the state", |m| &mut m.model.tau).above(0.0),
-                V::calculated("rate", &PER_SECOND, "1/tau", |m| &mut m.model.rate),
-                V::parameter("band", &BAND, "Added to the start of the state", |m| &mut m.model.band).at_least(0.0),
-                V::array_parameter("offsets", &VOLT, "Of sums", 2, |m| &mut m.model.offsets).tunable(),
-                V::array_parameter("weights", &ONE, "Of vector, in sums", 6, |m| m.model.weights.as_flattened_mut())
-                    .shape(&[2, 3]),
-                V::text_parameter("label", "A text", |m| &mut m.model.label),
-                V::text_constant("revision", "Another", "r1 \u{b5}"),
-                V::float32_parameter("fixed.single", &ONE, "Shown by the local", |m| &mut m.model.fixed.single),
-                V::boolean_parameter("fixed.truth", "Shown by the local", |m| &mut m.model.fixed.truth),
-                V::enumeration_parameter("fixed.fan", "Shown by the local", &Field(|m| &mut m.model.fixed.fan)),
-                V::int8_parameter("fixed.int8", "Shown by the local", |m| &mut m.model.fixed.int8),
-                V::uint8_parameter("fixed.uint8", "Shown by the local", |m| &mut m.model.fixed.uint8),
-                V::int16_parameter("fixed.int16", "Shown by the local", |m| &mut m.model.fixed.int16),
-                V::uint16_parameter("fixed.uint16", "Shown by the local", |m| &mut m.model.fixed.uint16),
-                V::integer_parameter("fixed.int32", "Shown by the local", |m| &mut m.model.fixed.int32).at_least(-9.0),
-                V::uint32_parameter("fixed.uint32", "Shown by the local", |m| &mut m.model.fixed.uint32),
-                V::int64_parameter("fixed.int64", "Shown by the local", |m| &mut m.model.fixed.int64),
-                V::uint64_parameter("fixed.uint64", "Shown by the local", |m| &mut m.model.fixed.uint64),
-                V::parameter("tuned.real", &ONE, "Shown by the local", |m| &mut m.model.tuned.real).tunable(),
-                V::integer_parameter("tuned.int32", "Shift of square", |m| &mut m.model.tuned.int32)
-                    .at_least(0.0)
-                    .tunable(),
-            ]
-        },
-    );
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::input("voltage", &VOLT, "Input of the state", |m| &mut m.model.voltage),
+        V::array_input("vector", &VOLT, "Three inputs", 3, |m| &mut m.model.vector),
+        V::array_input("matrix", &ONE, "Four sampled inputs", 4, |m| m.model.matrix.as_flattened_mut())
+            .shape(&[2, 2])
+            .discrete(),
+        V::discrete_input("in.real", &VOLT, "Sampled", |m| &mut m.model.held.real),
+        V::float32_input("in.single", &VOLT, "Sampled", |m| &mut m.model.held.single).at_most(0.3),
+        V::boolean_input("in.truth", "Sampled", |m| &mut m.model.held.truth),
+        V::enumeration_input("in.fan", "Sampled", &Field(|m| &mut m.model.held.fan)),
+        V::int8_input("in.int8", "Sampled", |m| &mut m.model.held.int8),
+        V::uint8_input("in.uint8", "Sampled", |m| &mut m.model.held.uint8).at_most(200.0),
+        V::int16_input("in.int16", "Sampled", |m| &mut m.model.held.int16),
+        V::uint16_input("in.uint16", "Sampled", |m| &mut m.model.held.uint16),
+        V::integer_input("in.int32", "Sampled", |m| &mut m.model.held.int32),
+        V::uint32_input("in.uint32", "Sampled", |m| &mut m.model.held.uint32),
+        V::int64_input("in.int64", "Sampled", |m| &mut m.model.held.int64),
+        V::uint64_input("in.uint64", "Sampled", |m| &mut m.model.held.uint64),
+        V::output("x", &VOLT, "The state", |m| &mut m.out.x),
+        V::array_output("sums", &VOLT, "weights times vector, and offsets", 2, |m| &mut m.out.sums),
+        V::array_output("transposed", &ONE, "matrix, transposed", 4, |m| m.out.transposed.as_flattened_mut())
+            .shape(&[2, 2])
+            .discrete(),
+        V::discrete_output("square", &ONE, "Square of in.int32 from the file", |m| &mut m.out.square),
+        V::float32_output("out.single", &VOLT, "As the input", |m| &mut m.out.each.single),
+        V::boolean_output("out.truth", "As the input", |m| &mut m.out.each.truth),
+        V::enumeration_output("out.fan", "As the input", &Field(|m| &mut m.out.each.fan)),
+        V::int8_output("out.int8", "As the input", |m| &mut m.out.each.int8),
+        V::uint8_output("out.uint8", "As the input", |m| &mut m.out.each.uint8),
+        V::int16_output("out.int16", "As the input", |m| &mut m.out.each.int16),
+        V::uint16_output("out.uint16", "As the input", |m| &mut m.out.each.uint16),
+        V::integer_output("out.int32", "As the input", |m| &mut m.out.each.int32),
+        V::uint32_output("out.uint32", "As the input", |m| &mut m.out.each.uint32),
+        V::int64_output("out.int64", "As the input", |m| &mut m.out.each.int64),
+        V::uint64_output("out.uint64", "As the input", |m| &mut m.out.each.uint64),
+        V::integer_output("letters", "Length of the label", |m| &mut m.out.letters),
+        V::text_output("status", "The label, while in.truth is true", |m| {
+            if m.model.held.truth { &m.model.label } else { "off" }
+        }),
+        V::state("state", &VOLT, "The state again", |m| &mut m.model.x).nominal(2.0),
+        V::array_local("distances", &VOLT, "Of the state from 1 V and 2 V", 2, |m| &mut m.model.distances),
+        V::discrete_local("local.real", &ONE, "As the parameter", |m| &mut m.model.local.real),
+        V::float32_local("local.single", &ONE, "As the parameter", |m| &mut m.model.local.single),
+        V::boolean_local("local.truth", "As the parameter", |m| &mut m.model.local.truth),
+        V::enumeration_local("local.fan", "As the parameter", &Field(|m| &mut m.model.local.fan)),
+        V::int8_local("local.int8", "As the parameter", |m| &mut m.model.local.int8),
+        V::uint8_local("local.uint8", "As the parameter", |m| &mut m.model.local.uint8),
+        V::int16_local("local.int16", "As the parameter", |m| &mut m.model.local.int16),
+        V::uint16_local("local.uint16", "As the parameter", |m| &mut m.model.local.uint16),
+        V::integer_local("local.int32", "As the parameter", |m| &mut m.model.local.int32),
+        V::uint32_local("local.uint32", "As the parameter", |m| &mut m.model.local.uint32),
+        V::int64_local("local.int64", "As the parameter", |m| &mut m.model.local.int64),
+        V::uint64_local("local.uint64", "Square of the parameter", |m| &mut m.model.local.uint64),
+        V::parameter("tau", &SECOND, "Time constant of the state", |m| &mut m.model.tau).above(0.0),
+        V::calculated("rate", &PER_SECOND, "1/tau", |m| &mut m.model.rate),
+        V::parameter("band", &BAND, "Added to the start of the state", |m| &mut m.model.band).at_least(0.0),
+        V::array_parameter("offsets", &VOLT, "Of sums", 2, |m| &mut m.model.offsets).tunable(),
+        V::array_parameter("weights", &ONE, "Of vector, in sums", 6, |m| m.model.weights.as_flattened_mut())
+            .shape(&[2, 3]),
+        V::text_parameter("label", "A text", |m| &mut m.model.label),
+        V::text_constant("revision", "Another", "r1 \u{b5}"),
+        V::float32_parameter("fixed.single", &ONE, "Shown by the local", |m| &mut m.model.fixed.single),
+        V::boolean_parameter("fixed.truth", "Shown by the local", |m| &mut m.model.fixed.truth),
+        V::enumeration_parameter("fixed.fan", "Shown by the local", &Field(|m| &mut m.model.fixed.fan)),
+        V::int8_parameter("fixed.int8", "Shown by the local", |m| &mut m.model.fixed.int8),
+        V::uint8_parameter("fixed.uint8", "Shown by the local", |m| &mut m.model.fixed.uint8),
+        V::int16_parameter("fixed.int16", "Shown by the local", |m| &mut m.model.fixed.int16),
+        V::uint16_parameter("fixed.uint16", "Shown by the local", |m| &mut m.model.fixed.uint16),
+        V::integer_parameter("fixed.int32", "Shown by the local", |m| &mut m.model.fixed.int32).at_least(-9.0),
+        V::uint32_parameter("fixed.uint32", "Shown by the local", |m| &mut m.model.fixed.uint32),
+        V::int64_parameter("fixed.int64", "Shown by the local", |m| &mut m.model.fixed.int64),
+        V::uint64_parameter("fixed.uint64", "Shown by the local", |m| &mut m.model.fixed.uint64),
+        V::parameter("tuned.real", &ONE, "Shown by the local", |m| &mut m.model.tuned.real).tunable(),
+        V::integer_parameter("tuned.int32", "Shift of square", |m| &mut m.model.tuned.int32).at_least(0.0).tunable(),
+    ];
 
     fn load(&mut self, resources: Option<&Path>) -> Result<(), Fault> {
         let folder = resources.ok_or_else(|| Fault::new("EveryType needs the folder of its resources"))?;

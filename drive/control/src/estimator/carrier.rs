@@ -15,7 +15,7 @@ use crate::estimator::{Context, Setup};
 use drive_base::frame::Vector;
 use drive_base::math::sin_cos;
 use fmu_core::unit::{ONE, RAD_PER_S, VOLT};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -153,17 +153,10 @@ pub fn validate(setup: &Setup) -> Result<(), Fault> {
 type P = Row<CarrierParameters>;
 
 /// The variables; their owner adds the prefix `carrier.`.
-pub const CARRIER: &Table<CarrierParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("voltage", &VOLT, "Amplitude of the sinusoidal carrier voltage", |p| &mut p.voltage)
-                .above(0.0),
-            P::parameter("frequency", &RAD_PER_S, "Angular frequency of the sinusoidal carrier", |p| &mut p.frequency)
-                .above(0.0),
-            P::parameter("zeta", &ONE, "Damping ratio of the band-pass filter at the carrier frequency", |p| {
-                &mut p.zeta
-            })
-            .above(0.0),
-        ]
-    },
-);
+pub const CARRIER: &Table<CarrierParameters> = table![
+    P::parameter("voltage", &VOLT, "Amplitude of the sinusoidal carrier voltage", |p| &mut p.voltage).above(0.0),
+    P::parameter("frequency", &RAD_PER_S, "Angular frequency of the sinusoidal carrier", |p| &mut p.frequency)
+        .above(0.0),
+    P::parameter("zeta", &ONE, "Damping ratio of the band-pass filter at the carrier frequency", |p| { &mut p.zeta })
+        .above(0.0),
+];

@@ -12,37 +12,29 @@
 //! Limits: those of the voltage model, because the two models are equivalent and differ only in form. It holds rated load
 //! down to 0.010 of the rated speed, 0.010 with a compensated dead time.
 
+use crate::estimator::Context;
 use crate::estimator::emf::pole;
-use crate::estimator::follower::Follower;
+use crate::estimator::follower::{Follower, Rows};
 use crate::estimator::interval::Interval;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
 use serde::{Deserialize, Serialize};
 
-/// State kept from one sample to the next.
+/// The model as an estimator.
+pub type CurrentModel = Follower<CurrentRows>;
+
+/// The rows of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct CurrentModel {
-    follower: Follower,
-}
+pub struct CurrentRows;
 
-impl Estimating for CurrentModel {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
-        (Self { follower: Follower::at(theta, w, context.T_s) }, Estimate::new(theta, w, sample))
-    }
-
+impl Rows for CurrentRows {
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn rows(w: &mut f64, context: &Context, x: &Interval, slip: f64) -> f64 {
         let Context { motor, par, T_s, .. } = *context;
-        let f = &mut self.follower;
-        f.advance(T_s);
-        let x = Interval::new(f.theta_last, f.theta, sample, T_s);
-        let (w, slip) = (f.w, par.emf.slip(&x, f.w));
-        let r_d = x.v.d() - motor.R_s * x.i.d() + (w * motor.L_q + slip * motor.L_d) * x.i.q();
-        let r_q = x.v.q() - motor.R_s * x.i.q() - (w * motor.L_d + slip * motor.L_q) * x.i.d() - w * motor.psi_M;
+        let r_d = x.v.d() - motor.R_s * x.i.d() + (*w * motor.L_q + slip * motor.L_d) * x.i.q();
+        let r_q = x.v.q() - motor.R_s * x.i.q() - (*w * motor.L_d + slip * motor.L_q) * x.i.d() - *w * motor.psi_M;
         let di_d = x.i_now.d() - (x.i_last.d() + T_s / motor.L_d * r_d);
         let di_q = x.i_now.q() - (x.i_last.q() + T_s / motor.L_q * r_q);
-        f.w -= (1.0 - pole(par.matsui.filter, T_s)) * di_q * motor.L_q / (T_s * motor.psi_M);
-        f.correct(context, -di_d * motor.L_d / T_s);
-        Estimate::new(f.theta, f.speed(), sample)
+        *w -= (1.0 - pole(par.matsui.filter, T_s)) * di_q * motor.L_q / (T_s * motor.psi_M);
+        -di_d * motor.L_d / T_s
     }
 }
 

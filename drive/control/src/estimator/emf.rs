@@ -31,7 +31,7 @@ use crate::estimator::{Context, Estimate, Sample, Setup};
 use drive_base::frame::DqHat;
 use drive_base::math::{atan2, exp};
 use fmu_core::unit::RAD_PER_S;
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -172,40 +172,36 @@ pub fn pole(w: f64, T_s: f64) -> f64 {
 type P = Row<EmfParameters>;
 
 /// The variables; their owner adds the prefix `emf.`.
-pub const EMF: &Table<EmfParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the back-EMF observer or filter", |p| &mut p.bandwidth)
-                .above(0.0)
-                .tunable(),
-            P::parameter(
-                "w_sign",
-                &RAD_PER_S,
-                "Electrical speed beyond zero at which the estimated direction of rotation changes",
-                |p| &mut p.w_sign,
-            )
-            .above(0.0),
-            P::boolean_parameter(
-                "frame_term",
-                "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18); false: methods with this term alone",
-                |p| &mut p.frame_term,
-            ),
-            P::boolean_parameter(
-                "hold_reversal",
-                "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; estimators \
+pub const EMF: &Table<EmfParameters> = table![
+    P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the back-EMF observer or filter", |p| &mut p.bandwidth)
+        .above(0.0)
+        .tunable(),
+    P::parameter(
+        "w_sign",
+        &RAD_PER_S,
+        "Electrical speed beyond zero at which the estimated direction of rotation changes",
+        |p| &mut p.w_sign,
+    )
+    .above(0.0),
+    P::boolean_parameter(
+        "frame_term",
+        "Keep the term of the estimated frame's speed error, which Kim & Sul drop in (18); false: methods with this term alone",
+        |p| &mut p.frame_term,
+    ),
+    P::boolean_parameter(
+        "hold_reversal",
+        "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; estimators \
                  other than the EMF methods refuse it",
-                |p| &mut p.hold_reversal,
-            ),
-            P::parameter(
-                "w_hold",
-                &RAD_PER_S,
-                "Electrical speed below which emf.hold_reversal takes the speed from the EMF",
-                |p| &mut p.w_hold,
-            )
-            .above(0.0),
-        ]
-    },
-);
+        |p| &mut p.hold_reversal,
+    ),
+    P::parameter(
+        "w_hold",
+        &RAD_PER_S,
+        "Electrical speed below which emf.hold_reversal takes the speed from the EMF",
+        |p| &mut p.w_hold,
+    )
+    .above(0.0),
+];
 
 #[cfg(test)]
 mod tests {

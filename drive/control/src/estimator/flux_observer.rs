@@ -42,7 +42,7 @@ use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Sampl
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use drive_base::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Share of `rho_0` above which the magnet flux adapts more slowly.
@@ -170,22 +170,18 @@ fn flux(motor: &Motor, psi_M: f64, i: DqHat) -> DqHat {
 type P = Row<FluxObserverParameters>;
 
 /// The observer's variables; their owner adds the prefix `flux_observer.`.
-pub const FLUX_OBSERVER: &Table<FluxObserverParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("k_w", &ONE, "Feedback gain of the flux error per electrical speed", |p| &mut p.k_w)
-                .at_least(0.0)
-                .tunable(),
-            P::parameter(
-                "magnet",
-                &PER_SECOND,
-                "Rate at which FluxObserver adapts psi_M, the others refuse it; 0: motor.psi_M",
-                |p| &mut p.magnet,
-            )
-            .at_least(0.0),
-        ]
-    },
-);
+pub const FLUX_OBSERVER: &Table<FluxObserverParameters> = table![
+    P::parameter("k_w", &ONE, "Feedback gain of the flux error per electrical speed", |p| &mut p.k_w)
+        .at_least(0.0)
+        .tunable(),
+    P::parameter(
+        "magnet",
+        &PER_SECOND,
+        "Rate at which FluxObserver adapts psi_M, the others refuse it; 0: motor.psi_M",
+        |p| &mut p.magnet,
+    )
+    .at_least(0.0),
+];
 
 #[cfg(test)]
 mod tests {

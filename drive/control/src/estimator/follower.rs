@@ -1,15 +1,18 @@
-//! Shared parts of the voltage model and the current model: parameters, and the frame that turns at a calculated speed.
+//! The estimator that voltage model and current model share: parameters, and the frame that turns at a calculated speed.
+//! A model gives the [`Rows`] of the voltage equation.
 //!
 //! The speed comes from the q row, smoothed by a low-pass. The angle integrates it, corrected by the d row's error e:
 //! theta' = w + x + rho e, x' = rho^2/4 e. Without the integral x, a speed bias becomes an angle error bias / rho: with
 //! L_q + 20 %, the drive then loses synchronism at half the rated speed. Both angle poles are at -rho/2.
 
-use crate::estimator::Context;
 use crate::estimator::emf::Direction;
+use crate::estimator::interval::Interval;
+use crate::estimator::{Context, Estimate, Estimating, Sample};
 use fmu_core::unit::RAD_PER_S;
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use std::marker::PhantomData;
 
 /// Largest angle error in rad that is passed on.
 const CLIP: f64 = 0.5;
@@ -31,9 +34,16 @@ impl Default for MatsuiParameters {
     }
 }
 
+/// Both rows of the machine's voltage equation in the estimated frame.
+pub trait Rows {
+    /// Smooths the electrical speed `w` (rad/s) with that of the q row, and returns the voltage -w psi_M sin theta~ (V) of
+    /// the d row. `slip` is the frame-speed term in rad/s.
+    fn rows(w: &mut f64, context: &Context, x: &Interval, slip: f64) -> f64;
+}
+
 /// State at a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Follower {
+pub struct Follower<R> {
     /// Electrical angle at this sample in rad, not wrapped.
     pub theta: f64,
     /// Electrical angle at the last sample in rad.
@@ -45,12 +55,30 @@ pub struct Follower {
     /// Frame speed until the next sample in rad/s.
     w_frame: f64,
     direction: Direction,
+    model: PhantomData<R>,
 }
 
-impl Follower {
+impl<R: Rows> Estimating for Follower<R> {
+    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        (Self::at(theta, w, context.T_s), Estimate::new(theta, w, sample))
+    }
+
+    #[inline]
+    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+        self.advance(context.T_s);
+        let x = Interval::new(self.theta_last, self.theta, sample, context.T_s);
+        let slip = context.par.emf.slip(&x, self.w);
+        let e_d = R::rows(&mut self.w, context, &x, slip);
+        self.correct(context, e_d);
+        Estimate::new(self.theta, self.speed(), sample)
+    }
+}
+
+impl<R> Follower<R> {
     /// At the electrical angle `theta` (rad), turning at `w` (rad/s).
     pub fn at(theta: f64, w: f64, T_s: f64) -> Self {
-        Self { theta, theta_last: theta - T_s * w, w, x: 0.0, w_frame: w, direction: Direction::of(w) }
+        let (theta_last, direction) = (theta - T_s * w, Direction::of(w));
+        Self { theta, theta_last, w, x: 0.0, w_frame: w, direction, model: PhantomData }
     }
 
     /// Advances to the next sample; each update calls this first.
@@ -83,27 +111,23 @@ impl Follower {
 type P = Row<MatsuiParameters>;
 
 /// The variables; their owner adds the prefix `matsui.`.
-pub const MATSUI: &Table<MatsuiParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("bandwidth", &RAD_PER_S, "Gain of the angle error in voltage and current model", |p| {
-                &mut p.bandwidth
-            })
-            .above(0.0)
-            .tunable(),
-            P::parameter("filter", &RAD_PER_S, "Bandwidth of the speed filter in voltage and current model", |p| {
-                &mut p.filter
-            })
-            .above(0.0)
-            .tunable(),
-            P::boolean_parameter(
-                "integral",
-                "Integrate the angle error, so that a speed bias causes no angle error; false: as printed, VoltageModel and CurrentModel alone",
-                |p| &mut p.integral,
-            ),
-        ]
-    },
-);
+pub const MATSUI: &Table<MatsuiParameters> = table![
+    P::parameter("bandwidth", &RAD_PER_S, "Gain of the angle error in voltage and current model", |p| {
+        &mut p.bandwidth
+    })
+    .above(0.0)
+    .tunable(),
+    P::parameter("filter", &RAD_PER_S, "Bandwidth of the speed filter in voltage and current model", |p| {
+        &mut p.filter
+    })
+    .above(0.0)
+    .tunable(),
+    P::boolean_parameter(
+        "integral",
+        "Integrate the angle error, so that a speed bias causes no angle error; false: as printed, VoltageModel and CurrentModel alone",
+        |p| &mut p.integral,
+    ),
+];
 
 #[cfg(test)]
 mod tests {
@@ -118,7 +142,7 @@ mod tests {
         let (rho, T_s) = (par.matsui.bandwidth, 1e-6);
         let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s };
         for sign in [1.0, -1.0] {
-            let mut follower = Follower::at(0.0, sign * w, T_s);
+            let mut follower = Follower::<()>::at(0.0, sign * w, T_s);
             let n = 2.0 / (rho * T_s);
             let (mut theta, mut k) = (0.0, 0.0);
             while k < n {

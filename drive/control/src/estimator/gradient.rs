@@ -27,7 +27,7 @@ use crate::estimator::{Context, Estimate, Estimating, Sample};
 use drive_base::frame::{AlphaBeta, Axis, Estimated};
 use drive_base::math::atan2;
 use fmu_core::unit::PER_SECOND;
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Least length of eta as a share of `psi_M`.
@@ -96,25 +96,18 @@ fn length(context: &Context, axis: Axis<Estimated>, sample: &Sample) -> f64 {
 type P = Row<GradientParameters>;
 
 /// The observer's variables; their owner adds the prefix `gradient.`.
-pub const GRADIENT: &Table<GradientParameters> = &Table::new(
-    const {
-        &[
-            P::parameter(
-                "bandwidth",
-                &PER_SECOND,
-                "Rate at which GradientObserver brings the flux to the circle",
-                |p| &mut p.bandwidth,
-            )
-            .above(0.0)
-            .tunable(),
-            P::boolean_parameter(
-                "clamped",
-                "GradientObserver, the others refuse it: both components of the flux limited to the magnet's, as in open motor controllers",
-                |p| &mut p.clamped,
-            ),
-        ]
-    },
-);
+pub const GRADIENT: &Table<GradientParameters> = table![
+    P::parameter("bandwidth", &PER_SECOND, "Rate at which GradientObserver brings the flux to the circle", |p| {
+        &mut p.bandwidth
+    })
+    .above(0.0)
+    .tunable(),
+    P::boolean_parameter(
+        "clamped",
+        "GradientObserver, the others refuse it: both components of the flux limited to the magnet's, as in open motor controllers",
+        |p| &mut p.clamped,
+    ),
+];
 
 #[cfg(test)]
 mod tests {

@@ -16,7 +16,7 @@ use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use drive_base::frame::{Axis, DqHat, Estimated};
 use fmu_core::unit::RAD_PER_S;
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -103,37 +103,31 @@ impl Estimating for Hybrid {
 type P = Row<HybridParameters>;
 
 /// The variables; their owner adds the prefix `hybrid.`.
-pub const HYBRID: &Table<HybridParameters> = &Table::new(
-    const {
-        &[
-            P::parameter(
-                "w_low",
-                &RAD_PER_S,
-                "Electrical speed up to which the hybrid uses the injection alone",
-                |p| &mut p.w_low,
-            )
-            .at_least(0.0),
-            P::parameter("w_high", &RAD_PER_S, "Electrical speed from which the hybrid uses the back EMF alone", |p| {
-                &mut p.w_high
-            })
-            .above(0.0),
-            P::parameter(
-                "bandwidth",
-                &RAD_PER_S,
-                "Magnitude of the tracker pole where the hybrid uses the back EMF alone",
-                |p| &mut p.bandwidth,
-            )
-            .above(0.0)
-            .tunable(),
-        ]
-    },
-);
+pub const HYBRID: &Table<HybridParameters> = table![
+    P::parameter("w_low", &RAD_PER_S, "Electrical speed up to which the hybrid uses the injection alone", |p| {
+        &mut p.w_low
+    })
+    .at_least(0.0),
+    P::parameter("w_high", &RAD_PER_S, "Electrical speed from which the hybrid uses the back EMF alone", |p| {
+        &mut p.w_high
+    })
+    .above(0.0),
+    P::parameter(
+        "bandwidth",
+        &RAD_PER_S,
+        "Magnitude of the tracker pole where the hybrid uses the back EMF alone",
+        |p| &mut p.bandwidth,
+    )
+    .above(0.0)
+    .tunable(),
+];
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::estimator::EstimatorParameters;
-    use crate::estimator::testing::{comes_to_the_rotor, finds_the_rotor};
+    use crate::estimator::testing::{beside, comes_to_the_rotor, finds_the_rotor, salient};
+    use drive_base::frame::Dq;
 
     #[test]
     fn finds_the_rotor_at_standstill_and_at_speed() {
@@ -142,6 +136,19 @@ mod tests {
         (par.hybrid.w_low, par.hybrid.w_high) = (1e3, 2e3);
         finds_the_rotor::<Hybrid>(&par, 0.05);
         comes_to_the_rotor::<Hybrid>(100.0);
+    }
+
+    /// Above w_high, the angle error follows e_0 (1 - rho t) e^{-rho t} with both poles at rho = `hybrid.bandwidth`,
+    /// whatever `tracker.bandwidth` is; the EMF observer adds its lag of about 2 ms.
+    #[test]
+    fn above_the_transition_the_pole_is_that_of_the_hybrid() {
+        let (mut par, t, start) = (EstimatorParameters::default(), 0.02, 0.05);
+        for rho in [TAU * 5.0, TAU * 8.0] {
+            par.hybrid.bandwidth = rho;
+            let (angle, _) = beside::<Hybrid>(&par, &salient(), (300.0, Dq::new(-0.84, 5.59)), start, 200);
+            let expected = start * (1.0 - rho * t) * (-rho * t).exp();
+            assert!((angle - expected).abs() < 0.1 * start, "{rho} rad/s: {angle} rad, not {expected} rad");
+        }
     }
 
     #[test]

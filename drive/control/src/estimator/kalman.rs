@@ -43,7 +43,7 @@ use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::sin_cos;
 use drive_base::motor::Motor;
 use fmu_core::unit::{Exponents, Quantity, Unit};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 
@@ -215,28 +215,24 @@ impl Estimating for Kalman {
 type P = Row<KalmanParameters>;
 
 /// The filter's variables; their owner adds the prefix `kalman.`.
-pub const KALMAN: &Table<KalmanParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("voltage_d", &V2_S, "Noise density of the estimated d-axis voltage", |p| &mut p.voltage_d)
-                .above(0.0)
-                .tunable(),
-            P::parameter("voltage_q", &V2_S, "Noise density of the estimated q-axis voltage", |p| &mut p.voltage_q)
-                .above(0.0)
-                .tunable(),
-            P::parameter("acceleration", &RAD2_PER_S3, "Noise density of the electrical acceleration", |p| {
-                &mut p.acceleration
-            })
-            .above(0.0)
-            .tunable(),
-            P::parameter("current", &A2_S, "Noise density of the measured current: its variance times T_s", |p| {
-                &mut p.current
-            })
-            .above(0.0)
-            .tunable(),
-        ]
-    },
-);
+pub const KALMAN: &Table<KalmanParameters> = table![
+    P::parameter("voltage_d", &V2_S, "Noise density of the estimated d-axis voltage", |p| &mut p.voltage_d)
+        .above(0.0)
+        .tunable(),
+    P::parameter("voltage_q", &V2_S, "Noise density of the estimated q-axis voltage", |p| &mut p.voltage_q)
+        .above(0.0)
+        .tunable(),
+    P::parameter("acceleration", &RAD2_PER_S3, "Noise density of the electrical acceleration", |p| {
+        &mut p.acceleration
+    })
+    .above(0.0)
+    .tunable(),
+    P::parameter("current", &A2_S, "Noise density of the measured current: its variance times T_s", |p| {
+        &mut p.current
+    })
+    .above(0.0)
+    .tunable(),
+];
 
 #[cfg(test)]
 mod tests {

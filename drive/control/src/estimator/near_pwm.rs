@@ -18,7 +18,7 @@ use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::atan2;
 use fmu_core::unit::VOLT;
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// The parameters with the prefix `near_pwm.`.
@@ -103,14 +103,12 @@ impl Estimating for NearPwmInjection {
 type P = Row<NearPwmParameters>;
 
 /// The variables; their owner adds the prefix `near_pwm.`.
-pub const NEAR_PWM: &Table<NearPwmParameters> = &Table::new(
-    const {
-        &[P::parameter("voltage", &VOLT, "Injected voltage vector, which turns by 120 degrees each sample", |p| {
-            &mut p.voltage
-        })
-        .above(0.0)]
-    },
-);
+pub const NEAR_PWM: &Table<NearPwmParameters> = table![
+    P::parameter("voltage", &VOLT, "Injected voltage vector, which turns by 120 degrees each sample", |p| {
+        &mut p.voltage
+    })
+    .above(0.0)
+];
 
 #[cfg(test)]
 mod tests {

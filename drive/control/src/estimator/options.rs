@@ -7,6 +7,8 @@
 use crate::estimator::pulsating::Demodulation;
 use crate::estimator::tracker::TrackerKind;
 use crate::estimator::{Class, Kind, Setup};
+use Kind::{CurrentModel, DirectEmf, EmfObserver, ExtendedEmf, Hybrid, KalmanFilter, Rasmussen, Sensored, SlidingMode};
+use Kind::{VoltageFeedback, VoltageModel};
 use fmu_core::Fault;
 
 struct Choice {
@@ -22,101 +24,36 @@ struct Choice {
     off: &'static str,
 }
 
+const NO_TRACKER: &[Kind] = &[Rasmussen, VoltageModel, CurrentModel, Sensored, KalmanFilter];
+const SIGN_OF_EMF: &[Kind] = &[DirectEmf, EmfObserver, ExtendedEmf, VoltageFeedback, SlidingMode];
+const FRAME_TERM: &[Kind] = &[DirectEmf, EmfObserver, ExtendedEmf, VoltageFeedback, Hybrid, VoltageModel, CurrentModel];
+
+#[rustfmt::skip]
 const CHOICES: &[Choice] = &[
-    Choice {
-        name: "start.mode",
-        asked: |s| s.starts_by_injection,
-        has: |kind| kind.class().injects(),
-        why: "the start by injection needs an estimator that injects",
-        off: "set start.mode = CurrentFrequency or Direct",
-    },
-    Choice {
-        name: "weakening.use",
-        asked: |s| s.weakens,
-        has: |kind| kind.class() != Class::Injection,
-        why: "injection leaves no voltage for field weakening",
-        off: "set it to false",
-    },
-    Choice {
-        name: "tracker.kind",
-        asked: |s| s.par.tracker.kind != TrackerKind::Pll,
-        has: |kind| {
-            use Kind::{CurrentModel, KalmanFilter, Rasmussen, Sensored, VoltageModel};
-            !matches!(kind, Rasmussen | VoltageModel | CurrentModel | Sensored | KalmanFilter)
-        },
-        why: "it has no tracker",
-        off: "set it to Pll",
-    },
-    Choice {
-        name: "adaptation.resistance",
-        asked: |s| s.par.adaptation.resistance,
-        has: |kind| matches!(kind, Kind::Rasmussen | Kind::FluxObserver),
-        why: "it does not adapt the resistance",
-        off: "set it to false",
-    },
-    Choice {
-        name: "adaptation.tracking",
-        asked: |s| s.par.adaptation.tracking > 0.0,
-        has: |kind| kind == Kind::Rasmussen,
-        why: "only Rasmussen needs it; FluxObserver adapts the resistance at every speed",
-        off: "set adaptation.tracking = 0",
-    },
-    Choice {
-        name: "adaptation.k_a",
-        asked: |s| s.par.adaptation.k_a > 0.0,
-        has: |kind| kind == Kind::Rasmussen,
-        why: "it does not turn the frame at rest",
-        off: "set adaptation.k_a = 0",
-    },
-    Choice {
-        name: "flux_observer.magnet",
-        asked: |s| s.par.flux_observer.magnet > 0.0,
-        has: |kind| kind == Kind::FluxObserver,
-        why: "it does not adapt psi_M",
-        off: "set it to 0",
-    },
-    Choice {
-        name: "emf.hold_reversal",
-        asked: |s| s.par.emf.hold_reversal,
-        has: |kind| {
-            use Kind::{DirectEmf, EmfObserver, ExtendedEmf, SlidingMode, VoltageFeedback};
-            matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | SlidingMode)
-        },
-        why: "it does not take the direction of rotation from the sign of the EMF",
-        off: "set it to false",
-    },
-    Choice {
-        name: "emf.frame_term",
-        asked: |s| !s.par.emf.frame_term,
-        has: |kind| {
-            use Kind::{CurrentModel, DirectEmf, EmfObserver, ExtendedEmf, Hybrid, VoltageFeedback, VoltageModel};
-            let by_emf = matches!(kind, DirectEmf | EmfObserver | ExtendedEmf | VoltageFeedback | Hybrid);
-            by_emf || matches!(kind, VoltageModel | CurrentModel)
-        },
-        why: "it has no such term",
-        off: "set it to true",
-    },
-    Choice {
-        name: "matsui.integral",
-        asked: |s| !s.par.matsui.integral,
-        has: |kind| matches!(kind, Kind::VoltageModel | Kind::CurrentModel),
-        why: "it has no such integral",
-        off: "set it to true",
-    },
-    Choice {
-        name: "pulsating.demodulation",
-        asked: |s| s.par.pulsating.demodulation != Demodulation::Heterodyne,
-        has: |kind| kind == Kind::PulsatingInjection,
-        why: "it has no pulsating carrier",
-        off: "set it to Heterodyne",
-    },
-    Choice {
-        name: "gradient.clamped",
-        asked: |s| s.par.gradient.clamped,
-        has: |kind| kind == Kind::GradientObserver,
-        why: "it has no such clamp",
-        off: "set it to false",
-    },
+    Choice { name: "start.mode", asked: |s| s.starts_by_injection, has: |kind| kind.class().injects(),
+        why: "the start by injection needs an estimator that injects", off: "set start.mode = CurrentFrequency or Direct" },
+    Choice { name: "weakening.use", asked: |s| s.weakens, has: |kind| kind.class() != Class::Injection,
+        why: "injection leaves no voltage for field weakening", off: "set it to false" },
+    Choice { name: "tracker.kind", asked: |s| s.par.tracker.kind != TrackerKind::Pll, has: |kind| !NO_TRACKER.contains(&kind),
+        why: "it has no tracker", off: "set it to Pll" },
+    Choice { name: "adaptation.resistance", asked: |s| s.par.adaptation.resistance, has: |kind| matches!(kind, Kind::Rasmussen | Kind::FluxObserver),
+        why: "it does not adapt the resistance", off: "set it to false" },
+    Choice { name: "adaptation.tracking", asked: |s| s.par.adaptation.tracking > 0.0, has: |kind| kind == Kind::Rasmussen,
+        why: "only Rasmussen needs it; FluxObserver adapts the resistance at every speed", off: "set adaptation.tracking = 0" },
+    Choice { name: "adaptation.k_a", asked: |s| s.par.adaptation.k_a > 0.0, has: |kind| kind == Kind::Rasmussen,
+        why: "it does not turn the frame at rest", off: "set adaptation.k_a = 0" },
+    Choice { name: "flux_observer.magnet", asked: |s| s.par.flux_observer.magnet > 0.0, has: |kind| kind == Kind::FluxObserver,
+        why: "it does not adapt psi_M", off: "set it to 0" },
+    Choice { name: "emf.hold_reversal", asked: |s| s.par.emf.hold_reversal, has: |kind| SIGN_OF_EMF.contains(&kind),
+        why: "it does not take the direction of rotation from the sign of the EMF", off: "set it to false" },
+    Choice { name: "emf.frame_term", asked: |s| !s.par.emf.frame_term, has: |kind| FRAME_TERM.contains(&kind),
+        why: "it has no such term", off: "set it to true" },
+    Choice { name: "matsui.integral", asked: |s| !s.par.matsui.integral, has: |kind| matches!(kind, Kind::VoltageModel | Kind::CurrentModel),
+        why: "it has no such integral", off: "set it to true" },
+    Choice { name: "pulsating.demodulation", asked: |s| s.par.pulsating.demodulation != Demodulation::Heterodyne, has: |kind| kind == Kind::PulsatingInjection,
+        why: "it has no pulsating carrier", off: "set it to Heterodyne" },
+    Choice { name: "gradient.clamped", asked: |s| s.par.gradient.clamped, has: |kind| kind == Kind::GradientObserver,
+        why: "it has no such clamp", off: "set it to false" },
 ];
 
 /// Checks that the estimator has the options that are on.

@@ -16,7 +16,7 @@ use crate::estimator::saliency::{self, Admittance, CLIP, response};
 use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
-use fmu_core::{Fault, Field, Row, Table, enumeration};
+use fmu_core::{Fault, Field, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 
 enumeration! {
@@ -102,15 +102,11 @@ impl Estimating for PulsatingInjection {
 type P = Row<PulsatingParameters>;
 
 /// The variables; their owner adds the prefix `pulsating.`.
-pub const PULSATING: &Table<PulsatingParameters> = &Table::new(
-    const {
-        &[P::enumeration_parameter(
-            "demodulation",
-            "Demodulation of the carrier current; the second is refused with other estimators than PulsatingInjection",
-            &Field(|p| &mut p.demodulation),
-        )]
-    },
-);
+pub const PULSATING: &Table<PulsatingParameters> = table![P::enumeration_parameter(
+    "demodulation",
+    "Demodulation of the carrier current; the second is refused with other estimators than PulsatingInjection",
+    &Field(|p| &mut p.demodulation),
+)];
 
 #[cfg(test)]
 mod tests {

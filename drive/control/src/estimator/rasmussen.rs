@@ -25,7 +25,7 @@ use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Injec
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use drive_base::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND, RAD_PER_S};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the observer.
@@ -147,24 +147,20 @@ fn inductive(motor: &Motor, i: DqHat) -> DqHat {
 type P = Row<RasmussenParameters>;
 
 /// The observer's variables; their owner adds the prefix `rasmussen.`.
-pub const RASMUSSEN: &Table<RasmussenParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("c_1", &PER_SECOND, "Feedback gain of the d-axis flux error, eq (21)", |p| &mut p.c_1)
-                .at_least(0.0)
-                .tunable(),
-            P::parameter("c_2", &PER_SECOND, "Feedback gain of the q-axis flux, eq (21)", |p| &mut p.c_2)
-                .at_least(0.0)
-                .tunable(),
-            P::parameter("w_n", &RAD_PER_S, "Natural angular frequency of the speed adaptation", |p| &mut p.w_n)
-                .above(0.0)
-                .tunable(),
-            P::parameter("zeta", &ONE, "Damping ratio of the speed adaptation; 0: integral form (16)", |p| &mut p.zeta)
-                .at_least(0.0)
-                .tunable(),
-        ]
-    },
-);
+pub const RASMUSSEN: &Table<RasmussenParameters> = table![
+    P::parameter("c_1", &PER_SECOND, "Feedback gain of the d-axis flux error, eq (21)", |p| &mut p.c_1)
+        .at_least(0.0)
+        .tunable(),
+    P::parameter("c_2", &PER_SECOND, "Feedback gain of the q-axis flux, eq (21)", |p| &mut p.c_2)
+        .at_least(0.0)
+        .tunable(),
+    P::parameter("w_n", &RAD_PER_S, "Natural angular frequency of the speed adaptation", |p| &mut p.w_n)
+        .above(0.0)
+        .tunable(),
+    P::parameter("zeta", &ONE, "Damping ratio of the speed adaptation; 0: integral form (16)", |p| &mut p.zeta)
+        .at_least(0.0)
+        .tunable(),
+];
 
 #[cfg(test)]
 mod tests {

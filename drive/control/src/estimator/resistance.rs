@@ -49,7 +49,7 @@ use crate::estimator::{Context, Sample, Setup};
 use drive_base::frame::DqHat;
 use drive_base::motor::Motor;
 use fmu_core::unit::{AMPERE, ONE, PER_SECOND};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Mechanical speed in rad/s below which a speed reference counts as standstill.
@@ -216,9 +216,7 @@ pub fn validate(setup: &Setup) -> Result<(), Fault> {
 type P = Row<ResistanceParameters>;
 
 /// The adaptation's variables; their owner adds the prefix `adaptation.`.
-pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
-    const {
-        &[
+pub const ADAPTATION: &Table<ResistanceParameters> = table![
             P::boolean_parameter(
                 "resistance",
                 "Rasmussen (while the reference is standstill) and FluxObserver adapt the resistance, the others refuse it; false: motor.R_s",
@@ -275,9 +273,7 @@ pub const ADAPTATION: &Table<ResistanceParameters> = &Table::new(
             .at_least(0.0)
             .at_most(1.0)
             .tunable(),
-        ]
-    },
-);
+        ];
 
 #[cfg(test)]
 mod tests {

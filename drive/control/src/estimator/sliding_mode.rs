@@ -21,7 +21,7 @@ use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::{atan2, sin_cos};
 use fmu_core::unit::{RAD_PER_S, VOLT};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the observer.
@@ -96,19 +96,13 @@ impl Estimating for SlidingMode {
 type P = Row<SlidingModeParameters>;
 
 /// The observer's variables; their owner adds the prefix `sliding_mode.`.
-pub const SLIDING_MODE: &Table<SlidingModeParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("gain", &VOLT, "Sliding gain, above the greatest back EMF", |p| &mut p.gain)
-                .above(0.0)
-                .tunable(),
-            P::parameter("bandwidth", &RAD_PER_S, "Bandwidth within the boundary layer, at most 1/T_s", |p| {
-                &mut p.bandwidth
-            })
-            .above(0.0),
-        ]
-    },
-);
+pub const SLIDING_MODE: &Table<SlidingModeParameters> = table![
+    P::parameter("gain", &VOLT, "Sliding gain, above the greatest back EMF", |p| &mut p.gain).above(0.0).tunable(),
+    P::parameter("bandwidth", &RAD_PER_S, "Bandwidth within the boundary layer, at most 1/T_s", |p| {
+        &mut p.bandwidth
+    })
+    .above(0.0),
+];
 
 #[cfg(test)]
 mod tests {

@@ -17,7 +17,7 @@ use crate::estimator::tracker::Tracker;
 use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
 use drive_base::frame::{Axis, DqHat, Estimated};
 use fmu_core::unit::VOLT;
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// The parameters with the prefix `square_wave.`.
@@ -126,17 +126,13 @@ impl Estimating for SquareWaveInjection {
 type P = Row<SquareWaveParameters>;
 
 /// The variables; their owner adds the prefix `square_wave.`.
-pub const SQUARE_WAVE: &Table<SquareWaveParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("voltage", &VOLT, "Square-wave voltage injected on the estimated d axis", |p| &mut p.voltage)
-                .above(0.0),
-            P::integer_parameter("samples", "Samples per period of the square wave, 2 or 4", |p| &mut p.samples)
-                .at_least(2.0)
-                .at_most(4.0),
-        ]
-    },
-);
+pub const SQUARE_WAVE: &Table<SquareWaveParameters> = table![
+    P::parameter("voltage", &VOLT, "Square-wave voltage injected on the estimated d axis", |p| &mut p.voltage)
+        .above(0.0),
+    P::integer_parameter("samples", "Samples per period of the square wave, 2 or 4", |p| &mut p.samples)
+        .at_least(2.0)
+        .at_most(4.0),
+];
 
 #[cfg(test)]
 mod tests {

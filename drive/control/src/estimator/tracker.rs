@@ -11,7 +11,7 @@
 use crate::estimator::{Context, Estimate, Sample, Setup};
 use drive_base::math::at_least;
 use fmu_core::unit::RAD_PER_S;
-use fmu_core::{Fault, Field, Row, Table, enumeration};
+use fmu_core::{Fault, Field, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
@@ -113,25 +113,21 @@ impl Tracker {
 type P = Row<TrackerParameters>;
 
 /// The tracker's variables; their owner adds the prefix `tracker.`.
-pub const TRACKER: &Table<TrackerParameters> = &Table::new(
-    const {
-        &[
-            P::enumeration_parameter(
-                "kind",
-                "Tracker of angle and speed from the angle error; estimators without a tracker refuse the second",
-                &Field(|p| &mut p.kind),
-            ),
-            P::parameter(
-                "bandwidth",
-                &RAD_PER_S,
-                "Magnitude of the tracker's double or triple pole; field weakening raises it where angle errors make torque",
-                |p| &mut p.bandwidth,
-            )
-            .above(0.0)
-            .tunable(),
-        ]
-    },
-);
+pub const TRACKER: &Table<TrackerParameters> = table![
+    P::enumeration_parameter(
+        "kind",
+        "Tracker of angle and speed from the angle error; estimators without a tracker refuse the second",
+        &Field(|p| &mut p.kind),
+    ),
+    P::parameter(
+        "bandwidth",
+        &RAD_PER_S,
+        "Magnitude of the tracker's double or triple pole; field weakening raises it where angle errors make torque",
+        |p| &mut p.bandwidth,
+    )
+    .above(0.0)
+    .tunable(),
+];
 
 #[cfg(test)]
 mod tests {

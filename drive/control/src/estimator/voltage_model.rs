@@ -9,37 +9,28 @@
 //! shifts the angle by 5.5 deg and makes rated load oscillate above 0.75 of the rated speed. The derivative of the
 //! current makes the speed noisy.
 
+use crate::estimator::Context;
 use crate::estimator::emf::pole;
-use crate::estimator::follower::Follower;
+use crate::estimator::follower::{Follower, Rows};
 use crate::estimator::interval::Interval;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
 use serde::{Deserialize, Serialize};
 
-/// State kept from one sample to the next.
+/// The model as an estimator.
+pub type VoltageModel = Follower<VoltageRows>;
+
+/// The rows of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct VoltageModel {
-    follower: Follower,
-}
+pub struct VoltageRows;
 
-impl Estimating for VoltageModel {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
-        (Self { follower: Follower::at(theta, w, context.T_s) }, Estimate::new(theta, w, sample))
-    }
-
+impl Rows for VoltageRows {
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn rows(w: &mut f64, context: &Context, x: &Interval, slip: f64) -> f64 {
         let Context { motor, par, T_s, .. } = *context;
-        let f = &mut self.follower;
-        f.advance(T_s);
-        let x = Interval::new(f.theta_last, f.theta, sample, T_s);
-        let slip = par.emf.slip(&x, f.w);
         let p_i = (x.i_now - x.i_last) * (1.0 / T_s);
         let w_cal = (x.v.q() - motor.R_s * x.i.q() - motor.L_q * p_i.q() - slip * motor.L_q * x.i.d())
             / (motor.psi_M + motor.L_d * x.i.d());
-        f.w += (1.0 - pole(par.matsui.filter, T_s)) * (w_cal - f.w);
-        let dv_d = x.v.d() - motor.R_s * x.i.d() - motor.L_d * p_i.d() + (f.w * motor.L_q + slip * motor.L_d) * x.i.q();
-        f.correct(context, dv_d);
-        Estimate::new(f.theta, f.speed(), sample)
+        *w += (1.0 - pole(par.matsui.filter, T_s)) * (w_cal - *w);
+        x.v.d() - motor.R_s * x.i.d() - motor.L_d * p_i.d() + (*w * motor.L_q + slip * motor.L_d) * x.i.q()
     }
 }
 

@@ -36,6 +36,9 @@ pub fn magnitudes<S: Scalar>(i: Vector<Stator, S>) -> S {
     abs(a) + abs(b) + abs(c)
 }
 
+/// Mean of [`magnitudes`] over a period with a sinusoidal current of amplitude 1 A: 3 (2/pi).
+pub const MEAN_OF_MAGNITUDES: f64 = 3.0 * std::f64::consts::FRAC_2_PI;
+
 impl<S: Scalar> Switches<S> {
     /// These `legs` under these `inputs`. An active short circuit conducts through the transistors of one side and their
     /// diodes; upper and lower ones are taken in turns, so each leg has the mean drop of both.
@@ -65,7 +68,7 @@ mod tests {
             magnitudes(AlphaBeta::new(150.0 * theta.cos(), 150.0 * theta.sin())) * per_ampere(&devices, 1e-4, 360.0)
         };
         let mean = (0..count).map(at).sum::<f64>() / f64::from(count);
-        let closed = 3.0 * 1e4 * 25e-3 * std::f64::consts::FRAC_2_PI * 0.5 * 0.9_f64.powf(1.3);
+        let closed = MEAN_OF_MAGNITUDES * 1e4 * 25e-3 * 0.5 * 0.9_f64.powf(1.3);
         assert!((mean / closed - 1.0).abs() < 1e-5, "{mean} W, not {closed} W");
         assert_eq!(per_ampere(&devices, 1e-4, 0.0), 0.0);
     }

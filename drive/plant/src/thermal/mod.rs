@@ -184,6 +184,17 @@ impl Thermal {
         let [iron, inverter] = [losses.iron - magnet + losses.friction, losses.cond + losses.sw];
         Heat { winding: losses.cu, iron, magnet, inverter, coolant: losses.sum() }
     }
+
+    /// The heat of the parts with these `losses`, and that to the `coolant` (K) at the temperatures `at` (K).
+    #[inline]
+    pub fn heat_at<S: Scalar>(&self, coolant: S, at: &Temperatures<S>, losses: &Losses<S>) -> Heat<S> {
+        let heat = self.heat(losses);
+        match self.mode {
+            ThermalMode::Constant => heat,
+            ThermalMode::Network => Heat { coolant: self.network.to_coolant(at, coolant), ..heat },
+            ThermalMode::Imposed => Heat { coolant: 0.0.into(), ..heat },
+        }
+    }
 }
 
 /// Rejects a network without heat capacities.

@@ -65,6 +65,19 @@ impl Network {
         }
     }
 
+    /// The temperatures (K) that stay with the `heat` (W) of its parts and the coolant at `coolant` (K); not finite where a part
+    /// that is heated is insulated.
+    pub fn steady(&self, heat: &Heat, coolant: f64) -> Temperatures {
+        let above = |heat: f64, G: f64| if heat == 0.0 { 0.0 } else { heat / G };
+        let stator = coolant + above(heat.winding + heat.iron + heat.magnet, self.G_sc);
+        Temperatures {
+            winding: stator + above(heat.winding, self.G_ws),
+            stator,
+            magnet: stator + above(heat.magnet, self.G_sr),
+            inverter: coolant + above(heat.inverter, self.G_inverter),
+        }
+    }
+
     /// Heat (W) to the `coolant` (K).
     pub fn to_coolant<S: Scalar>(&self, at: &Temperatures<S>, coolant: S) -> S {
         (at.stator - coolant) * self.G_sc + (at.inverter - coolant) * self.G_inverter
@@ -212,6 +225,20 @@ mod tests {
             let closed = (coolant + p_20 * (1.0 - 20.0 * ALPHA) * r + iron / network.G_sc) / (1.0 - ALPHA * p_20 * r);
             assert!((found[0] - closed).abs() < 1e-3, "{} {closed}", found[0]);
         }
+    }
+
+    #[test]
+    fn the_steady_temperatures_stay() {
+        let network = &networks()[0];
+        let heat = heat(&Losses { cu: 228.42, iron: 61.64, cond: 30.0, sw: 10.0, friction: 4.0 });
+        let at = network.steady(&heat, 293.15);
+        let after = network.step(&at, &heat, 293.15, 300.0);
+        for (a, b) in [(at.winding, after.winding), (at.stator, after.stator), (at.magnet, after.magnet)] {
+            assert!((a - b).abs() < 1e-9 && a > 330.0, "{at:?} {after:?}");
+        }
+        assert!((at.inverter - after.inverter).abs() < 1e-9 && (at.inverter - 295.15).abs() < 1e-9, "{at:?}");
+        let insulated = Network { G_ws: 0.0, ..network.clone() };
+        assert!(!insulated.steady(&heat, 293.15).winding.is_finite());
     }
 
     #[test]

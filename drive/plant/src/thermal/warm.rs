@@ -66,13 +66,7 @@ impl PmsmPlant {
     /// The heat (W) of these `losses` (W) at the temperatures `at` (K) under these `inputs`.
     #[inline]
     pub fn heat<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Temperatures<S>, losses: &Losses<S>) -> Heat<S> {
-        let thermal = &self.parameters.thermal;
-        let heat = thermal.heat(losses);
-        match thermal.mode {
-            ThermalMode::Constant => heat,
-            ThermalMode::Network => Heat { coolant: thermal.network.to_coolant(at, inputs.thermal.coolant), ..heat },
-            ThermalMode::Imposed => Heat { coolant: 0.0.into(), ..heat },
-        }
+        self.parameters.thermal.heat_at(inputs.thermal.coolant, at, losses)
     }
 
     /// From now on, the parts have these temperatures (K).

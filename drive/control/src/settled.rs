@@ -1,0 +1,77 @@
+//! The references of a drive that has settled: the controller's limits and currents at a speed, without its sample grid.
+//!
+//! For maps and for models of the mean: the low-speed law, maximum torque per ampere and field weakening are those of a
+//! sample ([`reference`](crate::reference), [`weakening`](crate::weakening)), with the machine estimates of the parameters, and
+//! their iterations run to the end. The estimates of angle and speed are the true ones, and nothing is injected.
+
+use crate::gains::{Gains, Law};
+use crate::tables::ControllerParameters;
+use crate::weakening::Weakening;
+use drive_base::frame::DqHat;
+use serde::{Deserialize, Serialize};
+
+/// Computed from the parameters.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Settled {
+    gains: Gains,
+}
+
+impl Settled {
+    /// For these parameters.
+    pub fn new(par: &ControllerParameters) -> Self {
+        Self { gains: Gains::new(par) }
+    }
+
+    /// Gains of the speed loop, and the torque constant in N.m/A.
+    #[inline]
+    pub fn speed_loop(&self) -> (&crate::speed::SpeedGains, f64) {
+        (&self.gains.speed, self.gains.k)
+    }
+
+    /// The references at the mechanical `speed` (rad/s) on a DC link of `u_dc` (V), with the trim `trim` (V) of field weakening;
+    /// `par` are the parameters of [`new`](Self::new).
+    #[inline]
+    pub fn at<'a>(&'a self, par: &'a ControllerParameters, speed: f64, u_dc: f64, trim: f64) -> SettledAt<'a> {
+        let gains = &self.gains;
+        let (law, w) = (gains.law(par, speed), f64::from(par.motor.n_p) * speed);
+        let (weakening, (low, high)) = if par.weakening.used {
+            Weakening::settled(&gains.weakening, &par.weakening, (w, u_dc), law.limit, trim)
+        } else {
+            (Weakening::default(), (law.limit, law.limit))
+        };
+        SettledAt { gains, par, law, w, weakening, limits: [-gains.k * low, gains.k * high] }
+    }
+}
+
+/// The references at a speed and a DC-link voltage.
+#[derive(Clone, Debug)]
+pub struct SettledAt<'a> {
+    gains: &'a Gains,
+    par: &'a ControllerParameters,
+    law: Law,
+    /// Electrical speed in rad/s.
+    w: f64,
+    weakening: Weakening,
+    limits: [f64; 2],
+}
+
+impl SettledAt<'_> {
+    /// Least and greatest torque in N.m that the references may ask for: the outputs `tau_min` and `tau_max`.
+    #[inline]
+    pub fn limits(&self) -> [f64; 2] {
+        self.limits
+    }
+
+    /// Currents (A) for the torque `tau` (N.m) within the limits, and whether field weakening lowers i_d.
+    #[inline]
+    pub fn currents(&self, tau: f64) -> (DqHat, bool) {
+        let &Self { gains, par, ref law, w, ref weakening, .. } = self;
+        let plain = || gains.currents(par, law, tau / gains.k);
+        if !par.weakening.used {
+            return (plain(), false);
+        }
+        let mut state = *weakening;
+        let i = state.currents(&gains.weakening, tau, w, par.limit.i_q, par.current.mtpa, plain);
+        (i, state.weakens)
+    }
+}

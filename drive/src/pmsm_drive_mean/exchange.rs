@@ -1,0 +1,70 @@
+//! `PmsmDriveMean` for Model Exchange: the rates of its states; the energies are states too.
+//!
+//! The ramp of the speed reference follows it with the current loop's bandwidth, at most at its rate. Nothing switches, so the
+//! model has no events of its own: a solver takes steps as long as inputs and limits are smooth. The outputs of the controller,
+//! which are discrete, are those of the importer's last event.
+
+use super::{MeanOutputs, PmsmDriveMean, State};
+use drive_base::math::all_finite;
+use drive_plant::power::Energy;
+use fmu_core::unit::{Exponents, Quantity, RAD_PER_S2, SPEED, Unit, WATT};
+use fmu_core::{ContinuousTime, Elapsed, Events, Fault, Next, Outcome, State as Variable};
+
+const NEWTON_METER_PER_S: Quantity = Quantity::new("TorqueRate", Unit::si("N.m/s", Exponents::mechanical(1, 2, -3, 0)));
+const AMPERE_PER_S: Quantity = Quantity::new("CurrentRate", Unit::si("A/s", Exponents::mechanical(0, 0, -1, 1)));
+
+impl PmsmDriveMean {
+    /// The speed reference of the loop: on its ramp, if there is one.
+    fn referred(&self) -> State {
+        let ramp = self.drive.controller.speed_loop.ramp > 0.0;
+        State { speed_ref: if ramp { self.state.speed_ref } else { self.inputs.speed_ref }, ..self.state }
+    }
+}
+
+impl ContinuousTime for PmsmDriveMean {
+    const STATES: &'static [Variable<Self>] = &[
+        Variable::<Self>::new("tau_lag", &NEWTON_METER_PER_S, |m| &mut m.state.tau),
+        Variable::<Self>::new("speed_loop_integral", &AMPERE_PER_S, |m| &mut m.state.integral),
+        Variable::<Self>::new("speed_ref_ramp", &RAD_PER_S2, |m| &mut m.state.speed_ref),
+        Variable::<Self>::new("speed", &RAD_PER_S2, |m| &mut m.state.speed),
+        Variable::<Self>::new("angle", &SPEED, |m| &mut m.state.angle),
+        Variable::<Self>::new("energy_in", &WATT, |m| &mut m.energy.r#in),
+        Variable::<Self>::new("energy_mech", &WATT, |m| &mut m.energy.mech),
+        Variable::<Self>::new("energy_loss", &WATT, |m| &mut m.energy.loss),
+    ];
+
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        let state = self.referred();
+        let rates = self.rates(&state, self.temperatures());
+        let speed = self.speed(&state);
+        let energy = Energy::from(self.powers_of(&rates.point, speed));
+        let par = &self.drive.controller;
+        let to = par.current.bandwidth * (self.inputs.speed_ref - self.state.speed_ref);
+        let ramp = if par.speed_loop.ramp > 0.0 { to.clamp(-par.speed_loop.ramp, par.speed_loop.ramp) } else { to };
+        let all = [rates.tau, rates.integral, ramp, rates.speed, speed, energy.r#in, energy.mech, energy.loss];
+        if !all_finite(all) {
+            return Err(Fault::new(format!("the drive has no finite derivatives at {speed} rad/s, {} N.m", state.tau)));
+        }
+        dx.copy_from_slice(&all);
+        Ok(())
+    }
+
+    fn observe(&self, _now: Elapsed, out: &mut MeanOutputs) {
+        let (temperatures, state) = (self.temperatures(), self.referred());
+        let point = self.point_at(&state, temperatures);
+        self.show(&state, &point, temperatures, out);
+        out.drive.controller = self.held;
+    }
+}
+
+impl Events for PmsmDriveMean {
+    fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+        let state = self.referred();
+        self.held = self.controller(&state, &self.point_at(&state, self.temperatures()));
+        Ok(Outcome::default())
+    }
+
+    fn next(&self, _now: Elapsed) -> Next {
+        Next::Never
+    }
+}

@@ -1,0 +1,317 @@
+//! The model `PmsmDriveMean`: the drive for system models, which takes the place of `PmsmDrive` by its file name.
+//!
+//! It has the variables of [`PmsmDrive`](crate::PmsmDrive) and the [steady state](crate::steady) of that drive at every
+//! instant; only the torque takes time. With the torque reference t of torque mode or speed loop:
+//!
+//! ```text
+//! t_lag dx/dt = min(max(t, tau_min), tau_max) - x,  t_lag = 1 / current.bandwidth       currents, voltage, powers: those of x
+//! J d speed/dt = tau_e - friction - tau_load, or with mechanics.imposed speed_shaft
+//! ```
+//!
+//! tau_min and tau_max are those of speed and u_dc. Nothing is sampled, so a step has any length: [`advance`] is exact for x
+//! in torque mode, and stable and of second order for the speed. The energies are the integrals of the powers; all other
+//! outputs are those of the step's end. The estimates are the true values, the phase currents the sinusoids of i_d and i_q.
+//!
+//! No estimator, start, sensor error or injection, and no oscillation of the current loop: those parameters are accepted, and
+//! [`Model::has_effect`] names the others. In Model Exchange the importer integrates the same equations.
+//!
+//! [`advance`]: Model::advance
+
+mod exchange;
+mod motion;
+mod show;
+
+use crate::dc_link::{LINK, LinkParameters};
+use crate::pmsm_drive::{DriveInputs, DriveOutputs, INPUTS, OUTPUTS, in_part, same_pole_pairs};
+use crate::steady::{Condition, Point, Steady};
+use drive_base::frame::Dq;
+use drive_base::math::all_finite;
+use drive_control::model::clipped;
+use drive_control::signals::ControllerOutputs;
+use drive_control::tables as control;
+use drive_plant::PmsmPlant;
+use drive_plant::power::{Energy, Powers};
+use drive_plant::tables as plant;
+use drive_plant::thermal::{self, Temperatures, ThermalMode};
+use fmu_core::log::Warnings;
+use fmu_core::unit::{AMPERE, NEWTON_METER, SPEED};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Step, Table, Terminal, Warns};
+use motion::Passed;
+use serde::{Deserialize, Serialize};
+
+/// A drive of which only the torque and the shaft take time.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PmsmDriveMean {
+    /// Inputs, held over a communication step.
+    pub inputs: DriveInputs,
+    /// Plant and controller with their parameters.
+    pub drive: Steady,
+    /// Parameters of the DC link, without effect: `u_dc` is the voltage of the inverter.
+    pub link_parameters: LinkParameters,
+    state: State,
+    /// Energies in J.
+    energy: Energy,
+    /// Temperatures in K of the network.
+    network: Temperatures,
+    /// The point at its end, what it answers, and whether it still does: a changed parameter ends that.
+    point: Point,
+    asked: Question,
+    known: bool,
+    /// A step has been taken.
+    moved: bool,
+    /// Model Exchange: what the controller shows since the last event.
+    held: ControllerOutputs,
+    /// Time in s for which the torque reference has been beyond its limits.
+    clipped_for: f64,
+}
+
+impl Default for PmsmDriveMean {
+    fn default() -> Self {
+        let drive = Steady::default().sampled();
+        let network = drive.start_temperatures();
+        Self {
+            inputs: DriveInputs::default(),
+            drive,
+            link_parameters: LinkParameters::default(),
+            state: State::default(),
+            energy: Energy::default(),
+            network,
+            point: Point::default(),
+            asked: Question::default(),
+            known: false,
+            moved: false,
+            held: ControllerOutputs::default(),
+            clipped_for: 0.0,
+        }
+    }
+}
+
+/// What takes time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct State {
+    /// Torque of the current loop in N.m: x.
+    tau: f64,
+    /// Integral part of the speed loop in A.
+    integral: f64,
+    /// Speed reference on its ramp in rad/s.
+    speed_ref: f64,
+    /// Mechanical speed in rad/s.
+    speed: f64,
+    /// Mechanical angle in rad, not wrapped.
+    angle: f64,
+}
+
+/// What decides on a point: the condition, the torque in N.m, and whether the drive is enabled.
+type Question = (Condition, f64, bool);
+
+/// Outputs: those of `PmsmDrive`, and the flux linkage.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeanOutputs {
+    /// Outputs of plant and controller.
+    pub drive: DriveOutputs,
+    /// Flux linkage in Wb.
+    pub psi: Dq,
+}
+
+/// Temperatures that cannot be.
+const REMEDY: &str = "the network became too hot; reduce the torque, or raise thermal.G_ws and thermal.G_sc";
+
+impl PmsmDriveMean {
+    /// The temperatures (K) under the inputs.
+    fn temperatures(&self) -> Temperatures {
+        match self.drive.plant.thermal.mode {
+            ThermalMode::Constant => self.drive.start_temperatures(),
+            ThermalMode::Network => self.network,
+            ThermalMode::Imposed => self.inputs.thermal.imposed,
+        }
+    }
+
+    /// Mechanical speed (rad/s) in this state.
+    fn speed(&self, state: &State) -> f64 {
+        if self.drive.plant.mechanics.imposed { self.inputs.speed_shaft } else { state.speed }
+    }
+
+    /// The condition in this state at the temperatures `at` (K).
+    fn condition(&self, state: &State, at: Temperatures) -> Condition {
+        Condition { speed: self.speed(state), u_dc: self.inputs.u_dc, temperatures: at }
+    }
+
+    /// What decides on the point in this state at the temperatures `at` (K).
+    fn question(&self, state: &State, at: Temperatures) -> Question {
+        (self.condition(state, at), state.tau, self.inputs.enable)
+    }
+
+    /// The point in this state at the temperatures `at` (K); that of the last step's end is known.
+    fn point_at(&self, state: &State, at: Temperatures) -> Point {
+        if self.known && self.question(state, at) == self.asked {
+            return self.point;
+        }
+        let at = self.drive.at(&self.condition(state, at));
+        if self.inputs.enable { at.by_reference(state.tau) } else { at.off() }
+    }
+
+    /// The powers of a point at the mechanical `speed` (rad/s): a shaft that turns freely gives its load what the load takes.
+    fn powers_of(&self, point: &Point, speed: f64) -> Powers {
+        if self.drive.plant.mechanics.imposed {
+            return point.powers;
+        }
+        Powers { tau_shaft: self.inputs.tau_load, p_mech: self.inputs.tau_load * speed, ..point.powers }
+    }
+
+    /// Whether the torque reference is beyond its limits.
+    fn is_clipped(&self) -> bool {
+        let (tau_ref, [low, high]) = (self.inputs.tau_ref, self.point.limits);
+        self.drive.controller.speed_loop.torque_mode && self.inputs.enable && (tau_ref > high || tau_ref < low)
+    }
+
+    /// A plant with these parameters and inputs, for its rules.
+    fn plant(&self) -> PmsmPlant {
+        let mut plant = PmsmPlant::default();
+        plant.parameters.clone_from(&self.drive.plant);
+        plant.inputs.thermal = self.inputs.thermal;
+        plant
+    }
+}
+
+/// Parameters of the controller that have an effect: these, and those below these groups.
+const EFFECTIVE: [&str; 13] = [
+    "T_s",
+    "estimator",
+    "motor.",
+    "mechanics.J",
+    "initial.speed_est",
+    "limit.",
+    "speed_loop.",
+    "current.bandwidth",
+    "current.mtpa",
+    "zero_speed.",
+    "weakening.use",
+    "weakening.k_",
+    "weakening.bandwidth",
+];
+
+impl Model for PmsmDriveMean {
+    type Outputs = MeanOutputs;
+
+    const INFO: Info = Info {
+        name: "PmsmDriveMean",
+        description: "PmsmDrive for system models: its steady state at every instant, with steps of 10 ms and more",
+        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-2 },
+        documentation: crate::documentation::MEAN,
+        ..drive_base::PROJECT
+    };
+
+    const TABLE: &'static Table<Block<Self>> = TABLE;
+
+    const TERMINALS: &'static [Terminal] = crate::terminals::DRIVE;
+
+    const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
+
+    fn has_effect(parameter: &str) -> bool {
+        if let Some(name) = parameter.strip_prefix("controller.") {
+            let listed = |of: &&str| name == *of || (of.ends_with(['.', '_']) && name.starts_with(*of));
+            return !name.starts_with("limit.i_dc_") && EFFECTIVE.iter().any(listed);
+        }
+        let elsewhere = ["plant.inverter.dead_time", "plant.inverter.i_zero"].contains(&parameter);
+        !elsewhere && !parameter.starts_with("dc_link.") && !parameter.starts_with("chopper.")
+    }
+
+    fn derive(&mut self) {
+        self.drive.derive();
+        self.known = false;
+    }
+
+    fn validate(&self) -> Result<(), Fault> {
+        self.plant().validate().map_err(|fault| in_part("plant", &fault))?;
+        same_pole_pairs(&self.drive.plant, &self.drive.controller)
+    }
+
+    fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
+        self.plant().validate_for(interface).map_err(|fault| in_part("plant", &fault))
+    }
+
+    fn initialize(&mut self) {
+        let Steady { plant, controller, .. } = &self.drive;
+        let (speed, angle) = if plant.mechanics.imposed {
+            (self.inputs.speed_shaft, self.inputs.angle_shaft)
+        } else {
+            (plant.initial.speed, plant.initial.theta_e / f64::from(plant.motor.n_p))
+        };
+        self.state = State { speed, angle, speed_ref: controller.speed_est, ..State::default() };
+        (self.energy, self.network, self.moved) = (Energy::default(), self.drive.start_temperatures(), false);
+        self.clipped_for = 0.0;
+        let temperatures = self.temperatures();
+        self.point = self.point_at(&self.state, temperatures);
+        (self.asked, self.known) = (self.question(&self.state, temperatures), true);
+        self.held = self.controller(&self.state, &self.point);
+    }
+
+    fn output(&self, _now: Elapsed, out: &mut MeanOutputs) {
+        self.show(&self.state, &self.point, self.temperatures(), out);
+        out.drive.controller = self.controller(&self.state, &self.point);
+    }
+
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        let temperatures = self.temperatures();
+        let thermal = &self.drive.plant.thermal;
+        if thermal.mode == ThermalMode::Imposed {
+            let names = ["T_winding_imposed", "T_magnet_imposed"];
+            thermal::check(&self.drive.plant, &temperatures, names, "temperatures are in K (20 degC are 293.15 K)")?;
+        }
+        let Passed { state, powers, point } = self.pass(step.h, temperatures)?;
+        if !all_finite([state.tau, state.integral, state.speed, state.angle, powers.p_in, powers.p_loss]) {
+            return Err(Fault::new(format!("the drive's state left the finite numbers within a step of {} s", step.h)));
+        }
+        let total = Energy::from(powers);
+        self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
+        (self.state, self.point, self.moved) = (state, point, true);
+        (self.asked, self.known) = (self.question(&state, temperatures), true);
+        self.clipped_for = if self.is_clipped() { self.clipped_for + step.h } else { 0.0 };
+        if thermal.mode == ThermalMode::Network {
+            let (heat, coolant) = (thermal.heat(&powers.losses), self.inputs.thermal.coolant);
+            let next = thermal.network.step(&self.network, &heat, coolant, step.h);
+            thermal::check(&self.drive.plant, &next, ["T_winding", "T_magnet"], REMEDY)?;
+            self.network = next;
+        }
+        Ok(())
+    }
+}
+
+impl Warns for PmsmDriveMean {
+    fn warn(&self, log: &mut Warnings<'_>) {
+        if self.clipped_for >= 1.0 {
+            log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.point.limits));
+        }
+    }
+}
+
+type S = Row<State>;
+
+/// The states beyond those of `PmsmDrive`.
+const STATES: &Table<State> = &Table::new(
+    const {
+        &[
+            S::state("tau_lag", &NEWTON_METER, "Torque of the current loop, which follows its reference", |s| {
+                &mut s.tau
+            }),
+            S::state("speed_loop_integral", &AMPERE, "Integral part of the speed loop", |s| &mut s.integral),
+            S::state("speed_ref_ramp", &SPEED, "Speed reference on its ramp", |s| &mut s.speed_ref).nominal(100.0),
+        ]
+    },
+);
+
+type V = Row<Block<PmsmDriveMean>>;
+
+const TABLE: &Table<Block<PmsmDriveMean>> = &Table::new(
+    const {
+        &[
+            V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
+            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out.drive }),
+            V::part("", &Part { table: plant::FLUX, lens: |m| &mut m.out.psi }),
+            V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.drive.plant }),
+            V::part("controller.", &Part { table: control::PARAMETERS, lens: |m| &mut m.model.drive.controller }),
+            V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
+            V::part("", &Part { table: STATES, lens: |m| &mut m.model.state }),
+        ]
+    },
+);

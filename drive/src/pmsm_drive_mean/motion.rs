@@ -1,0 +1,234 @@
+//! Torque and shaft over time: the rates of the states, and a step of any length.
+//!
+//! The speed loop is that of the controller without its samples ([`speed`](drive_control::speed)): wanted i_q = K_p (b w_ref -
+//! w) + I, dI/dt = K_i (w_ref - w). While a limit acts and the error drives further in, I holds; it does so within 1 % of the
+//! limit's torque beyond the limit, so that the rates are continuous. With field weakening it follows the limit at the speed loop's
+//! bandwidth, as the controller's.
+//!
+//! A step: in torque mode, until a limit acts, x is an exponential, exactly, and the shaft sees its mean. Otherwise x, I and the speed
+//! go together by
+//! the Rosenbrock method of Verwer et al. 1999 (ROS2, DOI 10.1137/S1064827597326651), gamma = 1 - 1/sqrt 2: second order with any
+//! matrix, stable however fast the lag is. With the matrix M = 1 - gamma h J,
+//!
+//! ```text
+//! M k_1 = f(y),   M k_2 = f(y + h k_1) - 2 k_1,   y + h (3 k_1 + k_2)/2,   error about h (k_1 + k_2)/2
+//! ```
+//!
+//! A step with a greater error than [`SMALL`] is taken in parts. Powers are the trapezoid of both stages.
+
+use super::{PmsmDriveMean, State};
+use crate::pmsm_drive::DriveInputs;
+use crate::steady::{Point, Steady, within};
+use drive_base::math::exp;
+use drive_plant::power::Powers;
+use drive_plant::thermal::Temperatures;
+use fmu_core::{Dual, Fault};
+
+const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
+
+/// Errors that a part of a step may have: of torque and integral part over the greatest torque, of the speed over itself plus 1 rad/s.
+const SMALL: [f64; 2] = [2e-3, 1e-4];
+
+/// Shortest part in s, and most parts of a step.
+const SHORTEST: f64 = 1e-8;
+const MOST: u32 = 100_000;
+
+/// Share of the limit beyond it in which the integral part comes to its hold.
+const BAND: f64 = 0.01;
+
+/// What a step gives: the state at its end, means over it, and the point at the end.
+pub(super) struct Passed {
+    pub(super) state: State,
+    pub(super) powers: Powers,
+    pub(super) point: Point,
+}
+
+/// An instant: rates of torque (N.m/s), integral part (A/s) and speed (rad/s2), and the point.
+pub(super) struct Rates {
+    pub(super) tau: f64,
+    pub(super) integral: f64,
+    pub(super) speed: f64,
+    pub(super) point: Point,
+    /// Whether a limit acts.
+    limited: bool,
+    /// The greatest torque reference in N.m.
+    greatest: f64,
+}
+
+impl PmsmDriveMean {
+    /// The rates in this state, at the temperatures `at` (K).
+    pub(super) fn rates(&self, state: &State, at: Temperatures) -> Rates {
+        let Steady { plant, controller, .. } = &self.drive;
+        let condition = self.condition(state, at);
+        let (speed, point) = (condition.speed, self.point_at(state, at));
+        let accelerate = |point: &Point| {
+            if plant.mechanics.imposed {
+                0.0
+            } else {
+                (point.powers.tau_shaft - self.inputs.tau_load) / plant.mechanics.J
+            }
+        };
+        let lag = controller.current.bandwidth;
+        if !self.inputs.enable {
+            let (tau, integral) = (-lag * state.tau, -lag * state.integral);
+            return Rates { tau, integral, speed: accelerate(&point), point, limited: true, greatest: 0.0 };
+        }
+        let [low, high] = point.limits;
+        let greatest = high.max(-low);
+        let (wanted, integral, limited) = if controller.speed_loop.torque_mode {
+            (self.inputs.tau_ref, 0.0, true)
+        } else {
+            let (gains, k) = self.drive.settled().speed_loop();
+            let error = state.speed_ref - speed;
+            let wanted = k * gains.wanted(state.integral, state.speed_ref, speed);
+            let cut = wanted - within(wanted, point.limits);
+            let [_, k_i] = gains.slopes();
+            let share = if cut * error > 0.0 { (1.0 - cut.abs() / (BAND * greatest.max(1e-9))).max(0.0) } else { 1.0 };
+            let follow = if controller.weakening.used { controller.speed_loop.bandwidth * cut / k } else { 0.0 };
+            (wanted, share * k_i * error - follow, cut != 0.0)
+        };
+        let tau = lag * (within(wanted, point.limits) - state.tau);
+        Rates { tau, integral, speed: accelerate(&point), point, limited, greatest }
+    }
+
+    /// A step of `h` (s) with the temperatures `at` (K).
+    pub(super) fn pass(&self, h: f64, at: Temperatures) -> Result<Passed, Fault> {
+        let Steady { plant, controller, .. } = &self.drive;
+        if plant.mechanics.imposed && (controller.speed_loop.torque_mode || !self.inputs.enable) {
+            return Ok(self.pass_imposed(h, at));
+        }
+        let (mut state, mut done, mut part, mut powers) = (self.state, 0.0, h, Powers::default());
+        for _ in 0..MOST {
+            let left = h - done;
+            let ends = part >= left * (1.0 - 1e-12);
+            let length = if ends { left } else { part };
+            let (next, mean, error) = self.part(&state, length, at);
+            if error > 1.0 && length > SHORTEST {
+                part = length * (0.9 / error.sqrt()).clamp(0.05, 0.5);
+                continue;
+            }
+            done += length;
+            state = next;
+            powers = if ends && length >= h { mean } else { powers.with(mean, length / done) };
+            if ends {
+                if plant.mechanics.imposed {
+                    state = self.on_the_shaft(state, h);
+                }
+                return Ok(Passed { point: self.point_at(&state, at), state, powers });
+            }
+            part = length * (0.9 / error.max(1e-3).sqrt()).clamp(0.5, 5.0);
+        }
+        Err(Fault::new(format!("a step of {h} s takes more than {MOST} parts: the coupling is unstable; shorten it")))
+    }
+
+    /// Torque in N.m after `h` (s) from `start` (N.m) within these limits (N.m), with the held torque reference; and the share
+    /// of the start in its mean, the rest being that of the end.
+    fn lagging(&self, start: f64, limits: [f64; 2], h: f64) -> (f64, f64) {
+        let target = within(self.inputs.tau_ref, limits);
+        let x = h * self.drive.controller.current.bandwidth;
+        let decay = exp(-x);
+        // mean = target + (start - target) (1 - decay) / x, end = target + (start - target) decay.
+        let share = if x > 1e-3 { 1.0 / x - decay / (1.0 - decay) } else { 0.5 - x * (1.0 / 12.0) };
+        (target + (start - target) * decay, share)
+    }
+
+    /// `state` after a step of `h` (s) with the imposed shaft.
+    fn on_the_shaft(&self, state: State, h: f64) -> State {
+        let DriveInputs { speed_shaft, angle_shaft, .. } = self.inputs;
+        State { speed: speed_shaft, angle: angle_shaft + speed_shaft * h, ..state }
+    }
+
+    /// A step of `h` (s) in torque mode, or without torque, on an imposed shaft: nothing is integrated.
+    fn pass_imposed(&self, h: f64, at: Temperatures) -> Passed {
+        let condition = self.condition(&self.state, at);
+        let drive = self.drive.at(&condition);
+        let enable = self.inputs.enable;
+        let limits = if enable { drive.limits() } else { [0.0; 2] };
+        let (tau, share) = self.lagging(self.state.tau, limits, h);
+        let state = State { tau, integral: 0.0, speed_ref: self.inputs.speed_ref, ..self.state };
+        let point = if enable { drive.by_reference(tau) } else { drive.off() };
+        // The powers go with the torque from the last step's end to this one's.
+        Passed { state: self.on_the_shaft(state, h), powers: point.powers.with(self.point.powers, share), point }
+    }
+
+    /// A part of a step, of `h` (s): the state after it, the mean powers, and the error in units of the allowed one.
+    fn part(&self, start: &State, h: f64, at: Temperatures) -> (State, Powers, f64) {
+        let free = |[low, high]: [f64; 2]| self.inputs.tau_ref >= low && self.inputs.tau_ref <= high;
+        if !self.inputs.enable {
+            return self.part_with(start, h, at, Some([0.0; 2])).1;
+        }
+        if self.drive.controller.speed_loop.torque_mode {
+            let limits = self.point_at(start, at).limits;
+            if free(limits) {
+                let (end, found) = self.part_with(start, h, at, Some(limits));
+                if free(end) {
+                    return found;
+                }
+            }
+        }
+        self.part_with(start, h, at, None).1
+    }
+
+    /// [`part`](Self::part), with x as an exponential within these limits (N.m) or as one of the states; and the limits at
+    /// its end.
+    fn part_with(
+        &self,
+        start: &State,
+        h: f64,
+        at: Temperatures,
+        limits: Option<[f64; 2]>,
+    ) -> ([f64; 2], (State, Powers, f64)) {
+        let Steady { plant, controller, .. } = &self.drive;
+        let (imposed, exact) = (plant.mechanics.imposed, limits.is_some());
+        let mut y = *start;
+        let lag = controller.current.bandwidth;
+        if !exact {
+            // The ramp is a straight line; the part sees its middle.
+            let reached = controller.speed_loop.ramped(start.speed_ref, self.inputs.speed_ref, h);
+            y.speed_ref = 0.5 * (if controller.speed_loop.ramp > 0.0 { start.speed_ref } else { reached } + reached);
+        }
+        let mut end_tau = 0.0;
+        if let Some(limits) = limits {
+            let (end, share) = self.lagging(start.tau, limits, h);
+            (end_tau, y.tau) = (end, end + (start.tau - end) * share);
+        }
+        let one = self.rates(&y, at);
+        let (gains, k) = self.drive.settled().speed_loop();
+        let [k_p, k_i] = gains.slopes();
+        let g = GAMMA * h;
+        // Rows of the matrix: the lag, the speed loop by a limit that acts, the shaft.
+        let a = if exact { 0.0 } else { g * lag };
+        let loops = if exact || one.limited { 0.0 } else { a * k };
+        let c = if imposed { 0.0 } else { g / plant.mechanics.J };
+        let friction = plant.mechanics.friction(Dual::new(self.speed(&y), 1.0)).change;
+        let (d, e) = (c * friction, if exact || one.limited { 0.0 } else { g * k_i });
+        let solve = |tau: f64, integral: f64, speed: f64| {
+            // From the last row to the first: I = b_I - e w, x = (b_x - loops (K_p w - I)) / (1 + a).
+            let by = 1.0 / (1.0 + a);
+            let w = (speed + c * by * (tau + loops * integral)) / (1.0 + d + c * by * loops * (k_p + e));
+            let i = integral - e * w;
+            [by * (tau - loops * (k_p * w - i)), i, w]
+        };
+        let lagging = |rate: f64| if exact { 0.0 } else { rate };
+        let k_1 = solve(lagging(one.tau), one.integral, one.speed);
+        let ahead =
+            State { tau: y.tau + h * k_1[0], integral: y.integral + h * k_1[1], speed: y.speed + h * k_1[2], ..y };
+        let two = self.rates(&ahead, at);
+        let k_2 = solve(lagging(two.tau) - 2.0 * k_1[0], two.integral - 2.0 * k_1[1], two.speed - 2.0 * k_1[2]);
+        let step = |n: usize| h * (1.5 * k_1[n] + 0.5 * k_2[n]);
+        let off = |n: usize| 0.5 * h * (k_1[n] + k_2[n]).abs();
+        let speed = y.speed + step(2);
+        let torque = off(0).max(k * off(1)) / (SMALL[0] * one.greatest.max(1e-6));
+        let error = torque.max(off(2) / (SMALL[1] * (1.0 + speed.abs())));
+        let state = State {
+            tau: if exact { end_tau } else { y.tau + step(0) },
+            integral: y.integral + step(1),
+            speed_ref: controller.speed_loop.ramped(start.speed_ref, self.inputs.speed_ref, h),
+            speed,
+            angle: start.angle + 0.5 * h * (start.speed + speed),
+        };
+        let powers =
+            self.powers_of(&one.point, self.speed(&y)).with(self.powers_of(&two.point, self.speed(&ahead)), 0.5);
+        (two.point.limits, (state, powers, error))
+    }
+}

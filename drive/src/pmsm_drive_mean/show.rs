@@ -1,0 +1,80 @@
+//! The outputs of `PmsmDriveMean`: those of `PmsmDrive` with their steady meaning.
+
+use super::{MeanOutputs, PmsmDriveMean, State};
+use crate::dc_link::LinkOutputs;
+use crate::pmsm_drive::Means;
+use crate::steady::{Point, Region, within};
+use drive_base::frame::{Axis, Phases, Rotor};
+use drive_base::math::wrap;
+use drive_control::signals::{ControllerOutputs, DqParts};
+use drive_control::trip::Cause;
+use drive_plant::losses::efficiency;
+use drive_plant::power::Powers;
+use drive_plant::signals::PlantOutputs;
+use drive_plant::thermal::Temperatures;
+
+impl PmsmDriveMean {
+    /// The outputs in this state with its point and these `temperatures` (K), but for those of the controller.
+    pub(super) fn show(&self, state: &State, point: &Point, temperatures: Temperatures, out: &mut MeanOutputs) {
+        let plant = &self.drive.plant;
+        let speed = self.speed(state);
+        let powers = self.powers_of(point, speed);
+        let Powers { p_in, p_mech, p_loss, tau_shaft, losses, .. } = powers;
+        let (angle, theta, axis) = self.angle(state);
+        let Point { i, psi, tau_e, .. } = *point;
+        out.psi = psi;
+        out.drive.plant = PlantOutputs {
+            i: Phases::from_stator(axis.to_stator(i)),
+            speed,
+            angle,
+            theta_e: wrap(theta),
+            tau_e,
+            i_d: i.d(),
+            i_q: i.q(),
+            powers,
+            energy: self.energy,
+            efficiency: efficiency(p_in, p_mech),
+            temperatures,
+            heat: plant.thermal.heat_at(self.inputs.thermal.coolant, &temperatures, &losses),
+        };
+        out.drive.link = LinkOutputs { i_source: powers.i_dc, ..LinkOutputs::none() };
+        out.drive.means = if self.moved { Means { p_in, p_mech, p_loss, tau_shaft } } else { Means::default() };
+    }
+
+    /// Mechanical and electrical angle (rad) and the rotor's axis.
+    fn angle(&self, state: &State) -> (f64, f64, Axis<Rotor>) {
+        let plant = &self.drive.plant;
+        let angle = if plant.mechanics.imposed && !self.moved { self.inputs.angle_shaft } else { state.angle };
+        let theta = f64::from(plant.motor.n_p) * angle;
+        (angle, theta, Axis::at(theta))
+    }
+
+    /// What a controller shows whose estimates are the truth.
+    pub(super) fn controller(&self, state: &State, point: &Point) -> ControllerOutputs {
+        let enabled = self.inputs.enable;
+        let (_, theta, axis) = self.angle(state);
+        let Point { i, u, u_share, region, limits: [tau_min, tau_max], tau_ref, weakens, .. } = *point;
+        let parts = DqParts { d: i.d(), q: i.q() };
+        let wanted = within(state.tau, point.limits).abs();
+        ControllerOutputs {
+            u: if enabled { Phases::from_stator(axis.to_stator(u)) } else { Phases::default() },
+            speed_est: self.speed(state),
+            theta_est: wrap(theta),
+            i: parts,
+            i_ref: parts,
+            lock_lost: 0.0,
+            enabled,
+            voltage_limited: enabled && tau_ref.abs() < wanted - 1e-9 * tau_max,
+            current_limited: enabled && matches!(region, Region::Limit | Region::Mtpv),
+            tau_max,
+            tau_min,
+            u_share,
+            weakens,
+            // Without samples, nothing trips and no sensor is lost.
+            short_circuit: false,
+            tripped: Cause::None,
+            sensor_lost: false,
+            R_s_est: self.drive.controller.motor.R_s,
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! The flux linkage of a terminal current in steady state.
+//!
+//! The current at the terminals is that of the flux linkage and that of the iron, i_s = i(psi) + (h + j g) psi: g = G w, and h =
+//! 0 unless the voltage is behind the flux linkage's motion. Newton's method from psi = (L_d i_d + psi_M, L_q i_q); d i/d psi is
+//! symmetric. A machine without saturation is linear, and the first step is exact: with h = 0, i_md = (i_d + g L_q (i_q - g
+//! psi_M)) / (1 + g^2 L_d L_q). Derived here from the circuit of [`iron`](drive_plant::iron). i in A, psi in Wb, g and h in 1/H.
+
+use drive_base::frame::Dq;
+use drive_base::motor::Motor;
+use drive_plant::machine;
+use drive_plant::saturation::Saturation;
+
+/// Newton steps of a saturated machine, at most.
+const STEPS: usize = 12;
+
+/// Residue as a share of the current at which they end.
+const SMALL: f64 = 1e-14;
+
+/// The flux linkage (Wb) with the current `i_s` (A) at the terminals.
+#[inline]
+pub(super) fn linkage(motor: &Motor, saturation: &Saturation, i_s: Dq, (h, g): (f64, f64)) -> Dq {
+    let mut psi = machine::flux(motor, i_s);
+    let linear = saturation.is_none();
+    if linear && g == 0.0 {
+        return psi;
+    }
+    for _ in 0..if linear { 1 } else { STEPS } {
+        let rest =
+            if linear { Dq::ZERO } else { machine::current(motor, saturation, psi) - i_s } + psi * h + psi.turned() * g;
+        if !linear && rest.magnitude() <= SMALL * (1.0 + i_s.magnitude()) {
+            break;
+        }
+        let [d, cross, q] = saturation.slope(motor, psi);
+        let (d, q, above, below) = (d + h, q + h, cross - g, cross + g);
+        let by = 1.0 / (d * q - above * below);
+        let step = Dq::new(q * rest.d() - above * rest.q(), d * rest.q() - below * rest.d()) * by;
+        psi = psi - step;
+    }
+    psi
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn current_of_flux_and_iron_is_that_of_the_terminals() {
+        let motor = Motor::IPMSM_2_2_KW;
+        let saturations = [Saturation::default(), Saturation { s_2: 6.0, s_3: 20.0, s_dq: 5.0 }];
+        for saturation in saturations {
+            for (i, iron) in [
+                ((-3.0, 5.0), (0.02, 0.3)),
+                ((-8.0, -6.0), (-0.03, -0.4)),
+                ((0.0, 1.0), (0.0, 0.1)),
+                ((2.0, 0.0), (0.0, 0.0)),
+            ] {
+                let i_s = Dq::new(i.0, i.1);
+                let psi = linkage(&motor, &saturation, i_s, iron);
+                let found = machine::current(&motor, &saturation, psi) + psi * iron.0 + psi.turned() * iron.1;
+                assert!((found - i_s).magnitude() < 1e-12, "{saturation:?}, {iron:?}: {found:?}, not {i_s:?}");
+            }
+        }
+    }
+
+    /// The closed form of the linear machine.
+    #[test]
+    fn one_step_is_exact_for_a_linear_machine() {
+        let (motor, i_s, g) = (Motor::IPMSM_2_2_KW, Dq::new(-1.0, 5.6), 0.15);
+        let Motor { L_d, L_q, psi_M, .. } = motor;
+        let i_d = (i_s.d() + g * L_q * (i_s.q() - g * psi_M)) / (1.0 + g * g * L_d * L_q);
+        let i_q = i_s.q() - g * (psi_M + L_d * i_d);
+        let psi = linkage(&motor, &Saturation::default(), i_s, (0.0, g));
+        assert!((psi - Dq::new(psi_M + L_d * i_d, L_q * i_q)).magnitude() < 1e-15, "{psi:?}");
+    }
+}

@@ -1,0 +1,51 @@
+//! Steady temperatures: those at which the network passes on the losses that the drive has at them.
+//!
+//! A fixed point: losses at the temperatures, temperatures of the losses ([`Network::steady`]), and again. Copper loss grows by
+//! alpha p (1/G_ws + 1/G_sc) of each change of the winding, p the loss at T_ref; from 1 on, the winding runs away.
+//!
+//! [`Network::steady`]: drive_plant::thermal::network::Network::steady
+
+use super::{At, Condition, Point, Steady};
+use drive_plant::thermal::Temperatures;
+
+/// Rounds, at most, and the change in K at which they end.
+const MOST: usize = 400;
+const SMALL: f64 = 1e-7;
+
+impl Steady {
+    /// The temperatures (K) that stay at the mechanical `speed` (rad/s) on a link of `u_dc` (V) with the coolant at `coolant` (K),
+    /// and the point there that `find` chooses under the condition, for example the one of a torque at the shaft. `None` where
+    /// the winding runs away, a heated part is insulated, or `find` has no point.
+    pub fn warmed(
+        &self,
+        speed: f64,
+        u_dc: f64,
+        coolant: f64,
+        find: impl Fn(&At<'_>) -> Option<Point>,
+    ) -> Option<(Temperatures, Point)> {
+        let thermal = &self.plant.thermal;
+        let mut temperatures = Temperatures::all(coolant);
+        for _ in 0..MOST {
+            let point = find(&self.at(&Condition { speed, u_dc, temperatures }))?;
+            let next = thermal.network.steady(&thermal.heat(&point.powers.losses), coolant);
+            let parts = |t: &Temperatures| [t.winding, t.stator, t.magnet, t.inverter];
+            let works = self.works_at(&next);
+            let change = parts(&next).iter().zip(parts(&temperatures)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            if !works || !change.is_finite() {
+                return None;
+            }
+            temperatures = next;
+            if change <= SMALL {
+                return Some((temperatures, point));
+            }
+        }
+        None
+    }
+
+    /// Whether the machine has a resistance and a magnet at these temperatures (K).
+    fn works_at(&self, at: &Temperatures) -> bool {
+        let motor = self.plant.thermal.motor(&self.plant.motor, at);
+        let works = |x: f64| x > 0.0 && x.is_finite();
+        works(motor.R_s) && works(motor.psi_M)
+    }
+}

@@ -1,0 +1,241 @@
+//! A point in steady state: the controller's currents, what the machine makes of them, and the powers.
+
+use super::sampling::Held;
+use super::{Condition, SQRT_3, Steady, flux, within};
+use drive_base::frame::Dq;
+use drive_base::motor::Motor;
+use drive_control::settled::SettledAt;
+use drive_control::weakening::share;
+use drive_plant::losses::flow::Dissipation;
+use drive_plant::losses::{Losses, conduction, efficiency, switching};
+use drive_plant::machine;
+use drive_plant::power::Powers;
+use serde::{Deserialize, Serialize};
+
+/// Where a point lies among the limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Region {
+    /// The plain reference: maximum torque per ampere, i_d = 0 or the low-speed law.
+    #[default]
+    Mtpa,
+    /// Field weakening, within the limits.
+    Weakening,
+    /// The greatest torque that the voltage gives, with less than the current limit.
+    Mtpv,
+    /// The limit of current or torque, or without field weakening that of the voltage.
+    Limit,
+}
+
+impl Region {
+    /// Its name in tables: `mtpa`, `fw`, `mtpv` or `limit`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mtpa => "mtpa",
+            Self::Weakening => "fw",
+            Self::Mtpv => "mtpv",
+            Self::Limit => "limit",
+        }
+    }
+}
+
+/// A point in steady state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Torque reference of the controller in N.m, after its limits.
+    pub tau_ref: f64,
+    /// Least and greatest torque reference in N.m here: the outputs `tau_min` and `tau_max` of the drive.
+    pub limits: [f64; 2],
+    /// Current at the terminals in A, with [`Steady::sampled`] its mean.
+    pub i: Dq,
+    /// Flux linkage in Wb.
+    pub psi: Dq,
+    /// Voltage at the terminals of the machine in V.
+    pub u: Dq,
+    /// Magnitude in V of the voltage that the current loop requests: with the drop of the devices.
+    pub requested: f64,
+    /// It as a share of u_dc / sqrt 3; 0 without a link.
+    pub u_share: f64,
+    /// Electromagnetic torque in N.m.
+    pub tau_e: f64,
+    /// Powers, losses, link current and torque at the shaft.
+    pub powers: Powers,
+    /// Efficiency, 0 where there is none ([`efficiency`]).
+    pub efficiency: f64,
+    /// Where it lies.
+    pub region: Region,
+    /// Field weakening lowers i_d.
+    pub weakens: bool,
+}
+
+/// A drive under a condition.
+#[derive(Clone, Debug)]
+pub struct At<'a> {
+    pub(super) drive: &'a Steady,
+    condition: Condition,
+    /// The machine at its temperatures.
+    motor: Motor,
+    /// Electrical speed in rad/s.
+    w: f64,
+    /// Resistance in Ohm at this speed, and conductance of the iron in S.
+    R: f64,
+    G: f64,
+    held: Held,
+    /// Switching loss in W per ampere of the amplitude.
+    sw: f64,
+    friction: f64,
+    settled: SettledAt<'a>,
+}
+
+impl<'a> At<'a> {
+    pub(super) fn new(drive: &'a Steady, condition: &Condition) -> Self {
+        let Steady { plant, controller, settled, sampled } = drive;
+        let &Condition { speed, u_dc, temperatures } = condition;
+        let motor = plant.thermal.motor(&plant.motor, &temperatures);
+        let w = f64::from(motor.n_p) * speed;
+        let Dissipation { R, G } = Dissipation::at(plant, motor.R_s, w);
+        let inverter = &plant.inverter;
+        let sw = switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc) * switching::MEAN_OF_MAGNITUDES;
+        Self {
+            drive,
+            condition: *condition,
+            motor,
+            w,
+            R,
+            G: G.unwrap_or(0.0),
+            held: if *sampled { Held::new(w * controller.T_s) } else { Held::NOT },
+            sw,
+            friction: plant.mechanics.friction(speed),
+            settled: settled.at(controller, speed, u_dc, 0.0),
+        }
+    }
+
+    /// The condition.
+    pub fn condition(&self) -> &Condition {
+        &self.condition
+    }
+
+    /// Least and greatest torque reference in N.m: the outputs `tau_min` and `tau_max` of the drive.
+    #[inline]
+    pub fn limits(&self) -> [f64; 2] {
+        self.settled.limits()
+    }
+
+    /// u_dc / sqrt 3 in V.
+    pub(super) fn highest(&self) -> f64 {
+        self.condition.u_dc / SQRT_3
+    }
+
+    /// This condition, with the trim `trim` (V) of field weakening.
+    pub(super) fn trimmed(&self, trim: f64) -> Self {
+        let (Steady { controller, settled, .. }, Condition { speed, u_dc, .. }) = (self.drive, self.condition);
+        Self { settled: settled.at(controller, speed, u_dc, trim), ..self.clone() }
+    }
+
+    /// The point of the torque reference `tau` (N.m), which the limits clip.
+    #[inline]
+    pub fn by_reference(&self, tau: f64) -> Point {
+        let point = self.of_reference(tau);
+        if point.requested > self.allowed() { self.within_voltage(tau, point) } else { point }
+    }
+
+    /// The points of least and greatest torque.
+    pub fn ends(&self) -> [Point; 2] {
+        self.limits().map(|tau| self.by_reference(tau))
+    }
+
+    /// The point of the torque reference `tau` (N.m), whatever voltage it takes.
+    #[inline]
+    pub(super) fn of_reference(&self, tau: f64) -> Point {
+        let limits = self.settled.limits();
+        let [low, high] = limits;
+        let tau_ref = within(tau, limits);
+        let (i, weakens) = self.settled.currents(tau_ref);
+        let i = Dq::new(i.d(), i.q());
+        let near = 1e-9 * high.max(-low);
+        let clipped = tau_ref >= high - near || tau_ref <= low + near;
+        let below = i.dot(i) < (1.0 - 1e-9) * self.drive.controller.limit.i * self.drive.controller.limit.i;
+        let region = match (clipped, weakens) {
+            (true, true) if below => Region::Mtpv,
+            (true, _) => Region::Limit,
+            (false, true) => Region::Weakening,
+            (false, false) => Region::Mtpa,
+        };
+        Point { tau_ref, limits, region, weakens, ..self.by_current(i) }
+    }
+
+    /// The point of the current `i_s` (A) at the terminals, as the controller samples it; its torque reference is that of the
+    /// controller's estimates.
+    #[inline]
+    pub fn by_current(&self, i_s: Dq) -> Point {
+        let Self { drive: Steady { plant, controller, .. }, motor, w, R, G, held: Held { share: held, late }, .. } =
+            self;
+        let g = G * w;
+        // j times the late part.
+        let (mut psi, mut i) = (flux::linkage(motor, &plant.saturation, i_s, (-g * late[1], g * late[0])), i_s);
+        let at_sample = psi.turned() * *w;
+        let mut e = at_sample;
+        if *held < 1.0 {
+            psi = psi * (held * held);
+            e = psi.turned() * *w;
+            i = machine::current(motor, &plant.saturation, psi) + e * *G;
+        }
+        let u = i * *R + e;
+        let square = i.dot(i);
+        let (amplitude, magnitude) = (square.sqrt(), u.magnitude());
+        let (u_i, product) = (u.dot(i), amplitude * magnitude);
+        let (cond, drop) = if plant.inverter.devices.is_none() || amplitude == 0.0 {
+            (0.0, 0.0)
+        } else {
+            let cos_phi = if product > 0.0 { (u_i / product).clamp(-1.0, 1.0) } else { 1.0 };
+            let u_dc = self.condition.u_dc;
+            let m = if u_dc > 0.0 { 2.0 * magnitude / u_dc } else { 0.0 };
+            let loss = conduction::mean(&plant.inverter.devices, m, cos_phi, amplitude);
+            // The drop of the devices is a voltage along the current.
+            (loss, loss / (1.5 * square))
+        };
+        let losses = Losses {
+            cu: 1.5 * R * square,
+            // The held voltage has this magnitude all the time.
+            iron: 1.5 * G * held * held * at_sample.dot(at_sample),
+            cond,
+            sw: self.sw * amplitude,
+            friction: self.friction * self.condition.speed,
+        };
+        // The current of the flux linkage is the rest of that at the terminals.
+        let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i - e * *G);
+        let requested = (i * (R + drop) + at_sample * *held).magnitude();
+        let u_share = share(requested, self.condition.u_dc);
+        let tau_ref = controller.motor.torque(i_s.d(), i_s.q());
+        self.point(
+            Point { tau_ref, limits: self.limits(), i, psi, u, requested, u_share, tau_e, ..Point::default() },
+            losses,
+        )
+    }
+
+    /// The point with the gates off and diodes that block: iron and friction brake. Above the
+    /// [`diode_speed`](Steady::diode_speed) diodes conduct, which is not counted here.
+    pub fn off(&self) -> Point {
+        let Self { drive: Steady { plant, .. }, motor, w, G, .. } = self;
+        let i_m = plant.iron.idle_current(motor, *w);
+        let psi = machine::flux(motor, i_m);
+        let e = psi.turned() * *w;
+        let iron = 1.5 * G * e.dot(e);
+        let losses = Losses { iron, friction: self.friction * self.condition.speed, ..Losses::default() };
+        let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i_m);
+        let point = self.point(Point { psi, u: e, tau_e, ..Point::default() }, losses);
+        // Exactly nothing comes from the link.
+        Point { powers: Powers { p_in: 0.0, i_dc: 0.0, ..point.powers }, efficiency: 0.0, ..point }
+    }
+
+    /// `point` with the powers of its torque and these losses.
+    #[inline]
+    fn point(&self, point: Point, losses: Losses) -> Point {
+        let Condition { speed, u_dc, .. } = self.condition;
+        let tau_shaft = point.tau_e - self.friction;
+        let (p_mech, p_loss) = (tau_shaft * speed, losses.sum());
+        let p_in = p_mech + p_loss;
+        let i_dc = if u_dc > 0.0 { p_in / u_dc } else { 0.0 };
+        let powers = Powers { i_dc, p_in, p_mech, p_loss, losses, tau_shaft };
+        Point { powers, efficiency: efficiency(p_in, p_mech), ..point }
+    }
+}

@@ -1,0 +1,61 @@
+//! What it does that the controller holds its voltage over a sample period, while the rotor turns by x = w T_s.
+//!
+//! The controller sees the currents at its samples, between which the flux linkage in stator axes moves on a straight line
+//! instead of on its circle. Without resistance, the mean of the flux linkage in rotor axes is
+//!
+//! ```text
+//! psi = s^2 psi_sample,  u = s w psi_sample,  s = sin(x/2) / (x/2)
+//! ```
+//!
+//! so that the voltage and the mean are less than at the samples, by x^2/24 and x^2/12: 0.4 and 0.8 % for x = 0.31, 10 000 rpm
+//! with three pole pairs and 0.1 ms. The current of the mean is lower along the flux linkage, and the torque with it. The iron's
+//! current follows the voltage: at a sample, at the end of the period, it is s G j w psi_sample e^(-jx/2).
+//!
+//! Derived here.
+
+use drive_base::math::sin_cos_small;
+
+/// x up to which the drive works; beyond, the factors stay.
+const MOST: f64 = 2.0;
+
+/// The factors of a sample period in which the rotor turns by x.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    /// s.
+    pub(super) share: f64,
+    /// s e^(-jx/2).
+    pub(super) late: [f64; 2],
+}
+
+impl Held {
+    /// No sampling.
+    pub(super) const NOT: Self = Self { share: 1.0, late: [1.0, 0.0] };
+
+    /// For x in rad.
+    #[inline]
+    pub(super) fn new(x: f64) -> Self {
+        let half = 0.5 * x.clamp(-MOST, MOST);
+        let (sin, cos) = sin_cos_small(half);
+        let share = if half == 0.0 { 1.0 } else { sin / half };
+        Self { share, late: [share * cos, -share * sin] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    /// The mean of a chord of the circle in the frame that turns.
+    #[test]
+    fn the_mean_of_a_chord() {
+        for x in [1e-3_f64, 0.31, -0.8, 1.9] {
+            let count = 2000;
+            let at = |k: u32| {
+                let t = (f64::from(k) + 0.5) / f64::from(count) - 0.5;
+                let ((sin, cos), (chord_sin, chord_cos)) = ((x * t).sin_cos(), (0.5 * x).sin_cos());
+                chord_cos * cos + 2.0 * t * chord_sin * sin
+            };
+            let mean = (0..count).map(at).sum::<f64>() / f64::from(count);
+            let s = super::Held::new(x).share;
+            assert!((s * s - mean).abs() < 1e-6 * x * x, "{x}: {s}");
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Roots: the torque reference that gives a torque at the shaft, and the Illinois method for it.
+
+use super::operating::{At, Point};
+
+/// Evaluations, at most.
+const MOST: usize = 60;
+
+/// Residue of the torque at the shaft, as a share of the torque and in N.m.
+const SMALL: f64 = 1e-10;
+
+impl At<'_> {
+    /// The point with the torque `tau` (N.m) at the shaft; `None` beyond the [`ends`](Self::ends), or if `tau` is not finite.
+    pub fn by_shaft(&self, tau: f64) -> Option<Point> {
+        let allowed = SMALL * (1.0 + tau.abs());
+        let off = |point: &Point| point.powers.tau_shaft - tau;
+        // Iron and friction take about the same at every torque: two such steps are often enough.
+        let mut at = self.by_reference(tau);
+        for _ in 0..3 {
+            if off(&at).abs() <= allowed {
+                return Some(at);
+            }
+            at = self.by_reference(at.tau_ref - off(&at));
+        }
+        let [low, high] = self.ends();
+        for end in [low, high] {
+            if off(&end).abs() <= allowed.max(1e-9 * tau.abs()) {
+                return Some(end);
+            }
+        }
+        if !(off(&low) < 0.0 && off(&high) > 0.0) {
+            return None;
+        }
+        let bracket = [(low.tau_ref, off(&low)), (high.tau_ref, off(&high))];
+        Some(self.by_reference(root(bracket, allowed, |tau_ref| off(&self.by_reference(tau_ref)))))
+    }
+}
+
+/// A root of `f` between two places where its values (second of each pair) have opposite signs, to |f| <= `small`: the secant
+/// through both ends, with half the value at an end that stays (Illinois).
+pub(super) fn root([mut a, mut b]: [(f64, f64); 2], small: f64, f: impl Fn(f64) -> f64) -> f64 {
+    for _ in 0..MOST {
+        let x = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);
+        let y = f(x);
+        let resolved = (b.0 - a.0).abs() <= 4.0 * f64::EPSILON * x.abs();
+        if y.abs() <= small || resolved {
+            return x;
+        }
+        if (y > 0.0) == (b.1 > 0.0) {
+            a.1 *= 0.5;
+        } else {
+            a = b;
+        }
+        b = (x, y);
+    }
+    b.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_root_is_found_from_both_sides() {
+        let f = |x: f64| x * x * x - 2.0;
+        for (a, b) in [(0.0, 9.0), (9.0, 0.0), (1.0, 1.3)] {
+            let x = root([(a, f(a)), (b, f(b))], 1e-14, f);
+            assert!((x - 2.0_f64.cbrt()).abs() < 1e-14, "{x}");
+        }
+    }
+}

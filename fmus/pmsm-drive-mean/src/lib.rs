@@ -1,0 +1,3 @@
+//! The FMU PmsmDriveMean.
+
+fmu_export::export!(drive::PmsmDriveMean: ContinuousTime + Events + Warns);
