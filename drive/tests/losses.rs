@@ -169,7 +169,7 @@ fn the_drive_with_iron_loss_and_temperatures_is_the_same_in_model_exchange() {
         let step = Step { start: now, h: 1e-4 };
         stepped.step(&step).unwrap();
         let Block { model, out } = &mut integrated;
-        integrate::hybrid::<PmsmDrive, 4>(model, &step, 2e-6).unwrap();
+        integrate::hybrid::<PmsmDrive, 5>(model, &step, 2e-6).unwrap();
         now = step.end();
         model.observe(now, out);
         let (ours, theirs) = (stepped.out.controller.speed_est, out.controller.speed_est);

@@ -1,5 +1,6 @@
 //! The controller's parameters, and the tables of its parameters and outputs.
 
+use crate::battery::{DC_LIMITS, DcLimits};
 use crate::current::{CURRENT_LOOP, CurrentLoop};
 use crate::estimator::Kind;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
@@ -9,6 +10,7 @@ use crate::sensor::{SENSOR, Sensor};
 use crate::signals::ControllerOutputs;
 use crate::speed::{SPEED_LOOP, SpeedLoop};
 use crate::start::{START, StartParameters};
+use crate::trip::{TRIP, TripParameters};
 use crate::weakening::{WEAKENING, WeakeningParameters};
 use crate::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use drive_base::math::{at_least, at_most};
@@ -118,6 +120,8 @@ pub struct ControllerParameters {
     pub speed_est: f64,
     /// Limits of the references.
     pub limit: Limits,
+    /// Limits of the current of the DC link.
+    pub dc: DcLimits,
     /// The speed loop.
     pub speed_loop: SpeedLoop,
     /// The current loop.
@@ -132,8 +136,12 @@ pub struct ControllerParameters {
     pub polarity: PolarityParameters,
     /// Detection of a lost rotor.
     pub lock: LockParameters,
+    /// Over-current and over-voltage trips.
+    pub trip: TripParameters,
     /// Current sensors.
     pub sensor: Sensor,
+    /// Estimator that takes the place of a lost sensor; `Sensored`: none.
+    pub fallback: Kind,
     /// Dead-time compensation.
     pub compensation: Compensation,
     /// Parameters of the estimators.
@@ -154,6 +162,7 @@ impl Default for ControllerParameters {
             theta_est: 0.0,
             speed_est: 0.0,
             limit: Limits { i_q: 6.0, i: 7.5, tau: 1000.0 },
+            dc: DcLimits::default(),
             speed_loop: SpeedLoop::default(),
             current: CurrentLoop::default(),
             zero_speed: ZeroSpeed::default(),
@@ -161,10 +170,26 @@ impl Default for ControllerParameters {
             start: StartParameters::default(),
             polarity: PolarityParameters::default(),
             lock: LockParameters::default(),
+            trip: TripParameters::default(),
             sensor: Sensor::default(),
+            fallback: Kind::Sensored,
             compensation: Compensation::default(),
             estimators: EstimatorParameters::default(),
         }
+    }
+}
+
+impl ControllerParameters {
+    /// The estimator in use; `lost`: the sensor is lost.
+    #[inline]
+    pub(crate) fn estimator_with(&self, lost: bool) -> Kind {
+        if lost { self.fallback } else { self.estimator }
+    }
+
+    /// Whether the drive reads a sensor that it can lose.
+    #[inline]
+    pub(crate) fn has_fallback(&self) -> bool {
+        self.estimator == Kind::Sensored && self.fallback != Kind::Sensored
     }
 }
 
@@ -212,6 +237,7 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::parameter("limit.tau", &NEWTON_METER, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
                 .above(0.0)
                 .tunable(),
+            P::part("limit.", &Part { table: DC_LIMITS, lens: |p| &mut p.dc }),
             P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
             P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
             P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
@@ -219,7 +245,13 @@ pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
             P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
             P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
             P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
+            P::part("trip.", &Part { table: TRIP, lens: |p| &mut p.trip }),
             P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
+            P::enumeration_parameter(
+                "sensor.fallback",
+                "Estimator that takes over when sensor_valid becomes false, until enable falls; Sensored: none",
+                &Field(|p| &mut p.fallback),
+            ),
             P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
             P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
         ]
@@ -279,12 +311,25 @@ pub const STATUS: &Table<ControllerOutputs> = &Table::new(
             ),
             O::boolean_output(
                 "current_limited",
-                "limit.i_q, limit.i, limit.tau or field weakening limited the current references of the last sample",
+                "limit.i_q, limit.i, limit.tau, limit.i_dc_max, limit.i_dc_min or field weakening limited the current references of the last sample",
                 |o| &mut o.current_limited,
             ),
             O::boolean_output("weakens", "Field weakening lowers i_d_ref", |o| &mut o.weakens),
             O::boolean_output("enabled", "The controller is running: the voltage references are its own", |o| {
                 &mut o.enabled
+            }),
+            O::boolean_output(
+                "short_circuit",
+                "The inverter short-circuits the machine: all upper or all lower transistors conduct",
+                |o| &mut o.short_circuit,
+            ),
+            O::enumeration_output(
+                "tripped",
+                "What has tripped: the controller rests until enable falls",
+                &Field(|o| &mut o.tripped),
+            ),
+            O::boolean_output("sensor_lost", "The sensor is lost: sensor.fallback supplies angle and speed", |o| {
+                &mut o.sensor_lost
             }),
             O::discrete_output(
                 "lock_lost",

@@ -24,7 +24,6 @@ use crate::state::Instant;
 use crate::tables::PlantParameters;
 use crate::thermal::ThermalMode;
 use drive_base::frame::{Axis, Phases, Rotor, Vector};
-use drive_base::modulation::limit_to_hexagon;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
 use fmu_core::{
     CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar,
@@ -46,7 +45,7 @@ impl PmsmPlant {
         } else {
             (speed, angle, self.state.axis.with(theta(angle)))
         };
-        let idle = self.blocked && !inputs.enable;
+        let idle = self.blocked && inputs.is_off();
         // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
         let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
         let psi = if follows { self.idle_flux(motor, speed) } else { psi };
@@ -81,9 +80,9 @@ impl PmsmPlant {
             return blocked_rates(&machine, &shaft, at.psi, at.i, at.speed);
         }
         let path = Path {
-            u: if inputs.enable { limit_to_hexagon(inputs.u, inputs.u_dc) } else { Vector::fixed(Vector::ZERO) },
+            u: inputs.voltage(),
             dissipation: Dissipation::at(&self.parameters, machine.resistance(), machine.electrical(at.speed)),
-            drops: Switches::new(&self.parameters, inputs.enable, inputs.u_dc, self.legs(inputs)),
+            drops: Switches::of(&self.parameters, inputs, self.legs(inputs)),
         };
         let psi = machine.to_stator(at.axis, at.psi);
         Circuit { machine, path, shaft }.rates(at.axis, psi, at.speed)
@@ -94,7 +93,7 @@ impl PmsmPlant {
     fn slopes<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> [S; 4] {
         let rates = self.rates(inputs, at);
         let w = at.speed * f64::from(self.parameters.motor.n_p);
-        let d_psi = if self.blocked && !inputs.enable {
+        let d_psi = if self.blocked && inputs.is_off() {
             Vector::fixed(Vector::ZERO)
         } else {
             at.axis.from_stator(rates.d_psi) - at.psi.turned().scaled(w)
@@ -150,7 +149,7 @@ impl PmsmPlant {
 
     /// [`Events::indicators`] under these `inputs`.
     pub fn indicators_under(&self, inputs: &PlantInputs, z: &mut [f64]) {
-        if inputs.enable {
+        if !inputs.is_off() {
             z.fill(1.0);
             return;
         }
@@ -163,7 +162,7 @@ impl PmsmPlant {
 
     /// Whether the gates are off and the diodes block the current that the flux linkage has.
     pub(super) fn blocks(&self, inputs: &PlantInputs) -> bool {
-        !inputs.enable && self.diodes(inputs).0
+        inputs.is_off() && self.diodes(inputs).0
     }
 
     /// Whether diodes block the current that the flux linkage has, and by how much this is exceeded.

@@ -41,6 +41,12 @@ impl<S: Scalar> Legs<S> {
         Self { share, u: u_dc * share, i_zone: inverter.i_zero.into(), u_diode: inverter.devices.u_diode }
     }
 
+    /// For legs that short-circuit the machine: nothing switches, so no dead time costs a voltage.
+    #[inline]
+    pub fn shorted(inverter: &Inverter) -> Self {
+        Self { share: 0.0, u: 0.0.into(), i_zone: inverter.i_zero.into(), u_diode: inverter.devices.u_diode }
+    }
+
     /// For legs with the gates off, with the smallest inductance (H) of the machine.
     pub fn off(inverter: &Inverter, least_inductance: f64, u_dc: S) -> Self {
         let narrowest = u_dc * SHORTEST_SUBSTEP / S::from(least_inductance);

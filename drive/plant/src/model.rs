@@ -7,7 +7,7 @@ use crate::losses::{Losses, efficiency};
 use crate::machine::{self, Machine};
 use crate::power::Energy;
 use crate::power::Powers;
-use crate::signals::{PlantInputs, PlantOutputs};
+use crate::signals::{Gates, PlantInputs, PlantOutputs};
 use crate::state::{Instant, State};
 use crate::tables::{PARAMETERS, PlantParameters, TABLE};
 use crate::thermal::warm::Warm;
@@ -48,10 +48,10 @@ impl PmsmPlant {
     #[inline]
     pub(super) fn legs<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Legs<S> {
         let (inverter, u_dc) = (&self.parameters.inverter, inputs.u_dc);
-        if inputs.enable {
-            Legs::switching(inverter, u_dc)
-        } else {
-            Legs::off(inverter, self.warm.least_inductance, u_dc)
+        match inputs.gates() {
+            Gates::Switch => Legs::switching(inverter, u_dc),
+            Gates::Short => Legs::shorted(inverter),
+            Gates::Off => Legs::off(inverter, self.warm.least_inductance, u_dc),
         }
     }
 
@@ -75,7 +75,7 @@ impl PmsmPlant {
     pub(super) fn reached(&self) -> Instant {
         let State { psi, speed, angle, axis } = self.state;
         let i = self.machine::<false>().current(psi);
-        Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable }
+        Instant { psi, i, speed, angle, axis, idle: self.blocked && self.inputs.is_off() }
     }
 
     /// [`reached`](Self::reached) with iron loss, and the current (A) at the terminals.
@@ -215,7 +215,7 @@ impl Model for PmsmPlant {
         } else {
             (initial.speed, initial.theta_e / f64::from(motor.n_p))
         };
-        let psi = if self.inputs.enable { machine::flux(motor, Dq::ZERO) } else { self.idle_flux(motor, speed) };
+        let psi = if self.inputs.is_off() { self.idle_flux(motor, speed) } else { machine::flux(motor, Dq::ZERO) };
         self.state = State::new(motor, psi, speed, angle);
         (self.energy, self.point) = (Energy::default(), Point::default());
         self.blocked = self.blocks(&self.inputs);

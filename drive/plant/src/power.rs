@@ -28,7 +28,7 @@
 
 use crate::legs::Legs;
 use crate::losses::{LOSSES, Losses};
-use crate::signals::PlantInputs;
+use crate::signals::{Gates, PlantInputs};
 use drive_base::frame::Phases;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
 use fmu_core::{Part, Row, Scalar, Table};
@@ -97,9 +97,10 @@ pub fn dc_current<S: Scalar>(p_in: S, inputs: &PlantInputs<S>, legs: &Legs<S>, i
 /// [`dc_current`] without a link voltage.
 fn link_current<S: Scalar>(inputs: &PlantInputs<S>, legs: &Legs<S>, i: Phases<S>) -> S {
     let (u, span, zero) = (&inputs.u, inputs.u.span(), S::from(0.0));
+    let switches = inputs.gates() == Gates::Switch;
     let full = if inputs.u_dc.value() > span.value() { inputs.u_dc } else { span };
     // The currents sum to zero, so a common part of the voltages has no power.
-    let apparent = if inputs.enable { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { zero };
+    let apparent = if switches { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { zero };
     if full.value() > 0.0 { apparent / full - legs.feed(i) + zero } else { zero - legs.feed(i) }
 }
 

@@ -15,7 +15,6 @@ use crate::thermal::ThermalMode;
 use drive_base::frame::{AlphaBeta, Dq};
 use drive_base::integrate::rk4;
 use drive_base::math::all_finite;
-use drive_base::modulation::limit_to_hexagon;
 use fmu_core::Fault;
 use nalgebra::SVector;
 
@@ -146,11 +145,11 @@ impl PmsmPlant {
         }
     }
 
-    /// A communication step of `h` (s) with ideal legs, which switch.
+    /// A communication step of `h` (s) with ideal legs, which switch or short-circuit the machine.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     fn pass_ideal(&self, h: f64) -> Result<(State, Passed), Fault> {
-        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
+        let u = self.inputs.voltage();
         let mechanics = &self.parameters.mechanics;
         let is_one = Self::is_one_step(h, self.machine::<true>().electrical(self.state.speed));
         if is_one && self.parameters.is_linear() && !mechanics.imposed {
@@ -192,14 +191,14 @@ impl PmsmPlant {
     /// A communication step of `h` (s) with the gates off, with dead time or with losses.
     #[inline(never)]
     fn advance_general(&mut self, h: f64) -> Result<(), Fault> {
-        let PlantInputs { enable, u, u_dc, .. } = self.inputs;
+        let conducts = !self.inputs.is_off();
         let legs = self.legs(&self.inputs);
-        let switches = Switches::new(&self.parameters, enable, u_dc, legs);
+        let switches = Switches::of(&self.parameters, &self.inputs, legs);
         let (mut state, mut passed) = self.at_the_shaft();
         let count = self.substeps(h, state.speed, &legs, &switches)?;
         let (mut lost, mut by_iron) = (None, Dq::ZERO);
-        if enable {
-            let (step, current) = self.pass_kinks(&mut state, h, limit_to_hexagon(u, u_dc), &legs, switches);
+        if conducts {
+            let (step, current) = self.pass_kinks(&mut state, h, self.inputs.voltage(), &legs, switches);
             passed.add(&step);
             by_iron = current;
         } else {
@@ -219,7 +218,7 @@ impl PmsmPlant {
         }
         self.conclude(h, state, &passed, lost.is_some(), &legs)?;
         if !self.parameters.iron.is_none() {
-            self.by_iron = if enable { by_iron } else { self.current_by_iron() };
+            self.by_iron = if conducts { by_iron } else { self.current_by_iron() };
         }
         Ok(())
     }
@@ -228,7 +227,7 @@ impl PmsmPlant {
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     pub(super) fn advance_at_temperature(&mut self, h: f64) -> Result<(), Fault> {
-        if !(self.warm.ideal && self.inputs.enable) {
+        if !self.warm.ideal || self.inputs.is_off() {
             return self.advance_general(h);
         }
         let (state, passed) = self.pass_ideal(h)?;

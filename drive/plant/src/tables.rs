@@ -195,6 +195,12 @@ pub const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
                 &mut m.model.inputs.enable
             })
             .optional(),
+            V::boolean_input(
+                "asc",
+                "Active short circuit: all upper or all lower transistors conduct, whatever enable says",
+                |m| &mut m.model.inputs.asc,
+            )
+            .optional(),
             V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
                 &mut m.model.inputs.tau_load
             }),

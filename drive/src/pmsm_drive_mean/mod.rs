@@ -21,6 +21,7 @@ mod exchange;
 mod motion;
 mod show;
 
+use crate::dc_link::{LINK, LinkParameters};
 use crate::pmsm_drive::{DriveInputs, DriveOutputs, INPUTS, OUTPUTS, in_part, same_pole_pairs};
 use crate::steady::{Condition, Point, Steady};
 use drive_base::frame::Dq;
@@ -45,6 +46,8 @@ pub struct PmsmDriveMean {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub drive: Steady,
+    /// Parameters of the DC link, without effect: `u_dc` is the voltage of the inverter.
+    pub link_parameters: LinkParameters,
     state: State,
     /// Energies in J.
     energy: Energy,
@@ -69,6 +72,7 @@ impl Default for PmsmDriveMean {
         Self {
             inputs: DriveInputs::default(),
             drive,
+            link_parameters: LinkParameters::default(),
             state: State::default(),
             energy: Energy::default(),
             network,
@@ -205,9 +209,11 @@ impl Model for PmsmDriveMean {
 
     fn has_effect(parameter: &str) -> bool {
         if let Some(name) = parameter.strip_prefix("controller.") {
-            return EFFECTIVE.iter().any(|&of| name == of || (of.ends_with(['.', '_']) && name.starts_with(of)));
+            let listed = |of: &&str| name == *of || (of.ends_with(['.', '_']) && name.starts_with(*of));
+            return !name.starts_with("limit.i_dc_") && EFFECTIVE.iter().any(listed);
         }
-        !["plant.inverter.dead_time", "plant.inverter.i_zero"].contains(&parameter)
+        let elsewhere = ["plant.inverter.dead_time", "plant.inverter.i_zero"].contains(&parameter);
+        !elsewhere && !parameter.starts_with("dc_link.") && !parameter.starts_with("chopper.")
     }
 
     fn derive(&mut self) {
@@ -304,6 +310,7 @@ const TABLE: &Table<Block<PmsmDriveMean>> = &Table::new(
             V::part("", &Part { table: plant::FLUX, lens: |m| &mut m.out.psi }),
             V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.drive.plant }),
             V::part("controller.", &Part { table: control::PARAMETERS, lens: |m| &mut m.model.drive.controller }),
+            V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
             V::part("", &Part { table: STATES, lens: |m| &mut m.model.state }),
         ]
     },
