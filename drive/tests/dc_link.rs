@@ -79,7 +79,7 @@ impl Run {
         let (par, out) = (&self.importer.block.model.pair.plant.model.parameters, &self.importer.block.out.plant);
         let i = Dq::new(out.i_d, out.i_q);
         let kinetic = if par.mechanics.imposed { 0.0 } else { 0.5 * par.mechanics.J * out.speed * out.speed };
-        self.in_capacitor() + magnetic_energy(&par.motor, &par.saturation, flux(&par.motor, i)) + kinetic
+        self.in_capacitor() + magnetic_energy(&par.motor, par.magnetics(), flux(&par.motor, i)) + kinetic
     }
 
     /// Checks the energy balance from the source to the shaft since the start; returns the energy in J that passed.
