@@ -250,6 +250,14 @@ impl Description {
             let words = words(&variables[i].name, need, &variables)?;
             variables[i].description += &words;
         }
+        if M::CONTINUOUS {
+            let sampled =
+                |v: &&mut Variable| v.causality == Causality::Output && v.variability == Variability::Discrete;
+            let real = |v: &&mut Variable| matches!(v.kind, VariableKind::Real { .. });
+            for v in variables.iter_mut().filter(sampled).filter(real) {
+                v.variability = Variability::Continuous;
+            }
+        }
         let accepted = |v: &Variable| v.causality == Causality::Parameter && !M::has_effect(&v.name);
         for v in variables.iter_mut().filter(|v| accepted(v)) {
             v.description += "; accepted, without effect in this model";

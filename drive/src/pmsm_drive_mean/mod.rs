@@ -207,6 +207,8 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
+    const CONTINUOUS: bool = true;
+
     fn has_effect(parameter: &str) -> bool {
         if let Some(name) = parameter.strip_prefix("controller.") {
             let listed = |of: &&str| name == *of || (of.ends_with(['.', '_']) && name.starts_with(*of));
