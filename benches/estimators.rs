@@ -6,8 +6,8 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use drive::estimator::{Context, Estimator, Injection, Kind, Sample};
 use drive::frame::{AlphaBeta, Axis, Dq, DqHat, Rotor};
-use drive::plant::machine::{self, flux};
-use drive::plant::saturation::Saturation;
+
+use drive::plant::machine::{self, Magnetics, flux};
 use drive_study::runner;
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -29,7 +29,7 @@ fn record(kind: Kind, context: &Context) -> Vec<Sample> {
     let current = |theta: f64, injected: AlphaBeta| {
         let axis = Axis::<Rotor>::at(theta);
         let psi = flux(&motor, i) + axis.from_stator(injected);
-        axis.to_stator(machine::current(&motor, &Saturation::default(), psi))
+        axis.to_stator(machine::current(&motor, Magnetics::Linear, psi))
     };
     let tau_ref = motor.torque(i.d(), i.q());
     let first = Sample { i: at(0.0, i), i_last: at(-W * T_S, i), tau_ref, u_dc: 540.0, w_meas: W, ..Sample::default() };

@@ -4,6 +4,7 @@
 
 use crate::pack::TOOL;
 use drive_study::tune::rules::{Setting, Value};
+use fmu_core::variable::position;
 use std::fmt::Write as _;
 
 const HEAD: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<ssv:ParameterSet \
@@ -22,18 +23,21 @@ pub fn text(name: &str, settings: &[Setting]) -> String {
 /// The file of any names and values.
 pub fn text_of<'a>(name: &str, values: impl IntoIterator<Item = (&'a str, &'a Value)>) -> String {
     let mut text = format!("{HEAD} name=\"{}\" generationTool=\"{}\">\n  <ssv:Parameters>\n", escape(name), TOOL);
+    let mut put = |name: &str, kind: &str, value: &str| {
+        let name = escape(name);
+        let _ = writeln!(text, "    <ssv:Parameter name=\"{name}\"><ssv:{kind} value=\"{value}\"/></ssv:Parameter>");
+    };
     for (name, value) in values {
-        let (kind, value) = match value {
-            Value::Real(x) => ("Real", x.to_string()),
-            Value::Integer(i) => ("Integer", i.to_string()),
-            Value::Boolean(b) => ("Boolean", b.to_string()),
-            Value::Item(item) => ("Enumeration", escape(item)),
-        };
-        let _ = writeln!(
-            text,
-            "    <ssv:Parameter name=\"{}\"><ssv:{kind} value=\"{value}\"/></ssv:Parameter>",
-            escape(name)
-        );
+        match value {
+            Value::Real(x) => put(name, "Real", &x.to_string()),
+            // SSP 1.0 has no arrays: one parameter for each element, with the name that it has in FMI 2.0.
+            Value::Reals(all) => all.iter().enumerate().for_each(|(element, x)| {
+                put(&format!("{name}{}", position(&[all.len()], element)), "Real", &x.to_string());
+            }),
+            Value::Integer(i) => put(name, "Integer", &i.to_string()),
+            Value::Boolean(b) => put(name, "Boolean", &b.to_string()),
+            Value::Item(item) => put(name, "Enumeration", &escape(item)),
+        }
     }
     text.push_str("  </ssv:Parameters>\n</ssv:ParameterSet>\n");
     text

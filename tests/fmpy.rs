@@ -27,6 +27,11 @@ fn losses_and_temperatures() {
 }
 
 #[test]
+fn links_limits_and_faults() {
+    pytest("fmpy", "protection", &["test_protection.py"], &[]);
+}
+
+#[test]
 fn drive_trains() {
     pytest("fmpy", "trains", &["test_drive_train.py"], &[]);
 }

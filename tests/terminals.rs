@@ -40,6 +40,7 @@ fn the_pair_connected_by_terminals_alone_is_the_one_wired_by_hand() {
             ("c.u_b", "p.u_b"),
             ("c.u_c", "p.u_c"),
             ("c.enabled", "p.enable"),
+            ("c.short_circuit", "p.asc"),
             ("p.i_a", "c.i_a"),
             ("p.i_b", "c.i_b"),
             ("p.i_c", "c.i_c"),
@@ -50,7 +51,7 @@ fn the_pair_connected_by_terminals_alone_is_the_one_wired_by_hand() {
         }
         let mut by_terminals = system(standard);
         // Either side may come first.
-        assert_eq!(by_terminals.connect_terminals("p.phases", "c.phases").unwrap().len(), 7);
+        assert_eq!(by_terminals.connect_terminals("p.phases", "c.phases").unwrap().len(), 8);
         assert_eq!(by_terminals.connect_terminals("c.sensor", "p.sensor").unwrap().len(), 2);
         let (by_hand, by_terminals) = (run(by_hand), run(by_terminals));
         assert_eq!(by_hand.columns.len(), by_terminals.columns.len());

@@ -13,6 +13,7 @@
 
 pub mod atlas;
 pub mod compare;
+pub mod csv;
 pub mod expected;
 pub mod ink;
 pub mod map;

@@ -40,7 +40,7 @@ fn every_scenario_and_any_number_of_threads() {
         speed: vec![-0.01],
         theta: vec![0.0],
     };
-    let drives = [of("Rasmussen"), of("ExtendedEmf"), of("SquareWaveInjection")];
+    let drives = vec![of("Rasmussen"), of("ExtendedEmf"), of("SquareWaveInjection")];
     let cells = grid.cells(1).unwrap();
     let files = |threads| {
         let atlases = atlas::run(&drives, &cells, threads, || ()).unwrap();

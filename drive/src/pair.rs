@@ -70,6 +70,14 @@ impl Pair {
         controller.model.inputs.measure(plant.model.measured());
     }
 
+    /// The voltage `u_dc` (V) of the link, and whether the controller operates, from this instant on.
+    #[inline]
+    pub(crate) fn supply(&mut self, u_dc: f64, enable: bool) {
+        let controller = &mut self.controller.model.inputs;
+        (controller.u_dc, controller.enable) = (u_dc, enable);
+        self.plant.model.inputs.u_dc = u_dc;
+    }
+
     /// Advances both by `h` (s); the outputs stay.
     ///
     /// # Errors

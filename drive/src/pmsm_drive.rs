@@ -11,12 +11,17 @@
 
 mod exchange;
 mod period;
+#[cfg(test)]
+mod tests;
 
 pub use period::Means;
 
+use crate::dc_link::ripple::ripple;
+use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
 use crate::pair::Pair;
 #[cfg(doc)]
 use crate::{PmsmPlant, SensorlessController};
+use drive_base::connection::Commanded;
 use drive_base::frame::Phases;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ControllerParameters, ESTIMATES, STATUS, VOLTAGES};
@@ -26,7 +31,8 @@ use drive_plant::thermal::{THERMAL_INPUTS, ThermalInputs};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
-    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, SampleGrid, Step, Table, Terminal, Warns,
+    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, SampleGrid, Sampled, Step, Table, Terminal,
+    Warns, table,
 };
 use period::{MEANS, Period};
 use serde::{Deserialize, Serialize};
@@ -51,6 +57,10 @@ pub struct DriveInputs {
     pub tau_ref: f64,
     /// The drive operates; false: the controller stays in its initial state and the gates are off.
     pub enable: bool,
+    /// Active short circuit.
+    pub asc: bool,
+    /// The sensor of the shaft works.
+    pub sensor_valid: bool,
     /// Temperatures in K.
     pub thermal: ThermalInputs,
 }
@@ -65,6 +75,8 @@ impl Default for DriveInputs {
             angle_shaft: 0.0,
             tau_ref: 0.0,
             enable: true,
+            asc: false,
+            sensor_valid: true,
             thermal: ThermalInputs::default(),
         }
     }
@@ -79,6 +91,8 @@ pub struct DriveOutputs {
     pub controller: ControllerOutputs,
     /// Means over the last sample period, in both interfaces.
     pub means: Means,
+    /// The DC link's.
+    pub link: LinkOutputs,
 }
 
 /// A complete sensorless drive.
@@ -88,8 +102,12 @@ pub struct PmsmDrive {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,
-    /// Model Exchange: voltages of the plant, and whether its gates switch, since the last sample.
-    before: (Phases, bool),
+    /// Parameters of the DC link.
+    pub link_parameters: LinkParameters,
+    /// The DC link.
+    link: Link,
+    /// Model Exchange: the command that acts in the plant since the last sample.
+    before: Commanded,
     period: Period,
     overload: Overload,
 }
@@ -110,20 +128,43 @@ const FAR: f64 = 2.0;
 
 impl PmsmDrive {
     fn set_inputs(&mut self) {
-        let Self { inputs, pair, .. } = self;
-        pair.set_inputs(inputs.speed_ref, inputs.tau_load, inputs.u_dc);
+        let u_dc = self.link_voltage();
+        let Self { inputs, pair, link, .. } = self;
+        pair.set_inputs(inputs.speed_ref, inputs.tau_load, u_dc);
         let plant = &mut pair.plant.model.inputs;
         (plant.speed_shaft, plant.angle_shaft, plant.thermal) =
             (inputs.speed_shaft, inputs.angle_shaft, inputs.thermal);
         let controller = &mut pair.controller.model.inputs;
-        (controller.tau_ref, controller.enable) = (inputs.tau_ref, inputs.enable);
+        (controller.tau_ref, controller.asc) = (inputs.tau_ref, inputs.asc);
+        // There is no voltage to control with.
+        controller.enable = inputs.enable && !link.precharges;
+        controller.sensor_valid = inputs.sensor_valid;
+    }
+
+    /// Voltage of the DC-link capacitor in V; 0 without the link.
+    pub fn link_u(&self) -> f64 {
+        self.link.u
+    }
+
+    /// Voltage (V) of inverter and controller.
+    #[inline]
+    fn link_voltage(&self) -> f64 {
+        // A solver may try voltages below 0, which the diodes of the inverter do not let pass.
+        if self.link_parameters.dc_link.used { self.link.u.max(0.0) } else { self.inputs.u_dc }
+    }
+
+    /// Ripple current (A, rms) of the capacitor with the `currents` (A) of the machine and the power `p_in` (W).
+    fn ripple(&self, currents: Phases, p_in: f64) -> f64 {
+        let inputs = &self.pair.plant.model.inputs;
+        ripple(inputs.voltage(), currents.to_stator(), p_in, inputs.u_dc)
     }
 
     /// The plant's inputs: those of the drive, and the voltages that the controller shows.
     fn plant_inputs(&self) -> PlantInputs {
-        let DriveInputs { tau_load, u_dc, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
-        let PlantInputs { u, enable, .. } = self.pair.plant.model.inputs;
-        PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, thermal }
+        let DriveInputs { tau_load, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
+        let u_dc = self.link_voltage();
+        let PlantInputs { u, enable, asc, .. } = self.pair.plant.model.inputs;
+        PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, asc, thermal }
     }
 
     /// Watches the load after a step; a start sequence and a drive at rest have no torque limits.
@@ -156,7 +197,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 15;
+    const STATE_VERSION: u16 = 17;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -167,7 +208,9 @@ impl Model for PmsmDrive {
         self.pair.plant.model.validate().map_err(|fault| in_part("plant", &fault))?;
         self.pair.controller.model.validate_on(self.inputs.u_dc).map_err(|fault| in_part("controller", &fault))?;
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
-        same_pole_pairs(plant, controller)
+        same_pole_pairs(plant, controller)?;
+        let starts = self.pair.controller.model.samples() == 0;
+        self.link_parameters.validate(if starts { self.inputs.u_dc } else { 0.0 })
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
@@ -176,11 +219,12 @@ impl Model for PmsmDrive {
     }
 
     fn initialize(&mut self) {
+        self.link = Link::new(&self.link_parameters, self.inputs.u_dc);
         self.set_inputs();
         self.pair.initialize();
         self.period = Period::new(self.pair.plant.out.powers);
         self.overload = Overload::default();
-        self.before = (self.pair.plant.model.inputs.u, self.pair.plant.model.inputs.enable);
+        self.before = self.pair.plant.model.inputs.commanded();
     }
 
     fn output(&self, _now: Elapsed, out: &mut DriveOutputs) {
@@ -188,11 +232,21 @@ impl Model for PmsmDrive {
         out.plant = plant.with(powers, model.heat(&model.inputs, &plant.temperatures, &powers.losses));
         out.controller.clone_from(&self.pair.controller.out);
         out.means = self.period.means();
+        out.link = if self.link_parameters.dc_link.used {
+            LinkOutputs {
+                i_rms: self.ripple(out.plant.i, powers.p_in),
+                ..self.link.reached(&self.link_parameters, self.inputs.u_dc)
+            }
+        } else {
+            LinkOutputs { u: self.link.u, i_source: powers.i_dc, ..LinkOutputs::default() }
+        };
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         self.set_inputs();
-        let Self { inputs, pair, period, .. } = self;
+        self.link.begin(step.h);
+        let Self { inputs, pair, period, link, link_parameters, .. } = self;
+        let linked = link_parameters.dc_link.used;
         let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
         let end = step.end();
         if step.h > MAX_SAMPLES * grid.period {
@@ -213,6 +267,12 @@ impl Model for PmsmDrive {
             pair.plant.model.inputs.angle_shaft = inputs.angle_shaft + inputs.speed_shaft * before.since(step.start);
             let ends = next <= left + grid.width();
             let h = if ends { next } else { left };
+            let (h, ends) = if linked {
+                let longest = link.longest(link_parameters, h, grid.period, pair.plant.model.powers().i_dc);
+                (longest, ends && longest >= h)
+            } else {
+                (h, ends)
+            };
             // Between the samples of a step, nobody reads the outputs.
             if std::mem::take(&mut outputs_are_present) {
                 pair.exchange();
@@ -222,6 +282,9 @@ impl Model for PmsmDrive {
             pair.advance(h)?;
             at_sample = ends;
             period.add(pair.plant.model.powers(), h, ends);
+            if linked {
+                supply(link, link_parameters, inputs, pair, (h, ends));
+            }
             if pair.now == before {
                 return Err(Fault::new(format!(
                     "{} s after the start, T_s is below the resolution of time",
@@ -233,6 +296,16 @@ impl Model for PmsmDrive {
         self.watch_load();
         Ok(())
     }
+}
+
+/// The `link` supplies the `pair` over a piece of `h` (s), at whose end a sample period may end.
+#[inline(never)]
+fn supply(link: &mut Link, par: &LinkParameters, inputs: &DriveInputs, pair: &mut Pair, (h, ends): (f64, bool)) {
+    link.advance(par, inputs.u_dc, h, pair.plant.model.powers().p_in * h);
+    if ends {
+        link.sample(inputs.u_dc);
+    }
+    pair.supply(link.u, inputs.enable && !link.precharges);
 }
 
 /// Refuses a controller with another number of pole pairs than the machine.
@@ -268,6 +341,7 @@ impl Warns for PmsmDrive {
                 )
             });
         }
+        plant.warn(log);
         self.pair.controller.model.warn(log);
         if self.overload == Overload::Now {
             let ControllerOutputs { tau_max, tau_min, .. } = self.pair.controller.out;
@@ -293,9 +367,7 @@ fn to_next_sample(grid: SampleGrid, now: Elapsed) -> f64 {
 type I = Row<DriveInputs>;
 
 /// The inputs, of `PmsmDrive` and of `PmsmDriveMean`.
-pub(crate) const INPUTS: &Table<DriveInputs> = &Table::new(
-    const {
-        &[
+pub(crate) const INPUTS: &Table<DriveInputs> = table![
             I::input("speed_ref", &SPEED, "Mechanical speed reference", |i| &mut i.speed_ref),
             I::input("tau_ref", &NEWTON_METER, "Torque reference", |i| &mut i.tau_ref)
                 .read_with("speed_loop.torque_mode", "true"),
@@ -305,8 +377,26 @@ pub(crate) const INPUTS: &Table<DriveInputs> = &Table::new(
                 |i| &mut i.enable,
             )
             .optional(),
-            I::input("u_dc", &VOLT, "DC-link voltage of inverter and controller", |i| &mut i.u_dc)
-                .at_least(0.0),
+            I::boolean_input(
+                "asc",
+                "Active short circuit, whatever enable says: all upper or all lower transistors conduct once short_circuit is true, and \
+                 the controller stays in its initial state",
+                |i| &mut i.asc,
+            )
+            .optional(),
+            I::boolean_input(
+                "sensor_valid",
+                "The sensor of the shaft works; false: controller.sensor.fallback takes over from it, if there is one",
+                |i| &mut i.sensor_valid,
+            )
+            .optional(),
+            I::input(
+                "u_dc",
+                &VOLT,
+                "DC-link voltage of inverter and controller; with dc_link.use, voltage of the source of the DC link",
+                |i| &mut i.u_dc,
+            )
+            .at_least(0.0),
             I::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |i| {
                 &mut i.tau_load
             }),
@@ -316,150 +406,41 @@ pub(crate) const INPUTS: &Table<DriveInputs> = &Table::new(
                 .unbounded()
                 .read_with("mechanics.imposed", "true"),
             I::part("", &Part { table: THERMAL_INPUTS, lens: |i| &mut i.thermal }),
-        ]
-    },
-);
+        ];
 
 type V = Row<Block<PmsmDrive>>;
 
-const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
-    const {
-        &[
-            V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
-            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: plant::FLUX, lens: |m| m.model.pair.plant.model.flux_mut() }),
-            V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
-            V::part(
-                "controller.",
-                &Part { table: control::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
-            ),
-        ]
-    },
-);
+const TABLE: &Table<Block<PmsmDrive>> = table![
+    V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
+    V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+    V::part("", &Part { table: plant::FLUX, lens: |m| m.model.pair.plant.model.flux_mut() }),
+    V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
+    V::part(
+        "controller.",
+        &Part { table: control::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
+    ),
+    V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
+];
 
 type D = Row<DriveOutputs>;
 
 /// The outputs, of `PmsmDrive` and of `PmsmDriveMean`.
-pub(crate) const OUTPUTS: &Table<DriveOutputs> = &Table::new(
-    const {
-        &[
-            D::part("", &Part { table: plant::OUTPUTS, lens: |o| &mut o.plant }),
-            D::part("", &Part { table: MEANS, lens: |o| &mut o.means }),
-            D::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |o| &mut o.controller }),
-        ]
-    },
-);
+pub(crate) const OUTPUTS: &Table<DriveOutputs> = table![
+    D::part("", &Part { table: plant::OUTPUTS, lens: |o| &mut o.plant }),
+    D::part("", &Part { table: MEANS, lens: |o| &mut o.means }),
+    D::part("", &Part { table: LINK_OUTPUTS, lens: |o| &mut o.link }),
+    D::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |o| &mut o.controller }),
+];
 
 type O = Row<ControllerOutputs>;
 
 /// The controller's outputs, renamed so that `i_d` and `i_q` remain the plant's.
-const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
-    const {
-        &[
-            O::part("", &Part { table: ESTIMATES, lens: |o| o }),
-            O::discrete_output("i_d_est", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| {
-                &mut o.i.d
-            }),
-            O::discrete_output("i_q_est", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| {
-                &mut o.i.q
-            }),
-            O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
-            O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
-            O::part("", &Part { table: VOLTAGES, lens: |o| o }),
-            O::part("", &Part { table: STATUS, lens: |o| o }),
-        ]
-    },
-);
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const RPM: f64 = std::f64::consts::PI / 30.0;
-
-    /// Times in s of a speed step and a load step, on the grid of every step size compared.
-    type Events = (f64, f64);
-
-    /// Speed reference and load at `t` (s).
-    fn inputs(t: f64, events: Events) -> (f64, f64) {
-        let t = t + 1e-9;
-        (if t < events.0 { 0.0 } else { 500.0 * RPM }, if t < events.1 { 0.0 } else { 1.5 })
-    }
-
-    fn drive(h: f64, steps: u32, events: Events) -> Block<PmsmDrive> {
-        let mut block = Block::<PmsmDrive>::default();
-        block.model.pair.plant.model.parameters.initial.theta_e = std::f64::consts::PI;
-        block.initialize();
-        block.model.validate().unwrap();
-        let mut now = Elapsed::ZERO;
-        for k in 0..steps {
-            (block.model.inputs.speed_ref, block.model.inputs.tau_load) = inputs(f64::from(k) * h, events);
-            let step = Step { start: now, h };
-            block.step(&step).unwrap();
-            now = step.end();
-        }
-        block
-    }
-
-    #[test]
-    fn steps_of_many_samples_are_the_pair_bit_for_bit() {
-        let (mut pair, events) = (Pair::default(), (0.05, 0.4));
-        pair.plant.model.parameters.initial.theta_e = std::f64::consts::PI;
-        pair.start().unwrap();
-        for k in 0..6000_u32 {
-            let (speed_ref, tau_load) = inputs(f64::from(k) * 1e-4, events);
-            pair.set_inputs(speed_ref, tau_load, 325.0);
-            pair.step(1e-4).unwrap();
-        }
-        for (h, steps) in [(1e-4, 6000), (1e-3, 600), (1e-2, 60)] {
-            let out = drive(h, steps, events).out;
-            assert_eq!((&out.plant, &out.controller), (&pair.plant.out, &pair.controller.out), "h = {h}");
-        }
-        assert!((pair.plant.out.speed - 500.0 * RPM).abs() < 15.0 * RPM, "{}", pair.plant.out.speed / RPM);
-    }
-
-    #[test]
-    fn other_steps_also_stop_at_the_samples() {
-        // 0.7 and 3.3 samples: the pair would lose the angle or the drive; here only rounding of the pieces differs.
-        let events = (0.0504, 0.399);
-        let reference = drive(1e-4, 4200, events).out.plant;
-        for (h, steps) in [(0.7e-4, 6000), (3.5e-4, 1200), (1.4e-3, 300)] {
-            let out = drive(h, steps, events).out.plant;
-            assert!((out.speed - reference.speed).abs() < 1e-4, "h = {h}: {} {}", out.speed, reference.speed);
-            assert!((out.i_q - reference.i_q).abs() < 1e-4, "h = {h}: {} {}", out.i_q, reference.i_q);
-        }
-    }
-
-    #[test]
-    fn an_imposed_shaft_turns_on_within_a_step() {
-        // A drive train accelerates for 0.3 s in steps of 1 ms; the drive takes each in one step, the pair in ten.
-        let mut pair = Pair::default();
-        pair.plant.model.parameters.mechanics.imposed = true;
-        // With a sensor: a sensorless drive can lose a shaft that does not yield, and then amplifies rounding errors.
-        pair.controller.model.parameters.estimator = crate::estimator::Kind::Sensored;
-        let mut drive = Block::<PmsmDrive>::default();
-        drive.model.pair = pair.clone();
-        drive.initialize();
-        pair.start().unwrap();
-        let (mut now, mut angle) = (Elapsed::ZERO, 0.0);
-        for k in 0..300_u32 {
-            let speed = 0.2 * f64::from(k);
-            let inputs = &mut drive.model.inputs;
-            (inputs.speed_ref, inputs.speed_shaft, inputs.angle_shaft) = (speed + 1.0, speed, angle);
-            let step = Step { start: now, h: 1e-3 };
-            drive.step(&step).unwrap();
-            now = step.end();
-            for sample in 0..10_u32 {
-                pair.set_inputs(speed + 1.0, 0.0, 325.0);
-                let inputs = &mut pair.plant.model.inputs;
-                (inputs.speed_shaft, inputs.angle_shaft) = (speed, angle + speed * 1e-4 * f64::from(sample));
-                pair.step(1e-4).unwrap();
-            }
-            angle += 1e-3 * speed;
-            let (ours, theirs) = (&drive.out.plant, &pair.plant.out);
-            assert!((ours.angle - angle).abs() < 1e-9 && (ours.theta_e - theirs.theta_e).abs() < 1e-9);
-            assert!((ours.powers.tau_shaft - theirs.powers.tau_shaft).abs() < 1e-6, "{ours:?} {theirs:?}");
-        }
-        assert!(drive.out.plant.powers.tau_shaft.abs() > 1.0, "{:?}", drive.out.plant);
-    }
-}
+const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = table![
+    O::part("", &Part { table: ESTIMATES, lens: |o| o }),
+    O::discrete_output("i_d_est", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| { &mut o.i.d }),
+    O::discrete_output("i_q_est", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| { &mut o.i.q }),
+    O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
+    O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
+    O::part("", &Part { table: VOLTAGES, lens: |o| o }),
+    O::part("", &Part { table: STATUS, lens: |o| o }),
+];

@@ -3,6 +3,8 @@
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 
+mod importer;
+
 use drive::control::current::CurrentLoop;
 use drive::control::tables::Limits;
 use drive::estimator::Kind as Estimator;
@@ -12,7 +14,8 @@ use drive::plant::power::Energy;
 use drive::plant::tables::PlantParameters;
 use drive::pmsm_drive::Means;
 use drive::{PmsmDrive, PmsmPlant};
-use fmu_core::{Block, CompletedSteps, ContinuousTime, Elapsed, Events, Model, Step};
+use fmu_core::{Block, CompletedSteps, ContinuousTime, Elapsed, Events, Step};
+use importer::Importer;
 
 const RPM: f64 = std::f64::consts::PI / 30.0;
 
@@ -162,79 +165,6 @@ fn a_free_shaft_has_the_torque_of_the_load() {
         let step = Step { start: Elapsed::ZERO.plus(1e-3 * f64::from(k)), h: 1e-3 };
         drive.step(&step).unwrap();
         assert_eq!(drive.out.plant.powers.tau_shaft.to_bits(), drive.model.inputs.tau_load.to_bits());
-    }
-}
-
-/// An importer for Model Exchange: Runge-Kutta steps of at most `longest` (s), which land on the model's events.
-struct Importer<M: Model> {
-    block: Block<M>,
-    now: Elapsed,
-    longest: f64,
-    /// Number of integration steps that are told as one; 0: no completed step is told.
-    told: u32,
-    done: u32,
-}
-
-impl<M: CompletedSteps + Events> Importer<M> {
-    fn new(model: M, longest: f64, told: u32) -> Self {
-        let mut block = Block { model, ..Block::default() };
-        block.initialize();
-        let mut importer = Self { block, now: Elapsed::ZERO, longest, told, done: 0 };
-        importer.event(|_| ());
-        importer
-    }
-
-    /// An event, with inputs that jump.
-    fn event(&mut self, set: impl FnOnce(&mut M)) {
-        let (model, now) = (&mut self.block.model, self.now);
-        model.complete(now).unwrap();
-        model.begin(now);
-        set(model);
-        while model.event(now).unwrap().again {}
-        model.complete(now).unwrap();
-    }
-
-    /// Integrates over `h` (s) with inputs that `set` gives at every time (s), with an event at its end if one is due.
-    fn run(&mut self, h: f64, set: impl Fn(&mut M, f64)) {
-        let end = self.now.plus(h);
-        loop {
-            let left = end.since(self.now);
-            if left <= 1e-9 * h {
-                break;
-            }
-            let next = self.block.model.next(self.now).left(self.now).unwrap_or(left).min(left);
-            let steps = (next / self.longest - 1e-9).ceil().max(1.0);
-            self.rk4(next / steps, &set);
-            self.done += 1;
-            if self.told > 0 && self.done.is_multiple_of(self.told) {
-                self.block.model.complete(self.now).unwrap();
-            }
-            if self.block.model.next(self.now).is_due(self.now) {
-                self.event(|_| ());
-            }
-        }
-        self.block.model.observe(self.now, &mut self.block.out);
-    }
-
-    fn rk4(&mut self, h: f64, set: &impl Fn(&mut M, f64)) {
-        let (model, start) = (&mut self.block.model, self.now);
-        let x: [f64; 4] = std::array::from_fn(|i| *(M::STATES[i].at)(model));
-        let (mut sum, mut k) = ([0.0; 4], [0.0; 4]);
-        let at = |model: &mut M, share: f64, k: &[f64; 4]| {
-            for (i, state) in M::STATES.iter().enumerate() {
-                *(state.at)(model) = x[i] + share * h * k[i];
-            }
-            model.settle();
-            let now = start.plus(share * h);
-            set(model, now.seconds());
-            now
-        };
-        for (share, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
-            let now = at(model, share, &k);
-            model.derivatives(now, &mut k).unwrap();
-            sum = std::array::from_fn(|i| sum[i] + weight * k[i]);
-        }
-        self.now = at(model, 1.0, &sum.map(|k| k / 6.0));
     }
 }
 

@@ -66,9 +66,10 @@ fn the_powers_are_balanced_at_every_instant() {
         let mut dx = [0.0; 4];
         block.model.derivatives(Elapsed::ZERO, &mut dx).unwrap();
         block.model.observe(Elapsed::ZERO, &mut block.out);
-        let PlantParameters { saturation, mechanics, .. } = &block.model.parameters;
+        let parameters = &block.model.parameters;
+        let mechanics = &parameters.mechanics;
         let motor = &machine_of(&block.model.parameters);
-        let i = machine::current(motor, saturation, drive::frame::Dq::new(values[0], values[1]));
+        let i = machine::current(motor, parameters.magnetics(), drive::frame::Dq::new(values[0], values[1]));
         let stored = 1.5 * (i.d() * dx[0] + i.q() * dx[1]) + mechanics.J * values[2] * dx[2];
         let p = &block.out.powers;
         let l = &p.losses;
@@ -109,9 +110,10 @@ fn turning(h: f64, steps: u32, set: impl Fn(&mut PlantParameters)) -> Block<Pmsm
 fn the_energies_are_balanced_over_20_ms() {
     let stored = |block: &mut Block<PmsmPlant>| {
         let [d, q, speed] = [0, 1, 2].map(|k: usize| *(PmsmPlant::STATES[k].at)(&mut block.model));
-        let PlantParameters { saturation, mechanics, .. } = &block.model.parameters;
-        machine::magnetic_energy(&machine_of(&block.model.parameters), saturation, drive::frame::Dq::new(d, q))
-            + 0.5 * mechanics.J * speed * speed
+        let parameters = &block.model.parameters;
+        let psi = drive::frame::Dq::new(d, q);
+        machine::magnetic_energy(&machine_of(parameters), parameters.magnetics(), psi)
+            + 0.5 * parameters.mechanics.J * speed * speed
     };
     let smooth = |par: &mut PlantParameters| {
         par.inverter.dead_time = 0.0;
@@ -167,7 +169,7 @@ fn the_drive_with_iron_loss_and_temperatures_is_the_same_in_model_exchange() {
         let step = Step { start: now, h: 1e-4 };
         stepped.step(&step).unwrap();
         let Block { model, out } = &mut integrated;
-        integrate::hybrid::<PmsmDrive, 4>(model, &step, 2e-6).unwrap();
+        integrate::hybrid::<PmsmDrive, 5>(model, &step, 2e-6).unwrap();
         now = step.end();
         model.observe(now, out);
         let (ours, theirs) = (stepped.out.controller.speed_est, out.controller.speed_est);

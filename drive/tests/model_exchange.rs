@@ -19,13 +19,13 @@ const RPM: f64 = PI / 30.0;
 const FINE: f64 = 1e-6;
 
 /// A model in co-simulation, and the same one integrated from its derivatives and events.
-struct Both<M: Model> {
+struct Both<M: Model, const N: usize> {
     stepped: Block<M>,
     integrated: Block<M>,
     now: Elapsed,
 }
 
-impl<M: ContinuousTime + Events> Both<M> {
+impl<M: ContinuousTime + Events, const N: usize> Both<M, N> {
     fn new(set: impl FnOnce(&mut M)) -> Self {
         let mut stepped = Block::<M>::default();
         set(&mut stepped.model);
@@ -44,7 +44,7 @@ impl<M: ContinuousTime + Events> Both<M> {
         let step = Step { start: self.now, h };
         self.stepped.step(&step).unwrap();
         let Block { model, out } = &mut self.integrated;
-        integrate::hybrid::<M, 4>(model, &step, longest).unwrap();
+        integrate::hybrid::<M, N>(model, &step, longest).unwrap();
         self.now = step.end();
         model.observe(self.now, out);
     }
@@ -58,7 +58,7 @@ fn apart(a: &PlantOutputs, b: &PlantOutputs) -> (f64, f64) {
 
 #[test]
 fn the_drive_starts_from_the_opposite_angle_and_takes_a_load_step() {
-    let mut drive = Both::<PmsmDrive>::new(|drive| {
+    let mut drive = Both::<PmsmDrive, 5>::new(|drive| {
         drive.pair.plant.model.parameters.initial.theta_e = PI;
         drive.inputs.speed_ref = 500.0 * RPM;
     });
@@ -91,7 +91,7 @@ fn the_drive_does_not_depend_on_the_importers_step() {
         let mut now = Elapsed::ZERO;
         for _ in 0..steps {
             let step = Step { start: now, h };
-            integrate::hybrid::<PmsmDrive, 4>(&mut drive.model, &step, 10e-6).unwrap();
+            integrate::hybrid::<PmsmDrive, 5>(&mut drive.model, &step, 10e-6).unwrap();
             now = step.end();
         }
         drive.model.observe(now, &mut drive.out);
@@ -125,7 +125,7 @@ fn an_enabled_plant_is_integrated_to_the_same_currents() {
     ];
     for (name, set, allowed, allowed_speed) in cases {
         let w = 1000.0 * RPM;
-        let mut plant = Both::<PmsmPlant>::new(|plant| {
+        let mut plant = Both::<PmsmPlant, 4>::new(|plant| {
             (plant.parameters.initial.speed, plant.parameters.mechanics.J) = (w, 0.05);
             set(plant);
         });
@@ -148,7 +148,7 @@ fn an_enabled_plant_is_integrated_to_the_same_currents() {
 #[test]
 fn gates_off_the_current_decays_and_the_diodes_block() {
     // 1 ms with voltage, then the gates are off: the current returns to the link until the diodes block.
-    let mut plant = Both::<PmsmPlant>::new(|plant| plant.parameters.initial.speed = 100.0);
+    let mut plant = Both::<PmsmPlant, 4>::new(|plant| plant.parameters.initial.speed = 100.0);
     plant.set(|plant| plant.inputs.u = Phases { a: 30.0, b: 20.0, c: -50.0 });
     plant.step(1e-3, FINE);
     assert!(plant.integrated.out.i.c < -2.0, "{:?}", plant.integrated.out);
@@ -182,7 +182,7 @@ fn gates_off_the_current_decays_and_the_diodes_block() {
 #[test]
 fn diodes_conduct_while_the_emf_exceeds_the_link() {
     // 600 rad/s: 468 V line to line. The link falls from 600 V to 325 V and rises again.
-    let mut plant = Both::<PmsmPlant>::new(|plant| {
+    let mut plant = Both::<PmsmPlant, 4>::new(|plant| {
         (plant.parameters.initial.speed, plant.parameters.mechanics.J) = (600.0, 1.0);
         (plant.inputs.enable, plant.inputs.u_dc) = (false, 600.0);
     });
@@ -243,7 +243,7 @@ fn indicators_stand_on_the_side_of_the_decision() {
 
 #[test]
 fn an_imposed_shaft_replaces_the_mechanical_states() {
-    let mut plant = Both::<PmsmPlant>::new(|plant| {
+    let mut plant = Both::<PmsmPlant, 4>::new(|plant| {
         plant.parameters.mechanics.imposed = true;
         plant.inputs.u = Phases { a: 20.0, b: -10.0, c: -10.0 };
     });
@@ -450,17 +450,19 @@ fn the_states_are_rows_of_the_tables() {
     let nominals = |rows: Vec<usize>, find: &dyn Fn(usize) -> (String, Option<f64>)| -> Vec<(String, Option<f64>)> {
         rows.into_iter().map(find).collect()
     };
-    let expected =
-        [("psi_d", 0.1), ("psi_q", 0.1), ("speed", 100.0), ("angle", 1.0)].map(|(n, x)| (n.to_owned(), Some(x)));
+    let expected = [("psi_d", 0.1), ("psi_q", 0.1), ("speed", 100.0), ("angle", 1.0), ("u_cap", 100.0)]
+        .map(|(n, x)| (n.to_owned(), Some(x)));
     let of_plant = |i| PmsmPlant::TABLE.locate(i).map(|(name, meta, _)| (name, meta.nominal)).unwrap();
     let of_drive = |i| PmsmDrive::TABLE.locate(i).map(|(name, meta, _)| (name, meta.nominal)).unwrap();
-    assert_eq!(nominals(plant.rows().unwrap(), &of_plant), expected);
+    assert_eq!(nominals(plant.rows().unwrap(), &of_plant), expected[..4]);
     assert_eq!(nominals(drive.rows().unwrap(), &of_drive), expected);
     // A state and its variable are the same number.
     let mut block = Block::<PmsmDrive>::default();
     block.model.pair.plant.model.parameters.initial.speed = 20.0;
     block.initialize();
     for (state, index) in PmsmDrive::STATES.iter().zip(drive.rows().unwrap()) {
+        *(state.at)(&mut block.model) += 0.1;
+        block.model.settle();
         let x = *(state.at)(&mut block.model);
         block.model.observe(Elapsed::ZERO, &mut block.out);
         let Some((_, Slot::Real(shown))) = PmsmDrive::TABLE.entry(&mut block, index) else {

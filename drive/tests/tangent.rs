@@ -62,7 +62,7 @@ fn knowns() -> Vec<Known<PmsmPlant>> {
 }
 
 /// The derivatives, then the continuous outputs.
-fn unknowns<M: Model>(dx: [f64; 4], block: &mut Block<M>) -> Vec<f64> {
+fn unknowns<M: Model>(dx: &[f64], block: &mut Block<M>) -> Vec<f64> {
     let mut values = dx.to_vec();
     for i in 0..M::TABLE.len() {
         let (_, meta, _) = M::TABLE.locate(i).unwrap();
@@ -79,11 +79,11 @@ fn unknowns<M: Model>(dx: [f64; 4], block: &mut Block<M>) -> Vec<f64> {
 
 /// Derivatives and outputs of the model as it is.
 fn evaluate<M: Differentiable>(block: &Block<M>) -> Vec<f64> {
-    let (mut block, mut dx) = (block.clone(), [0.0; 4]);
+    let (mut block, mut dx) = (block.clone(), vec![0.0; M::STATES.len()]);
     block.model.settle();
     block.model.derivatives(Elapsed::ZERO, &mut dx).unwrap();
     block.model.observe(Elapsed::ZERO, &mut block.out);
-    unknowns(dx, &mut block)
+    unknowns(&dx, &mut block)
 }
 
 /// The tangent along `seed`.
@@ -95,7 +95,7 @@ fn tangent(base: &Block<PmsmPlant>, knowns: &[Known<PmsmPlant>], seed: &[f64]) -
     }
     let (mut dx, mut result) = ([f64::NAN; 4], base.clone());
     result.model.tangent(Elapsed::ZERO, &along.model, &mut dx, &mut result.out).unwrap();
-    unknowns(dx, &mut result)
+    unknowns(&dx, &mut result)
 }
 
 /// The central difference along `seed` with steps of `h` and `h` / 2, extrapolated.
@@ -210,7 +210,7 @@ fn the_tangent_of_the_plant_is_its_derivative() {
     // The row of the efficiency: a value that no other unknown has.
     let mut marked = Block::<PmsmPlant>::default();
     marked.out.efficiency = 0.123;
-    let efficiency = unknowns([0.0; 4], &mut marked).iter().position(|x| x.to_bits() == 0.123_f64.to_bits()).unwrap();
+    let efficiency = unknowns(&[0.0; 4], &mut marked).iter().position(|x| x.to_bits() == 0.123_f64.to_bits()).unwrap();
     for point in 0..100 {
         let base = draw(&mut numbers, point, &mut kinds);
         let value = evaluate(&base);
@@ -306,13 +306,13 @@ fn the_tangent_of_the_drive_is_that_of_its_plant() {
             change(value, by);
         }
         change(&mut inputs.thermal.coolant, 5.0);
-        for (state, by) in PmsmDrive::STATES.iter().zip([0.02, -0.03, 10.0, 0.3]) {
+        for (state, by) in PmsmDrive::STATES.iter().zip([0.02, -0.03, 10.0, 0.3, 3.0]) {
             change((state.at)(&mut block.model), by);
         }
     };
     let mut along = base.clone();
     seed(&mut along, 1.0, false);
-    let (mut dx, mut result) = ([0.0; 4], base.clone());
+    let (mut dx, mut result) = ([0.0; 5], base.clone());
     base.model.tangent(now, &along.model, &mut dx, &mut result.out).unwrap();
     assert_eq!(result.out.controller, drive::control::signals::ControllerOutputs::default(), "held");
     let at = |h: f64| {
@@ -321,7 +321,7 @@ fn the_tangent_of_the_drive_is_that_of_its_plant() {
         evaluate(&moved)
     };
     let (plus, minus) = (at(1e-6), at(-1e-6));
-    for (row, exact) in unknowns(dx, &mut result).into_iter().enumerate() {
+    for (row, exact) in unknowns(&dx, &mut result).into_iter().enumerate() {
         let near = (plus[row] - minus[row]) / 2e-6;
         assert!((exact - near).abs() < 1e-6 * exact.abs().max(0.1), "{row}: {exact} {near}");
     }

@@ -139,6 +139,10 @@ pub const PER_HENRY: Quantity =
     Quantity::new("ReciprocalInductance", Unit::si("1/H", Exponents::mechanical(-1, -2, 2, 2)));
 /// Inductance in H.
 pub const HENRY: Quantity = Quantity::new("Inductance", Unit::si("H", Exponents::mechanical(1, 2, -2, -2)));
+/// Capacitance in F.
+pub const FARAD: Quantity = Quantity::new("Capacitance", Unit::si("F", Exponents::mechanical(-1, -2, 4, 2)));
+/// Rate of a voltage in V/s.
+pub const VOLT_PER_S: Quantity = Quantity::new("VoltageRate", Unit::si("V/s", Exponents::mechanical(1, 2, -4, -1)));
 /// Flux linkage in Wb.
 pub const WEBER: Quantity = Quantity::new("FluxLinkage", Unit::si("Wb", Exponents::mechanical(1, 2, -2, -1)));
 /// Torque in N.m.

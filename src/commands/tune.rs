@@ -176,6 +176,7 @@ fn shown(value: &Value) -> String {
     match value {
         // Six digits are enough to read; the file has them all.
         Value::Real(x) => format!("{}", format!("{x:.5e}").parse::<f64>().unwrap_or(*x)),
+        Value::Reals(all) => format!("{} values", all.len()),
         Value::Integer(i) => i.to_string(),
         Value::Boolean(b) => b.to_string(),
         Value::Item(item) => item.clone(),

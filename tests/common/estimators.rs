@@ -178,6 +178,6 @@ impl Experiment {
 pub fn experiments() -> Value {
     let all = Kind::ALL.iter().flat_map(|&kind| [load_step(kind), start(kind)]);
     let reversals = [Kind::ExtendedEmf, Kind::FluxObserver].map(reversal);
-    let later = [adapting_at_rest(), with_a_real_inverter(), adapting()].into_iter().chain(reversals);
+    let later = vec![adapting_at_rest(), with_a_real_inverter(), adapting()].into_iter().chain(reversals);
     Value::Array(all.chain(later).map(Experiment::run).collect())
 }

@@ -57,12 +57,13 @@ def test_fmpy_validates_with_start_values(archive):
 def test_header(archive, description):
     assert description.fmiVersion == {"fmi2": "2.0", "fmi3": "3.0"}[archive.parent.name]
     assert description.modelName == archive.stem == description.coSimulation.modelIdentifier
-    exchange, states = description.modelExchange, 0 if archive.stem == "SensorlessController" else 4
+    exchange, states = description.modelExchange, {"SensorlessController": 0, "PmsmPlant": 4, "PmsmDrive": 5}[archive.stem]
     assert exchange.modelIdentifier == archive.stem
     assert exchange.canGetAndSetFMUstate
     assert description.numberOfContinuousStates == states
-    assert description.numberOfEventIndicators == (2 if states else 0)
-    assert [d.variable.derivative.name for d in description.derivatives] == ["psi_d", "psi_q", "speed", "angle"][:states]
+    assert description.numberOfEventIndicators == {0: 0, 4: 2, 5: 3}[states]
+    names = ["psi_d", "psi_q", "speed", "angle", "u_cap"][:states]
+    assert [d.variable.derivative.name for d in description.derivatives] == names
     if description.fmiVersion == "2.0":  # FMPy looks for this name in FMI 3.0 too, where it ends with s
         assert exchange.providesDirectionalDerivative == (states > 0)
         assert description.coSimulation.providesDirectionalDerivative == (states > 0)

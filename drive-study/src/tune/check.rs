@@ -30,6 +30,7 @@ fn one(description: &Description, setting: &Setting) -> Result<()> {
     let Some(variable) = description.variable(name) else { bail!("{model} has no variable {name}") };
     let number = match (&variable.kind, &setting.value) {
         (VariableKind::Real { .. }, Value::Real(x)) => *x,
+        (VariableKind::Real { .. }, Value::Reals(all)) if all.len() == variable.elements() => return Ok(()),
         (VariableKind::Integer(_), Value::Integer(i)) => f64::from(*i),
         (VariableKind::Boolean, Value::Boolean(_)) => return Ok(()),
         (VariableKind::Enumeration { items, .. }, Value::Item(item)) => {

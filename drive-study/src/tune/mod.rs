@@ -2,8 +2,8 @@
 //!
 //! - [`motor`]: the TOML file of a machine. [`plausible`] checks its values, [`saturation`] its saturation.
 //! - [`rules`]: how values follow from the file: [`bandwidth`] for the loops, [`rasmussen`] and [`extended_emf`] for the
-//!   estimators, [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag test, [`losses`]
-//!   for inverter and temperature coefficients. [`check`](mod@check)
+//!   estimators, [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag test, [`flux_map`] for a map from a
+//!   table, [`losses`] for inverter and temperature coefficients. [`check`](mod@check)
 //!   compares them with the variables of the models; [`Tuned::pair`](rules::Tuned::pair) is the native drive with these values.
 //! - [`trial`]: tries the drive from many start angles, timed by its own time constants ([`pace`]). [`limits`]: what it will not
 //!   hold, and why. [`remedy`]: what helps.
@@ -11,6 +11,7 @@
 pub mod bandwidth;
 pub mod check;
 pub mod extended_emf;
+pub mod flux_map;
 pub mod iron;
 pub mod limits;
 pub mod losses;
@@ -73,7 +74,7 @@ fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Settin
     let one = |setting: &Setting| {
         let variable = description.variable(setting.name);
         let number = variable.and_then(|v| item_value(v, &setting.value)).map(Value::Integer);
-        let start = variable.and_then(|v| v.start.as_ref()?.first());
+        let start = variable.and_then(|v| v.start.as_deref());
         let same = start.is_some_and(|start| is(number.as_ref().unwrap_or(&setting.value), start));
         let value = number.filter(|_| integers).unwrap_or_else(|| setting.value.clone());
         (!same).then(|| Setting { value, ..setting.clone() })
@@ -92,11 +93,13 @@ fn item_value(variable: &Variable, value: &Value) -> Option<i32> {
 }
 
 /// Whether a value is the start value, to the last bit.
-fn is(value: &Value, start: &description::Value) -> bool {
+fn is(value: &Value, start: &[description::Value]) -> bool {
+    let real = |x: f64, start: &description::Value| matches!(start, description::Value::Real(start) if x.to_bits() == start.to_bits());
     match (value, start) {
-        (Value::Real(x), description::Value::Real(start)) => x.to_bits() == start.to_bits(),
-        (Value::Integer(x), description::Value::Integer(start)) => i128::from(*x) == *start,
-        (Value::Boolean(x), description::Value::Boolean(start)) => x == start,
+        (Value::Real(x), [start]) => real(*x, start),
+        (Value::Reals(all), starts) => all.iter().zip(starts).all(|(x, start)| real(*x, start)),
+        (Value::Integer(x), [description::Value::Integer(start)]) => i128::from(*x) == *start,
+        (Value::Boolean(x), [description::Value::Boolean(start)]) => x == start,
         _ => false,
     }
 }

@@ -38,6 +38,8 @@ pub struct Data {
     pub bandwidth: Bandwidth,
     /// Saturation of the plant.
     pub saturation: Option<Saturation>,
+    /// Flux map of the plant.
+    pub flux_map: Option<FluxMap>,
     /// Iron loss of the plant.
     pub iron: Option<Iron>,
     /// Losses of the inverter.
@@ -136,6 +138,22 @@ pub struct Saturation {
     pub s_dq: Option<Number>,
 }
 
+/// Flux map of the plant.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FluxMap {
+    /// CSV file with the columns i_d,i_q,psi_d,psi_q and perhaps torque, beside the machine's file.
+    pub file: Spanned<String>,
+    /// Axes of the table: "pm" (the d-axis on the magnet) or "syr" (the magnet on the negative q-axis); "pm" if omitted.
+    pub convention: Option<Spanned<String>>,
+    /// Values of the table: "peak" or "rms"; "peak" if omitted.
+    pub scale: Option<Spanned<String>>,
+    /// Temperature of the magnet in degC; 20 if omitted.
+    pub temperature: Option<Number>,
+    /// Temperature coefficient of the magnet in 1/K, where the temperature is not 20 degC.
+    pub alpha: Option<Number>,
+}
+
 /// Iron loss of the plant.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -212,6 +230,11 @@ impl MotorFile {
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
         Self::parse(&text, path)
+    }
+
+    /// A file named in this one, relative to its folder.
+    pub fn beside(&self, file: &str) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
     /// Position of a value: `file:line:column`.

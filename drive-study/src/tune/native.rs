@@ -35,6 +35,15 @@ impl Tuned {
 
 fn set<M: Model>(block: &mut Block<M>, setting: &Setting) {
     let index = (0..M::TABLE.len()).find(|&i| M::TABLE.locate(i).is_some_and(|(name, ..)| name == setting.name));
+    if let (Some(index), Value::Reals(values)) = (index, &setting.value) {
+        for (element, value) in values.iter().enumerate() {
+            match M::TABLE.entry(block, index + element) {
+                Some((_, Slot::Real(x))) => *x = *value,
+                _ => unreachable!("{} has another type", setting.name),
+            }
+        }
+        return;
+    }
     let (meta, slot) = index.and_then(|i| M::TABLE.entry(block, i)).expect("a variable of the model");
     match (slot, &setting.value, meta.kind) {
         (Slot::Real(x), Value::Real(value), _) => *x = *value,

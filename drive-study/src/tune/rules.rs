@@ -17,7 +17,7 @@ use super::check::check;
 use super::iron;
 use super::motor::{Data, MotorFile, Number};
 use super::voltage::{self, Voltage};
-use super::{extended_emf, losses, plausible, rasmussen, saturation};
+use super::{extended_emf, flux_map, losses, plausible, rasmussen, saturation};
 use anyhow::{Result, anyhow, bail};
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
@@ -29,6 +29,8 @@ use std::f64::consts::TAU;
 pub enum Value {
     /// Value of a real variable.
     Real(f64),
+    /// Values of an array of real variables.
+    Reals(Vec<f64>),
     /// Value of an integer.
     Integer(i32),
     /// Value of a Boolean.
@@ -106,6 +108,12 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     fits(motor, &bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
     plant.extend(losses::settings(motor, bandwidths.T_s.value)?);
+    let fitted = flux_map::fit(motor)?;
+    if let Some(fitted) = &fitted {
+        plant.retain(|setting| setting.name != "motor.psi_M");
+        plant.extend(fitted.settings.iter().cloned());
+        notes.extend(fitted.notes.iter().cloned());
+    }
     let rasmussen = estimator == Kind::Rasmussen;
     if rasmussen {
         controller.extend(rasmussen::settings(motor, &bandwidths, &mut notes)?);
@@ -114,7 +122,8 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     }
     let Voltage { settings, top_torque } = voltage::of(motor, !rasmussen, &mut notes)?;
     controller.extend(settings);
-    cap_current_loop(data, &bandwidths, &mut controller, &mut notes);
+    let least = |i| saturation::least_inductance(data, fitted.as_ref(), i);
+    cap_current_loop(data, &bandwidths, least, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
     // 5 / w_0: five periods of the swing, which the observer damps, over 2 pi.
     let rest = if rasmussen { (5.0 / swing(data, rasmussen::zero_speed_current(data))).max(REST) } else { 0.0 };
@@ -306,13 +315,19 @@ pub(super) fn electrical(data: &Data) -> Motor {
 const MAX_GAIN: f64 = 0.5;
 
 /// Lowers the bandwidth of the current loop to what the smallest inductance allows, and reports it.
-fn cap_current_loop(data: &Data, bandwidths: &Bandwidths, controller: &mut [Setting], notes: &mut Vec<String>) {
+fn cap_current_loop(
+    data: &Data,
+    bandwidths: &Bandwidths,
+    least_inductance: impl Fn(f64) -> f64,
+    controller: &mut [Setting],
+    notes: &mut Vec<String>,
+) {
     let value = |name: &str| controller.iter().find(|s| s.name == name).map(|s| &s.value);
     let number = |name: &str| if let Some(Value::Real(x)) = value(name) { *x } else { 0.0 };
     let Data { machine, rating, .. } = data;
     // During a start, the current may be on one axis and the same damping on the other.
     let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
-    let least = saturation::least_inductance(data, i);
+    let least = least_inductance(i);
     let greatest = machine.L_d.get_ref().max(*machine.L_q.get_ref());
     let gain = MAX_GAIN * least / number("T_s");
     let most = match value("current.active_resistance") {

@@ -4,12 +4,13 @@
 //! The current is a polynomial of the flux linkage. It belongs to a machine as long as its derivative, the inverse of the
 //! incremental inductances, is positive definite; beyond, more flux takes less current, and the plant runs away.
 
+use super::flux_map::Fitted;
 use super::motor::{Data, MotorFile, Number};
 use super::rules::electrical;
 use anyhow::{Result, bail};
 use drive::frame::Dq;
 use drive::motor::Motor;
-use drive::plant::machine;
+use drive::plant::machine::{self, Magnetics};
 use drive::plant::saturation::Saturation;
 use std::f64::consts::TAU;
 
@@ -31,21 +32,28 @@ fn outward<'a>(motor: &'a Motor, saturation: &'a Saturation, i: f64, direction: 
     let step = i * motor.L_d.max(motor.L_q) / 200.0;
     (0..=400_u32)
         .map(move |k| Dq::new(motor.psi_M + f64::from(k) * step * cos, f64::from(k) * step * sin))
-        .take_while(move |&psi| machine::current(motor, saturation, psi).magnitude() <= i)
+        .take_while(move |&psi| machine::current(motor, Magnetics::Polynomial(saturation), psi).magnitude() <= i)
 }
 
-/// The smallest incremental inductance in H of the plant with a current of `i` (A) in any direction.
-pub fn least_inductance(data: &Data, i: f64) -> f64 {
-    let (motor, saturation) = (electrical(data), of(data));
+/// The smallest incremental inductance in H of the plant, which may have a map, with a current of `i` (A) in any direction.
+pub fn least_inductance(data: &Data, fitted: Option<&Fitted>, i: f64) -> f64 {
+    let (mut motor, saturation) = (electrical(data), of(data));
+    let magnetics = match fitted {
+        Some(Fitted { map, psi_M, .. }) => {
+            motor.psi_M = *psi_M;
+            Magnetics::Map(map)
+        }
+        None => Magnetics::Polynomial(&saturation),
+    };
     let at = |angle: f64| {
         let psi = |r: f64| Dq::new(motor.psi_M + r * angle.cos(), r * angle.sin());
         let (mut low, mut high) = (0.0, i * motor.L_d.max(motor.L_q));
         for _ in 0..50 {
             let r = 0.5 * (low + high);
-            let above = machine::current(&motor, &saturation, psi(r)).magnitude() > i;
+            let above = machine::current(&motor, magnetics, psi(r)).magnitude() > i;
             *(if above { &mut high } else { &mut low }) = r;
         }
-        saturation.least_inductance(&motor, psi(low))
+        machine::least_inductance(&motor, magnetics, psi(low))
     };
     (0..DIRECTIONS).map(|k| at(f64::from(k) * TAU / f64::from(DIRECTIONS))).fold(f64::INFINITY, f64::min)
 }
@@ -58,7 +66,7 @@ pub fn check(motor: &MotorFile) -> Result<()> {
     let Some(given) = &motor.data.saturation else { return Ok(()) };
     let (machine, saturation) = (electrical(&motor.data), of(&motor.data));
     let limit = *motor.data.rating.current.get_ref();
-    let current = |psi: Dq| machine::current(&machine, &saturation, psi);
+    let current = |psi: Dq| machine::current(&machine, Magnetics::Polynomial(&saturation), psi);
     for psi in (0..DIRECTIONS).flat_map(|k| outward(&machine, &saturation, limit, k)) {
         let h = 1e-4 * machine.psi_M;
         let by = |step: Dq| (current(psi + step) - current(psi - step)) * (0.5 / h);
@@ -93,9 +101,9 @@ mod tests {
     #[test]
     fn the_least_inductance_is_on_the_side_of_the_magnet() {
         let data = ipmsm("s_2 = 40.0", "s_2 = 40.0").data;
-        assert!((least_inductance(&data, 1e-9) - 36e-3).abs() < 1e-9);
+        assert!((least_inductance(&data, None, 1e-9) - 36e-3).abs() < 1e-9);
         // On the d axis, 0.2277 Wb beyond the magnet's flux takes 8.87 A.
-        let found = 1e3 * least_inductance(&data, 8.87);
+        let found = 1e3 * least_inductance(&data, None, 8.87);
         assert!((found - 19.151).abs() < 0.05, "{found} mH");
     }
 

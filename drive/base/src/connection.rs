@@ -6,6 +6,7 @@
 
 use crate::frame::Phases;
 use fmu_core::{Icon, Member};
+use serde::{Deserialize, Serialize};
 
 /// What the sensors of a controller measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,21 +20,24 @@ pub struct Measured {
 }
 
 /// What a controller commands.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Commanded {
     /// Stator voltage references in V.
     pub u: Phases,
     /// Whether the gates switch.
     pub enable: bool,
+    /// Active short circuit, whatever `enable` says.
+    pub asc: bool,
 }
 
-/// The signals between controller and inverter; `enable` has another variable on each side.
-pub const fn phases(enable: Member) -> [Member; 7] {
+/// The signals between controller and inverter; `enable` and `asc` have another variable on each side.
+pub const fn phases(enable: Member, asc: Member) -> [Member; 8] {
     [
         Member::signal("u_a"),
         Member::signal("u_b"),
         Member::signal("u_c"),
         enable,
+        asc,
         Member::signal("i_a"),
         Member::signal("i_b"),
         Member::signal("i_c"),

@@ -8,6 +8,7 @@ use crate::model::SensorlessController;
 use crate::signals::ControllerOutputs;
 use crate::state::{Command, Leader, Mode, References, context};
 use crate::tables::Compensation;
+use crate::trip::Cause;
 use crate::weakening::share;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
 use drive_base::math::wrap;
@@ -73,6 +74,9 @@ impl SensorlessController {
             i_ref: i_ref.into(),
             lock_lost,
             enabled: true,
+            short_circuit: false,
+            tripped: Cause::None,
+            sensor_lost: self.state.sensor_lost,
             voltage_limited,
             current_limited,
             tau_max: high,
@@ -92,7 +96,7 @@ impl SensorlessController {
 
     /// Measured currents in A, less the offsets measured at rest.
     #[inline(always)]
-    fn currents(&self) -> Phases {
+    pub(super) fn currents(&self) -> Phases {
         let Phases { a, b, c } = self.parameters.sensor.measure(self.inputs.i, self.state.samples);
         let zero = self.state.offset.i;
         Phases { a: a - zero.a, b: b - zero.b, c: c - zero.c }

@@ -2,7 +2,7 @@
 //! the currents of a torque.
 
 use crate::current::CurrentGains;
-use crate::estimator::Class;
+use crate::estimator::{Class, Kind};
 use crate::lock::{LockGains, Reach};
 use crate::reference::{max_torque, max_torque_per_ampere};
 use crate::speed::SpeedGains;
@@ -33,7 +33,12 @@ pub(crate) struct Gains {
 impl Gains {
     /// From the parameters.
     pub(crate) fn new(par: &ControllerParameters) -> Self {
-        let ControllerParameters { current, speed_loop, motor, J, limit, estimator, lock, T_s, .. } = par;
+        Self::with(par, par.estimator)
+    }
+
+    /// From the parameters, with another `estimator` in use.
+    pub(crate) fn with(par: &ControllerParameters, estimator: Kind) -> Self {
+        let ControllerParameters { current, speed_loop, motor, J, limit, lock, T_s, .. } = par;
         // Finite, so that no current is no torque with any psi_M.
         let k = motor.torque_constant().min(f64::MAX);
         let observes_flux = estimator.class() == Class::FluxObserver;

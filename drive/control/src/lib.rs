@@ -8,6 +8,7 @@
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
 #![allow(non_snake_case)]
 
+pub mod battery;
 pub mod current;
 mod cycle;
 pub mod documentation;
@@ -27,6 +28,7 @@ mod state;
 pub mod tables;
 mod terminals;
 pub mod tracking;
+pub mod trip;
 pub mod weakening;
 pub mod zero_speed;
 

@@ -1,7 +1,8 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
+use crate::battery;
 use crate::current;
-use crate::estimator::{Class, Estimator, Sample, Setup};
+use crate::estimator::{Class, Estimator, Kind, Sample, Setup};
 use crate::gains::Gains;
 use crate::lock::{LOST, Lock};
 use crate::polarity;
@@ -9,6 +10,7 @@ use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::start::StartMode;
 use crate::state::{InUse, State, context};
 use crate::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
+use crate::trip::{self, Cause, Trip};
 use crate::weakening;
 use crate::zero_speed::{self, ZeroSpeed};
 use drive_base::motor::Motor;
@@ -49,8 +51,11 @@ impl SensorlessController {
     /// One sample of the controller: currents in, voltage references out. If a lost estimator makes the state
     /// non-finite, the controller restarts at rest from its last angle and reports the loss.
     fn compute(&mut self) {
-        if !self.inputs.enable {
+        if !self.inputs.enable || self.inputs.asc {
             self.state.computed = self.rest();
+            return;
+        }
+        if (self.parameters.trip.used || !self.inputs.sensor_valid) && self.protect() {
             return;
         }
         let theta = self.state.computed.theta_est;
@@ -72,17 +77,61 @@ impl SensorlessController {
         Err(Fault::new("an input of the controller is not a finite number"))
     }
 
-    /// Not enabled: resets everything except the sample grid and the displayed outputs.
+    /// The sensor is `lost`, or with a new start in use again; the gains follow the estimator.
+    #[cold]
+    #[inline(never)]
+    fn lose_sensor(&mut self, lost: bool) {
+        if self.state.sensor_lost != lost {
+            self.state.sensor_lost = lost;
+            self.derive();
+        }
+    }
+
+    /// Watches the limits of the trips and the sensor; returns whether the controller rests.
+    #[cold]
+    #[inline(never)]
+    fn protect(&mut self) -> bool {
+        if self.parameters.trip.used && self.trips() {
+            return true;
+        }
+        if !self.inputs.sensor_valid && self.parameters.has_fallback() {
+            self.lose_sensor(true);
+        }
+        false
+    }
+
+    /// Whether the drive has tripped, at this sample or before: then the controller rests.
+    fn trips(&mut self) -> bool {
+        if self.state.trip.cause == Cause::None {
+            let cause = self.parameters.trip.cause(self.currents(), self.inputs.u_dc);
+            if cause == Cause::None {
+                return false;
+            }
+            self.state.trip = Trip::new(cause, self.state.computed.speed_est);
+        }
+        let Self { inputs, parameters: par, state, .. } = self;
+        let sensor = par.estimator == Kind::Sensored && inputs.sensor_valid && !state.sensor_lost;
+        state.trip.update(par, inputs, sensor);
+        self.state.computed = self.rest();
+        true
+    }
+
+    /// Not enabled, or the machine is short-circuited: resets everything except the sample grid and the displayed outputs.
     #[cold]
     fn rest(&mut self) -> ControllerOutputs {
-        let Self { parameters: par, state, .. } = self;
+        let sensor_lost = self.inputs.enable && self.state.sensor_lost;
+        self.lose_sensor(sensor_lost);
+        let Self { inputs, parameters: par, state, .. } = self;
         let new = State::new(par, false);
-        let out = new.computed;
+        // A trip stays until enable falls.
+        let trip = if inputs.enable { state.trip } else { Trip::default() };
+        let short_circuit = inputs.asc || trip.shorts;
+        let out = ControllerOutputs { short_circuit, tripped: trip.cause, sensor_lost, ..new.computed };
         let mut offset = state.offset;
-        if par.compensation.calibrate {
-            offset.update(par.sensor.measure(self.inputs.i, state.samples), par.T_s);
+        if par.compensation.calibrate && !short_circuit {
+            offset.update(par.sensor.measure(inputs.i, state.samples), par.T_s);
         }
-        *state = State { samples: state.samples, shown: state.shown, offset, ..new };
+        *state = State { samples: state.samples, shown: state.shown, offset, trip, sensor_lost, ..new };
         out
     }
 
@@ -90,7 +139,7 @@ impl SensorlessController {
     #[cold]
     fn start_again(&mut self, theta: f64) {
         let Self { parameters: par, state, .. } = self;
-        let kind = par.estimator;
+        let kind = par.estimator_with(state.sensor_lost);
         let nothing = Sample { k: state.k, ..Sample::default() };
         let (estimator, _) = Estimator::start(kind, &context(par, &par.estimators, &par.motor), &nothing, theta, 0.0);
         *state = State {
@@ -99,6 +148,7 @@ impl SensorlessController {
             offset: state.offset,
             estimator,
             lock: Lock::lost(),
+            sensor_lost: state.sensor_lost,
             shown: state.shown,
             ..State::default()
         };
@@ -107,6 +157,7 @@ impl SensorlessController {
             theta_est: theta,
             lock_lost: LOST,
             enabled: true,
+            sensor_lost: state.sensor_lost,
             R_s_est,
             ..ControllerOutputs::default()
         };
@@ -118,6 +169,18 @@ impl SensorlessController {
     /// States which parameters do not fit together, and what to do.
     pub fn validate_on(&self, u_dc: f64) -> Result<(), Fault> {
         let par = &self.parameters;
+        self.validate_with(par, u_dc)?;
+        if !par.has_fallback() {
+            return Ok(());
+        }
+        let fallback = ControllerParameters { estimator: par.fallback, ..par.clone() };
+        let is = PARAMETERS.tell(par, |p| &mut p.fallback);
+        self.validate_with(&fallback, u_dc)
+            .map_err(|fault| Fault::new(format!("{is} does not fit: as the estimator, {fault}")))
+    }
+
+    /// [`validate_on`](Self::validate_on) for these parameters.
+    fn validate_with(&self, par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
         let ControllerParameters { limit, zero_speed, estimator, start, .. } = par;
         let tell = |name: &str| PARAMETERS.tell_name(par, name).unwrap_or_else(|| name.to_owned());
         estimator.validate(&Setup {
@@ -140,7 +203,10 @@ impl SensorlessController {
             polarity::validate(par)?;
         }
         // A running drive has to live with its DC link.
-        weakening::validate(par, if self.state.samples == 0 { u_dc } else { 0.0 })?;
+        let u_dc = if self.state.samples == 0 { u_dc } else { 0.0 };
+        weakening::validate(par, u_dc)?;
+        trip::validate(par, u_dc)?;
+        battery::validate(par)?;
         // The start value is accepted with an estimator that does not read it.
         let reads = estimator.class() == Class::FluxObserver;
         if zero_speed.i_0 > limit.i && (reads || zero_speed.i_0 > ZeroSpeed::default().i_0) {
@@ -173,14 +239,14 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 13;
+    const STATE_VERSION: u16 = 14;
 
     fn derive(&mut self) {
         if !self.tuned {
             self.last_gains.clone_from(&self.gains);
         }
         self.tuned = true;
-        self.gains = Gains::new(&self.parameters);
+        self.gains = Gains::with(&self.parameters, self.parameters.estimator_with(self.state.sensor_lost));
     }
 
     fn validate(&self) -> Result<(), Fault> {
@@ -198,7 +264,10 @@ impl Model for SensorlessController {
     }
 
     fn initialize(&mut self) {
-        self.state = State::new(&self.parameters, self.inputs.enable);
+        self.lose_sensor(false);
+        let ControllerInputs { enable, asc, .. } = self.inputs;
+        self.state = State::new(&self.parameters, enable && !asc);
+        self.state.shown.short_circuit = asc;
         self.tuned = false;
     }
 
@@ -246,6 +315,15 @@ pub fn clipped(tau_ref: f64, [tau_min, tau_max]: [f64; 2]) -> String {
 impl Warns for SensorlessController {
     fn warn(&self, log: &mut Warnings<'_>) {
         let (out, par, tau_ref) = (&self.state.shown, &self.parameters, self.inputs.tau_ref);
+        if out.tripped != Cause::None {
+            let stopped = if out.short_circuit { "the machine is short-circuited" } else { "the gates are off" };
+            return log.warn("tripped", || {
+                format!(
+                    "{} beyond its limit: {stopped}, and the controller rests until enable falls",
+                    out.tripped.what(par)
+                )
+            });
+        }
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
         if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
             log.warn("tau_ref", || clipped(tau_ref, [out.tau_min, out.tau_max]));
@@ -257,6 +335,7 @@ impl Warns for SensorlessController {
             theta_est: out.theta_est,
             lock_lost: LOST,
             enabled: true,
+            sensor_lost: out.sensor_lost,
             R_s_est: out.R_s_est,
             ..ControllerOutputs::default()
         };
@@ -296,6 +375,12 @@ const TABLE: &Table<Block<SensorlessController>> = table![
         &mut m.model.inputs.enable
     })
     .optional(),
+    V::boolean_input(
+        "asc",
+        "Active short circuit: the controller rests as without enable, and short_circuit passes the request to the inverter",
+        |m| &mut m.model.inputs.asc,
+    )
+    .optional(),
     V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
     V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
     V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),
@@ -304,6 +389,10 @@ const TABLE: &Table<Block<SensorlessController>> = table![
         .read_with("estimator", "Sensored"),
     V::input("speed_meas", &SPEED, "Mechanical speed of a sensor", |m| &mut m.model.inputs.speed_meas)
         .read_with("estimator", "Sensored"),
+    V::boolean_input("sensor_valid", "The sensor works; false: sensor.fallback takes over from it, if there is one", |m| {
+        &mut m.model.inputs.sensor_valid
+    })
+    .optional(),
     V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
     V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
 ];

@@ -1,5 +1,6 @@
 //! Inputs and outputs of the controller.
 
+use crate::trip::Cause;
 use drive_base::connection::{Commanded, Measured};
 use drive_base::frame::{DqHat, Phases};
 use drive_base::math::all_finite;
@@ -22,6 +23,10 @@ pub struct ControllerInputs {
     pub tau_ref: f64,
     /// The controller operates; false: it stays in its initial state and commands 0 V.
     pub enable: bool,
+    /// Active short circuit: the controller stays in its initial state and short-circuits the machine.
+    pub asc: bool,
+    /// The sensor of the shaft works.
+    pub sensor_valid: bool,
 }
 
 impl ControllerInputs {
@@ -33,7 +38,7 @@ impl ControllerInputs {
 
     /// Whether all values are finite.
     pub fn is_finite(&self) -> bool {
-        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _ } = self;
+        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _, asc: _, sensor_valid: _ } = self;
         all_finite([i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref])
     }
 }
@@ -48,6 +53,8 @@ impl Default for ControllerInputs {
             speed_meas: 0.0,
             tau_ref: 0.0,
             enable: true,
+            asc: false,
+            sensor_valid: true,
         }
     }
 }
@@ -70,6 +77,12 @@ pub struct ControllerOutputs {
     pub lock_lost: f64,
     /// Whether the controller operates.
     pub enabled: bool,
+    /// Whether the inverter shall short-circuit the machine.
+    pub short_circuit: bool,
+    /// What has tripped.
+    pub tripped: Cause,
+    /// The sensor of the shaft is lost: the fallback supplies angle and speed.
+    pub sensor_lost: bool,
     /// Whether the hexagon of u_dc limited the voltage references.
     pub voltage_limited: bool,
     /// Whether a current or torque limit limited the current references.
@@ -90,7 +103,7 @@ impl ControllerOutputs {
     /// What the plant receives.
     #[inline]
     pub fn commanded(&self) -> Commanded {
-        Commanded { u: self.u, enable: self.enabled }
+        Commanded { u: self.u, enable: self.enabled, asc: self.short_circuit }
     }
 
     /// Whether all values are finite.

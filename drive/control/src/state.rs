@@ -1,7 +1,8 @@
 //! The controller state from one sample to the next, and the source of the angle: a start sequence or the estimator.
 
+use crate::battery::Battery;
 use crate::current::CurrentController;
-use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Sample};
+use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::gains::{Gains, Law};
 use crate::lock::Lock;
 use crate::polarity::{PolaritySearch, SearchStep};
@@ -10,6 +11,7 @@ use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::speed::{SpeedController, SpeedGains};
 use crate::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::tables::ControllerParameters;
+use crate::trip::Trip;
 use crate::weakening::Weakening;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::{within, wrap};
@@ -117,8 +119,12 @@ pub(super) struct State {
     pub(super) u_pi: DqHat,
     pub(super) offset: Offset,
     pub(super) lock: Lock,
+    pub(super) trip: Trip,
+    /// The sensor is lost: `sensor.fallback` has taken its place until enable falls.
+    pub(super) sensor_lost: bool,
     pub(super) weakening: Weakening,
-    /// Time in s for which a limit has reduced the references, while field weakening is in use.
+    pub(super) battery: Battery,
+    /// Time in s for which a limit has reduced the references, while field weakening or limits of the DC link are in use.
     pub(super) limited_for: f64,
     /// Outputs of the last sample.
     pub(super) computed: ControllerOutputs,
@@ -171,12 +177,14 @@ impl State {
         sample: &Sample,
     ) -> (Estimate, Mode) {
         let context = context(par, &in_use.estimators, &in_use.motor);
+        let kind = par.estimator_with(self.sensor_lost);
         let first = (sample.k == 0).then(|| {
             let w = f64::from(par.motor.n_p) * par.speed_est;
-            let (estimator, estimate) = Estimator::start(par.estimator, &context, sample, par.theta_est, w);
+            let (estimator, estimate) = Estimator::start(kind, &context, sample, par.theta_est, w);
             self.estimator = estimator;
             estimate
         });
+        let first = first.or_else(|| self.fall_back(kind, &context, sample));
         let reference = if par.speed_loop.torque_mode { inputs.tau_ref } else { inputs.speed_ref };
         match &mut self.leader {
             Leader::Start(start) => match start.update(&par.start, &context, par.theta_est, reference, sample) {
@@ -204,6 +212,17 @@ impl State {
         }
     }
 
+    /// The estimate of the fallback, if the sensor was lost at this sample: it starts where the last one with the sensor leads.
+    fn fall_back(&mut self, kind: Kind, context: &Context, sample: &Sample) -> Option<Estimate> {
+        if !self.sensor_lost || !matches!(self.estimator, Estimator::Sensored(_)) {
+            return None;
+        }
+        let (theta, w) = (self.computed.theta_est, f64::from(context.motor.n_p) * self.computed.speed_est);
+        (self.estimator, _) = Estimator::start(kind, context, sample, theta, w);
+        self.estimator.place(context, sample, theta, w);
+        Some(Estimate::new(theta, w, sample))
+    }
+
     /// The references at the estimated mechanical `speed` (rad/s) in addition to an `injection`; `old` are the gains of a speed loop
     /// that is retuned at this sample.
     #[inline(always)]
@@ -224,8 +243,8 @@ impl State {
         }
         let law = gains.law(par, speed);
         let limit = law.limit;
-        if par.weakening.used {
-            return self.weakened(gains, par, inputs, (speed, w_ref), &law, injection);
+        if par.weakening.used || par.dc.used {
+            return self.limited(gains, par, inputs, (speed, w_ref), &law, injection);
         }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
@@ -238,9 +257,9 @@ impl State {
         References { i, limited: requested.abs() > limit, tau: (tau, tau), weakens: false }
     }
 
-    /// [`references`](Self::references) with field weakening.
+    /// [`references`](Self::references) with field weakening or with limits of the DC link.
     #[inline(never)]
-    fn weakened(
+    fn limited(
         &mut self,
         gains: &Gains,
         par: &ControllerParameters,
@@ -251,7 +270,15 @@ impl State {
     ) -> References {
         let w = f64::from(par.motor.n_p) * speed;
         let at = (w, inputs.u_dc, injection.magnitude());
-        let (low, high) = self.weakening.limits(&gains.weakening, &par.weakening, at, law.limit, self.k);
+        let (mut low, mut high) = if par.weakening.used {
+            self.weakening.limits(&gains.weakening, &par.weakening, at, law.limit, self.k)
+        } else {
+            (law.limit, law.limit)
+        };
+        if par.dc.used {
+            let (least, most) = self.battery.limits(&par.dc, &par.motor, inputs.u_dc, speed, self.i_ref);
+            (low, high) = (low.min(least / gains.k), high.min(most / gains.k));
+        }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
             (requested.clamp(-low, high), requested)
@@ -264,6 +291,9 @@ impl State {
         self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
         let tau = gains.k * i_q_ref;
         let plain = || gains.currents(par, law, i_q_ref);
+        if !par.weakening.used {
+            return References { i: plain(), limited, tau: (gains.k * low, gains.k * high), weakens: false };
+        }
         let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, par.current.mtpa, plain);
         References { i, limited, tau: (gains.k * low, gains.k * high), weakens: self.weakening.weakens }
     }

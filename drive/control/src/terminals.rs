@@ -7,8 +7,8 @@ use fmu_core::{Member, Terminal};
 pub(crate) const CONTROLLER: &[Terminal] = &[
     Terminal::plug(
         "phases",
-        "Voltage references and enable to the plant, measured currents from it",
-        &phases(Member::signal("enable").of("enabled")),
+        "Voltage references, enable and active short circuit to the plant, measured currents from it",
+        &phases(Member::signal("enable").of("enabled"), Member::signal("asc").of("short_circuit")),
     )
     .drawn(&PHASES, 100.0, 40.0),
     Terminal::plug(

@@ -122,6 +122,7 @@ mod tests {
     use super::*;
     use crate::legs::Legs;
     use crate::losses::flow::{Dissipation, Ideal, Switches};
+    use crate::machine::Magnetics;
     use crate::mechanics::{Mechanics, Standstill, Whole};
     use crate::saturation::Saturation;
     use crate::tables::PlantParameters;
@@ -157,7 +158,7 @@ mod tests {
             let (u, axis) = (AlphaBeta::new(draw(1.0, 300.0), -draw(1.0, 300.0)), Axis::at(draw(0.1, 10.0)));
             let psi = axis.to_stator(Dq::new(draw(0.1, 2.0) * motor.psi_M, draw(1e-3, 1.0) * motor.psi_M));
             let quick = Circuit {
-                machine: Machine::<_, true>::new(&motor, &par.saturation),
+                machine: Machine::<_, true>::new(&motor, Magnetics::Linear),
                 path: Path { u, dissipation: Dissipation { R: motor.R_s, G: None }, drops: Ideal },
                 shaft: Shaft::new(&par.mechanics, tau_load, Whole::new(&par.mechanics, speed)),
             };
@@ -166,7 +167,7 @@ mod tests {
             let mut inverter = par.inverter.clone();
             inverter.dead_time = dead_time;
             let general = Circuit {
-                machine: Machine::<_, false>::new(&motor, &saturation),
+                machine: Machine::<_, false>::new(&motor, Magnetics::Polynomial(&saturation)),
                 path: Path {
                     u,
                     dissipation: Dissipation::at(&par, motor.R_s, 4.0 * speed),
@@ -192,7 +193,7 @@ mod tests {
         let u = Dq::new(-motor.R_s - 200.0 * 9e-3 * 3.0, motor.R_s * 3.0 + 200.0 * (-6e-3 + 0.15));
         let (axis, psi) = (Axis::<Rotor>::at(0.4), crate::machine::flux(motor, i));
         let circuit = Circuit {
-            machine: Machine::<_>::new(motor, &par.saturation),
+            machine: Machine::<_>::new(motor, par.magnetics()),
             path: Path { u: axis.to_stator(u), dissipation: Dissipation { R: motor.R_s, G: None }, drops: Ideal },
             shaft: Shaft::new(&par.mechanics, 0.5, Standstill::new(&par.mechanics, speed)),
         };

@@ -76,11 +76,11 @@ impl PmsmPlant {
         let psi = self.machine::<false>().to_stator(axis_at(motor, angle), state.psi);
         let speeds = if imposed { [inputs.speed_shaft, end.speed_shaft] } else { [state.speed, self.state.speed] };
         let speed = speeds[0].abs().max(speeds[1].abs());
-        let mut left = if self.blocked && !inputs.enable {
+        let mut left = if self.blocked && inputs.is_off() {
             self.count(h, LONGEST_STEP, speed)?
         } else {
             let legs = self.legs(inputs);
-            self.substeps(h, speed, &legs, &Switches::new(&self.parameters, inputs.enable, inputs.u_dc, legs))?
+            self.substeps(h, speed, &legs, &Switches::of(&self.parameters, inputs, legs))?
         };
         let step = h / left;
         let mut x = SVector::from([psi.alpha(), psi.beta(), state.speed, angle, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -105,8 +105,8 @@ impl PmsmPlant {
     /// The rates with the flux linkage `psi` (Wb) in stator axes, the `speed` (rad/s) and the `angle` (rad).
     fn rates_at(&self, inputs: &PlantInputs, psi: AlphaBeta, speed: f64, angle: f64) -> Rates {
         let motor = self.motor(inputs);
-        let (machine, axis) = (Machine::<_>::new(&motor, &self.parameters.saturation), axis_at(&motor, angle));
-        let idle = self.blocked && !inputs.enable;
+        let (machine, axis) = (Machine::<_>::new(&motor, self.parameters.magnetics()), axis_at(&motor, angle));
+        let idle = self.blocked && inputs.is_off();
         let (psi, i) = if idle {
             let i = self.idle_current(&motor, speed);
             (machine::flux(&motor, i), i)

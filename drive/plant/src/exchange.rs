@@ -24,7 +24,6 @@ use crate::state::Instant;
 use crate::tables::PlantParameters;
 use crate::thermal::ThermalMode;
 use drive_base::frame::{Axis, Phases, Rotor, Vector};
-use drive_base::modulation::limit_to_hexagon;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
 use fmu_core::{
     CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar,
@@ -38,7 +37,7 @@ impl PmsmPlant {
     /// The state of flux linkage (Wb), speed (rad/s) and angle (rad) as the equations see it under these `inputs`.
     #[inline]
     fn instant<S: Scalar>(&self, inputs: &PlantInputs<S>, (psi, speed, angle): (Vector<Rotor, S>, S, S)) -> Instant<S> {
-        let PlantParameters { saturation, mechanics, iron, thermal, .. } = &self.parameters;
+        let PlantParameters { mechanics, iron, thermal, .. } = &self.parameters;
         let motor = &self.motor(inputs);
         let theta = |angle: S| angle * f64::from(motor.n_p);
         let (speed, angle, axis) = if mechanics.imposed {
@@ -46,11 +45,15 @@ impl PmsmPlant {
         } else {
             (speed, angle, self.state.axis.with(theta(angle)))
         };
-        let idle = self.blocked && !inputs.enable;
+        let idle = self.blocked && inputs.is_off();
         // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
         let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
         let psi = if follows { self.idle_flux(motor, speed) } else { psi };
-        let i = if idle { self.idle_current(motor, speed) } else { Machine::<_>::new(motor, saturation).current(psi) };
+        let i = if idle {
+            self.idle_current(motor, speed)
+        } else {
+            Machine::<_>::new(motor, self.parameters.magnetics()).current(psi)
+        };
         Instant { psi, i, speed, angle, axis, idle }
     }
 
@@ -70,16 +73,16 @@ impl PmsmPlant {
     /// Derivatives and powers at an instant.
     #[inline]
     pub(super) fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
-        let machine = Machine::<_>::new(&self.motor(inputs), saturation);
+        let mechanics = &self.parameters.mechanics;
+        let machine = Machine::<_>::new(&self.motor(inputs), self.parameters.magnetics());
         let shaft = Shaft::new(mechanics, inputs.tau_load, Standstill::new(mechanics, at.speed.value()));
         if at.idle {
             return blocked_rates(&machine, &shaft, at.psi, at.i, at.speed);
         }
         let path = Path {
-            u: if inputs.enable { limit_to_hexagon(inputs.u, inputs.u_dc) } else { Vector::fixed(Vector::ZERO) },
+            u: inputs.voltage(),
             dissipation: Dissipation::at(&self.parameters, machine.resistance(), machine.electrical(at.speed)),
-            drops: Switches::new(&self.parameters, inputs.enable, inputs.u_dc, self.legs(inputs)),
+            drops: Switches::of(&self.parameters, inputs, self.legs(inputs)),
         };
         let psi = machine.to_stator(at.axis, at.psi);
         Circuit { machine, path, shaft }.rates(at.axis, psi, at.speed)
@@ -90,7 +93,7 @@ impl PmsmPlant {
     fn slopes<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> [S; 4] {
         let rates = self.rates(inputs, at);
         let w = at.speed * f64::from(self.parameters.motor.n_p);
-        let d_psi = if self.blocked && !inputs.enable {
+        let d_psi = if self.blocked && inputs.is_off() {
             Vector::fixed(Vector::ZERO)
         } else {
             at.axis.from_stator(rates.d_psi) - at.psi.turned().scaled(w)
@@ -146,7 +149,7 @@ impl PmsmPlant {
 
     /// [`Events::indicators`] under these `inputs`.
     pub fn indicators_under(&self, inputs: &PlantInputs, z: &mut [f64]) {
-        if inputs.enable {
+        if !inputs.is_off() {
             z.fill(1.0);
             return;
         }
@@ -159,15 +162,15 @@ impl PmsmPlant {
 
     /// Whether the gates are off and the diodes block the current that the flux linkage has.
     pub(super) fn blocks(&self, inputs: &PlantInputs) -> bool {
-        !inputs.enable && self.diodes(inputs).0
+        inputs.is_off() && self.diodes(inputs).0
     }
 
     /// Whether diodes block the current that the flux linkage has, and by how much this is exceeded.
     fn diodes(&self, inputs: &PlantInputs) -> (bool, [f64; 2]) {
-        let (motor, saturation) = (&self.motor(inputs), &self.parameters.saturation);
+        let motor = &self.motor(inputs);
         let Instant { psi, speed, axis, .. } = self.present(inputs);
         let idle = self.idle_current(motor, speed);
-        let (legs, i) = (self.legs(inputs), machine::current(motor, saturation, psi) - idle);
+        let (legs, i) = (self.legs(inputs), machine::current(motor, self.parameters.magnetics(), psi) - idle);
         let w = f64::from(motor.n_p) * speed;
         (legs.block(motor, axis, i, w), legs.excess(motor, axis, i, w))
     }
@@ -241,7 +244,7 @@ impl Events for PmsmPlant {
         if self.blocked {
             let motor = self.motor(&self.inputs);
             let idle = self.idle_flux(&motor, state.speed);
-            let stored = |psi| machine::magnetic_energy(&motor, &self.parameters.saturation, psi);
+            let stored = |psi| machine::magnetic_energy(&motor, self.parameters.magnetics(), psi);
             self.energy.loss += stored(state.psi) - stored(idle);
             state.psi = idle;
         }

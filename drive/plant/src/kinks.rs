@@ -61,7 +61,7 @@ impl PmsmPlant {
     ) -> (Passed, Dq) {
         let (parameters, machine) = (&self.parameters, self.machine::<false>());
         let (zone, kinks) = (legs.i_zone(), switches.kinks());
-        let time = legs.time(&self.warm.motor, parameters.inverter.devices.threshold());
+        let time = legs.time(self.warm.least_inductance, parameters.inverter.devices.threshold());
         let resolved = LONGEST_STEP.min(RESOLVED * time);
         let dissipation = |speed| Dissipation::at(parameters, machine.resistance(), machine.electrical(speed));
         let at_start = dissipation(state.speed);
@@ -178,7 +178,7 @@ impl PmsmPlant {
             let path = Path { u, dissipation, drops: *switches };
             let circuit = Circuit { machine, path, shaft };
             if damped {
-                let small = DIFFERENCE * parameters.inverter.i_zero * self.warm.motor.L_d.min(self.warm.motor.L_q);
+                let small = DIFFERENCE * parameters.inverter.i_zero * self.warm.least_inductance;
                 self.integrate_damped(start, h, &circuit, small)
             } else {
                 self.integrate(start, h, &circuit)

@@ -41,9 +41,15 @@ impl<S: Scalar> Legs<S> {
         Self { share, u: u_dc * share, i_zone: inverter.i_zero.into(), u_diode: inverter.devices.u_diode }
     }
 
-    /// For legs with the gates off.
-    pub fn off(inverter: &Inverter, motor: &Motor, u_dc: S) -> Self {
-        let narrowest = u_dc * SHORTEST_SUBSTEP / S::from(motor.L_d.min(motor.L_q));
+    /// For legs that short-circuit the machine: nothing switches, so no dead time costs a voltage.
+    #[inline]
+    pub fn shorted(inverter: &Inverter) -> Self {
+        Self { share: 0.0, u: 0.0.into(), i_zone: inverter.i_zero.into(), u_diode: inverter.devices.u_diode }
+    }
+
+    /// For legs with the gates off, with the smallest inductance (H) of the machine.
+    pub fn off(inverter: &Inverter, least_inductance: f64, u_dc: S) -> Self {
+        let narrowest = u_dc * SHORTEST_SUBSTEP / S::from(least_inductance);
         let i_zone = if narrowest.value() > inverter.i_zero { narrowest } else { inverter.i_zero.into() };
         Self { share: 0.5, u: u_dc * 0.5, i_zone, u_diode: inverter.devices.u_diode }
     }
@@ -83,11 +89,11 @@ impl Legs {
         signs.to_stator() * self.u
     }
 
-    /// Time constant in s of a current within the zone, where the legs, which drop `threshold` (V) in their devices, act
+    /// Time constant in s of a current within the zone with the smallest inductance (H) of the machine, where the legs, which drop `threshold` (V) in their devices, act
     /// as resistances; infinite without a voltage.
     #[inline]
-    pub fn time(&self, motor: &Motor, threshold: f64) -> f64 {
-        self.i_zone * motor.L_d.min(motor.L_q) / (self.u + threshold)
+    pub fn time(&self, least_inductance: f64, threshold: f64) -> f64 {
+        self.i_zone * least_inductance / (self.u + threshold)
     }
 
     /// Line-to-line back EMF in V above which diodes conduct.

@@ -15,6 +15,7 @@ pub mod counters;
 mod damping;
 pub mod documentation;
 pub mod exchange;
+pub mod flux_map;
 mod integration;
 pub mod inverter;
 pub mod iron;

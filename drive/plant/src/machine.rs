@@ -1,9 +1,11 @@
 //! The salient permanent-magnet machine in its rotor frame (Rasmussen (2) for L_d = L_q, Kim & Sul (1) in general).
 //!
 //! d psi_d/dt = u_d - R_s i_d + w psi_q, d psi_q/dt = u_q - R_s i_q - w psi_d, psi_d = L_d i_d + psi_M, psi_q = L_q
-//! i_q, tau_e = 1.5 n_p (psi_d i_q - psi_q i_d); [`saturation`](crate::saturation) adds to the current. The flux
-//! linkages are the state, so the equations remain valid when the inductances saturate.
+//! i_q, tau_e = 1.5 n_p (psi_d i_q - psi_q i_d); [`saturation`](crate::saturation) adds to the current, or a
+//! [`flux_map`](crate::flux_map) gives it. The flux linkages are the state, so the equations remain valid when the
+//! inductances saturate.
 
+use crate::flux_map::FluxMap;
 use crate::saturation::Saturation;
 use drive_base::frame::{Axis, Dq, Rotor, Stator, Vector};
 use drive_base::math::reciprocal;
@@ -17,17 +19,53 @@ pub fn flux<S: Scalar>(motor: &Motor<S>, i: Vector<Rotor, S>) -> Vector<Rotor, S
     Vector::new(i.d() * motor.L_d + motor.psi_M, i.q() * motor.L_q)
 }
 
+/// How the current follows from the flux linkage.
+#[derive(Clone, Copy, Debug)]
+pub enum Magnetics<'a> {
+    /// By the inductances.
+    Linear,
+    /// By the inductances and a polynomial.
+    Polynomial(&'a Saturation),
+    /// By a map.
+    Map(&'a FluxMap),
+}
+
 /// Current (A) for the flux linkage `psi` (Wb).
 #[inline]
-pub fn current(motor: &Motor, saturation: &Saturation, psi: Dq) -> Dq {
-    Machine::<_>::new(motor, saturation).current(psi)
+pub fn current(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> Dq {
+    Machine::<_>::new(motor, magnetics).current(psi)
 }
 
 /// Magnetic energy in J at the flux linkage `psi` (Wb), excluding that of the magnet: 0 without current.
 #[inline]
-pub fn magnetic_energy(motor: &Motor, saturation: &Saturation, psi: Dq) -> f64 {
+pub fn magnetic_energy(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> f64 {
     let (x, q) = (psi.d() - motor.psi_M, psi.q());
-    0.75 * (x * x / motor.L_d + q * q / motor.L_q) + saturation.energy(motor, psi)
+    let linear = 0.75 * (x * x / motor.L_d + q * q / motor.L_q);
+    match magnetics {
+        Magnetics::Linear => linear,
+        Magnetics::Polynomial(saturation) => linear + saturation.energy(motor, psi),
+        Magnetics::Map(map) => map.energy(Dq::new(x, q)),
+    }
+}
+
+/// d i_d / d psi_d, d i_d / d psi_q and d i_q / d psi_q (1/H) at the flux linkage `psi` (Wb).
+#[inline]
+pub fn slope(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> [f64; 3] {
+    match magnetics {
+        Magnetics::Linear => [1.0 / motor.L_d, 0.0, 1.0 / motor.L_q],
+        Magnetics::Polynomial(saturation) => saturation.slope(motor, psi),
+        Magnetics::Map(map) => map.hessian(psi - Dq::new(motor.psi_M, 0.0)),
+    }
+}
+
+/// The smallest incremental inductance (H) of the machine over all directions at the flux linkage `psi` (Wb).
+pub fn least_inductance(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> f64 {
+    if let Magnetics::Linear = magnetics {
+        return motor.L_d.min(motor.L_q);
+    }
+    let [d, cross, q] = slope(motor, magnetics, psi);
+    // The greatest eigenvalue.
+    1.0 / (0.5 * (d + q) + (0.25 * (d - q) * (d - q) + cross * cross).sqrt())
 }
 
 /// The reciprocals of the inductances in 1/H.
@@ -48,8 +86,8 @@ impl Inverse {
 /// The machine with constants for many evaluations.
 #[derive(Clone, Copy, Debug)]
 pub struct Machine<'a, S = f64, const LINEAR: bool = false> {
-    /// `None` for a linear machine; never asked if `LINEAR`.
-    saturation: Option<&'a Saturation>,
+    /// Never asked if `LINEAR`.
+    magnetics: Magnetics<'a>,
     psi_M: S,
     R_s: S,
     by_L_q: f64,
@@ -61,16 +99,15 @@ pub struct Machine<'a, S = f64, const LINEAR: bool = false> {
 impl<'a, S: Scalar, const LINEAR: bool> Machine<'a, S, LINEAR> {
     /// From the parameters.
     #[inline]
-    pub fn new(motor: &Motor<S>, saturation: &'a Saturation) -> Self {
-        Self::with(motor, saturation, Inverse::of(motor))
+    pub fn new(motor: &Motor<S>, magnetics: Magnetics<'a>) -> Self {
+        Self::with(motor, magnetics, Inverse::of(motor))
     }
 
     /// With the reciprocals at hand.
     #[inline]
-    pub fn with(motor: &Motor<S>, saturation: &'a Saturation, Inverse { d, q }: Inverse) -> Self {
+    pub fn with(motor: &Motor<S>, magnetics: Magnetics<'a>, Inverse { d, q }: Inverse) -> Self {
         let Motor { n_p, R_s, L_d: _, L_q: _, psi_M } = *motor;
-        let saturation = (!saturation.is_none()).then_some(saturation);
-        Self { saturation, psi_M, R_s, by_L_q: q, saliency: d - q, n_p: f64::from(n_p) }
+        Self { magnetics, psi_M, R_s, by_L_q: q, saliency: d - q, n_p: f64::from(n_p) }
     }
 
     /// Current (A) for the flux linkage `psi` (Wb).
@@ -78,18 +115,25 @@ impl<'a, S: Scalar, const LINEAR: bool> Machine<'a, S, LINEAR> {
     pub fn current(&self, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
         let e = Vector::new(1.0.into(), 0.0.into());
         let x = psi - e.scaled(self.psi_M);
-        self.linear_current(x, e)
-            + self.saturation.map_or(Vector::fixed(Vector::ZERO), |saturation| saturation.current(x))
+        match self.magnetics {
+            Magnetics::Linear => self.linear_current(x, e),
+            Magnetics::Polynomial(saturation) => self.linear_current(x, e) + saturation.current(x),
+            Magnetics::Map(map) => map.current(x),
+        }
     }
 
     /// [`current`](Self::current) in stator axes, for the flux linkage `psi` (Wb) in stator axes with the magnet on `axis`.
     #[inline]
     pub fn stator_current(&self, axis: Axis<Rotor, S>, psi: Vector<Stator, S>) -> Vector<Stator, S> {
         let x = psi - axis.along(self.psi_M);
-        let linear = self.linear_current(x, axis.along(1.0.into()));
-        match self.saturation {
-            Some(saturation) if !LINEAR => linear + axis.to_stator(saturation.current(axis.from_stator(x))),
-            _ => linear,
+        let linear = || self.linear_current(x, axis.along(1.0.into()));
+        if LINEAR {
+            return linear();
+        }
+        match self.magnetics {
+            Magnetics::Linear => linear(),
+            Magnetics::Polynomial(saturation) => linear() + axis.to_stator(saturation.current(axis.from_stator(x))),
+            Magnetics::Map(map) => axis.to_stator(map.current(axis.from_stator(x))),
         }
     }
 
@@ -143,8 +187,8 @@ mod tests {
         let motor = Motor { L_q: 9e-3, ..Motor::default() };
         let i = Dq::new(-2.0, 4.0);
         let expected = 1.5 * 3.0 * (0.15 * 4.0 + (6e-3 - 9e-3) * -2.0 * 4.0);
-        let (linear, psi) = (Saturation::default(), flux(&motor, i));
-        assert!((Machine::<_>::new(&motor, &linear).torque(psi, i) - expected).abs() < 1e-14);
-        assert!((current(&motor, &linear, psi).q() - 4.0).abs() < 1e-14);
+        let psi = flux(&motor, i);
+        assert!((Machine::<_>::new(&motor, Magnetics::Linear).torque(psi, i) - expected).abs() < 1e-14);
+        assert!((current(&motor, Magnetics::Linear, psi).q() - 4.0).abs() < 1e-14);
     }
 }

@@ -1,12 +1,13 @@
 //! The model `PmsmPlant`: inverter, machine and mechanics, integrated with held inputs.
 
 use crate::counters::Point;
+use crate::flux_map;
 use crate::legs::Legs;
 use crate::losses::{Losses, efficiency};
 use crate::machine::{self, Machine};
 use crate::power::Energy;
 use crate::power::Powers;
-use crate::signals::{PlantInputs, PlantOutputs};
+use crate::signals::{Gates, PlantInputs, PlantOutputs};
 use crate::state::{Instant, State};
 use crate::tables::{PARAMETERS, PlantParameters, TABLE};
 use crate::thermal::warm::Warm;
@@ -15,7 +16,8 @@ use drive_base::connection::Measured;
 use drive_base::frame::{Dq, Phases, Rotor, Vector};
 use drive_base::math::wrap;
 use drive_base::motor::Motor;
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal, Warns};
 use serde::{Deserialize, Serialize};
 
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
@@ -45,9 +47,12 @@ impl PmsmPlant {
     /// Voltage drop of the inverter legs.
     #[inline]
     pub(super) fn legs<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Legs<S> {
-        let PlantParameters { motor, inverter, .. } = &self.parameters;
-        let u_dc = inputs.u_dc;
-        if inputs.enable { Legs::switching(inverter, u_dc) } else { Legs::off(inverter, motor, u_dc) }
+        let (inverter, u_dc) = (&self.parameters.inverter, inputs.u_dc);
+        match inputs.gates() {
+            Gates::Switch => Legs::switching(inverter, u_dc),
+            Gates::Short => Legs::shorted(inverter),
+            Gates::Off => Legs::off(inverter, self.warm.least_inductance, u_dc),
+        }
     }
 
     /// The current (A) that the flux linkage of this `motor` has while the diodes block, at the mechanical `speed` (rad/s).
@@ -70,7 +75,7 @@ impl PmsmPlant {
     pub(super) fn reached(&self) -> Instant {
         let State { psi, speed, angle, axis } = self.state;
         let i = self.machine::<false>().current(psi);
-        Instant { psi, i, speed, angle, axis, idle: self.blocked && !self.inputs.enable }
+        Instant { psi, i, speed, angle, axis, idle: self.blocked && self.inputs.is_off() }
     }
 
     /// [`reached`](Self::reached) with iron loss, and the current (A) at the terminals.
@@ -105,9 +110,10 @@ impl PmsmPlant {
         temperatures: Temperatures<S>,
         powers: Powers<S>,
     ) -> PlantOutputs<S> {
-        let PlantParameters { motor, saturation, .. } = &self.parameters;
+        let motor = &self.parameters.motor;
         let &Instant { psi, speed, angle, axis, .. } = at;
-        let (theta, tau_e) = (angle * f64::from(motor.n_p), Machine::<_>::new(motor, saturation).torque(psi, at.i));
+        let (theta, tau_e) =
+            (angle * f64::from(motor.n_p), Machine::<_>::new(motor, self.parameters.magnetics()).torque(psi, at.i));
         PlantOutputs {
             i: Phases::from_stator(axis.to_stator(i)),
             speed,
@@ -176,9 +182,10 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 11;
+    const STATE_VERSION: u16 = 12;
 
     fn derive(&mut self) {
+        self.warm.least_inductance = self.parameters.least_inductance();
         self.take(self.warm.at);
     }
 
@@ -189,6 +196,7 @@ impl Model for PmsmPlant {
             let allowed = format!("at most {fastest} rad/s in magnitude, the speed of any machine with this motor.n_p");
             return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.initial.speed, allowed));
         }
+        flux_map::validate(&self.parameters)?;
         thermal::validate(&self.parameters)?;
         self.judge_temperatures(&self.inputs)
     }
@@ -207,7 +215,7 @@ impl Model for PmsmPlant {
         } else {
             (initial.speed, initial.theta_e / f64::from(motor.n_p))
         };
-        let psi = if self.inputs.enable { machine::flux(motor, Dq::ZERO) } else { self.idle_flux(motor, speed) };
+        let psi = if self.inputs.is_off() { self.idle_flux(motor, speed) } else { machine::flux(motor, Dq::ZERO) };
         self.state = State::new(motor, psi, speed, angle);
         (self.energy, self.point) = (Energy::default(), Point::default());
         self.blocked = self.blocks(&self.inputs);
@@ -235,6 +243,22 @@ impl Model for PmsmPlant {
             self.advance_at_temperature(step.h)
         } else {
             self.advance_with_temperatures(step.h)
+        }
+    }
+}
+
+impl Warns for PmsmPlant {
+    fn warn(&self, log: &mut Warnings<'_>) {
+        let (map, psi) = (&self.parameters.flux_map, self.state.psi);
+        if map.used && !map.holds(psi - Dq::new(self.warm.motor.psi_M, 0.0)) {
+            log.warn("flux_map", || {
+                format!(
+                    "psi_d = {} Wb, psi_q = {} Wb is beyond the flux map: the inductances of its edge go on there; limit the current, \
+                     or fit a map to a table of greater currents",
+                    psi.d(),
+                    psi.q()
+                )
+            });
         }
     }
 }

@@ -12,7 +12,7 @@
 
 use drive_base::frame::{Dq, Rotor, Vector};
 use drive_base::motor::{A_PER_WB2, A_PER_WB3, Motor};
-use fmu_core::{Row, Scalar, Table};
+use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters; all zero gives the linear machine.
@@ -49,13 +49,6 @@ impl Saturation {
         [by_d, self.s_dq * q, 1.0 / motor.L_q + self.s_dq * x]
     }
 
-    /// The smallest incremental inductance (H) of the machine at the flux linkage `psi` (Wb) over all directions: 1
-    /// over the largest eigenvalue of d i / d psi.
-    pub fn least_inductance(&self, motor: &Motor, psi: Dq) -> f64 {
-        let [by_d, cross, by_q] = self.slope(motor, psi);
-        1.0 / (0.5 * (by_d + by_q) + (0.5 * (by_d - by_q)).hypot(cross))
-    }
-
     /// The energy (J) beyond the linear machine's at the flux linkage `psi` (Wb): 1.5 of the integral of i d psi.
     #[inline]
     pub fn energy(&self, motor: &Motor, psi: Dq) -> f64 {
@@ -67,22 +60,16 @@ impl Saturation {
 type P = Row<Saturation>;
 
 /// Variables of the saturation; their owner supplies the prefix `saturation.`.
-pub const SATURATION: &Table<Saturation> = &Table::new(
-    const {
-        &[
-            P::parameter("s_2", &A_PER_WB2, "Second-order d-axis saturation coefficient; 0: none", |p| &mut p.s_2),
-            P::parameter("s_3", &A_PER_WB3, "Third-order d-axis saturation coefficient; 0: none", |p| &mut p.s_3)
-                .at_least(0.0),
-            P::parameter("s_dq", &A_PER_WB2, "Cross-saturation coefficient between d and q axis; 0: none", |p| {
-                &mut p.s_dq
-            }),
-        ]
-    },
-);
+pub const SATURATION: &Table<Saturation> = table![
+    P::parameter("s_2", &A_PER_WB2, "Second-order d-axis saturation coefficient; 0: none", |p| &mut p.s_2),
+    P::parameter("s_3", &A_PER_WB3, "Third-order d-axis saturation coefficient; 0: none", |p| &mut p.s_3).at_least(0.0),
+    P::parameter("s_dq", &A_PER_WB2, "Cross-saturation coefficient between d and q axis; 0: none", |p| { &mut p.s_dq }),
+];
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::{self, Magnetics};
 
     #[test]
     fn is_reciprocal_and_tells_north_from_south() {
@@ -101,7 +88,10 @@ mod tests {
             1.0 / by(direction * h).dot(direction)
         };
         let least = (0..3600).map(|k| of(f64::from(k).to_radians() / 10.0)).fold(f64::INFINITY, f64::min);
-        assert!((s.least_inductance(&motor, psi) / least - 1.0).abs() < 1e-5, "{least} H");
+        assert!(
+            (machine::least_inductance(&motor, Magnetics::Polynomial(&s), psi) / least - 1.0).abs() < 1e-5,
+            "{least} H"
+        );
         let along = |x: f64| current(Dq::new(motor.psi_M + x, 0.0)).d();
         assert!(along(0.1) > 0.0 && along(0.1) > -along(-0.1));
     }

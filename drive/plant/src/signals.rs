@@ -4,9 +4,21 @@ use crate::losses::efficiency;
 use crate::power::{Energy, Powers};
 use crate::thermal::{Heat, Temperatures, ThermalInputs};
 use drive_base::connection::{Commanded, Measured};
-use drive_base::frame::Phases;
-use fmu_core::Dual;
+use drive_base::frame::{Phases, Stator, Vector};
+use drive_base::modulation::limit_to_hexagon;
+use fmu_core::{Dual, Scalar};
 use serde::{Deserialize, Serialize};
+
+/// What the transistors of the inverter do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gates {
+    /// They switch, and make the voltage references.
+    Switch,
+    /// All upper or all lower ones conduct: the terminals of the machine are short-circuited.
+    Short,
+    /// None conducts; only the diodes do.
+    Off,
+}
 
 /// Inputs, held over a communication step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,6 +35,8 @@ pub struct PlantInputs<S = f64> {
     pub angle_shaft: S,
     /// Whether the gates switch; false: only the diodes conduct.
     pub enable: bool,
+    /// Active short circuit: all upper or all lower transistors conduct, whatever `enable` says.
+    pub asc: bool,
     /// Temperatures in K.
     pub thermal: ThermalInputs<S>,
 }
@@ -30,15 +44,50 @@ pub struct PlantInputs<S = f64> {
 impl Default for PlantInputs {
     fn default() -> Self {
         let (u, thermal) = (Phases::default(), ThermalInputs::default());
-        Self { u, u_dc: 325.0, tau_load: 0.0, speed_shaft: 0.0, angle_shaft: 0.0, enable: true, thermal }
+        Self { u, u_dc: 325.0, tau_load: 0.0, speed_shaft: 0.0, angle_shaft: 0.0, enable: true, asc: false, thermal }
+    }
+}
+
+impl<S: Scalar> PlantInputs<S> {
+    /// What the transistors do.
+    #[inline]
+    pub fn gates(&self) -> Gates {
+        if self.asc {
+            Gates::Short
+        } else if self.enable {
+            Gates::Switch
+        } else {
+            Gates::Off
+        }
+    }
+
+    /// Whether only the diodes conduct.
+    #[inline]
+    pub fn is_off(&self) -> bool {
+        !(self.enable || self.asc)
+    }
+
+    /// Voltage (V) that the legs make, before any drop.
+    #[inline]
+    pub fn voltage(&self) -> Vector<Stator, S> {
+        match self.gates() {
+            Gates::Switch => limit_to_hexagon(self.u, self.u_dc),
+            Gates::Short | Gates::Off => Vector::fixed(Vector::ZERO),
+        }
     }
 }
 
 impl PlantInputs {
     /// Takes the voltages and the gates that a controller commands.
     #[inline]
-    pub fn apply(&mut self, Commanded { u, enable }: Commanded) {
-        (self.u, self.enable) = (u, enable);
+    pub fn apply(&mut self, Commanded { u, enable, asc }: Commanded) {
+        (self.u, self.enable, self.asc) = (u, enable, asc);
+    }
+
+    /// What the controller commanded.
+    #[inline]
+    pub fn commanded(&self) -> Commanded {
+        Commanded { u: self.u, enable: self.enable, asc: self.asc }
     }
 
     /// These inputs with the change `along` of the continuous ones.
@@ -61,6 +110,7 @@ impl PlantInputs {
             speed_shaft: f(self.speed_shaft, other.speed_shaft),
             angle_shaft: f(self.angle_shaft, other.angle_shaft),
             enable: self.enable,
+            asc: self.asc,
             thermal: self.thermal.zip(&other.thermal, f),
         }
     }

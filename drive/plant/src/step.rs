@@ -11,12 +11,10 @@ use crate::model::PmsmPlant;
 use crate::power::{Energy, Powers};
 use crate::signals::PlantInputs;
 use crate::state::{State, axis_at};
-use crate::tables::PlantParameters;
 use crate::thermal::ThermalMode;
 use drive_base::frame::{AlphaBeta, Dq};
 use drive_base::integrate::rk4;
 use drive_base::math::all_finite;
-use drive_base::modulation::limit_to_hexagon;
 use fmu_core::Fault;
 use nalgebra::SVector;
 
@@ -35,7 +33,7 @@ impl PmsmPlant {
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     fn at_the_shaft(&self) -> (State, Passed) {
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let mechanics = &self.parameters.mechanics;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         if !mechanics.imposed {
             return (self.state, Passed::default());
@@ -44,7 +42,7 @@ impl PmsmPlant {
         let axis = axis_at(motor, angle_shaft);
         let machine = self.machine::<false>();
         let psi = machine.from_stator(axis, machine.to_stator(self.state.axis, self.state.psi));
-        let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
+        let stored = |psi| machine::magnetic_energy(motor, self.parameters.magnetics(), psi);
         let energy = Energy { mech: stored(self.state.psi) - stored(psi), ..Energy::default() };
         (State { psi, speed: speed_shaft, angle: angle_shaft, axis }, Passed { energy, ..Passed::default() })
     }
@@ -52,10 +50,10 @@ impl PmsmPlant {
     /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s), with a voltage that
     /// follows the currents.
     pub(super) fn substeps(&self, h: f64, speed: f64, legs: &Legs, switches: &Switches) -> Result<f64, Fault> {
-        let PlantParameters { motor, inverter, .. } = &self.parameters;
+        let inverter = &self.parameters.inverter;
         let longest = if switches.kinks() {
             // Half of a time constant in the zone: no kink is looked for, so that the energies need shorter steps.
-            0.5 * LONGEST_STEP.min(legs.time(motor, inverter.devices.threshold()))
+            0.5 * LONGEST_STEP.min(legs.time(self.warm.least_inductance, inverter.devices.threshold()))
         } else {
             LONGEST_STEP
         };
@@ -138,7 +136,7 @@ impl PmsmPlant {
     #[inline(never)]
     fn integrate_any(&self, start: &State, h: f64, u: AlphaBeta) -> (State, Passed) {
         let mechanics = &self.parameters.mechanics;
-        if self.parameters.saturation.is_none() {
+        if self.parameters.is_linear() {
             self.integrate_linear(start, h, u)
         } else if mechanics.is_whole(start.speed) {
             self.integrate_ideal::<_, false>(start, h, u, Whole::new(mechanics, start.speed))
@@ -147,14 +145,14 @@ impl PmsmPlant {
         }
     }
 
-    /// A communication step of `h` (s) with ideal legs, which switch.
+    /// A communication step of `h` (s) with ideal legs, which switch or short-circuit the machine.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     fn pass_ideal(&self, h: f64) -> Result<(State, Passed), Fault> {
-        let u = limit_to_hexagon(self.inputs.u, self.inputs.u_dc);
-        let PlantParameters { saturation, mechanics, .. } = &self.parameters;
+        let u = self.inputs.voltage();
+        let mechanics = &self.parameters.mechanics;
         let is_one = Self::is_one_step(h, self.machine::<true>().electrical(self.state.speed));
-        if is_one && saturation.is_none() && !mechanics.imposed {
+        if is_one && self.parameters.is_linear() && !mechanics.imposed {
             let (next, step) = self.integrate_linear(&self.state, h, u);
             if mechanics.shorter(h, self.state.speed, next.speed).is_none() {
                 return Ok((next, step));
@@ -193,14 +191,14 @@ impl PmsmPlant {
     /// A communication step of `h` (s) with the gates off, with dead time or with losses.
     #[inline(never)]
     fn advance_general(&mut self, h: f64) -> Result<(), Fault> {
-        let PlantInputs { enable, u, u_dc, .. } = self.inputs;
+        let conducts = !self.inputs.is_off();
         let legs = self.legs(&self.inputs);
-        let switches = Switches::new(&self.parameters, enable, u_dc, legs);
+        let switches = Switches::of(&self.parameters, &self.inputs, legs);
         let (mut state, mut passed) = self.at_the_shaft();
         let count = self.substeps(h, state.speed, &legs, &switches)?;
         let (mut lost, mut by_iron) = (None, Dq::ZERO);
-        if enable {
-            let (step, current) = self.pass_kinks(&mut state, h, limit_to_hexagon(u, u_dc), &legs, switches);
+        if conducts {
+            let (step, current) = self.pass_kinks(&mut state, h, self.inputs.voltage(), &legs, switches);
             passed.add(&step);
             by_iron = current;
         } else {
@@ -220,7 +218,7 @@ impl PmsmPlant {
         }
         self.conclude(h, state, &passed, lost.is_some(), &legs)?;
         if !self.parameters.iron.is_none() {
-            self.by_iron = if enable { by_iron } else { self.current_by_iron() };
+            self.by_iron = if conducts { by_iron } else { self.current_by_iron() };
         }
         Ok(())
     }
@@ -229,7 +227,7 @@ impl PmsmPlant {
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     pub(super) fn advance_at_temperature(&mut self, h: f64) -> Result<(), Fault> {
-        if !(self.warm.ideal && self.inputs.enable) {
+        if !self.warm.ideal || self.inputs.is_off() {
             return self.advance_general(h);
         }
         let (state, passed) = self.pass_ideal(h)?;
@@ -307,10 +305,10 @@ impl PmsmPlant {
 
     /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.
     fn remaining(&self, state: &State, legs: &Legs) -> Option<f64> {
-        let (motor, saturation) = (&self.warm.motor, &self.parameters.saturation);
-        let i = machine::current(motor, saturation, state.psi) - self.idle_current(motor, state.speed);
+        let motor = &self.warm.motor;
+        let i = machine::current(motor, self.parameters.magnetics(), state.psi) - self.idle_current(motor, state.speed);
         let blocked = legs.block(motor, state.axis, i, f64::from(motor.n_p) * state.speed);
-        let stored = |psi| machine::magnetic_energy(motor, saturation, psi);
+        let stored = |psi| machine::magnetic_energy(motor, self.parameters.magnetics(), psi);
         blocked.then(|| stored(state.psi) - stored(self.idle_flux(motor, state.speed)))
     }
 }

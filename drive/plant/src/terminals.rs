@@ -11,8 +11,8 @@ use fmu_core::{Member, Terminal};
 pub(crate) const PLANT: &[Terminal] = &[
     Terminal::plug(
         "phases",
-        "Voltage references and enable from the controller, measured currents to it",
-        &phases(Member::signal("enable")),
+        "Voltage references, enable and active short circuit from the controller, measured currents to it",
+        &phases(Member::signal("enable"), Member::signal("asc")),
     )
     .drawn(&PHASES, -100.0, 40.0),
     Terminal::plug(

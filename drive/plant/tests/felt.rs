@@ -31,6 +31,8 @@ const MOVED: &[(&str, f64)] = &[
 /// Parameters of the network, which Model Exchange refuses and `temperature.rs` tests, and switches.
 fn is_elsewhere(name: &str) -> bool {
     name.starts_with("thermal.") && !matches!(name, "thermal.T_ref")
+        // flux_map.rs tests the map.
+        || name.starts_with("flux_map.")
         || name == "mechanics.imposed"
         || name == "motor.n_p"
 }

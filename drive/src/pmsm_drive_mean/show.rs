@@ -1,11 +1,13 @@
 //! The outputs of `PmsmDriveMean`: those of `PmsmDrive` with their steady meaning.
 
 use super::{MeanOutputs, PmsmDriveMean, State};
+use crate::dc_link::LinkOutputs;
 use crate::pmsm_drive::Means;
 use crate::steady::{Point, Region, within};
 use drive_base::frame::{Axis, Phases, Rotor};
 use drive_base::math::wrap;
 use drive_control::signals::{ControllerOutputs, DqParts};
+use drive_control::trip::Cause;
 use drive_plant::losses::efficiency;
 use drive_plant::power::Powers;
 use drive_plant::signals::PlantOutputs;
@@ -35,6 +37,7 @@ impl PmsmDriveMean {
             temperatures,
             heat: plant.thermal.heat_at(self.inputs.thermal.coolant, &temperatures, &losses),
         };
+        out.drive.link = LinkOutputs { i_source: powers.i_dc, ..LinkOutputs::none() };
         out.drive.means = if self.moved { Means { p_in, p_mech, p_loss, tau_shaft } } else { Means::default() };
     }
 
@@ -67,6 +70,10 @@ impl PmsmDriveMean {
             tau_min,
             u_share,
             weakens,
+            // Without samples, nothing trips and no sensor is lost.
+            short_circuit: false,
+            tripped: Cause::None,
+            sensor_lost: false,
             R_s_est: self.drive.controller.motor.R_s,
         }
     }

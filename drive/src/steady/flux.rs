@@ -7,10 +7,9 @@
 
 use drive_base::frame::Dq;
 use drive_base::motor::Motor;
-use drive_plant::machine;
-use drive_plant::saturation::Saturation;
+use drive_plant::machine::{self, Magnetics};
 
-/// Newton steps of a saturated machine, at most.
+/// Newton steps of a machine that is not linear, at most.
 const STEPS: usize = 12;
 
 /// Residue as a share of the current at which they end.
@@ -18,19 +17,19 @@ const SMALL: f64 = 1e-14;
 
 /// The flux linkage (Wb) with the current `i_s` (A) at the terminals.
 #[inline]
-pub(super) fn linkage(motor: &Motor, saturation: &Saturation, i_s: Dq, (h, g): (f64, f64)) -> Dq {
+pub(super) fn linkage(motor: &Motor, magnetics: Magnetics<'_>, i_s: Dq, (h, g): (f64, f64)) -> Dq {
     let mut psi = machine::flux(motor, i_s);
-    let linear = saturation.is_none();
+    let linear = matches!(magnetics, Magnetics::Linear);
     if linear && g == 0.0 {
         return psi;
     }
     for _ in 0..if linear { 1 } else { STEPS } {
         let rest =
-            if linear { Dq::ZERO } else { machine::current(motor, saturation, psi) - i_s } + psi * h + psi.turned() * g;
+            if linear { Dq::ZERO } else { machine::current(motor, magnetics, psi) - i_s } + psi * h + psi.turned() * g;
         if !linear && rest.magnitude() <= SMALL * (1.0 + i_s.magnitude()) {
             break;
         }
-        let [d, cross, q] = saturation.slope(motor, psi);
+        let [d, cross, q] = machine::slope(motor, magnetics, psi);
         let (d, q, above, below) = (d + h, q + h, cross - g, cross + g);
         let by = 1.0 / (d * q - above * below);
         let step = Dq::new(q * rest.d() - above * rest.q(), d * rest.q() - below * rest.d()) * by;
@@ -42,12 +41,15 @@ pub(super) fn linkage(motor: &Motor, saturation: &Saturation, i_s: Dq, (h, g): (
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drive_plant::flux_map;
+    use drive_plant::saturation::Saturation;
 
     #[test]
     fn current_of_flux_and_iron_is_that_of_the_terminals() {
         let motor = Motor::IPMSM_2_2_KW;
-        let saturations = [Saturation::default(), Saturation { s_2: 6.0, s_3: 20.0, s_dq: 5.0 }];
-        for saturation in saturations {
+        let saturation = Saturation { s_2: 6.0, s_3: 20.0, s_dq: 5.0 };
+        let map = flux_map::linear(&motor, [-0.6, 0.1], 0.4);
+        for magnetics in [Magnetics::Linear, Magnetics::Polynomial(&saturation), Magnetics::Map(&map)] {
             for (i, iron) in [
                 ((-3.0, 5.0), (0.02, 0.3)),
                 ((-8.0, -6.0), (-0.03, -0.4)),
@@ -55,9 +57,9 @@ mod tests {
                 ((2.0, 0.0), (0.0, 0.0)),
             ] {
                 let i_s = Dq::new(i.0, i.1);
-                let psi = linkage(&motor, &saturation, i_s, iron);
-                let found = machine::current(&motor, &saturation, psi) + psi * iron.0 + psi.turned() * iron.1;
-                assert!((found - i_s).magnitude() < 1e-12, "{saturation:?}, {iron:?}: {found:?}, not {i_s:?}");
+                let psi = linkage(&motor, magnetics, i_s, iron);
+                let found = machine::current(&motor, magnetics, psi) + psi * iron.0 + psi.turned() * iron.1;
+                assert!((found - i_s).magnitude() < 1e-12, "{magnetics:?}, {iron:?}: {found:?}, not {i_s:?}");
             }
         }
     }
@@ -69,7 +71,7 @@ mod tests {
         let Motor { L_d, L_q, psi_M, .. } = motor;
         let i_d = (i_s.d() + g * L_q * (i_s.q() - g * psi_M)) / (1.0 + g * g * L_d * L_q);
         let i_q = i_s.q() - g * (psi_M + L_d * i_d);
-        let psi = linkage(&motor, &Saturation::default(), i_s, (0.0, g));
+        let psi = linkage(&motor, Magnetics::Linear, i_s, (0.0, g));
         assert!((psi - Dq::new(psi_M + L_d * i_d, L_q * i_q)).magnitude() < 1e-15, "{psi:?}");
     }
 }

@@ -178,16 +178,16 @@ impl<'a> At<'a> {
         } = self;
         let g = G * w;
         // j times the late part.
-        let (mut psi, mut i) = (flux::linkage(motor, &plant.saturation, i_s, (-g * late[1], g * late[0])), i_s);
+        let (mut psi, mut i) = (flux::linkage(motor, plant.magnetics(), i_s, (-g * late[1], g * late[0])), i_s);
         let at_sample = psi.turned() * *w;
         let (mut e, mut rippled) = (at_sample, 0.0);
         if *held < 1.0 {
-            let [d, cross, q] = plant.saturation.slope(motor, psi);
+            let [d, cross, q] = machine::slope(motor, plant.magnetics(), psi);
             let along = Dq::new(d * psi.d() + cross * psi.q(), cross * psi.d() + q * psi.q());
             rippled = ripple * along.dot(along);
             psi = psi * (held * held);
             e = psi.turned() * *w;
-            i = machine::current(motor, &plant.saturation, psi) + e * *G;
+            i = machine::current(motor, plant.magnetics(), psi) + e * *G;
         }
         let u = i * *R + e;
         let square = i.dot(i);

@@ -5,6 +5,7 @@ use drive::Pair;
 use drive::control::reference::{max_torque, max_torque_per_ampere};
 use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters as Par;
+use drive::control::trip::Cause;
 use drive::estimator::Kind;
 use drive::estimator::pulsating::Demodulation;
 use drive::estimator::tracker::TrackerKind;
@@ -45,6 +46,25 @@ fn references(mut pair: Pair) -> Figures {
     pair.controller.model.inputs.tau_ref = 10.0;
     run(&mut pair, 0.1, |_, _| ());
     [pair.controller.out.i_ref.d, pair.controller.out.tau_max]
+}
+
+/// Whether a link of 600 V trips, and whether the machine is short-circuited once the link has lost its voltage.
+fn over_voltage(mut pair: Pair) -> Figures {
+    run(&mut pair, 0.1, |t, p| {
+        let u_dc = match t {
+            ..0.05 => 540.0,
+            ..0.08 => 600.0,
+            _ => 5.0,
+        };
+        p.set_inputs(SLOW, 0.0, u_dc);
+    });
+    let out = &pair.controller.out;
+    [f64::from(u8::from(out.tripped == Cause::OverVoltage)), f64::from(u8::from(out.short_circuit))]
+}
+
+/// Whether these figures are yes (1) or no (0) as expected.
+fn are(figures: Figures, expected: [bool; 2]) -> bool {
+    figures.map(|x| x > 0.5) == expected
 }
 
 /// Mean angle error in degrees, and estimate, after a load step of 7 N.m.
@@ -288,6 +308,47 @@ pub(super) const CASES: &[Case] = &[
         ask: |p| p.limit.tau = 2.0,
         figures: |pair| [references(pair)[1], 0.0],
         acts: |_, _, [tau_max, _]| (tau_max - 2.0).abs() < 1e-9,
+    },
+    Case {
+        option: "limit.i_dc_use",
+        on: slow,
+        ask: |p| (p.dc.used, p.dc.max) = (true, 0.3),
+        figures: |pair| [0.0, references(pair)[1]],
+        // The greatest torque takes 162 W, at a speed of 15.7 rad/s.
+        acts: |_, _, [_, tau_max]| tau_max * SLOW < 162.0 && tau_max > 3.0,
+    },
+    Case {
+        option: "trip.use",
+        on: slow,
+        ask: |p| (p.trip.used, p.trip.i, p.trip.u_dc) = (true, 15.1, 560.0),
+        figures: over_voltage,
+        acts: |_, without, with| are(without, [false, false]) && are(with, [true, false]),
+    },
+    Case {
+        option: "trip.asc",
+        on: |kind| {
+            let mut pair = slow(kind);
+            (pair.controller.model.parameters.trip.used, pair.controller.model.parameters.trip.u_dc) = (true, 560.0);
+            pair.controller.model.parameters.trip.i = 15.1;
+            pair
+        },
+        ask: |p| p.trip.asc = true,
+        figures: over_voltage,
+        // On a link that a short circuit has discharged, any speed is above that of the diodes.
+        acts: |_, without, with| are(without, [true, false]) && are(with, [true, true]),
+    },
+    Case {
+        option: "sensor.fallback",
+        on: slow,
+        ask: |p| p.fallback = Kind::RotatingInjection,
+        figures: |mut pair| {
+            run(&mut pair, 0.2, |t, p| p.controller.model.inputs.sensor_valid = t < 0.1);
+            [f64::from(u8::from(pair.controller.out.sensor_lost)), off(&pair)]
+        },
+        acts: |kind, [without, _], [with, off]| {
+            let sensor = kind == Kind::Sensored;
+            without < 0.5 && (with > 0.5) == sensor && (!sensor || off > 1e-9 && off < 5.0)
+        },
     },
     Case {
         option: "start.mode",

@@ -1,3 +1,3 @@
 //! The FMU PmsmPlant.
 
-fmu_export::export!(drive::PmsmPlant: ContinuousTime + Events + Differentiable + CompletedSteps);
+fmu_export::export!(drive::PmsmPlant: ContinuousTime + Events + Differentiable + CompletedSteps + Warns);

@@ -30,6 +30,7 @@ pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<Course> {
     for (name, value) in values {
         let text = match value {
             Value::Real(x) => format!("{x:?}"),
+            Value::Reals(all) => all.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(","),
             Value::Integer(x) => x.to_string(),
             Value::Boolean(x) => x.to_string(),
             Value::Item(item) => item,

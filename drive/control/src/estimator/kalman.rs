@@ -242,7 +242,7 @@ mod tests {
     use drive_base::frame::{Dq, Rotor};
     use drive_base::integrate::rk4;
     use drive_plant::machine;
-    use drive_plant::saturation::Saturation;
+    use drive_plant::machine::Magnetics;
 
     const T_S: f64 = 1e-4;
 
@@ -335,7 +335,7 @@ mod tests {
     /// The innovation (A) after `T_s` (s) of the machine's own equations, starting from a correct filter state.
     fn residual(n: u32, T_s: f64) -> f64 {
         let (motor, before) = (salient(), at(n));
-        let current = |psi: Dq| machine::current(&motor, &Saturation::default(), psi);
+        let current = |psi: Dq| machine::current(&motor, Magnetics::Linear, psi);
         let u = sample(n).u;
         let w = before.w;
         let mut x = Vector4::new(before.psi.d(), before.psi.q(), before.theta, 0.0);

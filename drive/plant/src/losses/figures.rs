@@ -40,7 +40,7 @@ impl Drive {
             for _ in 0..20 {
                 u = ideal + conduction.drop(u, wanted);
             }
-            let machine = Machine::<_>::new(motor, &par.saturation);
+            let machine = Machine::<_>::new(motor, par.magnetics());
             let shaft = Shaft::new(&par.mechanics, 0.0, Standstill::new(&par.mechanics, speed));
             let path = Path { u, dissipation: Dissipation::at(par, motor.R_s, w), drops: switches };
             let circuit = Circuit { machine, path, shaft };

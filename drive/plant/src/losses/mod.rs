@@ -20,7 +20,7 @@ pub mod switching;
 use crate::inverter::Inverter;
 use crate::tables::{PlantParameters, Winding};
 use fmu_core::unit::WATT;
-use fmu_core::{Row, Scalar, Table};
+use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Losses: powers in W, or energies in J.
@@ -83,8 +83,17 @@ impl Losses {
 /// Whether the legs are ideal and the winding's constant resistance is the machine's only loss: then a step is the quickest.
 /// Every parameter is named, so that a new one has to be thought of here.
 pub fn ideal(parameters: &PlantParameters) -> bool {
-    let PlantParameters { motor: _, saturation: _, inverter, mechanics: _, initial: _, iron, winding, thermal: _ } =
-        parameters;
+    let PlantParameters {
+        motor: _,
+        saturation: _,
+        flux_map: _,
+        inverter,
+        mechanics: _,
+        initial: _,
+        iron,
+        winding,
+        thermal: _,
+    } = parameters;
     let Inverter { dead_time, T_pwm: _, i_zero: _, devices } = inverter;
     let Winding { k_ac } = winding;
     *dead_time == 0.0 && devices.is_none() && iron.is_none() && *k_ac == 0.0
@@ -106,9 +115,7 @@ pub fn efficiency<S: Scalar>(p_in: S, p_mech: S) -> S {
 type P = Row<Losses>;
 
 /// Variables of the losses.
-pub const LOSSES: &Table<Losses> = &Table::new(
-    const {
-        &[
+pub const LOSSES: &Table<Losses> = table![
             P::output(
                 "p_cu",
                 &WATT,
@@ -144,9 +151,7 @@ pub const LOSSES: &Table<Losses> = &Table::new(
                 |p| &mut p.friction,
             )
             .mean(),
-        ]
-    },
-);
+        ];
 
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "exact numbers")]

@@ -6,9 +6,13 @@
 //!
 //! E_sw is turn-on, turn-off and recovery together. With a sinusoidal current of amplitude I, the mean is 3 (2/pi) E_sw /
 //! T_pwm (u_dc / u_sw)^k_sw I / i_sw. No voltage belongs to it. Linear in the current and a power of the voltage: the
-//! field's usual scaling of a data sheet's figure. With the gates off nothing switches.
+//! field's usual scaling of a data sheet's figure. With the gates off, and in an active short circuit, nothing switches.
 
-use crate::losses::conduction::Devices;
+use crate::legs::Legs;
+use crate::losses::conduction::{Conduction, Devices};
+use crate::losses::flow::Switches;
+use crate::signals::{Gates, PlantInputs};
+use crate::tables::PlantParameters;
 use drive_base::frame::{Phases, Stator, Vector};
 use drive_base::math::{abs, exp, ln};
 use fmu_core::Scalar;
@@ -34,6 +38,20 @@ pub fn magnitudes<S: Scalar>(i: Vector<Stator, S>) -> S {
 
 /// Mean of [`magnitudes`] over a period with a sinusoidal current of amplitude 1 A: 3 (2/pi).
 pub const MEAN_OF_MAGNITUDES: f64 = 3.0 * std::f64::consts::FRAC_2_PI;
+
+impl<S: Scalar> Switches<S> {
+    /// These `legs` under these `inputs`. An active short circuit conducts through the transistors of one side and their
+    /// diodes; upper and lower ones are taken in turns, so each leg has the mean drop of both.
+    #[inline]
+    pub fn of(parameters: &PlantParameters, inputs: &PlantInputs<S>, legs: Legs<S>) -> Self {
+        let gates = inputs.gates();
+        if gates == Gates::Short {
+            let conduction = Conduction::new(&parameters.inverter.devices, true, inputs.u_dc, legs.i_zone());
+            return Self { legs, conduction, sw: 0.0.into() };
+        }
+        Self::new(parameters, gates == Gates::Switch, inputs.u_dc, legs)
+    }
+}
 
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "exact numbers")]

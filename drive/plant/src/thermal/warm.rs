@@ -9,6 +9,8 @@ use crate::machine::{Inverse, Machine};
 use crate::model::PmsmPlant;
 use crate::signals::PlantInputs;
 use crate::tables::PARAMETERS;
+#[cfg(doc)]
+use crate::tables::PlantParameters;
 use drive_base::motor::Motor;
 use fmu_core::{Fault, Interface, Scalar};
 use serde::{Deserialize, Serialize};
@@ -22,6 +24,8 @@ pub struct Warm {
     pub motor: Motor,
     /// Reciprocals of its inductances.
     inverse: Inverse,
+    /// [`PlantParameters::least_inductance`] in H.
+    pub(crate) least_inductance: f64,
     /// [`losses::ideal`].
     pub(crate) ideal: bool,
 }
@@ -29,7 +33,8 @@ pub struct Warm {
 impl Default for Warm {
     fn default() -> Self {
         let motor = Motor::default();
-        Self { at: Temperatures::all(super::T_20), inverse: Inverse::of(&motor), motor, ideal: false }
+        let least_inductance = motor.L_d.min(motor.L_q);
+        Self { at: Temperatures::all(super::T_20), inverse: Inverse::of(&motor), motor, least_inductance, ideal: false }
     }
 }
 
@@ -60,7 +65,7 @@ impl PmsmPlant {
     /// The machine at its temperatures.
     #[inline]
     pub(crate) fn machine<const LINEAR: bool>(&self) -> Machine<'_, f64, LINEAR> {
-        Machine::with(&self.warm.motor, &self.parameters.saturation, self.warm.inverse)
+        Machine::with(&self.warm.motor, self.parameters.magnetics(), self.warm.inverse)
     }
 
     /// The heat (W) of these `losses` (W) at the temperatures `at` (K) under these `inputs`.
@@ -73,7 +78,7 @@ impl PmsmPlant {
     pub(crate) fn take(&mut self, at: Temperatures) {
         let motor = self.parameters.thermal.motor(&self.parameters.motor, &at);
         let (inverse, ideal) = (Inverse::of(&motor), losses::ideal(&self.parameters));
-        self.warm = Warm { at, motor, inverse, ideal };
+        self.warm = Warm { at, motor, inverse, ideal, ..self.warm };
     }
 
     /// The temperatures (K) that parameters and `inputs` say, and the names of those of winding and magnets.
@@ -86,6 +91,7 @@ impl PmsmPlant {
 
     /// The temperatures at the start act.
     pub(crate) fn start_temperatures(&mut self) {
+        self.warm.least_inductance = self.parameters.least_inductance();
         self.take(self.given(&self.inputs).0);
     }
 

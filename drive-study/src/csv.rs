@@ -1,0 +1,109 @@
+//! A table of numbers from a CSV file: a header with names, `#` before comments, a decimal point.
+
+use anyhow::{Context, Result, bail, ensure};
+use std::path::Path;
+
+/// The columns of a file.
+#[derive(Clone, Debug)]
+pub struct Columns {
+    file: String,
+    names: Vec<String>,
+    /// Line in the file, and the numbers of a row.
+    rows: Vec<(usize, Vec<f64>)>,
+}
+
+impl Columns {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or those of [`parse`](Self::parse).
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).with_context(|| format!("reading {file}"))?;
+        Self::parse(&text, &file)
+    }
+
+    /// Reads the text of `file`.
+    ///
+    /// # Errors
+    /// File and line, and what was expected: no header, semicolons, another number of cells than names, a cell that is not a
+    /// finite number, no row.
+    pub fn parse(text: &str, file: &str) -> Result<Self> {
+        let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
+        let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        let cells = |line: &str| line.split(',').map(|c| c.trim().trim_matches('"').to_owned()).collect::<Vec<_>>();
+        let Some((first, header)) = lines.next() else {
+            bail!("{file}: is empty; expected a header and rows of numbers")
+        };
+        ensure!(
+            !header.contains(';') && !header.contains('\t'),
+            "{file}:{first}: has semicolons or tabs; write commas between columns and a decimal point"
+        );
+        let names = cells(header.trim_start_matches('\u{feff}'));
+        if let Some(number) = names.iter().find(|name| name.parse::<f64>().is_ok()) {
+            bail!("{file}:{first}: {number} is a number; the first line names the columns");
+        }
+        let mut rows = Vec::new();
+        for (line, text) in lines {
+            let cells = cells(text);
+            let (found, expected) = (cells.len(), names.len());
+            ensure!(found == expected, "{file}:{line}: expected {expected} numbers, found {found}");
+            let number = |cell: &String| match cell.parse::<f64>() {
+                Ok(x) if x.is_finite() => Ok(x),
+                _ => bail!("{file}:{line}: {cell:?} is not a finite number"),
+            };
+            rows.push((line, cells.iter().map(number).collect::<Result<Vec<_>>>()?));
+        }
+        ensure!(!rows.is_empty(), "{file}: has no row of numbers below {}", names.join(","));
+        Ok(Self { file: file.into(), names, rows })
+    }
+
+    /// The file's name.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Line in the file, and the numbers of each row.
+    pub fn rows(&self) -> &[(usize, Vec<f64>)] {
+        &self.rows
+    }
+
+    /// Place of a column in the rows, if there is one of this name.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|found| found == name)
+    }
+
+    /// Place of a column in the rows.
+    ///
+    /// # Errors
+    /// Names the columns that there are.
+    pub fn column(&self, name: &str) -> Result<usize> {
+        self.find(name)
+            .with_context(|| format!("{}: has no column {name}; it has {}", self.file, self.names.join(", ")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_is_read_and_what_is_none_is_refused() {
+        let table = Columns::parse("# bench\n\na, b\n1,2\n# gap\n3 , -4e-3\n", "t.csv").unwrap();
+        assert_eq!((table.column("b").unwrap(), table.find("c")), (1, None));
+        assert_eq!(table.rows(), [(4, vec![1.0, 2.0]), (6, vec![3.0, -4e-3])]);
+        assert_eq!(table.column("c").unwrap_err().to_string(), "t.csv: has no column c; it has a, b");
+        for (text, message) in [
+            ("# only\n", "t.csv: is empty"),
+            ("a;b\n1;2\n", "t.csv:1: has semicolons"),
+            ("1,2\n3,4\n", "t.csv:1: 1 is a number"),
+            ("a,b\n", "t.csv: has no row of numbers below a,b"),
+            ("a,b\n1\n", "t.csv:2: expected 2 numbers, found 1"),
+            ("a,b\n1,x\n", "t.csv:2: \"x\" is not a finite number"),
+            ("a,b\n1,NaN\n", "t.csv:2: \"NaN\" is not a finite number"),
+        ] {
+            let error = Columns::parse(text, "t.csv").unwrap_err().to_string();
+            assert!(error.starts_with(message), "{error}");
+        }
+    }
+}

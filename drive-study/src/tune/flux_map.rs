@@ -1,0 +1,603 @@
+//! A flux map from a table of finite elements or of a bench: the energy whose gradient comes closest to the currents.
+//!
+//! The table has the columns `i_d,i_q,psi_d,psi_q` and may have `torque`; peak values, in any order, scattered or on a grid. The
+//! current of [`FluxMap`] is linear in its coefficients, so the fit is linear least squares of the currents at the flux
+//! linkages of the table; no inversion of the table is needed. Where the table has no point, a penalty on third differences
+//! continues the energy with constant curvature. The axis of the map is moved so that there is no current at the flux linkage
+//! of the magnet, which becomes `motor.psi_M` of the plant.
+//!
+//! A table that is not reciprocal (d psi_d/d i_q = d psi_q/d i_d) has no energy: the fit leaves a residue. Swapped axes, the sign
+//! of i_d and rms values for peak values show so, or in the torque, or in psi_M.
+
+use super::motor::{FluxMap as Given, MotorFile};
+use super::rules::{Setting, Value};
+use crate::csv::Columns;
+use anyhow::{Context, Result, bail, ensure};
+use drive::frame::Dq;
+use drive::plant::flux_map::{D, FluxMap, Q, contributions};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::SQRT_2;
+
+/// Weight of the third differences, as a share of the mean weight of the table's points in a coefficient.
+const SMOOTHNESS: f64 = 1e-5;
+
+/// Weight of an equation for the incremental inductance where there are no points, as a share of the same.
+const CONVEXITY: f64 = 1e-3;
+
+/// Factors of a third difference.
+const BINOMIAL: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
+
+/// Most rounds that add such equations.
+const ROUNDS: u32 = 40;
+
+/// Least number of points: two for three coefficients.
+const LEAST_POINTS: usize = 72;
+
+/// Greatest residue, reciprocity error and torque error as a share of the rms value.
+const ALLOWED: f64 = 0.15;
+
+/// A point of the table: current (A) and flux linkage (Wb).
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    i: Dq,
+    psi: Dq,
+}
+
+/// A fitted map.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// The map.
+    pub map: FluxMap,
+    /// Flux linkage of the magnet in Wb, at the temperature of the table.
+    pub psi_M: f64,
+    /// Settings of the plant.
+    pub settings: Vec<Setting>,
+    /// How close the map comes to the table, and what it does not cover.
+    pub notes: Vec<String>,
+}
+
+/// The map of a machine's file; `None` without `[flux_map]`.
+///
+/// # Errors
+/// File and line, and the problem: the table cannot be read, has too few points, or is not that of this machine, with the usual
+/// causes.
+pub fn fit(motor: &MotorFile) -> Result<Option<Fitted>> {
+    let Some(given) = &motor.data.flux_map else { return Ok(None) };
+    let place = motor.place(&given.file);
+    if let Some(saturation) = &motor.data.saturation {
+        let first = [&saturation.s_2, &saturation.s_3, &saturation.s_dq].into_iter().flatten().next();
+        let place = first.map_or_else(|| place.clone(), |x| motor.place(x));
+        bail!("{place}: [saturation] besides [flux_map], which has the saturation: remove one of them");
+    }
+    let table = Columns::read(&motor.beside(given.file.get_ref())).with_context(|| place.clone())?;
+    let (points, torques) = read(&table, given, motor)?;
+    ensure!(
+        points.len() >= LEAST_POINTS,
+        "{}: has {} points; a map needs {LEAST_POINTS}, best a grid of 11 by 11 or more",
+        table.file(),
+        points.len()
+    );
+    let reciprocal = reciprocity(&points, table.file())?;
+    let psi_M = *motor.data.machine.psi_M.get_ref();
+    let mut map = grid(&points, psi_M);
+    solve(&mut map, &points, psi_M).with_context(|| format!("{}: the points do not determine a map", table.file()))?;
+    let errors = Errors::of(&map, &points, psi_M);
+    check(&map, &errors, &points, table.file(), psi_M)?;
+    let moved = without_current(&map);
+    let found = psi_M + moved;
+    (map.d_min, map.d_max) = (map.d_min - moved, map.d_max - moved);
+    judge_magnet(found, motor)?;
+    let mut notes = vec![errors.tell(&points)];
+    notes.extend(reciprocal);
+    notes.extend(torque(&points, &torques, motor, table.file())?);
+    notes.extend(coverage(&points, motor));
+    let settings = settings(&map, found, motor, given, &table)?;
+    Ok(Some(Fitted { map, psi_M: found, settings, notes }))
+}
+
+/// The points of the table, and their torques (N.m) if it has a column `torque`.
+fn read(table: &Columns, given: &Given, motor: &MotorFile) -> Result<(Vec<Point>, Vec<f64>)> {
+    let [i_d, i_q, psi_d, psi_q] = ["i_d", "i_q", "psi_d", "psi_q"].map(|name| table.column(name));
+    let columns = [i_d?, i_q?, psi_d?, psi_q?];
+    let scale = match &given.scale {
+        None => 1.0,
+        Some(name) => match name.get_ref().as_str() {
+            "peak" => 1.0,
+            "rms" => SQRT_2,
+            other => bail!("{}: scale = \"{other}\" must be \"peak\" or \"rms\"", motor.place(name)),
+        },
+    };
+    let turned = match &given.convention {
+        None => false,
+        Some(name) => match name.get_ref().as_str() {
+            "pm" => false,
+            "syr" => true,
+            other => bail!(
+                "{}: convention = \"{other}\" must be \"pm\" (d-axis on the magnet) or \"syr\" (magnet on the negative q-axis)",
+                motor.place(name)
+            ),
+        },
+    };
+    let point = |row: &[f64]| {
+        let [i_d, i_q, psi_d, psi_q] = columns.map(|column| scale * row[column]);
+        let axes = |d: f64, q: f64| if turned { Dq::new(-q, d) } else { Dq::new(d, q) };
+        Point { i: axes(i_d, i_q), psi: axes(psi_d, psi_q) }
+    };
+    let points = table.rows().iter().map(|(_, row)| point(row)).collect();
+    let torques = table.find("torque").map_or_else(Vec::new, |c| table.rows().iter().map(|(_, row)| row[c]).collect());
+    Ok((points, torques))
+}
+
+/// A map without coefficients whose grid reaches the points and psi = 0.
+fn grid(points: &[Point], psi_M: f64) -> FluxMap {
+    let x = |p: &Point| p.psi.d() - psi_M;
+    let (least, greatest) = points.iter().fold((-psi_M, 0.0_f64), |(a, b), p| (a.min(x(p)), b.max(x(p))));
+    let q_max = points.iter().fold(0.0_f64, |most, p| most.max(p.psi.q().abs()));
+    let margin = 0.01 * (greatest - least);
+    // A grid that does not end at 0, also with points at psi_d <= psi_M only.
+    let d_max = (greatest + margin).max(0.1 * (0.0 - least));
+    FluxMap { used: true, d_min: least - margin, d_max, q_max: 1.01 * q_max, ..FluxMap::default() }
+}
+
+/// Weighted least squares of the coefficients, by the normal equations.
+struct Squares {
+    normal: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl Squares {
+    const N: usize = D * Q;
+
+    fn new() -> Self {
+        Self { normal: DMatrix::zeros(Self::N, Self::N), right: DVector::zeros(Self::N) }
+    }
+
+    /// Adds the equation that these coefficients times these factors are `y`.
+    fn add(&mut self, row: &[(usize, f64)], y: f64, weight: f64) {
+        for &(a, x) in row {
+            self.right[a] += weight * x * y;
+            for &(b, z) in row {
+                self.normal[(a, b)] += weight * x * z;
+            }
+        }
+    }
+
+    /// Mean weight of a coefficient.
+    #[expect(clippy::cast_precision_loss, reason = "a hundred coefficients")]
+    fn mean(&self) -> f64 {
+        self.normal.trace() / Self::N as f64
+    }
+
+    fn solve(&self, map: &mut FluxMap) -> Option<()> {
+        map.w.as_flattened_mut().copy_from_slice(self.normal.clone().cholesky()?.solve(&self.right).as_slice());
+        Some(())
+    }
+}
+
+/// The coefficients that minimize the error of the currents and, weakly, the third differences. Where the table has no points and
+/// the extrapolation is not that of a machine, further equations keep the incremental inductances of the table's edge.
+fn solve(map: &mut FluxMap, points: &[Point], psi_M: f64) -> Option<()> {
+    let (mut squares, magnet) = (Squares::new(), Dq::new(psi_M, 0.0));
+    for p in points {
+        let all = contributions(map, p.psi - magnet);
+        for (part, y) in [(Dq::d as fn(Dq) -> f64, p.i.d()), (Dq::q, p.i.q())] {
+            let row: Vec<_> = all.iter().map(|c| (c.place, part(c.current))).collect();
+            squares.add(&row, y, 1.0);
+        }
+    }
+    let mean = squares.mean();
+    // Third differences along both axes; along the q-axis across 0 too, where the energy is even.
+    for m in 0..D {
+        for n in 0..Q {
+            let difference = |place: &dyn Fn(usize) -> usize| [0, 1, 2, 3].map(|k| (place(k), BINOMIAL[k]));
+            if m + 3 < D {
+                squares.add(&difference(&|k| (m + k) * Q + n), 0.0, SMOOTHNESS * mean);
+            }
+            if n + 2 < Q {
+                squares.add(&difference(&|k| m * Q + (n + k).abs_diff(1)), 0.0, SMOOTHNESS * mean);
+            }
+        }
+    }
+    // The current does not determine the constant of the energy.
+    squares.add(&[(0, 1.0)], 0.0, SMOOTHNESS * mean);
+    squares.solve(map)?;
+    let least = points.iter().map(|p| map.least_curvature(p.psi - magnet)).fold(f64::INFINITY, f64::min);
+    for _ in 0..ROUNDS {
+        let flawed: Vec<Dq> = map.knots().filter(|&x| map.least_curvature(x) < 0.1 * least).collect();
+        if flawed.is_empty() || least <= 0.0 {
+            break;
+        }
+        for x in flawed {
+            let [a, b, c] = map.hessian(x);
+            // The direction of the least curvature.
+            let angle = 0.5 * (2.0 * b).atan2(a - c) + std::f64::consts::FRAC_PI_2;
+            let (sin, cos) = angle.sin_cos();
+            let along = |[dd, dq, qq]: [f64; 3]| dd * cos * cos + 2.0 * dq * sin * cos + qq * sin * sin;
+            let row: Vec<_> = contributions(map, x).iter().map(|c| (c.place, along(c.hessian))).collect();
+            let size: f64 = row.iter().map(|(_, x)| x * x).sum();
+            squares.add(&row, least, CONVEXITY * mean / size);
+        }
+        squares.solve(map)?;
+    }
+    Some(())
+}
+
+/// How far the map is from the table, in A.
+struct Errors {
+    /// Root mean square of both currents.
+    rms: Dq,
+    worst: f64,
+    /// Root mean square of the table's current.
+    scale: f64,
+}
+
+impl Errors {
+    #[expect(clippy::cast_precision_loss, reason = "thousands of points")]
+    fn of(map: &FluxMap, points: &[Point], psi_M: f64) -> Self {
+        let error = |p: &Point| map.current(p.psi - Dq::new(psi_M, 0.0)) - p.i;
+        let mean = |of: &dyn Fn(&Point) -> f64| (points.iter().map(of).sum::<f64>() / points.len() as f64).sqrt();
+        Self {
+            rms: Dq::new(mean(&|p| error(p).d().powi(2)), mean(&|p| error(p).q().powi(2))),
+            worst: points.iter().map(|p| error(p).magnitude()).fold(0.0, f64::max),
+            scale: mean(&|p| p.i.magnitude().powi(2)),
+        }
+    }
+
+    fn tell(&self, points: &[Point]) -> String {
+        let Self { rms, worst, .. } = self;
+        format!(
+            "flux_map comes within {:.2e} A (i_d) and {:.2e} A (i_q) rms of its {} points, {worst:.2e} A at worst",
+            rms.d(),
+            rms.q(),
+            points.len()
+        )
+    }
+}
+
+/// Refuses a map that is far from its table, or is not that of a machine.
+fn check(map: &FluxMap, errors: &Errors, points: &[Point], file: &str, psi_M: f64) -> Result<()> {
+    const CAUSES: &str = "usual causes are swapped axes, the other sign of i_d (convention = \"syr\"?), or columns of another \
+                          run; columns are i_d,i_q in A and psi_d,psi_q in Wb";
+    let off = errors.rms.magnitude() / errors.scale;
+    ensure!(
+        off < ALLOWED,
+        "{file}: no energy has these currents: the closest map is {:.0} % off, {:.0} % are allowed; {CAUSES}",
+        100.0 * off,
+        100.0 * ALLOWED
+    );
+    let Some(x) = map.flaw() else { return Ok(()) };
+    let psi = x + Dq::new(psi_M, 0.0);
+    let distance = |p: &&Point| (Dq::new(p.psi.d(), p.psi.q().abs()) - psi).magnitude();
+    let nearest = points.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).context("no points")?;
+    bail!(
+        "{file}: more flux takes less current at psi = ({:.4}, {:.4}) Wb, near i = ({:.2}, {:.2}) A: no machine does that; add or \
+         correct points there; {CAUSES}",
+        psi.d(),
+        psi.q(),
+        nearest.i.d(),
+        nearest.i.q()
+    )
+}
+
+/// The flux linkage (Wb) on the d-axis, beyond that of the machine's file, at which the map has no current: i_d rises along the axis.
+fn without_current(map: &FluxMap) -> f64 {
+    let (mut low, mut high) = (map.d_min, map.d_max);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        *(if map.current(Dq::new(middle, 0.0)).d() < 0.0 { &mut low } else { &mut high }) = middle;
+    }
+    // The last bit: with Newton's method, once.
+    let x = 0.5 * (low + high);
+    x - map.current(Dq::new(x, 0.0)).d() / map.hessian(Dq::new(x, 0.0))[0]
+}
+
+/// Refuses a table whose magnet is not that of the machine.
+fn judge_magnet(found: f64, motor: &MotorFile) -> Result<()> {
+    let given = &motor.data.machine.psi_M;
+    let ratio = found / given.get_ref();
+    let cause = if (ratio - SQRT_2).abs() < 0.1 || (ratio - 1.0 / SQRT_2).abs() < 0.1 {
+        "one of them is an rms value (scale = \"rms\" in [flux_map] for a table of rms values)"
+    } else {
+        "correct the value, or the table's axes, or give the temperature of the table"
+    };
+    ensure!(
+        (ratio - 1.0).abs() < 0.1,
+        "{}: machine.psi_M = {} Wb, but the table has no current at {found:.5} Wb: {cause}",
+        motor.place(given),
+        given.get_ref()
+    );
+    Ok(())
+}
+
+/// The reciprocity error of a table on a grid of currents by central differences; `None` if it is not on a grid.
+///
+/// # Errors
+/// It is too large for a machine.
+fn reciprocity(points: &[Point], file: &str) -> Result<Option<String>> {
+    let axis = |of: fn(Dq) -> f64| {
+        let mut values: Vec<f64> = points.iter().map(|p| of(p.i)).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup_by(|a, b| (*a - *b).abs() < 1e-6 * (1.0 + b.abs()));
+        values
+    };
+    let (along_d, along_q) = (axis(Dq::d), axis(Dq::q));
+    if along_d.len() * along_q.len() != points.len() || along_d.len() < 3 || along_q.len() < 3 {
+        return Ok(None);
+    }
+    let place = |values: &[f64], x: f64| values.partition_point(|v| *v < x - 1e-6 * (1.0 + x.abs()));
+    let mut psi = vec![Dq::ZERO; points.len()];
+    for p in points {
+        psi[place(&along_d, p.i.d()) * along_q.len() + place(&along_q, p.i.q())] = p.psi;
+    }
+    let (mut error, mut mutual, mut own, mut n) = (0.0, 0.0, 0.0, 0.0);
+    for m in 1..along_d.len() - 1 {
+        for k in 1..along_q.len() - 1 {
+            let at = |m: usize, k: usize| psi[m * along_q.len() + k];
+            let by_d = (at(m + 1, k) - at(m - 1, k)) * (1.0 / (along_d[m + 1] - along_d[m - 1]));
+            let by_q = (at(m, k + 1) - at(m, k - 1)) * (1.0 / (along_q[k + 1] - along_q[k - 1]));
+            error += (by_q.d() - by_d.q()).powi(2);
+            mutual += 0.5 * (by_q.d().powi(2) + by_d.q().powi(2));
+            own += 0.5 * (by_d.d().powi(2) + by_q.q().powi(2));
+            n += 1.0;
+        }
+    }
+    let rms = |sum: f64| 1e3 * (sum / n).sqrt();
+    let [error, mutual, own] = [error, mutual, own].map(rms);
+    // Where the axes are hardly coupled, the error counts beside the inductances themselves.
+    let share = error / mutual.max(0.1 * own);
+    ensure!(
+        share < ALLOWED,
+        "{file}: d psi_d/d i_q and d psi_q/d i_d differ by {error:.3} mH rms and are {mutual:.3} mH: {:.0} % are allowed; a machine's \
+         are equal (swapped axes, the sign of i_d, or columns of two runs)",
+        100.0 * ALLOWED
+    );
+    Ok(Some(format!(
+        "the table's d psi_d/d i_q and d psi_q/d i_d, which reciprocity makes equal, differ by {error:.3} mH rms beside {mutual:.3} mH"
+    )))
+}
+
+/// How the torques of the table compare with those of its flux linkages and currents.
+///
+/// # Errors
+/// They are too far off.
+fn torque(points: &[Point], torques: &[f64], motor: &MotorFile, file: &str) -> Result<Option<String>> {
+    if torques.is_empty() {
+        return Ok(None);
+    }
+    let k = 1.5 * f64::from(*motor.data.machine.n_p.get_ref());
+    let (mut by, mut squared, mut error) = (0.0, 0.0, 0.0);
+    for (p, tau) in points.iter().zip(torques) {
+        let own = k * p.psi.cross(p.i);
+        (by, squared) = (by + own * tau, squared + own * own);
+        error += (own - tau).powi(2);
+    }
+    let (ratio, off) = (by / squared, (error / squared).sqrt());
+    ensure!(
+        off < ALLOWED,
+        "{file}: the torques are {ratio:.3} times 1.5 n_p psi x i, {:.0} % rms off: wrong n_p, rms values (scale = \"rms\": 2 times), or \
+         a torque per sector of the machine",
+        100.0 * off
+    );
+    Ok(Some(format!(
+        "the table's torques are {ratio:.4} times 1.5 n_p psi x i, {:.1} % rms off (1 to 3 % are usual with finite elements)",
+        100.0 * off
+    )))
+}
+
+/// Says where the table ends before the currents in use do.
+fn coverage(points: &[Point], motor: &MotorFile) -> Option<String> {
+    let limit = *motor.data.rating.current.get_ref();
+    let most = |of: fn(Dq) -> f64| points.iter().map(|p| of(p.i)).fold(f64::NEG_INFINITY, f64::max);
+    let (d, q) = (most(|i| -i.d()), most(|i| i.q().abs()));
+    (d.min(q) < 1.2 * limit).then(|| {
+        format!(
+            "the table ends at i_d = {:.1} A and |i_q| = {q:.1} A; with 1.2 times rating.current, {:.1} A, transients stay inside it; \
+             beyond, the inductances of its edge go on",
+            -d,
+            1.2 * limit
+        )
+    })
+}
+
+/// The settings of the plant.
+#[expect(non_snake_case, reason = "the symbols of the model")]
+fn settings(map: &FluxMap, psi_M: f64, motor: &MotorFile, given: &Given, table: &Columns) -> Result<Vec<Setting>> {
+    let origin = Some(given.file.span().start);
+    let setting = |name, value, rule: &str| Setting { name, value, rule: rule.into(), origin };
+    let (mut psi_M, mut all) = (psi_M, Vec::new());
+    let warmer = given.temperature.as_ref().map_or(0.0, |t| t.get_ref() - 20.0);
+    if let (Some(temperature), true) = (&given.temperature, warmer != 0.0) {
+        let Some(alpha) = &given.alpha else {
+            bail!(
+                "{}: a table of {} degC needs the temperature coefficient of the magnet too: alpha = -1.1e-3 in [flux_map] for NdFeB",
+                motor.place(temperature),
+                temperature.get_ref()
+            );
+        };
+        psi_M /= 1.0 + alpha.get_ref() * warmer;
+        all.push(setting("magnet.alpha", Value::Real(*alpha.get_ref()), "as given"));
+    }
+    all.extend([
+        setting("motor.psi_M", Value::Real(psi_M), "where the map has no current, at 20 degC"),
+        setting("flux_map.use", Value::Boolean(true), "a table is given"),
+        setting("flux_map.d_min", Value::Real(map.d_min), "the table's flux linkages, and psi = 0"),
+        setting("flux_map.d_max", Value::Real(map.d_max), "the table's flux linkages"),
+        setting("flux_map.q_max", Value::Real(map.q_max), "the table's flux linkages"),
+        setting(
+            "flux_map.w",
+            Value::Reals(map.w.as_flattened().to_vec()),
+            &format!("least squares of {}", table.file()),
+        ),
+    ]);
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use drive::plant::machine::{self, Magnetics};
+    use std::fmt::Write as _;
+    use std::path::Path;
+
+    const MOTOR: &str = include_str!("../../../motors/traction-63kw.toml");
+
+    /// The currents (A) of a machine that saturates, at the flux linkage (Wb) beyond that of its magnet: reciprocal.
+    fn current(x: Dq, [L_d, L_q]: [f64; 2]) -> Dq {
+        let (d, q) = (x.d(), x.q());
+        Dq::new(d / L_d + 2e4 * (d * d * d + d * q * q), q / L_q + 2e4 * (q * q * q + d * d * q))
+    }
+
+    /// The motor file with a table beside it, whose lines follow from current (A) and flux linkage (Wb).
+    struct Bench {
+        folder: tempfile::TempDir,
+        motor: String,
+    }
+
+    impl Bench {
+        fn new(keys: &str) -> Self {
+            let motor = format!("{MOTOR}\n[flux_map]\nfile = \"map.csv\"\n{keys}\n");
+            Self { folder: tempfile::tempdir().unwrap(), motor }
+        }
+
+        fn machine(&self) -> (f64, [f64; 2], f64) {
+            let machine = MotorFile::parse(&self.motor, Path::new("m.toml")).unwrap().data.machine;
+            let n_p = f64::from(*machine.n_p.get_ref());
+            (*machine.psi_M.get_ref(), [*machine.L_d.get_ref(), *machine.L_q.get_ref()], n_p)
+        }
+
+        fn fit_text(&self, text: &str) -> Result<Fitted> {
+            std::fs::write(self.folder.path().join("map.csv"), text).unwrap();
+            let motor = MotorFile::parse(&self.motor, &self.folder.path().join("m.toml"))?;
+            fit(&motor).map(|found| found.unwrap())
+        }
+
+        fn fit(&self, header: &str, line: impl Fn(Dq, Dq) -> Vec<f64>) -> Result<Fitted> {
+            let (psi_M, inductances, _) = self.machine();
+            let mut text = format!("# made for a test\n{header}\n");
+            for m in 0..15_u32 {
+                for n in 0..15_u32 {
+                    let x = Dq::new(0.015 * f64::from(m) - 0.13, 0.02 * (f64::from(n) - 7.0));
+                    let cells = line(current(x, inductances), x + Dq::new(psi_M, 0.0));
+                    let cells: Vec<_> = cells.iter().map(f64::to_string).collect();
+                    writeln!(text, "{}", cells.join(",")).unwrap();
+                }
+            }
+            self.fit_text(&text)
+        }
+    }
+
+    const HEADER: &str = "i_d,i_q,psi_d,psi_q";
+
+    fn line(i: Dq, psi: Dq) -> Vec<f64> {
+        vec![i.d(), i.q(), psi.d(), psi.q()]
+    }
+
+    #[test]
+    fn the_map_has_the_currents_of_its_table() {
+        let bench = Bench::new("");
+        let (psi_M, inductances, n_p) = bench.machine();
+        let torque = |i: Dq, psi: Dq| [line(i, psi), vec![1.5 * n_p * psi.cross(i)]].concat();
+        let fitted = bench.fit("i_d,i_q,psi_d,psi_q,torque", torque).unwrap();
+        assert!((fitted.psi_M / psi_M - 1.0).abs() < 1e-4, "{} Wb", fitted.psi_M);
+        assert!(fitted.map.current(Dq::ZERO).magnitude() < 1e-9);
+        // Between the points of the table, too.
+        for (d, q) in [(-0.1, 0.05), (0.03, -0.11), (0.0, 0.07)] {
+            let (got, wanted) = (fitted.map.current(Dq::new(d, q)), current(Dq::new(d, q), inductances));
+            assert!((got - wanted).magnitude() < 0.01 * wanted.magnitude(), "{got:?}, {wanted:?}");
+        }
+        let notes = fitted.notes.join("\n");
+        assert!(notes.contains("225 points") && notes.contains("1.0000 times 1.5 n_p psi x i"), "{notes}");
+    }
+
+    #[test]
+    fn the_values_of_the_table_may_be_rms_or_turned() {
+        let plain = Bench::new("").fit(HEADER, line).unwrap();
+        let same = |fitted: Fitted| {
+            let error = fitted.map.current(Dq::new(-0.05, 0.06)) - plain.map.current(Dq::new(-0.05, 0.06));
+            assert!(error.magnitude() < 1e-6 && (fitted.psi_M - plain.psi_M).abs() < 1e-9, "{error:?}");
+        };
+        same(
+            Bench::new("scale = \"rms\"")
+                .fit(HEADER, |i, psi| line(i, psi).iter().map(|x| x / SQRT_2).collect())
+                .unwrap(),
+        );
+        let turned = |i: Dq, psi: Dq| vec![i.q(), -i.d(), psi.q(), -psi.d()];
+        same(Bench::new("convention = \"syr\"").fit(HEADER, turned).unwrap());
+        // Another order of the columns.
+        same(Bench::new("").fit("psi_q,i_d,psi_d,i_q", |i, psi| vec![psi.q(), i.d(), psi.d(), i.q()]).unwrap());
+    }
+
+    #[test]
+    fn a_table_on_a_grid_of_currents_says_whether_it_is_reciprocal() {
+        let bench = Bench::new("");
+        let (psi_M, inductances, _) = bench.machine();
+        let table = |shift: f64| {
+            let mut text = format!("{HEADER}\n");
+            for m in 0..13_u32 {
+                for n in 0..13_u32 {
+                    let i = Dq::new(30.0 * f64::from(m) - 300.0, 50.0 * (f64::from(n) - 6.0));
+                    let mut x = Dq::ZERO;
+                    for _ in 0..60 {
+                        let rest = i - current(x, inductances);
+                        x += Dq::new(rest.d() * inductances[0], rest.q() * inductances[1]) * 0.2;
+                    }
+                    let psi = x + Dq::new(psi_M, 0.0);
+                    writeln!(text, "{},{},{},{}", i.d(), i.q(), psi.d() + shift * i.q(), psi.q()).unwrap();
+                }
+            }
+            text
+        };
+        let notes = bench.fit_text(&table(0.0)).unwrap().notes.join("\n");
+        assert!(notes.contains("which reciprocity makes equal, differ by 0.0"), "{notes}");
+        let error = bench.fit_text(&table(3e-5)).unwrap_err().to_string();
+        assert!(error.contains("d psi_d/d i_q and d psi_q/d i_d differ by 0.03"), "{error}");
+    }
+
+    #[test]
+    fn a_table_of_another_machine_is_refused() {
+        let bench = Bench::new("");
+        let n_p = bench.machine().2;
+        let refused = |bench: &Bench, header: &str, f: &dyn Fn(Dq, Dq) -> Vec<f64>| {
+            format!("{:#}", bench.fit(header, f).unwrap_err())
+        };
+        let swapped = refused(&bench, HEADER, &|i, psi| vec![i.d(), i.q(), psi.q(), psi.d()]);
+        assert!(swapped.contains("no energy has these currents") && swapped.contains("swapped axes"), "{swapped}");
+        let mirrored = refused(&bench, HEADER, &|i, psi| vec![-i.d(), i.q(), psi.d(), psi.q()]);
+        assert!(mirrored.contains("the other sign of i_d"), "{mirrored}");
+        let rms = refused(&bench, HEADER, &|i, psi| line(i, psi).iter().map(|x| x / SQRT_2).collect());
+        assert!(rms.contains("one of them is an rms value"), "{rms}");
+        let torque = |i: Dq, psi: Dq| [line(i, psi), vec![3.0 * n_p * psi.cross(i)]].concat();
+        let torque = refused(&bench, "i_d,i_q,psi_d,psi_q,torque", &torque);
+        assert!(torque.contains("are 2.000 times 1.5 n_p psi x i"), "{torque}");
+        let missing = refused(&bench, "i_d,i_q,psi_d,psi", &line);
+        assert!(missing.contains("map.csv: has no column psi_q; it has i_d, i_q, psi_d, psi"), "{missing}");
+        let few = format!("{:#}", bench.fit_text("i_d,i_q,psi_d,psi_q\n0,0,0.1,0\n").unwrap_err());
+        assert!(few.contains("has 1 points; a map needs 72"), "{few}");
+        let warm = refused(&Bench::new("temperature = 80.0"), HEADER, &line);
+        assert!(warm.contains("needs the temperature coefficient of the magnet"), "{warm}");
+        for (keys, message) in [
+            ("scale = \"RMS\"", "scale = \"RMS\" must be \"peak\" or \"rms\""),
+            ("convention = \"x\"", "convention = \"x\" must be \"pm\""),
+        ] {
+            let error = refused(&Bench::new(keys), HEADER, &line);
+            assert!(error.contains(message) && error.contains("m.toml:"), "{error}");
+        }
+        let both = Bench { motor: format!("{}\n[saturation]\ns_2 = 40.0\n", bench.motor), ..Bench::new("") };
+        assert!(refused(&both, HEADER, &line).contains("remove one of them"));
+    }
+
+    #[test]
+    fn the_drive_is_tuned_with_its_map() {
+        let bench = Bench::new("");
+        let fitted = bench.fit(HEADER, line).unwrap();
+        let motor = MotorFile::parse(&bench.motor, &bench.folder.path().join("m.toml")).unwrap();
+        let tuned = super::super::rules::tune(&motor).unwrap();
+        let pair = tuned.pair();
+        let parameters = &pair.plant.model.parameters;
+        assert_eq!(parameters.flux_map, fitted.map);
+        assert!((parameters.motor.psi_M - fitted.psi_M).abs() < 1e-15);
+        assert!(matches!(parameters.magnetics(), Magnetics::Map(_)));
+        let i = machine::current(&parameters.motor, parameters.magnetics(), Dq::new(fitted.psi_M, 0.0));
+        assert!(i.magnitude() < 1e-9);
+    }
+}

@@ -1,0 +1,148 @@
+//! Trips: over-current and over-voltage end the operation of the inverter until `enable` falls.
+//!
+//! A sample that measures a phase current beyond `trip.i`, or a DC link beyond `trip.u_dc`, trips: from the next sample
+//! instant on the controller rests, and the gates are off. With `trip.asc` the machine is short-circuited instead where
+//! gates off would feed the link through the diodes, that is where its line-to-line back EMF exceeds u_dc:
+//!
+//! ```text
+//! sqrt 3 psi_M |w| > u_dc         and until sqrt 3 psi_M |w| < 0.9 u_dc
+//! ```
+//!
+//! w is the speed of the sensor if the estimator reads it, else the estimate at the trip. An active short circuit from
+//! full torque swings to currents beyond most limits, so a current does not trip a second time.
+
+use crate::signals::ControllerInputs;
+use crate::tables::{ControllerParameters, PARAMETERS};
+use drive_base::frame::Phases;
+use fmu_core::unit::{AMPERE, VOLT};
+use fmu_core::{Fault, Row, Table, enumeration, table};
+use serde::{Deserialize, Serialize};
+
+enumeration! {
+    /// What has tripped; values never change.
+    #[derive(Serialize, Deserialize)]
+    pub enum Cause("Trip", "What has tripped") {
+        1 None "Nothing";
+        2 OverCurrent "A phase current beyond trip.i";
+        3 OverVoltage "A DC-link voltage beyond trip.u_dc";
+    }
+}
+
+#[expect(clippy::derivable_impls, reason = "the macro writes the variants")]
+impl Default for Cause {
+    fn default() -> Self {
+        Self::None
+    }
+}
+
+/// Back EMF over u_dc below which a short circuit ends.
+const END: f64 = 0.9;
+
+/// Parameters of the trips.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TripParameters {
+    /// Trips are in use.
+    pub used: bool,
+    /// Phase current in A beyond which the drive trips.
+    pub i: f64,
+    /// DC-link voltage in V beyond which the drive trips.
+    pub u_dc: f64,
+    /// A trip short-circuits the machine where its back EMF exceeds u_dc.
+    pub asc: bool,
+}
+
+impl Default for TripParameters {
+    fn default() -> Self {
+        Self { used: false, i: 15.0, u_dc: 450.0, asc: false }
+    }
+}
+
+impl TripParameters {
+    /// What the measured currents `i` (A) and the DC-link voltage `u_dc` (V) trip.
+    #[inline]
+    pub fn cause(&self, Phases { a, b, c }: Phases, u_dc: f64) -> Cause {
+        if a.abs().max(b.abs()).max(c.abs()) > self.i {
+            Cause::OverCurrent
+        } else if u_dc > self.u_dc {
+            Cause::OverVoltage
+        } else {
+            Cause::None
+        }
+    }
+}
+
+impl Cause {
+    /// The limit that was exceeded, for messages.
+    pub(crate) fn what(self, par: &ControllerParameters) -> String {
+        match self {
+            Self::None => String::new(),
+            Self::OverCurrent => format!("trip: a phase current is (trip.i = {} A)", par.trip.i),
+            Self::OverVoltage => format!("trip: the DC link is (trip.u_dc = {} V)", par.trip.u_dc),
+        }
+    }
+}
+
+/// What has tripped, and what the inverter does since.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Trip {
+    /// What has tripped.
+    pub cause: Cause,
+    /// The machine is short-circuited.
+    pub shorts: bool,
+    /// Mechanical speed in rad/s at the trip.
+    speed: f64,
+}
+
+impl Trip {
+    /// After the trip `cause` at the mechanical `speed` (rad/s).
+    pub fn new(cause: Cause, speed: f64) -> Self {
+        Self { cause, shorts: false, speed }
+    }
+
+    /// At a sample: whether the machine is short-circuited. `sensor`: the speed is measured.
+    pub fn update(&mut self, par: &ControllerParameters, inputs: &ControllerInputs, sensor: bool) {
+        if sensor {
+            self.speed = inputs.speed_meas;
+        }
+        let motor = &par.motor;
+        let emf = 3.0_f64.sqrt() * motor.psi_M * (f64::from(motor.n_p) * self.speed).abs();
+        self.shorts = par.trip.asc && emf > if self.shorts { END * inputs.u_dc } else { inputs.u_dc };
+    }
+}
+
+/// Checks the limits of the trips, on a DC link of `u_dc` (V) at the start, or 0 later.
+///
+/// # Errors
+/// A trip that normal operation would reach.
+pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
+    let (trip, table) = (&par.trip, PARAMETERS);
+    if !trip.used {
+        return Ok(());
+    }
+    if trip.i.is_nan() || trip.i <= par.limit.i {
+        let limit = table.tell(par, |p| &mut p.limit.i);
+        return Err(table.fault(par, |p| &mut p.trip.i, format!("above {limit}, the current limit")));
+    }
+    if trip.u_dc.is_nan() || trip.u_dc <= u_dc.max(0.0) {
+        return Err(table.fault(par, |p| &mut p.trip.u_dc, format!("above u_dc, {u_dc} V at the start")));
+    }
+    Ok(())
+}
+
+type P = Row<TripParameters>;
+
+/// Variables of the trips; their owner supplies the prefix `trip.`.
+pub const TRIP: &Table<TripParameters> = table![
+    P::boolean_parameter(
+        "use",
+        "Over-current and over-voltage trips: the gates are off until enable falls; false: no trip",
+        |p| &mut p.used,
+    ),
+    P::parameter("i", &AMPERE, "Measured phase current beyond which the drive trips; above limit.i", |p| { &mut p.i }),
+    P::parameter("u_dc", &VOLT, "Measured DC-link voltage beyond which the drive trips", |p| &mut p.u_dc),
+    P::boolean_parameter(
+        "asc",
+        "A trip short-circuits the machine where its back EMF exceeds u_dc; false: gates off at any speed",
+        |p| &mut p.asc,
+    ),
+];
