@@ -58,7 +58,7 @@ impl Cycle {
         Self::new(VEHICLE, CYCLE)
     }
 
-    /// Of the text of a vehicle (TOML) and that of a cycle (CSV: time in s, speed in km/h; comments with `#`).
+    /// Reads the text of a vehicle (TOML) and that of a cycle (CSV: time in s, speed in km/h; comments with `#`).
     ///
     /// # Errors
     /// A key or a number is missing or wrong.

@@ -35,15 +35,13 @@
 
   const names = ["speed", "torque", "efficiency", "p_in", "p_mech", "p_cu", "p_iron", "p_cond", "p_sw", "p_friction"];
   const units = ["rpm", "N.m", "%", "W", "W", "W", "W", "W", "W", "W"];
-  const cells = names.map((name, k) => {
+  const cells = names.map((name) => {
     const row = body.insertRow();
     const head = document.createElement("th");
     head.textContent = name;
     row.append(head);
-    const value = row.insertCell(), unit = document.createElement("td");
-    unit.textContent = units[k];
-    unit.style.textAlign = "left";
-    row.append(unit);
+    const value = row.insertCell();
+    row.insertCell();
     return value;
   });
 
@@ -69,7 +67,10 @@
         const { losses, mechanical, electric, efficiency } = found;
         texts.push((100 * efficiency).toFixed(2), ...[electric, mechanical, ...losses].map(shown));
       } else texts.push("out of reach");
-      cells.forEach((cell, k) => { cell.textContent = texts[k] ?? "\u2013"; });
+      cells.forEach((cell, k) => {
+        cell.textContent = texts[k] ?? "\u2013";
+        cell.nextSibling.textContent = found || k < 2 ? units[k] : "";
+      });
       readings.hidden = false;
       rings.forEach((ring) => {
         ring.setAttribute("cx", at[0]);

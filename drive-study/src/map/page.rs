@@ -17,7 +17,8 @@ const STYLE: &str = include_str!("page.css");
 /// # Errors
 /// A sheet has no point.
 pub fn page(map: &Map, report: &Report) -> Result<String> {
-    let mut html = format!("<p>{}</p>\n", escape(&map.source));
+    // A page loads nothing and links to nothing outside: addresses stay as text.
+    let mut html = format!("<p>{}</p>\n", escape(&map.source.replace("https://", "")));
     if map.sheets.len() > 1 {
         html.push_str("<p class=\"choose\"><label>DC link and temperature <select id=\"sheet\">\n");
         for (k, sheet) in map.sheets.iter().enumerate() {

@@ -120,7 +120,7 @@ fn told(title: &str, rated: f64, cost: &Cost) -> String {
 }
 
 impl Report {
-    /// As text.
+    /// The tables in Markdown, then the notes.
     pub fn text(&self) -> String {
         let tables = self.tables.iter().map(|(title, rows)| format!("{title}\n\n{}\n", markdown(rows)));
         tables.chain(self.notes.iter().map(|note| format!("note: {note}\n"))).collect()

@@ -23,9 +23,9 @@ const MEAN: f64 = 1.0;
 pub struct Verified {
     /// Number of points.
     pub points: usize,
-    /// Of the power from the link.
+    /// Greatest relative difference of the power from the link.
     pub power: f64,
-    /// Of a loss.
+    /// Greatest relative difference of a loss.
     pub loss: f64,
 }
 

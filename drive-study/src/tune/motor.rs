@@ -191,9 +191,9 @@ pub struct Inverter {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Temperature {
-    /// Of the resistance: copper 3.93e-3.
+    /// Coefficient of the resistance: copper 3.93e-3.
     pub winding: Option<Number>,
-    /// Of the magnet's flux linkage: NdFeB -1.1e-3, SmCo -0.4e-3, ferrite -2e-3.
+    /// Coefficient of the magnet's flux linkage: NdFeB -1.1e-3, SmCo -0.4e-3, ferrite -2e-3.
     pub magnet: Option<Number>,
 }
 
