@@ -36,9 +36,8 @@ fn number(x: f64) -> String {
 
 /// `map.csv`: a line for each point within reach, in SI units.
 pub fn map_csv(map: &Map) -> String {
-    let mut csv = String::from("speed,torque,u_dc,T_winding,T_magnet");
-    COLUMNS.iter().for_each(|(name, _)| csv += &format!(",{name}"));
-    csv += ",region\n";
+    let names = COLUMNS.map(|(name, _)| name).join(",");
+    let mut csv = format!("speed,torque,u_dc,T_winding,T_magnet,{names},region\n");
     for sheet in &map.sheets {
         for (points, speed) in sheet.points.chunks(map.axes.x.len()).zip(&map.axes.speed) {
             for point in points.iter().flatten() {
@@ -78,9 +77,9 @@ pub fn flux_map_csv(map: &Map) -> String {
 
 /// An array as a file of NumPy's format, version 1.0; `descr` is the type of the bytes.
 fn npy(descr: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
-    let extents: String = shape.iter().map(|n| format!("{n}, ")).collect();
-    let head =
-        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({}), }}", extents.trim_end_matches(' '));
+    let extents: Vec<String> = shape.iter().map(usize::to_string).collect();
+    // A tuple of one has its comma, too.
+    let head = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({},), }}", extents.join(", "));
     // Magic, version and length of the header take ten bytes; the data start at a multiple of 64.
     let length = (head.len() + 11).next_multiple_of(64) - 10;
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();

@@ -182,7 +182,7 @@ fn notes(drive: &Steady, T: &[f64]) -> Vec<String> {
         notes.push(format!("the motor file has no {table}: the map counts no loss of the {loss}"));
     }
     let thermal = &drive.plant.thermal;
-    if thermal.alpha_R == 0.0 && thermal.alpha_psi == 0.0 && T.iter().any(|T| *T != 20.0) {
+    if thermal.alpha_R == 0.0 && thermal.alpha_psi == 0.0 && T.iter().any(|T| T.to_bits() != 20.0_f64.to_bits()) {
         notes.push("the motor file has no [temperature]: the map is the same at every temperature".into());
     }
     notes

@@ -31,10 +31,10 @@ pub fn page(map: &Map, report: &Report) -> Result<String> {
         let hidden = if k == map.shown { "" } else { " hidden" };
         let drawn = chart::draw(&picture::chart(map, k))?;
         let title = escape(&map.title(sheet));
-        let _ = write!(
+        let _ = writeln!(
             html,
             "<figure class=\"map\" data-sheet=\"{k}\"{hidden}><div class=\"scroll\" tabindex=\"0\" role=\"region\" \
-             aria-label=\"Efficiency map, {title}\">{drawn}</div></figure>\n"
+             aria-label=\"Efficiency map, {title}\">{drawn}</div></figure>"
         );
     }
     html.push_str(
@@ -83,7 +83,7 @@ fn data(map: &Map) -> Value {
     let sheet = |sheet: &super::sheet::Sheet| {
         let losses = |point: &drive::steady::Point| {
             let Losses { cu, iron, cond, sw, friction } = point.powers.losses;
-            json!([cu, iron, cond, sw, friction].map(|x| digits(x)))
+            json!([cu, iron, cond, sw, friction].map(digits))
         };
         let points: Vec<Value> = sheet.points.iter().map(|p| p.as_ref().map_or(Value::Null, losses)).collect();
         json!({ "limits": sheet.limits.iter().map(|l| all(l)).collect::<Vec<_>>(), "losses": points })

@@ -95,7 +95,7 @@ fn compare(drive: &Steady, sheet: &Sheet, speed: f64, point: &Point) -> Result<[
     // Where the shaft alone feeds the losses, p_in passes through 0.
     let size = powers.p_in.abs().max(powers.losses.sum());
     let power = (powers.p_in - p_in).abs() / size;
-    if !(power <= OF_POWER) {
+    if power.is_nan() || power > OF_POWER {
         bail!(
             "the map differs from PmsmDrive {}: p_in is {:.3} W, not {p_in:.3} W, {:.2} % apart, allowed {} %",
             place(),
@@ -111,7 +111,7 @@ fn compare(drive: &Steady, sheet: &Sheet, speed: f64, point: &Point) -> Result<[
     };
     for ((name, of_map), (_, of_run)) in parts(&powers.losses).into_iter().zip(parts(&losses)) {
         let loss = (of_map - of_run).abs() / of_run.abs().max(least);
-        if !(loss <= OF_LOSS) {
+        if loss.is_nan() || loss > OF_LOSS {
             bail!(
                 "the map differs from PmsmDrive {}: {name} is {of_map:.4} W, not {of_run:.4} W, {:.2} % apart, allowed {} %",
                 place(),
