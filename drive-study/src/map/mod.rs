@@ -4,7 +4,7 @@
 //! - [`verify`](mod@verify): some of them against the running drive.
 //! - [`table`]: reading between the points. [`cycle`]: a vehicle on a driving cycle.
 //! - [`linear`]: what the controller's constant inductances cost a machine that saturates.
-//! - [`files`]: CSV and npz. [`picture`]: the map as a figure. [`page`]: the map as a page. [`report`]: tables of text.
+//! - [`files`](mod@files): CSV and npz. [`picture`]: the map as a figure. [`page`]: the map as a page. [`report`]: tables of text.
 //!
 //! The drive is that of torque control with a sensor, whose controller has the estimates that the rules give it; the current is
 //! the only limit, and the voltage is held over the sample period, as `PmsmDrive` does.
