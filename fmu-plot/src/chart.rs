@@ -92,7 +92,8 @@ pub fn draw(chart: &Chart) -> Result<String> {
     );
     area.axes(&chart.labels[0], &chart.labels[1], &mut svg);
     text(&mut svg, (left, 18.0), "start\" font-weight=\"bold", &chart.title);
-    let mut labels = Labels { area: &area, placed: Vec::new(), texts: String::new() };
+    let marks = chart.marks.iter().map(|(place, _)| area.x(*place)).collect();
+    let mut labels = Labels { area: &area, marks, placed: Vec::new(), texts: String::new() };
     for band in &chart.bands {
         fill(chart, band, &area, &mut labels, &mut svg);
     }
@@ -103,7 +104,15 @@ pub fn draw(chart: &Chart) -> Result<String> {
         } else {
             "class=\"faint\" stroke=\"#5c6a73\" stroke-width=\"0.8\" stroke-dasharray=\"4 3\""
         };
-        let _ = writeln!(svg, "<path d=\"{}\" fill=\"none\" {style}/>", path(&points));
+        let path = path(&points);
+        if !line.thick {
+            // Light below the dashes, for dark areas.
+            let _ = writeln!(
+                svg,
+                "<path d=\"{path}\" fill=\"none\" stroke=\"#ffffff\" stroke-opacity=\"0.4\" stroke-width=\"1.6\"/>"
+            );
+        }
+        let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" {style}/>");
         if let Some(&(x, y)) = points.last().filter(|_| !line.label.is_empty()) {
             labels.put((x, y), "middle", &line.label);
         }
@@ -125,7 +134,10 @@ pub fn draw(chart: &Chart) -> Result<String> {
             svg,
             "<circle class=\"dot\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\" fill=\"#fff\" stroke=\"#1d2429\"/>"
         );
-        labels.put((x + 7.0, y + 4.0), "start", words);
+        // A letter is about 6.2 pixels wide.
+        let outside = x + 7.0 + 6.2 * count(words.chars().count()) > right;
+        let (x, anchor) = if outside { (x - 7.0, "end") } else { (x + 7.0, "start") };
+        labels.put((x, y + 4.0), anchor, words);
     }
     svg.push_str(&labels.texts);
     text(&mut svg, (right + 16.0, top + 10.0), "start\" font-weight=\"bold", &chart.legend);
@@ -169,6 +181,7 @@ fn fill(chart: &Chart, band: &Band, area: &Area, labels: &mut Labels<'_>, svg: &
 /// Labels on the areas, drawn last.
 struct Labels<'a> {
     area: &'a Area,
+    marks: Vec<f64>,
     placed: Vec<Place>,
     texts: String,
 }
@@ -179,13 +192,14 @@ impl Labels<'_> {
         text(&mut self.texts, at, &format!("{anchor}\" class=\"on"), words);
     }
 
-    /// A label on the point of a line that is farthest from other labels and from the border.
+    /// A label on the point of a line that is farthest from other labels, from marks and from the border.
     fn along(&mut self, line: &[Place], words: &str) {
         let Area { left, top, right, bottom, .. } = *self.area;
         let room = |p: &Place| {
             let border = [p.0 - left, right - p.0, p.1 - top, bottom - p.1].into_iter().fold(f64::INFINITY, f64::min);
             let others = self.placed.iter().map(|q| (q.0 - p.0).hypot(q.1 - p.1)).fold(f64::INFINITY, f64::min);
-            others.min(border)
+            let marks = self.marks.iter().map(|x| 2.0 * (x - p.0).abs()).fold(f64::INFINITY, f64::min);
+            others.min(border).min(marks)
         };
         let best = line.iter().max_by(|a, b| room(a).total_cmp(&room(b))).filter(|p| room(p) > BORDER);
         if let Some(&(x, y)) = best {
