@@ -44,10 +44,10 @@ def profile():
         ramp = lambda s: np.where(s < rise, s - rise / (2 * np.pi) * np.sin(2 * np.pi * s / rise), s) * (s > 0)
         shape = lambda s: np.where(s < rise, s / rise - np.sin(2 * np.pi * s / rise) / (2 * np.pi), 1.0) * (s > 0)
         speed = sign * most * (shape(t) - shape(t - (whole - rise)))
-        x.append(start + np.cumsum(speed) * H)
+        x.append(start + np.cumsum(speed) * H - speed * H)
         v.append(speed)
         force.append(np.where(np.abs(speed) > 0.99 * most, cut, 0.0))
-        start = x[-1][-1]
+        start = x[-1][-1] + speed[-1] * H
     return np.concatenate(x), np.concatenate(v), np.concatenate(force)
 
 
@@ -63,7 +63,7 @@ def run(file, stop):
         angle, speed = row[0], row[1]
         rows.append(row)
     drive.close()
-    return {"time": H * np.arange(len(x)), "wanted": x, **dict(zip(OUTPUTS, np.array(rows).T))}
+    return {"time": H * np.arange(len(x)), "wanted": x + v * H, **dict(zip(OUTPUTS, np.array(rows).T))}
 
 
 def energies(run):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from drives import ENERGIES, RPM, Fmu, arguments, compare, plot, power, tuned
 
-H = 1e-2  # s
+H = 2e-2  # s
 RATED, TORQUE, FLOW, HEAD = 1500 * RPM, 11.0, 30 / 3600, 16.0  # rad/s, N.m, m3/s, m: assumed
 WATER = 1000 * 9.81  # N/m3
 DEMAND = [0.0, 0.6, 0.6, 0.8, 1.0, 0.9, 0.5, 0.4, 0.0]  # share of the flow, every 20 s

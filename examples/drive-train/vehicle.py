@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from drives import ENERGIES, HERE, LOSSES, RPM, Fmu, arguments, compare, plot, power, tuned
 
-H = 1e-2  # s
+H = 2e-2  # s
 OUTPUTS = ["tau_shaft", *ENERGIES, *LOSSES]
 VALUES = tuned("traction-100kw")
 # Torque control with a resolver instead of the sensorless start, on the shaft of the vehicle. The current is the only limit.
