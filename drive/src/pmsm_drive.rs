@@ -32,7 +32,7 @@ use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
     Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, SampleGrid, Sampled, Step, Table, Terminal,
-    Warns,
+    Warns, table,
 };
 use period::{MEANS, Period};
 use serde::{Deserialize, Serialize};
@@ -367,9 +367,7 @@ fn to_next_sample(grid: SampleGrid, now: Elapsed) -> f64 {
 type I = Row<DriveInputs>;
 
 /// The inputs, of `PmsmDrive` and of `PmsmDriveMean`.
-pub(crate) const INPUTS: &Table<DriveInputs> = &Table::new(
-    const {
-        &[
+pub(crate) const INPUTS: &Table<DriveInputs> = table![
             I::input("speed_ref", &SPEED, "Mechanical speed reference", |i| &mut i.speed_ref),
             I::input("tau_ref", &NEWTON_METER, "Torque reference", |i| &mut i.tau_ref)
                 .read_with("speed_loop.torque_mode", "true"),
@@ -408,59 +406,41 @@ pub(crate) const INPUTS: &Table<DriveInputs> = &Table::new(
                 .unbounded()
                 .read_with("mechanics.imposed", "true"),
             I::part("", &Part { table: THERMAL_INPUTS, lens: |i| &mut i.thermal }),
-        ]
-    },
-);
+        ];
 
 type V = Row<Block<PmsmDrive>>;
 
-const TABLE: &Table<Block<PmsmDrive>> = &Table::new(
-    const {
-        &[
-            V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
-            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: plant::FLUX, lens: |m| m.model.pair.plant.model.flux_mut() }),
-            V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
-            V::part(
-                "controller.",
-                &Part { table: control::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
-            ),
-            V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
-        ]
-    },
-);
+const TABLE: &Table<Block<PmsmDrive>> = table![
+    V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
+    V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+    V::part("", &Part { table: plant::FLUX, lens: |m| m.model.pair.plant.model.flux_mut() }),
+    V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
+    V::part(
+        "controller.",
+        &Part { table: control::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
+    ),
+    V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
+];
 
 type D = Row<DriveOutputs>;
 
 /// The outputs, of `PmsmDrive` and of `PmsmDriveMean`.
-pub(crate) const OUTPUTS: &Table<DriveOutputs> = &Table::new(
-    const {
-        &[
-            D::part("", &Part { table: plant::OUTPUTS, lens: |o| &mut o.plant }),
-            D::part("", &Part { table: MEANS, lens: |o| &mut o.means }),
-            D::part("", &Part { table: LINK_OUTPUTS, lens: |o| &mut o.link }),
-            D::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |o| &mut o.controller }),
-        ]
-    },
-);
+pub(crate) const OUTPUTS: &Table<DriveOutputs> = table![
+    D::part("", &Part { table: plant::OUTPUTS, lens: |o| &mut o.plant }),
+    D::part("", &Part { table: MEANS, lens: |o| &mut o.means }),
+    D::part("", &Part { table: LINK_OUTPUTS, lens: |o| &mut o.link }),
+    D::part("", &Part { table: CONTROLLER_OUTPUTS, lens: |o| &mut o.controller }),
+];
 
 type O = Row<ControllerOutputs>;
 
 /// The controller's outputs, renamed so that `i_d` and `i_q` remain the plant's.
-const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = &Table::new(
-    const {
-        &[
-            O::part("", &Part { table: ESTIMATES, lens: |o| o }),
-            O::discrete_output("i_d_est", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| {
-                &mut o.i.d
-            }),
-            O::discrete_output("i_q_est", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| {
-                &mut o.i.q
-            }),
-            O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
-            O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
-            O::part("", &Part { table: VOLTAGES, lens: |o| o }),
-            O::part("", &Part { table: STATUS, lens: |o| o }),
-        ]
-    },
-);
+const CONTROLLER_OUTPUTS: &Table<ControllerOutputs> = table![
+    O::part("", &Part { table: ESTIMATES, lens: |o| o }),
+    O::discrete_output("i_d_est", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| { &mut o.i.d }),
+    O::discrete_output("i_q_est", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| { &mut o.i.q }),
+    O::discrete_output("i_d_ref", &AMPERE, "Reference of i_d_est", |o| &mut o.i_ref.d),
+    O::discrete_output("i_q_ref", &AMPERE, "Reference of i_q_est", |o| &mut o.i_ref.q),
+    O::part("", &Part { table: VOLTAGES, lens: |o| o }),
+    O::part("", &Part { table: STATUS, lens: |o| o }),
+];

@@ -344,6 +344,9 @@ fn both_interfaces_agree() {
         (ours.energy.r#in, theirs.energy.r#in),
         (ours.energy.loss, theirs.energy.loss),
         (ours.powers.p_in, theirs.powers.p_in),
+        (solved.out.drive.means.p_loss, stepped.out.drive.means.p_loss),
+        (solved.out.drive.controller.tau_max, stepped.out.drive.controller.tau_max),
+        (solved.out.drive.controller.speed_est, stepped.out.drive.controller.speed_est),
     ];
     for (a, b) in pairs {
         assert!((a / b - 1.0).abs() < 2e-3 && b != 0.0, "{a} in Model Exchange, {b} in Co-Simulation");

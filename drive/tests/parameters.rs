@@ -15,6 +15,10 @@ fn leaves(value: &impl Serialize) -> BTreeMap<String, String> {
         if let Value::Object(fields) = value {
             return fields.iter().for_each(|(name, value)| collect(&format!("{path}.{name}"), value, found));
         }
+        if let Value::Array(elements) = value {
+            let each = elements.iter().enumerate();
+            return each.for_each(|(k, value)| collect(&format!("{path}[{k}]"), value, found));
+        }
         found.insert(path.into(), value.to_string());
     }
     let mut found = BTreeMap::new();

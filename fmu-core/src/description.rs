@@ -250,10 +250,7 @@ impl Description {
             let words = words(&variables[i].name, need, &variables)?;
             variables[i].description += &words;
         }
-        let accepted = |v: &Variable| v.causality == Causality::Parameter && !M::has_effect(&v.name);
-        for v in variables.iter_mut().filter(|v| accepted(v)) {
-            v.description += "; accepted, without effect in this model";
-        }
+        variables.iter_mut().for_each(in_place_of_another::<M>);
         let terminals = terminals::describe(M::TERMINALS, &variables)?;
         let after = |i: usize| reference(table.len() + i);
         let model_exchange = can.model_exchange().then(|| ModelExchange {
@@ -290,6 +287,17 @@ impl Description {
     /// The variable of this name.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|v| v.name == name)
+    }
+}
+
+/// A variable of a table that the model shares with another one, as this model has it.
+fn in_place_of_another<M: Model>(v: &mut Variable) {
+    let real = matches!(v.kind, VariableKind::Real { .. });
+    if M::CONTINUOUS && real && v.causality == Causality::Output && v.variability == Variability::Discrete {
+        v.variability = Variability::Continuous;
+    }
+    if v.causality == Causality::Parameter && !M::has_effect(&v.name) {
+        v.description += "; accepted, without effect in this model";
     }
 }
 

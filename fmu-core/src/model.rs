@@ -129,6 +129,10 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
         Ok(())
     }
 
+    /// The real outputs that the table calls discrete follow at every instant: for a model without samples that has the table of one
+    /// that samples, so that it can take its place.
+    const CONTINUOUS: bool = false;
+
     /// Whether the parameter of this name has an effect. A model that has the parameters of another one, so that it can take its
     /// place, need not read them all; the descriptions of those without effect say so.
     fn has_effect(_parameter: &str) -> bool {

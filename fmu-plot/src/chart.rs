@@ -114,6 +114,8 @@ pub fn draw(chart: &Chart) -> Result<String> {
         }
         let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" {style}/>");
         if let Some(&(x, y)) = points.last().filter(|_| !line.label.is_empty()) {
+            // Beside the end of the line, away from the middle of the picture.
+            let y = if y > 0.5 * (top + bottom) { y + 11.0 } else { y };
             labels.put((x, y), "middle", &line.label);
         }
     }

@@ -65,6 +65,17 @@ pub fn envelope_csv(map: &Map) -> String {
     csv
 }
 
+/// `flux_map.csv`: the current of the fitted flux map on its knots, at 20 degC, psi_q >= 0; it is odd in psi_q.
+pub fn flux_map_csv(map: &Map) -> String {
+    let plant = &map.drive.plant;
+    let mut csv = String::from("psi_d,psi_q,i_d,i_q\n");
+    for x in plant.flux_map.knots() {
+        let i = plant.flux_map.current(x);
+        let _ = writeln!(csv, "{}", [x.d() + plant.motor.psi_M, x.q(), i.d(), i.q()].map(number).join(","));
+    }
+    csv
+}
+
 /// An array as a file of NumPy's format, version 1.0; `descr` is the type of the bytes.
 fn npy(descr: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
     let extents: String = shape.iter().map(|n| format!("{n}, ")).collect();

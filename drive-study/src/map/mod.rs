@@ -3,6 +3,7 @@
 //! - [`request`]: what is asked for. [`sheet`]: the points at one voltage and temperature, from [`drive::steady`].
 //! - [`verify`](mod@verify): some of them against the running drive.
 //! - [`table`]: reading between the points. [`cycle`]: a vehicle on a driving cycle.
+//! - [`linear`]: what the controller's constant inductances cost a machine that saturates.
 //! - [`files`]: CSV and npz. [`picture`]: the map as a figure. [`page`]: the map as a page. [`report`]: tables of text.
 //!
 //! The drive is that of torque control with a sensor, whose controller has the estimates that the rules give it; the current is
@@ -10,6 +11,7 @@
 
 pub mod cycle;
 pub mod files;
+pub mod linear;
 pub mod page;
 pub mod picture;
 pub mod report;
@@ -108,13 +110,13 @@ pub fn make(motor: &MotorFile, request: &Request) -> Result<Map> {
     Ok(Map { name, source, drive, rated, u_dc, T, axes, sheets, shown, verified, notes })
 }
 
-/// The map of a drive that is given with its values, at one voltage (V) and 20 degC, without verification.
-pub fn of_drive(name: &str, drive: Steady, u_dc: f64, grid: (usize, usize), top: f64) -> Map {
-    let (axes, T) = (Axes::new(grid, top), vec![20.0]);
+/// The map of a drive that is given with its values: one voltage (V), 20 degC, speeds up to `top` (rad/s), without verification.
+pub fn of_drive(name: &str, drive: Steady, u_dc: f64, top: f64, rated: [f64; 2]) -> Map {
+    let (axes, T) = (Axes::new(Request::default().grid, top), vec![20.0]);
     let sheets = sheet::all(&drive, &axes, &[u_dc], &[20.0 + ZERO_CELSIUS]);
     let (name, u_dc) = (name.into(), vec![u_dc]);
     let (source, notes, verified) = (String::new(), Vec::new(), Verified::default());
-    Map { name, source, drive, rated: [0.0; 2], u_dc, T, axes, sheets, shown: 0, verified, notes }
+    Map { name, source, drive, rated, u_dc, T, axes, sheets, shown: 0, verified, notes }
 }
 
 /// Refuses a temperature at which the machine has no resistance or no magnet.
@@ -199,13 +201,17 @@ fn missing(drive: &Steady) -> impl Iterator<Item = (&'static str, &'static str)>
 /// # Errors
 /// A sheet has no point.
 pub fn files(map: &Map, report: &Report) -> Result<Vec<(&'static str, Vec<u8>)>> {
-    Ok(vec![
+    let mut all = vec![
         ("map.csv", files::map_csv(map).into()),
         ("envelope.csv", files::envelope_csv(map).into()),
         ("map.npz", files::npz(map)?),
         ("map.svg", chart::draw(&picture::chart(map, map.shown))?.into()),
         ("map.html", page::page(map, report)?.into()),
-    ])
+    ];
+    if map.drive.plant.flux_map.used {
+        all.push(("flux_map.csv", files::flux_map_csv(map).into()));
+    }
+    Ok(all)
 }
 
 impl Map {

@@ -1,6 +1,7 @@
 //! What `fmu map` prints: the best point, the losses at the rated point, the energy of the driving cycle.
 
 use super::cycle::{Cycle, Energy};
+use super::linear::{self, Cost};
 use super::{Map, short};
 use crate::output::markdown;
 use drive::plant::losses::Losses;
@@ -58,6 +59,9 @@ pub fn of(map: &Map, cycle: &Cycle) -> Report {
             }
             None => notes.push(format!("{title}: the rated point is out of reach")),
         }
+        notes.extend(
+            linear::cost(&map.drive, map.rated, sheet.u_dc, sheet.T).map(|cost| told(&title, map.rated[1], &cost)),
+        );
         match map.energy(k, cycle) {
             Ok([exact, read]) => {
                 let Energy { link: [out, back], losses } = exact;
@@ -93,6 +97,26 @@ pub fn of(map: &Map, cycle: &Cycle) -> Report {
         )
     });
     Report { tables, notes }
+}
+
+/// A sentence about the controller's constant inductances.
+fn told(title: &str, rated: f64, cost: &Cost) -> String {
+    let Cost { torque, now, best } = cost;
+    let [lost, least] = [now, best].map(|point| point.powers.losses.sum());
+    format!(
+        "{title}: the controller computes with constant inductances: a reference of {} N.m gives {:.4} N.m ({:+.2} %); at the rated \
+         point it takes i_d = {:.3} A, i_q = {:.3} A and loses {lost:.2} W, {:.2} W ({:.2} %) more than with the best currents, {:.3} A \
+         and {:.3} A",
+        short(rated),
+        torque,
+        100.0 * (torque / rated - 1.0),
+        now.i.d(),
+        now.i.q(),
+        lost - least,
+        100.0 * (lost / least - 1.0),
+        best.i.d(),
+        best.i.q()
+    )
 }
 
 impl Report {

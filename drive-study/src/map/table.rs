@@ -5,9 +5,12 @@
 //! ```
 //!
 //! tau_lim is linear in the speed between those of the grid. The efficiency is computed from the losses and never interpolated:
-//! it is 0/0 without load. At another voltage the map is read at the speed n u_ref / u_dc, where field weakening is as deep; then
-//! p_sw grows with (u_dc / u_ref)^k_sw, p_iron is that of the speed with this flux linkage, and p_friction that of the speed. At
-//! another temperature of the winding, p_cu is in proportion to R_s(T). Errors of the reading: see the tests.
+//! it is 0/0 without load.
+//!
+//! At another voltage the map is read at the speed n u_ref / u_dc, where field weakening is as deep, with the torque that leaves the
+//! same to the rotor after friction. p_sw grows with (u_dc / u_ref)^k_sw; p_iron is that of the speed with this flux linkage, and
+//! p_friction that of the speed. At another temperature of the winding, p_cu is in proportion to R_s(T). `tests/map.rs` has the
+//! errors.
 
 use super::sheet::{Axes, Sheet};
 use drive::plant::losses::{Losses, efficiency};
@@ -80,7 +83,9 @@ impl<'a> Table<'a> {
         let Self { sheet, plant, .. } = self;
         let (n, forward, scale) = (speed.abs(), if speed < 0.0 { -tau } else { tau }, u_dc / sheet.u_dc);
         let read = n / scale;
-        let at_speed = self.losses(read, share(self.limits(read)?, forward)?)?;
+        // The rotor has the same torque: friction takes another part of it at the speed of the reading.
+        let friction = |n: f64| plant.mechanics.friction(n);
+        let at_speed = self.losses(read, share(self.limits(read)?, forward + friction(n) - friction(read))?)?;
         let iron = |n: f64| {
             let w = f64::from(plant.motor.n_p) * n;
             plant.iron.conductance(w) * w * w
@@ -91,7 +96,7 @@ impl<'a> Table<'a> {
             iron: if read > 0.0 && at_speed.iron > 0.0 { at_speed.iron * iron(n) / iron(read) } else { 0.0 },
             cond: at_speed.cond,
             sw: at_speed.sw * scale.powf(plant.inverter.devices.k_sw),
-            friction: plant.mechanics.friction(n) * n,
+            friction: friction(n) * n,
         };
         Some(reading(losses, n * forward))
     }

@@ -17,7 +17,7 @@ use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::DqHat;
 use drive_base::motor::Motor;
 use fmu_core::unit::AMPERE;
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Share of the new loss in the low-pass at each sample.
@@ -88,23 +88,17 @@ pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
 type P = Row<DcLimits>;
 
 /// Variables of the limits; their owner supplies the prefix `limit.`.
-pub const DC_LIMITS: &Table<DcLimits> = &Table::new(
-    const {
-        &[
-            P::boolean_parameter(
-                "i_dc_use",
-                "Limits of the current of the DC link, kept by limiting the torque; false: no such limits",
-                |p| &mut p.used,
-            ),
-            P::parameter("i_dc_max", &AMPERE, "Greatest current of the DC link with i_dc_use, 0 or more", |p| {
-                &mut p.max
-            })
-            .tunable(),
-            P::parameter("i_dc_min", &AMPERE, "Least current of the DC link with i_dc_use, 0 or less", |p| &mut p.min)
-                .tunable(),
-        ]
-    },
-);
+pub const DC_LIMITS: &Table<DcLimits> = table![
+    P::boolean_parameter(
+        "i_dc_use",
+        "Limits of the current of the DC link, kept by limiting the torque; false: no such limits",
+        |p| &mut p.used,
+    ),
+    P::parameter("i_dc_max", &AMPERE, "Greatest current of the DC link with i_dc_use, 0 or more", |p| { &mut p.max })
+        .tunable(),
+    P::parameter("i_dc_min", &AMPERE, "Least current of the DC link with i_dc_use, 0 or less", |p| &mut p.min)
+        .tunable(),
+];
 
 #[cfg(test)]
 mod tests {

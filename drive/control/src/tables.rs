@@ -17,7 +17,7 @@ use drive_base::math::{at_least, at_most};
 use drive_base::motor::A_PER_WB2;
 use drive_base::motor::{MOTOR, Motor};
 use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METER, OHM, ONE, RADIAN, SECOND, SPEED, VOLT};
-use fmu_core::{Field, Part, Row, Table};
+use fmu_core::{Field, Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Limits of the current references.
@@ -71,33 +71,29 @@ impl Default for Compensation {
 type C = Row<Compensation>;
 
 /// Variables of the compensation; their owner supplies the prefix `compensation.`.
-const COMPENSATION: &Table<Compensation> = &Table::new(
-    const {
-        &[
-            C::parameter(
-                "u_dead",
-                &VOLT,
-                "Dead-time voltage of an inverter leg, added to the command; 0: no compensation",
-                |p| &mut p.u_dead,
-            )
-            .at_least(0.0),
-            C::parameter("i_zero", &AMPERE, "Current below which the compensation falls linearly to zero", |p| {
-                &mut p.i_zero
-            })
-            .above(0.0),
-            C::boolean_parameter(
-                "observe",
-                "The estimators and lock_lost subtract the dead-time voltage at the measured currents; false: they assume that the compensation is exact",
-                |p| &mut p.observe,
-            ),
-            C::boolean_parameter(
-                "calibrate",
-                "The controller measures the offsets of the current sensors while enable is false; false: offsets stay",
-                |p| &mut p.calibrate,
-            ),
-        ]
-    },
-);
+const COMPENSATION: &Table<Compensation> = table![
+    C::parameter(
+        "u_dead",
+        &VOLT,
+        "Dead-time voltage of an inverter leg, added to the command; 0: no compensation",
+        |p| &mut p.u_dead,
+    )
+    .at_least(0.0),
+    C::parameter("i_zero", &AMPERE, "Current below which the compensation falls linearly to zero", |p| {
+        &mut p.i_zero
+    })
+    .above(0.0),
+    C::boolean_parameter(
+        "observe",
+        "The estimators and lock_lost subtract the dead-time voltage at the measured currents; false: they assume that the compensation is exact",
+        |p| &mut p.observe,
+    ),
+    C::boolean_parameter(
+        "calibrate",
+        "The controller measures the offsets of the current sensors while enable is false; false: offsets stay",
+        |p| &mut p.calibrate,
+    ),
+];
 
 /// All parameters that a commissioning engineer sets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -196,168 +192,140 @@ impl ControllerParameters {
 type P = Row<ControllerParameters>;
 
 /// The controller's parameters.
-pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(
-    const {
-        &[
-            P::parameter("T_s", &SECOND, "Sample period, independent of the communication step", |p| &mut p.T_s)
-                .above(0.0),
-            P::integer_parameter(
-                "timing.delay",
-                "Samples from taking the currents to the voltage acting, as the importer exchanges values: 1 (all \
+pub const PARAMETERS: &Table<ControllerParameters> = table![
+    P::parameter("T_s", &SECOND, "Sample period, independent of the communication step", |p| &mut p.T_s).above(0.0),
+    P::integer_parameter(
+        "timing.delay",
+        "Samples from taking the currents to the voltage acting, as the importer exchanges values: 1 (all \
                  outputs read, then all inputs set), 0 (one FMU gets what the other has computed in this step) or 2 \
                  (voltages or currents take a step more)",
-                |p| &mut p.delay,
-            )
-            .at_least(0.0)
-            .at_most(2.0),
-            P::enumeration_parameter("estimator", "Estimator of rotor angle and speed", &Field(|p| &mut p.estimator)),
-            P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
-            P::parameter(
-                "saturation.s_2",
-                &A_PER_WB2,
-                "Second-order d-axis saturation coefficient (estimate), read by the start by injection; 0: unknown",
-                |p| &mut p.s_2,
-            )
-            .at_least(0.0),
-            P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
-                .above(0.0)
-                .tunable(),
-            P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
-                &mut p.theta_est
-            }),
-            P::parameter("initial.speed_est", &SPEED, "First estimate of the mechanical speed", |p| &mut p.speed_est),
-            P::parameter("limit.i_q", &AMPERE, "Maximum magnitude of the q-axis current", |p| &mut p.limit.i_q)
-                .above(0.0)
-                .tunable(),
-            P::parameter("limit.i", &AMPERE, "Maximum phase current (peak); i_d has priority over i_q", |p| {
-                &mut p.limit.i
-            })
-            .above(0.0)
-            .tunable(),
-            P::parameter("limit.tau", &NEWTON_METER, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
-                .above(0.0)
-                .tunable(),
-            P::part("limit.", &Part { table: DC_LIMITS, lens: |p| &mut p.dc }),
-            P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
-            P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
-            P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
-            P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
-            P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
-            P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
-            P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
-            P::part("trip.", &Part { table: TRIP, lens: |p| &mut p.trip }),
-            P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
-            P::enumeration_parameter(
-                "sensor.fallback",
-                "Estimator that takes over when sensor_valid becomes false, until enable falls; Sensored: none",
-                &Field(|p| &mut p.fallback),
-            ),
-            P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
-            P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
-        ]
-    },
-);
+        |p| &mut p.delay,
+    )
+    .at_least(0.0)
+    .at_most(2.0),
+    P::enumeration_parameter("estimator", "Estimator of rotor angle and speed", &Field(|p| &mut p.estimator)),
+    P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
+    P::parameter(
+        "saturation.s_2",
+        &A_PER_WB2,
+        "Second-order d-axis saturation coefficient (estimate), read by the start by injection; 0: unknown",
+        |p| &mut p.s_2,
+    )
+    .at_least(0.0),
+    P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
+        .above(0.0)
+        .tunable(),
+    P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
+        &mut p.theta_est
+    }),
+    P::parameter("initial.speed_est", &SPEED, "First estimate of the mechanical speed", |p| &mut p.speed_est),
+    P::parameter("limit.i_q", &AMPERE, "Maximum magnitude of the q-axis current", |p| &mut p.limit.i_q)
+        .above(0.0)
+        .tunable(),
+    P::parameter("limit.i", &AMPERE, "Maximum phase current (peak); i_d has priority over i_q", |p| { &mut p.limit.i })
+        .above(0.0)
+        .tunable(),
+    P::parameter("limit.tau", &NEWTON_METER, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
+        .above(0.0)
+        .tunable(),
+    P::part("limit.", &Part { table: DC_LIMITS, lens: |p| &mut p.dc }),
+    P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
+    P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
+    P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
+    P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
+    P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
+    P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
+    P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
+    P::part("trip.", &Part { table: TRIP, lens: |p| &mut p.trip }),
+    P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
+    P::enumeration_parameter(
+        "sensor.fallback",
+        "Estimator that takes over when sensor_valid becomes false, until enable falls; Sensored: none",
+        &Field(|p| &mut p.fallback),
+    ),
+    P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
+    P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
+];
 
 type O = Row<ControllerOutputs>;
 
 /// The voltage references, of the controller and of `PmsmDrive`.
-pub const VOLTAGES: &Table<ControllerOutputs> = &Table::new(
-    const {
-        &[
-            O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| {
-                &mut o.u.a
-            }),
-            O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
-            O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
-        ]
-    },
-);
+pub const VOLTAGES: &Table<ControllerOutputs> = table![
+    O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| { &mut o.u.a }),
+    O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
+    O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
+];
 
 /// The estimates, of the controller and of `PmsmDrive`.
-pub const ESTIMATES: &Table<ControllerOutputs> = &Table::new(
-    const {
-        &[
-            O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
-            O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
-                &mut o.theta_est
-            }),
-        ]
-    },
-);
+pub const ESTIMATES: &Table<ControllerOutputs> = table![
+    O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
+    O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
+        &mut o.theta_est
+    }),
+];
 
 /// The limits and the state of the control, of the controller and of `PmsmDrive`.
-pub const STATUS: &Table<ControllerOutputs> = &Table::new(
-    const {
-        &[
-            O::discrete_output("tau_max", &NEWTON_METER, "Greatest torque that the references may ask for now", |o| {
-                &mut o.tau_max
-            }),
-            O::discrete_output(
-                "tau_min",
-                &NEWTON_METER,
-                "Least torque that the references may ask for now, 0 or less",
-                |o| &mut o.tau_min,
-            ),
-            O::discrete_output(
-                "u_share",
-                &ONE,
-                "Voltage that the current loop requests, before the hexagon, as a share of u_dc / sqrt(3)",
-                |o| &mut o.u_share,
-            ),
-            O::boolean_output(
-                "voltage_limited",
-                "The voltage hexagon of u_dc limited the voltage references of the last sample",
-                |o| &mut o.voltage_limited,
-            ),
-            O::boolean_output(
-                "current_limited",
-                "limit.i_q, limit.i, limit.tau, limit.i_dc_max, limit.i_dc_min or field weakening limited the current references of the last sample",
-                |o| &mut o.current_limited,
-            ),
-            O::boolean_output("weakens", "Field weakening lowers i_d_ref", |o| &mut o.weakens),
-            O::boolean_output("enabled", "The controller is running: the voltage references are its own", |o| {
-                &mut o.enabled
-            }),
-            O::boolean_output(
-                "short_circuit",
-                "The inverter short-circuits the machine: all upper or all lower transistors conduct",
-                |o| &mut o.short_circuit,
-            ),
-            O::enumeration_output(
-                "tripped",
-                "What has tripped: the controller rests until enable falls",
-                &Field(|o| &mut o.tripped),
-            ),
-            O::boolean_output("sensor_lost", "The sensor is lost: sensor.fallback supplies angle and speed", |o| {
-                &mut o.sensor_lost
-            }),
-            O::discrete_output(
-                "lock_lost",
-                &ONE,
-                "Mismatch of the estimate with the applied voltage or the speed reference: 0 locked, 1 or more lost, 10 at most",
-                |o| &mut o.lock_lost,
-            ),
-            O::discrete_output(
-                "R_s_est",
-                &OHM,
-                "Stator resistance that the estimator uses: motor.R_s, or what adaptation.resistance makes of it",
-                |o| &mut o.R_s_est,
-            ),
-        ]
-    },
-);
+pub const STATUS: &Table<ControllerOutputs> = table![
+    O::discrete_output("tau_max", &NEWTON_METER, "Greatest torque that the references may ask for now", |o| {
+        &mut o.tau_max
+    }),
+    O::discrete_output("tau_min", &NEWTON_METER, "Least torque that the references may ask for now, 0 or less", |o| {
+        &mut o.tau_min
+    },),
+    O::discrete_output(
+        "u_share",
+        &ONE,
+        "Voltage that the current loop requests, before the hexagon, as a share of u_dc / sqrt(3)",
+        |o| &mut o.u_share,
+    ),
+    O::boolean_output(
+        "voltage_limited",
+        "The voltage hexagon of u_dc limited the voltage references of the last sample",
+        |o| &mut o.voltage_limited,
+    ),
+    O::boolean_output(
+        "current_limited",
+        "limit.i_q, limit.i, limit.tau, limit.i_dc_max, limit.i_dc_min or field weakening limited the current references of the last sample",
+        |o| &mut o.current_limited,
+    ),
+    O::boolean_output("weakens", "Field weakening lowers i_d_ref", |o| &mut o.weakens),
+    O::boolean_output("enabled", "The controller is running: the voltage references are its own", |o| {
+        &mut o.enabled
+    }),
+    O::boolean_output(
+        "short_circuit",
+        "The inverter short-circuits the machine: all upper or all lower transistors conduct",
+        |o| &mut o.short_circuit,
+    ),
+    O::enumeration_output(
+        "tripped",
+        "What has tripped: the controller rests until enable falls",
+        &Field(|o| &mut o.tripped),
+    ),
+    O::boolean_output("sensor_lost", "The sensor is lost: sensor.fallback supplies angle and speed", |o| {
+        &mut o.sensor_lost
+    }),
+    O::discrete_output(
+        "lock_lost",
+        &ONE,
+        "Mismatch of the estimate with the applied voltage or the speed reference: 0 locked, 1 or more lost, 10 at most",
+        |o| &mut o.lock_lost,
+    ),
+    O::discrete_output(
+        "R_s_est",
+        &OHM,
+        "Stator resistance that the estimator uses: motor.R_s, or what adaptation.resistance makes of it",
+        |o| &mut o.R_s_est,
+    ),
+];
 
 /// The controller's outputs.
-pub const OUTPUTS: &Table<ControllerOutputs> = &Table::new(
-    const {
-        &[
-            O::part("", &Part { table: VOLTAGES, lens: |o| o }),
-            O::part("", &Part { table: ESTIMATES, lens: |o| o }),
-            O::discrete_output("i_d", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| &mut o.i.d),
-            O::discrete_output("i_q", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| &mut o.i.q),
-            O::discrete_output("i_d_ref", &AMPERE, "d-axis stator current reference", |o| &mut o.i_ref.d),
-            O::discrete_output("i_q_ref", &AMPERE, "q-axis stator current reference", |o| &mut o.i_ref.q),
-            O::part("", &Part { table: STATUS, lens: |o| o }),
-        ]
-    },
-);
+pub const OUTPUTS: &Table<ControllerOutputs> = table![
+    O::part("", &Part { table: VOLTAGES, lens: |o| o }),
+    O::part("", &Part { table: ESTIMATES, lens: |o| o }),
+    O::discrete_output("i_d", &AMPERE, "d-axis stator current in the estimated rotor frame", |o| &mut o.i.d),
+    O::discrete_output("i_q", &AMPERE, "q-axis stator current in the estimated rotor frame", |o| &mut o.i.q),
+    O::discrete_output("i_d_ref", &AMPERE, "d-axis stator current reference", |o| &mut o.i_ref.d),
+    O::discrete_output("i_q_ref", &AMPERE, "q-axis stator current reference", |o| &mut o.i_ref.q),
+    O::part("", &Part { table: STATUS, lens: |o| o }),
+];

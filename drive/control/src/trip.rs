@@ -15,7 +15,7 @@ use crate::signals::ControllerInputs;
 use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::Phases;
 use fmu_core::unit::{AMPERE, VOLT};
-use fmu_core::{Fault, Row, Table, enumeration};
+use fmu_core::{Fault, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 
 enumeration! {
@@ -132,23 +132,17 @@ pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
 type P = Row<TripParameters>;
 
 /// Variables of the trips; their owner supplies the prefix `trip.`.
-pub const TRIP: &Table<TripParameters> = &Table::new(
-    const {
-        &[
-            P::boolean_parameter(
-                "use",
-                "Over-current and over-voltage trips: the gates are off until enable falls; false: no trip",
-                |p| &mut p.used,
-            ),
-            P::parameter("i", &AMPERE, "Measured phase current beyond which the drive trips; above limit.i", |p| {
-                &mut p.i
-            }),
-            P::parameter("u_dc", &VOLT, "Measured DC-link voltage beyond which the drive trips", |p| &mut p.u_dc),
-            P::boolean_parameter(
-                "asc",
-                "A trip short-circuits the machine where its back EMF exceeds u_dc; false: gates off at any speed",
-                |p| &mut p.asc,
-            ),
-        ]
-    },
-);
+pub const TRIP: &Table<TripParameters> = table![
+    P::boolean_parameter(
+        "use",
+        "Over-current and over-voltage trips: the gates are off until enable falls; false: no trip",
+        |p| &mut p.used,
+    ),
+    P::parameter("i", &AMPERE, "Measured phase current beyond which the drive trips; above limit.i", |p| { &mut p.i }),
+    P::parameter("u_dc", &VOLT, "Measured DC-link voltage beyond which the drive trips", |p| &mut p.u_dc),
+    P::boolean_parameter(
+        "asc",
+        "A trip short-circuits the machine where its back EMF exceeds u_dc; false: gates off at any speed",
+        |p| &mut p.asc,
+    ),
+];

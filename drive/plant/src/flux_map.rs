@@ -18,7 +18,7 @@ use crate::tables::{PARAMETERS, PlantParameters};
 use drive_base::frame::{Dq, Rotor, Vector};
 use drive_base::motor::Motor;
 use fmu_core::unit::{JOULE, WEBER};
-use fmu_core::{Fault, Row, Scalar, Table};
+use fmu_core::{Fault, Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Coefficients along the d-axis.
@@ -242,7 +242,7 @@ pub struct Contribution {
     pub place: usize,
     /// Current in A.
     pub current: Dq,
-    /// As [`FluxMap::hessian`], in 1/H.
+    /// Entries of the [`FluxMap::hessian`] in 1/H.
     pub hessian: [f64; 3],
 }
 
@@ -284,30 +284,24 @@ pub fn linear(motor: &Motor, [d_min, d_max]: [f64; 2], q_max: f64) -> FluxMap {
 type P = Row<FluxMap>;
 
 /// Variables of the map; their owner supplies the prefix `flux_map.`.
-pub const FLUX_MAP: &Table<FluxMap> = &Table::new(
-    const {
-        &[
-            P::boolean_parameter(
-                "use",
-                "A map of the flux linkage gives the current, in place of motor.L_d, motor.L_q and saturation",
-                |p| &mut p.used,
-            ),
-            P::parameter("d_min", &WEBER, "Least d-axis flux linkage of the grid, less motor.psi_M", |p| &mut p.d_min),
-            P::parameter("d_max", &WEBER, "Greatest d-axis flux linkage of the grid, less motor.psi_M", |p| {
-                &mut p.d_max
-            }),
-            P::parameter("q_max", &WEBER, "Greatest q-axis flux linkage of the grid", |p| &mut p.q_max),
-            P::array_parameter(
-                "w",
-                &JOULE,
-                "B-spline coefficients of the energy whose gradient is the current: 12 along the d-axis times 9 along the \
+pub const FLUX_MAP: &Table<FluxMap> = table![
+    P::boolean_parameter(
+        "use",
+        "A map of the flux linkage gives the current, in place of motor.L_d, motor.L_q and saturation",
+        |p| &mut p.used,
+    ),
+    P::parameter("d_min", &WEBER, "Least d-axis flux linkage of the grid, less motor.psi_M", |p| &mut p.d_min),
+    P::parameter("d_max", &WEBER, "Greatest d-axis flux linkage of the grid, less motor.psi_M", |p| { &mut p.d_max }),
+    P::parameter("q_max", &WEBER, "Greatest q-axis flux linkage of the grid", |p| &mut p.q_max),
+    P::array_parameter(
+        "w",
+        &JOULE,
+        "B-spline coefficients of the energy whose gradient is the current: 12 along the d-axis times 9 along the \
                  q-axis from 0 on, the q-axis fastest; fmu tune fits them",
-                D * Q,
-                |p| p.w.as_flattened_mut(),
-            ),
-        ]
-    },
-);
+        D * Q,
+        |p| p.w.as_flattened_mut(),
+    ),
+];
 
 #[cfg(test)]
 #[expect(clippy::cast_precision_loss, reason = "a few intervals")]

@@ -9,7 +9,7 @@
 
 use crate::losses::conduction::{DEVICES, Devices};
 use fmu_core::unit::{AMPERE, SECOND};
-use fmu_core::{Part, Row, Table};
+use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters; zero dead time gives the ideal average inverter.
@@ -42,22 +42,18 @@ impl Inverter {
 type P = Row<Inverter>;
 
 /// Variables of the inverter; their owner supplies the prefix `inverter.`.
-pub const INVERTER: &Table<Inverter> = &Table::new(
-    const {
-        &[
-            P::parameter("dead_time", &SECOND, "Dead time between the two switches of a leg; 0: ideal inverter", |p| {
-                &mut p.dead_time
-            })
-            .at_least(0.0),
-            P::parameter("T_pwm", &SECOND, "PWM period", |p| &mut p.T_pwm).above(0.0),
-            P::parameter("i_zero", &AMPERE, "Current below which the dead-time voltage falls linearly to zero", |p| {
-                &mut p.i_zero
-            })
-            .above(0.0),
-            P::part("", &Part { table: DEVICES, lens: |p| &mut p.devices }),
-        ]
-    },
-);
+pub const INVERTER: &Table<Inverter> = table![
+    P::parameter("dead_time", &SECOND, "Dead time between the two switches of a leg; 0: ideal inverter", |p| {
+        &mut p.dead_time
+    })
+    .at_least(0.0),
+    P::parameter("T_pwm", &SECOND, "PWM period", |p| &mut p.T_pwm).above(0.0),
+    P::parameter("i_zero", &AMPERE, "Current below which the dead-time voltage falls linearly to zero", |p| {
+        &mut p.i_zero
+    })
+    .above(0.0),
+    P::part("", &Part { table: DEVICES, lens: |p| &mut p.devices }),
+];
 
 #[cfg(test)]
 mod tests {

@@ -22,7 +22,7 @@
 use drive_base::frame::{Rotor, Vector};
 use drive_base::motor::Motor;
 use fmu_core::unit::{PER_HENRY, RAD_PER_S, SIEMENS};
-use fmu_core::{Row, Scalar, Table};
+use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters; all zero gives a machine without iron loss.
@@ -69,28 +69,16 @@ impl Iron {
 type P = Row<Iron>;
 
 /// Variables of the iron loss; their owner supplies the prefix `iron.`.
-pub const IRON: &Table<Iron> = &Table::new(
-    const {
-        &[
-            P::parameter(
-                "G_e",
-                &SIEMENS,
-                "Iron loss by eddy currents: conductance parallel to the flux; 0: none",
-                |p| &mut p.G_e,
-            )
-            .at_least(0.0),
-            P::parameter(
-                "G_h",
-                &PER_HENRY,
-                "Iron loss by hysteresis: conductance times electrical speed; 0: none",
-                |p| &mut p.G_h,
-            )
-            .at_least(0.0),
-            P::parameter("w_0", &RAD_PER_S, "Electrical speed below which the hysteresis loss fades", |p| &mut p.w_0)
-                .above(0.0),
-        ]
-    },
-);
+pub const IRON: &Table<Iron> = table![
+    P::parameter("G_e", &SIEMENS, "Iron loss by eddy currents: conductance parallel to the flux; 0: none", |p| &mut p
+        .G_e,)
+    .at_least(0.0),
+    P::parameter("G_h", &PER_HENRY, "Iron loss by hysteresis: conductance times electrical speed; 0: none", |p| &mut p
+        .G_h,)
+    .at_least(0.0),
+    P::parameter("w_0", &RAD_PER_S, "Electrical speed below which the hysteresis loss fades", |p| &mut p.w_0)
+        .above(0.0),
+];
 
 #[cfg(test)]
 mod tests {

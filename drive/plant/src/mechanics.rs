@@ -10,7 +10,7 @@
 
 use drive_base::math::{abs, reciprocal, tanh};
 use fmu_core::unit::{KG_M2, NEWTON_METER, NM_S_PER_RAD, NM_S2_PER_RAD2, SPEED};
-use fmu_core::{Row, Scalar, Table};
+use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Inertia and friction.
@@ -225,27 +225,21 @@ impl<'a, C: Coulomb<S>, S: Scalar> Shaft<'a, C, S> {
 type P = Row<Mechanics>;
 
 /// Mechanical variables; their owner supplies the prefix `mechanics.`.
-pub const MECHANICS: &Table<Mechanics> = &Table::new(
-    const {
-        &[
-            P::parameter("J", &KG_M2, "Moment of inertia of rotor and load", |m| &mut m.J).above(0.0),
-            P::parameter("B", &NM_S_PER_RAD, "Viscous friction coefficient", |m| &mut m.B).at_least(0.0),
-            P::parameter("tau_coulomb", &NEWTON_METER, "Coulomb friction torque", |m| &mut m.tau_coulomb).at_least(0.0),
-            P::parameter("w_coulomb", &SPEED, "Speed over which the Coulomb torque changes sign", |m| &mut m.w_coulomb)
-                .above(0.0),
-            P::parameter("k_w", &NM_S2_PER_RAD2, "Windage: torque over the square of the speed; 0: none", |m| {
-                &mut m.k_w
-            })
-            .at_least(0.0),
-            P::boolean_parameter(
-                "imposed",
-                "The drive train imposes speed_shaft and angle_shaft and takes tau_shaft; the inertia is its own. false: the \
+pub const MECHANICS: &Table<Mechanics> = table![
+    P::parameter("J", &KG_M2, "Moment of inertia of rotor and load", |m| &mut m.J).above(0.0),
+    P::parameter("B", &NM_S_PER_RAD, "Viscous friction coefficient", |m| &mut m.B).at_least(0.0),
+    P::parameter("tau_coulomb", &NEWTON_METER, "Coulomb friction torque", |m| &mut m.tau_coulomb).at_least(0.0),
+    P::parameter("w_coulomb", &SPEED, "Speed over which the Coulomb torque changes sign", |m| &mut m.w_coulomb)
+        .above(0.0),
+    P::parameter("k_w", &NM_S2_PER_RAD2, "Windage: torque over the square of the speed; 0: none", |m| { &mut m.k_w })
+        .at_least(0.0),
+    P::boolean_parameter(
+        "imposed",
+        "The drive train imposes speed_shaft and angle_shaft and takes tau_shaft; the inertia is its own. false: the \
                  shaft turns freely under tau_load",
-                |m| &mut m.imposed,
-            ),
-        ]
-    },
-);
+        |m| &mut m.imposed,
+    ),
+];
 
 #[cfg(test)]
 mod tests {

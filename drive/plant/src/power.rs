@@ -31,7 +31,7 @@ use crate::losses::{LOSSES, Losses};
 use crate::signals::{Gates, PlantInputs};
 use drive_base::frame::Phases;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
-use fmu_core::{Part, Row, Scalar, Table};
+use fmu_core::{Part, Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Powers; motor sign, from the DC link to the load.
@@ -135,9 +135,7 @@ impl Energy {
 type P = Row<Powers>;
 
 /// Variables of the powers.
-pub const POWERS: &Table<Powers> = &Table::new(
-    const {
-        &[
+pub const POWERS: &Table<Powers> = table![
             P::output(
                 "i_dc",
                 &AMPERE,
@@ -169,35 +167,29 @@ pub const POWERS: &Table<Powers> = &Table::new(
             )
             .mean(),
             P::part("", &Part { table: LOSSES, lens: |p| &mut p.losses }),
-        ]
-    },
-);
+        ];
 
 type E = Row<Energy>;
 
 /// Variables of the energies; their owner supplies the prefix `energy_`.
-pub const ENERGY: &Table<Energy> = &Table::new(
-    const {
-        &[
-            E::output(
-                "in",
-                &JOULE,
-                "Energy from the DC link since the start, the integral of p_in; in Model Exchange up to the last completed integrator step \
+pub const ENERGY: &Table<Energy> = table![
+    E::output(
+        "in",
+        &JOULE,
+        "Energy from the DC link since the start, the integral of p_in; in Model Exchange up to the last completed integrator step \
                  or event, as exact as in Co-Simulation with inputs that are held or ramp between two of them",
-                |e| &mut e.r#in,
-            ),
-            E::output(
-                "mech",
-                &JOULE,
-                "Energy delivered to the load since the start, the integral of p_mech; in Model Exchange as energy_in",
-                |e| &mut e.mech,
-            ),
-            E::output(
-                "loss",
-                &JOULE,
-                "Energy lost since the start, the integral of p_loss; in Model Exchange as energy_in",
-                |e| &mut e.loss,
-            ),
-        ]
-    },
-);
+        |e| &mut e.r#in,
+    ),
+    E::output(
+        "mech",
+        &JOULE,
+        "Energy delivered to the load since the start, the integral of p_mech; in Model Exchange as energy_in",
+        |e| &mut e.mech,
+    ),
+    E::output(
+        "loss",
+        &JOULE,
+        "Energy lost since the start, the integral of p_loss; in Model Exchange as energy_in",
+        |e| &mut e.loss,
+    ),
+];

@@ -12,7 +12,7 @@
 
 use drive_base::frame::{Dq, Rotor, Vector};
 use drive_base::motor::{A_PER_WB2, A_PER_WB3, Motor};
-use fmu_core::{Row, Scalar, Table};
+use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters; all zero gives the linear machine.
@@ -60,18 +60,11 @@ impl Saturation {
 type P = Row<Saturation>;
 
 /// Variables of the saturation; their owner supplies the prefix `saturation.`.
-pub const SATURATION: &Table<Saturation> = &Table::new(
-    const {
-        &[
-            P::parameter("s_2", &A_PER_WB2, "Second-order d-axis saturation coefficient; 0: none", |p| &mut p.s_2),
-            P::parameter("s_3", &A_PER_WB3, "Third-order d-axis saturation coefficient; 0: none", |p| &mut p.s_3)
-                .at_least(0.0),
-            P::parameter("s_dq", &A_PER_WB2, "Cross-saturation coefficient between d and q axis; 0: none", |p| {
-                &mut p.s_dq
-            }),
-        ]
-    },
-);
+pub const SATURATION: &Table<Saturation> = table![
+    P::parameter("s_2", &A_PER_WB2, "Second-order d-axis saturation coefficient; 0: none", |p| &mut p.s_2),
+    P::parameter("s_3", &A_PER_WB3, "Third-order d-axis saturation coefficient; 0: none", |p| &mut p.s_3).at_least(0.0),
+    P::parameter("s_dq", &A_PER_WB2, "Cross-saturation coefficient between d and q axis; 0: none", |p| { &mut p.s_dq }),
+];
 
 #[cfg(test)]
 mod tests {

@@ -13,7 +13,7 @@ use crate::thermal::{THERMAL, THERMAL_INPUTS, THERMAL_OUTPUTS, Thermal};
 use drive_base::frame::Dq;
 use drive_base::motor::{MOTOR, Motor};
 use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, PER_KELVIN, RADIAN, S2_PER_RAD2, SPEED, VOLT, WEBER};
-use fmu_core::{Block, Part, Row, Table};
+use fmu_core::{Block, Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// The parameters of machine, inverter and shaft.
@@ -83,136 +83,116 @@ pub struct Initial {
 type O = Row<PlantOutputs>;
 
 /// The plant's outputs.
-pub const OUTPUTS: &Table<PlantOutputs> = &Table::new(
-    const {
-        &[
-            O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed).nominal(100.0),
-            O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle)
-                .unbounded()
-                .nominal(1.0),
-            O::output("theta_e", &RADIAN, "Electrical rotor angle from phase a to the d axis, in (-pi, pi]", |o| {
-                &mut o.theta_e
-            }),
-            O::output("tau_e", &NEWTON_METER, "Electromagnetic torque at the instant", |o| &mut o.tau_e),
-            O::output(
-                "tau_shaft",
-                &NEWTON_METER,
-                "Torque of the shaft on the load: tau_load, or with mechanics.imposed tau_e minus friction; mean over the last \
+pub const OUTPUTS: &Table<PlantOutputs> = table![
+    O::output("speed", &SPEED, "Mechanical rotor speed", |o| &mut o.speed).nominal(100.0),
+    O::output("angle", &RADIAN, "Mechanical rotor angle, not wrapped", |o| &mut o.angle).unbounded().nominal(1.0),
+    O::output("theta_e", &RADIAN, "Electrical rotor angle from phase a to the d axis, in (-pi, pi]", |o| {
+        &mut o.theta_e
+    }),
+    O::output("tau_e", &NEWTON_METER, "Electromagnetic torque at the instant", |o| &mut o.tau_e),
+    O::output(
+        "tau_shaft",
+        &NEWTON_METER,
+        "Torque of the shaft on the load: tau_load, or with mechanics.imposed tau_e minus friction; mean over the last \
                  step, as p_mech (PmsmDrive: over the last T_s; Model Exchange: at the instant)",
-                |o| &mut o.powers.tau_shaft,
-            )
-            .mean(),
-            O::output("i_a", &AMPERE, "Stator current of phase a, positive into the machine", |o| &mut o.i.a),
-            O::output("i_b", &AMPERE, "Stator current of phase b", |o| &mut o.i.b),
-            O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
-            O::output("i_d", &AMPERE, "d-axis stator current", |o| &mut o.i_d),
-            O::output("i_q", &AMPERE, "q-axis stator current", |o| &mut o.i_q),
-            O::part("", &Part { table: POWERS, lens: |o| &mut o.powers }),
-            O::output(
-                "efficiency",
-                &ONE,
-                "p_mech / p_in of a motor, p_in / p_mech of a generator, else 0; of the means (Model Exchange: at the instant)",
-                |o| &mut o.efficiency,
-            )
-            .mean(),
-            O::part("energy_", &Part { table: ENERGY, lens: |o| &mut o.energy }),
-            O::part("", &Part { table: THERMAL_OUTPUTS, lens: |o| o }),
-        ]
-    },
-);
+        |o| &mut o.powers.tau_shaft,
+    )
+    .mean(),
+    O::output("i_a", &AMPERE, "Stator current of phase a, positive into the machine", |o| &mut o.i.a),
+    O::output("i_b", &AMPERE, "Stator current of phase b", |o| &mut o.i.b),
+    O::output("i_c", &AMPERE, "Stator current of phase c", |o| &mut o.i.c),
+    O::output("i_d", &AMPERE, "d-axis stator current", |o| &mut o.i_d),
+    O::output("i_q", &AMPERE, "q-axis stator current", |o| &mut o.i_q),
+    O::part("", &Part { table: POWERS, lens: |o| &mut o.powers }),
+    O::output(
+        "efficiency",
+        &ONE,
+        "p_mech / p_in of a motor, p_in / p_mech of a generator, else 0; of the means (Model Exchange: at the instant)",
+        |o| &mut o.efficiency,
+    )
+    .mean(),
+    O::part("energy_", &Part { table: ENERGY, lens: |o| &mut o.energy }),
+    O::part("", &Part { table: THERMAL_OUTPUTS, lens: |o| o }),
+];
 
 type P = Row<PlantParameters>;
 
 /// The plant's parameters.
-pub const PARAMETERS: &Table<PlantParameters> = &Table::new(
-    const {
-        &[
-            P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
-            P::part("saturation.", &Part { table: SATURATION, lens: |p| &mut p.saturation }),
-            P::part("flux_map.", &Part { table: FLUX_MAP, lens: |p| &mut p.flux_map }),
-            P::part("mechanics.", &Part { table: MECHANICS, lens: |p| &mut p.mechanics }),
-            P::parameter("initial.theta_e", &RADIAN, "Electrical rotor angle at the start", |p| &mut p.initial.theta_e),
-            P::parameter("initial.speed", &SPEED, "Mechanical rotor speed at the start", |p| &mut p.initial.speed),
-            P::part("inverter.", &Part { table: INVERTER, lens: |p| &mut p.inverter }),
-            P::part("iron.", &Part { table: IRON, lens: |p| &mut p.iron }),
-            P::parameter("iron.rotor_share", &ONE, "Share of the iron loss that heats the rotor", |p| {
-                &mut p.thermal.rotor_share
-            })
-            .at_least(0.0)
-            .at_most(1.0),
-            P::parameter(
-                "winding.k_ac",
-                &S2_PER_RAD2,
-                "Growth of the resistance with the square of the electrical speed, R_s (1 + k_ac w^2); 0: none",
-                |p| &mut p.winding.k_ac,
-            )
-            .at_least(0.0),
-            P::parameter(
-                "winding.alpha",
-                &PER_KELVIN,
-                "Temperature coefficient of the resistance, R_s (1 + alpha (T_winding - T_ref)); copper 3.93e-3; 0: none",
-                |p| &mut p.thermal.alpha_R,
-            )
-            .at_least(0.0)
-            .nominal(4e-3),
-            P::parameter(
-                "magnet.alpha",
-                &PER_KELVIN,
-                "Temperature coefficient of the permanent-magnet flux linkage; NdFeB -1.1e-3; 0: none",
-                |p| &mut p.thermal.alpha_psi,
-            )
-            .nominal(1e-3),
-            P::part("thermal.", &Part { table: THERMAL, lens: |p| &mut p.thermal }),
-        ]
-    },
-);
+pub const PARAMETERS: &Table<PlantParameters> = table![
+    P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
+    P::part("saturation.", &Part { table: SATURATION, lens: |p| &mut p.saturation }),
+    P::part("flux_map.", &Part { table: FLUX_MAP, lens: |p| &mut p.flux_map }),
+    P::part("mechanics.", &Part { table: MECHANICS, lens: |p| &mut p.mechanics }),
+    P::parameter("initial.theta_e", &RADIAN, "Electrical rotor angle at the start", |p| &mut p.initial.theta_e),
+    P::parameter("initial.speed", &SPEED, "Mechanical rotor speed at the start", |p| &mut p.initial.speed),
+    P::part("inverter.", &Part { table: INVERTER, lens: |p| &mut p.inverter }),
+    P::part("iron.", &Part { table: IRON, lens: |p| &mut p.iron }),
+    P::parameter("iron.rotor_share", &ONE, "Share of the iron loss that heats the rotor", |p| {
+        &mut p.thermal.rotor_share
+    })
+    .at_least(0.0)
+    .at_most(1.0),
+    P::parameter(
+        "winding.k_ac",
+        &S2_PER_RAD2,
+        "Growth of the resistance with the square of the electrical speed, R_s (1 + k_ac w^2); 0: none",
+        |p| &mut p.winding.k_ac,
+    )
+    .at_least(0.0),
+    P::parameter(
+        "winding.alpha",
+        &PER_KELVIN,
+        "Temperature coefficient of the resistance, R_s (1 + alpha (T_winding - T_ref)); copper 3.93e-3; 0: none",
+        |p| &mut p.thermal.alpha_R,
+    )
+    .at_least(0.0)
+    .nominal(4e-3),
+    P::parameter(
+        "magnet.alpha",
+        &PER_KELVIN,
+        "Temperature coefficient of the permanent-magnet flux linkage; NdFeB -1.1e-3; 0: none",
+        |p| &mut p.thermal.alpha_psi,
+    )
+    .nominal(1e-3),
+    P::part("thermal.", &Part { table: THERMAL, lens: |p| &mut p.thermal }),
+];
 
 type S = Row<Dq>;
 
 /// The flux linkage: the states that are not outputs, of the plant and of `PmsmDrive`.
-pub const FLUX: &Table<Dq> = &Table::new(
-    const {
-        &[
-            S::state("psi_d", &WEBER, "d-axis stator flux linkage", |psi| psi.parts_mut().0).nominal(0.1),
-            S::state("psi_q", &WEBER, "q-axis stator flux linkage", |psi| psi.parts_mut().1).nominal(0.1),
-        ]
-    },
-);
+pub const FLUX: &Table<Dq> = table![
+    S::state("psi_d", &WEBER, "d-axis stator flux linkage", |psi| psi.parts_mut().0).nominal(0.1),
+    S::state("psi_q", &WEBER, "q-axis stator flux linkage", |psi| psi.parts_mut().1).nominal(0.1),
+];
 
 type V = Row<Block<PmsmPlant>>;
 
 /// All variables of `PmsmPlant`.
-pub const TABLE: &Table<Block<PmsmPlant>> = &Table::new(
-    const {
-        &[
-            V::input("u_a", &VOLT, "Voltage reference of phase a, average over a PWM period", |m| {
-                &mut m.model.inputs.u.a
-            }),
-            V::input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
-            V::input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
-            V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
-            V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
-                &mut m.model.inputs.enable
-            })
-            .optional(),
-            V::boolean_input(
-                "asc",
-                "Active short circuit: all upper or all lower transistors conduct, whatever enable says",
-                |m| &mut m.model.inputs.asc,
-            )
-            .optional(),
-            V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
-                &mut m.model.inputs.tau_load
-            }),
-            V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
-                .read_with("mechanics.imposed", "true"),
-            V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
-                .unbounded()
-                .read_with("mechanics.imposed", "true"),
-            V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
-            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
-            V::part("", &Part { table: FLUX, lens: |m| m.model.flux_mut() }),
-            V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-        ]
-    },
-);
+pub const TABLE: &Table<Block<PmsmPlant>> = table![
+    V::input("u_a", &VOLT, "Voltage reference of phase a, average over a PWM period", |m| { &mut m.model.inputs.u.a }),
+    V::input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
+    V::input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
+    V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+    V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
+        &mut m.model.inputs.enable
+    })
+    .optional(),
+    V::boolean_input(
+        "asc",
+        "Active short circuit: all upper or all lower transistors conduct, whatever enable says",
+        |m| &mut m.model.inputs.asc,
+    )
+    .optional(),
+    V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
+        &mut m.model.inputs.tau_load
+    }),
+    V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
+        .read_with("mechanics.imposed", "true"),
+    V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
+        .unbounded()
+        .read_with("mechanics.imposed", "true"),
+    V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
+    V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+    V::part("", &Part { table: FLUX, lens: |m| m.model.flux_mut() }),
+    V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+];

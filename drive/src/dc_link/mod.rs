@@ -19,7 +19,7 @@ pub mod ripple;
 
 use circuit::{Circuit, Piece};
 use fmu_core::unit::{AMPERE, JOULE, VOLT, WATT};
-use fmu_core::{Dual, Elapsed, Row, Scalar, Table};
+use fmu_core::{Dual, Elapsed, Row, Scalar, Table, table};
 pub use parameters::{Chopper, DcLink, LINK, LinkParameters};
 use serde::{Deserialize, Serialize};
 
@@ -291,9 +291,7 @@ impl LinkOutputs<Dual> {
 type O = Row<LinkOutputs>;
 
 /// The link's outputs.
-pub const LINK_OUTPUTS: &Table<LinkOutputs> = &Table::new(
-    const {
-        &[
+pub const LINK_OUTPUTS: &Table<LinkOutputs> = table![
             O::output("u_cap", &VOLT, "Voltage of the DC-link capacitor, which is a state; 0 without dc_link.use", |o| {
                 &mut o.u
             })
@@ -341,6 +339,4 @@ pub const LINK_OUTPUTS: &Table<LinkOutputs> = &Table::new(
                 &mut o.precharges
             }),
             O::boolean_output("chopper_on", "The brake chopper conducts", |o| &mut o.chops),
-        ]
-    },
-);
+        ];

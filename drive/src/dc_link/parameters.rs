@@ -1,7 +1,7 @@
 //! Parameters of the DC link: what is in use, what is allowed, and their table.
 
 use fmu_core::unit::{FARAD, OHM, VOLT};
-use fmu_core::{Fault, Row, Table};
+use fmu_core::{Fault, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Capacitor and source.
@@ -102,34 +102,28 @@ impl LinkParameters {
 type P = Row<LinkParameters>;
 
 /// The link's parameters.
-pub const LINK: &Table<LinkParameters> = &Table::new(
-    const {
-        &[
-            P::boolean_parameter(
-                "dc_link.use",
-                "The drive contains its DC link: u_dc is the voltage of the source; false: of inverter and controller",
-                |p| &mut p.dc_link.used,
-            ),
-            P::parameter("dc_link.C", &FARAD, "Capacitance of the DC link", |p| &mut p.dc_link.C).nominal(1e-3),
-            P::parameter("dc_link.R_source", &OHM, "Resistance of the source of the DC link", |p| {
-                &mut p.dc_link.R_source
-            }),
-            P::parameter(
-                "dc_link.R_precharge",
-                &OHM,
-                "Resistance besides R_source while the capacitor charges from 0 V; 0: it is charged at the start",
-                |p| &mut p.dc_link.R_precharge,
-            ),
-            P::boolean_parameter("chopper.use", "The DC link has a brake chopper; needs dc_link.use", |p| {
-                &mut p.chopper.used
-            }),
-            P::parameter("chopper.u_on", &VOLT, "Voltage of the capacitor at which the chopper switches on", |p| {
-                &mut p.chopper.u_on
-            }),
-            P::parameter("chopper.u_off", &VOLT, "Voltage of the capacitor at which the chopper switches off", |p| {
-                &mut p.chopper.u_off
-            }),
-            P::parameter("chopper.R", &OHM, "Resistance of the brake chopper", |p| &mut p.chopper.R),
-        ]
-    },
-);
+pub const LINK: &Table<LinkParameters> = table![
+    P::boolean_parameter(
+        "dc_link.use",
+        "The drive contains its DC link: u_dc is the voltage of the source; false: of inverter and controller",
+        |p| &mut p.dc_link.used,
+    ),
+    P::parameter("dc_link.C", &FARAD, "Capacitance of the DC link", |p| &mut p.dc_link.C).nominal(1e-3),
+    P::parameter("dc_link.R_source", &OHM, "Resistance of the source of the DC link", |p| { &mut p.dc_link.R_source }),
+    P::parameter(
+        "dc_link.R_precharge",
+        &OHM,
+        "Resistance besides R_source while the capacitor charges from 0 V; 0: it is charged at the start",
+        |p| &mut p.dc_link.R_precharge,
+    ),
+    P::boolean_parameter("chopper.use", "The DC link has a brake chopper; needs dc_link.use", |p| {
+        &mut p.chopper.used
+    }),
+    P::parameter("chopper.u_on", &VOLT, "Voltage of the capacitor at which the chopper switches on", |p| {
+        &mut p.chopper.u_on
+    }),
+    P::parameter("chopper.u_off", &VOLT, "Voltage of the capacitor at which the chopper switches off", |p| {
+        &mut p.chopper.u_off
+    }),
+    P::parameter("chopper.R", &OHM, "Resistance of the brake chopper", |p| &mut p.chopper.R),
+];

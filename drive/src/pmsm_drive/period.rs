@@ -3,7 +3,7 @@
 use drive_plant::counters::Total;
 use drive_plant::power::Powers;
 use fmu_core::unit::{NEWTON_METER, WATT};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Means over the last sample period; 0 before the first is over.
@@ -75,28 +75,17 @@ impl Period {
 type M = Row<Means>;
 
 /// The means over the last sample period.
-pub(super) const MEANS: &Table<Means> = &Table::new(
-    const {
-        &[
-            M::discrete_output(
-                "p_in_mean",
-                &WATT,
-                "Power from the DC link, mean over the last T_s in Co-Simulation and in Model Exchange; 0 before the first is over",
-                |m| &mut m.p_in,
-            ),
-            M::discrete_output(
-                "p_mech_mean",
-                &WATT,
-                "Power delivered to the load at the shaft, mean as p_in_mean",
-                |m| &mut m.p_mech,
-            ),
-            M::discrete_output("p_loss_mean", &WATT, "All losses, mean as p_in_mean", |m| &mut m.p_loss),
-            M::discrete_output(
-                "tau_shaft_mean",
-                &NEWTON_METER,
-                "Torque of the shaft on the load, mean as p_in_mean",
-                |m| &mut m.tau_shaft,
-            ),
-        ]
-    },
-);
+pub(super) const MEANS: &Table<Means> = table![
+    M::discrete_output(
+        "p_in_mean",
+        &WATT,
+        "Power from the DC link, mean over the last T_s in Co-Simulation and in Model Exchange; 0 before the first is over",
+        |m| &mut m.p_in,
+    ),
+    M::discrete_output("p_mech_mean", &WATT, "Power delivered to the load at the shaft, mean as p_in_mean", |m| &mut m
+        .p_mech,),
+    M::discrete_output("p_loss_mean", &WATT, "All losses, mean as p_in_mean", |m| &mut m.p_loss),
+    M::discrete_output("tau_shaft_mean", &NEWTON_METER, "Torque of the shaft on the load, mean as p_in_mean", |m| {
+        &mut m.tau_shaft
+    },),
+];

@@ -1,12 +1,14 @@
 //! `PmsmDriveMean` for Model Exchange: the rates of its states; the energies are states too.
 //!
 //! The ramp of the speed reference follows it with the current loop's bandwidth, at most at its rate. Nothing switches, so the
-//! model has no events of its own: a solver takes steps as long as inputs and limits are smooth. The outputs of the controller,
-//! which are discrete, are those of the importer's last event.
+//! model has no events of its own: a solver takes steps as long as inputs and limits are smooth. The truth values of the controller
+//! are those of the importer's last event.
 
 use super::{MeanOutputs, PmsmDriveMean, State};
+use crate::pmsm_drive::Means;
 use drive_base::math::all_finite;
-use drive_plant::power::Energy;
+use drive_control::signals::ControllerOutputs;
+use drive_plant::power::{Energy, Powers};
 use fmu_core::unit::{Exponents, Quantity, RAD_PER_S2, SPEED, Unit, WATT};
 use fmu_core::{ContinuousTime, Elapsed, Events, Fault, Next, Outcome, State as Variable};
 
@@ -53,7 +55,11 @@ impl ContinuousTime for PmsmDriveMean {
         let (temperatures, state) = (self.temperatures(), self.referred());
         let point = self.point_at(&state, temperatures);
         self.show(&state, &point, temperatures, out);
-        out.drive.controller = self.held;
+        let Powers { p_in, p_mech, p_loss, tau_shaft, .. } = out.drive.plant.powers;
+        out.drive.means = Means { p_in, p_mech, p_loss, tau_shaft };
+        let ControllerOutputs { enabled, voltage_limited, current_limited, weakens, .. } = self.held;
+        let now = self.controller(&state, &point);
+        out.drive.controller = ControllerOutputs { enabled, voltage_limited, current_limited, weakens, ..now };
     }
 }
 

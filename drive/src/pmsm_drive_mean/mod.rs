@@ -35,7 +35,9 @@ use drive_plant::tables as plant;
 use drive_plant::thermal::{self, Temperatures, ThermalMode};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, SPEED};
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Step, Table, Terminal, Warns};
+use fmu_core::{
+    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Step, Table, Terminal, Warns, table,
+};
 use motion::Passed;
 use serde::{Deserialize, Serialize};
 
@@ -207,6 +209,8 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
+    const CONTINUOUS: bool = true;
+
     fn has_effect(parameter: &str) -> bool {
         if let Some(name) = parameter.strip_prefix("controller.") {
             let listed = |of: &&str| name == *of || (of.ends_with(['.', '_']) && name.starts_with(*of));
@@ -288,30 +292,20 @@ impl Warns for PmsmDriveMean {
 type S = Row<State>;
 
 /// The states beyond those of `PmsmDrive`.
-const STATES: &Table<State> = &Table::new(
-    const {
-        &[
-            S::state("tau_lag", &NEWTON_METER, "Torque of the current loop, which follows its reference", |s| {
-                &mut s.tau
-            }),
-            S::state("speed_loop_integral", &AMPERE, "Integral part of the speed loop", |s| &mut s.integral),
-            S::state("speed_ref_ramp", &SPEED, "Speed reference on its ramp", |s| &mut s.speed_ref).nominal(100.0),
-        ]
-    },
-);
+const STATES: &Table<State> = table![
+    S::state("tau_lag", &NEWTON_METER, "Torque of the current loop, which follows its reference", |s| { &mut s.tau }),
+    S::state("speed_loop_integral", &AMPERE, "Integral part of the speed loop", |s| &mut s.integral),
+    S::state("speed_ref_ramp", &SPEED, "Speed reference on its ramp", |s| &mut s.speed_ref).nominal(100.0),
+];
 
 type V = Row<Block<PmsmDriveMean>>;
 
-const TABLE: &Table<Block<PmsmDriveMean>> = &Table::new(
-    const {
-        &[
-            V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
-            V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out.drive }),
-            V::part("", &Part { table: plant::FLUX, lens: |m| &mut m.out.psi }),
-            V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.drive.plant }),
-            V::part("controller.", &Part { table: control::PARAMETERS, lens: |m| &mut m.model.drive.controller }),
-            V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
-            V::part("", &Part { table: STATES, lens: |m| &mut m.model.state }),
-        ]
-    },
-);
+const TABLE: &Table<Block<PmsmDriveMean>> = table![
+    V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
+    V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out.drive }),
+    V::part("", &Part { table: plant::FLUX, lens: |m| &mut m.out.psi }),
+    V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.drive.plant }),
+    V::part("controller.", &Part { table: control::PARAMETERS, lens: |m| &mut m.model.drive.controller }),
+    V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
+    V::part("", &Part { table: STATES, lens: |m| &mut m.model.state }),
+];

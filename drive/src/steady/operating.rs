@@ -182,7 +182,7 @@ impl<'a> At<'a> {
         let at_sample = psi.turned() * *w;
         let (mut e, mut rippled) = (at_sample, 0.0);
         if *held < 1.0 {
-            let [d, cross, q] = plant.saturation.slope(motor, psi);
+            let [d, cross, q] = machine::slope(motor, plant.magnetics(), psi);
             let along = Dq::new(d * psi.d() + cross * psi.q(), cross * psi.d() + q * psi.q());
             rippled = ripple * along.dot(along);
             psi = psi * (held * held);

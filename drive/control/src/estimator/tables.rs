@@ -14,7 +14,7 @@ use crate::estimator::resistance::{ADAPTATION, ResistanceParameters};
 use crate::estimator::sliding_mode::{SLIDING_MODE, SlidingModeParameters};
 use crate::estimator::square_wave::{SQUARE_WAVE, SquareWaveParameters};
 use crate::estimator::tracker::{TRACKER, TrackerParameters};
-use fmu_core::{Part, Row, Table};
+use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of all estimators; each estimator reads its own part.
@@ -54,23 +54,19 @@ type P = Row<EstimatorParameters>;
 
 /// The estimators' variables, with their prefixes: the flux observers, the back-EMF methods, the injection methods, and the
 /// hybrid of two.
-pub const ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = &Table::new(
-    const {
-        &[
-            P::part("rasmussen.", &Part { table: RASMUSSEN, lens: |p| &mut p.rasmussen }),
-            P::part("adaptation.", &Part { table: ADAPTATION, lens: |p| &mut p.adaptation }),
-            P::part("flux_observer.", &Part { table: FLUX_OBSERVER, lens: |p| &mut p.flux_observer }),
-            P::part("tracker.", &Part { table: TRACKER, lens: |p| &mut p.tracker }),
-            P::part("emf.", &Part { table: EMF, lens: |p| &mut p.emf }),
-            P::part("matsui.", &Part { table: MATSUI, lens: |p| &mut p.matsui }),
-            P::part("kalman.", &Part { table: KALMAN, lens: |p| &mut p.kalman }),
-            P::part("gradient.", &Part { table: GRADIENT, lens: |p| &mut p.gradient }),
-            P::part("sliding_mode.", &Part { table: SLIDING_MODE, lens: |p| &mut p.sliding_mode }),
-            P::part("carrier.", &Part { table: CARRIER, lens: |p| &mut p.carrier }),
-            P::part("pulsating.", &Part { table: PULSATING, lens: |p| &mut p.pulsating }),
-            P::part("square_wave.", &Part { table: SQUARE_WAVE, lens: |p| &mut p.square_wave }),
-            P::part("near_pwm.", &Part { table: NEAR_PWM, lens: |p| &mut p.near_pwm }),
-            P::part("hybrid.", &Part { table: HYBRID, lens: |p| &mut p.hybrid }),
-        ]
-    },
-);
+pub const ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = table![
+    P::part("rasmussen.", &Part { table: RASMUSSEN, lens: |p| &mut p.rasmussen }),
+    P::part("adaptation.", &Part { table: ADAPTATION, lens: |p| &mut p.adaptation }),
+    P::part("flux_observer.", &Part { table: FLUX_OBSERVER, lens: |p| &mut p.flux_observer }),
+    P::part("tracker.", &Part { table: TRACKER, lens: |p| &mut p.tracker }),
+    P::part("emf.", &Part { table: EMF, lens: |p| &mut p.emf }),
+    P::part("matsui.", &Part { table: MATSUI, lens: |p| &mut p.matsui }),
+    P::part("kalman.", &Part { table: KALMAN, lens: |p| &mut p.kalman }),
+    P::part("gradient.", &Part { table: GRADIENT, lens: |p| &mut p.gradient }),
+    P::part("sliding_mode.", &Part { table: SLIDING_MODE, lens: |p| &mut p.sliding_mode }),
+    P::part("carrier.", &Part { table: CARRIER, lens: |p| &mut p.carrier }),
+    P::part("pulsating.", &Part { table: PULSATING, lens: |p| &mut p.pulsating }),
+    P::part("square_wave.", &Part { table: SQUARE_WAVE, lens: |p| &mut p.square_wave }),
+    P::part("near_pwm.", &Part { table: NEAR_PWM, lens: |p| &mut p.near_pwm }),
+    P::part("hybrid.", &Part { table: HYBRID, lens: |p| &mut p.hybrid }),
+];

@@ -25,7 +25,7 @@ use drive_base::frame::{AlphaBeta, Phases, Stator, Vector};
 use drive_base::modulation::clamp_unit;
 use fmu_core::Scalar;
 use fmu_core::unit::{AMPERE, JOULE, OHM, ONE, VOLT};
-use fmu_core::{Row, Table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_1_PI, PI};
 
@@ -160,29 +160,24 @@ impl Conduction<f64> {
 type P = Row<Devices>;
 
 /// Variables of the devices; their owner supplies the prefix `inverter.`.
-pub const DEVICES: &Table<Devices> = &Table::new(
-    const {
-        &[
-            P::parameter("u_transistor", &VOLT, "Threshold voltage of a transistor; 0: none", |p| &mut p.u_transistor)
-                .at_least(0.0),
-            P::parameter("r_transistor", &OHM, "Resistance of a transistor; 0: none", |p| &mut p.r_transistor)
-                .at_least(0.0),
-            P::parameter("u_diode", &VOLT, "Threshold voltage of a diode; 0: none", |p| &mut p.u_diode).at_least(0.0),
-            P::parameter("r_diode", &OHM, "Resistance of a diode; 0: none", |p| &mut p.r_diode).at_least(0.0),
-            P::parameter(
-                "E_sw",
-                &JOULE,
-                "Energy of switching a leg on and off once at i_sw and u_sw, with the diode's recovery; 0: none",
-                |p| &mut p.E_sw,
-            )
-            .at_least(0.0),
-            P::parameter("i_sw", &AMPERE, "Current of E_sw", |p| &mut p.i_sw).above(0.0),
-            P::parameter("u_sw", &VOLT, "DC-link voltage of E_sw", |p| &mut p.u_sw).above(0.0),
-            P::parameter("k_sw", &ONE, "Exponent of the DC-link voltage in the switching energy", |p| &mut p.k_sw)
-                .at_least(1.0),
-        ]
-    },
-);
+pub const DEVICES: &Table<Devices> = table![
+    P::parameter("u_transistor", &VOLT, "Threshold voltage of a transistor; 0: none", |p| &mut p.u_transistor)
+        .at_least(0.0),
+    P::parameter("r_transistor", &OHM, "Resistance of a transistor; 0: none", |p| &mut p.r_transistor).at_least(0.0),
+    P::parameter("u_diode", &VOLT, "Threshold voltage of a diode; 0: none", |p| &mut p.u_diode).at_least(0.0),
+    P::parameter("r_diode", &OHM, "Resistance of a diode; 0: none", |p| &mut p.r_diode).at_least(0.0),
+    P::parameter(
+        "E_sw",
+        &JOULE,
+        "Energy of switching a leg on and off once at i_sw and u_sw, with the diode's recovery; 0: none",
+        |p| &mut p.E_sw,
+    )
+    .at_least(0.0),
+    P::parameter("i_sw", &AMPERE, "Current of E_sw", |p| &mut p.i_sw).above(0.0),
+    P::parameter("u_sw", &VOLT, "DC-link voltage of E_sw", |p| &mut p.u_sw).above(0.0),
+    P::parameter("k_sw", &ONE, "Exponent of the DC-link voltage in the switching energy", |p| &mut p.k_sw)
+        .at_least(1.0),
+];
 
 #[cfg(test)]
 mod tests {

@@ -20,7 +20,7 @@ pub mod switching;
 use crate::inverter::Inverter;
 use crate::tables::{PlantParameters, Winding};
 use fmu_core::unit::WATT;
-use fmu_core::{Row, Scalar, Table};
+use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Losses: powers in W, or energies in J.
@@ -115,9 +115,7 @@ pub fn efficiency<S: Scalar>(p_in: S, p_mech: S) -> S {
 type P = Row<Losses>;
 
 /// Variables of the losses.
-pub const LOSSES: &Table<Losses> = &Table::new(
-    const {
-        &[
+pub const LOSSES: &Table<Losses> = table![
             P::output(
                 "p_cu",
                 &WATT,
@@ -153,9 +151,7 @@ pub const LOSSES: &Table<Losses> = &Table::new(
                 |p| &mut p.friction,
             )
             .mean(),
-        ]
-    },
-);
+        ];
 
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "exact numbers")]

@@ -27,7 +27,7 @@ use crate::signals::PlantOutputs;
 use crate::tables::{PARAMETERS, PlantParameters};
 use drive_base::motor::Motor;
 use fmu_core::unit::{KELVIN, WATT};
-use fmu_core::{Fault, Field, Part, Row, Scalar, Table, enumeration};
+use fmu_core::{Fault, Field, Part, Row, Scalar, Table, enumeration, table};
 use network::{NETWORK, Network};
 use serde::{Deserialize, Serialize};
 
@@ -254,90 +254,71 @@ fn refused(par: &PlantParameters, (name, T): (&str, f64), alpha: Get, effect: &s
 type P = Row<Thermal>;
 
 /// Variables of the temperatures; their owner supplies the prefix `thermal.`.
-pub const THERMAL: &Table<Thermal> = &Table::new(
-    const {
-        &[
-            P::enumeration_parameter("mode", "Where the temperatures come from", &Field(|p| &mut p.mode)),
-            P::parameter("T_ref", &KELVIN, "Temperature of motor.R_s and motor.psi_M", |p| &mut p.T_ref).above(0.0),
-            P::parameter("T_start", &KELVIN, "All temperatures at the start", |p| &mut p.T_start).above(0.0),
-            P::part("", &Part { table: NETWORK, lens: |p| &mut p.network }),
-        ]
-    },
-);
+pub const THERMAL: &Table<Thermal> = table![
+    P::enumeration_parameter("mode", "Where the temperatures come from", &Field(|p| &mut p.mode)),
+    P::parameter("T_ref", &KELVIN, "Temperature of motor.R_s and motor.psi_M", |p| &mut p.T_ref).above(0.0),
+    P::parameter("T_start", &KELVIN, "All temperatures at the start", |p| &mut p.T_start).above(0.0),
+    P::part("", &Part { table: NETWORK, lens: |p| &mut p.network }),
+];
 
 type I = Row<ThermalInputs>;
 
 /// The temperatures that the importer sets.
-pub const THERMAL_INPUTS: &Table<ThermalInputs> = &Table::new(
-    const {
-        &[
-            I::input("T_coolant", &KELVIN, "Temperature of the coolant", |i| &mut i.coolant)
-                .at_least(0.0)
-                .nominal(300.0)
-                .read_with("thermal.mode", "Network"),
-            I::input("T_winding_imposed", &KELVIN, "Temperature of the winding", |i| &mut i.imposed.winding)
-                .at_least(0.0)
-                .nominal(300.0)
-                .read_with("thermal.mode", "Imposed"),
-            I::input("T_stator_imposed", &KELVIN, "Temperature of the stator iron", |i| &mut i.imposed.stator)
-                .at_least(0.0)
-                .nominal(300.0)
-                .read_with("thermal.mode", "Imposed"),
-            I::input("T_magnet_imposed", &KELVIN, "Temperature of the magnets", |i| &mut i.imposed.magnet)
-                .at_least(0.0)
-                .nominal(300.0)
-                .read_with("thermal.mode", "Imposed"),
-            I::input("T_inverter_imposed", &KELVIN, "Temperature of the inverter", |i| &mut i.imposed.inverter)
-                .at_least(0.0)
-                .nominal(300.0)
-                .read_with("thermal.mode", "Imposed"),
-        ]
-    },
-);
+pub const THERMAL_INPUTS: &Table<ThermalInputs> = table![
+    I::input("T_coolant", &KELVIN, "Temperature of the coolant", |i| &mut i.coolant)
+        .at_least(0.0)
+        .nominal(300.0)
+        .read_with("thermal.mode", "Network"),
+    I::input("T_winding_imposed", &KELVIN, "Temperature of the winding", |i| &mut i.imposed.winding)
+        .at_least(0.0)
+        .nominal(300.0)
+        .read_with("thermal.mode", "Imposed"),
+    I::input("T_stator_imposed", &KELVIN, "Temperature of the stator iron", |i| &mut i.imposed.stator)
+        .at_least(0.0)
+        .nominal(300.0)
+        .read_with("thermal.mode", "Imposed"),
+    I::input("T_magnet_imposed", &KELVIN, "Temperature of the magnets", |i| &mut i.imposed.magnet)
+        .at_least(0.0)
+        .nominal(300.0)
+        .read_with("thermal.mode", "Imposed"),
+    I::input("T_inverter_imposed", &KELVIN, "Temperature of the inverter", |i| &mut i.imposed.inverter)
+        .at_least(0.0)
+        .nominal(300.0)
+        .read_with("thermal.mode", "Imposed"),
+];
 
 type O = Row<PlantOutputs>;
 
 /// Temperatures and heat.
-pub const THERMAL_OUTPUTS: &Table<PlantOutputs> = &Table::new(
-    const {
-        &[
-            O::output("T_winding", &KELVIN, "Temperature of the winding", |o| &mut o.temperatures.winding)
-                .nominal(300.0),
-            O::output("T_stator", &KELVIN, "Temperature of the stator iron", |o| &mut o.temperatures.stator)
-                .nominal(300.0),
-            O::output("T_magnet", &KELVIN, "Temperature of the magnets", |o| &mut o.temperatures.magnet).nominal(300.0),
-            O::output("T_inverter", &KELVIN, "Temperature of the inverter", |o| &mut o.temperatures.inverter)
-                .nominal(300.0),
-            O::output("Q_winding", &WATT, "Heat out of the winding, p_cu; a mean as p_cu is", |o| &mut o.heat.winding)
-                .mean(),
-            O::output(
-                "Q_iron",
-                &WATT,
-                "Heat out of the stator iron, (1 - iron.rotor_share) p_iron + p_friction; a mean as these are",
-                |o| &mut o.heat.iron,
-            )
-            .mean(),
-            O::output(
-                "Q_magnet",
-                &WATT,
-                "Heat out of rotor and magnets, iron.rotor_share p_iron; a mean as p_iron is",
-                |o| &mut o.heat.magnet,
-            )
-            .mean(),
-            O::output("Q_inverter", &WATT, "Heat out of the inverter, p_cond + p_sw; a mean as these are", |o| {
-                &mut o.heat.inverter
-            })
-            .mean(),
-            O::output(
-                "Q_coolant",
-                &WATT,
-                "Heat to the coolant, out of the FMU: Constant all losses, Network what the network gives, Imposed 0",
-                |o| &mut o.heat.coolant,
-            )
-            .mean(),
-        ]
-    },
-);
+pub const THERMAL_OUTPUTS: &Table<PlantOutputs> = table![
+    O::output("T_winding", &KELVIN, "Temperature of the winding", |o| &mut o.temperatures.winding).nominal(300.0),
+    O::output("T_stator", &KELVIN, "Temperature of the stator iron", |o| &mut o.temperatures.stator).nominal(300.0),
+    O::output("T_magnet", &KELVIN, "Temperature of the magnets", |o| &mut o.temperatures.magnet).nominal(300.0),
+    O::output("T_inverter", &KELVIN, "Temperature of the inverter", |o| &mut o.temperatures.inverter).nominal(300.0),
+    O::output("Q_winding", &WATT, "Heat out of the winding, p_cu; a mean as p_cu is", |o| &mut o.heat.winding).mean(),
+    O::output(
+        "Q_iron",
+        &WATT,
+        "Heat out of the stator iron, (1 - iron.rotor_share) p_iron + p_friction; a mean as these are",
+        |o| &mut o.heat.iron,
+    )
+    .mean(),
+    O::output("Q_magnet", &WATT, "Heat out of rotor and magnets, iron.rotor_share p_iron; a mean as p_iron is", |o| {
+        &mut o.heat.magnet
+    },)
+    .mean(),
+    O::output("Q_inverter", &WATT, "Heat out of the inverter, p_cond + p_sw; a mean as these are", |o| {
+        &mut o.heat.inverter
+    })
+    .mean(),
+    O::output(
+        "Q_coolant",
+        &WATT,
+        "Heat to the coolant, out of the FMU: Constant all losses, Network what the network gives, Imposed 0",
+        |o| &mut o.heat.coolant,
+    )
+    .mean(),
+];
 
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "exact numbers")]

@@ -17,7 +17,7 @@
 
 use super::{Heat, Temperatures};
 use fmu_core::unit::{JOULE_PER_KELVIN, WATT_PER_KELVIN};
-use fmu_core::{Row, Scalar, Table};
+use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the network; a conductance of 0 insulates.
@@ -87,59 +87,43 @@ impl Network {
 type P = Row<Network>;
 
 /// Variables of the network; their owner supplies the prefix `thermal.`.
-pub const NETWORK: &Table<Network> = &Table::new(
-    const {
-        &[
-            P::parameter("C_winding", &JOULE_PER_KELVIN, "Heat capacity of the winding; Network: above 0", |p| {
-                &mut p.C_winding
-            })
-            .at_least(0.0),
-            P::parameter("C_stator", &JOULE_PER_KELVIN, "Heat capacity of the stator iron; Network: above 0", |p| {
-                &mut p.C_stator
-            })
-            .at_least(0.0),
-            P::parameter(
-                "C_rotor",
-                &JOULE_PER_KELVIN,
-                "Heat capacity of the rotor with its magnets; Network: above 0",
-                |p| &mut p.C_rotor,
-            )
-            .at_least(0.0),
-            P::parameter("C_inverter", &JOULE_PER_KELVIN, "Heat capacity of the inverter; Network: above 0", |p| {
-                &mut p.C_inverter
-            })
-            .at_least(0.0),
-            P::parameter(
-                "G_ws",
-                &WATT_PER_KELVIN,
-                "Thermal conductance from the winding to the stator; 0: insulated",
-                |p| &mut p.G_ws,
-            )
-            .at_least(0.0),
-            P::parameter(
-                "G_sc",
-                &WATT_PER_KELVIN,
-                "Thermal conductance from the stator to the coolant; 0: insulated",
-                |p| &mut p.G_sc,
-            )
-            .at_least(0.0),
-            P::parameter(
-                "G_sr",
-                &WATT_PER_KELVIN,
-                "Thermal conductance from the stator to the rotor; 0: insulated",
-                |p| &mut p.G_sr,
-            )
-            .at_least(0.0),
-            P::parameter(
-                "G_inverter",
-                &WATT_PER_KELVIN,
-                "Thermal conductance from the inverter to the coolant; 0: insulated",
-                |p| &mut p.G_inverter,
-            )
-            .at_least(0.0),
-        ]
-    },
-);
+pub const NETWORK: &Table<Network> = table![
+    P::parameter("C_winding", &JOULE_PER_KELVIN, "Heat capacity of the winding; Network: above 0", |p| {
+        &mut p.C_winding
+    })
+    .at_least(0.0),
+    P::parameter("C_stator", &JOULE_PER_KELVIN, "Heat capacity of the stator iron; Network: above 0", |p| {
+        &mut p.C_stator
+    })
+    .at_least(0.0),
+    P::parameter("C_rotor", &JOULE_PER_KELVIN, "Heat capacity of the rotor with its magnets; Network: above 0", |p| {
+        &mut p.C_rotor
+    },)
+    .at_least(0.0),
+    P::parameter("C_inverter", &JOULE_PER_KELVIN, "Heat capacity of the inverter; Network: above 0", |p| {
+        &mut p.C_inverter
+    })
+    .at_least(0.0),
+    P::parameter("G_ws", &WATT_PER_KELVIN, "Thermal conductance from the winding to the stator; 0: insulated", |p| {
+        &mut p.G_ws
+    },)
+    .at_least(0.0),
+    P::parameter("G_sc", &WATT_PER_KELVIN, "Thermal conductance from the stator to the coolant; 0: insulated", |p| {
+        &mut p.G_sc
+    },)
+    .at_least(0.0),
+    P::parameter("G_sr", &WATT_PER_KELVIN, "Thermal conductance from the stator to the rotor; 0: insulated", |p| {
+        &mut p.G_sr
+    },)
+    .at_least(0.0),
+    P::parameter(
+        "G_inverter",
+        &WATT_PER_KELVIN,
+        "Thermal conductance from the inverter to the coolant; 0: insulated",
+        |p| &mut p.G_inverter,
+    )
+    .at_least(0.0),
+];
 
 #[cfg(test)]
 mod tests {
