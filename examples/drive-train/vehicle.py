@@ -1,7 +1,7 @@
 """A vehicle on a driving cycle: the same script with PmsmDrive, PmsmDriveMean or a map.
 
     cargo run --release -- build
-    cargo run --release -- map motors/traction-100kw.toml --T 20 --u-dc 500 --out target/map
+    cargo run --release -- map motors/traction-100kw.toml --out target/map
     pip install fmpy matplotlib
     python examples/drive-train/vehicle.py target/fmu/fmi3/PmsmDriveMean.fmu
     python examples/drive-train/vehicle.py target/fmu/fmi3/PmsmDrive.fmu target/fmu/fmi3/PmsmDriveMean.fmu \
