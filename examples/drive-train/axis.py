@@ -32,18 +32,21 @@ VALUES |= {f"plant.inverter.{name}": 0.9 for name in ("u_transistor", "u_diode")
 VALUES |= {f"plant.inverter.{name}": 0.03 for name in ("r_transistor", "r_diode")}
 
 
+def risen(s):
+    """Share of the speed at the share s of its rise, in which the acceleration is a pulse sin^2."""
+    s = s.clip(0.0, 1.0)
+    return s - np.sin(2 * np.pi * s) / (2 * np.pi)
+
+
 def profile():
-    """Position (m), speed (m/s) and cutting force (N) at each step: a move's acceleration is a smooth pulse."""
+    """Position (m), speed (m/s) and cutting force (N) at each step."""
     x, v, force, start = [], [], [], 0.0
     for distance, most, acceleration, cut, rest in MOVES:
         sign, distance = np.sign(distance), abs(distance)
-        # The pulse sin^2 has half the mean: it takes twice the time.
-        rise = 2.0 * most / acceleration
+        rise = 2.0 * most / acceleration  # the mean of the pulse is half of its peak
         whole = rise + distance / most
         t = H * np.arange(round((whole + rest) / H))
-        ramp = lambda s: np.where(s < rise, s - rise / (2 * np.pi) * np.sin(2 * np.pi * s / rise), s) * (s > 0)
-        shape = lambda s: np.where(s < rise, s / rise - np.sin(2 * np.pi * s / rise) / (2 * np.pi), 1.0) * (s > 0)
-        speed = sign * most * (shape(t) - shape(t - (whole - rise)))
+        speed = sign * most * (risen(t / rise) - risen((t - whole + rise) / rise))
         x.append(start + np.cumsum(speed) * H - speed * H)
         v.append(speed)
         force.append(np.where(np.abs(speed) > 0.99 * most, cut, 0.0))
@@ -92,7 +95,8 @@ def main():
     runs = {Path(drive).stem: run(drive, stop) for drive in drives}
     compare(runs, energies)
     for name, one in runs.items():
-        print(f"{name}: following error up to {np.abs(error(one)).max():.3f} mm, torque up to {np.abs(one['tau_e']).max():.1f} N.m")
+        most, torque = np.abs(error(one)).max(), np.abs(one["tau_e"]).max()
+        print(f"{name}: following error up to {most:.3f} mm, torque up to {torque:.1f} N.m")
     if file:
         plot(file, runs, panels)
 

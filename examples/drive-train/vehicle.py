@@ -12,6 +12,7 @@ its speed on the shaft in return. Vehicle and cycle are those of examples/vehicl
 """
 
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,12 @@ CAR = tomllib.loads((HERE.parent / "vehicle/vehicle.toml").read_text())
 TIME, SPEED = np.genfromtxt(HERE.parent / "vehicle/cycle.csv", delimiter=",", skip_header=2, unpack=True)
 RATIO = CAR["gear_ratio"] / CAR["wheel_radius"]  # rad/s of the machine per m/s
 MASS = CAR["mass"] + float(VALUES["plant.mechanics.J"]) * RATIO**2
+
+
+def cell(axis, at):
+    """The cell of a grid, and the place in it from 0 to 1."""
+    k = min(np.searchsorted(axis, at, "right"), len(axis) - 1) - 1
+    return k, (at - axis[k]) / (axis[k + 1] - axis[k])
 
 
 class Map:
@@ -48,11 +55,9 @@ class Map:
         low, high = (np.interp(speed, self.speed, limit) for limit in self.limits)
         tau = min(max(tau_ref, low), high)
         x = tau / (high if tau > 0.0 else -low)
-        k, n = (min(np.searchsorted(axis, at, "right"), len(axis) - 1) - 1 for axis, at in ((self.speed, speed), (self.x, x)))
-        a = (speed - self.speed[k]) / (self.speed[k + 1] - self.speed[k])
-        b = (x - self.x[n]) / (self.x[n + 1] - self.x[n])
-        corners = self.losses[k : k + 2, n : n + 2]
-        losses = (1 - a) * ((1 - b) * corners[0, 0] + b * corners[0, 1]) + a * ((1 - b) * corners[1, 0] + b * corners[1, 1])
+        (k, a), (n, b) = cell(self.speed, speed), cell(self.x, x)
+        low_speed, high_speed = (1 - b) * self.losses[k : k + 2, n] + b * self.losses[k : k + 2, n + 1]
+        losses = (1 - a) * low_speed + a * high_speed
         self.energy += h * np.array([tau * speed + losses.sum(), tau * speed, losses.sum()])
         return [tau, *self.energy, *losses]
 
@@ -68,14 +73,12 @@ def resistance(v):
 
 def run(file, stop):
     """The cycle with a drive: its outputs over time, and the speed in m/s."""
-    if file.endswith(".npz"):
-        drive = Map(file)
-    else:
-        drive = Fmu(file, VALUES, ["speed_shaft", "angle_shaft", "tau_ref"], OUTPUTS)
+    inputs = ["speed_shaft", "angle_shaft", "tau_ref"]
+    drive = Map(file) if file.endswith(".npz") else Fmu(file, VALUES, inputs, OUTPUTS)
     time = H * np.arange(round((stop or TIME[-1]) / H) + 1)
     wanted = np.interp(time, TIME, SPEED / 3.6)
     rows, v, angle, integral = [], 0.0, 0.0, 0.0
-    for now, then in zip(wanted[:-1], wanted[1:]):
+    for now, then in pairwise(wanted):
         # The driver: the force for the wanted acceleration, and a PI controller of the speed; the brakes hold the vehicle.
         held = now == then == 0.0
         integral = 0.0 if held else integral + 800.0 * (now - v) * H
@@ -109,7 +112,8 @@ def main():
     runs = {Path(drive).stem: run(drive, stop) for drive in drives}
     compare(runs, energies)
     for name, one in runs.items():
-        print(f"{name}: speed within {3.6 * np.abs(one['v'] - one['wanted']).max():.2f} km/h, up to {one['v'].max() * RATIO / RPM:.0f} rpm")
+        error, most = 3.6 * np.abs(one["v"] - one["wanted"]).max(), one["v"].max() * RATIO / RPM
+        print(f"{name}: speed within {error:.2f} km/h, up to {most:.0f} rpm")
     if file:
         plot(file, runs, panels)
 

@@ -85,7 +85,10 @@ def run(archive, values, torque, short):
     drive = instantiate_fmu(folder, description, fmi_type="CoSimulation")
     assert not apply_start_values(drive, description, values)
     reference = {v.name: v.valueReference for v in description.modelVariables}
-    of = lambda *names: [reference[name] for name in names]
+
+    def of(*names):
+        return [reference[name] for name in names]
+
     read, write = (drive.getFloat64, drive.setFloat64) if three else (drive.getReal, drive.setReal)
     drive.setBoolean(of("asc"), [short])
     if not three:
@@ -119,7 +122,10 @@ def test_torque(archives, tuned):
     # The voltage is that of the table's flux linkage, and not that of constant inductances.
     phases = np.array([result[name] for name in ("u_a", "u_b", "u_c")])
     u = np.sqrt((2 / 3 * (phases - phases.mean(axis=0)) ** 2).sum(axis=0))[-100:].mean()
-    of = lambda psi_d, psi_q: np.hypot(R * i_d - N_P * SPEED * psi_q, R * i_q + N_P * SPEED * psi_d)
+
+    def of(psi_d, psi_q):
+        return np.hypot(R * i_d - N_P * SPEED * psi_q, R * i_q + N_P * SPEED * psi_d)
+
     assert u == pytest.approx(of(PSI_M + x, q), rel=5e-3)
     assert of(PSI_M + L_D * i_d, L_Q * i_q) > 1.05 * u
 
