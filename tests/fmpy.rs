@@ -5,6 +5,7 @@
 mod common;
 
 use common::python::{pytest, scratch};
+use std::path::Path;
 use std::process::Command;
 use std::{fs, process};
 
@@ -34,6 +35,14 @@ fn links_limits_and_faults() {
 #[test]
 fn drive_trains() {
     pytest("fmpy", "trains", &["test_drive_train.py"], &[]);
+}
+
+/// The examples of docs/drive-train.md, which make a map, and a flux map from a table.
+#[test]
+fn examples_of_drive_trains_and_flux_maps() {
+    let command = Path::new(env!("CARGO_BIN_EXE_fmu"));
+    let files = ["test_drive_train_examples.py", "test_flux_map.py"];
+    pytest("fmpy", "drive-train", &files, &[("FMU_COMMAND", command)]);
 }
 
 #[test]

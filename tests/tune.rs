@@ -74,6 +74,24 @@ fn every_machine_starts_and_reaches_its_speed() {
     }
 }
 
+/// The parameters in examples/drive-train are what `fmu tune` writes today; `UPDATE_GOLDEN=1 cargo test --test tune` accepts others.
+#[test]
+fn the_examples_have_the_parameters_of_today() {
+    let dir = tempfile::tempdir().unwrap();
+    for machine in ["traction-100kw", "ipmsm-2.2kw", "servo-6.6kw"] {
+        let motor = motors().into_iter().find(|p| p.file_stem().unwrap() == machine).unwrap();
+        let tuned = fmu(&["tune", motor.to_str().unwrap(), "--integers", "--out", dir.path().to_str().unwrap()]);
+        assert!(tuned.status.success(), "{}", String::from_utf8_lossy(&tuned.stderr));
+        let name = format!("{machine}.PmsmDrive.ssv");
+        let written = std::fs::read_to_string(dir.path().join(&name)).unwrap();
+        let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/drive-train").join(&name);
+        if std::env::var_os("UPDATE_GOLDEN").is_some() {
+            std::fs::write(&kept, &written).unwrap();
+        }
+        assert_eq!(written, std::fs::read_to_string(&kept).unwrap(), "{}", kept.display());
+    }
+}
+
 #[test]
 fn the_reference_motor_gives_the_start_values_of_the_controller() {
     let path = motors().into_iter().find(|p| p.ends_with("reference.toml")).unwrap();

@@ -1,0 +1,63 @@
+"""The examples of docs/drive-train.md: PmsmDriveMean or a map instead of PmsmDrive changes the energy by less than 0.5 %.
+
+`FMU_COMMAND` names the command, which makes the map.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+# What follows the names of the drives, seconds of the short run, and energy from the link in kJ there.
+EXAMPLES = {"vehicle": (56, 66.26), "pump": (120, 102.4), "axis": (1.4, 0.325)}
+
+
+def run(script, *words):
+    """What the script prints."""
+    command = [sys.executable, ROOT / "examples/drive-train" / f"{script}.py", *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "MPLBACKEND": "Agg"})
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def numbers(text):
+    return [float(x) for x in re.findall(r"[+-]?\d+\.\d+", text)]
+
+
+def close(text):
+    """Each drive differs from the first by less than 0.5 %."""
+    differences = [float(x) for x in re.findall(r"differs from \w+ by ([+-][\d.]+) %", text)]
+    assert differences and max(map(abs, differences)) < 0.5, text
+    return len(differences)
+
+
+@pytest.mark.parametrize("script", EXAMPLES)
+def test_another_file_name_is_another_drive(archives, script):
+    stop, energy = EXAMPLES[script]
+    text = run(script, *(archives / "fmi2" / f"{name}.fmu" for name in ("PmsmDrive", "PmsmDriveMean")), "--stop", stop)
+    assert close(text) == 1
+    assert numbers(text.splitlines()[1])[0] == pytest.approx(energy, rel=0.01), text
+
+
+@pytest.mark.parametrize("script", EXAMPLES)
+def test_the_page_has_what_the_script_prints(archives, script, tmp_path):
+    """All of it with FMI 3.0, the vehicle with a map, too: the numbers of the page, and the labels of its plot."""
+    drives = [archives / "fmi3" / f"{name}.fmu" for name in ("PmsmDrive", "PmsmDriveMean")]
+    if script == "vehicle":
+        motor = ROOT / "motors/traction-100kw.toml"
+        subprocess.run([os.environ["FMU_COMMAND"], "map", motor, "--out", tmp_path], check=True, capture_output=True)
+        drives.append(tmp_path / "map.npz")
+    text = run(script, *drives, "--plot", tmp_path / "plot.svg")
+    assert close(text) == len(drives) - 1
+    page = (ROOT / "docs/drive-train.md").read_text()
+    shown = page[page.index("energy in kJ", page.index(f"{script}.py")) :].split("```")[0]
+    # Some of the last digits belong to rounding.
+    assert re.findall(r"[A-Za-z]+", shown) == re.findall(r"[A-Za-z]+", text), text
+    assert numbers(shown) == pytest.approx(numbers(text), rel=2e-3, abs=2e-3), text
+    labels = [re.findall(r"<text[^>]*>([^<]*)</text>", path.read_text())
+              for path in (tmp_path / "plot.svg", ROOT / f"docs/drive-train-{script}.svg")]  # fmt: skip
+    assert labels[0] == labels[1] and "time [s]" in labels[0]
