@@ -70,6 +70,11 @@ pub struct Indicator {
 
 /// A model with events. The importer enters Event Mode at the time that [`next`](Self::next) gave, where an indicator
 /// changes its sign, or for reasons of its own; there it exchanges inputs and outputs.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` has no events: it lacks the capability `Events`",
+    note = "write `impl Events for {Self}`, or remove `Events` from the line that exports the model",
+    note = "a model that acts only at multiples of a period implements `Sampled` instead"
+)]
 pub trait Events: Model {
     /// The event indicators, in the order of all calls.
     const INDICATORS: &'static [Indicator] = &[];
@@ -137,6 +142,7 @@ fn endless(period: f64, now: Elapsed) -> Fault {
     Fault::value("the time", format!("{} s after the start", now.seconds()), longest)
 }
 
+#[diagnostic::do_not_recommend]
 impl<M: Sampled> Events for M {
     fn begin(&mut self, now: Elapsed) {
         if grid(self).reached(self.samples(), now) {
