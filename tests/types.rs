@@ -359,69 +359,6 @@ fn every_type_has_every_causality() {
     }
 }
 
-/// The compiler shows the row and says which variable it is, and why. A crate of its own, checked by Cargo.
-#[test]
-fn a_wrong_row_is_an_error_at_its_place() {
-    const CASES: [(&str, &str, &str, usize); 8] = [
-        (
-            "bound",
-            r#"V::boolean_input("on", "", |m| &mut m.on).at_least(0.0)"#,
-            "on: only a number can have a bound",
-            5,
-        ),
-        (
-            "empty",
-            r#"V::output("x", &VOLT, "", |m| &mut m.u).above(1.0).at_most(1.0)"#,
-            "x: the bounds leave no value",
-            5,
-        ),
-        (
-            "shape",
-            r#"V::array_input("a", &VOLT, "", 4, |m| &mut m.a).shape(&[2, 3])"#,
-            "a: the product of the extents",
-            5,
-        ),
-        (
-            "tuned",
-            r#"V::text_parameter("t", "", |m| &mut m.t).tunable()"#,
-            "t: only a parameter of a type other than text",
-            5,
-        ),
-        ("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
-        ("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
-        // These two show in the table, whose start is in line 3.
-        ("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
-        ("empty_array", r#"V::array_input("a", &VOLT, "", 0, |m| &mut m.a)"#, "a: an array needs an element", 3),
-    ];
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folder = common::python::scratch().join("rows");
-    let sources = folder.join("src/bin");
-    fs::create_dir_all(&sources).unwrap();
-    let manifest = format!(
-        "[workspace]\n[package]\nname = \"rows\"\nedition = \"2024\"\n[dependencies]\nfmu-core = {{ path = {:?} }}\n",
-        root.join("fmu-core")
-    );
-    fs::write(folder.join("Cargo.toml"), manifest).unwrap();
-    fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
-    for (name, row, ..) in CASES {
-        let source = format!(
-            "use fmu_core::{{Row, Table, table, unit::VOLT}};\n\
-             struct M {{ u: f64, on: bool, a: [f64; 4], t: String, f: f32 }} type V = Row<M>;\n\
-             const TABLE: &Table<M> = table![\n    V::input(\"u\", &VOLT, \"\", |m| &mut m.u),\n    \
-             {row},\n];\nfn main() {{ let _ = TABLE.len(); }}\n"
-        );
-        fs::write(sources.join(format!("{name}.rs")), source).unwrap();
-    }
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["check", "--offline", "--keep-going", "--message-format", "short"]).current_dir(&folder);
-    let output = cargo.env("CARGO_TARGET_DIR", folder.join("target")).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    for (name, _, why, line) in CASES {
-        let place = Path::new("src/bin").join(format!("{name}.rs:{line}:")).display().to_string();
-        assert!(said.lines().any(|l| l.starts_with(&place) && l.contains(why)), "{place} {why}: {said}");
-    }
-}
-
 #[test]
 fn fmpy_runs_it() {
     let folder = archives()[0].parent().and_then(Path::parent).unwrap();

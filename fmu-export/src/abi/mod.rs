@@ -225,6 +225,8 @@ macro_rules! export {
                     $crate::Capabilities::<$model>::NONE$(.$first()$(.$more())*)?;
             }
 
+            const _: () = $crate::check::<This>();
+
             $crate::export_fmi2!(This);
             $crate::export_fmi3!(This);
 
