@@ -86,7 +86,7 @@ impl<E: Exported> Abi<'_, E> {
             description.token.push_str(&made.suffix);
             serde_json::to_string(&description).map_err(|e| Fault::new(e.to_string()))
         });
-        let json = json.unwrap_or_else(|_| Err(Fault::new("a fault in the model's code (panic)")));
+        let json = json.unwrap_or_else(|payload| Err(gate::panicked(payload.as_ref())));
         let (text, status) = match json {
             Ok(text) => (text, 0),
             Err(fault) => (fault.to_string(), 1),
