@@ -177,7 +177,8 @@ fn inputs<'a>(
 
 /// All outputs. If both components have a name, it denotes the plant's output; the controller's is an estimate.
 fn outputs<'a>(descriptions: &'a [(&'static str, ModelDescription)]) -> Vec<Outside<'a>> {
-    let outputs = |md: &'a ModelDescription| md.variables.iter().filter(|v| v.causality == Causality::Output);
+    let outputs =
+        |md: &'a ModelDescription| md.variables.iter().filter(|v| v.causality == Causality::Output && has_type(v));
     let plant = |name: &str| {
         descriptions.iter().any(|(component, md)| *component == "plant" && outputs(md).any(|v| v.name == name))
     };
@@ -258,7 +259,7 @@ fn description(
         let fed = |v: &ModelVariable| connections.iter().any(|(_, to)| *to == format!("{name}.{}", v.name));
         let connected = |v: &&ModelVariable| match v.causality {
             Causality::Input => v.base.is_float() || fed(v),
-            causality => causality == Causality::Output,
+            causality => causality == Causality::Output && has_type(v),
         };
         let connectors = md.variables.iter().filter(connected).map(|v| connector(&v.name, v.causality.as_str(), v));
         Element::new("ssd:Component")
@@ -326,6 +327,12 @@ fn binding(name: &str) -> Element {
     Element::new("ssd:ParameterBindings").children([one])
 }
 
+/// Whether a connector can say the type of the variable. OMSimulator stops at a connector without one, and an enumeration needs
+/// its items in a file besides.
+fn has_type(variable: &ModelVariable) -> bool {
+    !matches!(variable.base, BaseType::Enumeration | BaseType::String | BaseType::Binary | BaseType::Clock)
+}
+
 fn connector(name: &str, kind: &str, variable: &ModelVariable) -> Element {
     let base = match variable.base {
         BaseType::Float32 | BaseType::Float64 => {
@@ -345,7 +352,7 @@ fn units(descriptions: &[(&str, ModelDescription)]) -> Element {
     for (_, md) in descriptions {
         let connected = |v: &&ModelVariable| match v.causality {
             Causality::Input => v.base.is_float(),
-            causality => causality == Causality::Output,
+            causality => causality == Causality::Output && has_type(v),
         };
         for unit in md.variables.iter().filter(connected).filter_map(|v| md.unit(v.unit.as_deref()?)) {
             if !used.iter().any(|u| u.name == unit.name) {

@@ -60,7 +60,12 @@ fn the_reference_results_are_replayed() {
         // The result moves: a run of constants proves nothing.
         let result = read(&format!("{name}_ref.csv"));
         let rows: Vec<&str> = result.lines().skip(1).map(|line| line.split_once(',').unwrap().1).collect();
-        assert!(rows.len() == 201 && rows[200] != rows[100] && rows[100] != rows[0], "{name}: {}", rows[200]);
+        let last = rows.len() - 1;
+        assert!(
+            [100, 200].contains(&last) && rows[last] != rows[last / 2] && rows[last / 2] != rows[0],
+            "{name}: {}",
+            rows[last]
+        );
     }
 }
 
@@ -94,7 +99,9 @@ fn the_manifest_names_what_is_there() {
 #[test]
 fn a_wrong_reference_is_found() {
     let dir = tempfile::tempdir().unwrap();
-    let (archive, wrong) = (&archives()[3], dir.path().join("PmsmDrive.fmu"));
+    let all = archives();
+    let archive = all.iter().find(|path| path.ends_with("fmi3/PmsmDrive.fmu")).unwrap();
+    let wrong = dir.path().join("PmsmDrive.fmu");
     common::rewrite(archive, &wrong, |name, bytes| {
         let text = String::from_utf8_lossy(&bytes).into_owned();
         Some(if name.ends_with("_ref.csv") { text.replace("\n0.5,", "\n0.5,9").into_bytes() } else { bytes })

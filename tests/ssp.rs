@@ -3,6 +3,7 @@
 
 mod common;
 
+use fmu_core::description::VariableKind;
 use model_description::{BaseType, Element, ModelDescription};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -98,10 +99,19 @@ fn its_connectors_are_those_of_pmsm_drive() {
         names
     };
     let drive = fmu_core::Description::of::<drive::PmsmDrive>().unwrap();
+    let parts = [
+        fmu_core::Description::of::<drive::PmsmPlant>().unwrap(),
+        fmu_core::Description::of::<drive::SensorlessController>().unwrap(),
+    ];
     for (kind, causality) in [("input", fmu_core::Causality::Input), ("output", fmu_core::Causality::Output)] {
-        // `enable` stays inside, at its start value; the means over T_s are the drive's own.
-        let inside = |name: &str| name == "enable" || name.ends_with("_mean");
-        let outside = |v: &&fmu_core::description::Variable| v.causality == causality && !inside(&v.name);
+        // Switches stay inside, at their start values; means over T_s and the DC link are the drive's own; an enumeration has no
+        // connector.
+        let shared = |v: &fmu_core::description::Variable| match v.kind {
+            VariableKind::Boolean if causality == fmu_core::Causality::Input => false,
+            VariableKind::Enumeration { .. } => false,
+            _ => v.name.ends_with("_est") || parts.iter().any(|part| part.variable(&v.name).is_some()),
+        };
+        let outside = |v: &&fmu_core::description::Variable| v.causality == causality && shared(v);
         let mut expected: Vec<_> = drive.variables.iter().filter(outside).map(|v| v.name.clone()).collect();
         expected.sort();
         assert_eq!(of_kind(kind), expected, "{kind}");

@@ -359,7 +359,7 @@ impl<E: Exported> Instance<E> {
         self.meta(unknown).is_some_and(|meta| {
             meta.causality == Causality::Output
                 && matches!(meta.kind, Kind::Real(_))
-                && (discrete || meta.variability == Variability::Continuous)
+                && (discrete || E::Model::CONTINUOUS || meta.variability == Variability::Continuous)
         })
     }
 

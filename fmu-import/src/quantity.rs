@@ -44,11 +44,19 @@ pub(crate) fn convert(
 
 /// `; did you mean a or b?` with the names that resemble what was written, or nothing.
 pub fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> String {
-    let (whole, last) = (written.to_lowercase(), last_part(written).to_lowercase());
+    let whole = written.to_lowercase();
+    let (parent, last) = split_last(&whole);
     let likeness = |name: &str| {
         let lower = name.to_lowercase();
-        let part = last_part(&lower);
-        strsim::jaro_winkler(&whole, &lower).max(strsim::jaro_winkler(&last, part))
+        let (of, part) = split_last(&lower);
+        let of_last = strsim::jaro_winkler(last, part);
+        // `motor.R` is nearer to `plant.motor.R_s` than to `chopper.R`.
+        let of_parts = parent.map_or(of_last, |parent| {
+            let of = of.unwrap_or_default();
+            let as_deep = of.rmatch_indices('.').nth(parent.matches('.').count()).map_or(of, |(dot, _)| &of[dot + 1..]);
+            0.5 * (of_last + strsim::jaro_winkler(parent, as_deep))
+        });
+        strsim::jaro_winkler(&whole, &lower).max(of_parts)
     };
     let mut near: Vec<(f64, &str)> = names.map(|name| (likeness(name), name)).filter(|(x, _)| *x > 0.78).collect();
     near.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.len().cmp(&b.1.len())));
@@ -59,9 +67,9 @@ pub fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> Strin
     if names.is_empty() { String::new() } else { format!("; did you mean {}?", names.join(" or ")) }
 }
 
-/// What follows the last dot.
-fn last_part(name: &str) -> &str {
-    name.rsplit('.').next().unwrap_or(name)
+/// What is before the last dot, if there is one, and what follows it.
+fn split_last(name: &str) -> (Option<&str>, &str) {
+    name.rsplit_once('.').map_or((None, name), |(parent, last)| (Some(parent), last))
 }
 
 #[cfg(test)]
@@ -83,6 +91,8 @@ mod tests {
         let names = ["plant.motor.R_s", "controller.motor.R_s", "plant.motor.psi_M", "speed", "speed_ref"];
         let of = |written| suggest(written, names.into_iter());
         assert_eq!(of("R"), "; did you mean plant.motor.R_s or controller.motor.R_s?");
+        let with_chopper = suggest("motor.R", names.into_iter().chain(["chopper.R"]));
+        assert_eq!(with_chopper, "; did you mean plant.motor.R_s or controller.motor.R_s?");
         assert_eq!(of("motor.psi_m"), "; did you mean plant.motor.psi_M?");
         assert_eq!(of("sped"), "; did you mean speed?");
         assert_eq!(of("xyz"), "");

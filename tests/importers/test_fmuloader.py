@@ -12,6 +12,9 @@ import fmureader.fmi3
 from fmuloader.fmi2 import Fmi2Slave, Fmi2Type
 from fmuloader.fmi3 import Fmi3Slave
 
+# Of PmsmDrive.
+STATES = 5
+
 STANDARDS = pytest.mark.parametrize("standard", ["fmi2", "fmi3"])
 
 
@@ -76,14 +79,14 @@ class Instance:
 
     def integrate(self, t, h):
         """One step of the classical Runge-Kutta method."""
-        x = self.fmu.get_continuous_states(4)
+        x = self.fmu.get_continuous_states(STATES)
 
         def slopes(share, k):
             self.fmu.set_time(t + share * h)
             self.fmu.set_continuous_states([a + share * h * b for a, b in zip(x, k)])
-            return self.derivatives(4)
+            return self.derivatives(STATES)
 
-        k_1 = slopes(0.0, [0.0] * 4)
+        k_1 = slopes(0.0, [0.0] * STATES)
         k_2 = slopes(0.5, k_1)
         k_3 = slopes(0.5, k_2)
         k_4 = slopes(1.0, k_3)

@@ -242,7 +242,7 @@ pub struct Contribution {
     pub place: usize,
     /// Current in A.
     pub current: Dq,
-    /// As [`FluxMap::hessian`], in 1/H.
+    /// Entries of the [`FluxMap::hessian`] in 1/H.
     pub hessian: [f64; 3],
 }
 

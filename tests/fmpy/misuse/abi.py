@@ -93,7 +93,11 @@ class Fmu:
         self.identifier = root.find("CoSimulation").get("modelIdentifier")
         self.token = root.get("guid" if self.version == 2 else "instantiationToken")
         self.categories = {x.get("name") for x in root.iterfind("LogCategories/Category")}
-        self.variables = {v.name: v for v in map(self._variable, root.find("ModelVariables"))}
+        # The cases set and get scalars; tests/types has arrays.
+        scalars = [node for node in root.find("ModelVariables") if node.find("Dimension") is None]
+        self.variables = {v.name: v for v in map(self._variable, scalars)}
+        derivatives = ("Derivatives/Unknown", "ContinuousStateDerivative")[self.version - 2]
+        self.states = len(root.findall(f"ModelStructure/{derivatives}"))
         self.path = library(self.folder, self.version, self.identifier)
         self.load()
 

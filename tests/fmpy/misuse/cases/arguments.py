@@ -180,7 +180,7 @@ def nonsense_in_model_exchange(fmu):
     """Null pointers, wrong counts, numbers that are none: an Error or Discard, never a crash; a reset heals."""
     it, handle = exchange(fmu)
     derivatives = "GetDerivatives" if fmu.version == 2 else "GetContinuousStateDerivatives"
-    states, nan, room = (0 if fmu.identifier == "SensorlessController" else 4), float("nan"), (c.c_double * 8)()
+    states, nan, room = fmu.states, float("nan"), (c.c_double * 16)()
 
     def begin():
         assert fmu.function("Reset")(handle) == OK
@@ -193,7 +193,7 @@ def nonsense_in_model_exchange(fmu):
         assert fmu.function("EnterContinuousTimeMode")(handle) == OK
 
     for name in (derivatives, "GetContinuousStates", "SetContinuousStates", "GetNominalsOfContinuousStates"):
-        for pointer, count in ((None, states + 1), (room, states + 1), (None, 2**62), (room, 7)):
+        for pointer, count in ((None, states + 1), (room, states + 1), (None, 2**62), (room, states + 3)):
             begin()
             assert fmu.function(name)(handle, pointer, count) == ERROR, (name, count)
     for time in (nan, float("inf"), -1.0):
@@ -201,11 +201,11 @@ def nonsense_in_model_exchange(fmu):
         assert fmu.function("SetTime")(handle, c.c_double(time)) == ERROR, time
     begin()
     for bad in (nan, float("inf"), -float("inf")) if states else ():
-        before = (c.c_double * 4)()
-        assert fmu.function("GetContinuousStates")(handle, before, 4) == OK
-        assert fmu.function("SetContinuousStates")(handle, (c.c_double * 4)(0.1, bad, 1.0, 1.0), 4) == DISCARD
-        after = (c.c_double * 4)()
-        assert fmu.function("GetContinuousStates")(handle, after, 4) == OK
+        before, after = ((c.c_double * states)() for _ in range(2))
+        assert fmu.function("GetContinuousStates")(handle, before, states) == OK
+        wrong = (c.c_double * states)(0.1, bad, *[1.0] * (states - 2))
+        assert fmu.function("SetContinuousStates")(handle, wrong, states) == DISCARD
+        assert fmu.function("GetContinuousStates")(handle, after, states) == OK
         assert list(before) == list(after)
     assert fmu.function("SetTime")(handle, c.c_double(1e-5)) == OK
     fmu.function("FreeInstance")(handle)
