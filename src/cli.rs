@@ -1,6 +1,8 @@
 //! The command line: one variant for each command.
 
-use crate::commands::{atlas, build, compare, info, merge, new, preset, prove, reproduce, simulate, ssp, sweep, tune};
+use crate::commands::{
+    atlas, build, compare, info, map, merge, new, preset, prove, reproduce, simulate, ssp, sweep, tune,
+};
 use crate::message;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use fmu_check::{command as check, probe};
@@ -31,6 +33,7 @@ enum Command {
     Compare(compare::Compare),
     Atlas(atlas::Atlas),
     Tune(tune::Tune),
+    Map(map::Map),
     Ssp(ssp::Ssp),
     Preset(preset::Preset),
     Prove(prove::Prove),
@@ -109,6 +112,7 @@ pub fn main() -> ExitCode {
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Map(args) => map::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Preset(args) => preset::run(&args).map(|text| {
             print!("{text}");

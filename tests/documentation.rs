@@ -16,7 +16,7 @@ use drive_study::reproduce::plots;
 use fmu::documentation;
 use fmu_core::{Description, Model};
 use fmu_import::elf::FLOOR;
-use fmu_plot::svg;
+use fmu_plot::{chart, svg};
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 
@@ -102,6 +102,21 @@ fn the_losses_are_those_of_the_running_drive() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     keep_in(&[fragments::DRIVE], "drive/docs/losses.svg", &svg::draw(&plane::figure(motoring.panels.into())).unwrap());
+}
+
+/// The efficiency map on the pages of the drives is the one that the algebra gives today, and the page names its best point.
+#[test]
+fn the_map_is_that_of_the_steady_state() {
+    let chart = plane::map();
+    let (_, best) = &chart.dots[0];
+    shows(
+        "drive/docs/map.html",
+        include_str!("../drive/docs/map.html"),
+        &format!("the best point of the motor has {best}"),
+    );
+    let drawn = chart::draw(&chart).unwrap();
+    assert!(drawn.len() < 40_000, "{} bytes are too many for a page", drawn.len());
+    keep_in(&[fragments::DRIVE, fragments::MEAN], "drive/docs/map.svg", &drawn);
 }
 
 /// The plot `drawn` is the one that the controller's `docs` keep, and in the pages of controller and drive.
@@ -289,6 +304,7 @@ fn pages_in_a_browser() {
         vec!["compare", "--experiment", "ramp,reversal,load-0,signal,signal-trace", "--out", &path("compare")],
         vec!["reproduce", "--out", &path("reproduce")],
         vec!["atlas", "--every", "20", "--out", &path("atlas")],
+        vec!["map", "motors/traction-63kw.toml", "--u-dc", "320,400", "--out", &path("map")],
     ]
     .map(|command| command.into_iter().map(String::from).collect::<Vec<_>>());
     for command in commands {

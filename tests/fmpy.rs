@@ -60,6 +60,18 @@ fn tuned_machines() {
     fs::remove_dir_all(&folder).unwrap();
 }
 
+/// The efficiency map of a machine in NumPy.
+#[test]
+fn maps() {
+    let folder = scratch().join(format!("map-{}", process::id()));
+    let motor = format!("{}/motors/traction-63kw.toml", env!("CARGO_MANIFEST_DIR"));
+    let mut map = Command::new(env!("CARGO_BIN_EXE_fmu"));
+    map.args(["map", &motor, "--u-dc", "350,400", "--grid", "11x11", "--out"]).arg(&folder);
+    assert!(map.output().unwrap().status.success());
+    pytest("fmpy", "map", &["test_map.py"], &[("FMU_MAP", &folder)]);
+    fs::remove_dir_all(&folder).unwrap();
+}
+
 #[test]
 fn misuse_of_the_c_interface() {
     pytest("fmpy", "misuse", &["test_misuse.py"], &[]);

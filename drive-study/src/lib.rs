@@ -4,6 +4,7 @@
 //! - [`compare`]: the estimators side by side.
 //! - [`atlas`]: what wrong estimates of resistance and magnet flux lose at low speed.
 //! - [`tune`]: parameter values for a machine.
+//! - [`map`]: efficiency over speed and torque.
 //! - [`plane`]: torque and losses over speed, drawn for the documentation.
 
 #![forbid(unsafe_code)]
@@ -15,6 +16,7 @@ pub mod compare;
 pub mod csv;
 pub mod expected;
 pub mod ink;
+pub mod map;
 mod output;
 pub mod plane;
 pub mod queue;

@@ -1,4 +1,4 @@
-//! The torque-speed plane and the losses of the reference drive, drawn for the documentation page: curves from the
+//! The torque-speed plane, the losses and the efficiency map of the reference drive, drawn for the documentation page: curves from the
 //! equations of the steady state, dots from the running drive.
 //!
 //! To stack quantities, a [`Panel`] fills their sums down to zero, the greatest first.
@@ -15,6 +15,7 @@
 //!
 //! u_on, r_on of transistor and diode alike, so the duty cycle has no influence; k is the switching loss per ampere.
 
+use crate::map::{self, picture};
 use crate::runner;
 use anyhow::{Result, anyhow};
 use drive::Pair;
@@ -23,6 +24,8 @@ use drive::estimator::Kind;
 use drive::frame::{Dq, DqHat};
 use drive::plant::losses::{Losses, efficiency, switching};
 use drive::plant::machine;
+use drive::steady::Steady;
+use fmu_plot::chart::Chart;
 use fmu_plot::figure::{Curve, Figure, Panel};
 use fmu_plot::ink::{CURVES, Ink};
 use std::f64::consts::PI;
@@ -283,4 +286,13 @@ pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
         marks: stacked.marks.clone(),
     };
     Ok(Split { onset, end, panels: [stacked, efficiency], points })
+}
+
+/// The efficiency map of the reference drive with the losses of [`losses`].
+pub fn map() -> Chart {
+    let drive = Reference::lossy();
+    let (plant, controller) = (&drive.pair.plant.model, &drive.pair.controller.model);
+    let steady = Steady::new(plant.parameters.clone(), controller.parameters.clone()).sampled();
+    let rated = [3000.0 * RPM, 2.5];
+    picture::chart(&map::of_drive("reference motor", steady, plant.inputs.u_dc, 5300.0 * RPM, rated), 0)
 }

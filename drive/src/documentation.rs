@@ -14,6 +14,8 @@ pub const DRIVE: &str = joined!(
     ENVELOPE,
     include_str!("../docs/losses.html"),
     include_str!("../docs/losses.svg"),
+    include_str!("../docs/map.html"),
+    include_str!("../docs/map.svg"),
     include_str!("../docs/pmsm_drive_plant.html"),
     plant::DIAGRAM,
     plant::EQUATIONS,
@@ -30,4 +32,6 @@ pub const MEAN: &str = joined!(
     ENVELOPE,
     include_str!("../docs/losses.html"),
     include_str!("../docs/losses.svg"),
+    include_str!("../docs/map.html"),
+    include_str!("../docs/map.svg"),
 );

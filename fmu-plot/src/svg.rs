@@ -18,7 +18,7 @@ const STRETCHES: usize = 1000;
 const UNSEEN: f64 = 0.08;
 
 /// The library that draws PNG reads attributes; a browser also reads these rules.
-const STYLE: &str = "<style>@media (prefers-color-scheme:dark){.plot text{fill:#e3e7ea}.plot .paper{fill:#15191c}\
+pub(crate) const STYLE: &str = "<style>@media (prefers-color-scheme:dark){.plot text{fill:#e3e7ea}.plot .paper{fill:#15191c}\
     .plot .grid{stroke:#374047}.plot .dot{fill:#e3e7ea}}</style>";
 
 /// Draws an SVG.
@@ -73,24 +73,24 @@ pub fn draw(figure: &Figure) -> Result<String> {
 }
 
 /// Text at a place; `anchor` may close its attribute and open others.
-fn text(svg: &mut String, (x, y): (f64, f64), anchor: &str, words: &str) {
+pub(crate) fn text(svg: &mut String, (x, y): (f64, f64), anchor: &str, words: &str) {
     let words = words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>");
 }
 
-fn count(n: usize) -> f64 {
+pub(crate) fn count(n: usize) -> f64 {
     u32::try_from(n).map_or(f64::MAX, f64::from)
 }
 
 /// Where the curves of a panel are, in pixels, and what they show there.
-struct Area {
-    left: f64,
-    top: f64,
-    right: f64,
-    bottom: f64,
-    window: (f64, f64),
-    low: f64,
-    high: f64,
+pub(crate) struct Area {
+    pub(crate) left: f64,
+    pub(crate) top: f64,
+    pub(crate) right: f64,
+    pub(crate) bottom: f64,
+    pub(crate) window: (f64, f64),
+    pub(crate) low: f64,
+    pub(crate) high: f64,
 }
 
 impl Area {
@@ -110,16 +110,17 @@ impl Area {
         Self { left, top, right, bottom, window: panel.window, low: low - margin, high: high + margin }
     }
 
-    fn x(&self, x: f64) -> f64 {
+    pub(crate) fn x(&self, x: f64) -> f64 {
         self.left
             + (self.right - self.left) * (x - self.window.0) / (self.window.1 - self.window.0).max(f64::MIN_POSITIVE)
     }
 
-    fn y(&self, y: f64) -> f64 {
+    pub(crate) fn y(&self, y: f64) -> f64 {
         self.bottom - (self.bottom - self.top) * (y - self.low) / (self.high - self.low)
     }
 
-    fn draw(&self, panel: &Panel, label: &str, svg: &mut String) {
+    /// Grid lines with their numbers, and the labels of both axes.
+    pub(crate) fn axes(&self, label: &str, unit: &str, svg: &mut String) {
         let Self { left, top, right, bottom, .. } = *self;
         let (places, decimals) = ticks(self.low, self.high, 5.0);
         for place in places {
@@ -135,7 +136,12 @@ impl Area {
         }
         text(svg, (0.5 * (left + right), bottom + 32.0), "middle", label);
         let (x, y) = (left - 52.0, 0.5 * (top + bottom));
-        text(svg, (x, y), &format!("middle\" transform=\"rotate(-90 {x:.1} {y:.1})"), &panel.unit);
+        text(svg, (x, y), &format!("middle\" transform=\"rotate(-90 {x:.1} {y:.1})"), unit);
+    }
+
+    fn draw(&self, panel: &Panel, label: &str, svg: &mut String) {
+        let Self { top, bottom, .. } = *self;
+        self.axes(label, &panel.unit, svg);
         for (place, words) in &panel.marks {
             let x = self.x(*place);
             let _ = writeln!(svg, "<path d=\"M{x:.1} {top:.1}V{bottom:.1}\" stroke=\"{REFERENCE}\"/>");
@@ -201,7 +207,7 @@ fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// The points that preserve the shape of a curve (Douglas and Peucker 1973), in pixels.
-fn seen(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+pub(crate) fn seen(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let [first, between @ .., last] = points else { return points.to_vec() };
     let (x, y) = (last.0 - first.0, last.1 - first.1);
     let length = (x * x + y * y).sqrt().max(f64::MIN_POSITIVE);

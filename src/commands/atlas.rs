@@ -1,6 +1,6 @@
 //! `fmu atlas`: where a drive with wrong estimates holds low speeds under load.
 
-use super::bar_of_cells;
+use super::{bar_of_cells, numbers};
 use crate::workspace::output_folder;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
@@ -100,13 +100,7 @@ fn grid(args: &Atlas) -> Result<Grid> {
     ];
     for (option, given, axis) in axes {
         if let Some(text) = given {
-            let number = |part: &str| {
-                part.trim()
-                    .parse()
-                    .map_err(|_| anyhow!("{option} {part}: is not a number; write for example {option} 0.9,1"))
-            };
-            let parts = text.split(',').filter(|part| !part.trim().is_empty());
-            *axis = parts.map(number).collect::<Result<_>>()?;
+            *axis = numbers(option, text)?;
         }
     }
     if let Some(names) = &args.scenario {

@@ -4,6 +4,7 @@ pub mod atlas;
 pub mod build;
 pub mod compare;
 pub mod info;
+pub mod map;
 pub mod merge;
 pub mod new;
 pub mod preset;
@@ -14,8 +15,21 @@ pub mod ssp;
 pub mod sweep;
 pub mod tune;
 
+use anyhow::{Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, stderr};
+
+/// The numbers of an option, separated by commas.
+///
+/// # Errors
+/// Names the option and the part that is not a number.
+fn numbers(option: &str, text: &str) -> Result<Vec<f64>> {
+    let number = |part: &str| {
+        let number = part.trim().parse();
+        number.map_err(|_| anyhow!("{option} {part}: is not a number; write for example {option} 0.9,1"))
+    };
+    text.split(',').filter(|part| !part.trim().is_empty()).map(number).collect()
+}
 
 /// A progress bar for this many cells, on a terminal.
 fn bar_of_cells(count: usize) -> ProgressBar {

@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod map;
 mod simulate;
 
 use std::fs::File;

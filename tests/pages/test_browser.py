@@ -67,6 +67,32 @@ def test_wide_tables_show_that_they_scroll(browser):
     page.close()
 
 
+def test_the_map_has_values_at_the_cursor(browser):
+    """Between points of the grid, out of reach, with the arrow keys, and on the map of another voltage."""
+    page = opened(browser, FOLDER / "map" / "map.html", 1000)
+    cells = page.locator(".readings tr")
+    value = lambda name: cells.filter(has_text=name).first.locator("td").first.text_content()
+    assert not page.locator(".readings").is_visible()
+    assert page.locator("figure.map:visible").count() == 1
+    box = page.locator("figure.map:visible svg").bounding_box()
+    scale = box["width"] / 900
+    page.mouse.move(box["x"] + 400 * scale, box["y"] + 150 * scale)
+    efficiency = float(value("efficiency"))
+    mechanical = float(value("p_mech"))
+    losses = sum(float(value(name)) for name in ["p_cu", "p_iron", "p_cond", "p_sw", "p_friction"])
+    assert 94 < efficiency < 97
+    assert mechanical / (mechanical + losses) * 100 == pytest.approx(efficiency, abs=0.05)
+    page.mouse.move(box["x"] + 700 * scale, box["y"] + 60 * scale)
+    assert value("efficiency") == "out of reach"
+    page.locator("figure.map:visible svg").focus()
+    before = value("speed")
+    page.keyboard.press("ArrowRight")
+    assert value("speed") != before
+    page.select_option("#sheet", "0")
+    assert page.locator("figure.map:visible").get_attribute("data-sheet") == "0"
+    page.close()
+
+
 @pytest.fixture
 def run(browser):
     page = opened(browser, FOLDER / "run.html", 900)

@@ -42,6 +42,10 @@ pub struct Data {
     pub flux_map: Option<FluxMap>,
     /// Iron loss of the plant.
     pub iron: Option<Iron>,
+    /// Losses of the inverter.
+    pub inverter: Option<Inverter>,
+    /// Temperature coefficients of the plant.
+    pub temperature: Option<Temperature>,
     /// Overrides of what the rules choose.
     #[serde(default)]
     pub control: Control,
@@ -77,6 +81,8 @@ pub struct Mechanics {
     pub tau_coulomb: Option<Number>,
     /// Speed range in rad/s over which the Coulomb friction changes sign.
     pub w_coulomb: Option<Number>,
+    /// Windage in N.m.s2/rad2: torque over the square of the speed; none if omitted.
+    pub k_w: Option<Number>,
 }
 
 /// Ratings.
@@ -154,6 +160,41 @@ pub struct FluxMap {
 pub struct Iron {
     /// Drag test: pairs of mechanical speed in rad/s and iron loss in W.
     pub p: Spanned<Vec<[f64; 2]>>,
+}
+
+/// Losses of the inverter's devices, and its switching frequency.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(non_snake_case, reason = "the symbols of the models")]
+pub struct Inverter {
+    /// Threshold voltage of a transistor in V; none if omitted, like the three below.
+    pub u_transistor: Option<Number>,
+    /// Resistance of a transistor in Ohm.
+    pub r_transistor: Option<Number>,
+    /// Threshold voltage of a diode in V.
+    pub u_diode: Option<Number>,
+    /// Resistance of a diode in Ohm.
+    pub r_diode: Option<Number>,
+    /// Switching energy of a leg and PWM period in J at `i_sw` and `u_sw`: turn-on, turn-off and recovery; none if omitted.
+    pub E_sw: Option<Number>,
+    /// Current of `E_sw` in A.
+    pub i_sw: Option<Number>,
+    /// DC-link voltage of `E_sw` in V.
+    pub u_sw: Option<Number>,
+    /// Exponent of the DC-link voltage in the switching energy; 1.3 if omitted.
+    pub k_sw: Option<Number>,
+    /// Switching frequency in Hz; 1 / T_s if omitted.
+    pub f_sw: Option<Number>,
+}
+
+/// Temperature coefficients in 1/K, from the 20 degC of the file's values.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Temperature {
+    /// Coefficient of the resistance: copper 3.93e-3.
+    pub winding: Option<Number>,
+    /// Coefficient of the magnet's flux linkage: NdFeB -1.1e-3, SmCo -0.4e-3, ferrite -2e-3.
+    pub magnet: Option<Number>,
 }
 
 /// Overrides of what the rules choose.

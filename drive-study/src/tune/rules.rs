@@ -17,7 +17,7 @@ use super::check::check;
 use super::iron;
 use super::motor::{Data, MotorFile, Number};
 use super::voltage::{self, Voltage};
-use super::{extended_emf, flux_map, plausible, rasmussen, saturation};
+use super::{extended_emf, flux_map, losses, plausible, rasmussen, saturation};
 use anyhow::{Result, anyhow, bail};
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
@@ -77,7 +77,7 @@ pub struct Tuned {
     pub rest: f64,
 }
 
-fn given(name: &'static str, x: &Number) -> Setting {
+pub(super) fn given(name: &'static str, x: &Number) -> Setting {
     Setting { name, value: Value::Real(*x.get_ref()), rule: "as given".into(), origin: Some(x.span().start) }
 }
 
@@ -107,6 +107,7 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     saturation::check(motor)?;
     fits(motor, &bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
+    plant.extend(losses::settings(motor, bandwidths.T_s.value)?);
     let fitted = flux_map::fit(motor)?;
     if let Some(fitted) = &fitted {
         plant.retain(|setting| setting.name != "motor.psi_M");
@@ -180,6 +181,7 @@ fn plant(data: &Data) -> Vec<Setting> {
     all.push(optional("mechanics.B", &mechanics.B));
     all.push(optional("mechanics.tau_coulomb", &mechanics.tau_coulomb));
     all.extend(mechanics.w_coulomb.as_ref().map(|x| given("mechanics.w_coulomb", x)));
+    all.extend(mechanics.k_w.as_ref().map(|x| given("mechanics.k_w", x)));
     if let Some(s) = saturation {
         all.push(optional("saturation.s_2", &s.s_2));
         all.push(optional("saturation.s_3", &s.s_3));

@@ -89,7 +89,8 @@ impl Legs {
         signs.to_stator() * self.u
     }
 
-    /// Time constant in s of a current within the zone with the smallest inductance (H) of the machine, where the legs, which drop `threshold` (V) in their devices, act
+    /// Time constant in s of a current within the zone with the smallest inductance (H) of the machine, where the legs,
+    /// which drop `threshold` (V) in their devices, act
     /// as resistances; infinite without a voltage.
     #[inline]
     pub fn time(&self, least_inductance: f64, threshold: f64) -> f64 {

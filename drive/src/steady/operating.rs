@@ -167,14 +167,24 @@ impl<'a> At<'a> {
     /// controller's estimates.
     #[inline]
     pub fn by_current(&self, i_s: Dq) -> Point {
-        let Self { drive: Steady { plant, controller, .. }, motor, w, R, G, held: Held { share: held, late }, .. } =
-            self;
+        let Self {
+            drive: Steady { plant, controller, .. },
+            motor,
+            w,
+            R,
+            G,
+            held: Held { share: held, late, ripple },
+            ..
+        } = self;
         let g = G * w;
         // j times the late part.
         let (mut psi, mut i) = (flux::linkage(motor, plant.magnetics(), i_s, (-g * late[1], g * late[0])), i_s);
         let at_sample = psi.turned() * *w;
-        let mut e = at_sample;
+        let (mut e, mut rippled) = (at_sample, 0.0);
         if *held < 1.0 {
+            let [d, cross, q] = machine::slope(motor, plant.magnetics(), psi);
+            let along = Dq::new(d * psi.d() + cross * psi.q(), cross * psi.d() + q * psi.q());
+            rippled = ripple * along.dot(along);
             psi = psi * (held * held);
             e = psi.turned() * *w;
             i = machine::current(motor, plant.magnetics(), psi) + e * *G;
@@ -194,7 +204,7 @@ impl<'a> At<'a> {
             (loss, loss / (1.5 * square))
         };
         let losses = Losses {
-            cu: 1.5 * R * square,
+            cu: 1.5 * R * (square + rippled),
             // The held voltage has this magnitude all the time.
             iron: 1.5 * G * held * held * at_sample.dot(at_sample),
             cond,

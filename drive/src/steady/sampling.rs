@@ -11,6 +11,10 @@
 //! with three pole pairs and 0.1 ms. The current of the mean is lower along the flux linkage, and the torque with it. The iron's
 //! current follows the voltage: at a sample, at the end of the period, it is s G j w psi_sample e^(-jx/2).
 //!
+//! Between the samples, the flux linkage leaves the mean along itself, by r psi with r = x^2/8 (1 - (2t/T_s)^2) less its mean; the
+//! mean of r^2 is (4/45) (x^2/8)^2. The current that belongs to it adds copper loss: 2 % of that of an idle machine without
+//! saliency that turns by 0.35 rad in a period.
+//!
 //! Derived here.
 
 use drive_base::math::sin_cos_small;
@@ -25,11 +29,13 @@ pub(super) struct Held {
     pub(super) share: f64,
     /// s e^(-jx/2).
     pub(super) late: [f64; 2],
+    /// Mean of the square of r, by which the flux linkage leaves its mean.
+    pub(super) ripple: f64,
 }
 
 impl Held {
     /// No sampling.
-    pub(super) const NOT: Self = Self { share: 1.0, late: [1.0, 0.0] };
+    pub(super) const NOT: Self = Self { share: 1.0, late: [1.0, 0.0], ripple: 0.0 };
 
     /// For x in rad.
     #[inline]
@@ -37,7 +43,8 @@ impl Held {
         let half = 0.5 * x.clamp(-MOST, MOST);
         let (sin, cos) = sin_cos_small(half);
         let share = if half == 0.0 { 1.0 } else { sin / half };
-        Self { share, late: [share * cos, -share * sin] }
+        let bow = 0.5 * half * half;
+        Self { share, late: [share * cos, -share * sin], ripple: 4.0 / 45.0 * bow * bow }
     }
 }
 
@@ -54,8 +61,10 @@ mod tests {
                 chord_cos * cos + 2.0 * t * chord_sin * sin
             };
             let mean = (0..count).map(at).sum::<f64>() / f64::from(count);
-            let s = super::Held::new(x).share;
+            let super::Held { share: s, ripple, .. } = super::Held::new(x);
             assert!((s * s - mean).abs() < 1e-6 * x * x, "{x}: {s}");
+            let square = (0..count).map(|k| (at(k) - mean) * (at(k) - mean)).sum::<f64>() / f64::from(count);
+            assert!((ripple / square - 1.0).abs() < 1e-5 + 0.3 * x * x, "{x}: {ripple}, not {square}");
         }
     }
 }

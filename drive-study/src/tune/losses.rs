@@ -1,0 +1,78 @@
+//! Losses of the inverter and temperature coefficients: values of the file for the plant alone, which the controller does not
+//! know.
+
+use super::motor::{Inverter, MotorFile, Number};
+use super::rules::{Setting, given, real};
+use anyhow::{Result, bail};
+
+/// The settings of `[inverter]` and `[temperature]`; none where the file has neither. `T_s` is the sample period in s.
+///
+/// # Errors
+/// A switching energy without its current or voltage, or a frequency that is not positive.
+#[expect(non_snake_case, reason = "the symbols of the model")]
+pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
+    let mut all = Vec::new();
+    let mut add = |name, x: &Option<Number>| all.extend(x.as_ref().map(|x| given(name, x)));
+    if let Some(temperature) = &motor.data.temperature {
+        add("winding.alpha", &temperature.winding);
+        add("magnet.alpha", &temperature.magnet);
+    }
+    let Some(inverter) = &motor.data.inverter else { return Ok(all) };
+    let Inverter { u_transistor, r_transistor, u_diode, r_diode, E_sw, i_sw, u_sw, k_sw, f_sw } = inverter;
+    for (name, x) in [
+        ("inverter.u_transistor", u_transistor),
+        ("inverter.r_transistor", r_transistor),
+        ("inverter.u_diode", u_diode),
+        ("inverter.r_diode", r_diode),
+        ("inverter.E_sw", E_sw),
+        ("inverter.i_sw", i_sw),
+        ("inverter.u_sw", u_sw),
+        ("inverter.k_sw", k_sw),
+    ] {
+        add(name, x);
+    }
+    for (key, x) in [("i_sw", i_sw), ("u_sw", u_sw)] {
+        if let (Some(energy), None) = (E_sw, x) {
+            bail!("{}: inverter.E_sw needs inverter.{key}: give the one at which it was measured", motor.place(energy));
+        }
+    }
+    all.push(match f_sw {
+        None => real("inverter.T_pwm", T_s, "one PWM period per sample"),
+        Some(f) if *f.get_ref() > 0.0 && f.get_ref().is_finite() => {
+            Setting { origin: Some(f.span().start), ..real("inverter.T_pwm", 1.0 / f.get_ref(), "1 / f_sw") }
+        }
+        Some(f) => {
+            bail!("{}: inverter.f_sw = {} Hz must be greater than 0: correct the value", motor.place(f), f.get_ref())
+        }
+    });
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn of(text: &str) -> Result<Vec<(&'static str, super::super::rules::Value)>> {
+        let motor = include_str!("../../../motors/ipmsm-2.2kw.toml");
+        let motor = MotorFile::parse(&format!("{motor}\n{text}\n"), Path::new("m.toml"))?;
+        Ok(settings(&motor, 5e-5)?.into_iter().map(|s| (s.name, s.value)).collect())
+    }
+
+    #[test]
+    fn what_the_file_gives_and_no_more() {
+        use super::super::rules::Value::Real;
+        assert!(of("").unwrap().is_empty());
+        assert_eq!(of("[temperature]\nmagnet = -1.1e-3").unwrap(), [("magnet.alpha", Real(-1.1e-3))]);
+        let period = ("inverter.T_pwm", Real(5e-5));
+        assert_eq!(of("[inverter]\nr_diode = 0.1").unwrap(), [("inverter.r_diode", Real(0.1)), period]);
+        assert_eq!(of("[inverter]\nf_sw = 8000.0").unwrap(), [("inverter.T_pwm", Real(1.25e-4))]);
+        for (text, message) in [
+            ("E_sw = 1e-3\nu_sw = 300.0", "inverter.E_sw needs inverter.i_sw"),
+            ("f_sw = 0.0", "inverter.f_sw = 0 Hz must be greater than 0"),
+        ] {
+            let error = of(&format!("[inverter]\n{text}")).unwrap_err().to_string();
+            assert!(error.contains(message) && error.starts_with("m.toml:"), "{error}");
+        }
+    }
+}

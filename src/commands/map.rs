@@ -1,0 +1,82 @@
+//! `fmu map`: the efficiency map of a machine.
+
+use super::numbers;
+use crate::pack;
+use crate::workspace::output_folder;
+use anyhow::{Result, bail};
+use clap::Args;
+use drive_study::map::cycle::Cycle;
+use drive_study::map::request::{self, Request};
+use drive_study::map::{self, report};
+use drive_study::tune::motor::MotorFile;
+use std::path::PathBuf;
+
+/// Computes the efficiency map and the envelope of a machine with the values of `fmu tune`.
+///
+/// The map covers speed and torque at the shaft in both quadrants, for each DC-link voltage and temperature. It counts the losses
+/// of copper, iron, inverter and friction that the motor file describes ([iron], [inverter], [mechanics]). Points of it are
+/// compared with PmsmDrive; if one differs by more than 0.1 % of its power or 1 % of a loss, nothing is written.
+///
+/// Writes map.csv (a line per point), envelope.csv, map.npz (for numpy.load), map.svg and map.html, which needs no network, and
+/// prints the best point, the losses at the rated point and the energy of a driving cycle (examples/vehicle).
+///
+///   fmu map motors/traction-63kw.toml --out target/map
+///   fmu map motors/traction-63kw.toml --u-dc 300,350,400 --T 20,80,120 --grid 21x21
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+#[expect(non_snake_case, reason = "the symbol of the temperature")]
+pub struct Map {
+    /// Motor file, as for `fmu tune`
+    #[arg(value_name = "MOTOR.toml")]
+    pub motor: PathBuf,
+    /// Output folder [default: map in Cargo's target folder]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// DC-link voltages [default: that of the motor file]
+    #[arg(long, value_name = "V,...", allow_hyphen_values = true)]
+    pub u_dc: Option<String>,
+    /// Temperatures of winding and magnet in degC [default: 20]
+    #[arg(long = "T", value_name = "DEGC,...", allow_hyphen_values = true)]
+    pub T: Option<String>,
+    /// Number of speeds and of torques, which is odd
+    #[arg(long, value_name = "NxM", default_value = "47x41", allow_hyphen_values = true)]
+    pub grid: String,
+    /// Points that are compared with PmsmDrive, for each voltage and temperature; 0: none
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub verify: usize,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The motor file or an option is wrong, a point differs from `PmsmDrive`, or a file cannot be written.
+pub fn run(args: &Map) -> Result<()> {
+    let values = |option: &str, given: &Option<String>| {
+        let Some(text) = given else { return Ok(Vec::new()) };
+        let values = numbers(option, text)?;
+        if values.is_empty() {
+            bail!("{option} has no value: give at least one, or leave the option out");
+        }
+        Ok(values)
+    };
+    let request = Request {
+        u_dc: values("--u-dc", &args.u_dc)?,
+        T: values("--T", &args.T)?,
+        grid: request::grid(&args.grid)?,
+        verify: args.verify,
+    };
+    request.check()?;
+    let map = map::make(&MotorFile::read(&args.motor)?, &request)?;
+    let report = report::of(&map, &Cycle::example()?);
+    // All of them are ready before the first is written.
+    let files = map::files(&map, &report)?;
+    let out = args.out.clone().map_or_else(|| output_folder("map"), Ok)?;
+    for (name, bytes) in &files {
+        pack::write(&out.join(name), bytes)?;
+    }
+    println!("{}\n{}\n\n{}", map.name, map.source, report.text());
+    for (name, _) in &files {
+        println!("{}", out.join(name).display());
+    }
+    Ok(())
+}
