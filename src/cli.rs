@@ -140,6 +140,13 @@ mod tests {
     use super::*;
     use clap::error::ErrorKind;
 
+    #[test]
+    fn several_packages_are_built_at_once() {
+        let arguments = ["fmu", "build", "--package", "own-fmu", "--package", "my-fmu"];
+        let Command::Build(args) = Cli::try_parse_from(arguments).unwrap().command else { panic!("another command") };
+        assert_eq!(args.package, ["own-fmu", "my-fmu"]);
+    }
+
     /// An example is a line of the long help that starts with two spaces and the command; `\\` continues it.
     #[test]
     fn the_help_of_every_command_has_an_example_that_parses() {

@@ -77,7 +77,8 @@ impl PresetFmu {
             for preset::Entry { name, value, .. } in
                 preset::read(&old).map_err(|e| anyhow!("{}: {e}", file.display()))?
             {
-                let (variable, element) = find(&own, &name).with_context(|| format!("{name} in resources/{FILE}"))?;
+                let (variable, element) =
+                    find(&own, &reader, &name).with_context(|| format!("{name} in resources/{FILE}"))?;
                 values.insert(reference(variable, element.unwrap_or(0)), (name, value));
             }
         }
@@ -102,7 +103,7 @@ impl PresetFmu {
     /// Names the variable and the value, and what is expected.
     pub fn set(&mut self, name: &str, text: &str, unit: Option<&str>) -> Result<()> {
         let model = &self.own.name;
-        let Some((variable, element)) = find(&self.own, name) else {
+        let Some((variable, element)) = find(&self.own, &self.reader, name) else {
             let names = self.own.variables.iter().filter(|v| v.causality.is_settable()).map(|v| v.name.as_str());
             bail!("{model} has no variable {name}{}", suggest(name, names));
         };
@@ -257,13 +258,10 @@ fn cause(error: &str, unpacked: &Unpacked) -> String {
 }
 
 /// The variable of this name, or the array and the index of the element.
-fn find<'a>(description: &'a Description, name: &str) -> Option<(&'a Variable, Option<usize>)> {
-    if let Some(variable) = description.variable(name) {
-        return Some((variable, None));
-    }
-    let mut arrays = description.variables.iter().filter(|v| v.is_array() && name.starts_with(&v.name));
-    let element = |v: &'a Variable| (0..v.elements()).find(|&i| element_name(v, i) == name).map(|i| (v, Some(i)));
-    arrays.find_map(element)
+fn find<'a>(own: &'a Description, reader: &ModelDescription, name: &str) -> Option<(&'a Variable, Option<usize>)> {
+    let element =
+        || reader.element(name).and_then(|(array, element)| Some((own.variable(&array.name)?, Some(element))));
+    own.variable(name).map(|variable| (variable, None)).or_else(element)
 }
 
 fn element_name(variable: &Variable, element: usize) -> String {

@@ -30,7 +30,7 @@ fn ecos_libcosim_fmucontainer_pathsim_and_fmuloader() {
 #[ignore = "opt-in: cargo test --test importers pathsim_in_model_exchange -- --ignored (half a minute)"]
 fn pathsim_in_model_exchange() {
     let own = scratch().join("pathsim-own-fmu");
-    let template = build::Build { package: Some("own-fmu".into()), out: Some(own.clone()), ..build::Build::default() };
+    let template = build::Build { package: vec!["own-fmu".into()], out: Some(own.clone()), ..build::Build::default() };
     build::run(&template).unwrap();
     let variables = [("FMU_REFERENCE", &*references()), ("FMU_OWN", &*own)];
     pytest("importers", "pathsim-exchange", &["test_pathsim_exchange.py"], &variables);

@@ -14,7 +14,7 @@ fn archives() -> &'static [PathBuf] {
     static FILES: OnceLock<Vec<PathBuf>> = OnceLock::new();
     FILES.get_or_init(|| {
         let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("own-fmu");
-        build::run(&Build { package: Some("own-fmu".into()), out: Some(out), ..Build::default() }).unwrap()
+        build::run(&Build { package: vec!["own-fmu".into()], out: Some(out), ..Build::default() }).unwrap()
     })
 }
 

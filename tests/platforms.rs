@@ -175,7 +175,7 @@ fn the_drive_has_the_same_states_on_three_platforms() {
 fn an_error_and_a_panic_are_a_status_on_three_platforms() {
     let _ = Machines::find();
     let dir = tempfile::tempdir().unwrap();
-    for archive in archives(Build { package: Some("faulty-fmu".into()), ..Build::default() }, dir.path()) {
+    for archive in archives(Build { package: vec!["faulty-fmu".into()], ..Build::default() }, dir.path()) {
         let answers = everywhere(&archive, dir.path(), |md| {
             // The values of mode: see fmu-export/tests/common/model.rs.
             ["fault", &reference(md, "mode"), "2", "4"].map(String::from).to_vec()

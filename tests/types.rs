@@ -4,12 +4,10 @@
 mod common;
 
 use fmu::commands::build::{self, Build};
-use fmu_check::Level;
 use fmu_import::cosimulation::{Settings, System};
 use fmu_import::{Fmu, Instance, Kind, Values};
 use model_description::FmiVersion::{self, V2, V3};
 use model_description::{BaseType, Causality};
-use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,7 +18,7 @@ fn archives() -> &'static [PathBuf] {
     static FILES: OnceLock<Vec<PathBuf>> = OnceLock::new();
     FILES.get_or_init(|| {
         let out = common::python::scratch().join("types");
-        build::run(&Build { package: Some("types-fmu".into()), out: Some(out), ..Build::default() }).unwrap()
+        build::run(&Build { package: vec!["types-fmu".into()], out: Some(out), ..Build::default() }).unwrap()
     })
 }
 
@@ -301,9 +299,13 @@ fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
     let (done, said) =
         run(&["simulate", three, "--set", "label=a b,c", "--set", "weights=1,2,3,4,5,6", "--stop", "0.2"]);
     assert!(done && said.contains("EveryType.out.uint64"), "{said}");
+    assert!(said.contains(r#"EveryType.status"#) && said.contains(r#""a b,c""#), "{said}");
     for (option, value, why) in [
-        ("--record", "status", "status: is a String; only numbers"),
-        ("--record", "sums", "sums: is an array; only scalars"),
+        ("--record", "sums", "recorded: name an element, sums[1]"),
+        ("--input", "vector=0:1", "recorded: name an element, vector[1]"),
+        ("--input", "vector[4]=0:1", "has no variable vector[4]"),
+        ("--set", "weights[1,1]=1,2", "weights[1,1] = 1,2 is not one value"),
+        ("--set", "weights=1 2", "weights has 6 elements, not 2"),
         ("--input", "label=3", "label: is a String; only numbers"),
         ("--set", "weights=1,2", "weights has 6 elements, not 2"),
         ("--set", "in.uint8=x", "in.uint8 = x is not an integer"),
@@ -312,6 +314,27 @@ fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
         let (done, said) = run(&["simulate", three, option, value]);
         assert!(!done && said.contains(why), "{said}");
     }
+    // An element of an array has the name that it has in FMI 2.0; spaces or commas separate the elements of the whole.
+    for file in archives() {
+        let file = file.to_str().unwrap();
+        let elements =
+            ["simulate", file, "--input", "vector[2]=0:3,0.1:4", "--input", "vector[3]=0:10", "--set", "vector[1]=5"];
+        let others = ["--set", "weights[2,1]=100", "--record", "sums[2],status,sums[1]", "--stop", "0.2", "--csv", "-"];
+        let (done, said) = run(&[&elements[..], &others].concat());
+        let rows = "time,sums[2],sums[1],status\n0,513.5,5,as built & <tested>\n0.1,513.5,5,as built & <tested>\n0.2,514.5,5,as built & <tested>\n";
+        assert!(done && said.contains(rows), "{said}");
+    }
+    let (done, said) = run(&[
+        "simulate",
+        three,
+        "--set",
+        "weights=1 2 3 4 5 6",
+        "--set",
+        "vector=1 1 1",
+        "--record",
+        "sums[1],sums[2]",
+    ]);
+    assert!(done && said.contains(" 6 V\n") && said.contains(" 15.5 V\n"), "{said}");
     let (_, said) = run(&["info", three]);
     for line in ["label         \"as built & <tested>\"", "weights[2,3]  1 0 0 0 1 1", "\"r1 \u{b5}\""] {
         assert!(said.contains(line), "{said}");
@@ -334,15 +357,15 @@ fn the_documentation_shows_types_and_extents() {
     }
 }
 
-/// What single precision and the solvers' discrete inputs cost is no requirement; nothing else is found.
+/// What the binary needs from the system is the linker's matter.
 #[test]
-fn it_violates_no_must() {
+fn the_checker_finds_nothing() {
     let program = Some(PathBuf::from(env!("CARGO_BIN_EXE_fmu")));
     for file in archives() {
         let report =
             fmu_check::run(file, &fmu_check::Options { program: program.clone(), ..Default::default() }).unwrap();
-        let must: Vec<_> = report.violated().filter(|f| f.level == Level::Must).collect();
-        assert!(must.is_empty(), "{}", report.text(false));
+        let found = report.violated().filter(|f| !["B03", "B04"].contains(&&*f.id)).count();
+        assert_eq!(found, 0, "{}", report.text(false));
         assert!(report.findings.len() > 150);
     }
 }
@@ -356,69 +379,6 @@ fn every_type_has_every_causality() {
         for causality in [Causality::Input, Causality::Output, Causality::Local, Causality::Parameter] {
             assert!(md.variables.iter().any(|v| v.base == base && v.causality == causality), "{base} {causality}");
         }
-    }
-}
-
-/// The compiler shows the row and says which variable it is, and why. A crate of its own, checked by Cargo.
-#[test]
-fn a_wrong_row_is_an_error_at_its_place() {
-    const CASES: [(&str, &str, &str, usize); 8] = [
-        (
-            "bound",
-            r#"V::boolean_input("on", "", |m| &mut m.on).at_least(0.0)"#,
-            "on: only a number can have a bound",
-            5,
-        ),
-        (
-            "empty",
-            r#"V::output("x", &VOLT, "", |m| &mut m.u).above(1.0).at_most(1.0)"#,
-            "x: the bounds leave no value",
-            5,
-        ),
-        (
-            "shape",
-            r#"V::array_input("a", &VOLT, "", 4, |m| &mut m.a).shape(&[2, 3])"#,
-            "a: the product of the extents",
-            5,
-        ),
-        (
-            "tuned",
-            r#"V::text_parameter("t", "", |m| &mut m.t).tunable()"#,
-            "t: only a parameter of a type other than text",
-            5,
-        ),
-        ("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
-        ("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
-        // These two show in the table, whose start is in line 3.
-        ("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
-        ("empty_array", r#"V::array_input("a", &VOLT, "", 0, |m| &mut m.a)"#, "a: an array needs an element", 3),
-    ];
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folder = common::python::scratch().join("rows");
-    let sources = folder.join("src/bin");
-    fs::create_dir_all(&sources).unwrap();
-    let manifest = format!(
-        "[workspace]\n[package]\nname = \"rows\"\nedition = \"2024\"\n[dependencies]\nfmu-core = {{ path = {:?} }}\n",
-        root.join("fmu-core")
-    );
-    fs::write(folder.join("Cargo.toml"), manifest).unwrap();
-    fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
-    for (name, row, ..) in CASES {
-        let source = format!(
-            "use fmu_core::{{Row, Table, table, unit::VOLT}};\n\
-             struct M {{ u: f64, on: bool, a: [f64; 4], t: String, f: f32 }} type V = Row<M>;\n\
-             const TABLE: &Table<M> = table![\n    V::input(\"u\", &VOLT, \"\", |m| &mut m.u),\n    \
-             {row},\n];\nfn main() {{ let _ = TABLE.len(); }}\n"
-        );
-        fs::write(sources.join(format!("{name}.rs")), source).unwrap();
-    }
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["check", "--offline", "--keep-going", "--message-format", "short"]).current_dir(&folder);
-    let output = cargo.env("CARGO_TARGET_DIR", folder.join("target")).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    for (name, _, why, line) in CASES {
-        let place = Path::new("src/bin").join(format!("{name}.rs:{line}:")).display().to_string();
-        assert!(said.lines().any(|l| l.starts_with(&place) && l.contains(why)), "{place} {why}: {said}");
     }
 }
 

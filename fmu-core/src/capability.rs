@@ -6,7 +6,8 @@
 use crate::continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 use crate::events::{Events, Indicator, Next, Outcome, Sampled};
 use crate::log::Warnings;
-use crate::variable::{Causality, Kind, Meta, Variability};
+use crate::rules::can_be_state;
+use crate::variable::Meta;
 use crate::{Elapsed, Fault, Hash, Model};
 use std::marker::PhantomData;
 
@@ -191,14 +192,8 @@ impl<M: Model> Capabilities<M> {
     /// Names a state without a continuous real row that is an output or local.
     pub fn rows(&self) -> Result<Vec<usize>, Fault> {
         let row = |state: &State<M>| {
-            let fits = |meta: &Meta| {
-                meta.variability == Variability::Continuous
-                    && meta.dimension.is_none()
-                    && matches!(meta.kind, Kind::Real(_))
-                    && matches!(meta.causality, Causality::Output | Causality::Local)
-            };
-            let named =
-                |index: &usize| M::TABLE.locate(*index).is_some_and(|(name, meta, _)| name == state.name && fits(meta));
+            let fits = |name: &str, meta: &Meta| name == state.name && can_be_state(meta);
+            let named = |index: &usize| M::TABLE.locate(*index).is_some_and(|(name, meta, _)| fits(&name, meta));
             let none =
                 || Fault::new(format!("the state {} has no continuous real output or state in the table", state.name));
             (0..M::TABLE.len()).find(named).ok_or_else(none)

@@ -65,15 +65,29 @@ impl<W, E: Enumerated> Place<W> for Field<W, E> {
 /// }
 /// assert_eq!((Fan::of(2), Fan::of(3), Fan::On.value(), Fan::On.name()), (Some(Fan::On), None, 2, "On"));
 /// ```
+///
+/// With `#[derive(Default)]`, one item is marked as the default. A model whose own `Default` names an item needs none.
+///
+/// ```
+/// fmu_core::enumeration! {
+///     #[derive(Default)]
+///     enum Fan("FanMode", "What the fan does") {
+///         #[default]
+///         1 Off "Stands still";
+///         2 On "Turns";
+///     }
+/// }
+/// assert_eq!(Fan::default(), Fan::Off);
+/// ```
 #[macro_export]
 macro_rules! enumeration {
     ($(#[$attribute:meta])* $visibility:vis enum $type:ident($name:literal, $description:literal) {
-        $($value:literal $item:ident $about:literal;)*
+        $($(#[$mark:meta])* $value:literal $item:ident $about:literal;)*
     }) => {
         $(#[$attribute])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         $visibility enum $type {
-            $(#[doc = $about] $item = $value,)*
+            $($(#[$mark])* #[doc = $about] $item = $value,)*
         }
 
         impl $type {

@@ -70,6 +70,108 @@ pub struct Indicator {
 
 /// A model with events. The importer enters Event Mode at the time that [`next`](Self::next) gave, where an indicator
 /// changes its sign, or for reasons of its own; there it exchanges inputs and outputs.
+///
+/// A ball that bounces until it rests, a whole model:
+///
+/// ```
+/// use fmu_core::unit::{METER, METER_PER_S, METER_PER_S2, ONE};
+/// use fmu_core::{
+///     Block, ContinuousTime, Elapsed, Events, Fault, Indicator, Info, Model, Next, Outcome, Row, State, Step, Table, integrate, table,
+/// };
+/// use serde::{Deserialize, Serialize};
+///
+/// #[derive(Clone, Serialize, Deserialize)]
+/// struct Ball { e: f64, h_start: f64, h: f64, v: f64, resting: bool }
+///
+/// impl Default for Ball {
+///     fn default() -> Self {
+///         Self { e: 0.7, h_start: 1.0, h: 1.0, v: 0.0, resting: false }
+///     }
+/// }
+///
+/// #[derive(Clone, Default, Serialize, Deserialize)]
+/// struct Outputs { h: f64, v: f64, resting: bool }
+///
+/// type V = Row<Block<Ball>>;
+///
+/// impl Model for Ball {
+///     type Outputs = Outputs;
+///     const INFO: Info = Info { name: "Ball", description: "A ball that bounces until it rests", ..Info::DEFAULT };
+///     const TABLE: &'static Table<Block<Self>> = table![
+///         V::output("h", &METER, "Height", |m| &mut m.out.h),
+///         V::output("v", &METER_PER_S, "Velocity, positive upwards", |m| &mut m.out.v),
+///         V::boolean_output("resting", "The ball lies on the ground", |m| &mut m.out.resting),
+///         V::parameter("e", &ONE, "Coefficient of restitution", |m| &mut m.model.e).at_least(0.0).below(1.0),
+///         V::parameter("h_start", &METER, "Height at the start", |m| &mut m.model.h_start).above(0.0),
+///     ];
+///
+///     fn initialize(&mut self) {
+///         (self.h, self.v, self.resting) = (self.h_start, 0.0, false);
+///     }
+///
+///     fn output(&self, _now: Elapsed, out: &mut Outputs) {
+///         *out = Outputs { h: self.h, v: self.v, resting: self.resting };
+///     }
+///
+///     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+///         integrate::hybrid::<Self, 2>(self, step, 1e-2)
+///     }
+/// }
+///
+/// impl ContinuousTime for Ball {
+///     const STATES: &'static [State<Self>] = &[
+///         State::new("h", &METER_PER_S, |m: &mut Self| &mut m.h).reinit(),
+///         State::new("v", &METER_PER_S2, |m: &mut Self| &mut m.v).reinit(),
+///     ];
+///
+///     // `resting` changes only in an event, so that the rates are continuous between events.
+///     fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+///         dx.copy_from_slice(&if self.resting { [0.0, 0.0] } else { [self.v, -9.81] });
+///         Ok(())
+///     }
+/// }
+///
+/// /// Height (m) below the ground at which the event begins: after a bounce the indicator is above 0.
+/// const DEPTH: f64 = 1e-9;
+///
+/// impl Events for Ball {
+///     const INDICATORS: &'static [Indicator] = &[Indicator { name: "z", description: "Height above the ground" }];
+///
+///     fn indicators(&self, _now: Elapsed, z: &mut [f64]) {
+///         z[0] = if self.resting { 1.0 } else { self.h + DEPTH };
+///     }
+///
+///     fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+///         let bounces = !self.resting && self.h + DEPTH <= 0.0;
+///         if bounces {
+///             (self.h, self.v) = (0.0, -self.e * self.v);
+///             // The bounces would come ever faster.
+///             self.resting = self.v < 0.05;
+///             self.v = if self.resting { 0.0 } else { self.v };
+///         }
+///         Ok(Outcome { states_changed: bounces, ..Outcome::default() })
+///     }
+///
+///     fn next(&self, _now: Elapsed) -> Next {
+///         Next::Never
+///     }
+/// }
+///
+/// let mut ball = Block::<Ball>::default();
+/// ball.initialize();
+/// // It falls for sqrt(2/g) and is at the highest point of its first bounce e times that later.
+/// let fall = (2.0_f64 / 9.81).sqrt();
+/// ball.step(&Step { start: Elapsed::ZERO, h: 1.7 * fall })?;
+/// assert!((ball.out.h - 0.49).abs() < 1e-6 && ball.out.v.abs() < 1e-6);
+/// ball.step(&Step { start: Elapsed::ZERO.plus(1.7 * fall), h: 3.0 })?;
+/// assert!(ball.out.resting && ball.out.h == 0.0);
+/// # Ok::<(), Fault>(())
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` has no events: it lacks the capability `Events`",
+    note = "write `impl Events for {Self}`, or remove `Events` from the line that exports the model",
+    note = "a model that acts only at multiples of a period implements `Sampled` instead"
+)]
 pub trait Events: Model {
     /// The event indicators, in the order of all calls.
     const INDICATORS: &'static [Indicator] = &[];
@@ -137,6 +239,7 @@ fn endless(period: f64, now: Elapsed) -> Fault {
     Fault::value("the time", format!("{} s after the start", now.seconds()), longest)
 }
 
+#[diagnostic::do_not_recommend]
 impl<M: Sampled> Events for M {
     fn begin(&mut self, now: Elapsed) {
         if grid(self).reached(self.samples(), now) {

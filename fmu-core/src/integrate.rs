@@ -5,6 +5,7 @@
 //! falsi and bisection in turn, each trial being a substep of its own, as exact as the integration itself.
 
 use crate::events::{bounded_by, grid};
+use crate::rules::check_number;
 use crate::{ContinuousTime, Elapsed, Events, Fault, Sampled, Step};
 
 /// Maximum number of substeps in one communication step.
@@ -29,7 +30,7 @@ const WIDTH: f64 = 1e-9;
 /// # Errors
 /// Those of [`ContinuousTime::derivatives`], a state that is not finite, or more substeps than anyone can wait for.
 pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, longest: f64) -> Result<(), Fault> {
-    const { assert!(N == M::STATES.len(), "N is the number of the states") };
+    const { check_number::<M>(M::STATES.len(), N) };
     let count = substeps(step.h, longest)?;
     let h = step.h / count;
     let (mut now, mut left) = (step.start, count);
@@ -52,7 +53,7 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
     step: &Step,
     longest: f64,
 ) -> Result<(), Fault> {
-    const { assert!(N == M::STATES.len(), "N is the number of the states") };
+    const { check_number::<M>(M::STATES.len(), N) };
     const { assert!(M::INDICATORS.len() <= MAX_INDICATORS, "more event indicators than the integrator has room for") };
     let (mut now, end) = (step.start, step.end());
     let count = substeps(step.h, longest)?;

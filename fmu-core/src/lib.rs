@@ -79,7 +79,7 @@
 //! and a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`terminal`], [`model`],
-//! [`continuous`], [`events`], [`capability`], [`description`]. No motor, no XML, no C, no `unsafe`.
+//! [`continuous`], [`events`], [`capability`], [`rules`], [`description`]. No motor, no XML, no C, no `unsafe`.
 
 #![forbid(unsafe_code)]
 
@@ -100,6 +100,7 @@ mod probe;
 pub mod reals;
 pub mod resource;
 pub mod row;
+pub mod rules;
 pub mod table;
 pub mod terminal;
 pub mod time;

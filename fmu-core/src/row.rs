@@ -13,7 +13,6 @@ use crate::need::Need;
 use crate::reals::{Inputs, Interval};
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
-pub(crate) use settings::demand;
 pub use slot::Slot;
 use std::mem::MaybeUninit;
 

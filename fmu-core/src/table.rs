@@ -5,7 +5,8 @@
 
 use crate::fault::Fault;
 use crate::reals::Inputs;
-use crate::row::{Access, Node, Row, Slot, demand};
+use crate::row::{Access, Node, Row, Slot};
+use crate::rules::{demand, same_text};
 use crate::token::Hash;
 use crate::variable::{Kind, Meta};
 use std::fmt::Display;
@@ -251,19 +252,4 @@ const fn check_unique<W>(rows: &[Row<W>], last: usize) {
         demand(!same, rows[last].meta.name, "two rows of the table have this name");
         row += 1;
     }
-}
-
-pub(crate) const fn same_text(a: &str, b: &str) -> bool {
-    let (a, b) = (a.as_bytes(), b.as_bytes());
-    if a.len() != b.len() {
-        return false;
-    }
-    let mut i = 0;
-    while i < a.len() {
-        if a[i] != b[i] {
-            return false;
-        }
-        i += 1;
-    }
-    true
 }

@@ -3,7 +3,7 @@
 //! A terminal names variables of the table and adds nothing to them: an importer that knows no terminals loses nothing, and
 //! the instantiation token does not change.
 
-use crate::table::same_text;
+use crate::rules::same_text;
 use serde::{Deserialize, Serialize};
 
 /// A group of variables that is connected as a whole.

@@ -187,3 +187,51 @@ pub const RAD_PER_S2: Quantity =
 pub const PER_SECOND: Quantity = Quantity::new("Rate", Unit::si("1/s", Exponents::mechanical(0, 0, -1, 0)));
 /// Time in s.
 pub const SECOND: Quantity = Quantity::new("Time", Unit::si("s", Exponents::mechanical(0, 0, 1, 0)));
+/// Length in m.
+pub const METER: Quantity = Quantity::new("Length", Unit::si("m", Exponents::mechanical(0, 1, 0, 0)));
+/// Area in m2.
+pub const METER2: Quantity = Quantity::new("Area", Unit::si("m2", Exponents::mechanical(0, 2, 0, 0)));
+/// Volume in m3.
+pub const METER3: Quantity = Quantity::new("Volume", Unit::si("m3", Exponents::mechanical(0, 3, 0, 0)));
+/// Speed along a line in m/s.
+pub const METER_PER_S: Quantity = Quantity::new("Velocity", Unit::si("m/s", Exponents::mechanical(0, 1, -1, 0)));
+/// Acceleration in m/s2.
+pub const METER_PER_S2: Quantity = Quantity::new("Acceleration", Unit::si("m/s2", Exponents::mechanical(0, 1, -2, 0)));
+/// Mass in kg.
+pub const KILOGRAM: Quantity = Quantity::new("Mass", Unit::si("kg", Exponents::mechanical(1, 0, 0, 0)));
+/// Force in N.
+pub const NEWTON: Quantity = Quantity::new("Force", Unit::si("N", Exponents::mechanical(1, 1, -2, 0)));
+/// Pressure in Pa.
+pub const PASCAL: Quantity = Quantity::new("Pressure", Unit::si("Pa", Exponents::mechanical(1, -1, -2, 0)));
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exponents of kilogram, meter, second and ampere of a product.
+    fn product(factors: &[(&Quantity, i8)]) -> Exponents {
+        factors.iter().fold(Exponents::NONE, |sum, (quantity, power)| {
+            let of = quantity.unit.exponents;
+            let add = |sum: i8, of: i8| sum + power * of;
+            Exponents::mechanical(add(sum.kg, of.kg), add(sum.m, of.m), add(sum.s, of.s), add(sum.ampere, of.ampere))
+        })
+    }
+
+    #[test]
+    fn mechanical_units_fit_together() {
+        for (quantity, factors) in [
+            (METER2, &[(&METER, 2)][..]),
+            (METER3, &[(&METER, 3)]),
+            (METER_PER_S, &[(&METER, 1), (&SECOND, -1)]),
+            (METER_PER_S2, &[(&METER, 1), (&SECOND, -2)]),
+            (NEWTON, &[(&KILOGRAM, 1), (&METER_PER_S2, 1)]),
+            (PASCAL, &[(&NEWTON, 1), (&METER2, -1)]),
+            (KG_M2, &[(&KILOGRAM, 1), (&METER2, 1)]),
+            (JOULE, &[(&NEWTON, 1), (&METER, 1)]),
+            (WATT, &[(&PASCAL, 1), (&METER3, 1), (&SECOND, -1)]),
+            (WATT, &[(&VOLT, 1), (&AMPERE, 1)]),
+        ] {
+            assert_eq!(quantity.unit.exponents, product(factors), "{}", quantity.name);
+        }
+    }
+}

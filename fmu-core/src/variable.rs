@@ -170,6 +170,18 @@ pub fn position(shape: &[usize], element: usize) -> String {
     format!("[{}]", indices.join(","))
 }
 
+/// The element that [`position`] writes so; `None` where the array has none.
+pub fn element(shape: &[usize], position: &str) -> Option<usize> {
+    let mut indices = position.strip_prefix('[')?.strip_suffix(']')?.split(',');
+    let mut element = 0_usize;
+    for &extent in shape {
+        let index: usize = indices.next()?.parse().ok()?;
+        let index = index.checked_sub(1).filter(|index| *index < extent)?;
+        element = element.checked_mul(extent)?.checked_add(index)?;
+    }
+    indices.next().is_none().then_some(element)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -188,6 +200,12 @@ mod tests {
         assert_eq!((position(&[], 2), position(&[3], 2)), ("[3]".into(), "[3]".into()));
         let names: Vec<String> = (0..6).map(|i| position(&[2, 3], i)).collect();
         assert_eq!(names, ["[1,1]", "[1,2]", "[1,3]", "[2,1]", "[2,2]", "[2,3]"]);
+        for (i, name) in names.iter().enumerate() {
+            assert_eq!(element(&[2, 3], name), Some(i));
+        }
+        for none in ["", "[1]", "[0,1]", "[3,1]", "[1,4]", "[1,1,1]", "[1,1", "1,1", "[,]", "[1,-1]"] {
+            assert_eq!(element(&[2, 3], none), None, "{none}");
+        }
     }
 
     #[test]

@@ -97,4 +97,5 @@ mod text;
 pub mod value;
 
 #[doc(hidden)]
+pub use fmu_core::rules::check;
 pub use fmu_core::{Capabilities, Exported};

@@ -247,5 +247,5 @@ fn a_load_that_changes_the_state_is_not_described() {
     let change = "load changes what a state saves: store what it reads in a Resource";
     assert_eq!(describe(c"/change"), (1, change.into()));
     assert_eq!(describe(c"/none"), (1, "no file data.bin".into()));
-    assert_eq!(describe(c"/panic"), (1, "a fault in the model's code (panic)".into()));
+    assert_eq!(describe(c"/panic"), (1, "a fault in the model's code (panic): the file is empty".into()));
 }

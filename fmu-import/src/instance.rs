@@ -10,7 +10,7 @@ use crate::abi::journal::{self, Call};
 use crate::abi::live::{Live, Pointer};
 use crate::abi::log::{Log, Message, Status};
 use crate::abi::raw::Simple;
-use model_description::{BaseType, Dimension, ModelDescription, ModelVariable};
+use model_description::{BaseType, ModelDescription, ModelVariable};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -284,14 +284,8 @@ impl Instance {
     /// # Errors
     /// A size is not known.
     pub fn elements(&self, variable: &ModelVariable) -> Result<usize, Error> {
-        let extent = |dimension: &Dimension| match dimension {
-            Dimension::Fixed(n) => usize::try_from(*n).ok(),
-            Dimension::Variable(reference) => {
-                let size = self.description.variables.iter().find(|v| v.value_reference == *reference)?;
-                size.start.as_ref()?.trim().parse().ok()
-            }
-        };
-        let count = variable.dimensions.iter().map(extent).try_fold(1, |n: usize, d| n.checked_mul(d?));
+        let shape = self.description.shape(variable);
+        let count = shape.and_then(|shape| shape.iter().try_fold(1_usize, |n, d| n.checked_mul(*d)));
         count.ok_or_else(|| Error::usage(&self.name, format!("the size of {} is not known", variable.name)))
     }
 

@@ -21,7 +21,7 @@ pub enum Values {
 }
 
 impl Values {
-    /// Reads what a user writes: numbers, `true` or `false`, names of an enumeration; commas between elements.
+    /// Reads what a user writes: numbers, `true` or `false`, names of an enumeration; commas or spaces between elements.
     ///
     /// # Errors
     /// Says what was expected.
@@ -36,7 +36,12 @@ impl Values {
         items: &[(String, i64)],
         number: impl Fn(&str) -> Result<Option<f64>, String>,
     ) -> Result<Self, String> {
-        let elements = || text.split(',').map(str::trim);
+        let is_number = |word: &str| quantity::split(word).is_some();
+        let spaced = variable.is_array()
+            && !text.contains(',')
+            && (!variable.base.is_float() || text.split_whitespace().all(is_number));
+        let separator = |c: char| if spaced { c.is_whitespace() } else { c == ',' };
+        let elements = || text.split(separator).map(str::trim).filter(|e| !(spaced && e.is_empty()));
         let wrong = |element: &str, expected: &str| format!("{} = {element} is not {expected}", variable.name);
         match variable.base {
             BaseType::Float32 | BaseType::Float64 => elements()
@@ -115,12 +120,35 @@ impl Values {
 
     /// The first element as a number, for columns and plots; `None` for a text.
     pub fn number(&self) -> Option<f64> {
+        self.number_at(0)
+    }
+
+    /// An element as a number; `None` for a text, or without this element.
+    pub fn number_at(&self, element: usize) -> Option<f64> {
         match self {
-            Self::Reals(x) => x.first().copied(),
+            Self::Reals(x) => x.get(element).copied(),
             #[expect(clippy::cast_precision_loss, reason = "columns are of doubles; exact below 2^53")]
-            Self::Integers(x) => x.first().map(|&i| i as f64),
-            Self::Booleans(x) => x.first().map(|&b| f64::from(u8::from(b))),
+            Self::Integers(x) => x.get(element).map(|&i| i as f64),
+            Self::Booleans(x) => x.get(element).map(|&b| f64::from(u8::from(b))),
             Self::Strings(_) | Self::Binaries(_) => None,
+        }
+    }
+
+    /// Replaces an element by the one of `value`; returns whether both exist and have one type.
+    #[must_use]
+    pub fn replace(&mut self, element: usize, value: &Self) -> bool {
+        fn put<T: Clone>(all: &mut [T], element: usize, value: &[T]) -> bool {
+            let ([value], Some(place)) = (value, all.get_mut(element)) else { return false };
+            place.clone_from(value);
+            true
+        }
+        match (self, value) {
+            (Self::Reals(all), Self::Reals(value)) => put(all, element, value),
+            (Self::Integers(all), Self::Integers(value)) => put(all, element, value),
+            (Self::Booleans(all), Self::Booleans(value)) => put(all, element, value),
+            (Self::Strings(all), Self::Strings(value)) => put(all, element, value),
+            (Self::Binaries(all), Self::Binaries(value)) => put(all, element, value),
+            _ => false,
         }
     }
 

@@ -1,8 +1,9 @@
 //! The content of a modelDescription.xml, as far as importers need it.
 
 use crate::units::{DisplayUnit, TypeDefinition, Unit};
-use crate::variable::ModelVariable;
+use crate::variable::{Dimension, ModelVariable};
 use crate::version::FmiVersion;
+use fmu_core::variable::element;
 
 /// A modelDescription.xml.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,6 +65,30 @@ impl ModelDescription {
     pub fn variable(&self, name: &str) -> Option<&ModelVariable> {
         let named = self.variables.iter().find(|v| v.name == name);
         named.or_else(|| self.variables.iter().find(|v| v.aliases.iter().any(|a| a.name == name)))
+    }
+
+    /// Extents of a variable, none of a scalar; a structural parameter counts with its start value. `None` if a size is not known.
+    pub fn shape(&self, variable: &ModelVariable) -> Option<Vec<usize>> {
+        let extent = |dimension: &Dimension| match dimension {
+            Dimension::Fixed(n) => usize::try_from(*n).ok(),
+            Dimension::Variable(reference) => {
+                let size = self.variables.iter().find(|v| v.value_reference == *reference)?;
+                size.start.as_ref()?.trim().parse().ok()
+            }
+        };
+        variable.dimensions.iter().map(extent).collect()
+    }
+
+    /// The array of FMI 3.0 and the index of its element that this name means: `x[2]`, `m[1,2]`.
+    pub fn element(&self, name: &str) -> Option<(&ModelVariable, usize)> {
+        let (array, _) = name.rsplit_once('[')?;
+        let variable = self.variable(array).filter(|v| v.is_array())?;
+        Some((variable, element(&self.shape(variable)?, &name[array.len()..])?))
+    }
+
+    /// The variable of this name, or the array of which it names an element.
+    pub fn variable_or_array(&self, name: &str) -> Option<&ModelVariable> {
+        self.variable(name).or_else(|| Some(self.element(name)?.0))
     }
 
     /// The variable that a number in the model structure refers to: its position in the list, from 1, in FMI 2.0

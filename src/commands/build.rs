@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 /// name of its package (pmsm-plant) or of the FMU (PmsmPlant). `fmu new` makes a package for an FMU of your own.
 ///
 /// An FMU is any cdylib with the line `fmu_export::export!(MyModel);`:
-///   a package elsewhere in the workspace    fmu build --package own-fmu
+///   packages elsewhere in the workspace     fmu build --package own-fmu --package my-fmu
 ///   a library that is already built, or several libraries of one model for several platforms
 ///                                  fmu build --library target/release/libmy_fmu.so
 ///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
@@ -66,9 +66,9 @@ pub struct Build {
     /// Folder for fmi2/NAME.fmu and fmi3/NAME.fmu [default: fmu in Cargo's target folder]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Package of this workspace with a cdylib
+    /// Package of this workspace with a cdylib (repeatable)
     #[arg(long, value_name = "NAME", conflicts_with = "library")]
-    pub package: Option<String>,
+    pub package: Vec<String>,
     /// Library that is already built; PLATFORM= names another platform than this computer's
     #[arg(long, value_name = "[PLATFORM=]FILE")]
     pub library: Vec<String>,
@@ -247,12 +247,13 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
         [] => vec![tools.host()],
         triples => targets(&tools, triples)?,
     };
-    let packages = match &args.package {
-        Some(name) => {
-            let package = workspace.package(name).filter(|p| p.has_cdylib());
-            vec![package.ok_or_else(|| anyhow!("{name} is not a package with crate-type = [\"cdylib\"] here"))?]
-        }
-        None => choose(&workspace.fmus(), &args.fmus)?,
+    let named = |name: &String| {
+        let package = workspace.package(name).filter(|p| p.has_cdylib());
+        package.ok_or_else(|| anyhow!("{name} is not a package with crate-type = [\"cdylib\"] here"))
+    };
+    let packages = match &args.package[..] {
+        [] => choose(&workspace.fmus(), &args.fmus)?,
+        names => names.iter().map(named).collect::<Result<_>>()?,
     };
     let names: Vec<String> = packages.iter().map(|p| p.name.clone()).collect();
     let mut built: BTreeMap<String, Vec<(Platform, PathBuf)>> = BTreeMap::new();

@@ -13,7 +13,7 @@ fn archives() -> &'static [PathBuf] {
     static FILES: OnceLock<Vec<PathBuf>> = OnceLock::new();
     FILES.get_or_init(|| {
         let out = scratch().join("preset-types");
-        build::run(&Build { package: Some("types-fmu".into()), out: Some(out), ..Build::default() }).unwrap()
+        build::run(&Build { package: vec!["types-fmu".into()], out: Some(out), ..Build::default() }).unwrap()
     })
 }
 

@@ -3,6 +3,7 @@
 use crate::need::Need;
 use crate::reals::Interval;
 use crate::row::Row;
+use crate::rules::demand;
 use crate::variable::{Causality, Kind, Range, Variability};
 
 impl<W: 'static> Row<W> {
@@ -164,27 +165,5 @@ impl<W: 'static> Row<W> {
 
     const fn is_real(&self) -> bool {
         matches!(self.meta.kind, Kind::Real(_) | Kind::Float32(_))
-    }
-}
-
-/// A compile-time check of a row. The error is shown at the caller's place, which is the row, with the variable's name.
-#[track_caller]
-pub(crate) const fn demand(fits: bool, name: &str, why: &str) {
-    if fits {
-        return;
-    }
-    // A panic while compiling takes one text.
-    let (parts, mut text, mut len, mut part) = ([name, ": ", why], [0_u8; 256], 0, 0);
-    while part < parts.len() {
-        let (bytes, mut i) = (parts[part].as_bytes(), 0);
-        while i < bytes.len() && len < text.len() {
-            text[len] = bytes[i];
-            (i, len) = (i + 1, len + 1);
-        }
-        part += 1;
-    }
-    match std::str::from_utf8(text.split_at(len).0) {
-        Ok(text) => panic!("{}", text),
-        Err(_) => panic!("{}", why),
     }
 }

@@ -117,7 +117,7 @@ fn misplaced<E: Exported>(entry: &'static Entry, instance: &Instance<E>) -> Faul
     Fault::new(format!("not allowed in the state {state}; allowed in: {allowed}"))
 }
 
-fn panicked(payload: &(dyn Any + Send)) -> Fault {
+pub(super) fn panicked(payload: &(dyn Any + Send)) -> Fault {
     let text = payload.downcast_ref::<&str>().copied();
     let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
     Fault::new(format!("a fault in the model's code (panic): {}", text.unwrap_or("no message")))

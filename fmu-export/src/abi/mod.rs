@@ -86,7 +86,7 @@ impl<E: Exported> Abi<'_, E> {
             description.token.push_str(&made.suffix);
             serde_json::to_string(&description).map_err(|e| Fault::new(e.to_string()))
         });
-        let json = json.unwrap_or_else(|_| Err(Fault::new("a fault in the model's code (panic)")));
+        let json = json.unwrap_or_else(|payload| Err(gate::panicked(payload.as_ref())));
         let (text, status) = match json {
             Ok(text) => (text, 0),
             Err(fault) => (fault.to_string(), 1),
@@ -224,6 +224,8 @@ macro_rules! export {
                 const CAN: $crate::Capabilities<$model> =
                     $crate::Capabilities::<$model>::NONE$(.$first()$(.$more())*)?;
             }
+
+            const _: () = $crate::check::<This>();
 
             $crate::export_fmi2!(This);
             $crate::export_fmi3!(This);

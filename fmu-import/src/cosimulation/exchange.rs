@@ -3,7 +3,6 @@
 use super::Schedule;
 use super::parts::Port;
 use crate::{Error, Instance, Values};
-use model_description::BaseType;
 
 /// Source of an input.
 #[derive(Clone)]
@@ -32,6 +31,11 @@ pub(super) struct Wiring {
 impl Wiring {
     pub(super) fn add(&mut self, target: Port, source: Source, continuous: bool) {
         self.feeds.push(Feed { target, source, continuous });
+    }
+
+    /// Whether the variable with this reference is fed, or an element of it.
+    pub(super) fn feeds_any(&self, instance: usize, reference: Option<u32>) -> bool {
+        self.feeds.iter().any(|Feed { target, .. }| target.instance == instance && Some(target.reference) == reference)
     }
 
     pub(super) fn feeds(&self, instance: usize, name: &str) -> bool {
@@ -98,7 +102,7 @@ impl Exchange {
         for (index, source) in sources.enumerate() {
             let Source::Port(port) = source else { continue };
             let traffic = &mut traffic[port.instance];
-            if port.base != BaseType::Float64 {
+            if !port.is_fast() {
                 if !traffic.read_singly.contains(port) {
                     traffic.read_singly.push(port.clone());
                 }
@@ -118,7 +122,7 @@ impl Exchange {
         for Feed { target, source, continuous } in continuous.into_iter().chain(discrete) {
             let place = place(&traffic, source);
             let traffic = &mut traffic[target.instance];
-            let fast = target.base == BaseType::Float64;
+            let fast = target.is_fast();
             if fast {
                 traffic.references.push(target.reference);
                 traffic.write.push((target.reference, place));
@@ -274,7 +278,13 @@ impl Exchange {
 
 fn write_single(instance: &mut Instance, port: &Port, value: f64) -> Result<(), Error> {
     let value = Values::from_number(value, port.base).map_err(|cause| Error::usage(instance.name(), cause))?;
-    instance.set_at(port.base, port.reference, &value)
+    let Some((element, count)) = port.element else { return instance.set_at(port.base, port.reference, &value) };
+    // The other elements stay.
+    let mut all = instance.get_at(port.base, port.reference, count)?;
+    if !all.replace(element, &value) {
+        return Err(Error::usage(instance.name(), format!("{} has no such element", port.name)));
+    }
+    instance.set_at(port.base, port.reference, &all)
 }
 
 impl Traffic {
@@ -285,7 +295,8 @@ impl Traffic {
             instance.get_reals(&self.read[..fast], &mut numbers[..fast])?;
         }
         for (port, value) in self.read_singly[..single].iter().zip(others) {
-            *value = instance.get_at(port.base, port.reference, 1)?.number().unwrap_or(f64::NAN);
+            let (element, count) = port.element.unwrap_or((0, 1));
+            *value = instance.get_at(port.base, port.reference, count)?.number_at(element).unwrap_or(f64::NAN);
         }
         Ok(())
     }
@@ -294,6 +305,6 @@ impl Traffic {
     fn slot(&self, port: &Port) -> usize {
         let fast = || self.read.iter().position(|reference| *reference == port.reference);
         let slow = || self.read_singly.iter().position(|p| p == port).map(|i| i + self.read.len());
-        (if port.base == BaseType::Float64 { fast() } else { slow() }).unwrap_or_default()
+        (if port.is_fast() { fast() } else { slow() }).unwrap_or_default()
     }
 }

@@ -43,7 +43,7 @@ pub use crate::integration::Solver;
 pub use grid::Settings;
 pub use method::{Integration, Method};
 pub use plan::{Plan, Target, Worker};
-pub use recording::{Column, Recording, item};
+pub use recording::{Column, Recording, TextColumn, item};
 pub use run::{Ended, Point};
 pub use schedule::Schedule;
 
@@ -66,6 +66,8 @@ pub struct System {
     records: Vec<Port>,
     /// Names of the recorded columns.
     columns: Vec<String>,
+    /// Texts that a single run records, with the names of their columns.
+    texts: Vec<(Port, String)>,
 }
 
 impl System {
@@ -98,15 +100,31 @@ impl System {
         take_messages(&self.instances)
     }
 
-    /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text.
+    /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text. An element of an array
+    /// leaves the others as they were set, or as they start.
     ///
     /// # Errors
     /// The variable does not exist, the text is not a value of its type, or the FMU refuses.
     pub fn set(&mut self, port: &str, text: &str) -> Result<(), Error> {
         let port = self.parts.port(port)?;
-        let values = self.instances[port.instance].parse(&port.name, text)?;
-        self.instances[port.instance].set(&port.name, &values)?;
-        self.set.push((port, values));
+        let (index, description) = (port.instance, self.parts.0[port.instance].description());
+        let variable = self.parts.variable(index, &port.name)?;
+        let wrong = |cause: String| Error::usage(self.instances[index].name(), cause);
+        let read = |text: &str| Values::read(text, variable, description).map_err(wrong);
+        let mut values = read(text)?;
+        let mut whole = port;
+        if let Some((element, count)) = whole.element.take() {
+            let one = values;
+            let name = std::mem::replace(&mut whole.name, variable.name.clone());
+            let before = self.value_set(index, &whole.name).cloned();
+            values = before.map_or_else(|| read(variable.start.as_deref().unwrap_or_default()), Ok)?;
+            if values.len() != count || !values.replace(element, &one) {
+                return Err(wrong(format!("{name} = {text} is not one value, or the start values are not known")));
+            }
+        }
+        self.instances[index].set(&whole.name, &values)?;
+        self.set.pop_if(|(last, _)| *last == whole);
+        self.set.push((whole, values));
         Ok(())
     }
 
@@ -189,6 +207,27 @@ impl System {
         Ok(())
     }
 
+    /// Records a variable that is a text under this name, in a single run.
+    ///
+    /// # Errors
+    /// The variable does not exist or is not a text.
+    pub fn record_text_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
+        if !self.is_text(port)? {
+            return Err(Error::usage(port, "is not a text"));
+        }
+        self.texts.push((self.parts.port(port)?, name.into()));
+        Ok(())
+    }
+
+    /// Whether a variable, written `instance.variable`, is one text.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn is_text(&self, port: &str) -> Result<bool, Error> {
+        let port = self.parts.port(port)?;
+        Ok(port.base == BaseType::String && !self.parts.variable(port.instance, &port.name)?.is_array())
+    }
+
     /// Whether a connection or a schedule feeds an input, written `instance.variable`.
     ///
     /// # Errors
@@ -200,7 +239,9 @@ impl System {
 
     /// The inputs of an instance that must be fed and are neither fed nor set: they keep their start values.
     pub fn untouched(&self, instance: usize) -> Vec<&ModelVariable> {
-        let touched = |name: &str| self.wiring.feeds(instance, name) || self.value_set(instance, name).is_some();
+        let reference = |name: &str| self.parts.variable(instance, name).map(|v| v.value_reference).ok();
+        let touched =
+            |name: &str| self.wiring.feeds_any(instance, reference(name)) || self.value_set(instance, name).is_some();
         let is_free =
             |v: &&ModelVariable| v.causality == Causality::Input && v.base != BaseType::Clock && !touched(&v.name);
         let needed = |v: &&ModelVariable| match Need::of(v.description.as_deref().unwrap_or_default()) {
@@ -240,14 +281,19 @@ impl System {
     /// # Errors
     /// The variables come from the descriptions, so no error is known.
     pub fn record_outputs(&mut self) -> Result<(), Error> {
-        self.outputs().iter().try_for_each(|port| self.record(port))
+        self.outputs().iter().try_for_each(|port| self.record(port))?;
+        let texts = self.scalar_outputs(|base| base == BaseType::String);
+        texts.iter().try_for_each(|port| self.record_text_as(port, port))
     }
 
     /// All numeric outputs of all instances, written `instance.variable`.
     pub fn outputs(&self) -> Vec<String> {
+        self.scalar_outputs(|base| kind(base).is_some())
+    }
+
+    fn scalar_outputs(&self, of: impl Fn(BaseType) -> bool) -> Vec<String> {
         let outputs = |i: &Instance| {
-            let is_scalar =
-                |v: &&ModelVariable| v.causality == Causality::Output && !v.is_array() && kind(v.base).is_some();
+            let is_scalar = |v: &&ModelVariable| v.causality == Causality::Output && !v.is_array() && of(v.base);
             let name = |v: &ModelVariable| format!("{}.{}", i.name(), v.name);
             i.description().variables.iter().filter(is_scalar).map(name).collect::<Vec<_>>()
         };

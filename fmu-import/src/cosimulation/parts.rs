@@ -3,6 +3,7 @@
 use super::Column;
 use crate::quantity::suggest;
 use crate::{Error, Fmu, Kind};
+use fmu_core::variable::position;
 use model_description::{BaseType, Causality, Initial, ModelDescription, ModelVariable, Variability};
 
 /// A variable of one of the instances.
@@ -12,6 +13,15 @@ pub(super) struct Port {
     pub(super) name: String,
     pub(super) reference: u32,
     pub(super) base: BaseType,
+    /// An element of an array, and the number of elements of the array.
+    pub(super) element: Option<(usize, usize)>,
+}
+
+impl Port {
+    /// Whether it is a double-precision number with a value reference of its own.
+    pub(super) fn is_fast(&self) -> bool {
+        self.base == BaseType::Float64 && self.element.is_none()
+    }
 }
 
 /// An FMU with the name of its instance.
@@ -38,14 +48,23 @@ impl Parts {
     pub(super) fn port(&self, text: &str) -> Result<Port, Error> {
         let (instance, name) = self.instance_and_rest(text, "VARIABLE")?;
         let variable = self.variable(instance, name)?;
-        Ok(Port { instance, reference: variable.value_reference, base: variable.base, name: name.to_owned() })
+        let description = self.0[instance].description();
+        let is_named = description.variable(name).is_some();
+        let element = if is_named { None } else { description.element(name) };
+        let count = || description.shape(variable).unwrap_or_default().iter().product();
+        let element = element.map(|(_, element)| (element, count()));
+        let (reference, base) = (variable.value_reference, variable.base);
+        Ok(Port { instance, reference, base, name: name.to_owned(), element })
     }
 
     /// A port that is one number.
     pub(super) fn scalar(&self, text: &str) -> Result<Port, Error> {
         let port = self.port(text)?;
-        if self.variable(port.instance, &port.name)?.is_array() {
-            return Err(Error::usage(text, "is an array; only scalars can be connected, fed, varied and recorded"));
+        let variable = self.variable(port.instance, &port.name)?;
+        if variable.is_array() && port.element.is_none() {
+            let shape = self.0[port.instance].description().shape(variable).unwrap_or_default();
+            let cause = "is an array; only scalars can be connected, fed, varied and recorded";
+            return Err(Error::usage(text, format!("{cause}: name an element, {text}{}", position(&shape, 0))));
         }
         if kind(port.base).is_none() {
             return Err(Error::usage(
@@ -59,6 +78,9 @@ impl Parts {
     /// A port that is one number and takes a value before the initialization.
     pub(super) fn settable(&self, text: &str) -> Result<Port, Error> {
         let port = self.scalar(text)?;
+        if port.element.is_some() {
+            return Err(Error::usage(text, "is an element of an array; only scalars can be varied"));
+        }
         let variable = self.variable(port.instance, &port.name)?;
         let starts = matches!(variable.initial_or_default(), Some(Initial::Exact | Initial::Approx));
         if variable.variability == Variability::Constant || !(starts || variable.causality == Causality::Input) {
@@ -68,11 +90,12 @@ impl Parts {
         Ok(port)
     }
 
+    /// The variable of this name, or the array of which it names an element.
     pub(super) fn variable(&self, instance: usize, name: &str) -> Result<&ModelVariable, Error> {
         let Part { name: of, fmu, .. } = &self.0[instance];
         let names = || fmu.description().variables.iter().map(|v| v.name.as_str());
         let none = || Error::usage(of, format!("has no variable {name}{}", suggest(name, names())));
-        fmu.description().variable(name).ok_or_else(none)
+        fmu.description().variable_or_array(name).ok_or_else(none)
     }
 
     pub(super) fn causality(&self, port: &Port) -> Causality {
@@ -103,7 +126,7 @@ impl Parts {
     /// A column for the values of a port, with the units of its variable.
     pub(super) fn column(&self, port: &Port, name: &str) -> Column {
         let description = self.0[port.instance].description();
-        let variable = description.variable(&port.name);
+        let variable = self.variable(port.instance, &port.name).ok();
         let unit = variable.and_then(|v| v.unit.clone());
         let display = variable.and_then(|v| description.display_unit(v, None));
         let definition = variable.and_then(|v| description.type_definition(v.declared_type.as_ref()?));

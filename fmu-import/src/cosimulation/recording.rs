@@ -30,6 +30,15 @@ impl Column {
     }
 }
 
+/// A recorded text.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TextColumn {
+    /// `instance.variable`.
+    pub name: String,
+    /// One text for each communication point.
+    pub values: Vec<String>,
+}
+
 /// Columns over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
@@ -37,6 +46,8 @@ pub struct Recording {
     pub time: Vec<f64>,
     /// The recorded variables, in the order they were asked for.
     pub columns: Vec<Column>,
+    /// The recorded texts, in the order they were asked for.
+    pub texts: Vec<TextColumn>,
     /// The instance that asked to end the simulation, if one did.
     pub ended_by: Option<String>,
 }
@@ -56,16 +67,19 @@ impl Recording {
         self.columns.iter().find(|c| c.name == name)
     }
 
-    /// Comma-separated, one header line; every number reads back to the same double.
+    /// Comma-separated, one header line; every number reads back to the same double. Texts follow the numbers, in quotation marks
+    /// where they need them (RFC 4180).
     ///
     /// # Errors
     /// As the writer's.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
-        let names: Vec<_> = std::iter::once("time").chain(self.columns.iter().map(|c| c.name.as_str())).collect();
+        let columns = self.columns.iter().map(|c| c.name.as_str()).chain(self.texts.iter().map(|c| c.name.as_str()));
+        let names: Vec<_> = std::iter::once("time").chain(columns).collect();
         writeln!(out, "{}", names.join(","))?;
         for (k, t) in self.time.iter().enumerate() {
             write!(out, "{t}")?;
             self.columns.iter().try_for_each(|c| write!(out, ",{}", c.values[k]))?;
+            self.texts.iter().try_for_each(|c| write!(out, ",{}", cell(&c.values[k])))?;
             writeln!(out)?;
         }
         out.flush()
@@ -74,17 +88,25 @@ impl Recording {
     /// The last values as a table, with the display unit where there is one.
     pub fn last_values(&self) -> String {
         // Longer names of other tools break their own row alone.
-        let width = self.columns.iter().map(|c| c.name.len()).max().unwrap_or(0).min(200);
+        let texts = || self.texts.iter().filter_map(|c| Some((c.name.as_str(), c.values.last()?)));
+        let names = self.columns.iter().map(|c| c.name.as_str()).chain(texts().map(|(name, _)| name));
+        let width = names.map(str::len).max().unwrap_or(0).min(200);
         let row = |c: &Column| {
             let x = c.values.last().copied().unwrap_or(f64::NAN);
             let value = c.item(x).map_or_else(|| six(x), str::to_owned);
             let shown = c.display.as_ref().map(|d| format!("  = {} {}", six(d.show(x)), d.name));
             format!("{:width$}  {:>12} {}{}", c.name, value, c.unit, shown.unwrap_or_default()).trim_end().to_owned()
         };
-        let rows: Vec<String> = self.columns.iter().map(row).collect();
+        let text = |(name, value): (&str, &String)| format!("{name:width$}  {value:?}");
+        let rows: Vec<String> = self.columns.iter().map(row).chain(texts().map(text)).collect();
         let time = self.time.last().copied().unwrap_or(f64::NAN);
         format!("{:width$}  {:>12} s\n{}", "time", six(time), rows.join("\n"))
     }
+}
+
+/// A text as CSV has it.
+fn cell(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 
 /// The name of the value `x` among those of an enumeration.
@@ -121,6 +143,19 @@ mod tests {
         let mut text = Vec::new();
         recording().write_csv(&mut text).unwrap();
         assert_eq!(text, b"time,p.speed\n0,0.30000000000000004\n0.0001,104.71975511965977\n");
+    }
+
+    #[test]
+    fn texts_follow_the_numbers() {
+        let mut recording = recording();
+        let values = vec!["off".into(), "a \"b\", c\nd".into()];
+        recording.texts.push(TextColumn { name: "p.status".into(), values });
+        let mut text = Vec::new();
+        recording.write_csv(&mut text).unwrap();
+        let expected = "time,p.speed,p.status\n0,0.30000000000000004,off\n\
+                        0.0001,104.71975511965977,\"a \"\"b\"\", c\nd\"\n";
+        assert_eq!(String::from_utf8(text).unwrap(), expected);
+        assert!(recording.last_values().ends_with("\np.status  \"a \\\"b\\\", c\\nd\""), "{}", recording.last_values());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::exchange::Exchange;
 use super::grid::Grid;
 use super::method::Method;
-use super::{Recording, Settings, System, continuous, events, take_messages};
+use super::{Recording, Settings, System, TextColumn, continuous, events, take_messages};
 use crate::{Error, Instance, Kind, Message};
 use std::ops::ControlFlow;
 
@@ -134,8 +134,15 @@ impl System {
         let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
         let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
         let mut recording = Recording::new(self.columns());
+        recording.texts =
+            self.texts.iter().map(|(_, name)| TextColumn { name: name.clone(), values: vec![] }).collect();
+        let texts = &self.texts;
         let ended = simulate(&self.method, &mut self.instances, &mut exchange, &grid, &mut Vec::new(), |point| {
             recording.push(point.time, point.values);
+            for ((port, _), column) in texts.iter().zip(&mut recording.texts) {
+                let value = point.instances[port.instance].get_at(port.base, port.reference, 1)?;
+                column.values.push(value.to_string());
+            }
             hook(point)
         })?;
         recording.ended_by = ended.by;

@@ -229,9 +229,13 @@ impl Loaded {
     /// Records a connector of the system, or `component.variable`.
     ///
     /// # Errors
-    /// The variable does not exist or is not a number.
+    /// The variable does not exist, or is neither a number nor a text.
     pub fn record(&mut self, name: &str) -> Result<()> {
-        Ok(self.system.record_as(&self.connectors.source(name)?, name)?)
+        let port = self.connectors.source(name)?;
+        if self.system.is_text(&port)? {
+            return Ok(self.system.record_text_as(&port, name)?);
+        }
+        Ok(self.system.record_as(&port, name)?)
     }
 
     /// Records all outputs of the system, or those of all FMUs where it has none.
@@ -341,7 +345,7 @@ impl Loaded {
             for port in ports {
                 let has = |i: &crate::Instance| {
                     let variable = port.strip_prefix(i.name())?.strip_prefix('.')?;
-                    i.description().variable(variable).map(|_| (i.name().to_owned(), variable.to_owned()))
+                    i.description().variable_or_array(variable).map(|_| (i.name().to_owned(), variable.to_owned()))
                 };
                 match self.system.instances().iter().find_map(has) {
                     Some((instance, name)) => {

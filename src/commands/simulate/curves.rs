@@ -65,7 +65,7 @@ mod tests {
             values: vec![0.0, 1.0, f64::NAN],
         };
         let columns = vec![column("c.i_a_ref", "A"), column("p.speed", ""), column("p.i_q", "A"), column("p.i_a", "A")];
-        let figure = figure(&Recording { time: vec![0.0, 0.5, 1.0], columns, ended_by: None });
+        let figure = figure(&Recording { time: vec![0.0, 0.5, 1.0], columns, ..Recording::default() });
         let [currents, speed] = &figure.panels[..] else { panic!("{figure:?}") };
         assert_eq!((currents.unit.as_str(), speed.unit.as_str(), speed.window), ("A", "no unit", (0.0, 1.0)));
         let shown: Vec<_> = currents.curves.iter().map(|c| (c.ink, c.dashed)).collect();

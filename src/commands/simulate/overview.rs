@@ -40,7 +40,7 @@ pub(super) fn overview(recording: &Recording) -> Recording {
             columns.push(column.clone());
         }
     }
-    Recording { columns, time: recording.time.clone(), ended_by: recording.ended_by.clone() }
+    Recording { columns, time: recording.time.clone(), ended_by: recording.ended_by.clone(), ..Recording::default() }
 }
 
 /// The last values of the first plot: a line per panel, in its unit. Names of variables omit the instance `alone`.
@@ -85,7 +85,7 @@ mod tests {
             items: Vec::new(),
             values: vec![0.0, 3.0],
         };
-        Recording { time: vec![0.0, 1.0], columns: names.iter().map(column).collect(), ended_by: None }
+        Recording { time: vec![0.0, 1.0], columns: names.iter().map(column).collect(), ..Recording::default() }
     }
 
     fn shown(names: &[(&str, &str)]) -> Vec<String> {

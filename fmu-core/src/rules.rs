@@ -1,0 +1,142 @@
+//! What the compiler checks of a model. A panic while compiling is an error whose text names the row, the state or the model.
+
+use crate::capability::Exported;
+use crate::model::Model;
+use crate::row::{Access, Row};
+use crate::variable::{Causality, Kind, Meta, Variability};
+
+/// Checks a model as it is exported: its name, and that its states have rows. The line that exports a model calls it.
+///
+/// # Panics
+/// At compile time: the name is not a C identifier (`modelIdentifier` of FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.2.2), or a state has no
+/// continuous real row that is an output or a local variable. Describing the model checks the rows of parts.
+#[track_caller]
+pub const fn check<E: Exported>() {
+    let model = E::Model::INFO.name;
+    let rule =
+        "INFO.name must be a C identifier, as modelIdentifier of FMI is: a letter or _, then letters, digits and _";
+    demand(is_identifier(model), model, rule);
+    let (rows, states, can) = (E::Model::TABLE.rows, E::CAN.states().len(), E::CAN);
+    let mut i = 0;
+    while i < states {
+        let name = can.states()[i].name;
+        let mut other = 0;
+        while other < i {
+            let twice = same_text(can.states()[other].name, name);
+            demand(!twice, name, "two states have this name");
+            other += 1;
+        }
+        check_state(rows, model, name);
+        i += 1;
+    }
+}
+
+#[track_caller]
+const fn check_state<W>(rows: &[Row<W>], model: &str, name: &str) {
+    let mut row = 0;
+    while row < rows.len() {
+        let meta = &rows[row].meta;
+        if let Access::Part { .. } = rows[row].access {
+            // The compiler cannot read the names of a part's rows.
+            if starts_with(name, meta.name) {
+                return;
+            }
+        } else if same_text(meta.name, name) {
+            demand(meta.dimension.is_none(), name, "an array cannot be a state: write a row for each element");
+            demand(can_be_state(meta), name, "the row of a state is V::output or V::state");
+            return;
+        }
+        row += 1;
+    }
+    fail(&["STATES of ", model, ": no row of the table has the name ", name]);
+}
+
+/// Whether a row can hold a continuous state.
+pub(crate) const fn can_be_state(meta: &Meta) -> bool {
+    matches!(meta.variability, Variability::Continuous)
+        && meta.dimension.is_none()
+        && matches!(meta.kind, Kind::Real(_))
+        && matches!(meta.causality, Causality::Output | Causality::Local)
+}
+
+/// Checks the number of states that a model gives to an integrator.
+///
+/// # Panics
+/// At compile time, if it is another.
+#[track_caller]
+pub(crate) const fn check_number<M: Model>(states: usize, given: usize) {
+    let (mut of_model, mut of_call) = ([0; 20], [0; 20]);
+    if states != given {
+        let (states, given) = (digits(states, &mut of_model), digits(given, &mut of_call));
+        fail(&["STATES of ", M::INFO.name, " has the length ", states, ", and its integrator is made for ", given]);
+    }
+}
+
+/// A compile-time check of a row. The error is shown at the caller's place, which is the row, with the variable's name.
+#[track_caller]
+pub(crate) const fn demand(fits: bool, name: &str, why: &str) {
+    if !fits {
+        fail(&[name, ": ", why]);
+    }
+}
+
+/// An error of the compiler with this text.
+#[track_caller]
+const fn fail(parts: &[&str]) -> ! {
+    // A panic while compiling takes one text.
+    let (mut text, mut len, mut part) = ([0_u8; 256], 0, 0);
+    while part < parts.len() {
+        let (bytes, mut i) = (parts[part].as_bytes(), 0);
+        while i < bytes.len() && len < text.len() {
+            text[len] = bytes[i];
+            (i, len) = (i + 1, len + 1);
+        }
+        part += 1;
+    }
+    match std::str::from_utf8(text.split_at(len).0) {
+        Ok(text) => panic!("{}", text),
+        Err(_) => panic!("{}", parts[parts.len() - 1]),
+    }
+}
+
+/// A number in decimal.
+#[expect(clippy::cast_possible_truncation, reason = "a digit")]
+const fn digits(mut number: usize, text: &mut [u8; 20]) -> &str {
+    let mut first = text.len();
+    while first == text.len() || number > 0 {
+        first -= 1;
+        text[first] = b'0' + (number % 10) as u8;
+        number /= 10;
+    }
+    match std::str::from_utf8(text.split_at(first).1) {
+        Ok(text) => text,
+        Err(_) => "",
+    }
+}
+
+const fn is_identifier(name: &str) -> bool {
+    let (bytes, mut i) = (name.as_bytes(), 0);
+    while i < bytes.len() {
+        if !(bytes[i] == b'_' || bytes[i].is_ascii_alphabetic() || i > 0 && bytes[i].is_ascii_digit()) {
+            return false;
+        }
+        i += 1;
+    }
+    !bytes.is_empty()
+}
+
+const fn starts_with(text: &str, start: &str) -> bool {
+    let (text, start, mut i) = (text.as_bytes(), start.as_bytes(), 0);
+    while i < start.len() {
+        if i >= text.len() || text[i] != start[i] {
+            return false;
+        }
+        i += 1;
+    }
+    true
+}
+
+/// Whether two texts are equal.
+pub(crate) const fn same_text(a: &str, b: &str) -> bool {
+    a.len() == b.len() && starts_with(a, b)
+}

@@ -1,0 +1,147 @@
+//! What the compiler says of rows and models that contradict themselves: a crate of its own, built by Cargo.
+#![allow(missing_docs)]
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// A wrong program: its name, its source, what the error says, and the line that the error is at.
+struct Wrong {
+    name: &'static str,
+    source: String,
+    why: &'static str,
+    line: usize,
+}
+
+/// A table with a wrong row.
+fn row(name: &'static str, row: &str, why: &'static str, line: usize) -> Wrong {
+    let source = format!(
+        "use fmu_core::{{Row, Table, table, unit::VOLT}};\n\
+         struct M {{ u: f64, on: bool, a: [f64; 4], t: String, f: f32 }} type V = Row<M>;\n\
+         const TABLE: &Table<M> = table![\n    V::input(\"u\", &VOLT, \"\", |m| &mut m.u),\n    \
+         {row},\n];\nfn main() {{ let _ = TABLE.len(); }}\n"
+    );
+    Wrong { name, source, why, line }
+}
+
+/// A model that is exported with the first text of `change` replaced by the second.
+fn model(name: &'static str, change: (&str, &str), why: &'static str, line: usize) -> Wrong {
+    const RIGHT: &str = r#"use fmu_core::*;
+use fmu_core::unit::*;
+#[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
+struct Ball { h: f64, v: f64, a: [f64; 2] }
+type V = Row<Block<Ball>>;
+impl Model for Ball {
+    type Outputs = ();
+    const INFO: Info = Info { name: "Ball", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![
+        V::state("h", &METER, "", |m| &mut m.model.h),
+        V::discrete_local("v", &METER_PER_S, "", |m| &mut m.model.v),
+        V::array_local("a", &METER, "", 2, |m| &mut m.model.a),
+    ];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, (): &mut ()) {}
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        integrate::smooth::<Self, 1>(self, step, 1.0)
+    }
+}
+impl ContinuousTime for Ball {
+    const STATES: &'static [State<Self>] = &[
+        State::new("h", &METER_PER_S, |m| &mut m.h),
+    ];
+    fn derivatives(&self, _: Elapsed, dx: &mut [f64]) -> Result<(), Fault> { dx[0] = self.v; Ok(()) }
+}
+fmu_export::export!(Ball: ContinuousTime);
+fn main() {}
+"#;
+    assert!(RIGHT.contains(change.0), "{name}");
+    Wrong { name, source: RIGHT.replacen(change.0, change.1, 1), why, line }
+}
+
+/// An enumeration and what follows it.
+fn enumeration(name: &'static str, derive: &str, rest: &str, why: &'static str, line: usize) -> Wrong {
+    let body = "enum Fan(\"FanMode\", \"\") {\n1 Off \"Stands\";\n2 On \"Turns\";\n}";
+    let source = format!("fmu_core::enumeration! {{\n{derive}\n{body}\n}}\n{rest}\n");
+    Wrong { name, source, why, line }
+}
+
+#[test]
+fn a_wrong_row_or_model_is_an_error_at_its_place() {
+    const EXPORT: usize = 26;
+    let state = |wrong: &'static str| ("State::new(\"h\"", wrong);
+    let cases = [
+        row(
+            "bound",
+            r#"V::boolean_input("on", "", |m| &mut m.on).at_least(0.0)"#,
+            "on: only a number can have a bound",
+            5,
+        ),
+        row(
+            "empty",
+            r#"V::output("x", &VOLT, "", |m| &mut m.u).above(1.0).at_most(1.0)"#,
+            "x: the bounds leave no value",
+            5,
+        ),
+        row(
+            "shape",
+            r#"V::array_input("a", &VOLT, "", 4, |m| &mut m.a).shape(&[2, 3])"#,
+            "a: the product of the extents",
+            5,
+        ),
+        row(
+            "tuned",
+            r#"V::text_parameter("t", "", |m| &mut m.t).tunable()"#,
+            "t: only a parameter of a type other than text",
+            5,
+        ),
+        row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
+        row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
+        // These two show in the table, whose start is in line 3.
+        row("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
+        row("empty_array", r#"V::array_input("a", &VOLT, "", 0, |m| &mut m.a)"#, "a: an array needs an element", 3),
+        model("hyphen", (r#"name: "Ball""#, r#"name: "My-Ball""#), "My-Ball: INFO.name must be a C identifier", EXPORT),
+        model("digit", (r#"name: "Ball""#, r#"name: "2Balls""#), "2Balls: INFO.name must be a C identifier", EXPORT),
+        model("nameless", (r#"name: "Ball", "#, ""), ": INFO.name must be a C identifier", EXPORT),
+        model("typo", state("State::new(\"hight\""), "STATES of Ball: no row of the table has the name hight", EXPORT),
+        model("sampled", state("State::new(\"v\""), "v: the row of a state is V::output or V::state", EXPORT),
+        model("array", state("State::new(\"a\""), "a: an array cannot be a state: write a row for each", EXPORT),
+        model(
+            "double",
+            (
+                "        State::new(\"h\"",
+                "        State::new(\"h\", &METER_PER_S, |m| &mut m.h),\n        State::new(\"h\"",
+            ),
+            "h: two states have this name",
+            EXPORT + 1,
+        ),
+        model("number", ("<Self, 1>", "<Self, 12>"), "the above error was encountered while instantiating", 17),
+        model("events", ("Ball: ContinuousTime", "Ball: ContinuousTime + Events"), "`Ball` has no events", EXPORT),
+        enumeration("unmarked", "#[derive(Default)]", "fn main() {}", "no `#[default]`", 2),
+        enumeration("start", "", "#[derive(Default)]\nstruct M { fan: Fan }", "`Fan: Default` is not satisfied", 9),
+    ];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compile_errors");
+    let sources = folder.join("src/bin");
+    fs::create_dir_all(&sources).unwrap();
+    let crates = ["fmu-core", "fmu-export"].map(|name| format!("{name} = {{ path = {:?} }}\n", root.join(name)));
+    let manifest = format!(
+        "[workspace]\n[package]\nname = \"wrong\"\nedition = \"2024\"\n[profile.dev]\ndebug = 0\n[dependencies]\n{}\
+         serde = {{ version = \"1\", features = [\"derive\"] }}\n",
+        crates.concat()
+    );
+    fs::write(folder.join("Cargo.toml"), manifest).unwrap();
+    fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+    for wrong in &cases {
+        fs::write(sources.join(format!("{}.rs", wrong.name)), &wrong.source).unwrap();
+    }
+    // The number of the states shows only where code is made.
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["build", "--offline", "--keep-going", "--message-format", "short"]).current_dir(&folder);
+    let output = cargo.env("CARGO_TARGET_DIR", folder.join("target")).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("STATES of Ball has the length 1, and its integrator is made for 12"), "{said}");
+    for Wrong { name, why, line, .. } in cases {
+        let place = Path::new("src/bin").join(format!("{name}.rs:{line}:")).display().to_string();
+        assert!(said.lines().any(|l| l.starts_with(&place) && l.contains(why)), "{place} {why}: {said}");
+    }
+}
