@@ -299,7 +299,7 @@ fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
     let (done, said) =
         run(&["simulate", three, "--set", "label=a b,c", "--set", "weights=1,2,3,4,5,6", "--stop", "0.2"]);
     assert!(done && said.contains("EveryType.out.uint64"), "{said}");
-    assert!(said.contains(r#"EveryType.status"#) && said.contains(r#""a b,c""#), "{said}");
+    assert!(said.contains("EveryType.status") && said.contains(r#""a b,c""#), "{said}");
     for (option, value, why) in [
         ("--record", "sums", "recorded: name an element, sums[1]"),
         ("--input", "vector=0:1", "recorded: name an element, vector[1]"),
@@ -364,7 +364,7 @@ fn the_checker_finds_nothing() {
     for file in archives() {
         let report =
             fmu_check::run(file, &fmu_check::Options { program: program.clone(), ..Default::default() }).unwrap();
-        let found = report.violated().filter(|f| !["B03", "B04"].contains(&&*f.id)).count();
+        let found = report.violated().filter(|f| !["B03", "B04"].contains(&f.id)).count();
         assert_eq!(found, 0, "{}", report.text(false));
         assert!(report.findings.len() > 150);
     }
