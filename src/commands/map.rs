@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// Computes the efficiency map and the envelope of a machine with the values of `fmu tune`.
 ///
 /// The map covers speed and torque at the shaft in both quadrants, for each DC-link voltage and temperature. It counts the losses
-/// of copper, iron, inverter and friction that the motor file describes ([iron], [inverter], [mechanics]). Points of it are
+/// of copper, iron, inverter and friction that the motor file describes (its tables iron, inverter and mechanics). Points of it are
 /// compared with PmsmDrive; if one differs by more than 0.1 % of its power or 1 % of a loss, nothing is written.
 ///
 /// Writes map.csv (a line per point), envelope.csv, map.npz (for numpy.load), map.svg and map.html, which needs no network, and
