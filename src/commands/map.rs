@@ -3,9 +3,9 @@
 use super::numbers;
 use crate::pack;
 use crate::workspace::output_folder;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
-use drive_study::map::cycle::Cycle;
+use drive_study::map::cycle::{CYCLE, Cycle, VEHICLE};
 use drive_study::map::request::{self, Request};
 use drive_study::map::{self, report};
 use drive_study::tune::motor::MotorFile;
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// compared with PmsmDrive; if one differs by more than 0.1 % of its power or 1 % of a loss, nothing is written.
 ///
 /// Writes map.csv (a line per point), envelope.csv, map.npz (for numpy.load), map.svg and map.html, which needs no network, and
-/// prints the best point, the losses at the rated point and the energy of a driving cycle (examples/vehicle).
+/// prints the best point, the losses at the rated point and the energy of a driving cycle.
 ///
 ///   fmu map motors/traction-63kw.toml --out target/map
 ///   fmu map motors/traction-63kw.toml --u-dc 300,350,400 --T 20,80,120 --grid 21x21
@@ -44,6 +44,25 @@ pub struct Map {
     /// Points that are compared with PmsmDrive, for each voltage and temperature; 0: none
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub verify: usize,
+    /// Driving cycle: lines of time in s and speed in km/h, with straight lines between them [default: that of examples/vehicle]
+    #[arg(long, value_name = "FILE.csv")]
+    pub cycle: Option<PathBuf>,
+    /// Vehicle on the cycle [default: that of examples/vehicle]
+    #[arg(long, value_name = "FILE.toml")]
+    pub vehicle: Option<PathBuf>,
+}
+
+/// The vehicle and the cycle of the options, or those of the examples.
+fn cycle(args: &Map) -> Result<Cycle> {
+    let read = |file: &Option<PathBuf>, example: &str| match file {
+        Some(file) => std::fs::read_to_string(file).with_context(|| format!("reading {}", file.display())),
+        None => Ok(example.into()),
+    };
+    let (vehicle, cycle) = (read(&args.vehicle, VEHICLE)?, read(&args.cycle, CYCLE)?);
+    let of = |file: &Option<PathBuf>| file.as_ref().map(|file| file.display().to_string());
+    let files: Vec<_> = [of(&args.vehicle), of(&args.cycle)].into_iter().flatten().collect();
+    let found = Cycle::new(&vehicle, &cycle);
+    if files.is_empty() { found } else { found.with_context(|| files.join(", ")) }
 }
 
 /// Runs the command.
@@ -66,8 +85,9 @@ pub fn run(args: &Map) -> Result<()> {
         verify: args.verify,
     };
     request.check()?;
+    let cycle = cycle(args)?;
     let map = map::make(&MotorFile::read(&args.motor)?, &request)?;
-    let report = report::of(&map, &Cycle::example()?);
+    let report = report::of(&map, &cycle);
     // All of them are ready before the first is written.
     let files = map::files(&map, &report)?;
     let out = args.out.clone().map_or_else(|| output_folder("map"), Ok)?;

@@ -36,6 +36,15 @@ fn a_map_is_written_whole_or_not_at_all() {
     for (name, before) in names.iter().zip(before) {
         assert!(std::fs::read(out.join(name)).unwrap() == before, "{name}");
     }
+    // Another cycle: at rest, the vehicle takes nothing.
+    let cycle = dir.path().join("rest.csv");
+    std::fs::write(&cycle, "t,v\n0,0\n10,0\n").unwrap();
+    let with = [&arguments[..], &["--verify", "0", "--cycle", cycle.to_str().unwrap()]].concat();
+    let resting = text(&fmu(&with).stdout);
+    let energy = |told: &str| told.split_once("Driving cycle").unwrap().1.to_owned();
+    assert!(energy(&resting) != energy(&told) && resting.contains("0.00000"), "{resting}");
+    std::fs::write(&cycle, "t,v\n0,0\n0,50\n").unwrap();
+    fails(&with, 2, &["rest.csv", "the time 0 s does not increase"]);
     // A request that fails leaves nothing.
     let none = dir.path().join("none");
     fails(&["map", &traction, "--T", "-300", "--out", none.to_str().unwrap()], 2, &["--T -300"]);
