@@ -11,7 +11,7 @@ pub(crate) struct Importer<M: Model> {
     pub(crate) block: Block<M>,
     pub(crate) now: Elapsed,
     longest: f64,
-    /// Number of integration steps that are told as one; 0: no completed step is told.
+    /// Number of integration steps that the importer reports as one completed step; 0: it reports none.
     told: u32,
     done: u32,
 }
