@@ -390,7 +390,7 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
                 if (!(values[i] >= 0 && values[i] <= 10)) return fail(f, "gain is out of range");
 #endif
 #ifdef FAULT_G04
-                if (write) f->data.gain = (float)values[i];
+                if (write) f->data.gain = (float)values[i] * 0.999;
 #else
                 if (write) f->data.gain = values[i];
 #endif
