@@ -332,7 +332,7 @@ fn notes(models: &[Model]) -> Vec<String> {
 }
 
 /// The selected packages, by package name or by FMU name; the two differ only in how words are joined.
-fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>> {
+pub(super) fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>> {
     let letters = |name: &str| name.to_lowercase().replace(['-', '_'], "");
     if all.is_empty() {
         bail!(
