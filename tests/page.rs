@@ -118,7 +118,10 @@ fn what_is_wrong_in_a_page_toml_is_named() {
         ("inputs = [\"speed_reff\"]", "inputs: PmsmDrive has no variable speed_reff; did you mean speed_ref?"),
         ("inputs = [\"speed\"]", "inputs: speed is not an input"),
         ("parameters = [\"tau_load\"]", "parameters: tau_load is not a parameter"),
-        ("[range]\n\"plant.motor.R_s\" = [\"-1 Ohm\", 3]", "range of plant.motor.R_s: plant.motor.R_s = -1 Ohm is not greater"),
+        (
+            "[range]\n\"plant.motor.R_s\" = [\"-1 Ohm\", 3]",
+            "range of plant.motor.R_s: plant.motor.R_s = -1 Ohm is not greater",
+        ),
         ("[range]\nspeed_ref = [\"1 V\", \"2 V\"]", "range of speed_ref: "),
         ("[range]\nspeed_ref = [2, 1]", "range of speed_ref: 2 is not below 1"),
         ("[[plot]]\ntitle = \"A\"\ncurves = [\"plant.motor.R_s\"]", "plot \"A\": plant.motor.R_s is not a curve"),
@@ -135,7 +138,10 @@ fn what_is_wrong_in_a_page_toml_is_named() {
         (&preset("set = { \"plant.motor.R_s\" = 0 }"), "set: plant.motor.R_s = 0 is not greater than 0"),
         (&preset("set = { speed = 1 }"), "set: speed is not an input or a parameter with one value"),
         (&preset("set = { \"controller.estimator\" = \"Magic\" }"), "is not one of Rasmussen, DirectEmf"),
-        (&preset("events = [[2.0, \"tau_load\", 1]]\nstop = 1"), "event at 2 s: it is not between the start and the stop, 1 s"),
+        (
+            &preset("events = [[2.0, \"tau_load\", 1]]\nstop = 1"),
+            "event at 2 s: it is not between the start and the stop, 1 s",
+        ),
         (&preset("events = [[0.0005, \"tau_load\", 1]]"), "event at 0.0005 s: it is between two steps of 0.001 s"),
         (&preset("events = [[0.1, \"plant.motor.psi_M\", 1]]"), "does not change in a run"),
         (&preset("stop = -1"), "stop = -1 s is not after the start"),
@@ -145,7 +151,7 @@ fn what_is_wrong_in_a_page_toml_is_named() {
         let got = refused(own);
         assert!(got.starts_with("page.toml: ") && got.contains(why) && !got.contains('\n'), "{own}\n{got}\nnot {why}");
     }
-    let many: String = (0..51).map(|k| format!("[[preset]]\ntitle = \"{k}\"\n")).collect();
+    let many = (0..51).fold(String::new(), |all, k| all + &format!("[[preset]]\ntitle = \"{k}\"\n"));
     assert!(refused(&many).contains("51 presets, and 50 are the most"));
     assert!(Own::read(&" ".repeat(1 << 21)).unwrap_err().contains("are the most"));
 }
@@ -169,7 +175,8 @@ fn a_page_stands_alone_and_knows_the_model() {
     common::pages::stands_alone(&html, |_| false);
     let json = html.split_once("id=\"fmu\">").unwrap().1.split_once("</script>").unwrap().0;
     let json: Value = serde_json::from_str(json).unwrap();
-    let variable = |name: &str| json["variables"].as_array().unwrap().iter().find(|v| v["name"] == name).unwrap().clone();
+    let variable =
+        |name: &str| json["variables"].as_array().unwrap().iter().find(|v| v["name"] == name).unwrap().clone();
     assert_eq!(variable("speed_ref")["display"][0], "rpm");
     assert_eq!(variable("plant.motor.R_s")["range"], json!([0.5, 5.0]));
     assert_eq!(variable("controller.estimator")["type"], "Estimator");
@@ -206,7 +213,8 @@ fn pages_in_a_browser() {
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).unwrap();
     let make = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_fmu")).arg("page").args(arguments).arg("--out").arg(&folder).output();
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_fmu")).arg("page").args(arguments).arg("--out").arg(&folder).output();
         let output = output.unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     };
@@ -226,9 +234,11 @@ fn pages_in_a_browser() {
         compare: false,
     };
     let outputs = drive().variables.into_iter();
-    let names: Vec<String> = outputs.filter(|v| v.causality == fmu_core::Causality::Output && !v.is_array()).map(|v| v.name).collect();
+    let names: Vec<String> =
+        outputs.filter(|v| v.causality == fmu_core::Causality::Output && !v.is_array()).map(|v| v.name).collect();
     let rows = run::<PmsmDrive>(&experiment, &names);
-    let bits: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(|x| format!("{:016x}", x.to_bits())).collect()).collect();
+    let bits: Vec<Vec<String>> =
+        rows.iter().map(|row| row.iter().map(|x| format!("{:016x}", x.to_bits())).collect()).collect();
     let expected = json!({ "run": experiment.json(), "names": names, "rows": bits });
     let path: PathBuf = folder.join("expected.json");
     std::fs::write(&path, expected.to_string()).unwrap();

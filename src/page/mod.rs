@@ -66,7 +66,7 @@ pub fn page(source: &Source<'_>) -> Result<String> {
     if presets.is_empty() {
         presets.push(default_experiment(of, source.stimuli)?.json());
     }
-    let json = described(of, plain, members, presets).to_string().replace('<', "\\u003c");
+    let json = described(of, plain, members, &presets).to_string().replace('<', "\\u003c");
     let body = BODY
         .replace("{title}", &escape(of.model_name()))
         .replace("{name}", &escape(&of.name))
@@ -89,7 +89,10 @@ fn fits(module: &[u8], plain: &Description) -> Result<()> {
     let has = |text: &str| module.windows(text.len()).any(|part| part == text.as_bytes());
     ensure!(module.starts_with(b"\0asm\x01\0\0\0"), "the module is not one of WebAssembly (version 1)");
     ensure!(has("fmi3DoStep"), "the module has no function fmi3DoStep: not made with fmu_export::export!");
-    ensure!(has("__indirect_function_table"), "the module does not export its table of functions: build it with fmu page");
+    ensure!(
+        has("__indirect_function_table"),
+        "the module does not export its table of functions: build it with fmu page"
+    );
     ensure!(
         has(&plain.token),
         "the module is not of this {}: it lacks the token {}; build both again",
@@ -113,7 +116,7 @@ pub fn judged(of: &Description, own: Option<(&Path, &str)>) -> Result<Judged> {
 }
 
 /// What the page knows of the model.
-fn described(of: &Description, plain: &Description, mut members: Map<String, Value>, presets: Vec<Value>) -> Value {
+fn described(of: &Description, plain: &Description, mut members: Map<String, Value>, presets: &[Value]) -> Value {
     let ranges = members.remove("ranges").unwrap_or_default();
     if members.get("plots").is_none_or(|plots| plots == &json!([])) {
         members.insert("plots".into(), plots(of));

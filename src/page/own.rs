@@ -1,8 +1,8 @@
 //! What an author says about the page of a model: `page.toml`, beside the package's `Cargo.toml`.
 
 use fmu_core::Description;
-use fmu_core::variable::{Causality, Variability};
 use fmu_core::description::{Variable, VariableKind};
+use fmu_core::variable::{Causality, Variability};
 use fmu_import::{Values, suggest};
 use model_description::ModelDescription;
 use serde::Deserialize;
@@ -218,9 +218,8 @@ impl Own {
         if self.preset.len() > PRESETS {
             return Err(format!("has {} presets, and {PRESETS} are the most", self.preset.len()));
         }
-        let presets = self.preset.iter().map(|preset| {
-            model.run(preset).map_err(|e| format!("preset {:?}: {e}", preset.title))
-        });
+        let presets =
+            self.preset.iter().map(|preset| model.run(preset).map_err(|e| format!("preset {:?}: {e}", preset.title)));
         let presets = presets.collect::<Result<_, _>>()?;
         let differences: Vec<Value> =
             self.difference.iter().map(|d| json!({ "name": d.name, "of": d.of, "turn": d.turn })).collect();
@@ -269,7 +268,9 @@ struct Model<'a> {
 impl Model<'_> {
     fn variable(&self, name: &str) -> Result<&Variable, String> {
         let names = || self.of.variables.iter().map(|v| v.name.as_str());
-        self.of.variable(name).ok_or_else(|| format!("{} has no variable {name}{}", self.of.name, suggest(name, names())))
+        self.of
+            .variable(name)
+            .ok_or_else(|| format!("{} has no variable {name}{}", self.of.name, suggest(name, names())))
     }
 
     /// The value of a variable as a user writes it, checked against its range.

@@ -69,8 +69,7 @@ const grown = (old) => { const column = new Float64Array(2 * old.length); column
 
 const start = () => ({ set: new Map(), events: [], step: model.experiment.step, start: model.experiment.start, stop: model.experiment.stop });
 let plan = start(), chosen = null, rec = new Recording(), old = null, k = 0, running = false, ready = false, wanted = false, saved = null, speed = null;
-const worker = new Worker(URL.createObjectURL(new Blob([$("worker").textContent], { type: "text/javascript" })));
-let engine = worker, watch = 0;
+let engine = null, watch = 0;
 
 function send(message) {
   engine.postMessage(message);
@@ -116,7 +115,7 @@ function again() { begin(true); }
 function reset() {
   engine.terminate();
   clearTimeout(watch);
-  old = null;
+  [engine, ready, rec, old, wanted] = [null, false, new Recording(), null, false];
   if (chosen) take(chosen, false); else { plan = start(); load(); }
 }
 
@@ -169,7 +168,7 @@ const SAYS = {
   },
   restored({ k: at }) {
     old = rec;
-    const kept = new Recording(), n = old.row(plan.start + (at + 0.5) * plan.step);
+    const kept = new Recording(), n = old.row(plan.start + at * plan.step);
     for (const [name, column] of old.columns) kept.columns.set(name, column.slice());
     kept.n = Math.min(old.n, n + 1);
     [rec, k, running] = [kept, at, false];
@@ -201,7 +200,7 @@ function load() {
     tell("This browser cannot run the model: it lacks DecompressionStream or WebAssembly. Chrome 80, Firefox 113, Safari 16.4 and later have both.", "wrong");
     return;
   }
-  if (ready || running) engine = new Worker(URL.createObjectURL(new Blob([$("worker").textContent], { type: "text/javascript" })));
+  engine = new Worker(URL.createObjectURL(new Blob([$("worker").textContent], { type: "text/javascript" })));
   [ready, running, saved] = [false, false, null];
   listen();
   tell("Loading the model …");
@@ -236,7 +235,9 @@ const boxes = [];
 function control(parent, v) {
   const row = element(parent, "div", { class: "control" });
   const id = `v${v.reference}`, label = element(row, "label", { for: id });
-  element(label, "span", { class: "name" }, v.name);
+  // A long name breaks after its dots.
+  const name = element(label, "span", { class: "name" });
+  v.name.split(/(?<=[.])/).forEach((part, i) => { if (i) element(name, "wbr"); name.append(part); });
   element(label, "small", {}, v.description);
   const place = element(row, "span", { class: "value" });
   if (v.elements !== 1) {

@@ -152,7 +152,8 @@ fn models(workspace: &Workspace, args: &Page) -> Result<Vec<Model>> {
     } else {
         args.package.iter().map(named).collect::<Result<_>>()?
     };
-    let mut models = archives.into_iter().map(|file| archive(workspace, Path::new(file))).collect::<Result<Vec<_>>>()?;
+    let mut models =
+        archives.into_iter().map(|file| archive(workspace, Path::new(file))).collect::<Result<Vec<_>>>()?;
     let names: Vec<String> = packages.iter().map(|p| p.name.clone()).collect();
     if names.is_empty() {
         return Ok(models);
@@ -168,7 +169,8 @@ fn models(workspace: &Workspace, args: &Page) -> Result<Vec<Model>> {
 /// A model that reads files when it is instantiated has none in a page.
 fn reads_files(folder: &Path, cause: fmu_import::Error) -> anyhow::Error {
     if folder.join("resources").is_dir() {
-        return Failed(format!("the model reads resources/ at instantiation, which a page cannot give: {cause}")).into();
+        return Failed(format!("the model reads resources/ at instantiation, which a page cannot give: {cause}"))
+            .into();
     }
     cause.into()
 }

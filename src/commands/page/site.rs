@@ -56,7 +56,11 @@ pub(super) fn run(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     }
     let first = out.join("index.html");
     let name = workspace.root.file_name().map_or_else(|| "FMUs".into(), |name| name.to_string_lossy());
-    let title = if archives.iter().any(|file| file.ends_with(format!("{DRIVE}.fmu"))) { "Sensorless motor drives as FMUs" } else { &name };
+    let title = if archives.iter().any(|file| file.ends_with(format!("{DRIVE}.fmu"))) {
+        "Sensorless motor drives as FMUs"
+    } else {
+        &name
+    };
     pack::write(&first, page(title, &body).as_bytes())?;
     no_dead_link(out)?;
     Ok(first)
@@ -98,7 +102,8 @@ fn of_machines(workspace: &Workspace, drive: &Path, module: &[u8], out: &Path) -
             continue;
         }
         let mut model = archive(workspace, &preset)?;
-        let name = file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).context("a motor without a name")?;
+        let name =
+            file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).context("a motor without a name")?;
         model.description.title = Some(name);
         links.push(link(workspace, &model, module, out, "machines/")?);
     }
@@ -111,7 +116,12 @@ fn results(out: &Path) -> Result<Vec<Link>> {
     if !compared {
         message::note("a figure of compare is outside its tolerance");
     }
-    atlas::run(&Atlas { estimator: vec!["Rasmussen".into()], every: 1, out: Some(out.join("atlas")), ..Atlas::default() })?;
+    atlas::run(&Atlas {
+        estimator: vec!["Rasmussen".into()],
+        every: 1,
+        out: Some(out.join("atlas")),
+        ..Atlas::default()
+    })?;
     Ok(vec![
         ("compare/compare.html".into(), "Estimators compared".into(), "every estimator through every scenario".into()),
         ("atlas/atlas.html".into(), "Atlas".into(), "where a drive with wrong estimates is lost at low speed".into()),
@@ -129,7 +139,9 @@ fn no_dead_link(out: &Path) -> Result<()> {
             } else if path.extension().is_some_and(|e| e == "html") {
                 let text = fs::read_to_string(&path)?;
                 let links = text.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next());
-                for target in links.filter(|target| !target.starts_with('#') && !target.contains(':') && !target.contains('$')) {
+                for target in
+                    links.filter(|target| !target.starts_with('#') && !target.contains(':') && !target.contains('$'))
+                {
                     let file = target.split('#').next().unwrap_or_default();
                     if !folder.join(file).exists() {
                         bail!("{}: a link to {target}, which is not there", path.display());
