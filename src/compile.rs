@@ -62,6 +62,10 @@ pub fn module(workspace: &Workspace, package: &str) -> Result<PathBuf> {
     rustc.args(["--target", MODULE, "--lib"]);
     // A panic ends the call in the host; `fmu_fault` has its text.
     rustc.env("CARGO_PROFILE_RELEASE_PANIC", "abort");
+    // A page travels by mail: a tenth smaller, a fifth slower.
+    if env::var_os("CARGO_PROFILE_RELEASE_OPT_LEVEL").is_none() {
+        rustc.env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "s");
+    }
     if env::var_os(BUILD_STD).is_some() {
         rustc.env(BUILD_STD, "std,panic_abort");
     }

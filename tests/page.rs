@@ -222,7 +222,7 @@ fn pages_in_a_browser() {
     make(&["--package", "own-fmu", "--package", "faulty-fmu"]);
     let bytes = |name: &str| std::fs::metadata(folder.join(name)).unwrap().len();
     println!("PmsmDrive.html {} bytes, RcCircuit.html {} bytes", bytes("PmsmDrive.html"), bytes("RcCircuit.html"));
-    assert!(bytes("PmsmDrive.html") <= 700_000 && bytes("RcCircuit.html") <= 260_000);
+    assert!(bytes("PmsmDrive.html") <= 600_000 && bytes("RcCircuit.html") <= 260_000);
     // The experiment of the reference: start angle, speed step, load step, in all real outputs.
     let experiment = Run {
         title: "bits".into(),

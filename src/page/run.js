@@ -69,7 +69,7 @@ const grown = (old) => { const column = new Float64Array(2 * old.length); column
 
 const start = () => ({ set: new Map(), events: [], step: model.experiment.step, start: model.experiment.start, stop: model.experiment.stop });
 let plan = start(), chosen = null, rec = new Recording(), old = null, k = 0, running = false, ready = false, wanted = false, saved = null, speed = null;
-let engine = null, watch = 0;
+let engine = null, watch = 0, number = 0;
 
 function send(message) {
   engine.postMessage(message);
@@ -96,7 +96,8 @@ function begin(run) {
   for (const [name, value] of plan.set) sets.set(name, value);
   const coded = ([name, value]) => [byName.get(name).kind, byName.get(name).reference, value];
   tell("");
-  send({ does: "begin", plan: { ...plan, set: [...sets].map(coded), events: plan.events.map(([at, name, value]) => [at, ...coded([name, value])]), groups: groups() } });
+  number += 1;
+  send({ does: "begin", number, plan: { ...plan, set: [...sets].map(coded), events: plan.events.map(([at, name, value]) => [at, ...coded([name, value])]), groups: groups() } });
   follow(true);
   controls();
 }
@@ -187,6 +188,8 @@ const SAYS = {
 };
 function listen() {
   engine.onmessage = ({ data }) => {
+    // What a run before has said since.
+    if (data.run && data.run !== number) return;
     clearTimeout(watch);
     SAYS[data.does](data);
     if (running) alive();
@@ -476,12 +479,17 @@ class Plot {
 // ---------------------------------------------------------------- vectors
 
 class Plane {
-  constructor({ title, arrows }) {
+  constructor({ title, arrows }, i) {
     this.arrows = arrows;
     const box = element($("planes"), "figure", { class: "plane" });
     element(box, "figcaption").append(element(document.createElement("span"), "b", {}, title));
     this.canvas = element(box, "canvas", { role: "img", "aria-label": `${title}: ${arrows.map((arrow) => arrow.name).join(", ")}` });
     const list = element(box, "p", { class: "legend" });
+    // The first one also tells the differences, as large figures.
+    this.readings = i ? [] : [...differences.values()].map((d) => {
+      const item = element(list, "span", { class: "reading" }, `${d.name} `), value = element(item, "b");
+      return (row) => { value.textContent = `${shown(seen(d.like, rec.columns.get(d.name)[row]))} ${scale(d.like)[0]}`; };
+    });
     arrows.forEach(({ name }, i) => { const item = element(list, "span"); element(item, "span", { class: "swatch", style: `background:${model.inks[i % model.inks.length]}` }); item.append(name); });
     new ResizeObserver(draw).observe(this.canvas);
   }
@@ -493,6 +501,7 @@ class Plane {
   draw() {
     const { canvas } = this, ratio = devicePixelRatio || 1, size = canvas.clientWidth, row = rec.row(view.at);
     if (!size || row < 0) return;
+    this.readings.forEach((read) => read(row));
     [canvas.width, canvas.height] = [size * ratio, size * ratio];
     const pen = canvas.getContext("2d"), middle = size / 2, radius = 0.94 * middle;
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -599,7 +608,7 @@ function open() {
   group("Parameters that act at once", rest.filter((v) => v.causality === "parameter" && acts(v)), false);
   group("Parameters from the start", rest.filter((v) => v.causality === "parameter" && !acts(v)), false);
   plots = model.plots.map((plot) => new Plot(plot));
-  planes = model.planes.map((plane) => new Plane(plane));
+  planes = model.planes.map((plane, i) => new Plane(plane, i));
   for (const name of names()) element($("add"), "option", {}, name);
   $("add").addEventListener("change", () => { plots.push(new Plot({ title: "", curves: [$("add").value] })); $("add").value = ""; draw(); });
   $("run").addEventListener("click", () => (running ? pause() : run()));

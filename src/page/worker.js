@@ -157,8 +157,9 @@ class Fmu {
 }
 
 const SLICE = 12;
-const post = (message, transfer = []) => self.postMessage(message, transfer);
-let fmu = null, plan = null, k = 0, next = 0, rate = 0, running = false, origin = null, timer = 0, before = null, busy = 0;
+// Every message names the run that it belongs to.
+const post = (message, transfer = []) => self.postMessage({ run, ...message }, transfer);
+let run = 0, fmu = null, plan = null, k = 0, next = 0, rate = 0, running = false, origin = null, timer = 0, before = null, busy = 0;
 let rows = [], width = 1;
 
 // Appends a row: the time, then the columns.
@@ -180,7 +181,8 @@ function flush() {
   busy = 0;
 }
 
-function begin(given) {
+function begin(given, number) {
+  run = number;
   plan = { ...given, events: [...given.events].sort((a, b) => a[0] - b[0]) };
   [k, next, running, before, busy, rows] = [0, 0, false, null, 0, []];
   width = 1 + plan.groups.reduce((n, group) => n + group.references.length, 0);
@@ -270,7 +272,7 @@ const DOES = {
     fmu = new Fmu(await WebAssembly.compile(unpacked), token, (status, category, text) => post({ does: "log", status, category, text }));
     post({ does: "loaded", size: unpacked.byteLength, unpack, compile: performance.now() - begun - unpack });
   },
-  begin: ({ plan }) => begin(plan),
+  begin: ({ plan, number }) => begin(plan, number),
   run(message) {
     [rate, origin, running] = [message.rate, null, true];
     if ("stop" in message) plan.stop = message.stop;

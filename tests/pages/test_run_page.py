@@ -64,6 +64,7 @@ def preset(page, title, rate="0"):
     page.evaluate("choose(0)")
     page.evaluate("again()")
     finished(page)
+    assert page.evaluate("[rec.time[0], rec.n - 1]") == [0, page.evaluate("k")], "rows of another run"
 
 
 def test_the_bits_are_those_of_a_native_run(browser):
