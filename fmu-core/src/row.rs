@@ -172,6 +172,7 @@ impl<W: 'static> Row<W> {
             unbounded: false,
             mean: false,
             need: Need::Always,
+            intermediate: false,
             dimension: None,
             shape: &[],
         };
