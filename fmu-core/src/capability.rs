@@ -5,6 +5,7 @@
 
 use crate::continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 use crate::events::{Events, Indicator, Next, Outcome, Sampled};
+use crate::intermediate::Intermediate;
 use crate::log::Warnings;
 use crate::rules::can_be_state;
 use crate::variable::Meta;
@@ -79,6 +80,8 @@ pub struct Capabilities<M: Model> {
     pub tangent: Option<Tangent<M>>,
     /// Function of a model that follows [`CompletedSteps`].
     pub complete: Option<Complete<M>>,
+    /// [`Intermediate::longest`].
+    pub intermediate: Option<fn(&M) -> f64>,
     /// Function of a model that [`Warns`].
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,
 }
@@ -86,8 +89,15 @@ pub struct Capabilities<M: Model> {
 #[allow(non_snake_case, reason = "each method bears the name of its trait, as the line that exports a model has it")]
 impl<M: Model> Capabilities<M> {
     /// Co-simulation only.
-    pub const NONE: Self =
-        Self { continuous: None, events: None, samples: None, tangent: None, complete: None, warn: None };
+    pub const NONE: Self = Self {
+        continuous: None,
+        events: None,
+        samples: None,
+        tangent: None,
+        complete: None,
+        intermediate: None,
+        warn: None,
+    };
 
     /// Adds [`ContinuousTime`].
     pub const fn ContinuousTime(self) -> Self
@@ -148,6 +158,14 @@ impl<M: Model> Capabilities<M> {
         M: CompletedSteps,
     {
         Self { complete: Some(M::complete), ..self }
+    }
+
+    /// Adds [`Intermediate`].
+    pub const fn Intermediate(self) -> Self
+    where
+        M: Intermediate,
+    {
+        Self { intermediate: Some(M::longest), ..self }
     }
 
     /// Adds [`Warns`].

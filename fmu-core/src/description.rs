@@ -106,6 +106,8 @@ pub struct Variable {
     pub derivative: Option<u32>,
     /// A state that an event may change.
     pub reinit: bool,
+    /// It can be read or set inside a communication step (FMI 3.0).
+    pub intermediate: bool,
 }
 
 /// A base type with its type definition.
@@ -144,6 +146,13 @@ pub enum VariableKind {
     },
     /// A text.
     Text,
+    /// Bytes.
+    Binary {
+        /// MIME type of the content.
+        mime_type: String,
+        /// Greatest number of bytes.
+        most: usize,
+    },
 }
 
 /// A start value.
@@ -158,6 +167,8 @@ pub enum Value {
     Boolean(bool),
     /// Start value of a text.
     Text(String),
+    /// Start value of bytes.
+    Binary(Vec<u8>),
 }
 
 impl Description {
@@ -284,6 +295,12 @@ impl Description {
         self.title.as_deref().unwrap_or(&self.name)
     }
 
+    /// Why there can be no archive of FMI 2.0, if there cannot.
+    pub fn needs_fmi3(&self) -> Option<String> {
+        let binary = |v: &&Variable| matches!(v.kind, VariableKind::Binary { .. });
+        self.variables.iter().find(binary).map(|v| format!("{} is binary, and FMI 2.0 has no bytes", v.name))
+    }
+
     /// The variable of this name.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|v| v.name == name)
@@ -358,6 +375,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
         dependencies: None,
         derivative: None,
         reinit: false,
+        intermediate: meta.intermediate,
     }
 }
 
@@ -401,6 +419,7 @@ fn value(slot: &Slot<'_>) -> Value {
         Slot::Enumeration(x) => Value::Integer(x.get().into()),
         Slot::Text(x) => Value::Text((*x).clone()),
         Slot::Said(x) => Value::Text((*x).into()),
+        Slot::Binary(x) => Value::Binary(x.to_vec()),
     }
 }
 
@@ -419,6 +438,7 @@ fn kind(kind: &Kind) -> VariableKind {
         Kind::Integer(of) => VariableKind::Integer(*of),
         Kind::Boolean => VariableKind::Boolean,
         Kind::Text => VariableKind::Text,
+        Kind::Binary { mime_type, most } => VariableKind::Binary { mime_type: (*mime_type).into(), most: *most },
         Kind::Enumeration(Enumeration { name, description, items }) => VariableKind::Enumeration {
             name: (*name).into(),
             description: (*description).into(),
@@ -438,10 +458,12 @@ fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
         return Err(Fault::new(format!("{name} = {slot} at the start has a character that XML does not have")));
     }
     if slot.is_allowed(meta) {
-        Ok(())
-    } else {
-        Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
+        return Ok(());
     }
+    if let Kind::Binary { most, .. } = meta.kind {
+        return Err(Fault::value(name, format!("{slot} at the start"), format_args!("at most {most} bytes")));
+    }
+    Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
 }
 
 fn check_types(variables: &[Variable]) -> Result<(), Fault> {

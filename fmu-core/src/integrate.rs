@@ -194,7 +194,11 @@ fn rk4<M: ContinuousTime, const N: usize>(model: &mut M, now: Elapsed, h: f64) -
     Ok(())
 }
 
-fn substeps(h: f64, longest: f64) -> Result<f64, Fault> {
+/// Number of equal substeps into which a step of `h` (s) is divided.
+///
+/// # Errors
+/// More substeps than anyone can wait for.
+pub fn substeps(h: f64, longest: f64) -> Result<f64, Fault> {
     let count = (h / longest - 1e-9).ceil().max(1.0);
     if count <= MAX_SUBSTEPS {
         return Ok(count);

@@ -75,7 +75,7 @@
 //! ```
 //!
 //! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
-//! [`CompletedSteps`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
+//! [`CompletedSteps`], [`Intermediate`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
 //! and a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`terminal`], [`model`],
@@ -83,6 +83,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bytes;
 pub mod capability;
 pub mod continuous;
 pub mod description;
@@ -92,6 +93,8 @@ pub mod events;
 pub mod fault;
 pub mod integer;
 pub mod integrate;
+pub mod intermediate;
+pub mod list;
 pub mod log;
 pub mod model;
 pub mod need;
@@ -108,6 +111,7 @@ pub mod token;
 pub mod unit;
 pub mod variable;
 
+pub use bytes::Bytes;
 pub use capability::{Capabilities, Exported, Plain, Warns};
 pub use continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 pub use description::Description;
@@ -116,6 +120,8 @@ pub use enumeration::{Choice, Enumerated, Field};
 pub use events::{Events, Indicator, Next, Outcome, Sampled};
 pub use fault::Fault;
 pub use integer::{IntegerType, Whole};
+pub use intermediate::Intermediate;
+pub use list::{Element, Items};
 pub use model::{Block, Experiment, Info, Interface, Model};
 pub use need::Need;
 pub use reals::Inputs;

@@ -18,6 +18,7 @@ pub const fn check<E: Exported>() {
     demand(is_identifier(model), model, rule);
     let (rows, states, can) = (E::Model::TABLE.rows, E::CAN.states().len(), E::CAN);
     let mut i = 0;
+    check_intermediate::<E>(model);
     while i < states {
         let name = can.states()[i].name;
         let mut other = 0;
@@ -29,6 +30,15 @@ pub const fn check<E: Exported>() {
         check_state(rows, model, name);
         i += 1;
     }
+}
+
+/// The capability and its rows come together.
+#[track_caller]
+const fn check_intermediate<E: Exported>(model: &str) {
+    let (capability, rows) = (E::CAN.intermediate.is_some(), E::Model::TABLE.intermediate);
+    demand(rows || !capability, model, "the capability Intermediate needs a row of the table with .intermediate()");
+    demand(capability || !rows, model, "a row of the table with .intermediate() needs the capability Intermediate");
+    demand(!capability || E::CAN.continuous.is_some(), model, "the capability Intermediate needs ContinuousTime");
 }
 
 #[track_caller]

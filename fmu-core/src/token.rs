@@ -72,12 +72,16 @@ impl Hash {
             hash = hash.count(meta.shape[i]);
             i += 1;
         }
+        if meta.intermediate {
+            hash = hash.text("intermediate");
+        }
         match meta.kind {
             Kind::Real(quantity) => hash.quantity(quantity),
             Kind::Float32(quantity) => hash.text("Float32").quantity(quantity),
             Kind::Integer(IntegerType::Int32) => hash.text("integer"),
             Kind::Integer(of) => hash.text(of.name()),
             Kind::Text => hash.text("text"),
+            Kind::Binary { mime_type, most } => hash.text("binary").text(mime_type).count(most),
             Kind::Boolean => hash.text("boolean"),
             Kind::Enumeration(enumeration) => {
                 let (mut hash, mut i) = (hash.text(enumeration.name), 0);

@@ -81,6 +81,13 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
     /// A text.
     Text,
+    /// Bytes (FMI 3.0).
+    Binary {
+        /// MIME type of the content.
+        mime_type: &'static str,
+        /// Greatest number of bytes.
+        most: usize,
+    },
 }
 
 /// The values that are allowed. A strict bound is not itself allowed.
@@ -151,6 +158,8 @@ pub struct Meta {
     pub mean: bool,
     /// Whether an importer must feed it.
     pub need: Need<'static>,
+    /// It can be read or set inside a communication step; of a part, that one of its variables can.
+    pub intermediate: bool,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,
     /// Extents of a matrix, which is stored row by row; empty for a scalar, and for an array with one extent.

@@ -24,10 +24,14 @@ pub(crate) fn is_time(reference: u32, standard: Standard) -> bool {
 #[inline]
 pub(crate) fn open(meta: &Meta, state: State) -> bool {
     match meta.causality {
-        Causality::Input => state != State::Continuous || meta.variability == Variability::Continuous,
+        Causality::Input => match state {
+            State::Continuous => meta.variability == Variability::Continuous,
+            State::Intermediate => meta.intermediate,
+            _ => true,
+        },
         Causality::Parameter => match state {
             State::Step | State::Event => meta.variability == Variability::Tunable,
-            State::Continuous => false,
+            State::Continuous | State::Intermediate => false,
             _ => true,
         },
         _ => false,
@@ -224,19 +228,6 @@ impl<E: Exported> Instance<E> {
             }
             Some(_) => message::real(false, carries),
             None => message::unknown::<E>(reference, self.standard),
-        }
-    }
-
-    /// Refuses a getter or setter of a type that no variable has.
-    ///
-    /// # Errors
-    /// The list of references is not empty.
-    pub fn refuse(&mut self, references: &[u32], carries: &str) -> Result<(), Fault> {
-        let Some(&reference) = references.first() else { return Ok(()) };
-        match table::<E>().entry(&mut self.current.block, index(reference)) {
-            Some((meta, _)) => Err(message::type_of::<E::Model>(index(reference), meta, carries)),
-            None if is_time(reference, self.standard) => Err(message::real(true, carries)),
-            None => Err(self.beside_table(reference, carries, false)),
         }
     }
 

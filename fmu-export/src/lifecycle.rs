@@ -1,9 +1,9 @@
 //! The one lifecycle table: which call is allowed in which state, for both standards and all interfaces, and where it
 //! leads.
 //!
-//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2 and 4.2. The states that are not here (configuration and
-//! intermediate-update mode, step in progress) do not exist in an FMU without structural parameters, intermediate update
-//! and asynchronous steps: the calls that would lead to them are [`Call::Unsupported`].
+//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2 and 4.2. The states that are not here (configuration mode, step in
+//! progress) do not exist in an FMU without structural parameters and asynchronous steps: the calls that would lead to them
+//! are [`Call::Unsupported`].
 
 use fmu_core::Interface;
 use serde::{Deserialize, Serialize};
@@ -18,29 +18,31 @@ pub enum Standard {
     Fmi3,
 }
 
-/// State of an instance, a bit of [`States`].
+/// State of an instance, the number of a bit of [`States`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum State {
     /// After instantiation and after a reset.
     #[default]
-    Instantiated = 1,
+    Instantiated,
     /// Initialization Mode of both standards.
-    Initialization = 2,
+    Initialization,
     /// `stepComplete` of FMI 2.0, Step Mode of FMI 3.0.
-    Step = 4,
+    Step,
     /// After a termination.
-    Terminated = 8,
+    Terminated,
     /// After an error; Reset and SetFMUState lead out.
-    Error = 16,
+    Error,
     /// Event Mode of Model Exchange, and of co-simulation in FMI 3.0.
-    Event = 32,
+    Event,
     /// Continuous-Time Mode of Model Exchange.
-    Continuous = 64,
+    Continuous,
+    /// Intermediate Update Mode of co-simulation in FMI 3.0: while the importer's callback runs.
+    Intermediate,
 }
 
 impl State {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Instantiated,
         Self::Initialization,
         Self::Step,
@@ -48,7 +50,19 @@ impl State {
         Self::Continuous,
         Self::Terminated,
         Self::Error,
+        Self::Intermediate,
     ];
+
+    /// Those in which no call is under way.
+    const REST: [Self; 7] = {
+        let [rest @ .., _] = Self::ALL;
+        rest
+    };
+
+    /// Whether the instance waits for a callback of the importer.
+    pub const fn calls_back(self) -> bool {
+        matches!(self, Self::Intermediate)
+    }
 }
 
 impl fmt::Display for State {
@@ -61,19 +75,20 @@ impl fmt::Display for State {
             Self::Error => "Error",
             Self::Event => "Event Mode",
             Self::Continuous => "Continuous-Time Mode",
+            Self::Intermediate => "Intermediate Update Mode",
         })
     }
 }
 
 /// A set of states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct States(u8);
+pub struct States(u16);
 
 impl States {
     const fn of(states: &[State]) -> Self {
         let (mut bits, mut i) = (0, 0);
         while i < states.len() {
-            bits |= states[i] as u8;
+            bits |= 1 << states[i] as u8;
             i += 1;
         }
         Self(bits)
@@ -86,7 +101,7 @@ impl States {
 
     /// Whether `state` is in the set.
     pub const fn contains(self, state: State) -> bool {
-        self.0 & state as u8 != 0
+        self.0 >> state as u8 & 1 != 0
     }
 }
 
@@ -215,21 +230,27 @@ const fn exchange(states: [States; 2], next: Next) -> Row {
 impl Call {
     const fn row(self) -> Row {
         use Next::{Start, Stay, To};
-        use State::{Continuous, Error, Event, Initialization, Instantiated, Step, Terminated};
+        use State::{Continuous, Error, Event, Initialization, Instantiated, Intermediate, Step, Terminated};
         match self {
             Self::SetDebugLogging | Self::RestoreState | Self::UseState | Self::Unsupported => {
-                any(both(&State::ALL), Stay)
+                any(both(&State::REST), Stay)
             }
             Self::Instantiate => any(NONE, Stay),
             Self::SetupExperiment => any(each(&[Instantiated], &[]), Stay),
             Self::EnterInitialization => any(both(&[Instantiated]), To(Initialization)),
             Self::ExitInitialization => any(both(&[Initialization]), Start),
             Self::Terminate => any(both(&[Step, Event, Continuous]), To(Terminated)),
-            Self::Reset => any(both(&State::ALL), To(Instantiated)),
+            Self::Reset => any(both(&State::REST), To(Instantiated)),
             // FMI 3.0.2, 2.3.2 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
             // In Error: for debugging (2.0.5, 4.2.4).
             Self::Get => any(each(&[Initialization, Step, Event, Continuous, Terminated, Error], &State::ALL), Stay),
-            Self::Set => any(both(&[Instantiated, Initialization, Step, Event, Continuous]), Stay),
+            Self::Set => any(
+                each(
+                    &[Instantiated, Initialization, Step, Event, Continuous],
+                    &[Instantiated, Initialization, Step, Event, Continuous, Intermediate],
+                ),
+                Stay,
+            ),
             Self::DoStep => stepping(both(&[Step]), Stay),
             // A state that an error left behind is of no use.
             Self::SaveState => any(both(&[Instantiated, Initialization, Step, Event, Continuous, Terminated]), Stay),
@@ -266,7 +287,9 @@ impl Call {
                 ),
                 Stay,
             ),
-            Self::OutputDerivatives => stepping(each(&[Step, Terminated, Error], &[Step, Terminated]), Stay),
+            Self::OutputDerivatives => {
+                stepping(each(&[Step, Terminated, Error], &[Step, Terminated, Intermediate]), Stay)
+            }
             Self::InputDerivatives => stepping(each(&[Instantiated, Initialization, Step], &[]), Stay),
         }
     }
@@ -358,5 +381,19 @@ impl Life {
             Next::Start if self.handles_events() => self.state = State::Event,
             Next::Start => self.state = State::Step,
         }
+    }
+
+    /// Records that a step waits for a callback of the importer.
+    pub(crate) const fn call_back(&mut self) {
+        self.state = State::Intermediate;
+    }
+
+    /// Records that the callback has returned; false if a call in it has failed.
+    pub(crate) const fn called_back(&mut self) -> bool {
+        let waits = self.state.calls_back();
+        if waits {
+            self.state = State::Step;
+        }
+        waits
     }
 }

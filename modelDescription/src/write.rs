@@ -55,6 +55,9 @@ pub fn fits(description: &Description, version: FmiVersion) -> Result<(), String
             "{name} has no variable, and FMI 2.0 needs at least one: add one, or build for FMI 3.0 only, which has time"
         ));
     }
+    if let Some(why) = description.needs_fmi3().filter(|_| version == FmiVersion::V2) {
+        return Err(format!("{why}: build for FMI 3.0 only"));
+    }
     let narrow = |value: &Value| matches!(value, Value::Integer(x) if i32::try_from(*x).is_err());
     for v in description.variables.iter().filter(|_| version == FmiVersion::V2) {
         if let (VariableKind::Integer(of), Some(Value::Integer(x))) =
@@ -141,6 +144,7 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
     let exchange = description.model_exchange.as_ref();
     let continuous = exchange.is_some_and(|exchange| !exchange.states.is_empty());
     let event_mode = version == FmiVersion::V3 && exchange.is_some_and(|exchange| exchange.event_mode);
+    let intermediate = version == FmiVersion::V3 && description.variables.iter().any(|v| v.intermediate);
     let interpolates = if continuous { "true" } else { "false" };
     let element = Element::new("CoSimulation")
         .with("modelIdentifier", &*description.name)
@@ -151,7 +155,9 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
         .with_some("maxOutputDerivativeOrder", continuous.then_some("1"));
     let element = states_and_memory(element, version)
         .with_some("hasEventMode", event_mode.then_some("true"))
-        .with_some("mightReturnEarlyFromDoStep", event_mode.then_some("true"));
+        .with_some("mightReturnEarlyFromDoStep", event_mode.then_some("true"))
+        .with_some("providesIntermediateUpdate", intermediate.then_some("true"))
+        .with_some("canReturnEarlyAfterIntermediateUpdate", intermediate.then_some("true"));
     match exchange {
         Some(exchange) => derivatives(element, exchange, version),
         None => element,

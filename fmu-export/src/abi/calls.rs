@@ -4,6 +4,7 @@
 use super::pointer::{array, numbers, place, room, text};
 use super::types::{FmuState, References};
 use super::{Abi, Answer};
+use crate::lifecycle::State;
 use crate::value::Value;
 use crate::{blob, registry};
 use fmu_core::{Exported, Fault};
@@ -21,13 +22,26 @@ impl<E: Exported> Abi<'_, E> {
     pub unsafe fn get<T: Value>(&mut self, vr: References, n: usize, values: *mut T, room_for: usize) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (out, vr) = unsafe { (room(values, room_for, "values")?, array(vr, n, "value references")?) };
+        if const { E::CAN.intermediate.is_some() } && self.0.current.life.state() == State::Intermediate {
+            return self.0.get_inside(vr, out);
+        }
         self.0.get(vr, out)
     }
 
     pub unsafe fn set<T: Value>(&mut self, vr: References, n: usize, values: *const T, n_values: usize) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (values, vr) = unsafe { (array(values, n_values, "values")?, array(vr, n, "value references")?) };
+        self.inside(vr, true)?;
         self.0.set(vr, values)
+    }
+
+    /// Judges the variables that the importer uses inside a step.
+    #[inline]
+    fn inside(&self, vr: &[u32], sets: bool) -> Answer {
+        if const { E::CAN.intermediate.is_some() } && self.0.current.life.state() == State::Intermediate {
+            self.0.check_inside(vr, sets)?;
+        }
+        Ok(())
     }
 
     /// The texts stay where they are until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
@@ -40,6 +54,7 @@ impl<E: Exported> Abi<'_, E> {
     ) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (out, vr) = unsafe { (room(values, room_for, "values")?, array(vr, n, "value references")?) };
+        self.inside(vr, false)?;
         let texts = self.0.get_texts(vr, out.len())?;
         for (place, text) in out.iter_mut().zip(texts) {
             place.write(text.as_ptr());
@@ -56,15 +71,49 @@ impl<E: Exported> Abi<'_, E> {
     ) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (values, vr) = unsafe { (array(values, n_values, "values")?, array(vr, n, "value references")?) };
+        self.inside(vr, true)?;
         // SAFETY: C strings, if the variables are texts; others are refused before one is read.
-        Ok(self.0.set_texts(vr, values.len(), |i| unsafe { text(values[i]) })?)
+        self.0.set_texts(vr, values.len(), |i| unsafe { text(values[i]) })
     }
 
-    /// A getter or setter of a type that no variable has: succeeds only for zero variables.
-    pub unsafe fn none(&mut self, vr: References, n: usize, n_values: usize, carries: &str) -> Answer {
+    /// The bytes stay where they are until the next call that sets or computes them (FMI 3.0.2, 2.2.7.2); their pointer is never
+    /// NULL.
+    pub unsafe fn get_bytes(
+        &mut self,
+        vr: References,
+        n: usize,
+        sizes: *mut usize,
+        values: *mut *const u8,
+        room_for: usize,
+    ) -> Answer {
+        // SAFETY: the importer's arrays, of these lengths.
+        let (out, vr) = unsafe { (room(values, room_for, "values")?, array(vr, n, "value references")?) };
         // SAFETY: the importer's array, of this length.
-        self.0.refuse(unsafe { array(vr, n, "value references")? }, carries)?;
-        if n_values == 0 { Ok(()) } else { Err(Fault::value("nValues", n_values, "0 for no reference").into()) }
+        let sizes = unsafe { room(sizes, room_for, "valueSizes")? };
+        let mut places = out.iter_mut().zip(sizes);
+        self.0.get_bytes(vr, room_for, |bytes| {
+            if let Some((pointer, size)) = places.next() {
+                pointer.write(bytes.as_ptr());
+                size.write(bytes.len());
+            }
+        })
+    }
+
+    /// Every size is judged before a pointer is looked at.
+    pub unsafe fn set_bytes(
+        &mut self,
+        vr: References,
+        n: usize,
+        sizes: *const usize,
+        values: *const *const u8,
+        n_values: usize,
+    ) -> Answer {
+        // SAFETY: the importer's arrays, of these lengths.
+        let (values, vr) = unsafe { (array(values, n_values, "values")?, array(vr, n, "value references")?) };
+        // SAFETY: the importer's array, of this length.
+        let sizes = unsafe { array(sizes, n_values, "valueSizes")? };
+        // SAFETY: NULL or as many bytes as the size says, if the variables are bytes; others are refused before one is read.
+        self.0.set_bytes(vr, sizes, |i| unsafe { array(values[i], sizes[i], "a binary value") })
     }
 
     pub unsafe fn set_debug_logging(&mut self, on: bool, n: usize, categories: *const *const c_char) -> Answer {
@@ -211,6 +260,7 @@ impl<E: Exported> Abi<'_, E> {
         let (vr, orders, out) = unsafe {
             (array(vr, n, "value references")?, array(orders, n, "orders")?, numbers(values, n_values, "values")?)
         };
+        self.inside(vr, false)?;
         self.0.output_derivatives(vr, orders, out)
     }
 
