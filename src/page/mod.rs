@@ -127,11 +127,14 @@ fn described(of: &Description, plain: &Description, mut members: Map<String, Val
             enumerations.insert(name.clone(), json!(items));
         }
     }
-    let shown = |v: &&Variable| v.causality.is_settable() || is_curve(v);
+    // Bytes stay out.
+    let has_text = |v: &Variable| !matches!(v.kind, VariableKind::Binary { .. });
+    let shown = |v: &&Variable| (v.causality.is_settable() || is_curve(v)) && has_text(v);
     let variables: Vec<Value> = of.variables.iter().filter(shown).map(|v| variable(v, &ranges)).collect();
     // What a preset archive starts with, and the module does not.
     let starts = of.variables.iter().filter(|v| plain.variable(&v.name).is_none_or(|p| p.start != v.start));
-    let starts: Vec<Value> = starts.filter(|v| v.causality.is_settable()).map(|v| json!([v.name, start(v)])).collect();
+    let starts: Vec<Value> =
+        starts.filter(|v| v.causality.is_settable() && has_text(v)).map(|v| json!([v.name, start(v)])).collect();
     let experiment = &of.experiment;
     let mut json = json!({
         "title": of.model_name(),
@@ -177,6 +180,7 @@ fn variable(v: &Variable, ranges: &Value) -> Value {
         VariableKind::Boolean => ("Boolean".into(), None, None, None),
         VariableKind::Enumeration { name, .. } => ("Enumeration".into(), None, None, Some(name)),
         VariableKind::Text => (String::from("String"), None, None, None),
+        VariableKind::Binary { .. } => (String::from("Binary"), None, None, None),
     };
     let mut json = json!({
         "name": v.name,
@@ -215,6 +219,7 @@ fn start(v: &Variable) -> Value {
         Start::Integer(x) => i64::try_from(*x).map_or_else(|_| json!(x.to_string()), |x| json!(x)),
         Start::Boolean(x) => json!(x),
         Start::Text(x) => json!(x),
+        Start::Binary(_) => Value::Null,
     };
     match v.start.as_deref() {
         Some([x]) if !v.is_array() => one(x),
