@@ -308,7 +308,7 @@ impl Model<'_> {
         if computed.contains(&name) || is_curve(self.variable(name)?) {
             return Ok(());
         }
-        Err(format!("{name} is not a curve: it is no output and no input with one number"))
+        Err(format!("{name} is not a curve: a curve is an output or an input with one number"))
     }
 
     fn plane(&self, plane: &Plane) -> Result<Value, String> {
