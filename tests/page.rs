@@ -205,6 +205,29 @@ fn another_module_is_refused() {
     }
 }
 
+/// The serialized state of the packed FMU at the end of a run, in hexadecimal digits.
+fn state(run: &Run) -> String {
+    let fmu = fmu_import::Fmu::open(&common::archives().join("fmi3/PmsmDrive.fmu")).unwrap();
+    let mut instance = fmu.instantiate("instance", false).unwrap();
+    let set = |instance: &mut fmu_import::Instance, (name, value): &(String, Value)| {
+        instance.set_text(name, value.to_string().trim_matches('"')).unwrap();
+    };
+    run.set.iter().for_each(|pair| set(&mut instance, pair));
+    let experiment = PmsmDrive::INFO.experiment;
+    instance.setup(experiment.start, None).unwrap();
+    instance.enter_initialization().unwrap();
+    instance.exit_initialization().unwrap();
+    for k in 0..1000_u32 {
+        for (_, name, value) in run.events.iter().filter(|event| event.0 == u64::from(k)) {
+            set(&mut instance, &(name.clone(), value.clone()));
+        }
+        instance.do_step(f64::from(k) * experiment.step, experiment.step).unwrap();
+    }
+    let state = instance.get_state().unwrap();
+    let bytes = instance.serialize_state(state).unwrap();
+    bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+}
+
 /// Pages in a Chromium: the bits of native runs in every column, states, live changes, addresses, faults, widths, keys.
 #[test]
 #[ignore = "opt-in: cargo test --test page browser -- --ignored (needs Chromium and Rust's standard library for WebAssembly)"]
@@ -239,7 +262,7 @@ fn pages_in_a_browser() {
     let rows = run::<PmsmDrive>(&experiment, &names);
     let bits: Vec<Vec<String>> =
         rows.iter().map(|row| row.iter().map(|x| format!("{:016x}", x.to_bits())).collect()).collect();
-    let expected = json!({ "run": experiment.json(), "names": names, "rows": bits });
+    let expected = json!({ "run": experiment.json(), "names": names, "rows": bits, "state": state(&experiment) });
     let path: PathBuf = folder.join("expected.json");
     std::fs::write(&path, expected.to_string()).unwrap();
     common::python::pytest("pages", "run-pages", &["test_run_page.py"], &[("FMU_PAGES", &folder)]);
