@@ -72,6 +72,9 @@ impl Hash {
             hash = hash.count(meta.shape[i]);
             i += 1;
         }
+        if meta.exact {
+            hash = hash.text("exact");
+        }
         match meta.kind {
             Kind::Real(quantity) => hash.quantity(quantity),
             Kind::Float32(quantity) => hash.text("Float32").quantity(quantity),

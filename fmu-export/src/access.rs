@@ -26,11 +26,11 @@ pub(crate) fn open(meta: &Meta, state: State) -> bool {
     match meta.causality {
         Causality::Input => state != State::Continuous || meta.variability == Variability::Continuous,
         Causality::Parameter => match state {
-            State::Step | State::Event => meta.variability == Variability::Tunable,
+            State::Step | State::Event | State::Ended => meta.variability == Variability::Tunable,
             State::Continuous => false,
             _ => true,
         },
-        _ => false,
+        _ => meta.exact && matches!(state, State::Instantiated | State::Initialization),
     }
 }
 

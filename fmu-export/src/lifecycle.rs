@@ -20,7 +20,7 @@ pub enum Standard {
 
 /// State of an instance, a bit of [`States`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[repr(u8)]
+#[repr(u16)]
 pub enum State {
     /// After instantiation and after a reset.
     #[default]
@@ -37,15 +37,19 @@ pub enum State {
     Event = 32,
     /// Continuous-Time Mode of Model Exchange.
     Continuous = 64,
+    /// Co-simulation after a step in which the model has ended the simulation: `stepFailed` of FMI 2.0, Step Mode of FMI 3.0,
+    /// where no step follows.
+    Ended = 128,
 }
 
 impl State {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Instantiated,
         Self::Initialization,
         Self::Step,
         Self::Event,
         Self::Continuous,
+        Self::Ended,
         Self::Terminated,
         Self::Error,
     ];
@@ -61,19 +65,20 @@ impl fmt::Display for State {
             Self::Error => "Error",
             Self::Event => "Event Mode",
             Self::Continuous => "Continuous-Time Mode",
+            Self::Ended => "Ended by the model",
         })
     }
 }
 
 /// A set of states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct States(u8);
+pub struct States(u16);
 
 impl States {
     const fn of(states: &[State]) -> Self {
         let (mut bits, mut i) = (0, 0);
         while i < states.len() {
-            bits |= states[i] as u8;
+            bits |= states[i] as u16;
             i += 1;
         }
         Self(bits)
@@ -86,7 +91,7 @@ impl States {
 
     /// Whether `state` is in the set.
     pub const fn contains(self, state: State) -> bool {
-        self.0 & state as u8 != 0
+        self.0 & state as u16 != 0
     }
 }
 
@@ -215,7 +220,7 @@ const fn exchange(states: [States; 2], next: Next) -> Row {
 impl Call {
     const fn row(self) -> Row {
         use Next::{Start, Stay, To};
-        use State::{Continuous, Error, Event, Initialization, Instantiated, Step, Terminated};
+        use State::{Continuous, Ended, Error, Event, Initialization, Instantiated, Step, Terminated};
         match self {
             Self::SetDebugLogging | Self::RestoreState | Self::UseState | Self::Unsupported => {
                 any(both(&State::ALL), Stay)
@@ -224,16 +229,26 @@ impl Call {
             Self::SetupExperiment => any(each(&[Instantiated], &[]), Stay),
             Self::EnterInitialization => any(both(&[Instantiated]), To(Initialization)),
             Self::ExitInitialization => any(both(&[Initialization]), Start),
-            Self::Terminate => any(both(&[Step, Event, Continuous]), To(Terminated)),
+            Self::Terminate => any(both(&[Step, Event, Continuous, Ended]), To(Terminated)),
             Self::Reset => any(both(&State::ALL), To(Instantiated)),
             // FMI 3.0.2, 2.3.2 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
             // In Error: for debugging (2.0.5, 4.2.4).
-            Self::Get => any(each(&[Initialization, Step, Event, Continuous, Terminated, Error], &State::ALL), Stay),
-            Self::Set => any(both(&[Instantiated, Initialization, Step, Event, Continuous]), Stay),
+            Self::Get => {
+                any(each(&[Initialization, Step, Event, Continuous, Ended, Terminated, Error], &State::ALL), Stay)
+            }
+            Self::Set => any(
+                each(
+                    &[Instantiated, Initialization, Step, Event, Continuous],
+                    &[Instantiated, Initialization, Step, Event, Continuous, Ended],
+                ),
+                Stay,
+            ),
             Self::DoStep => stepping(both(&[Step]), Stay),
             // A state that an error left behind is of no use.
-            Self::SaveState => any(both(&[Instantiated, Initialization, Step, Event, Continuous, Terminated]), Stay),
-            Self::Status => stepping(each(&[Step, Terminated], &[]), Stay),
+            Self::SaveState => {
+                any(both(&[Instantiated, Initialization, Step, Event, Continuous, Ended, Terminated]), Stay)
+            }
+            Self::Status => stepping(each(&[Step, Ended, Terminated], &[]), Stay),
             // An FMU of FMI 2.0 without states may never leave Event Mode (FMI 2.0.5, 3.2.3).
             Self::EnterEvent => {
                 Row { event: States::of(&[Step]), ..exchange(each(&[Event, Continuous], &[Continuous]), To(Event)) }
@@ -261,12 +276,14 @@ impl Call {
             Self::Count => exchange(each(&[], &[Instantiated, Initialization, Event, Continuous, Terminated]), Stay),
             Self::Sensitivity => any(
                 each(
-                    &[Initialization, Step, Event, Continuous, Terminated, Error],
-                    &[Initialization, Step, Event, Continuous, Terminated],
+                    &[Initialization, Step, Event, Continuous, Ended, Terminated, Error],
+                    &[Initialization, Step, Event, Continuous, Ended, Terminated],
                 ),
                 Stay,
             ),
-            Self::OutputDerivatives => stepping(each(&[Step, Terminated, Error], &[Step, Terminated]), Stay),
+            Self::OutputDerivatives => {
+                stepping(each(&[Step, Ended, Terminated, Error], &[Step, Ended, Terminated]), Stay)
+            }
             Self::InputDerivatives => stepping(each(&[Instantiated, Initialization, Step], &[]), Stay),
         }
     }
@@ -308,8 +325,8 @@ impl Allowed {
     }
 }
 
-/// The state of one instance and the interface that it was made for. It changes in [`Life::after`] and nowhere else; a
-/// restored FMU state brings its own.
+/// The state of one instance and the interface that it was made for. It changes in [`Life::after`] and
+/// [`Life::end`] and nowhere else; a restored FMU state brings its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Life {
     state: State,
@@ -343,6 +360,11 @@ impl Life {
     /// Whether the importer handles events.
     pub const fn handles_events(self) -> bool {
         !matches!(self.interface, Interface::CoSimulation)
+    }
+
+    /// Records that the model has ended the simulation in a step.
+    pub const fn end(&mut self) {
+        self.state = State::Ended;
     }
 
     /// Records that a call succeeded, with the [next](Call::next) state, or failed.

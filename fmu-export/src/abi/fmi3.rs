@@ -33,6 +33,9 @@ impl<E: Exported> Abi<'_, E> {
             Interface::ModelExchange if !E::CAN.model_exchange() => {
                 Some("not supported: Model Exchange; this FMU is for Co-Simulation")
             }
+            Interface::CoSimulation | Interface::EventMode if E::CAN.exchange_only => {
+                Some("not supported: Co-Simulation; this FMU is for Model Exchange")
+            }
             Interface::EventMode if !E::CAN.event_mode() => {
                 Some("eventModeUsed = true is not allowed: hasEventMode = false")
             }
@@ -70,6 +73,7 @@ impl<E: Exported> Abi<'_, E> {
         let stepped = self.0.do_step(t, h)?;
         event.write(stepped.event.into());
         early.write(stepped.early.into());
+        terminate.write(stepped.terminate.into());
         time.write(self.0.current.end);
         Ok(())
     }

@@ -77,7 +77,7 @@ impl<E: Exported> Abi<'_, E> {
         // SAFETY: the caller's promise.
         let resources = crate::resources::folder(unsafe { pointer::text(resources) });
         let json = catch_unwind(|| {
-            let mut made = Made::<E::Model>::described(resources.as_deref())?;
+            let mut made = Made::<E::Model>::described(&E::CAN, resources.as_deref())?;
             if changes_on_loading(&made, resources.as_deref())? {
                 return Err(Fault::new("load changes what a state saves: store what it reads in a Resource"));
             }
