@@ -94,6 +94,12 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
             "t: only a parameter of a type other than text",
             5,
         ),
+        row(
+            "inner",
+            r#"V::discrete_input("x", &VOLT, "", |m| &mut m.u).intermediate()"#,
+            "x: only a continuous input or output can be intermediate",
+            5,
+        ),
         row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
         row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
         // These two show in the table, whose start is in line 3.
@@ -115,6 +121,21 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
             EXPORT + 1,
         ),
         model("number", ("<Self, 1>", "<Self, 12>"), "the above error was encountered while instantiating", 17),
+        model(
+            "inside",
+            ("Ball: ContinuousTime", "Ball: ContinuousTime + Intermediate"),
+            "`Ball` has no intermediate updates",
+            EXPORT,
+        ),
+        model(
+            "unnamed",
+            (
+                r#"V::state("h","#,
+                "V::output(\"y\", &METER, \"\", |m| &mut m.model.v).intermediate(),\n        V::state(\"h\",",
+            ),
+            "Ball: a row of the table with .intermediate() needs the capability Intermediate",
+            EXPORT + 1,
+        ),
         model("events", ("Ball: ContinuousTime", "Ball: ContinuousTime + Events"), "`Ball` has no events", EXPORT),
         enumeration("unmarked", "#[derive(Default)]", "fn main() {}", "no `#[default]`", 2),
         enumeration("start", "", "#[derive(Default)]\nstruct M { fan: Fan }", "`Fan: Default` is not satisfied", 9),

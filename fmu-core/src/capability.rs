@@ -5,6 +5,7 @@
 
 use crate::continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 use crate::events::{EventMode, Events, Indicator, Next, Outcome, Sampled, Stop};
+use crate::intermediate::Intermediate;
 use crate::log::Warnings;
 use crate::model::Block;
 use crate::row::Slot;
@@ -88,6 +89,8 @@ pub struct Capabilities<M: Model> {
     pub complete: Option<Complete<M>>,
     /// The model is not for Co-Simulation.
     pub exchange_only: bool,
+    /// [`Intermediate::longest`].
+    pub intermediate: Option<fn(&M) -> f64>,
     /// Function of a model that [`Warns`].
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,
 }
@@ -103,6 +106,7 @@ impl<M: Model> Capabilities<M> {
         tangent: None,
         complete: None,
         exchange_only: false,
+        intermediate: None,
         warn: None,
     };
 
@@ -178,6 +182,14 @@ impl<M: Model> Capabilities<M> {
     /// Leaves out Co-Simulation: for equations that need the importer's solver. Nobody calls [`Model::advance`].
     pub const fn ModelExchangeOnly(self) -> Self {
         Self { exchange_only: true, ..self }
+    }
+
+    /// Adds [`Intermediate`].
+    pub const fn Intermediate(self) -> Self
+    where
+        M: Intermediate,
+    {
+        Self { intermediate: Some(M::longest), ..self }
     }
 
     /// Adds [`Warns`].

@@ -115,6 +115,8 @@ pub struct Variable {
     pub derivative: Option<u32>,
     /// A state that an event may change.
     pub reinit: bool,
+    /// It can be read or set inside a communication step (FMI 3.0).
+    pub intermediate: bool,
 }
 
 /// A base type with its type definition.
@@ -375,6 +377,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
         dependencies: None,
         derivative: None,
         reinit: false,
+        intermediate: meta.intermediate,
     }
 }
 

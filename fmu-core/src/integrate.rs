@@ -255,7 +255,11 @@ fn arrive<M: ContinuousTime, const N: usize>(
     Ok(())
 }
 
-fn substeps(h: f64, longest: f64) -> Result<f64, Fault> {
+/// Number of equal substeps into which a step of `h` (s) is divided.
+///
+/// # Errors
+/// More substeps than anyone can wait for.
+pub fn substeps(h: f64, longest: f64) -> Result<f64, Fault> {
     let count = (h / longest - 1e-9).ceil().max(1.0);
     if count <= MAX_SUBSTEPS {
         return Ok(count);

@@ -75,7 +75,7 @@
 //! ```
 //!
 //! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
-//! [`CompletedSteps`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
+//! [`CompletedSteps`], [`Intermediate`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
 //! and a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`terminal`], [`model`],
@@ -92,6 +92,7 @@ pub mod events;
 pub mod fault;
 pub mod integer;
 pub mod integrate;
+pub mod intermediate;
 pub mod log;
 pub mod model;
 pub mod need;
@@ -116,6 +117,7 @@ pub use enumeration::{Choice, Enumerated, Field};
 pub use events::{EventMode, Events, Indicator, Next, Outcome, Sampled, Stop};
 pub use fault::Fault;
 pub use integer::{IntegerType, Whole};
+pub use intermediate::Intermediate;
 pub use model::{Block, Experiment, Info, Interface, Model};
 pub use need::Need;
 pub use reals::Inputs;

@@ -198,6 +198,7 @@ impl<W: 'static> Row<W> {
             mean: false,
             exact: false,
             need: Need::Always,
+            intermediate: false,
             dimension: None,
             shape: &[],
         };

@@ -24,6 +24,7 @@ pub const fn check<E: Exported>() {
     demand(complete, model, "EventMode is for a model that is exported with ContinuousTime and Events");
     let (rows, states, can) = (E::Model::TABLE.rows, E::CAN.states().len(), E::CAN);
     let mut i = 0;
+    check_intermediate::<E>(model);
     while i < states {
         let name = can.states()[i].name;
         let mut other = 0;
@@ -63,6 +64,15 @@ const fn is_positive(x: Option<f64>) -> bool {
         Some(x) => x > 0.0 && x < f64::INFINITY,
         None => true,
     }
+}
+
+/// The capability and its rows come together.
+#[track_caller]
+const fn check_intermediate<E: Exported>(model: &str) {
+    let (capability, rows) = (E::CAN.intermediate.is_some(), E::Model::TABLE.intermediate);
+    demand(rows || !capability, model, "the capability Intermediate needs a row of the table with .intermediate()");
+    demand(capability || !rows, model, "a row of the table with .intermediate() needs the capability Intermediate");
+    demand(!capability || E::CAN.continuous.is_some(), model, "the capability Intermediate needs ContinuousTime");
 }
 
 #[track_caller]

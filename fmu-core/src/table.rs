@@ -50,7 +50,9 @@ impl<W: 'static> Row<W> {
     /// All variables of a part, under a prefix that ends with a dot (or none).
     pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
         let access = Access::Part { len: part.table.len(), hash: part.table.hash(), node: part };
-        Self::new(prefix, "", Kind::Boolean, access)
+        let mut row = Self::new(prefix, "", Kind::Boolean, access);
+        row.meta.intermediate = part.table.intermediate;
+        row
     }
 }
 
@@ -82,6 +84,8 @@ pub struct Table<W: 'static> {
     pub(crate) places: [RowPlace; CAPACITY],
     len: usize,
     hash: Hash,
+    /// A variable can be read or set inside a communication step.
+    pub(crate) intermediate: bool,
 }
 
 impl<W: 'static> Table<W> {
@@ -94,9 +98,10 @@ impl<W: 'static> Table<W> {
         assert!(CAPACITY <= u16::MAX as usize);
         // No row past the end.
         let mut places = [RowPlace { row: u16::MAX, inner: 0 }; CAPACITY];
-        let (mut len, mut row, mut hash) = (0, 0, Hash::START);
+        let (mut len, mut row, mut hash, mut intermediate) = (0, 0, Hash::START, false);
         while row < rows.len() {
             let meta = &rows[row].meta;
+            intermediate |= meta.intermediate;
             let count = match (&rows[row].access, meta.dimension) {
                 (Access::Part { len, hash: of_part, .. }, _) => {
                     hash = hash.text(meta.name).join(of_part);
@@ -118,7 +123,7 @@ impl<W: 'static> Table<W> {
             check_unique(rows, row);
             row += 1;
         }
-        Self { rows, places, len, hash }
+        Self { rows, places, len, hash, intermediate }
     }
 
     /// Number of indices: variables, array elements counted singly.

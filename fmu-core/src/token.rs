@@ -75,6 +75,9 @@ impl Hash {
         if meta.exact {
             hash = hash.text("exact");
         }
+        if meta.intermediate {
+            hash = hash.text("intermediate");
+        }
         match meta.kind {
             Kind::Real(quantity) => hash.quantity(quantity),
             Kind::Float32(quantity) => hash.text("Float32").quantity(quantity),

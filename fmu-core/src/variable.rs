@@ -153,6 +153,8 @@ pub struct Meta {
     pub exact: bool,
     /// Whether an importer must feed it.
     pub need: Need<'static>,
+    /// It can be read or set inside a communication step; of a part, that one of its variables can.
+    pub intermediate: bool,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,
     /// Extents of a matrix, which is stored row by row; empty for a scalar, and for an array with one extent.

@@ -24,10 +24,14 @@ pub(crate) fn is_time(reference: u32, standard: Standard) -> bool {
 #[inline]
 pub(crate) fn open(meta: &Meta, state: State) -> bool {
     match meta.causality {
-        Causality::Input => state != State::Continuous || meta.variability == Variability::Continuous,
+        Causality::Input => match state {
+            State::Continuous => meta.variability == Variability::Continuous,
+            State::Intermediate => meta.intermediate,
+            _ => true,
+        },
         Causality::Parameter => match state {
             State::Step | State::Event | State::Ended => meta.variability == Variability::Tunable,
-            State::Continuous => false,
+            State::Continuous | State::Intermediate => false,
             _ => true,
         },
         _ => meta.exact && matches!(state, State::Instantiated | State::Initialization),

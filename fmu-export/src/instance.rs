@@ -1,6 +1,7 @@
 //! An instance of a model as an importer sees it, without C: names, times, saved states, messages.
 
 use crate::exchange::MAX_ITERATIONS;
+use crate::inside::Inside;
 use crate::lifecycle::{Standard, State};
 use crate::log::Log;
 use crate::sensitivity::Scratch;
@@ -55,7 +56,7 @@ pub struct Instance<E: Exported> {
     /// Indices of the states' rows.
     pub(crate) states: Vec<usize>,
     /// Ranges of the states.
-    pub(crate) ranges: Vec<Range>,
+    pub(crate) ranges: Box<[Range]>,
     /// Room for the derivatives and the indicators.
     pub(crate) values: Vec<f64>,
     /// The outputs are old: they belong to another instant (Model Exchange only).
@@ -68,6 +69,8 @@ pub struct Instance<E: Exported> {
     pub(crate) shelf: Shelf,
     /// The model as it was instantiated, for a reset, if that is not its `Default`.
     pub(crate) made: Option<Box<Block<E::Model>>>,
+    /// What the importer does inside communication steps.
+    pub(crate) inside: Option<Box<Inside<E::Model>>>,
     /// Keys of the warnings of the last second, and the times of their messages.
     warned: Vec<(&'static str, f64)>,
 }
@@ -98,6 +101,7 @@ impl<E: Exported> Instance<E> {
             texts: Vec::new(),
             shelf: Shelf::default(),
             made: None,
+            inside: None,
             warned: Vec::new(),
         }
     }
@@ -156,6 +160,14 @@ impl<E: Exported> Instance<E> {
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<Stepped, Fault> {
+        let next = self.begin_step(t, h)?;
+        self.advance(t, h, next)
+    }
+
+    /// Judges a communication step and the tunable parameters that were set; the time after the step.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
+    pub(crate) fn begin_step(&mut self, t: f64, h: f64) -> Result<Elapsed, Fault> {
         let current = &mut self.current;
         let next = current.elapsed.plus(h);
         current.check_step(t, h, next)?;
@@ -163,6 +175,14 @@ impl<E: Exported> Instance<E> {
             current.block.model = current.judged()?;
             current.dirty = false;
         }
+        Ok(next)
+    }
+
+    /// A communication step that was judged, or a part of it.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
+    pub(crate) fn advance(&mut self, t: f64, h: f64, next: Elapsed) -> Result<Stepped, Fault> {
+        let current = &mut self.current;
         let handles_events = current.life.handles_events();
         if E::CAN.event_mode() && (handles_events || self.early_return) {
             return match E::CAN.to_event {

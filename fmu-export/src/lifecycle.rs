@@ -1,9 +1,9 @@
 //! The one lifecycle table: which call is allowed in which state, for both standards and all interfaces, and where it
 //! leads.
 //!
-//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2 and 4.2. The states that are not here (configuration and
-//! intermediate-update mode, step in progress) do not exist in an FMU without structural parameters, intermediate update
-//! and asynchronous steps: the calls that would lead to them are [`Call::Unsupported`].
+//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2 and 4.2. The states that are not here (configuration mode, step in
+//! progress) do not exist in an FMU without structural parameters and asynchronous steps: the calls that would lead to them
+//! are [`Call::Unsupported`].
 
 use fmu_core::Interface;
 use serde::{Deserialize, Serialize};
@@ -18,32 +18,34 @@ pub enum Standard {
     Fmi3,
 }
 
-/// State of an instance, a bit of [`States`].
+/// State of an instance, the number of a bit of [`States`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[repr(u16)]
+#[repr(u8)]
 pub enum State {
     /// After instantiation and after a reset.
     #[default]
-    Instantiated = 1,
+    Instantiated,
     /// Initialization Mode of both standards.
-    Initialization = 2,
+    Initialization,
     /// `stepComplete` of FMI 2.0, Step Mode of FMI 3.0.
-    Step = 4,
+    Step,
     /// After a termination.
-    Terminated = 8,
+    Terminated,
     /// After an error; Reset and SetFMUState lead out.
-    Error = 16,
+    Error,
     /// Event Mode of Model Exchange, and of co-simulation in FMI 3.0.
-    Event = 32,
+    Event,
     /// Continuous-Time Mode of Model Exchange.
-    Continuous = 64,
+    Continuous,
     /// Co-simulation after a step in which the model has ended the simulation: `stepFailed` of FMI 2.0, Step Mode of FMI 3.0,
     /// where no step follows.
-    Ended = 128,
+    Ended,
+    /// Intermediate Update Mode of co-simulation in FMI 3.0: while the importer's callback runs.
+    Intermediate,
 }
 
 impl State {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Instantiated,
         Self::Initialization,
         Self::Step,
@@ -52,7 +54,19 @@ impl State {
         Self::Ended,
         Self::Terminated,
         Self::Error,
+        Self::Intermediate,
     ];
+
+    /// Those in which no call is under way.
+    const REST: [Self; 8] = {
+        let [rest @ .., _] = Self::ALL;
+        rest
+    };
+
+    /// Whether the instance waits for a callback of the importer.
+    pub const fn calls_back(self) -> bool {
+        matches!(self, Self::Intermediate)
+    }
 }
 
 impl fmt::Display for State {
@@ -66,6 +80,7 @@ impl fmt::Display for State {
             Self::Event => "Event Mode",
             Self::Continuous => "Continuous-Time Mode",
             Self::Ended => "Ended by the model",
+            Self::Intermediate => "Intermediate Update Mode",
         })
     }
 }
@@ -78,7 +93,7 @@ impl States {
     const fn of(states: &[State]) -> Self {
         let (mut bits, mut i) = (0, 0);
         while i < states.len() {
-            bits |= states[i] as u16;
+            bits |= 1 << states[i] as u8;
             i += 1;
         }
         Self(bits)
@@ -91,7 +106,7 @@ impl States {
 
     /// Whether `state` is in the set.
     pub const fn contains(self, state: State) -> bool {
-        self.0 & state as u16 != 0
+        self.0 >> state as u8 & 1 != 0
     }
 }
 
@@ -220,17 +235,17 @@ const fn exchange(states: [States; 2], next: Next) -> Row {
 impl Call {
     const fn row(self) -> Row {
         use Next::{Start, Stay, To};
-        use State::{Continuous, Ended, Error, Event, Initialization, Instantiated, Step, Terminated};
+        use State::{Continuous, Ended, Error, Event, Initialization, Instantiated, Intermediate, Step, Terminated};
         match self {
             Self::SetDebugLogging | Self::RestoreState | Self::UseState | Self::Unsupported => {
-                any(both(&State::ALL), Stay)
+                any(both(&State::REST), Stay)
             }
             Self::Instantiate => any(NONE, Stay),
             Self::SetupExperiment => any(each(&[Instantiated], &[]), Stay),
             Self::EnterInitialization => any(both(&[Instantiated]), To(Initialization)),
             Self::ExitInitialization => any(both(&[Initialization]), Start),
             Self::Terminate => any(both(&[Step, Event, Continuous, Ended]), To(Terminated)),
-            Self::Reset => any(both(&State::ALL), To(Instantiated)),
+            Self::Reset => any(both(&State::REST), To(Instantiated)),
             // FMI 3.0.2, 2.3.2 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
             // In Error: for debugging (2.0.5, 4.2.4).
             Self::Get => {
@@ -239,7 +254,7 @@ impl Call {
             Self::Set => any(
                 each(
                     &[Instantiated, Initialization, Step, Event, Continuous],
-                    &[Instantiated, Initialization, Step, Event, Continuous, Ended],
+                    &[Instantiated, Initialization, Step, Event, Continuous, Ended, Intermediate],
                 ),
                 Stay,
             ),
@@ -282,7 +297,7 @@ impl Call {
                 Stay,
             ),
             Self::OutputDerivatives => {
-                stepping(each(&[Step, Ended, Terminated, Error], &[Step, Ended, Terminated]), Stay)
+                stepping(each(&[Step, Ended, Terminated, Error], &[Step, Ended, Terminated, Intermediate]), Stay)
             }
             Self::InputDerivatives => stepping(each(&[Instantiated, Initialization, Step], &[]), Stay),
         }
@@ -380,5 +395,19 @@ impl Life {
             Next::Start if self.handles_events() => self.state = State::Event,
             Next::Start => self.state = State::Step,
         }
+    }
+
+    /// Records that a step waits for a callback of the importer.
+    pub(crate) const fn call_back(&mut self) {
+        self.state = State::Intermediate;
+    }
+
+    /// Records that the callback has returned; false if a call in it has failed.
+    pub(crate) const fn called_back(&mut self) -> bool {
+        let waits = self.state.calls_back();
+        if waits {
+            self.state = State::Step;
+        }
+        waits
     }
 }

@@ -153,6 +153,8 @@ impl<M: Model> Snapshot<M> {
             (State::Step | State::Ended, interface) => interface != Interface::ModelExchange,
             (State::Event, interface) => interface != Interface::CoSimulation,
             (State::Continuous, interface) => interface == Interface::ModelExchange,
+            // A step that is under way cannot be saved.
+            (State::Intermediate, _) => false,
             _ => true,
         }
     }

@@ -90,7 +90,7 @@ impl Fmu {
                 fmi2Instantiate(name, 1, token, null(), null(), no, no)
             } else {
                 let none = std::ptr::null_mut();
-                fmi3InstantiateCoSimulation(name, token, null(), no3, no3, no3, no3, null(), 0, none, None, null())
+                fmi3InstantiateCoSimulation(name, token, null(), no3, no3, no3, no3, null(), 0, none, None, None)
             };
             assert!(!it.is_null());
             let fmu = Self(version, it);

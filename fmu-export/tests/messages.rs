@@ -203,7 +203,7 @@ fn wishes_of_fmi3_that_are_refused() {
             n,
             environment,
             logger,
-            null(),
+            None,
         )
     };
     for (event_mode, n, why) in [(yes, 0, "hasEventMode = false"), (no, 1, "providesIntermediateUpdate = false")] {

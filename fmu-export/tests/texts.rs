@@ -101,7 +101,7 @@ fn open(resources: Option<&CStr>) -> Result<InstancePointer, String> {
             0,
             null_mut(),
             Some(log),
-            null(),
+            None,
         );
         if it.is_null() {
             return Err(SAID_TO_THE_LOGGER.take());

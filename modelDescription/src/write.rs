@@ -142,6 +142,7 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
     let exchange = description.model_exchange.as_ref();
     let continuous = exchange.is_some_and(|exchange| !exchange.states.is_empty());
     let event_mode = version == FmiVersion::V3 && exchange.is_some_and(|exchange| exchange.event_mode);
+    let intermediate = version == FmiVersion::V3 && description.variables.iter().any(|v| v.intermediate);
     let interpolates = if continuous { "true" } else { "false" };
     let element = Element::new("CoSimulation")
         .with("modelIdentifier", &*description.name)
@@ -154,7 +155,9 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
     let element = states_and_memory(element, version)
         .with_some("fixedInternalStepSize", fixed_step.map(number::format))
         .with_some("hasEventMode", event_mode.then_some("true"))
-        .with_some("mightReturnEarlyFromDoStep", event_mode.then_some("true"));
+        .with_some("mightReturnEarlyFromDoStep", event_mode.then_some("true"))
+        .with_some("providesIntermediateUpdate", intermediate.then_some("true"))
+        .with_some("canReturnEarlyAfterIntermediateUpdate", intermediate.then_some("true"));
     match exchange {
         Some(exchange) => derivatives(element, exchange, version),
         None => element,

@@ -143,6 +143,19 @@ impl<W: 'static> Row<W> {
         self
     }
 
+    /// The input can be set, the output be read, inside a communication step: see [`Intermediate`](crate::Intermediate).
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not a continuous real input or output.
+    #[track_caller]
+    pub const fn intermediate(mut self) -> Self {
+        let connected = matches!(self.meta.causality, Causality::Input | Causality::Output);
+        let continuous = matches!(self.meta.variability, Variability::Continuous) && connected;
+        demand(continuous, self.meta.name, "only a continuous input or output can be intermediate");
+        self.meta.intermediate = true;
+        self
+    }
+
     /// The output is a mean over the last communication step.
     ///
     /// # Panics

@@ -4,6 +4,7 @@
 use super::pointer::{array, numbers, place, room, text};
 use super::types::{FmuState, References};
 use super::{Abi, Answer};
+use crate::lifecycle::State;
 use crate::value::Value;
 use crate::{blob, registry};
 use fmu_core::{Exported, Fault, Model};
@@ -21,13 +22,26 @@ impl<E: Exported> Abi<'_, E> {
     pub unsafe fn get<T: Value>(&mut self, vr: References, n: usize, values: *mut T, room_for: usize) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (out, vr) = unsafe { (room(values, room_for, "values")?, array(vr, n, "value references")?) };
+        if const { E::CAN.intermediate.is_some() } && self.0.current.life.state() == State::Intermediate {
+            return self.0.get_inside(vr, out);
+        }
         self.0.get(vr, out)
     }
 
     pub unsafe fn set<T: Value>(&mut self, vr: References, n: usize, values: *const T, n_values: usize) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (values, vr) = unsafe { (array(values, n_values, "values")?, array(vr, n, "value references")?) };
+        self.inside(vr, true)?;
         self.0.set(vr, values)
+    }
+
+    /// Judges the variables that the importer uses inside a step.
+    #[inline]
+    fn inside(&self, vr: &[u32], sets: bool) -> Answer {
+        if const { E::CAN.intermediate.is_some() } && self.0.current.life.state() == State::Intermediate {
+            self.0.check_inside(vr, sets)?;
+        }
+        Ok(())
     }
 
     /// The texts stay where they are until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
@@ -40,6 +54,7 @@ impl<E: Exported> Abi<'_, E> {
     ) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (out, vr) = unsafe { (room(values, room_for, "values")?, array(vr, n, "value references")?) };
+        self.inside(vr, false)?;
         let texts = self.0.get_texts(vr, out.len())?;
         for (place, text) in out.iter_mut().zip(texts) {
             place.write(text.as_ptr());
@@ -56,6 +71,7 @@ impl<E: Exported> Abi<'_, E> {
     ) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (values, vr) = unsafe { (array(values, n_values, "values")?, array(vr, n, "value references")?) };
+        self.inside(vr, true)?;
         // SAFETY: C strings, if the variables are texts; others are refused before one is read.
         Ok(self.0.set_texts(vr, values.len(), |i| unsafe { text(values[i]) })?)
     }
@@ -211,6 +227,7 @@ impl<E: Exported> Abi<'_, E> {
         let (vr, orders, out) = unsafe {
             (array(vr, n, "value references")?, array(orders, n, "orders")?, numbers(values, n_values, "values")?)
         };
+        self.inside(vr, false)?;
         self.0.output_derivatives(vr, orders, out)
     }
 

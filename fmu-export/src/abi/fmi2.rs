@@ -1,6 +1,6 @@
 //! FMI 2.0.5: its own calls, and the table of its functions.
 
-use super::gate::{Entry, open};
+use super::gate::{Entry, Steps, open};
 use super::logger::Fmi2Sink;
 use super::pointer::{place, text};
 use super::types::{Fmi2Boolean, Fmi2Callbacks, Fmi2EventInfo, InstancePointer, Text};
@@ -55,7 +55,7 @@ impl<E: Exported> Abi<'_, E> {
             if fits { Ok(wanted) } else { Err(allowed()) }
         });
         let interface = if fmu_type == MODEL_EXCHANGE { Interface::ModelExchange } else { Interface::CoSimulation };
-        open::<E>(entry, Log::new(Box::new(sink), logging_on), judged, resources, interface, false)
+        open::<E>(entry, Log::new(Box::new(sink), logging_on), judged, resources, interface, Steps::WHOLE)
     }
 
     pub unsafe fn fmi2_new_discrete_states(&mut self, info: *mut Fmi2EventInfo) -> Answer {

@@ -1,13 +1,16 @@
 //! FMI 3.0.2: its own calls, and the table of its functions.
 
-use super::gate::{Entry, open};
+use super::callbacks::Callbacks;
+use super::gate::{Entry, Function, Steps, enter, enter_parts, open};
 use super::logger::{Fmi3Logger, Fmi3Sink};
-use super::pointer::{place, text};
-use super::types::{Fmi3Boolean, InstancePointer, Text};
+use super::pointer::{array, place, text};
+use super::types::{Fmi3Boolean, InstancePointer, References, Text};
 use super::{Abi, Answer, credentials};
+use crate::inside::{Then, Update};
+use crate::instance::Instance;
 use crate::log::Log;
 use fmu_core::{Exported, Fault, Interface};
-use std::ffi::c_void;
+use std::ffi::c_int;
 
 /// Errors and safety as in `calls.rs`.
 #[allow(missing_docs, reason = "named as in the standards")]
@@ -21,15 +24,21 @@ impl<E: Exported> Abi<'_, E> {
         token: Text,
         resources: Text,
         logging_on: Fmi3Boolean,
-        environment: *mut c_void,
         logger: Option<Fmi3Logger>,
         interface: Interface,
         early_return: bool,
+        callbacks: Callbacks,
+        (required, n_required): (References, usize),
         refused: Option<&str>,
     ) -> InstancePointer {
-        // SAFETY: the importer's texts, valid during this call.
-        let (name, token, resources) = unsafe { (text(name), text(token), text(resources)) };
+        // SAFETY: the importer's texts and array, valid during this call.
+        let (name, token, resources, required) =
+            unsafe { (text(name), text(token), text(resources), array(required, n_required, "variables")) };
+        let unused = const { E::CAN.intermediate.is_none() } && n_required > 0;
+        let environment = callbacks.environment;
+        let callbacks = if const { E::CAN.intermediate.is_some() } { callbacks } else { Callbacks::NONE };
         let refused = refused.or(match interface {
+            _ if unused => Some("nRequiredIntermediateVariables must be 0: providesIntermediateUpdate = false"),
             Interface::ModelExchange if !E::CAN.model_exchange() => {
                 Some("not supported: Model Exchange; this FMU is for Co-Simulation")
             }
@@ -43,20 +52,63 @@ impl<E: Exported> Abi<'_, E> {
         });
         let judged = credentials::<E>(name, token);
         let judged = judged.and_then(|wanted| refused.map_or(Ok(wanted), |why| Err(Fault::new(why))));
-        let log = Log::new(Box::new(Fmi3Sink { logger, environment }), logging_on.0 != 0);
-        open::<E>(entry, log, judged, resources, interface, early_return)
+        let (judged, required) = match required {
+            Ok(required) => (judged, required),
+            Err(fault) => (Err(fault), &[][..]),
+        };
+        let sink = Fmi3Sink { logger, environment };
+        let steps = Steps { early_return, callbacks, required };
+        open::<E>(entry, Log::new(Box::new(sink), logging_on.0 != 0), judged, resources, interface, steps)
     }
 
-    /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information.
-    pub unsafe fn fmi3_do_step(
-        &mut self,
+    /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information. An instance whose importer
+    /// wants to be called inside the step goes through it in parts.
+    ///
+    /// # Safety
+    /// As [`enter`](Self::enter), and the importer's variables.
+    #[inline]
+    pub unsafe fn fmi3_do_step<F: Function>(
+        instance: InstancePointer,
         t: f64,
         h: f64,
+        event: *mut Fmi3Boolean,
+        terminate: *mut Fmi3Boolean,
+        early: *mut Fmi3Boolean,
+        time: *mut f64,
+    ) -> c_int {
+        if const { E::CAN.intermediate.is_none() } {
+            // SAFETY: the caller's promise.
+            return unsafe {
+                enter::<E, F>(instance, |mut abi| {
+                    abi.report_step(event, terminate, early, time, |instance| instance.do_step(t, h).map(Then::Done))?;
+                    Ok(())
+                })
+            };
+        }
+        let mut under_way = None;
+        // SAFETY: the caller's promise.
+        unsafe {
+            enter_parts::<E, F>(instance, |mut abi, reply| {
+                Ok(abi.report_step(event, terminate, early, time, |instance| {
+                    if instance.inside.is_none() {
+                        return instance.do_step(t, h).map(Then::Done);
+                    }
+                    instance.step_part((t, h), &mut under_way, reply)
+                })?)
+            })
+        }
+    }
+
+    /// Takes a step or a part of it and writes how it ended, or returns what the importer is to be told inside it.
+    #[inline]
+    unsafe fn report_step(
+        &mut self,
         event_handling_needed: *mut Fmi3Boolean,
         terminate_simulation: *mut Fmi3Boolean,
         early_return: *mut Fmi3Boolean,
         last_successful_time: *mut f64,
-    ) -> Answer {
+        step: impl FnOnce(&mut Instance<E>) -> Result<Then, Fault>,
+    ) -> Result<Option<Update>, Fault> {
         // SAFETY: the importer's variables.
         let (time, event, early, terminate) = unsafe {
             (
@@ -70,12 +122,15 @@ impl<E: Exported> Abi<'_, E> {
         event.write(false.into());
         early.write(false.into());
         time.write(self.0.current.end);
-        let stepped = self.0.do_step(t, h)?;
+        let stepped = match step(self.0)? {
+            Then::Done(stepped) => stepped,
+            Then::Call(update) => return Ok(Some(update)),
+        };
         event.write(stepped.event.into());
         early.write(stepped.early.into());
         terminate.write(stepped.terminate.into());
         time.write(self.0.current.end);
-        Ok(())
+        Ok(None)
     }
 
     pub unsafe fn fmi3_update_discrete_states(
@@ -145,23 +200,22 @@ macro_rules! export_fmi3 {
             logging_on: Fmi3Boolean,
             event_mode_used: Fmi3Boolean,
             early_return_allowed: Fmi3Boolean,
-            _intermediate: References,
-            n_intermediate: usize,
+            required: References,
+            n_required: usize,
             environment: *mut c_void,
             logger: Option<Fmi3Logger>,
-            _intermediate_update: *const c_void,
+            intermediate: Option<Fmi3IntermediateUpdate>,
         ) -> InstancePointer {
             $crate::abi::quiet();
             const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateCoSimulation");
-            let refused = (n_intermediate > 0)
-                .then_some("nRequiredIntermediateVariables must be 0: providesIntermediateUpdate = false");
             let interface =
                 if event_mode_used.0 != 0 { Interface::EventMode } else { Interface::CoSimulation };
-            let early = early_return_allowed.0 != 0;
+            let (early, callbacks) = (early_return_allowed.0 != 0, Callbacks { environment, intermediate });
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, resources, logging_on, environment, logger, interface, early, refused,
+                    ENTRY, name, token, resources, logging_on, logger, interface, early, callbacks,
+                    (required, n_required), None,
                 )
             }
         }
@@ -178,11 +232,11 @@ macro_rules! export_fmi3 {
         ) -> InstancePointer {
             $crate::abi::quiet();
             const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateModelExchange");
-            let interface = Interface::ModelExchange;
+            let (interface, callbacks) = (Interface::ModelExchange, Callbacks { environment, ..Callbacks::NONE });
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, resources, logging_on, environment, logger, interface, false, None,
+                    ENTRY, name, token, resources, logging_on, logger, interface, false, callbacks, (null(), 0), None,
                 )
             }
         }
@@ -203,10 +257,11 @@ macro_rules! export_fmi3 {
             $crate::abi::quiet();
             const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateScheduledExecution");
             let refused = Some("not supported: Scheduled Execution");
+            let (interface, callbacks) = (Interface::CoSimulation, Callbacks { environment, ..Callbacks::NONE });
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, resources, logging_on, environment, logger, Interface::CoSimulation, false, refused,
+                    ENTRY, name, token, resources, logging_on, logger, interface, false, callbacks, (null(), 0), refused,
                 )
             }
         }
@@ -215,6 +270,29 @@ macro_rules! export_fmi3 {
         pub(crate) unsafe extern "C" fn fmi3FreeInstance(instance: InstancePointer) {
             // SAFETY: what the standard demands of the importer.
             unsafe { $crate::abi::Abi::<$exported>::free_instance(instance) }
+        }
+
+        #[unsafe(no_mangle)]
+        pub(crate) unsafe extern "C" fn fmi3DoStep(
+            instance: InstancePointer,
+            t: f64,
+            h: f64,
+            _no_set_state_prior: Fmi3Boolean,
+            event_handling_needed: *mut Fmi3Boolean,
+            terminate_simulation: *mut Fmi3Boolean,
+            early_return: *mut Fmi3Boolean,
+            last_successful_time: *mut f64,
+        ) -> c_int {
+            struct Here;
+            impl Function for Here {
+                const ENTRY: Entry = Entry::new(Standard::Fmi3, Call::DoStep, "fmi3DoStep");
+            }
+            // SAFETY: what the standard demands of the importer.
+            unsafe {
+                $crate::abi::Abi::<$exported>::fmi3_do_step::<Here>(
+                    instance, t, h, event_handling_needed, terminate_simulation, early_return, last_successful_time,
+                )
+            }
         }
 
         $crate::functions! { Fmi3 $exported;
@@ -266,10 +344,6 @@ macro_rules! export_fmi3 {
             fmi3DeserializeFMUState(bytes: *const u8, size: usize, state: *mut FmuState)
                 => UseState: deserialize(bytes, size, state);
 
-            fmi3DoStep(
-                t: f64, h: f64, _no_set_state_prior: Fmi3Boolean, event_handling_needed: *mut Fmi3Boolean,
-                terminate_simulation: *mut Fmi3Boolean, early_return: *mut Fmi3Boolean, last_successful_time: *mut f64
-            ) => DoStep: fmi3_do_step(t, h, event_handling_needed, terminate_simulation, early_return, last_successful_time);
             fmi3EnterStepMode() => EnterStep: fmi3_enter_step();
             fmi3EnterEventMode() => EnterEvent: enter_event();
             fmi3EvaluateDiscreteStates() => EvaluateDiscrete: fmi3_evaluate();

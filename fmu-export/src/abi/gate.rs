@@ -1,8 +1,10 @@
 //! The gate: every call on an instance passes here. NULL, re-entry, standard and lifecycle are checked, panics caught,
 //! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
 
+use super::callbacks::Callbacks;
 use super::{Abi, Answer, Wanted};
 use crate::blob;
+use crate::inside::{Reply, Update};
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Allowed, Call, Next, Standard};
 use crate::log::{Log, Status};
@@ -38,9 +40,12 @@ pub trait Function {
     const ENTRY: Entry;
 }
 
-/// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused.
+/// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused. `calling` while a callback
+/// runs for a call that is under way: the lifecycle says what it may call.
 struct Handle<E: Exported> {
     busy: Cell<bool>,
+    calling: Cell<bool>,
+    callbacks: Callbacks,
     instance: UnsafeCell<Instance<E>>,
 }
 
@@ -63,9 +68,57 @@ pub(crate) unsafe fn enter<E: Exported, F: Function>(
     }
     // SAFETY: `busy` was false, so no other call of this thread holds the instance, and no other thread uses it.
     let instance = unsafe { &mut *handle.instance.get() };
-    let status = pass(const { &F::ENTRY }, instance, body);
+    let status = if const { calls_back::<E>() } && handle.calling.get() && !instance.current.life.state().calls_back() {
+        instance.log.error(&format!("{}: not allowed: an earlier call of this callback failed", F::ENTRY.name));
+        Status::Error
+    } else {
+        pass(const { &F::ENTRY }, instance, body)
+    };
     handle.busy.set(false);
     status as c_int
+}
+
+/// Whether a call of the model can call the importer, which may call the instance again.
+const fn calls_back<E: Exported>() -> bool {
+    E::CAN.intermediate.is_some()
+}
+
+/// Passes a call to the instance in parts. After each that wants it, the importer is called, while nothing of the instance is
+/// borrowed and it is not busy: what the callback may call is for the lifecycle to say. A call there that fails makes this
+/// one fail.
+///
+/// # Safety
+/// As [`enter`].
+pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
+    pointer: *mut c_void,
+    mut part: impl FnMut(Abi<'_, E>, Reply) -> Result<Option<Update>, Refusal>,
+) -> c_int {
+    let mut reply = None;
+    loop {
+        let mut update = None;
+        // SAFETY: the caller's promise.
+        let status = unsafe {
+            enter::<E, F>(pointer, |mut abi| {
+                update = part(Abi(&mut *abi.0), reply)?;
+                if update.is_some() {
+                    abi.current.life.call_back();
+                }
+                Ok(())
+            })
+        };
+        let Some(update) = update else { return status };
+        // SAFETY: the caller's promise; the instance lives, because `close` leaves one alone that is calling.
+        let handle = unsafe { &*pointer.cast::<Handle<E>>() };
+        handle.calling.set(true);
+        reply = handle.callbacks.intermediate(update);
+        handle.calling.set(false);
+        // SAFETY: nothing else borrows the instance: every call of the callback has returned.
+        let instance = unsafe { &mut *handle.instance.get() };
+        if !instance.current.life.called_back() {
+            instance.log.error(&format!("{}: a call of the callback failed", F::ENTRY.name));
+            return Status::Error as c_int;
+        }
+    }
 }
 
 #[inline]
@@ -123,6 +176,22 @@ pub(super) fn panicked(payload: &(dyn Any + Send)) -> Fault {
     Fault::new(format!("a fault in the model's code (panic): {}", text.unwrap_or("no message")))
 }
 
+/// How the importer takes communication steps.
+#[derive(Clone, Copy)]
+pub(crate) struct Steps<'a> {
+    /// They may end early.
+    pub(crate) early_return: bool,
+    /// The functions that it wants to be called.
+    pub(crate) callbacks: Callbacks,
+    /// The variables that it uses inside a step.
+    pub(crate) required: &'a [u32],
+}
+
+impl Steps<'_> {
+    /// Whole steps.
+    pub(crate) const WHOLE: Self = Self { early_return: false, callbacks: Callbacks::NONE, required: &[] };
+}
+
 /// A new instance for the importer, or NULL and a message.
 pub(crate) fn open<E: Exported>(
     entry: &'static Entry,
@@ -130,7 +199,7 @@ pub(crate) fn open<E: Exported>(
     wanted: Result<Wanted, Fault>,
     resources: Option<&CStr>,
     interface: Interface,
-    early_return: bool,
+    steps: Steps<'_>,
 ) -> *mut c_void {
     let make = |suffix: &str| {
         let made = catch_unwind(|| {
@@ -146,8 +215,16 @@ pub(crate) fn open<E: Exported>(
         Ok((name, (block, shelf), suffix)) => {
             let made = (!shelf.is_empty() || !suffix.is_empty()).then(|| Box::new(block.clone()));
             let mut instance = Instance::<E>::new(entry.standard, name, log, Snapshot::of(interface, block));
-            (instance.shelf, instance.made, instance.early_return) = (shelf, made, early_return);
-            Box::into_raw(Box::new(Handle { busy: Cell::new(false), instance: UnsafeCell::new(instance) })).cast()
+            (instance.shelf, instance.made, instance.early_return) = (shelf, made, steps.early_return);
+            if steps.callbacks.intermediate.is_some()
+                && let Err(fault) = instance.look_inside(steps.required)
+            {
+                instance.log.error(&format!("{}: {fault}", entry.name));
+                return std::ptr::null_mut();
+            }
+            let (busy, calling) = (Cell::new(false), Cell::new(false));
+            let instance = UnsafeCell::new(instance);
+            Box::into_raw(Box::new(Handle { busy, calling, callbacks: steps.callbacks, instance })).cast()
         }
         Err(fault) => {
             log.error(&format!("{}: {fault}", entry.name));
@@ -156,7 +233,7 @@ pub(crate) fn open<E: Exported>(
     }
 }
 
-/// Frees an instance; ignores NULL and a logger that frees the instance it logs for.
+/// Frees an instance; ignores NULL and a callback that frees the instance it is called for.
 ///
 /// # Safety
 /// As [`enter`]; the pointer is not used again.
@@ -165,8 +242,8 @@ pub(crate) unsafe fn close<E: Exported>(pointer: *mut c_void) {
         return;
     }
     // SAFETY: the caller's promise.
-    let busy = unsafe { &*pointer.cast::<Handle<E>>() }.busy.get();
-    if !busy {
+    let handle = unsafe { &*pointer.cast::<Handle<E>>() };
+    if !handle.busy.get() && !handle.calling.get() {
         // SAFETY: from `open`, closed once by the caller's promise, not in use. A panic in a model's drop stops here.
         let _ = catch_unwind(AssertUnwindSafe(|| drop(unsafe { Box::from_raw(pointer.cast::<Handle<E>>()) })));
     }

@@ -93,7 +93,7 @@ impl Fmu {
                 0,
                 environment,
                 logger,
-                null(),
+                None,
             )
         }
     }

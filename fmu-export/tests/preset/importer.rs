@@ -65,20 +65,7 @@ pub(crate) fn open(way: Way, token: &str, resources: Option<&str>) -> Result<Ins
             }
             Way::Three => {
                 let (list, logger) = (null(), Some(log3 as extern "C" fn(_, _, _, _) as _));
-                fmi3InstantiateCoSimulation(
-                    name,
-                    token,
-                    resources,
-                    no,
-                    yes,
-                    no,
-                    no,
-                    list,
-                    0,
-                    null_mut(),
-                    logger,
-                    null(),
-                )
+                fmi3InstantiateCoSimulation(name, token, resources, no, yes, no, no, list, 0, null_mut(), logger, None)
             }
             Way::ThreeExchange => {
                 let logger = Some(log3 as extern "C" fn(_, _, _, _) as _);

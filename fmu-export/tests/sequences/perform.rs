@@ -353,7 +353,7 @@ pub(crate) fn miscarry(version: u8, wrong: u8, environment: *mut c_void) -> &'st
                         0,
                         environment,
                         Some(log3),
-                        none,
+                        None,
                     )
                 },
                 "fmi3InstantiateCoSimulation",

@@ -118,7 +118,7 @@ impl Fmu {
             },
             Kind::Cs3 { event, early } => {
                 let (event, early) = (Fmi3Boolean(event.into()), Fmi3Boolean(early.into()));
-                let (on, none) = (Fmi3Boolean(on), null());
+                let (on, none) = (Fmi3Boolean(on), None);
                 unsafe {
                     fmi3InstantiateCoSimulation(
                         name,

@@ -85,7 +85,8 @@ fn variable(v: &Variable) -> Element {
         VariableKind::Enumeration { .. } => "Enumeration",
         VariableKind::Text => "String",
     };
-    let mut element = identity(base, v, &v.name, v.value_reference);
+    let mut element =
+        identity(base, v, &v.name, v.value_reference).with_some("intermediateUpdate", v.intermediate.then_some("true"));
     element.attributes.extend(type_attributes(v, FmiVersion::V3));
     let starts: Option<Vec<String>> =
         v.start.as_ref().map(|all| all.iter().map(|value| text(v, value, FmiVersion::V3)).collect());

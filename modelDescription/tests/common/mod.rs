@@ -62,6 +62,7 @@ pub(crate) fn variable(
         dependencies: None,
         derivative: None,
         reinit: false,
+        intermediate: false,
     }
 }
 
