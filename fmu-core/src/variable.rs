@@ -129,6 +129,7 @@ impl std::fmt::Display for Range {
 }
 
 /// All properties of a variable except the location of its value.
+#[expect(clippy::struct_excessive_bools, reason = "properties that do not depend on each other")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meta {
     /// Name, relative to the part that it belongs to.

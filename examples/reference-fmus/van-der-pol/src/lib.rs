@@ -68,7 +68,7 @@ impl ContinuousTime for VanDerPol {
 impl Differentiable for VanDerPol {
     fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], x: &mut [f64; 2]) -> Result<(), Fault> {
         let dual = |i: usize| Dual::new(self.x[i], along.x[i]);
-        let change = f([dual(0), dual(1)], Dual::new(self.mu, along.mu));
+        let change = f([dual(0), dual(1)], Dual::from(self.mu));
         dx.copy_from_slice(&change.map(|d| d.change));
         *x = along.x;
         Ok(())
