@@ -155,6 +155,13 @@ pub enum VariableKind {
     },
     /// A text.
     Text,
+    /// Bytes.
+    Binary {
+        /// MIME type of the content.
+        mime_type: String,
+        /// Greatest number of bytes.
+        most: usize,
+    },
 }
 
 /// A start value.
@@ -169,6 +176,8 @@ pub enum Value {
     Boolean(bool),
     /// Start value of a text.
     Text(String),
+    /// Start value of bytes.
+    Binary(Vec<u8>),
 }
 
 impl Description {
@@ -295,6 +304,12 @@ impl Description {
     /// The name that users see.
     pub fn model_name(&self) -> &str {
         self.title.as_deref().unwrap_or(&self.name)
+    }
+
+    /// Why there can be no archive of FMI 2.0, if there cannot.
+    pub fn needs_fmi3(&self) -> Option<String> {
+        let binary = |v: &&Variable| matches!(v.kind, VariableKind::Binary { .. });
+        self.variables.iter().find(binary).map(|v| format!("{} is binary, and FMI 2.0 has no bytes", v.name))
     }
 
     /// The variable of this name.
@@ -426,6 +441,7 @@ fn value(slot: &Slot<'_>) -> Value {
         Slot::Constant(Constant::Integer(x)) => Value::Integer(*x),
         Slot::Constant(Constant::Boolean(x)) => Value::Boolean(*x),
         Slot::Constant(Constant::Enumeration(x)) => Value::Integer((*x).into()),
+        Slot::Binary(x) => Value::Binary(x.to_vec()),
     }
 }
 
@@ -444,6 +460,7 @@ fn kind(kind: &Kind) -> VariableKind {
         Kind::Integer(of) => VariableKind::Integer(*of),
         Kind::Boolean => VariableKind::Boolean,
         Kind::Text => VariableKind::Text,
+        Kind::Binary { mime_type, most } => VariableKind::Binary { mime_type: (*mime_type).into(), most: *most },
         Kind::Enumeration(Enumeration { name, description, items }) => VariableKind::Enumeration {
             name: (*name).into(),
             description: (*description).into(),
@@ -463,10 +480,12 @@ fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
         return Err(Fault::new(format!("{name} = {slot} at the start has a character that XML does not have")));
     }
     if slot.is_allowed(meta) {
-        Ok(())
-    } else {
-        Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
+        return Ok(());
     }
+    if let Kind::Binary { most, .. } = meta.kind {
+        return Err(Fault::value(name, format!("{slot} at the start"), format_args!("at most {most} bytes")));
+    }
+    Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
 }
 
 fn check_types(variables: &[Variable]) -> Result<(), Fault> {

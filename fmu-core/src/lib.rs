@@ -83,6 +83,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bytes;
 pub mod capability;
 pub mod continuous;
 pub mod description;
@@ -93,6 +94,7 @@ pub mod fault;
 pub mod integer;
 pub mod integrate;
 pub mod intermediate;
+pub mod list;
 pub mod log;
 pub mod model;
 pub mod need;
@@ -109,6 +111,7 @@ pub mod token;
 pub mod unit;
 pub mod variable;
 
+pub use bytes::Bytes;
 pub use capability::{Capabilities, Exported, Plain, Warns};
 pub use continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 pub use description::Description;
@@ -118,6 +121,7 @@ pub use events::{EventMode, Events, Indicator, Next, Outcome, Sampled, Stop};
 pub use fault::Fault;
 pub use integer::{IntegerType, Whole};
 pub use intermediate::Intermediate;
+pub use list::{Element, Items};
 pub use model::{Block, Experiment, Info, Interface, Model};
 pub use need::Need;
 pub use reals::Inputs;

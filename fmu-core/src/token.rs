@@ -84,6 +84,7 @@ impl Hash {
             Kind::Integer(IntegerType::Int32) => hash.text("integer"),
             Kind::Integer(of) => hash.text(of.name()),
             Kind::Text => hash.text("text"),
+            Kind::Binary { mime_type, most } => hash.text("binary").text(mime_type).count(most),
             Kind::Boolean => hash.text("boolean"),
             Kind::Enumeration(enumeration) => {
                 let (mut hash, mut i) = (hash.text(enumeration.name), 0);

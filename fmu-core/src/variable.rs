@@ -81,6 +81,13 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
     /// A text.
     Text,
+    /// Bytes (FMI 3.0).
+    Binary {
+        /// MIME type of the content.
+        mime_type: &'static str,
+        /// Greatest number of bytes.
+        most: usize,
+    },
 }
 
 /// The values that are allowed. A strict bound is not itself allowed.

@@ -24,6 +24,7 @@ pub(crate) fn allowed(meta: &Meta) -> String {
             let (min, max) = of.within(&meta.range);
             return format!("{min} to {max}");
         }
+        Kind::Binary { most, .. } => return format!("at most {most} bytes"),
         _ => return meta.range.to_string(),
     };
     let items: Vec<String> = enumeration.items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
@@ -39,6 +40,7 @@ fn kind(kind: &Kind) -> String {
         Kind::Boolean => "a truth value".into(),
         Kind::Enumeration(_) => "an enumeration".into(),
         Kind::Text => "a text".into(),
+        Kind::Binary { .. } => "bytes".into(),
     }
 }
 

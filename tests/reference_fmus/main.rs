@@ -3,6 +3,7 @@
 
 mod bouncing_ball;
 mod dahlquist;
+mod feedthrough;
 #[path = "../common/python.rs"]
 #[allow(dead_code, unreachable_pub, reason = "a module of several test programs")]
 mod python;
@@ -56,7 +57,8 @@ fn archives() -> &'static Path {
 }
 
 fn archive(package: &str, version: FmiVersion) -> PathBuf {
-    packed(package)[usize::from(version == V3)].clone()
+    let folder = if version == V3 { "fmi3" } else { "fmi2" };
+    packed(package).into_iter().find(|file| file.parent().is_some_and(|parent| parent.ends_with(folder))).unwrap()
 }
 
 /// Our importer with these values set, up to `stop` in steps of `h`.
@@ -102,17 +104,14 @@ fn euler<const N: usize>(
 
 /// FMPy's run of an archive: the columns of its recording with the time, as text that keeps every bit.
 fn fmpy(fmu: &Path, arguments: &str) -> Vec<Vec<f64>> {
-    let python = python::environment(Path::new("tests/fmpy/requirements.txt"));
     let script = "import sys, fmpy\n\
         from fmpy.validation import validate_fmu\n\
         problems = validate_fmu(sys.argv[1])\n\
         assert problems == [], problems\n\
         result = eval('fmpy.simulate_fmu(sys.argv[1], ' + sys.argv[2] + ')')\n\
         for name in result.dtype.names:\n    print(*(float(x).hex() for x in result[name]))\n";
-    let output = Command::new(python).args(["-c", script]).arg(fmu).arg(arguments).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}: {said}", fmu.display());
-    String::from_utf8_lossy(&output.stdout).lines().map(|line| line.split(' ').map(hexadecimal).collect()).collect()
+    let said = self::script(script, &[fmu, Path::new(arguments)]);
+    said.lines().map(|line| line.split(' ').map(hexadecimal).collect()).collect()
 }
 
 /// A number as Python's `float.hex` writes it.
@@ -129,3 +128,27 @@ fn hexadecimal(text: &str) -> f64 {
 }
 
 const BOTH: [FmiVersion; 2] = [V2, V3];
+
+/// The archive of FMI 3.0.
+fn open(package: &str) -> Fmu {
+    Fmu::open(&archive(package, V3)).unwrap()
+}
+
+/// What the checker finds in the archives, but for the linker's matters.
+fn checks(package: &str) {
+    for file in packed(package) {
+        let program = Some(PathBuf::from(env!("CARGO_BIN_EXE_fmu")));
+        let options = fmu_check::Options { program, ..Default::default() };
+        let report = fmu_check::run(&file, &options).unwrap();
+        let found = report.violated().filter(|f| !["B03", "B04"].contains(&f.id)).count();
+        assert_eq!(found, 0, "{}: {}", file.display(), report.text(false));
+    }
+}
+
+/// Runs a script with FMPy.
+fn script(script: &str, arguments: &[&Path]) -> String {
+    let mut python = Command::new(python::environment(Path::new("tests/fmpy/requirements.txt")));
+    let output = python.args(["-c", script]).args(arguments).env_remove("PYTHONPATH").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}

@@ -10,11 +10,12 @@ impl<W: 'static> Row<W> {
     /// Makes a parameter tunable: it may change at communication points.
     ///
     /// # Panics
-    /// At compile time, if the variable is not a parameter, or is a text.
+    /// At compile time, if the variable is not a parameter, or is a text or bytes.
     #[track_caller]
     pub const fn tunable(mut self) -> Self {
-        let parameter = matches!(self.meta.causality, Causality::Parameter) && !matches!(self.meta.kind, Kind::Text);
-        demand(parameter, self.meta.name, "only a parameter of a type other than text can be tunable");
+        let parameter = matches!(self.meta.causality, Causality::Parameter)
+            && !matches!(self.meta.kind, Kind::Text | Kind::Binary { .. });
+        demand(parameter, self.meta.name, "only a parameter of a type other than text and bytes can be tunable");
         self.meta.variability = Variability::Tunable;
         self
     }
@@ -36,15 +37,15 @@ impl<W: 'static> Row<W> {
     /// the state itself; the closure of another row leads to a field of the model, which its outputs do not have.
     ///
     /// # Panics
-    /// At compile time, if the variable is not an output or a local variable, or is a text, a mean or a constant. Describing the
+    /// At compile time, if the variable is not an output or a local variable, or is a text, bytes, a mean or a constant. Describing the
     /// model checks that the value survives the initialization.
     #[track_caller]
     pub const fn exact(mut self) -> Self {
         let calculated = matches!(self.meta.causality, Causality::Output | Causality::Local)
             && !matches!(self.meta.variability, Variability::Constant)
-            && !matches!(self.meta.kind, Kind::Text)
+            && !matches!(self.meta.kind, Kind::Text | Kind::Binary { .. })
             && !self.meta.mean;
-        let rule = "only an output or a local variable can be exact, and neither a text, a mean nor a constant";
+        let rule = "only an output or a local variable can be exact, and neither a text, bytes, a mean nor a constant";
         demand(calculated, self.meta.name, rule);
         self.meta.exact = true;
         self
@@ -59,6 +60,23 @@ impl<W: 'static> Row<W> {
         let constant = matches!(self.meta.variability, Variability::Constant);
         demand(constant, self.meta.name, "only a constant can be made an output");
         self.meta.causality = Causality::Output;
+        self
+    }
+
+    /// Makes an input, output or local variable in single precision continuous.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not in single precision, or is a parameter.
+    #[track_caller]
+    pub const fn continuous(mut self) -> Self {
+        let single =
+            matches!(self.meta.kind, Kind::Float32(_)) && matches!(self.meta.variability, Variability::Discrete);
+        demand(
+            single,
+            self.meta.name,
+            "only a variable in single precision other than a parameter can be made continuous",
+        );
+        self.meta.variability = Variability::Continuous;
         self
     }
 

@@ -1,9 +1,10 @@
 //! A value that a table has found.
 
+use crate::bytes::Bytes;
 use crate::enumeration::Choice;
 use crate::integer::Whole;
 use crate::variable::{Kind, Meta};
-use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::hash::{DefaultHasher, Hasher as _};
 
 /// The value of a constant that is not a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +40,8 @@ pub enum Slot<'a> {
     Said(&'a str),
     /// A constant.
     Constant(Constant),
+    /// Bytes.
+    Binary(&'a mut Bytes),
 }
 
 impl Slot<'_> {
@@ -51,31 +54,33 @@ impl Slot<'_> {
             (Self::Constant(Constant::Real(x)), _) => meta.range.contains(*x),
             (Self::Constant(Constant::Float32(x)), _) => meta.range.contains_single(*x),
             (Self::Constant(Constant::Integer(x)), Kind::Integer(of)) => of.allows(*x, &meta.range),
+            (Self::Binary(x), Kind::Binary { most, .. }) => x.len() <= most,
             _ => true,
         }
     }
 
-    /// The bits of the value, for comparisons; a hash of a text.
+    /// The bits of the value, for comparisons; a hash of a text or of bytes.
     pub(crate) fn bits(&self) -> u64 {
-        let hash = |text: &str| {
+        fn hash<T: std::hash::Hash + ?Sized>(content: &T) -> u64 {
             let mut hasher = DefaultHasher::new();
-            text.hash(&mut hasher);
+            content.hash(&mut hasher);
             hasher.finish()
-        };
+        }
         match self {
             Self::Real(x) => x.to_bits(),
             Self::Float32(x) => x.to_bits().into(),
             Self::Integer(x) => u64::try_from(x.get() & i128::from(u64::MAX)).unwrap_or_default(),
             Self::Boolean(x) => u64::from(**x),
             Self::Enumeration(x) => x.get().cast_unsigned().into(),
-            Self::Text(x) => hash(x),
-            Self::Said(x) => hash(x),
+            Self::Text(x) => hash(x.as_str()),
+            Self::Said(x) => hash(*x),
+            Self::Binary(x) => hash::<[u8]>(x),
             Self::Constant(_) => 0,
         }
     }
 }
 
-/// The value as a message shows it; an enumeration as its number, a text in quotes.
+/// The value as a message shows it; an enumeration as its number, a text in quotes, bytes in hexadecimal digits.
 impl std::fmt::Display for Slot<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -91,6 +96,7 @@ impl std::fmt::Display for Slot<'_> {
             Self::Constant(Constant::Integer(x)) => x.fmt(f),
             Self::Constant(Constant::Boolean(x)) => x.fmt(f),
             Self::Constant(Constant::Enumeration(x)) => x.fmt(f),
+            Self::Binary(x) => x.fmt(f),
         }
     }
 }
