@@ -288,10 +288,11 @@ impl<E: Exported> Instance<E> {
         let current = &mut self.current;
         if !event_mode {
             (events.begin)(&mut current.block.model, stop.at);
-            if stop.settles && !stepped.early {
-                if let Err(fault) = settle(events, &mut current.block.model, stop.at) {
-                    return self.end_or_fail(fault, t, h);
-                }
+            if stop.settles
+                && !stepped.early
+                && let Err(fault) = settle(events, &mut current.block.model, stop.at)
+            {
+                return self.end_or_fail(fault, t, h);
             }
         }
         let current = &mut self.current;

@@ -9,7 +9,7 @@ fn expected(x: f64, k: f64) -> Vec<f64> {
 #[test]
 fn has_the_bits_of_the_original() {
     let wanted = expected(1.0, 1.0);
-    assert_eq!((wanted.len(), wanted[100]), (101, 2.656139888758746e-5));
+    assert_eq!((wanted.len(), wanted[100]), (101, 2.656_139_888_758_746e-5));
     for version in BOTH {
         let fmu = archive("dahlquist", version);
         assert_eq!(column(&run(Method::default(), &fmu, &[], 10.0, 0.1), "x"), wanted, "{version:?}");

@@ -131,7 +131,7 @@ const BOTH: [FmiVersion; 2] = [V2, V3];
 
 /// The archive of FMI 3.0.
 fn open(package: &str) -> Fmu {
-    Fmu::open(&archive(package, V3)).unwrap()
+    Fmu::open(archive(package, V3)).unwrap()
 }
 
 /// What the checker finds in the archives, but for the linker's matters.

@@ -12,7 +12,7 @@ fn f([y1, y2]: [f64; 2]) -> [f64; 2] {
 #[test]
 fn its_equations_are_those_of_the_original() {
     for version in BOTH {
-        let fmu = Fmu::open(&archive("roberts", version)).unwrap();
+        let fmu = Fmu::open(archive("roberts", version)).unwrap();
         assert!(fmu.instantiate("it", false).is_err(), "no Co-Simulation");
         let description = fmu.description();
         assert_eq!(description.default_experiment.tolerance, Some(1e-4));

@@ -20,7 +20,7 @@ fn has_the_bits_of_the_original() {
 #[test]
 fn its_derivatives_are_exact() {
     for version in BOTH {
-        let fmu = Fmu::open(&archive("van-der-pol", version)).unwrap();
+        let fmu = Fmu::open(archive("van-der-pol", version)).unwrap();
         let mut instance = fmu.instantiate_as(Kind::ModelExchange, "it", false).unwrap();
         instance.set_text("x0", "1.5").unwrap();
         instance.set_text("x1", "-0.7").unwrap();

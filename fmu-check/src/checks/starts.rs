@@ -58,7 +58,7 @@ pub(super) fn stand(session: &Session) -> Result<(), NotDetermined> {
 }
 
 /// Steps up to the end of the default experiment; the end of the last one, if the FMU ends the simulation in it.
-fn end<'b>(session: &'b Session) -> Result<Option<(Instance<'b>, f64)>, NotDetermined> {
+fn end(session: &Session) -> Result<Option<(Instance<'_>, f64)>, NotDetermined> {
     let (instance, h) = (session.stepping()?, session.h());
     let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
     session
