@@ -69,7 +69,11 @@ fn every_arrow_goes_one_way() {
         );
     }
     let listed: BTreeSet<&str> = ARROWS.iter().map(|(name, _)| *name).collect();
-    let others: Vec<_> = crates.keys().filter(|name| !listed.contains(name.as_str())).collect();
+    // Each of the Reference-FMUs is an example of one file.
+    let examples = root().join("examples/reference-fmus");
+    let example = |name: &&String| crates[*name].0.starts_with(&examples);
+    let others: Vec<_> =
+        crates.keys().filter(|name| !listed.contains(name.as_str())).filter(|name| !example(name)).collect();
     assert_eq!(others, ["faulty-fmu", "own-fmu", "types-fmu"], "a new crate needs its row");
 }
 

@@ -206,6 +206,10 @@ pub struct Stop {
 
 /// A model with states and events whose importer may handle the events in Co-Simulation: Event Mode and early return of FMI 3.0
 /// (3.0.2, 2.3.5, 4.1.3 and 4.2.1). With any use of the two, the results are those of [`Model::advance`].
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not stop at its events: it lacks the capability `EventMode`",
+    note = "write `impl EventMode for {Self}`, or remove `EventMode` from the line that exports the model"
+)]
 pub trait EventMode: ContinuousTime + Events {
     /// Advances the state up to the first event after the beginning of the step, or to its end. A step begins as one of
     /// [`Model::advance`] does: what is due at its beginning is done there. [`integrate::to_event`](crate::integrate::to_event) and

@@ -247,10 +247,10 @@ impl Reference {
         let mut bits = Vec::new();
         let status = self.call(GET, |it| {
             it.arrays(kind, references, arrays)?;
+            it.now.refresh()?;
             if kind.is_binary(it.version) {
                 return if references.is_empty() { Ok(OK) } else { Err(()) };
             }
-            it.now.refresh()?;
             for &reference in references {
                 for offset in 0..elements(it.version, reference).ok_or(())? {
                     let reference = reference.wrapping_add(u32::try_from(offset).unwrap());
