@@ -1,7 +1,11 @@
 //! Start values that the importer sets, constants, the end of the simulation, Event Mode with states, and log categories of a
 //! model's own: a ball of Euler's method, in both standards.
 #![allow(missing_docs, clippy::float_cmp)]
-#![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    clippy::borrow_as_ptr,
+    reason = "an importer calls C functions, rightly or not"
+)]
 
 mod solver;
 
