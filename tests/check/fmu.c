@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 /* The fifth step ends the simulation. */
-#if defined FAULT_ENDS || defined FAULT_T12t || defined FAULT_T12g || defined FAULT_T12s
+#if defined FAULT_ENDS || defined FAULT_T12t || defined FAULT_T12e || defined FAULT_T12s
 #define ENDS
 #endif
 
@@ -284,6 +284,9 @@ EXPORT int fmi2Terminate(void *c) {
 #else
     ENTER(STEP);
 #endif
+#ifdef FAULT_T12e
+    if (f->data.steps >= 5) return fail(f, "the simulation has ended");
+#endif
 #ifdef FAULT_L10
     f->data.y = 1234;
 #endif
@@ -328,9 +331,6 @@ EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) 
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(5)) return fail(f, "no such Real");
-#ifdef FAULT_T12g
-        if (f->data.steps >= 5) return fail(f, "the simulation has ended");
-#endif
         double y = f->data.y;
 #ifdef FAULT_S04
         if (f->data.state == INITIALIZATION) y = f->data.gain;
