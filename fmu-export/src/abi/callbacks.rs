@@ -1,7 +1,7 @@
 //! The importer's callbacks that may call the instance again. The gate calls them while nothing of the instance is borrowed.
 
 use super::types::Fmi3Boolean;
-use crate::inside::{Intermission, Reply};
+use crate::inside::{Reply, Update};
 use std::ffi::c_void;
 
 /// `fmi3IntermediateUpdateCallback`.
@@ -30,7 +30,7 @@ impl Callbacks {
     pub const NONE: Self = Self { environment: std::ptr::null_mut(), intermediate: None };
 
     /// Calls `intermediateUpdate` at the end of a part of a step.
-    pub(crate) fn intermediate(&self, update: Intermission) -> Reply {
+    pub(crate) fn intermediate(&self, update: Update) -> Reply {
         let callback = self.intermediate?;
         let (mut requested, mut time) = (Fmi3Boolean(0), update.time);
         let yes = Fmi3Boolean(1);

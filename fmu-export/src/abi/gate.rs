@@ -4,7 +4,7 @@
 use super::callbacks::Callbacks;
 use super::{Abi, Answer, Wanted};
 use crate::blob;
-use crate::inside::{Intermission, Reply};
+use crate::inside::{Reply, Update};
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Allowed, Call, Next, Standard};
 use crate::log::{Log, Status};
@@ -91,7 +91,7 @@ const fn calls_back<E: Exported>() -> bool {
 /// As [`enter`].
 pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
     pointer: *mut c_void,
-    mut part: impl FnMut(Abi<'_, E>, Reply) -> Result<Option<Intermission>, Refusal>,
+    mut part: impl FnMut(Abi<'_, E>, Reply) -> Result<Option<Update>, Refusal>,
 ) -> c_int {
     let mut reply = None;
     loop {
