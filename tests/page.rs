@@ -221,7 +221,7 @@ fn state(run: &Run) -> String {
         for (_, name, value) in run.events.iter().filter(|event| event.0 == u64::from(k)) {
             set(&mut instance, &(name.clone(), value.clone()));
         }
-        instance.do_step(f64::from(k) * experiment.step, experiment.step).unwrap();
+        let _ = instance.do_step(f64::from(k) * experiment.step, experiment.step).unwrap();
     }
     let state = instance.get_state().unwrap();
     let bytes = instance.serialize_state(state).unwrap();
