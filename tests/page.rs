@@ -6,7 +6,7 @@ mod common;
 use drive::PmsmDrive;
 use fmu::page::own::{Own, Run};
 use fmu::page::{Source, judged, page};
-use fmu_core::{Block, Description, Elapsed, Model, Slot, Step};
+use fmu_core::{Block, Capabilities, Description, Elapsed, Exported, Model, Slot, Step};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -188,6 +188,23 @@ fn a_page_stands_alone_and_knows_the_model() {
     other.variables[at].start = Some(vec![fmu_core::description::Value::Real(0.775)]);
     let html = page(&source(&other, &of, &module)).unwrap();
     assert!(html.contains("\"starts\":[[\"plant.motor.R_s\",0.775]]") && html.contains("Default experiment"));
+}
+
+#[test]
+fn a_model_without_co_simulation_has_no_page() {
+    let mut of = drive();
+    fmu::page::is_possible(&of).unwrap();
+    of.model_exchange = Description::exported::<Alone>().unwrap().model_exchange;
+    let said = fmu::page::is_possible(&of).unwrap_err().to_string();
+    assert!(said.contains("for Model Exchange alone"), "{said}");
+}
+
+/// The drive for Model Exchange alone.
+struct Alone;
+
+impl Exported for Alone {
+    type Model = PmsmDrive;
+    const CAN: Capabilities<PmsmDrive> = Capabilities::NONE.ContinuousTime().Events().ModelExchangeOnly();
 }
 
 #[test]
