@@ -13,7 +13,8 @@ const POINTS: u32 = 64;
 /// The index that stands for `time`.
 pub(crate) const NOW: usize = usize::MAX;
 
-/// For each variable, the indices that it depends on; derivatives follow the table. `None` for a variable that is not an unknown.
+/// For each variable, the indices that it depends on; wide arrays, each as a whole under its first index, and then derivatives
+/// follow the table. `None` for a variable that is not an unknown.
 type Dependencies = Vec<Option<Vec<usize>>>;
 
 /// What initial values depend on: outputs, calculated parameters, states and derivatives on inputs and parameters.
@@ -22,7 +23,7 @@ pub(crate) fn initial_dependencies<M: Model>(
     fresh: &Block<M>,
     states: &[usize],
 ) -> Dependencies {
-    let causality = causalities(fresh);
+    let causality = causalities::<M>();
     let knowns: Vec<usize> = (0..causality.len()).filter(|&i| causality[i].0.is_settable()).collect();
     let mut found = Found::new(causality.len() + states.len());
     let mut draw = Draw(1);
@@ -46,13 +47,13 @@ pub(crate) fn initial_dependencies<M: Model>(
         let calculated = |&(c, _): &(Causality, _)| matches!(c, Causality::Output | Causality::CalculatedParameter);
         states.contains(&i) || causality.get(i).is_none_or(calculated)
     };
-    found.list(unknown)
+    found.list(unknown, &wide::<M>())
 }
 
 /// What values depend on between two events: outputs and derivatives on states, inputs, tunable parameters and time,
 /// for any values of the parameters.
 pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
-    let causality = causalities(fresh);
+    let causality = causalities::<M>();
     let known = |&(c, v): &(Causality, Variability)| c == Causality::Input || v == Variability::Tunable;
     let mut found = Found::new(causality.len() + states.len());
     let mut draw = Draw(2);
@@ -94,13 +95,15 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
             found.suspect(input);
         }
     }
-    found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output))
+    found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output), &wide::<M>())
 }
 
 /// Whether a variable is a text or bytes: which of them mean something is not known, so none is tried.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "a filter")]
-fn is_opaque<M: Model>(&index: &usize) -> bool {
-    M::TABLE.locate(index).is_some_and(|(_, meta, _)| matches!(meta.kind, Kind::Text | Kind::Binary { .. }))
+fn is_opaque<M: Model>(&known: &usize) -> bool {
+    M::TABLE
+        .locate(wide::<M>().index(known))
+        .is_some_and(|(_, meta, _)| matches!(meta.kind, Kind::Text | Kind::Binary { .. }))
 }
 
 /// The start values first; then other values for about half of the inputs and parameters.
@@ -147,8 +150,11 @@ impl Found {
         self.0.iter_mut().for_each(|list| list.push(known));
     }
 
-    fn list(self, unknown: impl Fn(usize) -> bool) -> Dependencies {
+    fn list(self, unknown: impl Fn(usize) -> bool, wide: &Wide) -> Dependencies {
         let sorted = |mut list: Vec<usize>| {
+            for known in &mut list {
+                *known = wide.index(*known);
+            }
             list.sort_unstable();
             list
         };
@@ -156,10 +162,36 @@ impl Found {
     }
 }
 
-fn causalities<M: Model>(fresh: &Block<M>) -> Vec<(Causality, Variability)> {
-    let mut block = fresh.clone();
-    let one = |i| M::TABLE.entry(&mut block, i).map(|(meta, _)| (meta.causality, meta.variability));
-    (0..M::TABLE.len()).map_while(one).collect()
+fn causalities<M: Model>() -> Vec<(Causality, Variability)> {
+    let one = |i| M::TABLE.locate(i).map(|(_, meta, _)| (meta.causality, meta.variability));
+    (0..M::TABLE.len()).chain(wide::<M>().arrays.into_iter().map(|(first, _)| first)).filter_map(one).collect()
+}
+
+/// The wide arrays of a table, whose places follow those of its other variables.
+pub(crate) struct Wide {
+    /// Number of the other variables.
+    len: usize,
+    /// First index and number of elements of each.
+    pub(crate) arrays: Vec<(usize, usize)>,
+}
+
+impl Wide {
+    /// The table's index of a place; [`NOW`] stays.
+    fn index(&self, place: usize) -> usize {
+        place.checked_sub(self.len).and_then(|i| self.arrays.get(i)).map_or(place, |(first, _)| *first)
+    }
+}
+
+/// The wide arrays of a model's table.
+pub(crate) fn wide<M: Model>() -> Wide {
+    let mut arrays: Vec<(usize, usize)> = Vec::new();
+    for index in M::TABLE.indices().skip(M::TABLE.len()) {
+        match M::TABLE.element(index) {
+            Some(0) => arrays.push((index, 1)),
+            _ => arrays.iter_mut().rev().take(1).for_each(|(_, n)| *n += 1),
+        }
+    }
+    Wide { len: M::TABLE.len(), arrays }
 }
 
 /// Bits of all values after the outputs at `now` were computed.
@@ -179,6 +211,13 @@ fn values<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) ->
     }
     let mut value = |i| M::TABLE.entry(&mut block, i).map_or(0, |(_, slot)| slot.bits());
     let mut all: Vec<u64> = (0..M::TABLE.len()).map(&mut value).collect();
+    for (first, n) in wide::<M>().arrays {
+        // Elements that differ by rounding alone make another hash: dependencies of a wide array may be too many.
+        let of_all = (first..first + n)
+            .map(&mut value)
+            .fold(0, |hash: u64, bits| (hash.rotate_left(5) ^ bits).wrapping_mul(0x0100_0000_01b3));
+        all.push(of_all >> 12);
+    }
     all.extend(dx.iter().map(|x| x.to_bits()));
     all
 }
@@ -193,8 +232,16 @@ fn shift<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize]
     }
 }
 
-/// Sets variable `index` to another value that is allowed.
-fn change<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
+/// Sets the variable of a place to another value that is allowed, each element of a wide array.
+fn change<M: Model>(block: &mut Block<M>, known: usize, draw: &mut Draw) {
+    if let Some((first, n)) = known.checked_sub(M::TABLE.len()).and_then(|i| wide::<M>().arrays.get(i).copied()) {
+        (first..first + n).for_each(|index| change_one::<M>(block, index, draw));
+    } else {
+        change_one::<M>(block, known, draw);
+    }
+}
+
+fn change_one<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
     let Some((meta, slot)) = M::TABLE.entry(block, index) else { return };
     match slot {
         Slot::Real(x) => {
