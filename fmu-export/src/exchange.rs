@@ -11,7 +11,7 @@ const MAX_ITERATIONS: usize = 100;
 
 /// The result of an update of the discrete states.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Update {
+pub struct Updated {
     /// What the event did.
     pub outcome: Outcome,
     /// Time in s of the next time event, if there is one.
@@ -47,14 +47,14 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// Tunable parameters that do not fit together, or what the model reports.
-    pub fn update_discrete(&mut self) -> Result<Update, Fault> {
+    pub fn update_discrete(&mut self) -> Result<Updated, Fault> {
         self.stale |= self.exchanges();
         let current = &mut self.current;
         if current.dirty {
             current.block.model = current.judged()?;
             current.dirty = false;
         }
-        let mut update = Update::default();
+        let mut update = Updated::default();
         if let Some(events) = &E::CAN.events {
             let (model, now) = (&mut current.block.model, current.elapsed);
             update.outcome = (events.event)(model, now)?;
