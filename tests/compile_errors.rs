@@ -100,6 +100,18 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
             "x: only a continuous input or output can be intermediate",
             5,
         ),
+        row(
+            "started",
+            r#"V::parameter("x", &VOLT, "", |m| &mut m.u).exact()"#,
+            "x: only an output or a local variable can be exact",
+            5,
+        ),
+        row(
+            "constant",
+            r#"V::output("x", &VOLT, "", |m| &mut m.u).as_output()"#,
+            "x: only a constant can be made an output",
+            5,
+        ),
         row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
         row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
         // These two show in the table, whose start is in line 3.
@@ -135,6 +147,27 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
             ),
             "Ball: a row of the table with .intermediate() needs the capability Intermediate",
             EXPORT + 1,
+        ),
+        model(
+            "stops",
+            ("Ball: ContinuousTime", "Ball: ContinuousTime + EventMode"),
+            "`Ball` does not stop at its events",
+            EXPORT,
+        ),
+        model(
+            "tolerance",
+            (
+                r#"name: "Ball","#,
+                r#"name: "Ball", experiment: Experiment { tolerance: Some(0.0), ..Experiment::DEFAULT },"#,
+            ),
+            "Ball: the tolerance of the experiment must be greater than 0",
+            EXPORT,
+        ),
+        model(
+            "category",
+            (r#"name: "Ball","#, r#"name: "Ball", categories: &[("logEvents", "")],"#),
+            "logEvents: two log categories have this name",
+            EXPORT,
         ),
         model("events", ("Ball: ContinuousTime", "Ball: ContinuousTime + Events"), "`Ball` has no events", EXPORT),
         enumeration("unmarked", "#[derive(Default)]", "fn main() {}", "no `#[default]`", 2),

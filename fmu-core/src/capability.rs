@@ -4,13 +4,15 @@
 //! nothing: its entry is `None`, known to the compiler.
 
 use crate::continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
-use crate::events::{Events, Indicator, Next, Outcome, Sampled};
+use crate::events::{EventMode, Events, Indicator, Next, Outcome, Sampled, Stop};
 use crate::intermediate::Intermediate;
 use crate::log::Warnings;
+use crate::model::Block;
+use crate::row::Slot;
 use crate::rules::can_be_state;
 use crate::table::WIDE;
 use crate::variable::Meta;
-use crate::{Elapsed, Fault, Hash, Model};
+use crate::{Elapsed, Fault, Hash, Model, Step};
 use std::marker::PhantomData;
 
 /// A model with warnings for the importer's log.
@@ -68,6 +70,9 @@ pub type Tangent<M> = fn(&M, Elapsed, &M, &mut [f64], &mut <M as Model>::Outputs
 /// [`CompletedSteps::complete`].
 pub type Complete<M> = fn(&mut M, Elapsed) -> Result<(), Fault>;
 
+/// [`EventMode::to_event`].
+pub type ToEvent<M> = fn(&mut M, &Step) -> Result<Stop, Fault>;
+
 /// The capabilities of the model `M`: `Capabilities::NONE.ContinuousTime().Events()`. A method exists only if the model
 /// implements the trait of its name.
 pub struct Capabilities<M: Model> {
@@ -77,10 +82,14 @@ pub struct Capabilities<M: Model> {
     pub events: Option<Eventful<M>>,
     /// Functions of a [`Sampled`] model.
     pub samples: Option<Samples<M>>,
+    /// Function of a model with [`EventMode`].
+    pub to_event: Option<ToEvent<M>>,
     /// Functions of a [`Differentiable`] model.
     pub tangent: Option<Tangent<M>>,
     /// Function of a model that follows [`CompletedSteps`].
     pub complete: Option<Complete<M>>,
+    /// The model is not for Co-Simulation.
+    pub exchange_only: bool,
     /// [`Intermediate::longest`].
     pub intermediate: Option<fn(&M) -> f64>,
     /// Function of a model that [`Warns`].
@@ -94,8 +103,10 @@ impl<M: Model> Capabilities<M> {
         continuous: None,
         events: None,
         samples: None,
+        to_event: None,
         tangent: None,
         complete: None,
+        exchange_only: false,
         intermediate: None,
         warn: None,
     };
@@ -145,6 +156,14 @@ impl<M: Model> Capabilities<M> {
         Self { samples: Some(samples), ..self.Events() }
     }
 
+    /// Adds [`EventMode`].
+    pub const fn EventMode(self) -> Self
+    where
+        M: EventMode,
+    {
+        Self { to_event: Some(M::to_event), ..self }
+    }
+
     /// Adds [`Differentiable`].
     pub const fn Differentiable(self) -> Self
     where
@@ -159,6 +178,11 @@ impl<M: Model> Capabilities<M> {
         M: CompletedSteps,
     {
         Self { complete: Some(M::complete), ..self }
+    }
+
+    /// Leaves out Co-Simulation: for equations that need the importer's solver. Nobody calls [`Model::advance`].
+    pub const fn ModelExchangeOnly(self) -> Self {
+        Self { exchange_only: true, ..self }
     }
 
     /// Adds [`Intermediate`].
@@ -184,9 +208,10 @@ impl<M: Model> Capabilities<M> {
         self.continuous.is_some() || self.events.is_some()
     }
 
-    /// Co-simulation with Event Mode and early return (FMI 3.0): for a sampled model without states of its own.
+    /// Co-simulation with Event Mode and early return (FMI 3.0): for a sampled model without states of its own, and for one with
+    /// [`EventMode`].
     pub const fn event_mode(&self) -> bool {
-        self.samples.is_some() && self.continuous.is_none()
+        self.to_event.is_some() || (self.samples.is_some() && self.continuous.is_none())
     }
 
     /// The states; none for a model without [`ContinuousTime`].
@@ -238,6 +263,19 @@ impl<M: Model> Capabilities<M> {
         if index >= beside && index < beside + M::TABLE.wide() { index - beside + WIDE } else { index }
     }
 
+    /// What variable `index` is, and where the importer's start value of it goes: to the state itself for the row of a state.
+    /// `rows` are those of [`rows`](Self::rows).
+    pub fn place<'a>(
+        &self,
+        block: &'a mut Block<M>,
+        rows: &[usize],
+        index: usize,
+    ) -> Option<(&'static Meta, Slot<'a>)> {
+        let Some(state) = rows.iter().position(|&row| row == index) else { return M::TABLE.entry(block, index) };
+        let (meta, _) = M::TABLE.entry(block, index)?;
+        Some((meta, Slot::Real((self.states()[state].at)(&mut block.model))))
+    }
+
     /// Hash of the model's table and of all that the capabilities add to its interface.
     pub const fn hash(&self) -> Hash {
         let mut hash = M::HASH;
@@ -256,6 +294,12 @@ impl<M: Model> Capabilities<M> {
         while i < self.indicators().len() {
             hash = hash.text(self.indicators()[i].name);
             i += 1;
+        }
+        if self.to_event.is_some() {
+            hash = hash.text("EventMode");
+        }
+        if self.exchange_only {
+            hash = hash.text("ModelExchangeOnly");
         }
         if self.complete.is_some() { hash.text("CompletedSteps") } else { hash }
     }

@@ -72,6 +72,9 @@ impl Hash {
             hash = hash.count(meta.shape[i]);
             i += 1;
         }
+        if meta.exact {
+            hash = hash.text("exact");
+        }
         if meta.intermediate {
             hash = hash.text("intermediate");
         }

@@ -147,6 +147,7 @@ pub struct Alias {
 }
 
 /// All properties of a variable except the location of its value.
+#[expect(clippy::struct_excessive_bools, reason = "properties that do not depend on each other")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meta {
     /// Name, relative to the part that it belongs to.
@@ -167,6 +168,8 @@ pub struct Meta {
     pub unbounded: bool,
     /// The value is a mean over the last communication step.
     pub mean: bool,
+    /// The importer may set the start value of this output or local variable.
+    pub exact: bool,
     /// Whether an importer must feed it.
     pub need: Need<'static>,
     /// It can be read or set inside a communication step; of a part, that one of its variables can.
@@ -177,6 +180,18 @@ pub struct Meta {
     pub shape: &'static [usize],
     /// Other names.
     pub aliases: &'static [Alias],
+}
+
+impl Meta {
+    /// Whether the importer sets it before the simulation starts.
+    pub fn takes_start(&self) -> bool {
+        self.causality.is_settable() || self.exact
+    }
+
+    /// Whether the description has a start value.
+    pub fn has_start(&self) -> bool {
+        self.takes_start() || self.variability == Variability::Constant
+    }
 }
 
 /// Where an element of an array is, as names have it: `[2]`, or `[1,2]` in a matrix that is stored row by row.

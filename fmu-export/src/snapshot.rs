@@ -152,7 +152,7 @@ impl<M: Model> Snapshot<M> {
     /// Whether an instance that was made for this interface can be in this state.
     pub(crate) fn fits_its_interface(&self) -> bool {
         match (self.life.state(), self.life.interface()) {
-            (State::Step, interface) => interface != Interface::ModelExchange,
+            (State::Step | State::Ended, interface) => interface != Interface::ModelExchange,
             (State::Event, interface) => interface != Interface::CoSimulation,
             (State::Continuous, interface) => interface == Interface::ModelExchange,
             // A step that is under way cannot be saved.
@@ -174,7 +174,7 @@ impl<M: Model> Snapshot<M> {
         let fits = self.elapsed == self.elapsed.plus(0.0)
             && match (self.life.state(), self.experiment) {
                 (State::Instantiated, _) | (State::Initialization, Some(_)) => since == 0.0 && elapsed == 0.0,
-                (State::Step | State::Event | State::Continuous | State::Terminated, Some(_)) => {
+                (State::Step | State::Event | State::Continuous | State::Ended | State::Terminated, Some(_)) => {
                     self.end.is_finite()
                         && (start..=self.end + rounding).contains(&self.settled)
                         && elapsed >= 0.0

@@ -6,6 +6,21 @@ use crate::integer::Whole;
 use crate::variable::{Kind, Meta};
 use std::hash::{DefaultHasher, Hasher as _};
 
+/// The value of a constant that is not a text.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Constant {
+    /// A real number.
+    Real(f64),
+    /// A real number in single precision.
+    Float32(f32),
+    /// An integer.
+    Integer(i128),
+    /// A truth value.
+    Boolean(bool),
+    /// An item of an enumeration.
+    Enumeration(i32),
+}
+
 /// A value found by a table, ready to read or to write.
 #[derive(Debug)]
 pub enum Slot<'a> {
@@ -21,8 +36,10 @@ pub enum Slot<'a> {
     Enumeration(&'a mut dyn Choice),
     /// A text that can be set.
     Text(&'a mut String),
-    /// A text computed by the model.
+    /// A text computed by the model, or a constant one.
     Said(&'a str),
+    /// A constant.
+    Constant(Constant),
     /// Bytes.
     Binary(&'a mut Bytes),
 }
@@ -34,6 +51,9 @@ impl Slot<'_> {
             (Self::Real(x), _) => meta.range.contains(**x),
             (Self::Float32(x), _) => meta.range.contains_single(**x),
             (Self::Integer(x), Kind::Integer(of)) => of.allows(x.get(), &meta.range),
+            (Self::Constant(Constant::Real(x)), _) => meta.range.contains(*x),
+            (Self::Constant(Constant::Float32(x)), _) => meta.range.contains_single(*x),
+            (Self::Constant(Constant::Integer(x)), Kind::Integer(of)) => of.allows(*x, &meta.range),
             (Self::Binary(x), Kind::Binary { most, .. }) => x.len() <= most,
             _ => true,
         }
@@ -55,6 +75,7 @@ impl Slot<'_> {
             Self::Text(x) => hash(x.as_str()),
             Self::Said(x) => hash(*x),
             Self::Binary(x) => hash::<[u8]>(x),
+            Self::Constant(_) => 0,
         }
     }
 }
@@ -70,6 +91,11 @@ impl std::fmt::Display for Slot<'_> {
             Self::Enumeration(x) => x.get().fmt(f),
             Self::Text(x) => write!(f, "{x:?}"),
             Self::Said(x) => write!(f, "{x:?}"),
+            Self::Constant(Constant::Real(x)) => x.fmt(f),
+            Self::Constant(Constant::Float32(x)) => x.fmt(f),
+            Self::Constant(Constant::Integer(x)) => x.fmt(f),
+            Self::Constant(Constant::Boolean(x)) => x.fmt(f),
+            Self::Constant(Constant::Enumeration(x)) => x.fmt(f),
             Self::Binary(x) => x.fmt(f),
         }
     }

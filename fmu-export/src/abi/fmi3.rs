@@ -42,6 +42,9 @@ impl<E: Exported> Abi<'_, E> {
             Interface::ModelExchange if !E::CAN.model_exchange() => {
                 Some("not supported: Model Exchange; this FMU is for Co-Simulation")
             }
+            Interface::CoSimulation | Interface::EventMode if E::CAN.exchange_only => {
+                Some("not supported: Co-Simulation; this FMU is for Model Exchange")
+            }
             Interface::EventMode if !E::CAN.event_mode() => {
                 Some("eventModeUsed = true is not allowed: hasEventMode = false")
             }
@@ -125,6 +128,7 @@ impl<E: Exported> Abi<'_, E> {
         };
         event.write(stepped.event.into());
         early.write(stepped.early.into());
+        terminate.write(stepped.terminate.into());
         time.write(self.0.current.end);
         Ok(None)
     }

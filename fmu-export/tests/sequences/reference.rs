@@ -262,7 +262,6 @@ impl Reference {
     /// Whether the arrays can be used at all.
     fn arrays(&self, kind: Kind, references: &[u32], arrays: Arrays) -> Result<(), ()> {
         let empty = references.is_empty();
-        // Bytes are always aligned.
         let byte = matches!(kind, Kind::Boolean | Kind::Foreign(1 | 2));
         let aligned = byte && self.version == 3;
         let usable = match arrays {
