@@ -29,6 +29,9 @@ impl Model for Stair {
     const INFO: Info = Info {
         name: "Stair",
         description: "This model generates a stair signal using time events",
+        author: env!("CARGO_PKG_AUTHORS"),
+        license: env!("CARGO_PKG_LICENSE"),
+        copyright: "The sensorless-drive developers; after the Reference-FMUs of the Modelica Association",
         experiment: Experiment { stop: 10.0, step: STEP, fixed_step: Some(STEP), ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
