@@ -42,7 +42,7 @@ impl Model for Stair {
         self.second = 1;
     }
 
-    fn output(&self, _now: Elapsed, _: &mut ()) {}
+    fn output(&self, _now: Elapsed, (): &mut ()) {}
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         integrate::euler_hybrid::<Self, 0>(self, step, STEP)
