@@ -65,11 +65,9 @@ fn enumeration(name: &'static str, derive: &str, rest: &str, why: &'static str, 
     Wrong { name, source, why, line }
 }
 
-#[test]
-fn a_wrong_row_or_model_is_an_error_at_its_place() {
-    const EXPORT: usize = 26;
-    let state = |wrong: &'static str| ("State::new(\"h\"", wrong);
-    let cases = [
+/// Tables with a wrong row.
+fn rows() -> Vec<Wrong> {
+    vec![
         row(
             "bound",
             r#"V::boolean_input("on", "", |m| &mut m.on).at_least(0.0)"#,
@@ -117,6 +115,14 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
         // These two show in the table, whose start is in line 3.
         row("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
         row("empty_array", r#"V::array_input("a", &VOLT, "", 0, |m| &mut m.a)"#, "a: an array needs an element", 3),
+    ]
+}
+
+/// Wrong models and enumerations.
+fn models() -> Vec<Wrong> {
+    const EXPORT: usize = 26;
+    let state = |wrong: &'static str| ("State::new(\"h\"", wrong);
+    vec![
         model("hyphen", (r#"name: "Ball""#, r#"name: "My-Ball""#), "My-Ball: INFO.name must be a C identifier", EXPORT),
         model("digit", (r#"name: "Ball""#, r#"name: "2Balls""#), "2Balls: INFO.name must be a C identifier", EXPORT),
         model("nameless", (r#"name: "Ball", "#, ""), ": INFO.name must be a C identifier", EXPORT),
@@ -172,7 +178,12 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
         model("events", ("Ball: ContinuousTime", "Ball: ContinuousTime + Events"), "`Ball` has no events", EXPORT),
         enumeration("unmarked", "#[derive(Default)]", "fn main() {}", "no `#[default]`", 2),
         enumeration("start", "", "#[derive(Default)]\nstruct M { fan: Fan }", "`Fan: Default` is not satisfied", 9),
-    ];
+    ]
+}
+
+#[test]
+fn a_wrong_row_or_model_is_an_error_at_its_place() {
+    let cases: Vec<Wrong> = rows().into_iter().chain(models()).collect();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compile_errors");
     let sources = folder.join("src/bin");
