@@ -42,7 +42,7 @@ pub(crate) enum Access<W: 'static> {
     ConstantText(&'static str),
     Constant(Constant),
     Constants(&'static [f64]),
-    Part { len: usize, hash: Hash, binary: bool, node: &'static dyn Node<W> },
+    Part { len: usize, wide: usize, hash: Hash, binary: bool, node: &'static dyn Node<W> },
 }
 
 /// A row of the table of `W`: a variable, or the table of a part of `W`.
@@ -138,6 +138,20 @@ pub(crate) enum Access<W: 'static> {
 /// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 3 + 2 + 4 + 4);
 /// ```
 ///
+/// Other names of a variable, of which FMI 2.0 has none:
+///
+/// ```
+/// # use fmu_core::unit::{DisplayUnit, METER};
+/// # use fmu_core::{Alias, Row, Table, table};
+/// # struct Model { h: f64 }
+/// const FOOT: DisplayUnit = DisplayUnit { name: "ft", factor: 1.0 / 0.3048, offset: 0.0 };
+/// const TABLE: &Table<Model> = table![
+///     Row::output("h", &METER, "Height", |m: &mut Model| &mut m.h)
+///         .aliases(&[Alias { name: "h_ft", description: "Height in feet", display: Some(FOOT) }]),
+/// ];
+/// # assert_eq!(TABLE.len(), 1);
+/// ```
+///
 /// Start values that the importer may set ([`exact`](Row::exact)), and constants of every type:
 ///
 /// ```
@@ -209,6 +223,7 @@ impl<W: 'static> Row<W> {
             intermediate: false,
             dimension: None,
             shape: &[],
+            aliases: &[],
         };
         Self { settable: Interval::of(&meta), meta, access }
     }
