@@ -217,6 +217,7 @@ fn unit(v: &Variable) -> String {
         VariableKind::Integer(of) if *of == IntegerType::Int32 => "<small>integer</small>".into(),
         VariableKind::Integer(of) => format!("<small>integer, {}</small>", of.name()),
         VariableKind::Text => "<small>text</small>".into(),
+        VariableKind::Clock(_) => "<small>clock, s</small>".into(),
         VariableKind::Boolean => "<small>true or false</small>".into(),
         VariableKind::Enumeration { name, .. } => format!("<a href=\"#{0}\">{0}</a>", escape(name)),
     }

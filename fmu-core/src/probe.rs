@@ -222,7 +222,7 @@ fn change<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
                 x.set(other);
             }
         }
-        Slot::Text(_) | Slot::Said(_) => {}
+        Slot::Text(_) | Slot::Said(_) | Slot::Clock(_) => {}
     }
 }
 

@@ -23,6 +23,7 @@ pub(crate) trait Node<W>: Sync {
     fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
+    fn clocks_of(&self, index: usize) -> &'static str;
 }
 
 /// Where the value lives.
@@ -36,7 +37,13 @@ pub(crate) enum Access<W: 'static> {
     Text(fn(&mut W) -> &mut String),
     Said(fn(&W) -> &str),
     Constant(&'static str),
-    Part { len: usize, hash: Hash, node: &'static dyn Node<W> },
+    /// A clock, and where its interval is.
+    Clock(Option<fn(&mut W) -> &mut f64>),
+    Part {
+        len: usize,
+        hash: Hash,
+        node: &'static dyn Node<W>,
+    },
 }
 
 /// A row of the table of `W`: a variable, or the table of a part of `W`.
@@ -172,6 +179,7 @@ impl<W: 'static> Row<W> {
             unbounded: false,
             mean: false,
             need: Need::Always,
+            clocks: "",
             intermediate: false,
             dimension: None,
             shape: &[],

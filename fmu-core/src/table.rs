@@ -3,12 +3,13 @@
 //! A variable's index is its running offset: a scalar takes one, an array one per element, a part as many as its table.
 //! Everything that does not need a value is checked while compiling: names, ranges, the number of variables.
 
+use crate::clock::Ticks;
 use crate::fault::Fault;
 use crate::reals::Inputs;
 use crate::row::{Access, Node, Row, Slot};
 use crate::rules::{demand, same_text};
 use crate::token::Hash;
-use crate::variable::{Kind, Meta};
+use crate::variable::{Causality, Kind, Meta, Variability};
 use std::fmt::Display;
 use std::mem::MaybeUninit;
 use std::ptr;
@@ -43,6 +44,10 @@ impl<W, P> Node<W> for Part<W, P> {
 
     fn element(&self, index: usize) -> Option<usize> {
         self.table.element(index)
+    }
+
+    fn clocks_of(&self, index: usize) -> &'static str {
+        self.table.clocks_of(index)
     }
 }
 
@@ -105,6 +110,9 @@ impl<W: 'static> Table<W> {
             let count = match (&rows[row].access, meta.dimension) {
                 (Access::Part { len, hash: of_part, .. }, _) => {
                     hash = hash.text(meta.name).join(of_part);
+                    if !meta.clocks.is_empty() {
+                        hash = hash.text("on").text(meta.clocks);
+                    }
                     *len
                 }
                 (_, dimension) => {
@@ -124,6 +132,21 @@ impl<W: 'static> Table<W> {
             row += 1;
         }
         Self { rows, places, len, hash, intermediate }
+    }
+
+    /// Whether a row is a clock that the model ticks, or one whose ticks it asks for.
+    pub const fn announces(&self) -> bool {
+        let mut row = 0;
+        while row < self.rows.len() {
+            if let Kind::Clock(timing) = self.rows[row].meta.kind
+                && (matches!(self.rows[row].meta.causality, Causality::Output)
+                    || matches!(timing.ticks, Ticks::Countdown))
+            {
+                return true;
+            }
+            row += 1;
+        }
+        false
     }
 
     /// Number of indices: variables, array elements counted singly.
@@ -159,6 +182,7 @@ impl<W: 'static> Table<W> {
             Access::Text(get) => Slot::Text(get(whole)),
             Access::Said(say) => Slot::Said(say(whole)),
             Access::Constant(text) => Slot::Said(text),
+            Access::Clock(interval) => Slot::Clock(interval.map(|get| get(whole))),
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
         };
         Some((&row.meta, slot))
@@ -170,6 +194,28 @@ impl<W: 'static> Table<W> {
         match &self.rows[usize::from(place.row)].access {
             Access::Part { node, .. } => node.element(usize::from(place.inner)),
             _ => Some(usize::from(place.inner)),
+        }
+    }
+
+    /// Names of the clocks that variable `index` is on, with spaces between them; empty for none. A part that is on a clock has its
+    /// variables on it, but for parameters.
+    pub fn clocks_of(&self, index: usize) -> &'static str {
+        let Some(place) = self.places[..self.len].get(index) else { return "" };
+        let row = &self.rows[usize::from(place.row)];
+        match &row.access {
+            Access::Part { node, .. } => {
+                let inner = node.clocks_of(usize::from(place.inner));
+                let changes = || {
+                    let found = node.locate(usize::from(place.inner), &mut String::new());
+                    found.is_some_and(|(meta, _)| {
+                        matches!(meta.causality, Causality::Input | Causality::Output | Causality::Local)
+                            && !matches!(meta.kind, Kind::Clock(_))
+                            && meta.variability != Variability::Constant
+                    })
+                };
+                if inner.is_empty() && !row.meta.clocks.is_empty() && changes() { row.meta.clocks } else { inner }
+            }
+            _ => row.meta.clocks,
         }
     }
 
@@ -203,6 +249,7 @@ impl<W: 'static> Table<W> {
                 Slot::Boolean(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Enumeration(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Text(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Clock(x) => x.map(|x| ptr::from_ref(x).addr()),
                 Slot::Said(_) => None,
             });
             address == Some(wanted)

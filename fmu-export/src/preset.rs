@@ -146,6 +146,7 @@ fn write(meta: &Meta, mut slot: Slot<'_>, text: &str) -> Result<(), String> {
         }
         Slot::Text(x) => text.clone_into(x),
         Slot::Said(_) => return Err("a text that the model computes".into()),
+        Slot::Clock(_) => return Err("a clock".into()),
     }
     if slot.is_allowed(meta) { Ok(()) } else { Err(allowed()) }
 }

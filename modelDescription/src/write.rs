@@ -31,6 +31,11 @@ pub fn write(description: &Description, version: FmiVersion, generation: &Genera
         [
             description.model_exchange.as_ref().map(|exchange| model_exchange(description, exchange, version)),
             Some(co_simulation(description, version)),
+            description
+                .model_exchange
+                .as_ref()
+                .filter(|of| of.scheduled)
+                .map(|_| scheduled_execution(description, version)),
             units,
             definitions,
             Some(log_categories(version)),
@@ -54,6 +59,9 @@ pub fn fits(description: &Description, version: FmiVersion) -> Result<(), String
         return Err(format!(
             "{name} has no variable, and FMI 2.0 needs at least one: add one, or build for FMI 3.0 only, which has time"
         ));
+    }
+    if version == FmiVersion::V2 && clocked(description) {
+        return Err(format!("{} has clocks, which FMI 2.0 lacks: build for FMI 3.0 only", description.name));
     }
     let narrow = |value: &Value| matches!(value, Value::Integer(x) if i32::try_from(*x).is_err());
     for v in description.variables.iter().filter(|_| version == FmiVersion::V2) {
@@ -152,13 +160,27 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
         .with_some("maxOutputDerivativeOrder", continuous.then_some("1"));
     let element = states_and_memory(element, version)
         .with_some("hasEventMode", event_mode.then_some("true"))
-        .with_some("mightReturnEarlyFromDoStep", event_mode.then_some("true"))
+        .with_some("mightReturnEarlyFromDoStep", (event_mode && !clocked(description)).then_some("true"))
         .with_some("providesIntermediateUpdate", intermediate.then_some("true"))
         .with_some("canReturnEarlyAfterIntermediateUpdate", intermediate.then_some("true"));
     match exchange {
         Some(exchange) => derivatives(element, exchange, version),
         None => element,
     }
+}
+
+/// FMI 3.0.2, 2.4.2 and 5.4.
+fn scheduled_execution(description: &Description, version: FmiVersion) -> Element {
+    let element = Element::new("ScheduledExecution")
+        .with("modelIdentifier", &*description.name)
+        .with("needsExecutionTool", "false")
+        .with("canBeInstantiatedOnlyOncePerProcess", "false");
+    states_and_memory(element, version)
+}
+
+/// Whether the model has clocks, which FMI 3.0 has.
+fn clocked(description: &Description) -> bool {
+    description.variables.iter().any(|v| matches!(v.kind, VariableKind::Clock(_)))
 }
 
 /// FMI 2.0.5, 2.2.4; FMI 3.0.2, 2.4.5.

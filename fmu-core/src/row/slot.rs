@@ -22,6 +22,8 @@ pub enum Slot<'a> {
     Text(&'a mut String),
     /// A text computed by the model.
     Said(&'a str),
+    /// A clock, and its interval in s if the importer may set it.
+    Clock(Option<&'a mut f64>),
 }
 
 impl Slot<'_> {
@@ -30,6 +32,7 @@ impl Slot<'_> {
         match (self, meta.kind) {
             (Self::Real(x), _) => meta.range.contains(**x),
             (Self::Float32(x), _) => meta.range.contains_single(**x),
+            (Self::Clock(Some(x)), _) => x.is_finite() && **x > 0.0,
             (Self::Integer(x), Kind::Integer(of)) => of.allows(x.get(), &meta.range),
             _ => true,
         }
@@ -50,6 +53,7 @@ impl Slot<'_> {
             Self::Enumeration(x) => x.get().cast_unsigned().into(),
             Self::Text(x) => hash(x),
             Self::Said(x) => hash(x),
+            Self::Clock(x) => x.as_ref().map_or(0, |x| x.to_bits()),
         }
     }
 }
@@ -65,6 +69,8 @@ impl std::fmt::Display for Slot<'_> {
             Self::Enumeration(x) => x.get().fmt(f),
             Self::Text(x) => write!(f, "{x:?}"),
             Self::Said(x) => write!(f, "{x:?}"),
+            Self::Clock(Some(x)) => write!(f, "{x} s"),
+            Self::Clock(None) => f.write_str("a clock"),
         }
     }
 }

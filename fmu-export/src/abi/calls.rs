@@ -25,6 +25,9 @@ impl<E: Exported> Abi<'_, E> {
         if const { E::CAN.intermediate.is_some() } && self.0.current.life.state() == State::Intermediate {
             return self.0.get_inside(vr, out);
         }
+        if const { E::CAN.clocked.is_some() } {
+            self.0.check_clocked(vr, false)?;
+        }
         self.0.get(vr, out)
     }
 
@@ -35,9 +38,12 @@ impl<E: Exported> Abi<'_, E> {
         self.0.set(vr, values)
     }
 
-    /// Judges the variables that the importer uses inside a step.
+    /// Judges the variables that the importer uses inside a step, or that are on clocks.
     #[inline]
-    fn inside(&self, vr: &[u32], sets: bool) -> Answer {
+    fn inside(&mut self, vr: &[u32], sets: bool) -> Answer {
+        if const { E::CAN.clocked.is_some() } {
+            self.0.check_clocked(vr, sets)?;
+        }
         if const { E::CAN.intermediate.is_some() } && self.0.current.life.state() == State::Intermediate {
             self.0.check_inside(vr, sets)?;
         }

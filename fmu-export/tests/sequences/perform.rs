@@ -330,9 +330,9 @@ pub(crate) fn miscarry(version: u8, wrong: u8, environment: *mut c_void) -> &'st
                     no,
                     environment,
                     Some(log3),
-                    none,
-                    none,
-                    none,
+                    None,
+                    None,
+                    None,
                 )
             },
             "fmi3InstantiateScheduledExecution",

@@ -61,6 +61,7 @@ pub(crate) fn variable(
         dependencies: None,
         derivative: None,
         reinit: false,
+        clocks: Vec::new(),
         intermediate: false,
     }
 }
@@ -179,6 +180,7 @@ pub(crate) fn exchange_sample() -> Description {
         indicators: vec![17],
         event_mode: false,
         completed_steps: true,
+        scheduled: false,
     };
     Description { name: "Exchange".into(), model_exchange: Some(exchange), ..description }
 }
@@ -191,6 +193,7 @@ pub(crate) fn sampled_sample() -> Description {
         indicators: Vec::new(),
         event_mode: true,
         completed_steps: false,
+        scheduled: false,
     };
     let mut description = sample();
     for v in description.variables.iter_mut().filter(|v| v.causality == Causality::Output) {
