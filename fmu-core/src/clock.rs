@@ -94,6 +94,14 @@ pub struct Clock<W: 'static> {
     interval: Option<fn(&mut W) -> &mut f64>,
 }
 
+impl<W: 'static> Clone for Clock<W> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<W: 'static> Copy for Clock<W> {}
+
 impl<W: 'static> Clock<W> {
     const fn new(ticks: Ticks, interval: Option<fn(&mut W) -> &mut f64>) -> Self {
         Self { timing: Timing { ticks, interval: None, fraction: None, shift: 0.0, priority: None }, interval }

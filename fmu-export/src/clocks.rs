@@ -168,7 +168,7 @@ impl<E: Exported> Instance<E> {
     fn evaluate_clocks(&mut self, outputs: bool) -> Result<(), Fault> {
         let (Some(functions), State::Event) = (&E::CAN.clocked, self.current.life.state()) else { return Ok(()) };
         let announced = self.clocks.as_ref().is_some_and(|clocks| clocks.list.iter().any(|(.., ticked)| !ticked));
-        if !announced && !(functions.feedthrough && outputs && self.stale) {
+        if !(announced || functions.feedthrough && outputs && self.stale) {
             return Ok(());
         }
         let mut model = self.current.block.model.clone();
@@ -368,13 +368,13 @@ impl<E: Exported> Instance<E> {
     ) -> Result<(), Fault> {
         for &reference in references {
             let clock = self.clock(reference)?;
-            self.fraction(clock)?;
+            Self::fraction(clock)?;
             self.check_interval(clock)?;
         }
         let places = counters.iter_mut().zip(resolutions).zip(qualifiers);
         for (&reference, ((counter, resolution), qualifier)) in references.iter().zip(places) {
             let clock = self.clock(reference)?;
-            let fraction = self.fraction(clock)?;
+            let fraction = Self::fraction(clock)?;
             counter.write(fraction.0);
             resolution.write(fraction.1);
             qualifier.write(self.tell_interval(clock).1 as c_int);
@@ -382,7 +382,7 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    fn fraction(&self, clock: Found) -> Result<(u64, u64), Fault> {
+    fn fraction(clock: Found) -> Result<(u64, u64), Fault> {
         clock.timing.fraction.ok_or_else(|| Self::no(clock, "has no fraction: supportsFraction = false"))
     }
 
@@ -411,10 +411,8 @@ impl<E: Exported> Instance<E> {
     fn tell_interval(&mut self, clock: Found) -> (f64, Qualifier) {
         let period = self.period(clock.index, &clock.timing);
         let Some(tick) = self.tick_of(clock.number) else { return (0.0, Qualifier::NotYetKnown) };
-        if let Some(period) = period.filter(|_| clock.timing.ticks.is_periodic()) {
-            if period.to_bits() != tick.interval.to_bits() {
-                (tick.interval, tick.qualifier) = (period, Qualifier::Changed);
-            }
+        if let Some(period) = period.filter(|period| period.to_bits() != tick.interval.to_bits()) {
+            (tick.interval, tick.qualifier) = (period, Qualifier::Changed);
         }
         let told = (tick.interval, tick.qualifier);
         if tick.qualifier == Qualifier::Changed {
@@ -477,12 +475,12 @@ impl<E: Exported> Instance<E> {
     ) -> Result<(), Fault> {
         for &reference in references {
             let clock = self.periodic(reference)?;
-            self.fraction(clock)?;
+            Self::fraction(clock)?;
         }
         for (&reference, (counter, resolution)) in references.iter().zip(counters.iter_mut().zip(resolutions)) {
             let clock = self.clock(reference)?;
             counter.write(clock.timing.shift_counter().unwrap_or(0));
-            resolution.write(self.fraction(clock)?.1);
+            resolution.write(Self::fraction(clock)?.1);
         }
         Ok(())
     }
@@ -584,7 +582,8 @@ impl Tick {
         };
         let due = now.seconds() + interval;
         let known = self.qualifier != Qualifier::NotYetKnown && !self.done;
-        if known && (due - self.due).abs() <= 1e-9 * due.abs() {
+        let passed = interval == 0.0 && self.due <= due;
+        if known && (passed || (due - self.due).abs() <= 1e-9 * due.abs()) {
             return;
         }
         (self.qualifier, self.interval, self.due) = (Qualifier::Changed, interval, due);

@@ -550,7 +550,9 @@ fn a_saved_state_holds_the_clocks() {
             );
         }
         let mut states = [state, copy];
-        states.iter_mut().for_each(|state| assert_eq!(unsafe { fmi3FreeFMUState(it, state) }, OK));
+        for state in &mut states {
+            assert_eq!(unsafe { fmi3FreeFMUState(it, state) }, OK);
+        }
     }
 }
 
@@ -643,12 +645,12 @@ fn a_panic_in_a_tick_ends_one_instance() {
     for kind in [Kind::Cs, Kind::Se] {
         let (host, other) = (Host::started(kind), Host::started(kind));
         assert_eq!(unsafe { fmi3SetBoolean(host.it.get(), &PANICS, 1, &Fmi3Boolean(1), 1) }, OK);
-        let tick = |host: &Host| match kind {
-            Kind::Se => host.activate(FIXED, 0.0),
-            _ => {
-                assert_eq!(host.set_clock(FIXED, true), OK);
-                host.update()
+        let tick = |host: &Host| {
+            if kind == Kind::Se {
+                return host.activate(FIXED, 0.0);
             }
+            assert_eq!(host.set_clock(FIXED, true), OK);
+            host.update()
         };
         assert_eq!((tick(&host), tick(&other)), (ERROR, OK));
         assert!(host.errors()[0].contains("panics is set"));
