@@ -4,10 +4,10 @@ mod preset;
 
 pub use preset::preset;
 
-use fmu_core::IntegerType;
 use fmu_core::description::{Description, MemberDescription, Value, Variable, VariableKind};
 use fmu_core::terminal::MemberKind;
 use fmu_core::variable::{Causality, Variability};
+use fmu_core::{Bytes, IntegerType};
 use fmu_plot::page::{document, escape};
 use model_description::FmiVersion;
 use std::fmt::Write;
@@ -218,6 +218,9 @@ fn unit(v: &Variable) -> String {
         VariableKind::Integer(of) => format!("<small>integer, {}</small>", of.name()),
         VariableKind::Text => "<small>text</small>".into(),
         VariableKind::Clock(_) => "<small>clock, s</small>".into(),
+        VariableKind::Binary { mime_type, most } => {
+            format!("<small>bytes, at most {most}: {}</small>", escape(mime_type))
+        }
         VariableKind::Boolean => "<small>true or false</small>".into(),
         VariableKind::Enumeration { name, .. } => format!("<a href=\"#{0}\">{0}</a>", escape(name)),
     }
@@ -235,6 +238,7 @@ fn start(v: &Variable) -> String {
         Value::Integer(x) => item(*x).unwrap_or_else(|| x.to_string()),
         Value::Boolean(x) => x.to_string(),
         Value::Text(x) => format!("“{}”", escape(x)),
+        Value::Binary(x) => Bytes::from(x).to_string(),
     };
     let all: Vec<String> = v.start.iter().flatten().map(one).collect();
     match all.as_slice() {

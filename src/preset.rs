@@ -6,10 +6,10 @@ use crate::message;
 use crate::pack::{self, Entry, Moment, TOOL};
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use fmu_core::Description;
 use fmu_core::description::{Value, Variable, VariableKind};
 use fmu_core::preset::{self, FILE};
 use fmu_core::variable::{Causality, position};
+use fmu_core::{Bytes, Description};
 use fmu_import::{Fmu, Kind, Unpacked, Values, describe, printable, suggest};
 use model_description::{FmiVersion, Generation, ModelDescription};
 use std::collections::{BTreeMap, BTreeSet};
@@ -302,6 +302,7 @@ fn shown(variable: &Variable) -> String {
         Value::Integer(x) => item(*x).unwrap_or_else(|| x.to_string()),
         Value::Boolean(x) => x.to_string(),
         Value::Text(x) => format!("{x:?}"),
+        Value::Binary(x) => Bytes::from(x).to_string(),
     };
     variable.start.iter().flatten().map(one).collect::<Vec<_>>().join(", ")
 }
@@ -318,6 +319,6 @@ fn texts(values: &Values, variable: &Variable) -> Vec<String> {
         Values::Integers(x) => x.iter().map(i128::to_string).collect(),
         Values::Booleans(x) => x.iter().map(bool::to_string).collect(),
         Values::Strings(x) => x.clone(),
-        Values::Binaries(_) => Vec::new(),
+        Values::Binaries(x) => x.iter().map(|bytes| Bytes::from(bytes).to_string()).collect(),
     }
 }

@@ -1,6 +1,6 @@
 //! `SensorlessControllerClocked` through its C functions: with the plant it gives the bits of the native pair that exchanges its
 //! values at every T_s, in Co-Simulation with Event Mode, Model Exchange and Scheduled Execution.
-#![allow(missing_docs, clippy::float_cmp, clippy::borrow_as_ptr)]
+#![allow(missing_docs, non_snake_case, clippy::float_cmp, clippy::borrow_as_ptr)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions")]
 
 use drive::{Pair, PmsmPlant, SensorlessControllerClocked};

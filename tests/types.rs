@@ -288,7 +288,7 @@ fn a_parameter_file_sets_texts() {
     }
 }
 
-/// What `fmu simulate` records and connects are scalar numbers; it says so of others.
+/// `fmu simulate` feeds and records variables of every type, and says what it cannot do.
 #[test]
 fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
     let run = |arguments: &[&str]| {
@@ -301,12 +301,12 @@ fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
     assert!(done && said.contains("EveryType.out.uint64"), "{said}");
     assert!(said.contains("EveryType.status") && said.contains(r#""a b,c""#), "{said}");
     for (option, value, why) in [
-        ("--record", "sums", "recorded: name an element, sums[1]"),
-        ("--input", "vector=0:1", "recorded: name an element, vector[1]"),
+        ("--record", "sums[3]", "has no variable sums[3]"),
+        ("--input", "vector=0:1", "vector: has 3 elements, and a value has another number"),
         ("--input", "vector[4]=0:1", "has no variable vector[4]"),
         ("--set", "weights[1,1]=1,2", "weights[1,1] = 1,2 is not one value"),
         ("--set", "weights=1 2", "weights has 6 elements, not 2"),
-        ("--input", "label=3", "label: is a String; only numbers"),
+        ("--input", "label=3", "label: is not an input or a tunable parameter"),
         ("--set", "weights=1,2", "weights has 6 elements, not 2"),
         ("--set", "in.uint8=x", "in.uint8 = x is not an integer"),
         ("--set", "in.uint8=300", "in.uint8 = 300 is not of the type UInt8: 0 to 255"),
@@ -335,6 +335,10 @@ fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
         "sums[1],sums[2]",
     ]);
     assert!(done && said.contains(" 6 V\n") && said.contains(" 15.5 V\n"), "{said}");
+    // The whole array is one column, and one input.
+    let whole = ["--input", "vector=0:1 2 3,0.1:4 5 6", "--record", "sums,x", "--stop", "0.2", "--csv", "-"];
+    let (done, said) = run(&[&["simulate", three][..], &whole].concat());
+    assert!(done && said.contains(",1 5.5\n0.1,") && said.contains(",4 11.5\n"), "{said}");
     let (_, said) = run(&["info", three]);
     for line in ["label         \"as built & <tested>\"", "weights[2,3]  1 0 0 0 1 1", "\"r1 \u{b5}\""] {
         assert!(said.contains(line), "{said}");

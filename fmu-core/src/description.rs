@@ -153,6 +153,13 @@ pub enum VariableKind {
     Text,
     /// A clock; its start value is the interval in s, if the importer may set it.
     Clock(Timing),
+    /// Bytes.
+    Binary {
+        /// MIME type of the content.
+        mime_type: String,
+        /// Greatest number of bytes.
+        most: usize,
+    },
 }
 
 /// A start value.
@@ -167,6 +174,8 @@ pub enum Value {
     Boolean(bool),
     /// Start value of a text.
     Text(String),
+    /// Start value of bytes.
+    Binary(Vec<u8>),
 }
 
 impl Description {
@@ -293,6 +302,15 @@ impl Description {
     /// The name that users see.
     pub fn model_name(&self) -> &str {
         self.title.as_deref().unwrap_or(&self.name)
+    }
+
+    /// Why there can be no archive of FMI 2.0, if there cannot.
+    pub fn needs_fmi3(&self) -> Option<String> {
+        let binary = |v: &&Variable| matches!(v.kind, VariableKind::Binary { .. });
+        let of_bytes = self.variables.iter().find(binary);
+        let clock = self.variables.iter().find(|v| matches!(v.kind, VariableKind::Clock(_)));
+        let bytes = of_bytes.map(|v| format!("{} is binary, and FMI 2.0 has no bytes", v.name));
+        bytes.or_else(|| clock.map(|v| format!("{} is a clock, and FMI 2.0 has no clocks", v.name)))
     }
 
     /// The variable of this name.
@@ -459,6 +477,7 @@ fn value(slot: &Slot<'_>) -> Value {
         Slot::Text(x) => Value::Text((*x).clone()),
         Slot::Said(x) => Value::Text((*x).into()),
         Slot::Clock(x) => Value::Real(x.as_ref().map_or(f64::NAN, |x| **x)),
+        Slot::Binary(x) => Value::Binary(x.to_vec()),
     }
 }
 
@@ -478,6 +497,7 @@ fn kind(kind: &Kind) -> VariableKind {
         Kind::Boolean => VariableKind::Boolean,
         Kind::Text => VariableKind::Text,
         Kind::Clock(timing) => VariableKind::Clock(*timing),
+        Kind::Binary { mime_type, most } => VariableKind::Binary { mime_type: (*mime_type).into(), most: *most },
         Kind::Enumeration(Enumeration { name, description, items }) => VariableKind::Enumeration {
             name: (*name).into(),
             description: (*description).into(),
@@ -497,10 +517,12 @@ fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
         return Err(Fault::new(format!("{name} = {slot} at the start has a character that XML does not have")));
     }
     if slot.is_allowed(meta) {
-        Ok(())
-    } else {
-        Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
+        return Ok(());
     }
+    if let Kind::Binary { most, .. } = meta.kind {
+        return Err(Fault::value(name, format!("{slot} at the start"), format_args!("at most {most} bytes")));
+    }
+    Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
 }
 
 fn check_types(variables: &[Variable]) -> Result<(), Fault> {

@@ -83,6 +83,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bytes;
 pub mod capability;
 pub mod clock;
 pub mod continuous;
@@ -94,6 +95,7 @@ pub mod fault;
 pub mod integer;
 pub mod integrate;
 pub mod intermediate;
+pub mod list;
 pub mod log;
 pub mod model;
 pub mod need;
@@ -110,6 +112,7 @@ pub mod token;
 pub mod unit;
 pub mod variable;
 
+pub use bytes::Bytes;
 pub use capability::{Capabilities, Exported, Plain, Warns};
 pub use clock::{Clock, Clocked, Ticks, Timing};
 pub use continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
@@ -120,6 +123,7 @@ pub use events::{Events, Indicator, Next, Outcome, Sampled};
 pub use fault::Fault;
 pub use integer::{IntegerType, Whole};
 pub use intermediate::Intermediate;
+pub use list::{Element, Items};
 pub use model::{Block, Experiment, Info, Interface, Model};
 pub use need::Need;
 pub use reals::Inputs;

@@ -39,9 +39,7 @@ pub(crate) fn initial_dependencies<M: Model>(
             found.compare(known, &before, &start(changed));
         }
     }
-    // Which texts mean something is not known, so none is tried.
-    let is_text = |&i: &usize| M::TABLE.locate(i).is_some_and(|(_, meta, _)| meta.kind == Kind::Text);
-    for known in knowns.into_iter().filter(is_text) {
+    for known in knowns.into_iter().filter(is_opaque::<M>) {
         found.suspect(known);
     }
     let unknown = |i: usize| {
@@ -91,7 +89,18 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
         now = now.plus(draw.between(0.1, 1.0));
         found.compare(NOW, &before, &observed(can, base, now));
     }
+    if can.model_exchange() {
+        for input in settable.into_iter().filter(|&i| causality[i].0 == Causality::Input).filter(is_opaque::<M>) {
+            found.suspect(input);
+        }
+    }
     found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output))
+}
+
+/// Whether a variable is a text or bytes: which of them mean something is not known, so none is tried.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "a filter")]
+fn is_opaque<M: Model>(&index: &usize) -> bool {
+    M::TABLE.locate(index).is_some_and(|(_, meta, _)| matches!(meta.kind, Kind::Text | Kind::Binary { .. }))
 }
 
 /// The start values first; then other values for about half of the inputs and parameters.
@@ -222,7 +231,7 @@ fn change<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
                 x.set(other);
             }
         }
-        Slot::Text(_) | Slot::Said(_) | Slot::Clock(_) => {}
+        Slot::Text(_) | Slot::Said(_) | Slot::Binary(_) | Slot::Clock(_) => {}
     }
 }
 

@@ -7,8 +7,10 @@ mod kinds;
 mod settings;
 mod slot;
 
+use crate::bytes::Bytes;
 use crate::enumeration::Place;
 use crate::integer::Getter;
+use crate::list::List;
 use crate::need::Need;
 use crate::reals::{Inputs, Interval};
 use crate::token::Hash;
@@ -34,14 +36,17 @@ pub(crate) enum Access<W: 'static> {
     Integer(Getter<W>),
     Boolean(fn(&mut W) -> &mut bool),
     Enumeration(&'static dyn Place<W>),
+    List(&'static dyn List<W>),
     Text(fn(&mut W) -> &mut String),
     Said(fn(&W) -> &str),
+    Binary(fn(&mut W) -> &mut Bytes),
     Constant(&'static str),
     /// A clock, and where its interval is.
     Clock(Option<fn(&mut W) -> &mut f64>),
     Part {
         len: usize,
         hash: Hash,
+        binary: bool,
         node: &'static dyn Node<W>,
     },
 }
@@ -112,27 +117,31 @@ pub(crate) enum Access<W: 'static> {
 /// ```
 ///
 /// Arrays, matrices, single precision and texts. An array is one variable of FMI 3.0, and `a[1]`, `a[2]` or `m[1,2]` in
-/// FMI 2.0:
+/// FMI 2.0; an array of another type than real numbers is a list:
 ///
 /// ```
 /// # use fmu_core::unit::{ONE, VOLT};
-/// # use fmu_core::{Row, Table, table};
-/// # #[derive(Default)] struct Model { u: [f64; 3], y: [f64; 3], a: [[f64; 3]; 2], x: f32, label: String, on: bool }
+/// # use fmu_core::{Items, Row, Table, table};
+/// # #[derive(Default)] struct Model { u: [f64; 3], y: [f64; 3], a: [[f64; 3]; 2], x: f32, label: String, on: bool,
+/// #     n: [i32; 3], names: [String; 2] }
 /// # type V = Row<Model>;
 /// const TABLE: &Table<Model> = table![
 ///     V::array_input("u", &VOLT, "Three inputs", 3, |m| &mut m.u),
 ///     V::array_output("y", &VOLT, "Three outputs, sampled", 3, |m| &mut m.y).discrete(),
 ///     V::array_local("y_local", &VOLT, "For inspection", 3, |m| &mut m.y),
 ///     V::array_parameter("A", &ONE, "Two rows of three", 6, |m| m.a.as_flattened_mut()).shape(&[2, 3]),
+///     V::list_input("n", "Three integers; `list_output`, `list_local` and `list_parameter` too", 3, &Items(|m| &mut m.n)),
+///     V::list_parameter("names", "Two texts", 2, &Items(|m| &mut m.names)),
 ///     V::float32_input("x", &VOLT, "Input, sampled", |m| &mut m.x),
-///     V::float32_output("x_out", &VOLT, "Output, sampled", |m| &mut m.x),
+///     V::float32_output("x_out", &VOLT, "Output, continuous", |m| &mut m.x).continuous(),
 ///     V::float32_local("x_local", &VOLT, "For inspection", |m| &mut m.x),
 ///     V::float32_parameter("x_parameter", &VOLT, "Parameter", |m| &mut m.x),
+///     V::text_input("title", "Set by the importer at any communication point", |m| &mut m.label),
 ///     V::text_parameter("label", "Fixed after initialization", |m| &mut m.label),
 ///     V::text_output("status", "Chosen or kept, never made in a step", |m| if m.on { &m.label } else { "off" }),
 ///     V::text_constant("revision", "Never changes", "r1"),
 /// ];
-/// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 4 + 3);
+/// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 3 + 2 + 4 + 4);
 /// ```
 ///
 /// A part has a table of its own, which the whole sees under a prefix:

@@ -54,9 +54,10 @@ impl<W, P> Node<W> for Part<W, P> {
 impl<W: 'static> Row<W> {
     /// All variables of a part, under a prefix that ends with a dot (or none).
     pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
-        let access = Access::Part { len: part.table.len(), hash: part.table.hash(), node: part };
+        let Table { len, hash, binary, intermediate, .. } = *part.table;
+        let access = Access::Part { len, hash, binary, node: part };
         let mut row = Self::new(prefix, "", Kind::Boolean, access);
-        row.meta.intermediate = part.table.intermediate;
+        row.meta.intermediate = intermediate;
         row
     }
 }
@@ -89,6 +90,8 @@ pub struct Table<W: 'static> {
     pub(crate) places: [RowPlace; CAPACITY],
     len: usize,
     hash: Hash,
+    /// A variable is binary.
+    binary: bool,
     /// A variable can be read or set inside a communication step.
     pub(crate) intermediate: bool,
 }
@@ -103,12 +106,13 @@ impl<W: 'static> Table<W> {
         assert!(CAPACITY <= u16::MAX as usize);
         // No row past the end.
         let mut places = [RowPlace { row: u16::MAX, inner: 0 }; CAPACITY];
-        let (mut len, mut row, mut hash, mut intermediate) = (0, 0, Hash::START, false);
+        let (mut len, mut row, mut hash, mut binary, mut intermediate) = (0, 0, Hash::START, false, false);
         while row < rows.len() {
             let meta = &rows[row].meta;
             intermediate |= meta.intermediate;
             let count = match (&rows[row].access, meta.dimension) {
-                (Access::Part { len, hash: of_part, .. }, _) => {
+                (Access::Part { len, hash: of_part, binary: of_bytes, .. }, _) => {
+                    binary |= *of_bytes;
                     hash = hash.text(meta.name).join(of_part);
                     if !meta.clocks.is_empty() {
                         hash = hash.text("on").text(meta.clocks);
@@ -117,6 +121,7 @@ impl<W: 'static> Table<W> {
                 }
                 (_, dimension) => {
                     check(meta);
+                    binary |= matches!(meta.kind, Kind::Binary { .. });
                     hash = hash.meta(meta);
                     if let Some(n) = dimension { n } else { 1 }
                 }
@@ -131,7 +136,7 @@ impl<W: 'static> Table<W> {
             check_unique(rows, row);
             row += 1;
         }
-        Self { rows, places, len, hash, intermediate }
+        Self { rows, places, len, hash, binary, intermediate }
     }
 
     /// Whether a row is a clock that the model ticks, or one whose ticks it asks for.
@@ -159,6 +164,11 @@ impl<W: 'static> Table<W> {
         self.len == 0
     }
 
+    /// Whether a variable is binary.
+    pub const fn has_binary(&self) -> bool {
+        self.binary
+    }
+
     /// Hash of all that the rows say.
     pub const fn hash(&self) -> Hash {
         self.hash
@@ -179,10 +189,12 @@ impl<W: 'static> Table<W> {
             Access::Integer(get) => Slot::Integer(get.find(whole)),
             Access::Boolean(get) => Slot::Boolean(get(whole)),
             Access::Enumeration(field) => Slot::Enumeration(field.find(whole)),
+            Access::List(items) => items.find(whole, usize::from(place.inner))?,
             Access::Text(get) => Slot::Text(get(whole)),
             Access::Said(say) => Slot::Said(say(whole)),
             Access::Constant(text) => Slot::Said(text),
             Access::Clock(interval) => Slot::Clock(interval.map(|get| get(whole))),
+            Access::Binary(get) => Slot::Binary(get(whole)),
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
         };
         Some((&row.meta, slot))
@@ -250,6 +262,7 @@ impl<W: 'static> Table<W> {
                 Slot::Enumeration(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Text(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Clock(x) => x.map(|x| ptr::from_ref(x).addr()),
+                Slot::Binary(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Said(_) => None,
             });
             address == Some(wanted)

@@ -85,6 +85,7 @@ impl Hash {
             Kind::Integer(IntegerType::Int32) => hash.text("integer"),
             Kind::Integer(of) => hash.text(of.name()),
             Kind::Text => hash.text("text"),
+            Kind::Binary { mime_type, most } => hash.text("binary").text(mime_type).count(most),
             Kind::Boolean => hash.text("boolean"),
             Kind::Clock(timing) => hash.timing(&timing),
             Kind::Enumeration(enumeration) => {

@@ -84,6 +84,13 @@ pub enum Kind {
     Text,
     /// A clock (FMI 3.0).
     Clock(Timing),
+    /// Bytes (FMI 3.0).
+    Binary {
+        /// MIME type of the content.
+        mime_type: &'static str,
+        /// Greatest number of bytes.
+        most: usize,
+    },
 }
 
 /// The values that are allowed. A strict bound is not itself allowed.

@@ -232,19 +232,6 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// Refuses a getter or setter of a type that no variable has.
-    ///
-    /// # Errors
-    /// The list of references is not empty.
-    pub fn refuse(&mut self, references: &[u32], carries: &str) -> Result<(), Fault> {
-        let Some(&reference) = references.first() else { return Ok(()) };
-        match table::<E>().entry(&mut self.current.block, index(reference)) {
-            Some((meta, _)) => Err(message::type_of::<E::Model>(index(reference), meta, carries)),
-            None if is_time(reference, self.standard) => Err(message::real(true, carries)),
-            None => Err(self.beside_table(reference, carries, false)),
-        }
-    }
-
     /// Checks the number of values: one for each reference or, in FMI 3.0, for each element of the variables (3.0.2, 2.2.7.2).
     pub(crate) fn check_count(&mut self, references: &[u32], given: usize) -> Result<(), Fault> {
         let mut needed = references.len();

@@ -11,6 +11,7 @@
 //! | n | payload in postcard's encoding, padded with zeros to a multiple of a fixed number |
 //! | 4 | CRC-32 of all preceding bytes |
 
+use crate::binary::make_room;
 use crate::lifecycle::State;
 use crate::snapshot::Snapshot;
 use fmu_core::resource::Shelf;
@@ -78,6 +79,7 @@ pub fn read<M: Model>(bytes: &[u8]) -> Result<Snapshot<M>, Fault> {
     if !rest.is_empty() {
         return Err(refuse("content".into()));
     }
+    make_room(&mut state.block);
     if !state.fits_its_interface() {
         return Err(refuse("content".into()));
     }

@@ -81,6 +81,7 @@
 #[allow(unsafe_code)]
 pub mod abi;
 mod access;
+mod binary;
 pub mod blob;
 pub mod clocks;
 pub mod exchange;

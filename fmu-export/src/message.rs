@@ -24,6 +24,7 @@ pub(crate) fn allowed(meta: &Meta) -> String {
             let (min, max) = of.within(&meta.range);
             return format!("{min} to {max}");
         }
+        Kind::Binary { most, .. } => return format!("at most {most} bytes"),
         _ => return meta.range.to_string(),
     };
     let items: Vec<String> = enumeration.items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
@@ -40,6 +41,7 @@ fn kind(kind: &Kind) -> String {
         Kind::Enumeration(_) => "an enumeration".into(),
         Kind::Text => "a text".into(),
         Kind::Clock(_) => "a clock".into(),
+        Kind::Binary { .. } => "bytes".into(),
     }
 }
 

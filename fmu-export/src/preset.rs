@@ -4,7 +4,7 @@
 use crate::lifecycle::State;
 use crate::message;
 use fmu_core::preset::{self, Entry, FILE, MOST};
-use fmu_core::{Block, Causality, Fault, Kind, Meta, Model, Slot};
+use fmu_core::{Block, Bytes, Causality, Fault, Kind, Meta, Model, Slot};
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, Read};
@@ -147,6 +147,7 @@ fn write(meta: &Meta, mut slot: Slot<'_>, text: &str) -> Result<(), String> {
         Slot::Text(x) => text.clone_into(x),
         Slot::Said(_) => return Err("a text that the model computes".into()),
         Slot::Clock(_) => return Err("a clock".into()),
+        Slot::Binary(x) => x.set(&Bytes::from_hex(text).ok_or("pairs of hexadecimal digits")?),
     }
     if slot.is_allowed(meta) { Ok(()) } else { Err(allowed()) }
 }

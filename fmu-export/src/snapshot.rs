@@ -1,5 +1,6 @@
 //! Everything that changes in an instance, as one plain value that an FMU state saves.
 
+use crate::binary::make_room;
 use crate::clocks::{Tick, ticks};
 use crate::lifecycle::{Life, State};
 use crate::message;
@@ -80,7 +81,8 @@ impl<M: Model> Snapshot<M> {
     }
 
     /// Like [`new`](Self::new), for a model other than its `Default`.
-    pub fn of(interface: Interface, block: Block<M>) -> Self {
+    pub fn of(interface: Interface, mut block: Block<M>) -> Self {
+        make_room(&mut block);
         Self {
             life: Life::new(interface),
             experiment: None,

@@ -2,12 +2,16 @@
 
 use crate::access::{index, is_time, open};
 use crate::instance::{Instance, Refusal};
+use crate::lifecycle::State;
 use crate::message;
 use fmu_core::{Causality, Exported, Fault, Kind, Model, Slot};
 use std::ffi::{CStr, CString};
 
 /// What the functions for texts carry.
 const CARRIES: &str = "a text";
+
+/// Greatest size of a text that is set, in bytes.
+const MOST: usize = 1 << 20;
 
 impl<E: Exported> Instance<E> {
     /// The texts of variables, `given` of them.
@@ -17,15 +21,14 @@ impl<E: Exported> Instance<E> {
     pub fn get_texts(&mut self, references: &[u32], given: usize) -> Result<&[CString], Refusal> {
         self.check_count(references, given)?;
         self.refresh();
-        let mut texts = Vec::with_capacity(references.len());
-        for &reference in references {
-            let slot = self.text_of(reference)?;
-            let bytes = match &slot {
-                Slot::Text(text) => text.as_bytes(),
-                Slot::Said(text) => text.as_bytes(),
+        let mut texts = Vec::with_capacity(given);
+        for index in self.each_index(references)? {
+            let bytes = match E::Model::TABLE.entry(&mut self.current.block, index) {
+                Some((_, Slot::Text(text))) => text.as_bytes(),
+                Some((_, Slot::Said(text))) => text.as_bytes(),
                 _ => &[],
             };
-            let nul = |_| Fault::new(format!("{} has a NUL byte", message::name::<E::Model>(index(reference))));
+            let nul = |_| Fault::new(format!("{} has a NUL byte", message::name::<E::Model>(index)));
             texts.push(CString::new(bytes).map_err(nul)?);
         }
         self.texts = texts;
@@ -36,49 +39,83 @@ impl<E: Exported> Instance<E> {
     /// all references are known to be texts that can be set.
     ///
     /// # Errors
-    /// Unknown reference, another type, not settable in this state, another number of values, NULL, not UTF-8.
+    /// Unknown reference, another type, not settable in this state, another number of values, NULL, not UTF-8, too long.
     pub fn set_texts<'a>(
         &mut self,
         references: &[u32],
         given: usize,
         read: impl Fn(usize) -> Option<&'a CStr>,
-    ) -> Result<(), Fault> {
+    ) -> Result<(), Refusal> {
         self.check_count(references, given)?;
-        let state = self.current.life.state();
-        for &reference in references {
-            self.text_of(reference)?;
-            let index = index(reference);
-            if let Some((meta, _)) = E::Model::TABLE.entry(&mut self.current.block, index)
-                && !(meta.causality == Causality::Parameter && open(meta, state))
-            {
-                return Err(message::fixed::<E::Model>(index, meta, state));
-            }
+        let indices = self.each_index(references)?;
+        for &index in &indices {
+            self.check_open(index)?;
         }
         let mut texts = Vec::with_capacity(given);
-        for (i, &reference) in references.iter().enumerate() {
-            let name = message::name::<E::Model>(index(reference));
+        for (i, &index) in indices.iter().enumerate() {
+            let name = message::name::<E::Model>(index);
             let value = read(i).ok_or_else(|| Fault::value(&name, "NULL", "a text"))?;
+            if value.count_bytes() > MOST {
+                let long = format!("a text of {} bytes", value.count_bytes());
+                return Err(Fault::value(&name, long, format_args!("at most {MOST} bytes")).into());
+            }
             texts.push(value.to_str().map_err(|_| Fault::new(format!("the new value of {name} is not UTF-8")))?);
         }
-        for (&reference, text) in references.iter().zip(texts) {
-            if let Some((_, Slot::Text(place))) = E::Model::TABLE.entry(&mut self.current.block, index(reference)) {
+        for (&index, text) in indices.iter().zip(texts) {
+            if let Some((_, Slot::Text(place))) = E::Model::TABLE.entry(&mut self.current.block, index) {
                 text.clone_into(place);
-                self.current.dirty = true;
             }
+        }
+        if !indices.is_empty() {
+            self.was_set();
         }
         Ok(())
     }
 
-    /// The text with this reference.
-    fn text_of(&mut self, reference: u32) -> Result<Slot<'_>, Fault> {
-        let index = index(reference);
-        match E::Model::TABLE.locate(index) {
-            Some((_, meta, _)) if meta.kind == Kind::Text => {}
-            Some((_, meta, _)) => return Err(message::type_of::<E::Model>(index, meta, CARRIES)),
-            None if is_time(reference, self.standard) => return Err(message::real(true, CARRIES)),
-            None => return Err(self.beside_table(reference, CARRIES, false)),
+    /// The table's indices of texts: one for each reference or, in FMI 3.0, for each element of an array.
+    fn each_index(&mut self, references: &[u32]) -> Result<Vec<usize>, Fault> {
+        let mut indices = Vec::with_capacity(references.len());
+        for &reference in references {
+            let first = self.index_of(reference, CARRIES, |kind| *kind == Kind::Text)?;
+            let count = if self.arrays { self.elements(reference)? } else { 1 };
+            indices.extend(first..first + count);
         }
-        let found = E::Model::TABLE.entry(&mut self.current.block, index);
-        found.map(|(_, slot)| slot).ok_or_else(|| message::unknown::<E>(reference, self.standard))
+        Ok(indices)
+    }
+
+    /// The table's index of a variable whose type fits, or why there is none.
+    pub(crate) fn index_of(
+        &mut self,
+        reference: u32,
+        carries: &str,
+        fits: impl Fn(&Kind) -> bool,
+    ) -> Result<usize, Fault> {
+        let index = index(reference);
+        match E::Model::TABLE.entry(&mut self.current.block, index) {
+            Some((meta, _)) if fits(&meta.kind) => Ok(index),
+            Some((meta, _)) => Err(message::type_of::<E::Model>(index, meta, carries)),
+            None if is_time(reference, self.standard) => Err(message::real(true, carries)),
+            None => Err(self.beside_table(reference, carries, false)),
+        }
+    }
+
+    /// Whether a variable, a text or bytes, can be set in this state. In Continuous-Time Mode an input is discarded as other
+    /// discrete inputs are.
+    pub(crate) fn check_open(&mut self, index: usize) -> Result<(), Refusal> {
+        let state = self.current.life.state();
+        let Some((meta, slot)) = E::Model::TABLE.entry(&mut self.current.block, index) else { return Ok(()) };
+        if open(meta, state) && !matches!(slot, Slot::Said(_)) {
+            return Ok(());
+        }
+        let fault = message::fixed::<E::Model>(index, meta, state);
+        let tried = state == State::Continuous && meta.causality == Causality::Input;
+        Err(if tried { Refusal::Discard(fault) } else { Refusal::Error(fault) })
+    }
+
+    /// Some texts or bytes have new values.
+    pub(crate) fn was_set(&mut self) {
+        let state = self.current.life.state();
+        self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);
+        self.stale |= self.exchanges() && state == State::Event;
     }
 }

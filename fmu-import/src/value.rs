@@ -1,7 +1,7 @@
 //! Values that cross the interface, whatever the standard calls their type.
 
 use crate::quantity;
-use fmu_core::IntegerType;
+use fmu_core::{Bytes, IntegerType};
 use model_description::{BaseType, ModelDescription, ModelVariable};
 use std::fmt;
 
@@ -56,8 +56,15 @@ impl Values {
                 })
                 .collect::<Result<_, _>>()
                 .map(Self::Booleans),
+            BaseType::String if variable.is_array() => Ok(Self::Strings(texts(text))),
             BaseType::String => Ok(Self::Strings(vec![text.into()])),
-            BaseType::Binary => Err(wrong(text, "a value that can be written as text")),
+            BaseType::Binary => elements()
+                .map(|e| match Bytes::from_hex(e) {
+                    Some(bytes) => Ok(bytes.to_vec()),
+                    None => Err(wrong(e, "bytes, each of two hexadecimal digits")),
+                })
+                .collect::<Result<_, _>>()
+                .map(Self::Binaries),
             BaseType::Enumeration => elements()
                 .map(|e| {
                     let named = items.iter().find(|(name, _)| name == e).map(|(_, value)| i128::from(*value));
@@ -98,6 +105,21 @@ impl Values {
             let Some((number, unit)) = quantity::split(element) else { return Ok(None) };
             quantity::convert(number, unit, variable, description).map(Some)
         })
+    }
+
+    /// The start value of a variable, all elements of an array.
+    ///
+    /// # Errors
+    /// It has none, or not one of its type.
+    pub fn start(variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
+        match variable.base {
+            BaseType::String if !variable.start_texts.is_empty() => Ok(Self::Strings(variable.start_texts.clone())),
+            BaseType::Binary => Self::parse(&variable.start_texts.join(" "), variable, &[]),
+            _ => {
+                let start = variable.start.as_deref().ok_or_else(|| format!("{} has no start value", variable.name))?;
+                Self::read(start, variable, description)
+            }
+        }
     }
 
     /// A number as a value of this base type: rounded for an integer, not 0 for true.
@@ -152,6 +174,25 @@ impl Values {
         }
     }
 
+    /// The elements as a cell of CSV has them: spaces between them, bytes in hexadecimal digits.
+    pub fn cell(&self) -> String {
+        self.words().join(" ")
+    }
+
+    /// Each element as text.
+    fn words(&self) -> Vec<String> {
+        fn each<T: ToString>(x: &[T]) -> Vec<String> {
+            x.iter().map(T::to_string).collect()
+        }
+        match self {
+            Self::Reals(x) => each(x),
+            Self::Integers(x) => each(x),
+            Self::Booleans(x) => each(x),
+            Self::Strings(x) => each(x),
+            Self::Binaries(x) => x.iter().map(|bytes| Bytes::from(bytes).to_string()).collect(),
+        }
+    }
+
     /// Number of elements.
     pub fn len(&self) -> usize {
         match self {
@@ -167,6 +208,20 @@ impl Values {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+}
+
+/// Texts with commas between them; one with a comma of its own is in quotation marks.
+fn texts(text: &str) -> Vec<String> {
+    let (mut texts, mut quoted) = (vec![String::new()], false);
+    for c in text.chars() {
+        match (c, texts.last_mut()) {
+            ('"', _) => quoted = !quoted,
+            (',', _) if !quoted => texts.push(String::new()),
+            (c, Some(last)) => last.push(c),
+            (_, None) => {}
+        }
+    }
+    texts.iter().map(|text| text.trim().to_owned()).collect()
 }
 
 /// The least and the greatest value of an integer type.
@@ -186,15 +241,6 @@ fn bounds(base: BaseType) -> (i128, i128) {
 
 impl fmt::Display for Values {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fn list<T: ToString>(x: &[T]) -> String {
-            x.iter().map(T::to_string).collect::<Vec<_>>().join(", ")
-        }
-        f.write_str(&match self {
-            Self::Reals(x) => list(x),
-            Self::Integers(x) => list(x),
-            Self::Booleans(x) => list(x),
-            Self::Strings(x) => list(x),
-            Self::Binaries(x) => list(&x.iter().map(|b| format!("{} bytes", b.len())).collect::<Vec<_>>()),
-        })
+        f.write_str(&self.words().join(", "))
     }
 }

@@ -60,8 +60,8 @@ pub fn fits(description: &Description, version: FmiVersion) -> Result<(), String
             "{name} has no variable, and FMI 2.0 needs at least one: add one, or build for FMI 3.0 only, which has time"
         ));
     }
-    if version == FmiVersion::V2 && clocked(description) {
-        return Err(format!("{} has clocks, which FMI 2.0 lacks: build for FMI 3.0 only", description.name));
+    if let Some(why) = description.needs_fmi3().filter(|_| version == FmiVersion::V2) {
+        return Err(format!("{why}: build for FMI 3.0 only"));
     }
     let narrow = |value: &Value| matches!(value, Value::Integer(x) if i32::try_from(*x).is_err());
     for v in description.variables.iter().filter(|_| version == FmiVersion::V2) {

@@ -9,7 +9,7 @@ use crate::Failed;
 use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use fmu_import::cosimulation::{Integration, Method, Point, Schedule, Settings, Solver, System};
+use fmu_import::cosimulation::{Integration, Method, Point, Sequence, Settings, Solver, System};
 use fmu_import::guard::Allowance;
 use fmu_import::ssp::load::Loaded;
 use fmu_import::ssp::{ssv, values};
@@ -86,7 +86,8 @@ pub struct Simulate {
     pub set: Vec<String>,
     /// Feed an input or a tunable parameter over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE
     /// for straight lines, or a CSV file with time in the first column; without VARIABLE=, the headings of the others name
-    /// what they feed. VALUE and headings may have a unit: 1000rpm, `speed_ref [rpm]`
+    /// what they feed. VALUE and headings may have a unit: 1000rpm, `speed_ref [rpm]`. What is not one real number is held from
+    /// point to point: texts, bytes as hexadecimal digits, arrays with spaces between their elements
     #[arg(long, value_name = "[VARIABLE=]POINTS|FILE.csv")]
     pub input: Vec<String>,
     /// Start time in s [default: from the FMUs, else 0]
@@ -315,17 +316,14 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
     for text in &args.input {
         match text.split_once('=') {
             Some((port, file)) if file.to_lowercase().ends_with(".csv") => {
-                loaded.input(port, &column(port, file).map_err(|cause| anyhow!("--input {text}: {cause}"))?)?;
+                loaded
+                    .sequence(port, &column(port, file).map_err(|cause| anyhow!("--input {text}: {cause}"))?)
+                    .with_context(|| format!("--input {text}"))?;
             }
-            Some((port, points)) => {
-                let schedule = Schedule::parse(points).map_err(|cause| anyhow!("--input {text}: {cause}"))?;
-                loaded.input(port, &schedule)?;
-            }
+            Some((port, points)) => loaded.points(port, points).with_context(|| format!("--input {text}"))?,
             None => {
-                for (port, schedule) in
-                    Schedule::read_csv(Path::new(text)).map_err(|cause| anyhow!("--input {cause}"))?
-                {
-                    loaded.input(&port, &schedule)?;
+                for (port, texts) in Sequence::read_csv(Path::new(text)).map_err(|cause| anyhow!("--input {cause}"))? {
+                    loaded.sequence(&port, &texts).with_context(|| format!("--input {text}"))?;
                 }
             }
         }
@@ -360,8 +358,8 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
 }
 
 /// The column of a CSV file that feeds the input `port`: the one of its name, or the only one.
-fn column(port: &str, file: &str) -> Result<Schedule, String> {
-    let mut columns = Schedule::read_csv(Path::new(file))?;
+fn column(port: &str, file: &str) -> Result<Sequence, String> {
+    let mut columns = Sequence::read_csv(Path::new(file))?;
     let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
     match names.iter().position(|name| *name == port).or_else(|| (names.len() == 1).then_some(0)) {
         Some(index) => Ok(columns.swap_remove(index).1),

@@ -1,7 +1,9 @@
 //! Constructors of rows: each says who sets the variable and when it changes. [`integer`](crate::integer) has those of
 //! integers.
 
+use crate::bytes::Bytes;
 use crate::enumeration::{Enumerated, Field};
+use crate::list::{Element, Items};
 use crate::row::{Access, Row};
 use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Variability};
@@ -75,8 +77,8 @@ constructors! {
 constructors! {
     [] (name: &'static str, quantity: &'static Quantity, description: &'static str, get: fn(&mut W) -> &mut f32)
         => Self::new(name, description, Kind::Float32(quantity), Access::Float32(get));
-    /// A real input in single precision, which changes at sample instants. FMI 2.0 has double precision only: what the
-    /// importer sets is rounded.
+    /// A real input in single precision, which changes at sample instants unless it is [`continuous`](Row::continuous). FMI 2.0
+    /// has double precision only: what the importer sets is rounded.
     float32_input Input Discrete;
     /// A real output in single precision, which changes at sample instants.
     float32_output Output Discrete;
@@ -104,15 +106,50 @@ constructors! {
     array_parameter Parameter Fixed;
 }
 
+constructors! {
+    [T: Element] (name: &'static str, description: &'static str, dimension: usize, items: &'static Items<W, T>)
+        => Self::new(name, description, T::KIND, Access::List(items)).of_dimension(dimension);
+    /// An array of inputs of another type than real numbers; `dimension` elements, and `items` says where the model holds them.
+    list_input Input Discrete;
+    /// An array of outputs of another type than real numbers; `dimension` elements.
+    list_output Output Discrete;
+    /// An array of `dimension` variables other than outputs, of another type than real numbers.
+    list_local Local Discrete;
+    /// A fixed array of parameters of another type than real numbers; `dimension` elements.
+    list_parameter Parameter Fixed;
+}
+
+constructors! {
+    [] (name: &'static str, description: &'static str, get: fn(&mut W) -> &mut String)
+        => Self::new(name, description, Kind::Text, Access::Text(get));
+    /// A text input: setting it may allocate.
+    text_input Input Discrete;
+    /// A text parameter, fixed after initialization: a file name, a mode that is not an enumeration.
+    text_parameter Parameter Fixed;
+}
+
+constructors! {
+    [] (
+        name: &'static str,
+        description: &'static str,
+        mime_type: &'static str,
+        most: usize,
+        get: fn(&mut W) -> &mut Bytes,
+    ) => Self::new(name, description, Kind::Binary { mime_type, most }, Access::Binary(get));
+    /// An input of `most` bytes at most (FMI 3.0), whose content has this MIME type.
+    binary_input Input Discrete;
+    /// An output of `most` bytes at most (FMI 3.0).
+    binary_output Output Discrete;
+    /// A variable of `most` bytes at most other than an output (FMI 3.0).
+    binary_local Local Discrete;
+    /// A parameter of `most` bytes at most (FMI 3.0), fixed after initialization.
+    binary_parameter Parameter Fixed;
+}
+
 impl<W: 'static> Row<W> {
     const fn of_dimension(mut self, dimension: usize) -> Self {
         self.meta.dimension = Some(dimension);
         self
-    }
-
-    /// A text parameter, fixed after initialization: a file name, a mode that is not an enumeration.
-    pub const fn text_parameter(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut String) -> Self {
-        Self::new(name, description, Kind::Text, Access::Text(get)).with(Causality::Parameter, Variability::Fixed)
     }
 
     /// A text output. The model keeps it or chooses among constants: reading it in a step does not allocate.

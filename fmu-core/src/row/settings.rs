@@ -10,11 +10,12 @@ impl<W: 'static> Row<W> {
     /// Makes a parameter tunable: it may change at communication points.
     ///
     /// # Panics
-    /// At compile time, if the variable is not a parameter, or is a text.
+    /// At compile time, if the variable is not a parameter, or is a text or bytes.
     #[track_caller]
     pub const fn tunable(mut self) -> Self {
-        let parameter = matches!(self.meta.causality, Causality::Parameter) && !matches!(self.meta.kind, Kind::Text);
-        demand(parameter, self.meta.name, "only a parameter of a type other than text can be tunable");
+        let parameter = matches!(self.meta.causality, Causality::Parameter)
+            && !matches!(self.meta.kind, Kind::Text | Kind::Binary { .. });
+        demand(parameter, self.meta.name, "only a parameter of a type other than text and bytes can be tunable");
         self.meta.variability = Variability::Tunable;
         self
     }
@@ -28,6 +29,23 @@ impl<W: 'static> Row<W> {
         let continuous = matches!(self.meta.variability, Variability::Continuous);
         demand(continuous, self.meta.name, "only a continuous variable can be made discrete");
         self.meta.variability = Variability::Discrete;
+        self
+    }
+
+    /// Makes an input, output or local variable in single precision continuous.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not in single precision, or is a parameter.
+    #[track_caller]
+    pub const fn continuous(mut self) -> Self {
+        let single =
+            matches!(self.meta.kind, Kind::Float32(_)) && matches!(self.meta.variability, Variability::Discrete);
+        demand(
+            single,
+            self.meta.name,
+            "only a variable in single precision other than a parameter can be made continuous",
+        );
+        self.meta.variability = Variability::Continuous;
         self
     }
 

@@ -1,9 +1,10 @@
 //! A value that a table has found.
 
+use crate::bytes::Bytes;
 use crate::enumeration::Choice;
 use crate::integer::Whole;
 use crate::variable::{Kind, Meta};
-use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::hash::{DefaultHasher, Hasher as _};
 
 /// A value found by a table, ready to read or to write.
 #[derive(Debug)]
@@ -24,6 +25,8 @@ pub enum Slot<'a> {
     Said(&'a str),
     /// A clock, and its interval in s if the importer may set it.
     Clock(Option<&'a mut f64>),
+    /// Bytes.
+    Binary(&'a mut Bytes),
 }
 
 impl Slot<'_> {
@@ -34,31 +37,33 @@ impl Slot<'_> {
             (Self::Float32(x), _) => meta.range.contains_single(**x),
             (Self::Clock(Some(x)), _) => x.is_finite() && **x > 0.0,
             (Self::Integer(x), Kind::Integer(of)) => of.allows(x.get(), &meta.range),
+            (Self::Binary(x), Kind::Binary { most, .. }) => x.len() <= most,
             _ => true,
         }
     }
 
-    /// The bits of the value, for comparisons; a hash of a text.
+    /// The bits of the value, for comparisons; a hash of a text or of bytes.
     pub(crate) fn bits(&self) -> u64 {
-        let hash = |text: &str| {
+        fn hash<T: std::hash::Hash + ?Sized>(content: &T) -> u64 {
             let mut hasher = DefaultHasher::new();
-            text.hash(&mut hasher);
+            content.hash(&mut hasher);
             hasher.finish()
-        };
+        }
         match self {
             Self::Real(x) => x.to_bits(),
             Self::Float32(x) => x.to_bits().into(),
             Self::Integer(x) => u64::try_from(x.get() & i128::from(u64::MAX)).unwrap_or_default(),
             Self::Boolean(x) => u64::from(**x),
             Self::Enumeration(x) => x.get().cast_unsigned().into(),
-            Self::Text(x) => hash(x),
-            Self::Said(x) => hash(x),
+            Self::Text(x) => hash(x.as_str()),
+            Self::Said(x) => hash(*x),
+            Self::Binary(x) => hash::<[u8]>(x),
             Self::Clock(x) => x.as_ref().map_or(0, |x| x.to_bits()),
         }
     }
 }
 
-/// The value as a message shows it; an enumeration as its number, a text in quotes.
+/// The value as a message shows it; an enumeration as its number, a text in quotes, bytes in hexadecimal digits.
 impl std::fmt::Display for Slot<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -71,6 +76,7 @@ impl std::fmt::Display for Slot<'_> {
             Self::Said(x) => write!(f, "{x:?}"),
             Self::Clock(Some(x)) => write!(f, "{x} s"),
             Self::Clock(None) => f.write_str("a clock"),
+            Self::Binary(x) => x.fmt(f),
         }
     }
 }

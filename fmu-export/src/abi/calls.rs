@@ -79,14 +79,49 @@ impl<E: Exported> Abi<'_, E> {
         let (values, vr) = unsafe { (array(values, n_values, "values")?, array(vr, n, "value references")?) };
         self.inside(vr, true)?;
         // SAFETY: C strings, if the variables are texts; others are refused before one is read.
-        Ok(self.0.set_texts(vr, values.len(), |i| unsafe { text(values[i]) })?)
+        self.0.set_texts(vr, values.len(), |i| unsafe { text(values[i]) })
     }
 
-    /// A getter or setter of a type that no variable has: succeeds only for zero variables.
-    pub unsafe fn none(&mut self, vr: References, n: usize, n_values: usize, carries: &str) -> Answer {
+    /// The bytes stay where they are until the next call that sets or computes them (FMI 3.0.2, 2.2.7.2); their pointer is never
+    /// NULL.
+    pub unsafe fn get_bytes(
+        &mut self,
+        vr: References,
+        n: usize,
+        sizes: *mut usize,
+        values: *mut *const u8,
+        room_for: usize,
+    ) -> Answer {
+        // SAFETY: the importer's arrays, of these lengths.
+        let (out, vr) = unsafe { (room(values, room_for, "values")?, array(vr, n, "value references")?) };
         // SAFETY: the importer's array, of this length.
-        self.0.refuse(unsafe { array(vr, n, "value references")? }, carries)?;
-        if n_values == 0 { Ok(()) } else { Err(Fault::value("nValues", n_values, "0 for no reference").into()) }
+        let sizes = unsafe { room(sizes, room_for, "valueSizes")? };
+        self.inside(vr, false)?;
+        let mut places = out.iter_mut().zip(sizes);
+        self.0.get_bytes(vr, room_for, |bytes| {
+            if let Some((pointer, size)) = places.next() {
+                pointer.write(bytes.as_ptr());
+                size.write(bytes.len());
+            }
+        })
+    }
+
+    /// Every size is judged before a pointer is looked at.
+    pub unsafe fn set_bytes(
+        &mut self,
+        vr: References,
+        n: usize,
+        sizes: *const usize,
+        values: *const *const u8,
+        n_values: usize,
+    ) -> Answer {
+        // SAFETY: the importer's arrays, of these lengths.
+        let (values, vr) = unsafe { (array(values, n_values, "values")?, array(vr, n, "value references")?) };
+        // SAFETY: the importer's array, of this length.
+        let sizes = unsafe { array(sizes, n_values, "valueSizes")? };
+        self.inside(vr, true)?;
+        // SAFETY: NULL or as many bytes as the size says, if the variables are bytes; others are refused before one is read.
+        self.0.set_bytes(vr, sizes, |i| unsafe { array(values[i], sizes[i], "a binary value") })
     }
 
     pub unsafe fn set_debug_logging(&mut self, on: bool, n: usize, categories: *const *const c_char) -> Answer {

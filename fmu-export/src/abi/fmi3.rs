@@ -452,8 +452,8 @@ macro_rules! export_fmi3 {
             fmi3GetUInt32(vr: References, n: usize, values: *mut u32, m: usize) => Get: get(vr, n, values, m);
             fmi3GetUInt64(vr: References, n: usize, values: *mut u64, m: usize) => Get: get(vr, n, values, m);
             fmi3GetString(vr: References, n: usize, values: *mut Text, m: usize) => Get: get_texts(vr, n, values, m);
-            fmi3GetBinary(vr: References, n: usize, _sizes: *mut usize, _v: *mut *const u8, m: usize)
-                => Get: none(vr, n, m, "bytes");
+            fmi3GetBinary(vr: References, n: usize, sizes: *mut usize, values: *mut *const u8, m: usize)
+                => Get: get_bytes(vr, n, sizes, values, m);
             fmi3GetClock(vr: References, n: usize, values: *mut Fmi3Boolean)
                 => GetClock if clocked: fmi3_get_clock(vr, n, values);
 
@@ -469,8 +469,8 @@ macro_rules! export_fmi3 {
             fmi3SetUInt32(vr: References, n: usize, values: *const u32, m: usize) => Set: set(vr, n, values, m);
             fmi3SetUInt64(vr: References, n: usize, values: *const u64, m: usize) => Set: set(vr, n, values, m);
             fmi3SetString(vr: References, n: usize, values: *const Text, m: usize) => Set: set_texts(vr, n, values, m);
-            fmi3SetBinary(vr: References, n: usize, _sizes: *const usize, _v: *const *const u8, m: usize)
-                => Set: none(vr, n, m, "bytes");
+            fmi3SetBinary(vr: References, n: usize, sizes: *const usize, values: *const *const u8, m: usize)
+                => Set: set_bytes(vr, n, sizes, values, m);
             fmi3SetClock(vr: References, n: usize, values: *const Fmi3Boolean)
                 => SetClock if clocked: fmi3_set_clock(vr, n, values);
 

@@ -133,6 +133,8 @@ functions! {
     debug_logging_3: v3::SetDebugLogging = "" "fmi3SetDebugLogging",
     do_step_2: v2::DoStep = "fmi2DoStep" "",
     do_step_3: v3::DoStep = "" "fmi3DoStep",
+    get_binary_3: v3::GetBinary = "" "fmi3GetBinary",
+    set_binary_3: v3::SetBinary = "" "fmi3SetBinary",
     get_state: StatePlace = "fmi2GetFMUstate" "fmi3GetFMUState",
     free_state: StatePlace = "fmi2FreeFMUstate" "fmi3FreeFMUState",
     set_state: SetState = "fmi2SetFMUstate" "fmi3SetFMUState",

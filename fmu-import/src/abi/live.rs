@@ -159,6 +159,9 @@ impl Live {
 
     pub(crate) fn get(&mut self, base: BaseType, reference: u32, count: usize) -> Outcome<Values> {
         let count = if self.is_v2() { 1 } else { count };
+        if base == BaseType::Binary {
+            return self.calls.get_binary(self.given(), reference, count).map(Values::Binaries);
+        }
         let mut buffer = Buffer::of(base, self.calls.version, &vec![0; count]);
         self.transfer(Way::Get, base, reference, &mut buffer)?;
         let bits = buffer.bits().into_iter();
@@ -186,6 +189,9 @@ impl Live {
         let refused = || misfit(base, values);
         if self.is_v2() && values.len() != 1 {
             return Err(refused());
+        }
+        if let (BaseType::Binary, Values::Binaries(values)) = (base, values) {
+            return self.calls.set_binary(self.given(), reference, values);
         }
         let mut texts = Vec::new();
         let bits: Vec<u64> = match (base, values) {

@@ -1,6 +1,7 @@
 //! The C interface of both standards as an importer calls it: the only module with `unsafe` code.
 
 pub(crate) mod arguments;
+mod binary;
 pub(crate) mod calls;
 pub(crate) mod functions;
 pub mod journal;

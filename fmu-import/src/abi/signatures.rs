@@ -142,6 +142,11 @@ pub(super) mod v3 {
     /// A getter or a setter of any type; a setter only reads the values.
     pub(in crate::abi) type Transfer =
         unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut c_void, usize) -> Status;
+    /// `fmi3GetBinary`: sizes and values.
+    pub(in crate::abi) type GetBinary =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut usize, *mut *const u8, usize) -> Status;
+    pub(in crate::abi) type SetBinary =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *const usize, *const *const u8, usize) -> Status;
     pub(in crate::abi) type DoStep =
         unsafe extern "C" fn(InstancePointer, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64) -> Status;
     pub(in crate::abi) type SetDebugLogging =

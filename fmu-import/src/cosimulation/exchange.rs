@@ -2,6 +2,7 @@
 
 use super::Schedule;
 use super::parts::Port;
+use super::sequence::Held;
 use crate::{Error, Instance, Values};
 
 /// Source of an input.
@@ -26,6 +27,8 @@ struct Feed {
 #[derive(Clone, Default)]
 pub(super) struct Wiring {
     feeds: Vec<Feed>,
+    /// Inputs that are not one number, with their values over time.
+    held: Vec<(Port, Held)>,
 }
 
 impl Wiring {
@@ -33,13 +36,21 @@ impl Wiring {
         self.feeds.push(Feed { target, source, continuous });
     }
 
+    pub(super) fn hold(&mut self, target: Port, values: Held) {
+        self.held.push((target, values));
+    }
+
+    fn targets(&self) -> impl Iterator<Item = &Port> {
+        self.feeds.iter().map(|feed| &feed.target).chain(self.held.iter().map(|(target, _)| target))
+    }
+
     /// Whether the variable with this reference is fed, or an element of it.
     pub(super) fn feeds_any(&self, instance: usize, reference: Option<u32>) -> bool {
-        self.feeds.iter().any(|Feed { target, .. }| target.instance == instance && Some(target.reference) == reference)
+        self.targets().any(|target| target.instance == instance && Some(target.reference) == reference)
     }
 
     pub(super) fn feeds(&self, instance: usize, name: &str) -> bool {
-        self.feeds.iter().any(|Feed { target, .. }| target.instance == instance && target.name == name)
+        self.targets().any(|target| target.instance == instance && target.name == name)
     }
 }
 
@@ -67,6 +78,8 @@ struct Traffic {
     /// Values written last: those of `write`, then those of `write_singly`.
     buffer: Vec<f64>,
     singles: Vec<f64>,
+    /// Inputs that are not one number, and which of their values was written last.
+    held: Vec<(Port, Held, Option<usize>)>,
 }
 
 /// All traffic of a run.
@@ -136,7 +149,16 @@ impl Exchange {
             t.buffer = vec![0.0; t.write.len()];
             t.singles = vec![0.0; t.write_singly.len()];
         }
+        for (port, values) in &wiring.held {
+            traffic[port.instance].held.push((port.clone(), values.clone(), None));
+        }
         Self { traffic, row, fed: wiring.feeds.len(), since: None }
+    }
+
+    /// A run begins: nothing is held, and nothing was written.
+    pub(super) fn begin(&mut self) {
+        self.since = None;
+        self.traffic.iter_mut().flat_map(|t| &mut t.held).for_each(|(_, _, last)| *last = None);
     }
 
     pub(super) fn read_all(&mut self, instances: &mut [Instance]) -> Result<(), Error> {
@@ -167,7 +189,20 @@ impl Exchange {
             write_single(instance, port, *single)?;
         }
         (self.traffic[index].buffer, self.traffic[index].singles) = (buffer, singles);
-        Ok(())
+        self.hold(index, instance, t).map(drop)
+    }
+
+    /// Sets the inputs that are not one number where they have another value; returns whether any has.
+    fn hold(&mut self, index: usize, instance: &mut Instance, t: f64) -> Result<bool, Error> {
+        let (mut changed, t) = (false, self.since.unwrap_or(t));
+        for (port, values, last) in &mut self.traffic[index].held {
+            let now = values.index(t);
+            if last.replace(now) != Some(now) {
+                instance.set_at(port.base, port.reference, values.value(now))?;
+                changed = true;
+            }
+        }
+        Ok(changed)
     }
 
     /// Passes outputs on to inputs until nothing changes: an output may depend on an input, through several FMUs. Returns
@@ -245,6 +280,9 @@ impl Exchange {
             }
         }
         (self.traffic[index].buffer, self.traffic[index].singles) = (buffer, singles);
+        if inputs == Inputs::All && self.hold(index, instance, t)? {
+            (changed, discrete) = (true, true);
+        }
         Ok((changed, discrete))
     }
 
@@ -256,7 +294,9 @@ impl Exchange {
         };
         let fast = self.traffic.iter().flat_map(|t| t.write.iter().map(|(_, place)| place));
         let singly = self.traffic.iter().flat_map(|t| t.write_singly.iter().map(|(_, place)| place));
-        fast.chain(singly).filter_map(next).reduce(f64::min)
+        let held = self.traffic.iter().flat_map(|traffic| &traffic.held);
+        let held = held.filter_map(|(_, values, _)| values.next_point(t));
+        fast.chain(singly).filter_map(next).chain(held).reduce(f64::min)
     }
 
     /// The recorded values at time `t`.

@@ -37,6 +37,7 @@ mod plan;
 mod recording;
 mod run;
 mod schedule;
+mod sequence;
 mod terminals;
 
 pub use crate::integration::Solver;
@@ -46,6 +47,7 @@ pub use plan::{Plan, Target, Worker};
 pub use recording::{Column, Recording, TextColumn, item};
 pub use run::{Ended, Point};
 pub use schedule::Schedule;
+pub use sequence::Sequence;
 
 use crate::{Error, Fmu, Instance, Message, Values};
 use exchange::{Source, Wiring};
@@ -117,7 +119,7 @@ impl System {
             let one = values;
             let name = std::mem::replace(&mut whole.name, variable.name.clone());
             let before = self.value_set(index, &whole.name).cloned();
-            values = before.map_or_else(|| read(variable.start.as_deref().unwrap_or_default()), Ok)?;
+            values = before.map_or_else(|| Values::start(variable, description).map_err(wrong), Ok)?;
             if values.len() != count || !values.replace(element, &one) {
                 return Err(wrong(format!("{name} = {text} is not one value, or the start values are not known")));
             }
@@ -207,25 +209,64 @@ impl System {
         Ok(())
     }
 
-    /// Records a variable that is a text under this name, in a single run.
+    /// Feeds an input or a tunable parameter of any type over time; the values of one that is not a real number are held.
     ///
     /// # Errors
-    /// The variable does not exist or is not a text.
-    pub fn record_text_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
-        if !self.is_text(port)? {
-            return Err(Error::usage(port, "is not a text"));
+    /// The variable does not exist, a text is not a value of its type, or it is fed already.
+    pub fn sequence(&mut self, port: &str, texts: &Sequence) -> Result<(), Error> {
+        if self.is_real(port)? {
+            return self.input(port, texts.lines().map_err(|cause| Error::usage(port, cause))?);
         }
-        self.texts.push((self.parts.port(port)?, name.into()));
+        let target = self.parts.port(port)?;
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let (instance, wrong) = (&self.instances[target.instance], |cause: String| Error::usage(port, cause));
+        if target.element.is_some() {
+            return Err(wrong("is an element of an array: feed the array, with spaces between its elements".into()));
+        }
+        self.check_fed(&target, port, true)?;
+        let values = texts.values(variable, instance.description()).map_err(wrong)?;
+        let count = instance.elements(variable)?;
+        if !values.fits(count) {
+            return Err(wrong(format!("has {count} elements, and a value has another number")));
+        }
+        self.wiring.hold(target, values);
         Ok(())
     }
 
-    /// Whether a variable, written `instance.variable`, is one text.
+    /// Records a variable under this name in a column of texts, in a single run: a text, bytes in hexadecimal digits, or an array
+    /// with spaces between its elements.
+    ///
+    /// # Errors
+    /// The variable does not exist, is one number, or is a clock.
+    pub fn record_text_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
+        let mut found = self.parts.port(port)?;
+        let variable = self.parts.variable(found.instance, &found.name)?;
+        if !self.is_text(port)? || found.base == BaseType::Clock {
+            return Err(Error::usage(port, "is one number, or a clock"));
+        }
+        if variable.is_array() {
+            found.element = Some((0, self.instances[found.instance].elements(variable)?));
+        }
+        self.texts.push((found, name.into()));
+        Ok(())
+    }
+
+    /// Whether a variable, written `instance.variable`, is recorded as text: it is not one number.
     ///
     /// # Errors
     /// The variable does not exist.
     pub fn is_text(&self, port: &str) -> Result<bool, Error> {
         let port = self.parts.port(port)?;
-        Ok(port.base == BaseType::String && !self.parts.variable(port.instance, &port.name)?.is_array())
+        let whole = self.parts.variable(port.instance, &port.name)?.is_array() && port.element.is_none();
+        Ok(whole || matches!(port.base, BaseType::String | BaseType::Binary))
+    }
+
+    /// Whether a variable, written `instance.variable`, is one real number.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn is_real(&self, port: &str) -> Result<bool, Error> {
+        Ok(!self.is_text(port)? && self.parts.port(port)?.base.is_float())
     }
 
     /// Whether a connection or a schedule feeds an input, written `instance.variable`.
@@ -263,7 +304,7 @@ impl System {
         let description = self.instances[instance].description();
         let Some(variable) = description.variable(name) else { return false };
         let read = |text: &str| Values::read(text, variable, description).ok();
-        let now = self.value_set(instance, name).cloned().or_else(|| read(variable.start.as_deref()?));
+        let now = self.value_set(instance, name).cloned().or_else(|| Values::start(variable, description).ok());
         now.is_some() && now == read(value)
     }
 
@@ -282,36 +323,43 @@ impl System {
     /// The variables come from the descriptions, so no error is known.
     pub fn record_outputs(&mut self) -> Result<(), Error> {
         self.outputs().iter().try_for_each(|port| self.record(port))?;
-        let texts = self.scalar_outputs(|base| base == BaseType::String);
+        let texts = self.outputs_of(|v| v.base != BaseType::Clock && (v.is_array() || kind(v.base).is_none()));
         texts.iter().try_for_each(|port| self.record_text_as(port, port))
     }
 
     /// All numeric outputs of all instances, written `instance.variable`.
     pub fn outputs(&self) -> Vec<String> {
-        self.scalar_outputs(|base| kind(base).is_some())
+        self.outputs_of(|v| !v.is_array() && kind(v.base).is_some())
     }
 
-    fn scalar_outputs(&self, of: impl Fn(BaseType) -> bool) -> Vec<String> {
+    fn outputs_of(&self, of: impl Fn(&ModelVariable) -> bool) -> Vec<String> {
         let outputs = |i: &Instance| {
-            let is_scalar = |v: &&ModelVariable| v.causality == Causality::Output && !v.is_array() && of(v.base);
+            let is_one = |v: &&ModelVariable| v.causality == Causality::Output && of(v);
             let name = |v: &ModelVariable| format!("{}.{}", i.name(), v.name);
-            i.description().variables.iter().filter(is_scalar).map(name).collect::<Vec<_>>()
+            i.description().variables.iter().filter(is_one).map(name).collect::<Vec<_>>()
         };
         self.instances.iter().flat_map(outputs).collect()
     }
 
     fn feed(&mut self, target: Port, written: &str, source: Source) -> Result<(), Error> {
+        self.check_fed(&target, written, matches!(source, Source::Schedule(_)))?;
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let continuous = variable.variability == Variability::Continuous && variable.base.is_float();
+        self.wiring.add(target, source, continuous);
+        Ok(())
+    }
+
+    /// Whether the variable takes values, over time or from a connection, and nothing feeds it yet.
+    fn check_fed(&self, target: &Port, written: &str, over_time: bool) -> Result<(), Error> {
         if self.wiring.feeds(target.instance, &target.name) {
             return Err(Error::usage(written, "is fed twice"));
         }
         let variable = self.parts.variable(target.instance, &target.name)?;
         let tunable = variable.causality == Causality::Parameter && variable.variability == Variability::Tunable;
-        if variable.causality != Causality::Input && !(tunable && matches!(source, Source::Schedule(_))) {
-            let also = if matches!(source, Source::Schedule(_)) { " or a tunable parameter" } else { "" };
+        if variable.causality != Causality::Input && !(tunable && over_time) {
+            let also = if over_time { " or a tunable parameter" } else { "" };
             return Err(Error::usage(written, format!("is not an input{also}")));
         }
-        let continuous = variable.variability == Variability::Continuous && variable.base.is_float();
-        self.wiring.add(target, source, continuous);
         Ok(())
     }
 }

@@ -55,7 +55,7 @@ pub(super) fn simulate(
     let settings = grid.settings();
     let kinds: Vec<Kind> = instances.iter().map(Instance::kind).collect();
     method.check(&kinds, settings.sequential)?;
-    exchange.since = None;
+    exchange.begin();
     for instance in instances.iter_mut() {
         instance.setup(settings.start, Some(settings.stop))?;
         instance.enter_initialization()?;
@@ -140,8 +140,9 @@ impl System {
         let ended = simulate(&self.method, &mut self.instances, &mut exchange, &grid, &mut Vec::new(), |point| {
             recording.push(point.time, point.values);
             for ((port, _), column) in texts.iter().zip(&mut recording.texts) {
-                let value = point.instances[port.instance].get_at(port.base, port.reference, 1)?;
-                column.values.push(value.to_string());
+                let (_, count) = port.element.unwrap_or((0, 1));
+                let value = point.instances[port.instance].get_at(port.base, port.reference, count)?;
+                column.values.push(value.cell());
             }
             hook(point)
         })?;

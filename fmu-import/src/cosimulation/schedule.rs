@@ -1,5 +1,6 @@
 //! Inputs over time.
 
+use super::sequence::Sequence;
 use crate::quantity::{convert, split};
 use model_description::{ModelDescription, ModelVariable};
 use std::fmt;
@@ -47,13 +48,23 @@ impl Schedule {
         Ok(Self { points, linear, units: Vec::new() })
     }
 
+    /// Lines whose value jumps where two points have one time; the times do not fall.
+    pub(super) fn jumping(points: Vec<(f64, f64)>, unit: &str) -> Result<Self, String> {
+        if let Some((t, x)) = points.iter().find(|(_, x)| !x.is_finite()) {
+            return Err(format!("{t}:{x} is not finite"));
+        }
+        let units = vec![unit.to_owned(); points.len()];
+        Ok(Self { points, linear: true, units: Vec::new() }.with_units(units))
+    }
+
     /// Converts the values to the unit of the `variable`.
     pub(super) fn in_unit_of(self, variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
         if self.units.is_empty() {
             return Ok(self);
         }
         let converted = |(&(t, x), unit): (&(f64, f64), &String)| Ok((t, convert(x, unit, variable, description)?));
-        Self::new(self.points.iter().zip(&self.units).map(converted).collect::<Result<_, String>>()?, self.linear)
+        let points = self.points.iter().zip(&self.units).map(converted).collect::<Result<_, String>>()?;
+        Ok(Self { points, units: Vec::new(), ..self })
     }
 
     /// With these units of the values, if there is one.
@@ -101,49 +112,12 @@ impl Schedule {
     }
 
     fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
-        let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-        let cells = |line: &str| line.split(',').map(|c| c.trim().trim_matches('"').to_owned()).collect::<Vec<_>>();
-        let (first, header) = lines.next().ok_or("is empty")?;
-        if header.contains(';') {
-            return Err(format!(
-                "line {}: has semicolons; write commas between columns and a decimal point",
-                first + 1
-            ));
-        }
-        let names: Vec<String> = cells(header).into_iter().skip(1).collect();
-        if names.is_empty() {
-            return Err("has no column but time".into());
-        }
-        let mut columns: Vec<Vec<(f64, f64)>> = vec![Vec::new(); names.len()];
-        for (index, line) in lines {
-            let number = |cell: &String| {
-                cell.parse::<f64>().map_err(|_| format!("line {}: {cell:?} is not a number", index + 1))
-            };
-            match cells(line).iter().map(number).collect::<Result<Vec<f64>, _>>()?.as_slice() {
-                [t, values @ ..] if values.len() == names.len() => {
-                    columns.iter_mut().zip(values).for_each(|(column, x)| column.push((*t, *x)));
-                }
-                row => {
-                    let (line, expected, found) = (index + 1, names.len() + 1, row.len());
-                    let commas = if found > expected { "; commas separate columns: write a decimal point" } else { "" };
-                    return Err(format!("line {line}: expected {expected} numbers, found {found}{commas}"));
-                }
-            }
-        }
-        let column = |(name, points): (String, Vec<(f64, f64)>)| {
-            let (name, unit) = match name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
-                Some((name, unit)) => (name.trim_end().to_owned(), unit.trim().to_owned()),
-                None => (name, String::new()),
-            };
-            let units = vec![unit; points.len()];
-            Ok((name, Self::lines(points)?.with_units(units)))
-        };
-        names.into_iter().zip(columns).map(column).collect()
+        Sequence::parse_csv(text)?.into_iter().map(|(name, texts)| Ok((name, texts.lines()?))).collect()
     }
 
     /// Value at time `t` (s).
     pub fn at(&self, t: f64) -> f64 {
-        let after = self.points.partition_point(|(time, _)| *time <= t + SAME);
+        let after = last_before(&self.points, t);
         let (Some(&(t0, x0)), next) = (self.points.get(after.saturating_sub(1)), self.points.get(after)) else {
             return 0.0;
         };
@@ -163,8 +137,13 @@ impl Schedule {
 
     /// Time (s) of the first point after `t`.
     pub(super) fn next_point(&self, t: f64) -> Option<f64> {
-        self.points.get(self.points.partition_point(|(time, _)| *time <= t + SAME)).map(|(time, _)| *time)
+        self.points.get(last_before(&self.points, t)).map(|(time, _)| *time)
     }
+}
+
+/// Number of points up to time `t` (s).
+pub(super) fn last_before<T>(points: &[(f64, T)], t: f64) -> usize {
+    points.partition_point(|(time, _)| *time <= t + SAME)
 }
 
 impl fmt::Display for Schedule {

@@ -3,7 +3,7 @@
 use super::ssv::{self, Parameter};
 use super::structure::{Binding, Connection, ConnectionEnd, Connector, ParameterValues, Structure};
 use super::{DESCRIPTION, values};
-use crate::cosimulation::{Method, Schedule, Settings, System};
+use crate::cosimulation::{Method, Schedule, Sequence, Settings, System};
 use crate::{Fmu, archive};
 use anyhow::{Context, Result, anyhow, bail};
 use model_description::{Experiment, decode, limits};
@@ -211,6 +211,34 @@ impl Loaded {
     pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<()> {
         for port in self.connectors.ports(name)? {
             self.system.input(&port, schedule.clone())?;
+        }
+        Ok(())
+    }
+
+    /// Feeds an input of any type over time, as [`input`](Self::input), from the texts that a user or a file has.
+    ///
+    /// # Errors
+    /// There is none of this name, it is fed already, or a text is not a value of its type.
+    pub fn sequence(&mut self, name: &str, texts: &Sequence) -> Result<()> {
+        for port in self.connectors.ports(name)? {
+            self.system.sequence(&port, texts)?;
+        }
+        Ok(())
+    }
+
+    /// Feeds an input over time from what a user writes: see [`Schedule::parse`] for a number, and [`Sequence::parse`] for an input
+    /// of another type.
+    ///
+    /// # Errors
+    /// As [`input`](Self::input), or the text has another form.
+    pub fn points(&mut self, name: &str, text: &str) -> Result<()> {
+        for port in self.connectors.ports(name)? {
+            let wrong = |cause: String| anyhow!("{text}: {cause}");
+            if self.system.is_text(&port)? {
+                self.system.sequence(&port, &Sequence::parse(text).map_err(wrong)?)?;
+            } else {
+                self.system.input(&port, Schedule::parse(text).map_err(wrong)?)?;
+            }
         }
         Ok(())
     }

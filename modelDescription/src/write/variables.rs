@@ -15,7 +15,7 @@ use fmu_core::Description;
 use fmu_core::description::{TIME, Value, Variable, VariableKind};
 use fmu_core::unit::SECOND;
 use fmu_core::variable::position;
-use fmu_core::{Causality, IntegerType, Range, Ticks, Timing, Variability};
+use fmu_core::{Bytes, Causality, IntegerType, Range, Ticks, Timing, Variability};
 
 /// All variables.
 pub(super) fn variables(description: &Description, version: FmiVersion) -> Element {
@@ -53,8 +53,8 @@ fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
             VariableKind::Integer(_) => "Integer",
             VariableKind::Boolean => "Boolean",
             VariableKind::Enumeration { .. } => "Enumeration",
-            // Such a model has no archive of FMI 2.0.
-            VariableKind::Text | VariableKind::Clock(_) => "String",
+            // No archive of FMI 2.0 has them.
+            VariableKind::Text | VariableKind::Binary { .. } | VariableKind::Clock(_) => "String",
         });
         typed.attributes = type_attributes(v, FmiVersion::V2);
         typed = typed
@@ -86,6 +86,7 @@ fn variable(v: &Variable) -> Element {
         VariableKind::Enumeration { .. } => "Enumeration",
         VariableKind::Text => "String",
         VariableKind::Clock(timing) => return clock(v, &timing),
+        VariableKind::Binary { .. } => "Binary",
     };
     let mut element = identity(base, v, &v.name, v.value_reference)
         .with_some("clocks", on_clocks(v))
@@ -93,11 +94,11 @@ fn variable(v: &Variable) -> Element {
     element.attributes.extend(type_attributes(v, FmiVersion::V3));
     let starts: Option<Vec<String>> =
         v.start.as_ref().map(|all| all.iter().map(|value| text(v, value, FmiVersion::V3)).collect());
-    if v.kind == VariableKind::Text {
-        let starts = starts.into_iter().flatten();
-        return element.children(starts.map(|value| Element::new("Start").with("value", value)));
-    }
     let dimensions = v.shape.iter().map(|n| Element::new("Dimension").with("start", n.to_string()));
+    if matches!(v.kind, VariableKind::Text | VariableKind::Binary { .. }) {
+        let starts = starts.into_iter().flatten().map(|value| Element::new("Start").with("value", value));
+        return element.children(dimensions).children(starts);
+    }
     let state = v.derivative.map(|reference| reference.to_string());
     let start = starts.map(|all| all.join(" "));
     element.with_some("derivative", state).with_some("start", start).children(dimensions)
@@ -200,6 +201,9 @@ fn type_attributes(v: &Variable, version: FmiVersion) -> Vec<(String, String)> {
                 .with_some("max", (high < greatest && high >= least).then(|| high.to_string()))
         }
         VariableKind::Boolean | VariableKind::Text | VariableKind::Clock(_) => element,
+        VariableKind::Binary { mime_type, most } => {
+            element.with("mimeType", mime_type).with("maxSize", most.to_string())
+        }
         VariableKind::Enumeration { name, .. } => element.with("declaredType", name),
     };
     element.attributes
@@ -216,5 +220,6 @@ fn text(v: &Variable, value: &Value, version: FmiVersion) -> String {
         Value::Integer(x) => x.to_string(),
         Value::Boolean(x) => x.to_string(),
         Value::Text(x) => x.clone(),
+        Value::Binary(x) => Bytes::from(x).to_string(),
     }
 }

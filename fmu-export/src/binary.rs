@@ -1,0 +1,85 @@
+//! Getting and setting bytes (FMI 3.0). The model lends its own bytes to the importer; setting copies into room that was made
+//! with the instance.
+
+use crate::access::index;
+use crate::instance::{Instance, Refusal};
+use crate::message;
+use fmu_core::{Block, Exported, Fault, Kind, Model, Slot};
+
+/// What the functions for bytes carry.
+const CARRIES: &str = "bytes";
+
+/// Makes room for the greatest size of every binary variable, so that no step and no set allocates.
+pub(crate) fn make_room<M: Model>(block: &mut Block<M>) {
+    if const { !M::TABLE.has_binary() } {
+        return;
+    }
+    for index in 0..M::TABLE.len() {
+        if let Some((meta, Slot::Binary(bytes))) = M::TABLE.entry(block, index)
+            && let Kind::Binary { most, .. } = meta.kind
+        {
+            bytes.reserve(most);
+        }
+    }
+}
+
+impl<E: Exported> Instance<E> {
+    /// Passes the bytes of `given` variables to `take`, which the model keeps until the next call that changes them.
+    ///
+    /// # Errors
+    /// Unknown reference, another type, another number of values, more bytes than the variable may have.
+    pub fn get_bytes(&mut self, references: &[u32], given: usize, mut take: impl FnMut(&[u8])) -> Result<(), Refusal> {
+        self.check_count(references, given)?;
+        self.refresh();
+        for &reference in references {
+            let index = self.index_of(reference, CARRIES, is_binary)?;
+            let Some((meta, slot)) = E::Model::TABLE.entry(&mut self.current.block, index) else { continue };
+            let (allowed, Slot::Binary(bytes)) = (slot.is_allowed(meta), slot) else { continue };
+            if !allowed {
+                return Err(message::range::<E::Model>(index, meta, format_args!("{} bytes", bytes.len())).into());
+            }
+            take(bytes);
+        }
+        Ok(())
+    }
+
+    /// Sets bytes of these sizes, each read by its position: all of them or, on an error, none. Nothing is read before all
+    /// references are known to be bytes that can be set, and all sizes to be allowed.
+    ///
+    /// # Errors
+    /// Unknown reference, another type, not settable in this state, another number of values, a size that is too large, NULL.
+    pub fn set_bytes<'a>(
+        &mut self,
+        references: &[u32],
+        sizes: &[usize],
+        read: impl Fn(usize) -> Result<&'a [u8], Fault>,
+    ) -> Result<(), Refusal> {
+        self.check_count(references, sizes.len())?;
+        for (&reference, &size) in references.iter().zip(sizes) {
+            let index = self.index_of(reference, CARRIES, is_binary)?;
+            self.check_open(index)?;
+            match E::Model::TABLE.entry(&mut self.current.block, index) {
+                Some((meta, _)) if !matches!(meta.kind, Kind::Binary { most, .. } if size <= most) => {
+                    return Err(message::range::<E::Model>(index, meta, format_args!("{size} bytes")).into());
+                }
+                _ => {}
+            }
+        }
+        for i in 0..references.len() {
+            read(i)?;
+        }
+        for (i, &reference) in references.iter().enumerate() {
+            if let Some((_, Slot::Binary(bytes))) = E::Model::TABLE.entry(&mut self.current.block, index(reference)) {
+                bytes.set(read(i)?);
+            }
+        }
+        if !references.is_empty() {
+            self.was_set();
+        }
+        Ok(())
+    }
+}
+
+fn is_binary(kind: &Kind) -> bool {
+    matches!(kind, Kind::Binary { .. })
+}

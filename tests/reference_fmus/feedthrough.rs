@@ -1,0 +1,146 @@
+//! Feedthrough: an input and an output of every type.
+
+use super::{archive, fmpy, open};
+use fmu_import::Values;
+use fmu_import::cosimulation::{Recording, Sequence, Settings, System};
+use model_description::{BaseType, Causality};
+use std::fs;
+use std::ops::ControlFlow;
+
+/// The inputs of the original's Feedthrough_in.csv: the ends of every integer type.
+const ENDS: &str = "time,Int8_input,UInt8_input,Int16_input,UInt16_input,Int32_input,UInt32_input,Int64_input,UInt64_input\n\
+     0.0,-128,0,-32768,0,-2147483648,0,-9223372036854775808,0\n\
+     1.0,127,255,32767,65535,2147483647,4294967295,9223372036854775807,18446744073709551615\n";
+
+/// Runs it over its default experiment with a file of inputs.
+fn run(name: &str, inputs: &str) -> Recording {
+    let mut system = System::default();
+    system.add("it", &open("feedthrough"), false).unwrap();
+    let file = super::folder().join(format!("feedthrough-{name}.csv"));
+    fs::write(&file, inputs).unwrap();
+    for (input, texts) in Sequence::read_csv(&file).unwrap() {
+        system.sequence(&format!("it.{input}"), &texts).unwrap();
+    }
+    system.record_outputs().unwrap();
+    let settings = Settings { start: 0.0, stop: 2.0, step: 0.1, sequential: false };
+    system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap()
+}
+
+/// 34 variables beside time, with the value references of the original's ValueReference.
+#[test]
+fn its_variables_are_those_of_the_original() {
+    let fmu = open("feedthrough");
+    let md = fmu.description();
+    assert_eq!((md.variables.len(), md.outputs.len(), md.initial_unknowns.len()), (35, 16, 16));
+    assert!(md.co_simulation.is_some() && md.model_exchange.is_some());
+    for (name, base, reference) in [
+        ("Float32_continuous_input", BaseType::Float32, 1),
+        ("Float64_discrete_output", BaseType::Float64, 10),
+        ("UInt64_output", BaseType::UInt64, 26),
+        ("String_input", BaseType::String, 29),
+        ("Binary_output", BaseType::Binary, 32),
+        ("Enumeration_output", BaseType::Enumeration, 34),
+    ] {
+        let v = md.variable(name).unwrap();
+        assert_eq!((v.base, v.value_reference), (base, reference), "{name}");
+    }
+    let start = |name: &str| md.variable(name).unwrap().start_texts.clone();
+    assert_eq!((start("String_input"), start("Binary_input")), (vec!["Set me!".into()], vec!["666f6f".into()]));
+}
+
+/// 21 rows, all of them the start values.
+#[test]
+fn without_inputs_the_outputs_are_the_start_values() {
+    let recording = run("none", "time,Int8_input\n0,0\n");
+    assert_eq!(recording.time.len(), 21);
+    for column in &recording.columns {
+        let expected = if column.name.contains("Enumeration") { 1.0 } else { 0.0 };
+        assert!(column.values.iter().all(|x| x.to_bits() == f64::to_bits(expected)), "{}", column.name);
+    }
+    let texts: Vec<_> = recording.texts.iter().map(|c| (c.name.as_str(), c.values.as_slice())).collect();
+    assert_eq!(texts.len(), 2);
+    assert!(texts[0].0.ends_with("String_output") && texts[0].1.iter().all(|x| x == "Set me!"), "{texts:?}");
+    assert!(texts[1].0.ends_with("Binary_output") && texts[1].1.iter().all(|x| x == "666f6f"), "{texts:?}");
+}
+
+/// Integers are held from their time on and arrive with every digit: an output follows one step later.
+#[test]
+fn the_ends_of_every_integer_arrive_exactly() {
+    let mut instance = open("feedthrough").instantiate("it", false).unwrap();
+    let recording = run("ends", ENDS);
+    let rows: Vec<Vec<&str>> = ENDS.lines().map(|line| line.split(',').collect()).collect();
+    for (k, name) in rows[0].iter().enumerate().skip(1) {
+        let output = name.replace("_input", "_output");
+        let values = &recording.column(&format!("it.{output}")).unwrap().values;
+        #[expect(clippy::cast_precision_loss, reason = "columns are of doubles")]
+        let expected = |row: usize| rows[row][k].parse::<i128>().unwrap() as f64;
+        for (n, x) in values.iter().enumerate() {
+            let row = if n <= 10 { 1 } else { 2 };
+            assert_eq!(x.to_bits(), expected(row).to_bits(), "{output} at row {n}");
+        }
+        instance.set_text(name, rows[2][k]).unwrap();
+    }
+    instance.setup(0.0, None).unwrap();
+    instance.enter_initialization().unwrap();
+    instance.exit_initialization().unwrap();
+    assert_eq!(instance.get("UInt64_output").unwrap(), Values::Integers(vec![u64::MAX.into()]));
+    assert_eq!(instance.get("Int64_output").unwrap(), Values::Integers(vec![i64::MAX.into()]));
+}
+
+/// Lines for what is continuous, jumps where a time comes twice, and texts and bytes that are held.
+#[test]
+fn inputs_of_every_kind_come_from_one_file() {
+    let recording = run(
+        "mixed",
+        "time,Float64_continuous_input,Float32_continuous_input,Int32_input,String_input,Binary_input,Boolean_input\n\
+         0,3,0,1,\"foo, \"\"bar\"\"\",,false\n1,3,1,1,\"foo, \"\"bar\"\"\",,false\n1,2,1,1,foo,00ff,true\n2,3,2,2,bar,00ff,true\n",
+    );
+    let at = |name: &str, row: usize| recording.column(&format!("it.{name}_output")).unwrap().values[row];
+    let real = |name: &str, row: usize, expected: f64| assert!((at(name, row) - expected).abs() < 1e-6, "{name} {row}");
+    for (row, double, single) in [(0, 3.0, 0.0), (10, 3.0, 0.9), (11, 2.0, 1.0), (16, 2.5, 1.5)] {
+        real("Float64_continuous", row, double);
+        real("Float32_continuous", row, single);
+    }
+    real("Int32", 20, 1.0);
+    assert_eq!((at("Boolean", 10).to_bits(), at("Boolean", 11).to_bits()), (0, 1.0_f64.to_bits()));
+    let text = |row: usize| recording.texts.iter().map(|c| c.values[row].as_str()).collect::<Vec<_>>();
+    assert_eq!((text(5), text(11)), (vec!["foo, \"bar\"", ""], vec!["foo", "00ff"]));
+}
+
+/// Outputs follow their inputs at once in Model Exchange, discrete ones in Event Mode.
+#[test]
+fn model_exchange_passes_values_through() {
+    let mut it = open("feedthrough").instantiate_as(fmu_import::Kind::ModelExchange, "it", false).unwrap();
+    it.setup(0.0, None).unwrap();
+    it.enter_initialization().unwrap();
+    it.exit_initialization().unwrap();
+    let (text, bytes) = (Values::Strings(vec!["event".into()]), Values::Binaries(vec![vec![0, 255, 7]]));
+    it.set("String_input", &text).unwrap();
+    it.set("Binary_input", &bytes).unwrap();
+    assert_eq!((it.get("String_output").unwrap(), it.get("Binary_output").unwrap()), (text.clone(), bytes.clone()));
+    it.update_discrete_states().unwrap();
+    it.enter_continuous_time_mode().unwrap();
+    it.set("Float32_continuous_input", &Values::Reals(vec![0.25])).unwrap();
+    assert_eq!(it.get("Float32_continuous_output").unwrap(), Values::Reals(vec![0.25]));
+    for (name, value) in [("String_input", &text), ("Binary_input", &bytes)] {
+        let error = it.set(name, value).unwrap_err().to_string();
+        assert!(error.contains("Discard"), "{error}");
+    }
+    assert_eq!((it.get("String_output").unwrap(), it.get("Binary_output").unwrap()), (text, bytes));
+}
+
+/// A variable of every type, each with an output: what the checker asks of them.
+#[test]
+fn the_checker_finds_nothing() {
+    super::checks("feedthrough");
+    let fmu = open("feedthrough");
+    let outputs = fmu.description().variables.iter().filter(|v| v.causality == Causality::Output);
+    assert_eq!(outputs.count(), 16);
+}
+
+#[test]
+fn fmpy_gives_the_same() {
+    let inputs = super::folder().join("feedthrough-fmpy.csv");
+    fs::write(&inputs, ENDS).unwrap();
+    fmpy(include_str!("feedthrough.py"), &[archive("feedthrough"), &inputs]);
+}
