@@ -100,6 +100,24 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
             "x: only a continuous input or output can be intermediate",
             5,
         ),
+        row(
+            "still",
+            r#"V::clock("c", "", fmu_core::Clock::constant(0.0))"#,
+            "c: the interval of a clock is greater than 0",
+            5,
+        ),
+        row(
+            "moved",
+            r#"V::clock("c", "", fmu_core::Clock::triggered()).shift(1.0)"#,
+            "c: only a clock with a period",
+            5,
+        ),
+        row(
+            "fixed",
+            r#"V::parameter("x", &VOLT, "", |m| &mut m.u).on("c")"#,
+            "x: only a variable that changes can be on a clock",
+            5,
+        ),
         row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
         row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
         // These two show in the table, whose start is in line 3.
@@ -134,6 +152,22 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
                 "V::output(\"y\", &METER, \"\", |m| &mut m.model.v).intermediate(),\n        V::state(\"h\",",
             ),
             "Ball: a row of the table with .intermediate() needs the capability Intermediate",
+            EXPORT + 1,
+        ),
+        model("tickless", ("Ball: ContinuousTime", "Ball: ContinuousTime + Clocked"), "`Ball` has no clocks", EXPORT),
+        model(
+            "unticked",
+            (r#"V::state("h","#, "V::clock(\"c\", \"\", Clock::triggered()),\n        V::state(\"h\","),
+            "Ball: a row V::clock needs the capability Clocked",
+            EXPORT + 1,
+        ),
+        model(
+            "adrift",
+            (
+                r#"V::state("h","#,
+                "V::output(\"y\", &METER, \"\", |m| &mut m.model.v).on(\"c\"),\n        V::state(\"h\",",
+            ),
+            "y: the table has no clock of the name that it is on",
             EXPORT + 1,
         ),
         model("events", ("Ball: ContinuousTime", "Ball: ContinuousTime + Events"), "`Ball` has no events", EXPORT),

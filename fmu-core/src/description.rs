@@ -343,6 +343,7 @@ fn put_on_clocks<M: Model>(variables: &mut [Variable], feedthrough: bool) -> Res
     let inputs: Vec<(u32, Vec<u32>)> = variables
         .iter()
         .filter(|v| v.causality == Causality::Input && !v.clocks.is_empty() && feedthrough)
+        .filter(|v| !matches!(v.kind, VariableKind::Clock(_)))
         .map(|v| (v.value_reference, v.clocks.clone()))
         .collect();
     let ticked = || clocks.iter().filter(|(.., causality)| *causality == Causality::Input).map(|(_, of, _)| *of);

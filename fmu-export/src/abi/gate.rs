@@ -150,8 +150,9 @@ pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
         handle.calling.store(true, Relaxed);
         reply = handle.callbacks.call(request);
         handle.calling.store(false, Relaxed);
-        if !handle.take() {
-            return Status::Error as c_int;
+        // Another thread may be in a call, if the importer gave no lock.
+        while !handle.take() {
+            std::thread::yield_now();
         }
         // SAFETY: `busy` was false, as in `pass_one`.
         let instance = unsafe { &mut *handle.instance.get() };
