@@ -65,35 +65,12 @@ fn enumeration(name: &'static str, derive: &str, rest: &str, why: &'static str, 
     Wrong { name, source, why, line }
 }
 
-#[test]
-fn a_wrong_row_or_model_is_an_error_at_its_place() {
-    const EXPORT: usize = 26;
-    let state = |wrong: &'static str| ("State::new(\"h\"", wrong);
-    let cases = [
-        row(
-            "bound",
-            r#"V::boolean_input("on", "", |m| &mut m.on).at_least(0.0)"#,
-            "on: only a number can have a bound",
-            5,
-        ),
-        row(
-            "empty",
-            r#"V::output("x", &VOLT, "", |m| &mut m.u).above(1.0).at_most(1.0)"#,
-            "x: the bounds leave no value",
-            5,
-        ),
-        row(
-            "shape",
-            r#"V::array_input("a", &VOLT, "", 4, |m| &mut m.a).shape(&[2, 3])"#,
-            "a: the product of the extents",
-            5,
-        ),
-        row(
-            "tuned",
-            r#"V::text_parameter("t", "", |m| &mut m.t).tunable()"#,
-            "t: only a parameter of a type other than text",
-            5,
-        ),
+/// Line of the export in the program of [`model`].
+const EXPORT: usize = 26;
+
+/// Intermediate updates and clocks.
+fn updates_and_clocks() -> Vec<Wrong> {
+    vec![
         row(
             "inner",
             r#"V::discrete_input("x", &VOLT, "", |m| &mut m.u).intermediate()"#,
@@ -118,27 +95,6 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
             "x: only a variable that changes can be on a clock",
             5,
         ),
-        row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
-        row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
-        // These two show in the table, whose start is in line 3.
-        row("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
-        row("empty_array", r#"V::array_input("a", &VOLT, "", 0, |m| &mut m.a)"#, "a: an array needs an element", 3),
-        model("hyphen", (r#"name: "Ball""#, r#"name: "My-Ball""#), "My-Ball: INFO.name must be a C identifier", EXPORT),
-        model("digit", (r#"name: "Ball""#, r#"name: "2Balls""#), "2Balls: INFO.name must be a C identifier", EXPORT),
-        model("nameless", (r#"name: "Ball", "#, ""), ": INFO.name must be a C identifier", EXPORT),
-        model("typo", state("State::new(\"hight\""), "STATES of Ball: no row of the table has the name hight", EXPORT),
-        model("sampled", state("State::new(\"v\""), "v: the row of a state is V::output or V::state", EXPORT),
-        model("array", state("State::new(\"a\""), "a: an array cannot be a state: write a row for each", EXPORT),
-        model(
-            "double",
-            (
-                "        State::new(\"h\"",
-                "        State::new(\"h\", &METER_PER_S, |m| &mut m.h),\n        State::new(\"h\"",
-            ),
-            "h: two states have this name",
-            EXPORT + 1,
-        ),
-        model("number", ("<Self, 1>", "<Self, 12>"), "the above error was encountered while instantiating", 17),
         model(
             "inside",
             ("Ball: ContinuousTime", "Ball: ContinuousTime + Intermediate"),
@@ -170,10 +126,63 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
             "y: the table has no clock of the name that it is on",
             EXPORT + 1,
         ),
+    ]
+}
+
+#[test]
+fn a_wrong_row_or_model_is_an_error_at_its_place() {
+    let state = |wrong: &'static str| ("State::new(\"h\"", wrong);
+    let mut cases = vec![
+        row(
+            "bound",
+            r#"V::boolean_input("on", "", |m| &mut m.on).at_least(0.0)"#,
+            "on: only a number can have a bound",
+            5,
+        ),
+        row(
+            "empty",
+            r#"V::output("x", &VOLT, "", |m| &mut m.u).above(1.0).at_most(1.0)"#,
+            "x: the bounds leave no value",
+            5,
+        ),
+        row(
+            "shape",
+            r#"V::array_input("a", &VOLT, "", 4, |m| &mut m.a).shape(&[2, 3])"#,
+            "a: the product of the extents",
+            5,
+        ),
+        row(
+            "tuned",
+            r#"V::text_parameter("t", "", |m| &mut m.t).tunable()"#,
+            "t: only a parameter of a type other than text",
+            5,
+        ),
+        row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
+        row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
+        // These two show in the table, whose start is in line 3.
+        row("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
+        row("empty_array", r#"V::array_input("a", &VOLT, "", 0, |m| &mut m.a)"#, "a: an array needs an element", 3),
+        model("hyphen", (r#"name: "Ball""#, r#"name: "My-Ball""#), "My-Ball: INFO.name must be a C identifier", EXPORT),
+        model("digit", (r#"name: "Ball""#, r#"name: "2Balls""#), "2Balls: INFO.name must be a C identifier", EXPORT),
+        model("nameless", (r#"name: "Ball", "#, ""), ": INFO.name must be a C identifier", EXPORT),
+        model("typo", state("State::new(\"hight\""), "STATES of Ball: no row of the table has the name hight", EXPORT),
+        model("sampled", state("State::new(\"v\""), "v: the row of a state is V::output or V::state", EXPORT),
+        model("array", state("State::new(\"a\""), "a: an array cannot be a state: write a row for each", EXPORT),
+        model(
+            "double",
+            (
+                "        State::new(\"h\"",
+                "        State::new(\"h\", &METER_PER_S, |m| &mut m.h),\n        State::new(\"h\"",
+            ),
+            "h: two states have this name",
+            EXPORT + 1,
+        ),
+        model("number", ("<Self, 1>", "<Self, 12>"), "the above error was encountered while instantiating", 17),
         model("events", ("Ball: ContinuousTime", "Ball: ContinuousTime + Events"), "`Ball` has no events", EXPORT),
         enumeration("unmarked", "#[derive(Default)]", "fn main() {}", "no `#[default]`", 2),
         enumeration("start", "", "#[derive(Default)]\nstruct M { fan: Fan }", "`Fan: Default` is not satisfied", 9),
     ];
+    cases.extend(updates_and_clocks());
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compile_errors");
     let sources = folder.join("src/bin");
