@@ -1,4 +1,4 @@
-//! Clocks of FMI 3.0 (2.2.8): when a part of a model acts is said to the importer, which makes the ticks.
+//! Clocks (FMI 3.0.2, 2.2.8): when a part of a model acts is said to the importer, which makes the ticks.
 
 use crate::events::Sampled;
 use crate::row::{Access, Row};

@@ -1,7 +1,7 @@
 //! The importer's callbacks that may call the instance again. The gate calls them while nothing of the instance is borrowed.
 
 use super::types::Fmi3Boolean;
-use crate::inside::{Reply, Update};
+use crate::inside::{Pause, Reply};
 use std::ffi::c_void;
 
 /// `fmi3IntermediateUpdateCallback`.
@@ -26,7 +26,7 @@ pub type Fmi3Preemption = unsafe extern "C" fn();
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Request {
     /// A part of a step is done.
-    Intermediate(Update),
+    Intermediate(Pause),
     /// A clock has ticked, or the time of its tick is known.
     Clocks,
 }
@@ -72,7 +72,7 @@ impl Callbacks {
     }
 
     /// Calls `intermediateUpdate` at the end of a part of a step.
-    fn intermediate(&self, update: Update) -> Reply {
+    fn intermediate(&self, update: Pause) -> Reply {
         let callback = self.intermediate?;
         let (mut requested, mut time) = (Fmi3Boolean(0), update.time);
         let yes = Fmi3Boolean(1);

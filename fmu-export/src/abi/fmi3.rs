@@ -6,7 +6,7 @@ use super::logger::{Fmi3Logger, Fmi3Sink};
 use super::pointer::{array, place, room, text};
 use super::types::{Fmi3Boolean, InstancePointer, References, Text};
 use super::{Abi, Answer, credentials};
-use crate::inside::{Then, Update};
+use crate::inside::{Pause, Then};
 use crate::instance::{Instance, Refusal};
 use crate::log::Log;
 use fmu_core::{Exported, Fault, Interface, Model};
@@ -114,7 +114,7 @@ impl<E: Exported> Abi<'_, E> {
         early_return: *mut Fmi3Boolean,
         last_successful_time: *mut f64,
         step: impl FnOnce(&mut Instance<E>) -> Result<Then, Fault>,
-    ) -> Result<Option<Update>, Fault> {
+    ) -> Result<Option<Pause>, Fault> {
         // SAFETY: the importer's variables.
         let (time, event, early, terminate) = unsafe {
             (

@@ -1,6 +1,7 @@
 //! The C interface: the only place with `unsafe`. It turns pointers into Rust values and decides nothing.
 //!
-//! Every call passes `gate.rs`, which also calls the importer back ([`callbacks`]); `calls.rs` holds the calls that both standards share, [`fmi2`] and [`fmi3`] the tables of
+//! Every call passes `gate.rs`, which also calls the importer back ([`callbacks`]); `calls.rs` holds the calls that both standards
+//! share, [`fmi2`] and [`fmi3`] the tables of
 //! their functions, from which [`export!`](crate::export) makes C functions.
 
 pub mod callbacks;

@@ -110,7 +110,7 @@ fn on_clocks(v: &Variable) -> Option<String> {
     (!list.is_empty()).then(|| list.join(" "))
 }
 
-/// FMI 3.0.2, 2.4.4 and 2.4.7.6.
+/// FMI 3.0.2, 2.4.4.
 fn clock(v: &Variable, timing: &Timing) -> Element {
     let interval = timing.interval.or(match v.start.as_deref() {
         Some([Value::Real(interval)]) => Some(*interval),
